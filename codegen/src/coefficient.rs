@@ -52,9 +52,7 @@ impl Coefficient {
             }
             let component = unit_of_component(effect, machine, unknowns)?;
             let same_kind = match &effect.driver {
-                Driver::Axis(name) => {
-                    is_rotary(machine, effect, name)? == (component == Some(InternalUnit::Radian))
-                }
+                Driver::Axis(name) => is_rotary(machine, effect, name)? == (component == Some(InternalUnit::Radian)),
                 _ => false,
             };
             let shared = Arc::new(effect.clone());

@@ -39,9 +39,7 @@ impl<N: Nominal> AxisStates<'_, N> {
             Driver::Axis(name) => CodegenError::no_axis(self.machine, effect.id(), name),
             driver => CodegenError::EffectWithoutForm {
                 effect: effect.id(),
-                why: format!(
-                    "{driver} needs an axis about which it exerts a moment, and the component has none"
-                ),
+                why: format!("{driver} needs an axis about which it exerts a moment, and the component has none"),
             },
         })
     }

@@ -43,10 +43,7 @@ impl Variable {
     /// Whether it is small, so that expressions are truncated in it: an error, a parameter of the instrument, a
     /// coefficient of an effect.
     pub fn is_small(&self) -> bool {
-        matches!(
-            self,
-            Variable::Error(_) | Variable::Instrument(_) | Variable::Coefficient(_)
-        )
+        matches!(self, Variable::Error(_) | Variable::Instrument(_) | Variable::Coefficient(_))
     }
 
     /// Whether it varies from reading to reading.
@@ -147,9 +144,7 @@ impl Variable {
             None => (text, String::new()),
         };
         match self {
-            Variable::Error(name) if symbols == Symbols::Iso => {
-                ("E".to_string(), name.to_string()[1..].to_string())
-            }
+            Variable::Error(name) if symbols == Symbols::Iso => ("E".to_string(), name.to_string()[1..].to_string()),
             _ => split(self.text(symbols)),
         }
     }
@@ -171,16 +166,8 @@ impl Variable {
 
 /// `text` in lower case, with every character except ASCII letters, digits and underscores replaced.
 pub fn identifier(text: &str) -> String {
-    let mut clean: String = text
-        .chars()
-        .map(|c| {
-            if c.is_ascii_alphanumeric() {
-                c.to_ascii_lowercase()
-            } else {
-                '_'
-            }
-        })
-        .collect();
+    let mut clean: String =
+        text.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '_' }).collect();
     if !clean.starts_with(|c: char| c.is_ascii_alphabetic()) {
         clean.insert(0, 'v');
     }

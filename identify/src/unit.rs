@@ -27,25 +27,20 @@ impl Unit {
             InternalUnit::Radian => ("arcsec", ARCSEC),
             InternalUnit::Ratio => ("um/m", 1e6),
         };
-        Unit {
-            name: name.to_string(),
-            display_per_internal,
-        }
+        Unit { name: name.to_string(), display_per_internal }
     }
 
     /// The unit in which coefficient `k` of an effect in a session is reported.
     pub fn of_effect(session: &Session, effect: &Effect, k: usize) -> Unit {
         let Some(internal_unit) = effect.component.unit(session.instrument.unknowns()) else {
-            return Unit {
-                name: "ms".to_string(),
-                display_per_internal: 1e3,
-            };
+            return Unit { name: "ms".to_string(), display_per_internal: 1e3 };
         };
         let driver_axis = effect.driver.axis_kind(&session.machine);
         Unit::of_coefficient(internal_unit, &effect.driver, driver_axis, &effect.shape, k)
     }
 
-    /// The unit of coefficient `k` of an effect. `driver_axis` is the kind of the axis that the effect follows, if it follows one.
+    /// The unit of coefficient `k` of an effect. `driver_axis` is the kind of the axis that the effect follows, if it
+    /// follows one.
     ///
     /// | shape | unit of a coefficient, for a component in µm |
     /// |---|---|
@@ -71,11 +66,9 @@ impl Unit {
         };
         match (shape.per(k), driver.kind().per()) {
             (Per::Rate, _) => match (component, driver_axis) {
-                (InternalUnit::Millimetre, Some(AxisKind::Linear))
-                | (InternalUnit::Radian, Some(AxisKind::Rotary)) => Unit {
-                    name: "ms".to_string(),
-                    display_per_internal: 1e3,
-                },
+                (InternalUnit::Millimetre, Some(AxisKind::Linear)) | (InternalUnit::Radian, Some(AxisKind::Rotary)) => {
+                    Unit { name: "ms".to_string(), display_per_internal: 1e3 }
+                }
                 (_, Some(AxisKind::Linear)) => per("(mm/s)"),
                 _ => per("(rad/s)"),
             },
@@ -104,16 +97,10 @@ mod tests {
         for (k, unit) in ["um/K", "um/K^2", "um/K^3"].into_iter().enumerate() {
             assert_eq!(name(Millimetre, &Driver::Temperature, None, &cubic(1.0), k), unit);
         }
-        assert_eq!(
-            name(Radian, &Driver::Gravity, None, &square(1.0), 0),
-            "arcsec/m^2"
-        );
+        assert_eq!(name(Radian, &Driver::Gravity, None, &square(1.0), 0), "arcsec/m^2");
         assert_eq!(name(Radian, &Driver::Gravity, None, &cubic(1.0), 0), "arcsec/m");
         // At another scale the coefficient is the value of the component there.
-        assert_eq!(
-            name(Millimetre, &Driver::Temperature, None, &square(5.0), 0),
-            "um"
-        );
+        assert_eq!(name(Millimetre, &Driver::Temperature, None, &square(5.0), 0), "um");
         let linear = Some(AxisKind::Linear);
         let rotary = Some(AxisKind::Rotary);
         assert_eq!(name(Millimetre, &axis("X"), linear, &cubic(100.0), 2), "um");
@@ -127,11 +114,8 @@ mod tests {
         assert_eq!(name(Radian, &axis("X"), linear, &Shape::Lag, 0), "arcsec/(mm/s)");
         assert_eq!(name(Millimetre, &axis("C"), rotary, &Shape::Lag, 0), "um/(rad/s)");
         assert_eq!(name(Ratio, &axis("X"), linear, &Shape::Lag, 0), "um/m/(mm/s)");
-        for shape in [
-            Shape::Backlash,
-            Shape::Harmonic(Harmonic { order: 2.0 }),
-            Shape::Warmup(Warmup { tau_s: 60.0 }),
-        ] {
+        for shape in [Shape::Backlash, Shape::Harmonic(Harmonic { order: 2.0 }), Shape::Warmup(Warmup { tau_s: 60.0 })]
+        {
             assert_eq!(name(Radian, &axis("C"), rotary, &shape, 0), "arcsec");
         }
     }

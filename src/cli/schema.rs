@@ -100,8 +100,7 @@ fn session() -> Result<Value, Failure> {
 }
 
 fn parsed(text: &str) -> Result<Value, Failure> {
-    serde_json::from_str(text)
-        .map_err(|error| Failure::Other(format!("a schema of this program is no JSON: {error}")))
+    serde_json::from_str(text).map_err(|error| Failure::Other(format!("a schema of this program is no JSON: {error}")))
 }
 
 /// The schema of a command's document.
@@ -121,12 +120,9 @@ fn of<T: JsonSchema + 'static>() -> Value {
 fn close(schema: &mut Value) {
     match schema {
         Value::Object(entries) => {
-            if entries.get("properties").is_some_and(Value::is_object)
-                && entries.get("type") == Some(&json!("object"))
+            if entries.get("properties").is_some_and(Value::is_object) && entries.get("type") == Some(&json!("object"))
             {
-                entries
-                    .entry("additionalProperties")
-                    .or_insert(Value::Bool(false));
+                entries.entry("additionalProperties").or_insert(Value::Bool(false));
             }
             entries.values_mut().for_each(close);
         }

@@ -68,10 +68,7 @@ fn intervals_of_effects(equation: &Equation, driver: &Variable) -> Vec<[f64; 2]>
     };
     let follows = |effect: &Effect| effect.driver == driver && effect.shape.uses() == part;
     let effects = equation.options.effects.iter();
-    effects
-        .filter(|effect| follows(effect))
-        .filter_map(|effect| effect.shape.varies_within())
-        .collect()
+    effects.filter(|effect| follows(effect)).filter_map(|effect| effect.shape.varies_within()).collect()
 }
 
 /// Draws the nominal variables over their whole range: lengths near their stated values, positions over all possible
@@ -82,27 +79,27 @@ pub(crate) fn draw_anywhere(
     draws: &mut PseudoRandom,
 ) -> Vec<(Variable, f64)> {
     let draw = |variable: Variable| {
-        let value =
-            match &variable {
-                Variable::Length(name) => match source.length_mm(name) {
-                    Some(value) => value * (1.0 + draws.between(-0.01, 0.01)),
-                    None => UNSTATED_MM * (1.0 + draws.between(-0.5, 0.5)),
-                },
-                Variable::Driver(quantity) if quantity.part == DriverPart::Direction => {
-                    if draws.bits() & 1 == 0 { -1.0 } else { 1.0 }
+        let value = match &variable {
+            Variable::Length(name) => match source.length_mm(name) {
+                Some(value) => value * (1.0 + draws.between(-0.01, 0.01)),
+                None => UNSTATED_MM * (1.0 + draws.between(-0.5, 0.5)),
+            },
+            Variable::Driver(quantity) if quantity.part == DriverPart::Direction => {
+                if draws.bits() & 1 == 0 {
+                    -1.0
+                } else {
+                    1.0
                 }
-                moving => {
-                    let places = intervals_of_effects(equation, moving);
-                    // Half of the points lie where local effects are not zero.
-                    let anywhere = places.is_empty() || draws.bits() & 1 == 0;
-                    let [low, high] = if anywhere {
-                        whole_range(moving)
-                    } else {
-                        places[(draws.bits() % places.len() as u64) as usize]
-                    };
-                    draws.between(low, high)
-                }
-            };
+            }
+            moving => {
+                let places = intervals_of_effects(equation, moving);
+                // Half of the points lie where local effects are not zero.
+                let anywhere = places.is_empty() || draws.bits() & 1 == 0;
+                let [low, high] =
+                    if anywhere { whole_range(moving) } else { places[(draws.bits() % places.len() as u64) as usize] };
+                draws.between(low, high)
+            }
+        };
         (variable, value)
     };
     let nominal = equation.arena.variables().into_iter().filter(|v| !v.is_small());
@@ -144,9 +141,5 @@ fn whole_range(moving: &Variable) -> [f64; 2] {
 /// The absolute difference; infinite if either value is not a number.
 pub(crate) fn worst(found: f64, expected: f64) -> f64 {
     let difference = (found - expected).abs();
-    if difference.is_nan() {
-        f64::INFINITY
-    } else {
-        difference
-    }
+    if difference.is_nan() { f64::INFINITY } else { difference }
 }

@@ -34,27 +34,15 @@ pub fn all(language: &str) -> Vec<Printed> {
         let machine = machine(code);
         let errors = all_errors(&machine);
         for what in [What::Bar, What::Volumetric] {
-            let options = Options {
-                gradient: true,
-                rotation: Some(Rotation::Exact),
-                ..Options::default()
-            };
+            let options = Options { gradient: true, rotation: Some(Rotation::Exact), ..Options::default() };
             let equation = match what {
                 What::Bar => Equation::of(&machine, &AnyBar, &errors, &options),
                 What::Volumetric => Equation::volumetric(&machine, &errors, &options),
             };
             let equation = equation.expect("an equation");
             let (kind, function, text) = match what {
-                What::Bar => (
-                    "bar",
-                    "bar_length",
-                    support::printed(&equation, &AnyBar, language),
-                ),
-                What::Volumetric => (
-                    "vol",
-                    "volumetric_error",
-                    support::printed(&equation, &ToolPoint, language),
-                ),
+                What::Bar => ("bar", "bar_length", support::printed(&equation, &AnyBar, language)),
+                What::Volumetric => ("vol", "volumetric_error", support::printed(&equation, &ToolPoint, language)),
             };
             printed.push(Printed {
                 name: format!("{kind}_{}", short(code)),
@@ -79,14 +67,8 @@ pub fn all(language: &str) -> Vec<Printed> {
 /// Compound operands under every operator: three coordinates, each shifted by one of three errors.
 fn operators(language: &str, random: &mut impl rand::Rng) -> Vec<Printed> {
     let machine = Machine::from_code("w b X t").expect("a code");
-    let errors: Vec<ErrorName> = ["EXX", "EYX", "EZX"]
-        .iter()
-        .filter_map(|name| ErrorName::parse(name))
-        .collect();
-    let options = Options {
-        gradient: true,
-        ..Options::default()
-    };
+    let errors: Vec<ErrorName> = ["EXX", "EYX", "EZX"].iter().filter_map(|name| ErrorName::parse(name)).collect();
+    let options = Options { gradient: true, ..Options::default() };
     let mut printed = Vec::new();
     for batch in Batch::all() {
         let equation = Equation::of(&machine, &batch, &errors, &options).expect("an equation");
@@ -113,11 +95,8 @@ fn operators(language: &str, random: &mut impl rand::Rng) -> Vec<Printed> {
 /// A bar with an effect of every shape, against the program that dual numbers confirmed.
 fn effects(language: &str, random: &mut impl rand::Rng) -> Printed {
     let machine = Machine::from_code("w C b X t").expect("a code");
-    let options = Options {
-        gradient: true,
-        effects: every_shape().into_iter().chain([curve()]).collect(),
-        ..Options::default()
-    };
+    let options =
+        Options { gradient: true, effects: every_shape().into_iter().chain([curve()]).collect(), ..Options::default() };
     let errors: Vec<ErrorName> = ErrorName::parse("EX0C").into_iter().collect();
     let equation = Equation::of(&machine, &Bar, &errors, &options).expect("an equation");
     let program = equation.program(true);
@@ -148,11 +127,7 @@ fn effects(language: &str, random: &mut impl rand::Rng) -> Printed {
             arguments[group].push(value);
         }
         let found = program.run(&arguments.concat());
-        Case {
-            arguments,
-            values: found[..1].to_vec(),
-            gradient: found[1..].to_vec(),
-        }
+        Case { arguments, values: found[..1].to_vec(), gradient: found[1..].to_vec() }
     });
     Printed {
         name: "effects".to_string(),
@@ -174,13 +149,7 @@ fn compare(printed: &Printed, single: &str, columns: &str) {
 pub fn sizes(printed: &Printed) -> [usize; 5] {
     let case = &printed.cases[0];
     let [lengths, axes, errors] = &case.arguments;
-    [
-        lengths.len(),
-        axes.len(),
-        errors.len(),
-        case.values.len(),
-        case.gradient.len(),
-    ]
+    [lengths.len(), axes.len(), errors.len(), case.values.len(), case.gradient.len()]
 }
 
 /// The arguments of the cases, a line each.

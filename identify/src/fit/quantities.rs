@@ -20,11 +20,7 @@ pub(crate) fn quantities(problem: &Problem<'_>, rank: &Rank) -> Vec<Quantity> {
     let mut quantities = Vec::new();
     let mut j = 0;
     while j < list.len() {
-        if let Role::Coefficient {
-            effect,
-            coefficient: 0,
-        } = list[j].role
-        {
+        if let Role::Coefficient { effect, coefficient: 0 } = list[j].role {
             let effect = &problem.parameters.effects[effect];
             let pair = effect.shape.is_wave();
             if pair && rank.is_identifiable(j) && rank.is_identifiable(j + 1) {
@@ -41,8 +37,8 @@ pub(crate) fn quantities(problem: &Problem<'_>, rank: &Rank) -> Vec<Quantity> {
     quantities
 }
 
-/// Passes the reported quantities at the parameters `beta` to a function, in display units, amplitude before phase. Each phase lies within
-/// half a turn of the fit's phase.
+/// Passes the reported quantities at the parameters `beta` to a function, in display units, amplitude before phase.
+/// Each phase lies within half a turn of the fit's phase.
 pub(crate) fn values_at(
     problem: &Problem<'_>,
     fit: &Fit,
@@ -79,8 +75,7 @@ mod tests {
     /// `A cos(nC + φ)` has the coefficients `A cos φ` and `−A sin φ`.
     #[test]
     fn amplitude_and_phase_of_a_harmonic_follow_from_its_coefficients() {
-        let file =
-            Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
         let session = files::session(&file, &ReadOptions::default()).unwrap();
         let (mut problem, _) = prepare(&session, 1).unwrap();
         problem
@@ -113,11 +108,7 @@ mod tests {
             values_at(&problem, &fit, &quantities, &other, |value| values.push(value));
             // No harmonic with two reported values precedes this one.
             assert!((values[place] - 3.0).abs() < 1e-12, "{}", values[place]);
-            assert!(
-                (values[place + 1] - other_deg).abs() < 1e-9,
-                "{} and {other_deg}",
-                values[place + 1]
-            );
+            assert!((values[place + 1] - other_deg).abs() < 1e-9, "{} and {other_deg}", values[place + 1]);
         }
     }
 }

@@ -1,4 +1,5 @@
-//! An axis: its position, direction of travel, rate and distance since the last reversal. Its word is the name of the axis.
+//! An axis: its position, direction of travel, rate and distance since the last reversal. Its word is the name of the
+//! axis.
 
 use std::f64::consts::PI;
 

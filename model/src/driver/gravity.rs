@@ -1,8 +1,8 @@
 //! `gravity`: the moment of a unit weight about the component's own axis, m.
 //!
-//! For an axis on the tool side the weight acts at the instrument's point in the tool frame (spindle ball, stylus, target). For an axis on
-//! the workpiece side it acts at the instrument's point in the table frame (workpiece ball, point of the artefact), not at the centre of
-//! mass of table and workpiece.
+//! For an axis on the tool side the weight acts at the instrument's point in the tool frame (spindle ball, stylus,
+//! target). For an axis on the workpiece side it acts at the instrument's point in the table frame (workpiece ball,
+//! point of the artefact), not at the centre of mass of table and workpiece.
 
 use super::Driver;
 use super::kind::{DriverFault, DriverInput, DriverKind, Entry, Recorded, SymbolInput, Symbols};

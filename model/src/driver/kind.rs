@@ -71,7 +71,8 @@ pub struct DriverFault {
 
 /// Everything that is particular to one driver, except its symbols: see [`Symbols`].
 ///
-/// `axis` is the kind of the axis that the driver is about: the one that it names, or else that of the effect's component.
+/// `axis` is the kind of the axis that the driver is about: the one that it names, or else that of the effect's
+/// component.
 pub trait DriverKind {
     /// The unit of its numbers.
     fn unit(&self, axis: Option<AxisKind>) -> DriverUnit;
@@ -82,8 +83,8 @@ pub trait DriverKind {
     /// Whether a session can have effects of this driver on a component whose axis is of this kind.
     fn is_observable(&self, recorded: &Recorded, axis: Option<AxisKind>) -> bool;
 
-    /// The divisor of the driver in polynomials and powers if a session states no `scale_…`, in the driver's internal unit. Coefficients of
-    /// one name are then comparable between tests of different travel.
+    /// The divisor of the driver in polynomials and powers if a session states no `scale_…`, in the driver's internal
+    /// unit. Coefficients of one name are then comparable between tests of different travel.
     fn default_scale(&self, axis: Option<AxisKind>) -> f64 {
         let _ = axis;
         1.0
@@ -92,8 +93,8 @@ pub trait DriverKind {
     fn column(&self) -> Option<&'static str> {
         None
     }
-    /// The unit of powers of the driver in the units of coefficients, at a scale of 1: `um/K`; `None`: coefficients have the unit of the
-    /// component.
+    /// The unit of powers of the driver in the units of coefficients, at a scale of 1: `um/K`; `None`: coefficients
+    /// have the unit of the component.
     fn per(&self) -> Option<&'static str> {
         None
     }
@@ -121,7 +122,8 @@ pub trait DriverKind {
 
 /// The state of a driver in symbols.
 pub trait Symbols {
-    /// The state at a reading; `named` gives the symbol of a quantity. `None` if the effect lacks an axis that the driver needs.
+    /// The state at a reading; `named` gives the symbol of a quantity. `None` if the effect lacks an axis that the
+    /// driver needs.
     fn symbols<N: Nominal>(
         &self,
         input: &SymbolInput<'_, N>,

@@ -45,8 +45,8 @@ macro_rules! drivers {
                 }
             }
 
-            /// The state of the driver at a reading in symbols; `named` gives the symbol of a quantity. `None` if the effect lacks an axis
-            /// that the driver needs.
+            /// The state of the driver at a reading in symbols; `named` gives the symbol of a quantity. `None` if the
+            /// effect lacks an axis that the driver needs.
             pub fn symbols<N: Nominal>(
                 &self,
                 input: &SymbolInput<'_, N>,
@@ -111,24 +111,14 @@ impl fmt::Display for Driver {
             return formatter.write_str(name);
         }
         let own = |entry: &&&Entry| entry.word.is_some_and(|word| (entry.driver)(word) == *self);
-        formatter.write_str(
-            DRIVERS
-                .iter()
-                .find(own)
-                .and_then(|entry| entry.word)
-                .unwrap_or_default(),
-        )
+        formatter.write_str(DRIVERS.iter().find(own).and_then(|entry| entry.word).unwrap_or_default())
     }
 }
 
 /// Suffixes of the keys of all drivers' numbers, each once, in the order of the registry.
 pub fn unit_suffixes() -> Vec<&'static str> {
     let mut suffixes = Vec::new();
-    for suffix in DRIVERS
-        .iter()
-        .flat_map(|entry| entry.units)
-        .flat_map(|unit| unit.suffixes())
-    {
+    for suffix in DRIVERS.iter().flat_map(|entry| entry.units).flat_map(|unit| unit.suffixes()) {
         if !suffixes.contains(&suffix) {
             suffixes.push(suffix);
         }

@@ -14,10 +14,7 @@ pub struct Origin {
 impl Origin {
     /// The reference values of a session, from the readings of its tests.
     pub fn of<'a>(readings: impl Iterator<Item = &'a Readings> + Clone) -> Origin {
-        let first = readings
-            .clone()
-            .flat_map(|r| r.time_s.first().copied())
-            .fold(f64::INFINITY, f64::min);
+        let first = readings.clone().flat_map(|r| r.time_s.first().copied()).fold(f64::INFINITY, f64::min);
         let (sum, count) = readings
             .flat_map(|r| r.temperature_c.iter())
             .fold((0.0, 0_usize), |(sum, count), value| (sum + value, count + 1));

@@ -21,13 +21,7 @@ impl<N: Nominal> DriverSample<N> {
     /// A driver that has a value and a rate but no direction of travel.
     pub fn plain(value: N, rate: N) -> Self {
         let zero = N::constant(0.0);
-        DriverSample {
-            value,
-            rate,
-            direction: N::constant(1.0),
-            since_reversal: zero,
-            since_reversal_s: zero,
-        }
+        DriverSample { value, rate, direction: N::constant(1.0), since_reversal: zero, since_reversal_s: zero }
     }
 }
 

@@ -15,18 +15,8 @@ pub struct DriverUnit {
 
 impl DriverUnit {
     /// A unit by its suffixes in files and inside, its name in results and its symbol.
-    pub const fn new(
-        file: &'static str,
-        internal: &'static str,
-        result: &'static str,
-        symbol: &'static str,
-    ) -> Self {
-        DriverUnit {
-            file,
-            internal,
-            result,
-            symbol,
-        }
+    pub const fn new(file: &'static str, internal: &'static str, result: &'static str, symbol: &'static str) -> Self {
+        DriverUnit { file, internal, result, symbol }
     }
 
     /// Whether the unit of files is the degree.
@@ -36,9 +26,7 @@ impl DriverUnit {
 
     /// Suffixes of keys, without repetition: that of files first.
     pub fn suffixes(self) -> impl Iterator<Item = &'static str> {
-        [self.file, self.internal]
-            .into_iter()
-            .take(if self.is_angle() { 2 } else { 1 })
+        [self.file, self.internal].into_iter().take(if self.is_angle() { 2 } else { 1 })
     }
 
     /// A number with a suffix in the internal unit; `None` if the suffix belongs to another driver.
@@ -54,11 +42,7 @@ impl DriverUnit {
 
     /// A number of the internal unit in the unit of files and results.
     pub fn to_display(self, number: f64) -> f64 {
-        if self.is_angle() {
-            number.to_degrees()
-        } else {
-            number
-        }
+        if self.is_angle() { number.to_degrees() } else { number }
     }
 
     /// A number in the unit of files that reads back to the same bits, or else in the internal unit; with its suffix.

@@ -19,7 +19,8 @@ pub enum Component {
         /// Its coordinate, or empty.
         coordinate: String,
     },
-    /// A delay between the axis positions and the reading, in seconds: every moving axis has an error of its speed times the delay.
+    /// A delay between the axis positions and the reading, in seconds: every moving axis has an error of its speed
+    /// times the delay.
     TriggerDelay,
 }
 
@@ -35,10 +36,7 @@ impl Component {
             .flat_map(|kind| kind.unknowns())
             .any(|unknown| unknown.thing == thing && unknown.coordinate == coordinate);
         if known {
-            return Some(Component::Instrument {
-                thing: thing.to_string(),
-                coordinate: coordinate.to_string(),
-            });
+            return Some(Component::Instrument { thing: thing.to_string(), coordinate: coordinate.to_string() });
         }
         ErrorName::parse(text).map(Component::Axis)
     }
@@ -56,8 +54,7 @@ impl Component {
         let Component::Instrument { thing, coordinate } = self else {
             return None;
         };
-        let own =
-            |parameter: &InstrumentParameter| parameter.thing == thing && parameter.coordinate == coordinate;
+        let own = |parameter: &InstrumentParameter| parameter.thing == thing && parameter.coordinate == coordinate;
         parameters.iter().position(own)
     }
 
@@ -71,8 +68,9 @@ impl Component {
         }
     }
 
-    /// The slots that it changes (machine errors first), with what multiplies the basis function in each (`None`: 1). A delay changes the
-    /// errors along every axis: `rate` is the rate of an axis, `None` if it stands; `times` is a rate times a number.
+    /// The slots that it changes (machine errors first), with what multiplies the basis function in each (`None`: 1). A
+    /// delay changes the errors along every axis: `rate` is the rate of an axis, `None` if it stands; `times` is a rate
+    /// times a number.
     pub fn slots<R>(
         &self,
         machine: &Machine,
@@ -81,16 +79,10 @@ impl Component {
         times: impl Fn(&R, f64) -> R,
     ) -> Vec<(usize, Option<R>)> {
         match self {
-            Component::Axis(name) => machine
-                .error_slot(name)
-                .map(|slot| (slot, None))
-                .into_iter()
-                .collect(),
-            Component::Instrument { .. } => self
-                .place(parameters)
-                .map(|place| (machine.error_slots() + place, None))
-                .into_iter()
-                .collect(),
+            Component::Axis(name) => machine.error_slot(name).map(|slot| (slot, None)).into_iter().collect(),
+            Component::Instrument { .. } => {
+                self.place(parameters).map(|place| (machine.error_slots() + place, None)).into_iter().collect()
+            }
             Component::TriggerDelay => {
                 let mut slots = Vec::new();
                 for axis in 0..machine.axes.len() {
@@ -125,9 +117,7 @@ impl fmt::Display for Component {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Component::Axis(name) => name.fmt(formatter),
-            Component::Instrument { thing, coordinate } if coordinate.is_empty() => {
-                formatter.write_str(thing)
-            }
+            Component::Instrument { thing, coordinate } if coordinate.is_empty() => formatter.write_str(thing),
             Component::Instrument { thing, coordinate } => write!(formatter, "{thing}.{coordinate}"),
             Component::TriggerDelay => formatter.write_str("trigger"),
         }

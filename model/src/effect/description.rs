@@ -1,8 +1,8 @@
 //! Plain descriptions of effects for work at the machine: `C table: axial motion twice per turn`.
 //!
-//! A description follows from component × driver × shape, so every effect of the library has its own. Machine parts are named by their
-//! position in the chain. A rotary axis on the workpiece side is a table, on the tool side a head. A linear axis is a slide, an axis of a
-//! robot a joint.
+//! A description follows from component × driver × shape, so every effect of the library has its own. Machine parts are
+//! named by their position in the chain. A rotary axis on the workpiece side is a table, on the tool side a head. A
+//! linear axis is a slide, an axis of a robot a joint.
 
 use std::fmt;
 
@@ -36,23 +36,14 @@ pub fn meaning(machine: &Machine, effect: &Effect) -> Meaning {
         [test] => format!(", in test {test}"),
         tests => format!(", in tests {}", tests.join(", ")),
     };
-    Meaning {
-        part: terms.part(),
-        what: format!("{}{tests}", terms.what()),
-    }
+    Meaning { part: terms.part(), what: format!("{}{tests}", terms.what()) }
 }
 
 /// The description of a component on a machine, without a driver: `C table: axial motion`.
 pub fn component_meaning(machine: &Machine, component: &Component) -> Meaning {
     let effect = constant(component.clone());
-    let terms = EffectTerms {
-        machine,
-        effect: &effect,
-    };
-    Meaning {
-        part: terms.part(),
-        what: terms.motion(),
-    }
+    let terms = EffectTerms { machine, effect: &effect };
+    Meaning { part: terms.part(), what: terms.motion() }
 }
 
 /// Joins several explanations into one phrase. Each part of the machine occurs once, in the order of first occurrence.
@@ -71,12 +62,7 @@ pub fn explanations(meanings: &[Meaning]) -> String {
 
 /// A constant effect on a component.
 fn constant(component: Component) -> Effect {
-    Effect {
-        component,
-        driver: Driver::None,
-        shape: Shape::Constant,
-        tests: Vec::new(),
-    }
+    Effect { component, driver: Driver::None, shape: Shape::Constant, tests: Vec::new() }
 }
 
 /// The name of an axis as a machine part.
@@ -151,12 +137,8 @@ impl EffectTerms<'_> {
     }
 
     fn axis_motion(&self, name: &ErrorName) -> String {
-        let own = self.axis_of_component().map(|axis| {
-            (
-                self.machine.axes[axis].kind,
-                self.machine.axes[axis].own_freedom(),
-            )
-        });
+        let own =
+            self.axis_of_component().map(|axis| (self.machine.axes[axis].kind, self.machine.axes[axis].own_freedom()));
         let rotary = own.is_some_and(|(kind, _)| kind == AxisKind::Rotary);
         let is_own = own.is_some_and(|(_, freedom)| freedom == name.freedom);
         let is_along = own.is_some_and(|(_, freedom)| direction(freedom) == direction(name.freedom));
@@ -186,11 +168,7 @@ impl EffectTerms<'_> {
         };
         match self.axis_of_driver() {
             Some(axis) if self.follows_its_own_axis() => format!("its {}", quantity(axis)),
-            Some(axis) => format!(
-                "the {} of the {}",
-                quantity(axis),
-                part_of_axis(self.machine, axis)
-            ),
+            Some(axis) => format!("the {} of the {}", quantity(axis), part_of_axis(self.machine, axis)),
             None => self.effect.driver.kind().phrase(),
         }
     }

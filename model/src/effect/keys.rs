@@ -66,13 +66,8 @@ pub trait KeyReader {
     ///
     /// # Errors
     /// As before, or if it is absent.
-    fn required_count(
-        &mut self,
-        key: &'static str,
-        help: &str,
-        least: usize,
-        most: usize,
-    ) -> Result<usize, ModelError>;
+    fn required_count(&mut self, key: &'static str, help: &str, least: usize, most: usize)
+    -> Result<usize, ModelError>;
     /// True or false; `None` if it is absent.
     ///
     /// # Errors
@@ -90,10 +85,7 @@ pub struct KeyWriter {
 impl KeyWriter {
     /// A table that starts with `heading`, of an effect whose driver has this unit.
     pub fn new(heading: &str, unit: DriverUnit) -> KeyWriter {
-        KeyWriter {
-            text: format!("{heading}\n"),
-            unit,
-        }
+        KeyWriter { text: format!("{heading}\n"), unit }
     }
 
     /// The unit of the driver.
@@ -113,7 +105,8 @@ impl KeyWriter {
         self.line(&format!("{}_{suffix}", key.name), number);
     }
 
-    /// Several numbers in one unit: that of files if every one of them reads back to the same bits, else the internal unit.
+    /// Several numbers in one unit: that of files if every one of them reads back to the same bits, else the internal
+    /// unit.
     pub fn quantities(&mut self, key: &Key, values: &[f64]) {
         let unit = self.unit;
         let all: Vec<(&str, String)> = values.iter().map(|value| unit.exact(*value)).collect();
@@ -122,10 +115,7 @@ impl KeyWriter {
         let numbers: Vec<String> = (values.iter().zip(all))
             .map(|(value, (_, number))| if exact { number } else { value.to_string() })
             .collect();
-        self.line(
-            &format!("{}_{suffix}", key.name),
-            format!("[{}]", numbers.join(", ")),
-        );
+        self.line(&format!("{}_{suffix}", key.name), format!("[{}]", numbers.join(", ")));
     }
 
     /// The text written.

@@ -1,9 +1,10 @@
 //! Effects: `component × driver × shape`.
 //!
-//! A *component* is the error or set-up quantity that changes (an error of an axis, a ball, the bar). A *driver* is the independent
-//! variable (an axis position, its direction, time, temperature, the gravity moment): see [`crate::driver`]. A *shape* is the functional
-//! form: see [`shape`]. The chain depends on components only, so the Jacobian column of an effect is the sensitivity to its component times
-//! the shape's basis function: `∂L/∂k = (∂L/∂component) · b_k(driver)`. A PIGE is `component × constant`.
+//! A *component* is the error or set-up quantity that changes (an error of an axis, a ball, the bar). A *driver* is the
+//! independent variable (an axis position, its direction, time, temperature, the gravity moment): see
+//! [`crate::driver`]. A *shape* is the functional form: see [`shape`]. The chain depends on components only, so the
+//! Jacobian column of an effect is the sensitivity to its component times the shape's basis function:
+//! `∂L/∂k = (∂L/∂component) · b_k(driver)`. A PIGE is `component × constant`.
 
 mod component;
 pub mod description;
@@ -68,11 +69,7 @@ impl Effect {
 
     /// The identifier used in results: `EZC~C:h2` (component, driver, shape).
     pub fn id(&self) -> String {
-        let tests = if self.tests.is_empty() {
-            String::new()
-        } else {
-            format!("[{}]", self.tests.join("+"))
-        };
+        let tests = if self.tests.is_empty() { String::new() } else { format!("[{}]", self.tests.join("+")) };
         format!("{}~{}:{}{tests}", self.component, self.driver, self.shape.tag())
     }
 }

@@ -10,11 +10,12 @@ use crate::effect::shape::SHAPES;
 /// Schema of `machine.toml` (JSON Schema, draft 2020-12).
 pub const MACHINE: &str = include_str!("schema/machine.json");
 
-/// Schema of `session.toml`. The caller inserts [`MACHINE`] at `#/$defs/machine`, and [`effect_properties`] into the properties of
-/// `#/$defs/effect`.
+/// Schema of `session.toml`. The caller inserts [`MACHINE`] at `#/$defs/machine`, and [`effect_properties`] into the
+/// properties of `#/$defs/effect`.
 pub const SESSION: &str = include_str!("schema/session.json");
 
-/// The properties of an effect that drivers and shapes determine, as the text of a JSON object: their words, and the keys of shapes.
+/// The properties of an effect that drivers and shapes determine, as the text of a JSON object: their words, and the
+/// keys of shapes.
 pub fn effect_properties() -> String {
     let words: Vec<String> = SHAPES.iter().map(|entry| format!("\"{}\"", entry.word)).collect();
     let mut properties = vec![format!("\"shape\": {{\"enum\": [{}]}}", words.join(", "))];
@@ -31,9 +32,7 @@ pub fn effect_properties() -> String {
         let (names, schema) = (names(key), schema(key.form));
         let meaning = meaning(key);
         for name in names {
-            properties.push(format!(
-                "\"{name}\": {{{schema}, \"description\": \"{meaning}\"}}"
-            ));
+            properties.push(format!("\"{name}\": {{{schema}, \"description\": \"{meaning}\"}}"));
         }
     }
     format!("{{{}}}", properties.join(", "))
@@ -65,22 +64,13 @@ fn schema(form: KeyForm) -> String {
 /// What the key means to the shapes that have it, each meaning once.
 fn meaning(key: &Key) -> String {
     let mut meanings: Vec<&str> = Vec::new();
-    for other in SHAPES
-        .iter()
-        .flat_map(|entry| entry.keys)
-        .filter(|other| other.name == key.name)
-    {
+    for other in SHAPES.iter().flat_map(|entry| entry.keys).filter(|other| other.name == key.name) {
         if !meanings.contains(&other.meaning) {
             meanings.push(other.meaning);
         }
     }
     let phrase = meanings.join(", ");
-    let capital: String = phrase
-        .chars()
-        .take(1)
-        .flat_map(char::to_uppercase)
-        .chain(phrase.chars().skip(1))
-        .collect();
+    let capital: String = phrase.chars().take(1).flat_map(char::to_uppercase).chain(phrase.chars().skip(1)).collect();
     match key.form {
         KeyForm::Quantity | KeyForm::Quantities => format!("{capital}. In the unit of the driver."),
         KeyForm::Positive | KeyForm::Count(..) | KeyForm::Flag => format!("{capital}."),

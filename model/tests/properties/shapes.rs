@@ -18,11 +18,7 @@ pub fn shapes(kind: AxisKind) -> impl Strategy<Value = Shape> {
     let place = move || -far..far;
     let width = move || 1e-3 * far..far;
     let recurs = (kind == AxisKind::Rotary).then_some(std::f64::consts::TAU);
-    let of_rotary = (1_u32..40).prop_map(|halves| {
-        Shape::Harmonic(Harmonic {
-            order: f64::from(halves) / 2.0,
-        })
-    });
+    let of_rotary = (1_u32..40).prop_map(|halves| Shape::Harmonic(Harmonic { order: f64::from(halves) / 2.0 }));
     let harmonic = match kind {
         AxisKind::Rotary => of_rotary.boxed(),
         AxisKind::Linear => Just(Shape::Lag).boxed(),
@@ -33,12 +29,7 @@ pub fn shapes(kind: AxisKind) -> impl Strategy<Value = Shape> {
         (1_usize..6, width()).prop_map(|(degree, scale)| Shape::Power(Power { degree, scale })),
         width().prop_map(|period| Shape::Periodic(Periodic { period })),
         (place(), width(), 4_usize..30, any::<bool>()).prop_map(|(from, length, intervals, closed)| {
-            Shape::Curve(Curve {
-                from,
-                to: from + length,
-                intervals,
-                closed,
-            })
+            Shape::Curve(Curve { from, to: from + length, intervals, closed })
         }),
         Just(Shape::Backlash),
         Just(Shape::Lag),

@@ -12,10 +12,7 @@ use crate::tree::{Tree, binary, product, sum};
 /// `√(x² + y² + z²)` of three steps.
 pub(crate) fn norm_of_steps(start: usize) -> Tree {
     let square = |index| (false, binary(Binary::Mul, Tree::Step(index), Tree::Step(index)));
-    Tree::Unary(
-        Unary::Sqrt,
-        Box::new(sum((start..start + 3).map(square).collect())),
-    )
+    Tree::Unary(Unary::Sqrt, Box::new(sum((start..start + 3).map(square).collect())))
 }
 
 /// The coordinate groups, and the length as a function of them.
@@ -29,16 +26,10 @@ pub(crate) fn sections(equation: &Equation, trees: &[Tree], complete: bool) -> (
     let bar = &equation.vectors[0];
     let labels: Vec<Label> = (0..3).map(|coordinate| bar.label(coordinate)).collect();
     let program = naming(equation, labels.clone());
-    let rows = labels
-        .into_iter()
-        .zip(trees)
-        .map(|(label, tree)| row(LeftSide::Named(label), tree.clone()));
+    let rows = labels.into_iter().zip(trees).map(|(label, tree)| row(LeftSide::Named(label), tree.clone()));
     let length = with_bar_parameters(equation, &program, norm_of_steps(0));
     let length = truncated(LeftSide::Output(0), length, complete);
-    let sections = [
-        section(&bar.meaning, rows),
-        section(quantity_heading(equation), [length]),
-    ];
+    let sections = [section(&bar.meaning, rows), section(quantity_heading(equation), [length])];
     (program, sections.into())
 }
 

@@ -2,9 +2,7 @@
 
 use crate::equation::Equation;
 use crate::print::article::groups::named_or_expanded;
-use crate::print::article::line::{
-    EquationLine, LeftSide, Section, naming, quantity_heading, row, section, truncated,
-};
+use crate::print::article::line::{EquationLine, LeftSide, Section, naming, quantity_heading, row, section, truncated};
 use crate::program::{Label, Program};
 use crate::symbol::{Binary, Unary};
 use crate::touch::{self, ProbeTerms};
@@ -31,17 +29,12 @@ pub(crate) fn sections(
         labels.extend(coordinates(step));
     }
     let program = naming(equation, labels);
-    let step_trees: Vec<Tree> = way.map_or_else(Vec::new, |step| {
-        step.components
-            .map(|part| named_or_expanded(equation, &program, part))
-            .to_vec()
-    });
+    let step_trees: Vec<Tree> = way
+        .map_or_else(Vec::new, |step| step.components.map(|part| named_or_expanded(equation, &program, part)).to_vec());
     let dot = |a: usize, b: usize| {
         let there = |i: &usize| trees[a + i] != Tree::Number(0.0) && trees[b + i] != Tree::Number(0.0);
         let parts = (0..3).filter(there);
-        sum(parts
-            .map(|i| (false, binary(Binary::Mul, Tree::Step(a + i), Tree::Step(b + i))))
-            .collect())
+        sum(parts.map(|i| (false, binary(Binary::Mul, Tree::Step(a + i), Tree::Step(b + i)))).collect())
     };
     let mut sections: Vec<Section> = Vec::new();
     for (vector, trees) in vectors.iter().zip(trees.chunks(3)) {
@@ -54,11 +47,8 @@ pub(crate) fn sections(
     let mut beyond = terms_of(&dot(0, 0));
     beyond.push(radius);
     let quadratic = [dot(3, 3), dot(0, 3), sum(beyond)];
-    let mut rows: Vec<EquationLine> = touch::QUADRATIC
-        .into_iter()
-        .zip(quadratic)
-        .map(|(label, tree)| row(LeftSide::Named(label), tree))
-        .collect();
+    let mut rows: Vec<EquationLine> =
+        touch::QUADRATIC.into_iter().zip(quadratic).map(|(label, tree)| row(LeftSide::Named(label), tree)).collect();
     if let Some(step) = way {
         let squares = (0..3)
             .filter(|i| step_trees[*i] != Tree::Number(0.0))
@@ -82,10 +72,6 @@ fn distance_of_steps(start: usize, with_length: bool) -> Tree {
     let product_of = |x: &Tree, y: &Tree| binary(Binary::Mul, x.clone(), y.clone());
     let under = binary(Binary::Sub, product_of(&b, &b), product_of(&a, &c));
     let way = binary(Binary::Add, b, Tree::Unary(Unary::Sqrt, Box::new(under)));
-    let way = if with_length {
-        product_of(&length, &way)
-    } else {
-        way
-    };
+    let way = if with_length { product_of(&length, &way) } else { way };
     negative(binary(Binary::Div, way, a))
 }

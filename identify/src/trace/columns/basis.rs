@@ -31,19 +31,11 @@ impl EffectColumns {
     /// The largest absolute value of its basis functions.
     pub fn greatest(&self) -> f64 {
         let terms = self.terms.iter().flatten();
-        let factors = |term: &EffectTerm| {
-            term.factor
-                .as_ref()
-                .map_or(1.0, |f| f.iter().fold(0.0_f64, |a, b| a.max(b.abs())))
-        };
+        let factors =
+            |term: &EffectTerm| term.factor.as_ref().map_or(1.0, |f| f.iter().fold(0.0_f64, |a, b| a.max(b.abs())));
         terms
             .map(|term| {
-                factors(term)
-                    * term
-                        .basis
-                        .iter()
-                        .flat_map(|basis| basis.iter())
-                        .fold(0.0_f64, |a, b| a.max(b.abs()))
+                factors(term) * term.basis.iter().flat_map(|basis| basis.iter()).fold(0.0_f64, |a, b| a.max(b.abs()))
             })
             .fold(0.0, f64::max)
     }
@@ -90,11 +82,7 @@ impl Columns<'_, '_> {
                 let (follows, samples) = self.driver_samples(number, &effect.driver, axis)?;
                 let make = || Arc::new(effect.shape.columns(&samples));
                 let basis = if keep {
-                    cached(
-                        &self.bases,
-                        (number, format!("{follows} {:?}", effect.shape)),
-                        make,
-                    )
+                    cached(&self.bases, (number, format!("{follows} {:?}", effect.shape)), make)
                 } else {
                     make()
                 };
@@ -111,14 +99,11 @@ impl Columns<'_, '_> {
             }
             terms.push(of_test);
         }
-        Some(EffectColumns {
-            count: effect.shape.coefficients(),
-            numbers: effect.shape.numbers(),
-            terms,
-        })
+        Some(EffectColumns { count: effect.shape.coefficients(), numbers: effect.shape.numbers(), terms })
     }
 
-    /// The samples of a driver in a test, and its key in the caches. Some drivers, as the moment of gravity, differ from axis to axis.
+    /// The samples of a driver in a test, and its key in the caches. Some drivers, as the moment of gravity, differ
+    /// from axis to axis.
     fn driver_samples(
         &self,
         test: usize,
@@ -127,11 +112,7 @@ impl Columns<'_, '_> {
     ) -> Option<(String, Arc<Vec<DriverSample<f64>>>)> {
         let readings = self.problem.tests[test].readings.as_ref()?;
         let kind = driver.kind();
-        let name = if kind.is_of_component() {
-            format!("{driver} {axis:?}")
-        } else {
-            driver.to_string()
-        };
+        let name = if kind.is_of_component() { format!("{driver} {axis:?}") } else { driver.to_string() };
         let samples = cached(&self.samples, (test, name.clone()), || {
             let input = DriverInput {
                 machine: &self.problem.session.machine,
@@ -145,8 +126,8 @@ impl Columns<'_, '_> {
         Some((name, samples))
     }
 
-    /// Places a shape on one coordinate of the readings of one test, without a component. `by_direction` changes its sign with
-    /// the direction of travel. `rows` confines it. `None` if the data lack its driver.
+    /// Places a shape on one coordinate of the readings of one test, without a component. `by_direction` changes its
+    /// sign with the direction of travel. `rows` confines it. `None` if the data lack its driver.
     pub fn reading_columns(
         &self,
         effect: &Effect,
@@ -164,20 +145,12 @@ impl Columns<'_, '_> {
             Arc::new(samples.iter().enumerate().map(factor).collect())
         });
         let mut terms = vec![Vec::new(); self.problem.tests.len()];
-        terms[test].push(EffectTerm {
-            target: TermTarget::Reading(coordinate),
-            factor,
-            basis,
-        });
-        Some(EffectColumns {
-            count: effect.shape.coefficients(),
-            numbers: 0,
-            terms,
-        })
+        terms[test].push(EffectTerm { target: TermTarget::Reading(coordinate), factor, basis });
+        Some(EffectColumns { count: effect.shape.coefficients(), numbers: 0, terms })
     }
 
-    /// A nonparametric curve over an axis in the readings of each test in which the axis moves, without a component. Tests with
-    /// too few readings for that many intervals have none.
+    /// A nonparametric curve over an axis in the readings of each test in which the axis moves, without a component.
+    /// Tests with too few readings for that many intervals have none.
     pub fn curves_of_tests(&self, driver: &Driver, intervals: usize) -> Vec<(Effect, EffectColumns)> {
         let Driver::Axis(name) = driver else {
             return Vec::new();
@@ -198,12 +171,7 @@ impl Columns<'_, '_> {
             let effect = Effect {
                 component: Component::TriggerDelay,
                 driver: driver.clone(),
-                shape: Shape::Curve(Curve {
-                    from: low,
-                    to: high,
-                    intervals,
-                    closed: false,
-                }),
+                shape: Shape::Curve(Curve { from: low, to: high, intervals, closed: false }),
                 tests: vec![test.name.clone()],
             };
             for coordinate in 0..self.problem.coordinates() {
@@ -214,8 +182,8 @@ impl Columns<'_, '_> {
         column_sets
     }
 
-    /// The largest plausible coefficient of an effect, in internal units: 0.1 mm and 1 mrad on a machine tool, ten times as much
-    /// on the robots and long chains that trackers and sockets measure.
+    /// The largest plausible coefficient of an effect, in internal units: 0.1 mm and 1 mrad on a machine tool, ten
+    /// times as much on the robots and long chains that trackers and sockets measure.
     pub fn plausible(&self, effect: &Effect, column_set: &EffectColumns) -> f64 {
         let machine_tool = self.problem.session.instrument.is_two_sided();
         let scale = if machine_tool { 1.0 } else { 10.0 };
@@ -252,11 +220,7 @@ pub fn chunked(column_sets: &[EffectColumns]) -> Vec<Range<usize>> {
 }
 
 /// The cached value of a key. Computes and stores it if it is absent.
-fn cached<K: std::hash::Hash + Eq, V: Clone>(
-    store: &Mutex<HashMap<K, V>>,
-    key: K,
-    make: impl FnOnce() -> V,
-) -> V {
+fn cached<K: std::hash::Hash + Eq, V: Clone>(store: &Mutex<HashMap<K, V>>, key: K, make: impl FnOnce() -> V) -> V {
     let found = store.lock().ok().and_then(|store| store.get(&key).cloned());
     if let Some(value) = found {
         return value;
@@ -276,23 +240,14 @@ mod tests {
     #[test]
     fn chunks_are_filled_in_order() {
         let column_sets = |counts: &[usize]| -> Vec<EffectColumns> {
-            let of_count = |&count: &usize| EffectColumns {
-                count,
-                numbers: 0,
-                terms: Vec::new(),
-            };
+            let of_count = |&count: &usize| EffectColumns { count, numbers: 0, terms: Vec::new() };
             counts.iter().map(of_count).collect()
         };
         let ends = |counts: &[usize]| -> Vec<usize> {
             let chunks = chunked(&column_sets(counts));
             let starts: Vec<usize> = chunks.iter().map(|chunk| chunk.start).collect();
             let ends: Vec<usize> = chunks.iter().map(|chunk| chunk.end).collect();
-            assert!(
-                starts
-                    .iter()
-                    .zip([0].iter().chain(&ends))
-                    .all(|(start, end)| start == end)
-            );
+            assert!(starts.iter().zip([0].iter().chain(&ends)).all(|(start, end)| start == end));
             ends
         };
         assert_eq!(ends(&[]), [0; 0]);

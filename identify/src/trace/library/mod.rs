@@ -67,7 +67,8 @@ pub struct Candidate {
     pub family: usize,
     /// Cost in the score in addition to its degrees of freedom, in natural-logarithm units.
     pub cost: f64,
-    /// Selection penalty: the reduction of the evidence for the selection of several positions. 0 for an effect of the library.
+    /// Selection penalty: the reduction of the evidence for the selection of several positions. 0 for an effect of the
+    /// library.
     pub selection_penalty: f64,
     /// Whether it is searched only if no simpler candidate is significant and structure remains.
     pub last_resort: bool,
@@ -107,18 +108,15 @@ pub fn families() -> Result<Vec<Family>, IdentifyError> {
     for family in &library.family {
         let is_axis = matches!(Driver::parse(&family.driver), Driver::Axis(_));
         if is_axis && !AXIS_DRIVERS.contains(&family.driver.as_str()) || !shapes::is_known(&family.shape) {
-            let fault = format!(
-                "the library of effects has an unknown driver or shape in \"{}\"",
-                family.name
-            );
+            let fault = format!("the library of effects has an unknown driver or shape in \"{}\"", family.name);
             return Err(IdentifyError::Request(fault));
         }
     }
     Ok(library.family)
 }
 
-/// The candidates of a session: all members that its axes, instrument and columns permit, except effects that the model already
-/// has.
+/// The candidates of a session: all members that its axes, instrument and columns permit, except effects that the model
+/// already has.
 ///
 /// # Errors
 /// See [`families`].
@@ -130,12 +128,7 @@ pub fn candidates(problem: &Problem<'_>) -> Result<Vec<Candidate>, IdentifyError
         for component in components(problem, &sampling, family.components) {
             for driver in drivers(problem, &sampling, &family.driver, &component) {
                 for (shape, tests, extra) in shapes(problem, &sampling, family, &component, &driver) {
-                    let effect = Effect {
-                        component: component.clone(),
-                        driver: driver.clone(),
-                        shape,
-                        tests,
-                    };
+                    let effect = Effect { component: component.clone(), driver: driver.clone(), shape, tests };
                     let cost = family.simplicity + extra + tilt_cost(problem, &component);
                     let last_resort = family.last_resort;
                     let grid = grid(problem, &sampling, &effect);
@@ -153,12 +146,7 @@ pub fn candidates(problem: &Problem<'_>) -> Result<Vec<Candidate>, IdentifyError
             }
         }
     }
-    let declared: Vec<String> = problem
-        .parameters
-        .list
-        .iter()
-        .map(|parameter| parameter.id.clone())
-        .collect();
+    let declared: Vec<String> = problem.parameters.list.iter().map(|parameter| parameter.id.clone()).collect();
     candidates.retain(|candidate| {
         let constant = candidate.effect.shape == Shape::Constant;
         let same_error = constant && declared.contains(&candidate.effect.component.to_string());
@@ -179,28 +167,18 @@ fn is_free_setup(problem: &Problem<'_>, effect: &Effect) -> bool {
     let Component::Instrument { thing, coordinate } = &effect.component else {
         return false;
     };
-    let Some(test) = problem
-        .tests
-        .iter()
-        .find(|test| effect.tests.contains(&test.name))
-    else {
+    let Some(test) = problem.tests.iter().find(|test| effect.tests.contains(&test.name)) else {
         return false;
     };
     let setup_parameters = problem.session.instrument.unknowns();
-    let index = setup_parameters
-        .iter()
-        .position(|u| u.thing == thing && u.coordinate == coordinate);
+    let index = setup_parameters.iter().position(|u| u.thing == thing && u.coordinate == coordinate);
     index.is_some_and(|index| test.priors[index] == abbe_model::session::Prior::Free)
 }
 
 fn components(problem: &Problem<'_>, sampling: &Sampling, choice: Components) -> Vec<Component> {
     let machine = &problem.session.machine;
     let error = |axis: usize, kind: ErrorKind, freedom: Freedom| {
-        Component::Axis(ErrorName {
-            kind,
-            freedom,
-            axis: machine.axes[axis].name.clone(),
-        })
+        Component::Axis(ErrorName { kind, freedom, axis: machine.axes[axis].name.clone() })
     };
     let moving = || (0..machine.axes.len()).filter(|axis| sampling.moves[*axis]);
     let things = |names: &[&str]| -> Vec<Component> {
@@ -217,12 +195,12 @@ fn components(problem: &Problem<'_>, sampling: &Sampling, choice: Components) ->
             .collect()
     };
     match choice {
-        Components::Motion => moving()
-            .flat_map(|axis| Freedom::ALL.map(|freedom| error(axis, ErrorKind::Motion, freedom)))
-            .collect(),
-        Components::OwnMotion => moving()
-            .map(|axis| error(axis, ErrorKind::Motion, machine.axes[axis].own_freedom()))
-            .collect(),
+        Components::Motion => {
+            moving().flat_map(|axis| Freedom::ALL.map(|freedom| error(axis, ErrorKind::Motion, freedom))).collect()
+        }
+        Components::OwnMotion => {
+            moving().map(|axis| error(axis, ErrorKind::Motion, machine.axes[axis].own_freedom())).collect()
+        }
         Components::AnyMotion => (0..machine.axes.len())
             .filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary)
             .flat_map(|axis| Freedom::ALL.map(|freedom| error(axis, ErrorKind::Motion, freedom)))
@@ -235,8 +213,8 @@ fn components(problem: &Problem<'_>, sampling: &Sampling, choice: Components) ->
                 let body = choice == Components::Body;
                 Freedom::ALL
                     .into_iter()
-                    // An axis is a line. It has no location error along itself, and its zero offset is no error of the line. The
-                    // body that it carries can move in these directions too.
+                    // An axis is a line. It has no location error along itself, and its zero offset is no error of the
+                    // line. The body that it carries can move in these directions too.
                     .filter(move |f| {
                         if rotary {
                             body || *f != own && *f != along
@@ -274,8 +252,8 @@ fn drivers(problem: &Problem<'_>, sampling: &Sampling, choice: &str, component: 
         "own" => own_of_kind(None),
         "own-rotary" => own_of_kind(Some(AxisKind::Rotary)),
         "own-linear" => own_of_kind(Some(AxisKind::Linear)),
-        // With independent poses every axis moves at once, so that any pair of axes would be a candidate. There gravity covers
-        // compliance.
+        // With independent poses every axis moves at once, so that any pair of axes would be a candidate. There gravity
+        // covers compliance.
         "other" if sampling.is_poses() => Vec::new(),
         "other" => (0..machine.axes.len())
             .filter(|axis| sampling.moves[*axis] && Some(*axis) != own)
@@ -295,8 +273,8 @@ fn drivers(problem: &Problem<'_>, sampling: &Sampling, choice: &str, component: 
     }
 }
 
-/// Additional cost of a tilt. A translation is a simpler cause than a tilt that displaces the point equally. The rotation about
-/// the axis itself is no tilt, and neither is the squareness of a linear axis.
+/// Additional cost of a tilt. A translation is a simpler cause than a tilt that displaces the point equally. The
+/// rotation about the axis itself is no tilt, and neither is the squareness of a linear axis.
 fn tilt_cost(problem: &Problem<'_>, component: &Component) -> f64 {
     match component {
         Component::Axis(name) if name.freedom.is_angle() => {

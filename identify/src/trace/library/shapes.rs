@@ -1,5 +1,5 @@
-//! The shapes of a family for a component and a driver, as far as the session samples them. A family names a shape of the registry, or one of
-//! the two choices here, which combine a shape with tests or with other shapes.
+//! The shapes of a family for a component and a driver, as far as the session samples them. A family names a shape of
+//! the registry, or one of the two choices here, which combine a shape with tests or with other shapes.
 
 use abbe_model::axis::AxisKind;
 use abbe_model::driver::Driver;
@@ -14,7 +14,8 @@ use crate::problem::Problem;
 
 /// A constant in the tests of one mount of a set-up component.
 const CONSTANT_PER_MOUNT: &str = "constant-per-mount";
-/// The dependence of a location error on another axis: harmonics of a rotary axis, powers of a linear one, up to [`LOW_ORDER`].
+/// The dependence of a location error on another axis: harmonics of a rotary axis, powers of a linear one, up to
+/// [`LOW_ORDER`].
 const HARMONIC_LOW: &str = "harmonic-low";
 const LOW_ORDER: usize = 2;
 
@@ -52,10 +53,7 @@ pub(super) fn shapes(
         sampled.numbers = (1..=LOW_ORDER).map(|degree| degree as f64).collect();
         members_of("power", &sampled)
     };
-    members
-        .into_iter()
-        .map(|(shape, cost)| (shape, Vec::new(), cost))
-        .collect()
+    members.into_iter().map(|(shape, cost)| (shape, Vec::new(), cost)).collect()
 }
 
 /// The sampling of a driver.
@@ -71,14 +69,13 @@ fn sampled(problem: &Problem<'_>, sampling: &Sampling, component: &Component, dr
         reverses_inside_runs: axis.is_some_and(|axis| sampling.reverses_inside_runs[axis]),
         has_time: sampling.has_time,
         duration_s: sampling.duration_s,
-        default_scale: driver
-            .kind()
-            .default_scale(driver.kind_of_axis(machine, component.axis(machine))),
+        default_scale: driver.kind().default_scale(driver.kind_of_axis(machine, component.axis(machine))),
         numbers: Vec::new(),
     }
 }
 
-/// The groups of tests that share one mount of a set-up component, each test alone, and each mount from a later test on.
+/// The groups of tests that share one mount of a set-up component, each test alone, and each mount from a later test
+/// on.
 fn mounts(problem: &Problem<'_>, component: &Component) -> Vec<Vec<String>> {
     let Component::Instrument { thing, .. } = component else {
         return Vec::new();

@@ -56,10 +56,7 @@ pub(super) fn result(
     let meanings: Vec<_> = alike.map(|effect| meaning(machine, effect)).collect();
     EffectResult {
         name: effect_name(machine, &candidate.effect),
-        family: families
-            .get(candidate.family)
-            .map(|family| family.name.clone())
-            .unwrap_or_default(),
+        family: families.get(candidate.family).map(|family| family.name.clone()).unwrap_or_default(),
         shape_parameters: shape_parameters_of(after, &candidate.effect),
         parameters: parameters_of(after, found.parameters, number),
         curve: curve_of(after, findings.after_fit, number, found.moves),
@@ -71,9 +68,7 @@ pub(super) fn result(
         unique: found.alias_effects.is_empty(),
         explanation_count: meanings.len(),
         explanations: explanations(&meanings),
-        aliases: (found.alias_effects.iter())
-            .map(|effect| effect_name(machine, effect))
-            .collect(),
+        aliases: (found.alias_effects.iter()).map(|effect| effect_name(machine, effect)).collect(),
         separated_by: None,
         separation: None,
         separating_tests: Vec::new(),
@@ -81,17 +76,12 @@ pub(super) fn result(
 }
 
 /// Of all parameters those of the `number`-th effect.
-fn parameters_of(
-    problem: &Problem<'_>,
-    parameters: &[ParameterResult],
-    number: usize,
-) -> Vec<ParameterResult> {
+fn parameters_of(problem: &Problem<'_>, parameters: &[ParameterResult], number: usize) -> Vec<ParameterResult> {
     let Some(id) = problem.parameters.effect_ids.get(number) else {
         return Vec::new();
     };
     let is_own = |p: &&ParameterResult| {
-        p.id.strip_prefix(id.as_str())
-            .is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+        p.id.strip_prefix(id.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
     };
     parameters.iter().filter(is_own).cloned().collect()
 }
@@ -119,15 +109,8 @@ fn curve_of(problem: &Problem<'_>, fit: &Fit, number: usize, moves: &Moves) -> V
         .map(|k| {
             let q = from + (to - from) * k as f64 / (CURVE_POINTS - 1) as f64;
             let mut basis = Vec::new();
-            effect.shape.basis(
-                &DriverSample {
-                    value: q,
-                    ..DriverSample::default()
-                },
-                &mut basis,
-            );
-            let value_at =
-                |beta: &[f64]| -> f64 { basis.iter().zip(&places).map(|(b, j)| b * beta[*j]).sum() };
+            effect.shape.basis(&DriverSample { value: q, ..DriverSample::default() }, &mut basis);
+            let value_at = |beta: &[f64]| -> f64 { basis.iter().zip(&places).map(|(b, j)| b * beta[*j]).sum() };
             let value = value_at(&fit.beta);
             let variance: f64 = basis
                 .iter()
@@ -180,8 +163,7 @@ mod tests {
 
     #[test]
     fn the_band_of_a_curve_is_enlarged_as_every_uncertainty_is_and_covers_what_aliases_move() {
-        let file =
-            Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
         let session = files::session(&file, &ReadOptions::default()).unwrap();
         let (mut problem, _) = prepare(&session, 1).unwrap();
         let turn = 360_f64.to_radians();
@@ -189,12 +171,7 @@ mod tests {
             .add_effect(&Effect {
                 component: Component::parse("EZC").unwrap(),
                 driver: Driver::parse("C"),
-                shape: Shape::Curve(Curve {
-                    from: 0.0,
-                    to: turn,
-                    intervals: 6,
-                    closed: false,
-                }),
+                shape: Shape::Curve(Curve { from: 0.0, to: turn, intervals: 6, closed: false }),
                 tests: Vec::new(),
             })
             .unwrap();
@@ -212,10 +189,9 @@ mod tests {
         }
 
         // Splines share out one: where an alias moves all coefficients by 1 µm, it moves the curve by that.
-        let of_curve = |j: usize| matches!(problem.parameters.list[j].role, Role::Coefficient { effect, .. } if effect == number);
-        let alias: Vec<f64> = (0..fit.beta.len())
-            .map(|j| if of_curve(j) { 1e-3 } else { 0.0 })
-            .collect();
+        let of_curve =
+            |j: usize| matches!(problem.parameters.list[j].role, Role::Coefficient { effect, .. } if effect == number);
+        let alias: Vec<f64> = (0..fit.beta.len()).map(|j| if of_curve(j) { 1e-3 } else { 0.0 }).collect();
         let covered = curve_of(&problem, &fit, number, &[vec![alias]]);
         for (enlarged, covered) in enlarged.iter().zip(&covered) {
             assert!((covered.u - enlarged.u.hypot(1.0)).abs() < 1e-9);

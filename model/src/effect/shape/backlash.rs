@@ -1,4 +1,5 @@
-//! `backlash`: lost motion on reversal. The basis function is −½ · direction, so the coefficient is the full lost motion.
+//! `backlash`: lost motion on reversal. The basis function is −½ · direction, so the coefficient is the full lost
+//! motion.
 
 use super::kind::{Basis, Entry, Follows, ShapeFault, ShapeKind};
 use super::words::EffectWords;

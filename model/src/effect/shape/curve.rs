@@ -58,7 +58,8 @@ pub(super) const ENTRY: Entry = Entry {
     members,
 };
 
-/// Reads a curve. By default it covers the full revolution of a rotary axis and is closed; for other drivers its ends are required.
+/// Reads a curve. By default it covers the full revolution of a rotary axis and is closed; for other drivers its ends
+/// are required.
 fn read(keys: &mut dyn KeyReader) -> Result<Shape, ModelError> {
     let rotary = keys.unit().is_angle();
     let stated = keys.flag("closed")?;
@@ -147,7 +148,8 @@ impl ShapeKind for Curve {
 }
 
 impl Basis for Curve {
-    /// Uniform cubic B-splines (de Boor, A Practical Guide to Splines, ch. IX): four of them are nonzero at any position.
+    /// Uniform cubic B-splines (de Boor, A Practical Guide to Splines, ch. IX): four of them are nonzero at any
+    /// position.
     fn basis<N: Nominal>(&self, sample: &DriverSample<N>, basis: &mut Vec<N>) {
         let Curve { intervals, closed, .. } = *self;
         let constant = N::constant;

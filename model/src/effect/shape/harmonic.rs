@@ -50,8 +50,8 @@ fn highest_order(sampled: &Sampled) -> usize {
 }
 
 impl Harmonic {
-    /// The members of the library up to an order. There are many high orders, and each single one is unlikely. The cost therefore grows as
-    /// the logarithm of the order.
+    /// The members of the library up to an order. There are many high orders, and each single one is unlikely. The cost
+    /// therefore grows as the logarithm of the order.
     pub fn up_to(most: usize) -> Vec<(Shape, f64)> {
         let orders = (1..=most).map(|order| order as f64);
         orders

@@ -24,8 +24,8 @@ pub struct Entry {
     pub follows: Follows,
     /// Reads it from its keys.
     pub read: fn(&mut dyn KeyReader) -> Result<Shape, ModelError>,
-    /// Its members in the library of the search for a driver as a session samples it, each with a cost in addition to that of
-    /// its family, in natural-logarithm units. A shape without members is one that only users declare.
+    /// Its members in the library of the search for a driver as a session samples it, each with a cost in addition to
+    /// that of its family, in natural-logarithm units. A shape without members is one that only users declare.
     pub members: fn(&Sampled) -> Vec<(Shape, f64)>,
 }
 
@@ -51,9 +51,7 @@ impl Follows {
     /// If the shape cannot have the driver.
     pub fn check(self, driver: &Driver, kind: Option<AxisKind>) -> Result<(), &'static str> {
         if (*driver == Driver::None) != (self == Follows::Nothing) {
-            return Err(
-                "a constant has the driver \"none\" (omit `driver`); every other shape needs a driver",
-            );
+            return Err("a constant has the driver \"none\" (omit `driver`); every other shape needs a driver");
         }
         match self {
             Follows::RotaryAxis if kind != Some(AxisKind::Rotary) => {
@@ -156,7 +154,8 @@ pub trait ShapeKind {
     fn numbers(&self) -> usize {
         0
     }
-    /// Spacing of its members in the library in the first of these numbers, for a travel of this length; 0 if there is none.
+    /// Spacing of its members in the library in the first of these numbers, for a travel of this length; 0 if there is
+    /// none.
     fn spacing(&self, span: f64) -> f64 {
         let _ = span;
         0.0
@@ -172,8 +171,9 @@ pub trait ShapeKind {
     }
 }
 
-/// The basis functions of a shape over an open scalar: numbers for a fit, symbols for a printed equation. Numbers select one piece of a
-/// piecewise function. Symbols cannot, so a symbolic basis function contains every piece times a step of 0 or 1.
+/// The basis functions of a shape over an open scalar: numbers for a fit, symbols for a printed equation. Numbers
+/// select one piece of a piecewise function. Symbols cannot, so a symbolic basis function contains every piece times a
+/// step of 0 or 1.
 pub trait Basis {
     /// Appends the values of the basis functions at one reading to `basis`, in the order of the coefficients.
     fn basis<N: Nominal>(&self, sample: &DriverSample<N>, basis: &mut Vec<N>);
@@ -184,8 +184,6 @@ pub(super) fn positive(value: f64, what: &str) -> Result<(), ShapeFault> {
     if value.is_finite() && value > 0.0 {
         Ok(())
     } else {
-        Err(ShapeFault(format!(
-            "{what} is {value}; it must be a positive number"
-        )))
+        Err(ShapeFault(format!("{what} is {value}; it must be a positive number")))
     }
 }

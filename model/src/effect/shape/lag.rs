@@ -1,4 +1,5 @@
-//! `lag`: the component trails in proportion to the rate of the driver. The basis function is −rate, so the coefficient is the delay in s.
+//! `lag`: the component trails in proportion to the rate of the driver. The basis function is −rate, so the coefficient
+//! is the delay in s.
 
 use super::kind::{Basis, Entry, Follows, Per, ShapeFault, ShapeKind};
 use super::words::EffectWords;

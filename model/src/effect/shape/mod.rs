@@ -1,8 +1,8 @@
 //! Shapes: the functional dependence of a component on its driver. Each file holds one; the registry below lists them.
 //!
-//! A shape is linear in its coefficients: `component = Σ c_k · b_k(driver; shape parameters)`. Shape parameters (a period, a time
-//! constant, a centre, a width, knots) are fixed numbers; a fit estimates the coefficients. Positions, periods and widths are in the
-//! driver's internal unit: mm, rad, s, °C, m.
+//! A shape is linear in its coefficients: `component = Σ c_k · b_k(driver; shape parameters)`. Shape parameters (a
+//! period, a time constant, a centre, a width, knots) are fixed numbers; a fit estimates the coefficients. Positions,
+//! periods and widths are in the driver's internal unit: mm, rad, s, °C, m.
 
 mod kind;
 mod words;

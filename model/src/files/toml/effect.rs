@@ -11,66 +11,34 @@ use crate::files::spelling::known_names;
 use crate::files::toml::document::{Table, Value};
 
 /// Reads one `[[effect]]`.
-pub(super) fn effect(
-    context: &Context<'_>,
-    declared: &[Declared],
-    item: Value<'_>,
-) -> Result<Effect, ModelError> {
+pub(super) fn effect(context: &Context<'_>, declared: &[Declared], item: Value<'_>) -> Result<Effect, ModelError> {
     let mut table = item.table("[[effect]]".into())?;
     let component = component(context, &mut table)?;
-    let word_value = table.require(
-        "shape",
-        "the dependence of the component on the driver, such as \"harmonic\"",
-    )?;
+    let word_value = table.require("shape", "the dependence of the component on the driver, such as \"harmonic\"")?;
     let word = word_value.text()?;
     let entry = Shape::entry_of(&word);
     let driver = driver(context, &mut table, &component, entry)?;
     let Some(entry) = entry else {
         let words: Vec<&str> = SHAPES.iter().map(|entry| entry.word).collect();
-        return Err(word_value.error(
-            format!("\"{word}\" is not a shape"),
-            Some(known_names(&word, &words)),
-        ));
+        return Err(word_value.error(format!("\"{word}\" is not a shape"), Some(known_names(&word, &words))));
     };
     let axis = driver.kind_of_axis(context.machine, component.axis(context.machine));
     let kind = driver.kind();
     let (unit, default_scale) = (kind.unit(axis), kind.default_scale(axis));
-    let shape = (entry.read)(&mut ShapeKeys::new(
-        &mut table,
-        &word_value,
-        &word,
-        unit,
-        default_scale,
-    ))?;
+    let shape = (entry.read)(&mut ShapeKeys::new(&mut table, &word_value, &word, unit, default_scale))?;
     drop(kind);
-    entry
-        .follows
-        .check(&driver, driver.axis_kind(context.machine))
-        .map_err(|help| {
-            let message = format!(
-                "the shape \"{}\" cannot have the driver \"{driver}\"",
-                shape.word()
-            );
-            word_value.error(message, Some(help.to_string()))
-        })?;
+    entry.follows.check(&driver, driver.axis_kind(context.machine)).map_err(|help| {
+        let message = format!("the shape \"{}\" cannot have the driver \"{driver}\"", shape.word());
+        word_value.error(message, Some(help.to_string()))
+    })?;
     let tests = tests(&mut table, declared)?;
-    shape
-        .check()
-        .map_err(|fault| word_value.error(fault.to_string(), None))?;
+    shape.check().map_err(|fault| word_value.error(fault.to_string(), None))?;
     table.finish()?;
-    Ok(Effect {
-        component,
-        driver,
-        shape,
-        tests,
-    })
+    Ok(Effect { component, driver, shape, tests })
 }
 
 fn component(context: &Context<'_>, table: &mut Table<'_>) -> Result<Component, ModelError> {
-    let value = table.require(
-        "component",
-        "the component, such as \"EZC\" or \"workpiece_ball.x\"",
-    )?;
+    let value = table.require("component", "the component, such as \"EZC\" or \"workpiece_ball.x\"")?;
     let text = value.text()?;
     let instrument = || {
         let own = context.instrument.unknowns().iter();
@@ -98,10 +66,7 @@ fn component(context: &Context<'_>, table: &mut Table<'_>) -> Result<Component, 
                 .iter()
                 .any(|unknown| unknown.thing == thing && unknown.coordinate == coordinate);
             if !own {
-                let message = format!(
-                    "effect on \"{text}\", which a {} does not have",
-                    context.instrument.word()
-                );
+                let message = format!("effect on \"{text}\", which a {} does not have", context.instrument.word());
                 return Err(value.error(message, Some(format!("it has {}", instrument()))));
             }
             Ok(Component::Instrument { thing, coordinate })
@@ -127,9 +92,7 @@ fn driver(
     let Some(value) = table.take("driver") else {
         return match (shape.and_then(|entry| entry.follows.default_driver()), component) {
             (Some(driver), _) => Ok(driver),
-            (None, Component::Axis(name)) if name.kind == ErrorKind::Motion => {
-                Ok(Driver::Axis(name.axis.clone()))
-            }
+            (None, Component::Axis(name)) if name.kind == ErrorKind::Motion => Ok(Driver::Axis(name.axis.clone())),
             _ => {
                 let words: Vec<String> = Driver::words().iter().map(|word| format!("\"{word}\"")).collect();
                 let help = format!("add `driver`: an axis, {}", listed(&words, "or"));
@@ -149,9 +112,7 @@ fn driver(
         },
         other => other,
     };
-    let own = component
-        .axis(context.machine)
-        .map(|axis| context.machine.axes[axis].kind);
+    let own = component.axis(context.machine).map(|axis| context.machine.axes[axis].kind);
     let checked = driver.kind().check_component(&component.to_string(), own);
     checked.map_err(|fault| value.error(fault.message, Some(fault.help.into())))?;
     Ok(driver)

@@ -1,7 +1,7 @@
 //! Reader of the keys of a shape, with the location of each in the file.
 //!
-//! Numbers in the unit of the driver have a suffix: `_mm` for a linear axis, `_deg` (or `_rad`) for a rotary one, `_s` for time, `_c` for
-//! temperature, `_m` for the gravity moment of a unit weight.
+//! Numbers in the unit of the driver have a suffix: `_mm` for a linear axis, `_deg` (or `_rad`) for a rotary one, `_s`
+//! for time, `_c` for temperature, `_m` for the gravity moment of a unit weight.
 
 use crate::driver::{DriverUnit, unit_suffixes};
 use crate::effect::keys::{Key, KeyReader};
@@ -28,13 +28,7 @@ impl<'t, 'a> ShapeKeys<'t, 'a> {
         unit: DriverUnit,
         default_scale: f64,
     ) -> ShapeKeys<'t, 'a> {
-        ShapeKeys {
-            table,
-            place,
-            word,
-            unit,
-            default_scale,
-        }
+        ShapeKeys { table, place, word, unit, default_scale }
     }
 
     /// Takes the form of a key that is present; also returns its suffix.
