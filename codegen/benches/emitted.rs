@@ -18,11 +18,10 @@
 //!   errors[5]    e_y0c        mm   location of C in Y (EY0C)
 //!   errors[6]    theta_x0c    rad  orientation of C about X (EA0C)
 //!   errors[7]    theta_y0c    rad  orientation of C about Y (EB0C)
-//! Value: the length read, mm. Gradient: by errors[0], errors[1] and so on, mm/mm and mm/rad. Value and gradient: 66
-//! operations per reading (28 + and −, 36 ·, 1 /, 1 √). Checked against the chain with dual numbers at 40 points,
-//! errors to ±10 mm and ±0.1 rad: largest relative difference 0e0 (value), 7e-16 (gradient). Largest deviation from the
-//! exact chain over C −180° to 180°, A −20° to 70°: 0.0054 µm at errors of ±10 µm and ±0.01°, 0.54 µm at errors of ±100
-//! µm and ±0.1°.
+//! Value: the length read, mm. Gradient: by errors[0], errors[1] and so on, mm/mm and mm/rad.
+//! Value and gradient: 66 operations per reading (28 + and −, 36 ·, 1 /, 1 √).
+//! Checked against the chain with dual numbers at 40 points, errors to ±10 mm and ±0.1 rad: largest relative difference 0e0 (value), 7e-16 (gradient).
+//! Largest deviation from the exact chain over C −180° to 180°, A −20° to 70°: 0.0054 µm at errors of ±10 µm and ±0.01°, 0.54 µm at errors of ±100 µm and ±0.1°.
 
 /// Lengths of the set-up.
 pub const LENGTHS: usize = 4;
@@ -127,8 +126,7 @@ pub fn bar_length_gradient(lengths: &[f64; LENGTHS], axes: &[f64; AXES], errors:
     (reading, gradient)
 }
 
-/// Values and gradients of columns of readings: a slice for each axis input, for each output, for each derivative
-/// (output by output).
+/// Values and gradients of columns of readings: a slice for each axis input, for each output, for each derivative (output by output).
 ///
 /// # Panics
 /// If a column has another length than `value[0]`.
