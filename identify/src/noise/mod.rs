@@ -245,7 +245,7 @@ mod tests {
                 response.push(terms.map(|(k, a)| a * response[t - 1 - k]).sum::<f64>());
             }
             let power: f64 = response.iter().map(|r| r * r).sum();
-            let noise = Noise { ar_coefficients: ar_coefficients, ..Noise::white(2.0, NoiseSource::Stated) };
+            let noise = Noise { ar_coefficients, ..Noise::white(2.0, NoiseSource::Stated) };
             let innovation = noise.innovation_mm();
             assert!((innovation - 2.0 / power.sqrt()).abs() < 1e-9, "{noise:?}: {innovation}");
         }
