@@ -1,4 +1,5 @@
-//! Fuzz functions for the readers of `abbe-identify`: files of error functions and of error values, read as the command reads them.
+//! Fuzz functions for the readers of `abbe-identify`: files of error functions and of error values, read as the command
+//! reads them.
 //!
 //! `identify/tests/corpus.rs` replays the corpus with these functions on every test run.
 
@@ -34,15 +35,12 @@ fn as_file<T>(input: &[u8], work: impl FnOnce(&PathBuf, &Machine) -> T) -> T {
     })
 }
 
-/// The file of `volumetric --functions`: accepted functions give a finite volumetric error everywhere, or the map returns an error.
+/// The file of `volumetric --functions`: accepted functions give a finite volumetric error everywhere, or the map
+/// returns an error.
 pub fn functions(input: &[u8]) {
     as_file(input, |file, machine| match functions::read(file, machine) {
         Ok(functions) => {
-            let machine_with_errors = MachineWithErrors {
-                machine,
-                functions: &functions,
-                tool_mm: [0.0, 0.0, -120.0],
-            };
+            let machine_with_errors = MachineWithErrors { machine, functions: &functions, tool_mm: [0.0, 0.0, -120.0] };
             let along = |kind| match kind {
                 AxisKind::Linear => vec![-250.0, 0.0, 300.0],
                 AxisKind::Rotary => vec![-1.5, 0.0, 3.0],

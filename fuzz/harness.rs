@@ -47,7 +47,8 @@ fn put(folder: &Path, name: &str, contents: &[u8]) {
     fs::write(folder.join(name), contents).expect("a file in a temporary folder");
 }
 
-/// Asserts that a message is not empty and that its span is a range of characters of the file, which the command prints.
+/// Asserts that a message is not empty and that its span is a range of characters of the file, which the command
+/// prints.
 fn check_message(fault: &ModelError) {
     assert!(!fault.to_string().is_empty());
     let Some(location) = fault.location() else { return };
@@ -56,10 +57,7 @@ fn check_message(fault: &ModelError) {
     if let Ok(text) = fs::read_to_string(&location.file)
         && span.end <= text.len()
     {
-        assert!(
-            text.is_char_boundary(span.start) && text.is_char_boundary(span.end),
-            "{fault}: {span:?}"
-        );
+        assert!(text.is_char_boundary(span.start) && text.is_char_boundary(span.end), "{fault}: {span:?}");
     }
 }
 
@@ -79,10 +77,7 @@ fn session_in(folder: &Path) -> Option<Session> {
         assert!(readings.observed.iter().all(|value| value.is_finite()));
         assert!(readings.positions.iter().flatten().all(|value| value.is_finite()));
         // Each row belongs to exactly one run.
-        assert_eq!(
-            readings.runs().iter().map(|run| run.len()).sum::<usize>(),
-            readings.rows()
-        );
+        assert_eq!(readings.runs().iter().map(|run| run.len()).sum::<usize>(), readings.rows());
     }
     Some(session)
 }
@@ -92,13 +87,7 @@ pub fn machine(input: &[u8]) {
     within(|folder| {
         put(folder, "other.toml", input);
         match files::machine(&folder.join("other.toml")) {
-            Ok(machine) => assert!(
-                machine
-                    .axes
-                    .iter()
-                    .flat_map(|axis| axis.direction)
-                    .all(f64::is_finite)
-            ),
+            Ok(machine) => assert!(machine.axes.iter().flat_map(|axis| axis.direction).all(f64::is_finite)),
             Err(fault) => check_message(&fault),
         }
     });
@@ -107,11 +96,7 @@ pub fn machine(input: &[u8]) {
 /// `session.toml`: a plan or, with `data = "C.csv"`, a measured session.
 pub fn session(input: &[u8]) {
     within(|folder| {
-        put(
-            folder,
-            "C.csv",
-            b"run,c_deg,length_mm\n1,0,100.0\n1,90,100.001\n2,90,100.0\n2,0,99.999\n",
-        );
+        put(folder, "C.csv", b"run,c_deg,length_mm\n1,0,100.0\n1,90,100.001\n2,90,100.0\n2,0,99.999\n");
         put(folder, "session.toml", input);
         let Some(session) = session_in(folder) else { return };
         let text = std::str::from_utf8(input).expect("an accepted session is UTF-8");
@@ -134,10 +119,7 @@ pub fn session(input: &[u8]) {
 
 fn table_of(data: &str, format: &str, columns: &str, input: &[u8]) {
     within(|folder| {
-        let text = SESSION
-            .replace("DATA", data)
-            .replace("FORMAT", format)
-            .replace("COLUMNS", columns);
+        let text = SESSION.replace("DATA", data).replace("FORMAT", format).replace("COLUMNS", columns);
         put(folder, "session.toml", text.as_bytes());
         put(folder, data, input);
         session_in(folder);
@@ -156,8 +138,7 @@ pub fn foreign(input: &[u8]) {
     };
     let (separator, decimal) = [(";", ","), ("\\t", "."), (":", "."), ("|", ",")][usize::from(choice % 4)];
     let header = choice & 4 == 0;
-    let format =
-        format!("[format]\nseparator = \"{separator}\"\ndecimal = \"{decimal}\"\nheader = {header}\n");
+    let format = format!("[format]\nseparator = \"{separator}\"\ndecimal = \"{decimal}\"\nheader = {header}\n");
     let columns = match (header, choice & 8 == 0) {
         (true, true) => "columns = { x_mm = \"X act\", y_mm = \"Y act\", deviation_um = \"ΔL\" }",
         (true, false) => "columns = { time_s = \"t\", c_rad = \"C\", length_mm = \"L\" }",

@@ -1,9 +1,10 @@
 //! Abbe: a modelling workspace for the geometric errors of machine tools and other serial chains.
 //!
-//! The facade of three crates: [`model`] (chain, effects, instruments, sessions), [`identify`] (fit, trace, simulate) and [`codegen`] (closed
-//! forms). The command `abbe` is built on the same.
+//! The facade of three crates: [`model`] (chain, effects, instruments, sessions), [`identify`] (fit, trace, simulate)
+//! and [`codegen`] (closed forms). The command `abbe` is built on the same.
 //!
-//! The three together: the change that a simulated error of 10 µm makes is what the equation of the same test says, −R·sin C/L₀.
+//! The three together: the change that a simulated error of 10 µm makes is what the equation of the same test says,
+//! −R·sin C/L₀.
 //!
 //! ```
 //! use std::path::Path;

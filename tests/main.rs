@@ -1,4 +1,5 @@
-//! The integration tests of the workspace, in one binary. `plant` is the independent simulator whose sessions they read.
+//! The integration tests of the workspace, in one binary. `plant` is the independent simulator whose sessions they
+//! read.
 
 mod plant;
 mod study;

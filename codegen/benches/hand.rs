@@ -20,16 +20,7 @@ pub fn reading([d, r, h, z_ca]: &[f64; 4], [sc, cc, sa, ca]: &[f64; 4], e: &[f64
     let vx = ux + tz * uy - ty * uz;
     let (vy, vz) = (uy - tz * ux, uz + ty * ux);
     let (wy, wz) = (ca * vy + sa * vz, ca * vz - sa * vy);
-    let gradient = [
-        uy,
-        uz,
-        ux * qz - uz * px,
-        uy * px - ux * qy,
-        vx,
-        wy,
-        wz * y - wy * z,
-        vx * z + wz * rs,
-    ];
+    let gradient = [uy, uz, ux * qz - uz * px, uy * px - ux * qy, vx, wy, wz * y - wy * z, vx * z + wz * rs];
     (length, gradient)
 }
 
@@ -42,9 +33,7 @@ pub fn columns(
     value: &mut [f64],
     [g0, g1, g2, g3, g4, g5, g6, g7]: [&mut [f64]; 8],
 ) {
-    columns_of(
-        lengths, sc, cc, sa, ca, errors, value, g0, g1, g2, g3, g4, g5, g6, g7,
-    );
+    columns_of(lengths, sc, cc, sa, ca, errors, value, g0, g1, g2, g3, g4, g5, g6, g7);
 }
 
 /// Takes every column as an argument of its own, so that the compiler knows that no two overlap.

@@ -34,30 +34,20 @@ fn axes() -> [Vec<f64>; 4] {
 
 fn kernels(criterion: &mut Criterion) {
     let axes = axes();
-    let rows: Vec<[f64; 4]> = (0..N)
-        .map(|i| [axes[0][i], axes[1][i], axes[2][i], axes[3][i]])
-        .collect();
+    let rows: Vec<[f64; 4]> = (0..N).map(|i| [axes[0][i], axes[1][i], axes[2][i], axes[3][i]]).collect();
     let mut group = criterion.benchmark_group("value and eight derivatives");
     group.throughput(Throughput::Elements(N as u64));
     group.bench_function("by hand, one at a time", |bencher| {
         bencher.iter(|| {
             for row in &rows {
-                black_box(hand::reading(
-                    black_box(&LENGTHS),
-                    black_box(row),
-                    black_box(&ERRORS),
-                ));
+                black_box(hand::reading(black_box(&LENGTHS), black_box(row), black_box(&ERRORS)));
             }
         });
     });
     group.bench_function("printed, one at a time", |bencher| {
         bencher.iter(|| {
             for row in &rows {
-                black_box(emitted::bar_length_gradient(
-                    black_box(&LENGTHS),
-                    black_box(row),
-                    black_box(&ERRORS),
-                ));
+                black_box(emitted::bar_length_gradient(black_box(&LENGTHS), black_box(row), black_box(&ERRORS)));
             }
         });
     });
@@ -67,13 +57,7 @@ fn kernels(criterion: &mut Criterion) {
         let mut gradient: [Vec<f64>; 8] = std::array::from_fn(|_| vec![0.0; N]);
         bencher.iter(|| {
             let slopes = gradient.each_mut().map(Vec::as_mut_slice);
-            hand::columns(
-                black_box(&LENGTHS),
-                black_box(columns),
-                black_box(&ERRORS),
-                &mut value,
-                slopes,
-            );
+            hand::columns(black_box(&LENGTHS), black_box(columns), black_box(&ERRORS), &mut value, slopes);
             black_box(&mut value);
             black_box(&mut gradient);
         });
@@ -105,10 +89,7 @@ fn equations(criterion: &mut Criterion) {
         .iter()
         .map(|name| ErrorName::parse(name).expect("an error"))
         .collect();
-    let options = Options {
-        gradient: true,
-        ..Options::default()
-    };
+    let options = Options { gradient: true, ..Options::default() };
     let mut group = criterion.benchmark_group("equation");
     group.sample_size(10);
     group.bench_function("error vector with eight derivatives, as C", |bencher| {

@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
-use abbe_model::effect::{Component, Driver, Effect, Shape};
+use abbe_model::driver::Driver;
+use abbe_model::effect::shape::Per;
+use abbe_model::effect::{Component, Effect};
 use abbe_model::instrument::{InstrumentParameter, InternalUnit};
 
 use crate::error::CodegenError;
@@ -50,9 +52,7 @@ impl Coefficient {
             }
             let component = unit_of_component(effect, machine, unknowns)?;
             let same_kind = match &effect.driver {
-                Driver::Axis(name) => {
-                    is_rotary(machine, effect, name)? == (component == Some(InternalUnit::Radian))
-                }
+                Driver::Axis(name) => is_rotary(machine, effect, name)? == (component == Some(InternalUnit::Radian)),
                 _ => false,
             };
             let shared = Arc::new(effect.clone());
@@ -90,14 +90,14 @@ impl Coefficient {
         let Some(component) = self.component else {
             return "s";
         };
-        match (&self.effect.shape, component) {
-            (Shape::Lag, _) if self.same_kind => "s",
-            (Shape::Lag, InternalUnit::Millimetre) => "mm·s/rad",
-            (Shape::Lag, InternalUnit::Radian) => "rad·s/mm",
-            (Shape::Lag, InternalUnit::Ratio) => "1/rate",
-            (Shape::Drift, InternalUnit::Millimetre) => "mm/h",
-            (Shape::Drift, InternalUnit::Radian) => "rad/h",
-            (Shape::Drift, InternalUnit::Ratio) => "1/h",
+        match (self.effect.shape.per(self.index), component) {
+            (Per::Rate, _) if self.same_kind => "s",
+            (Per::Rate, InternalUnit::Millimetre) => "mm·s/rad",
+            (Per::Rate, InternalUnit::Radian) => "rad·s/mm",
+            (Per::Rate, InternalUnit::Ratio) => "1/rate",
+            (Per::Hour, InternalUnit::Millimetre) => "mm/h",
+            (Per::Hour, InternalUnit::Radian) => "rad/h",
+            (Per::Hour, InternalUnit::Ratio) => "1/h",
             (_, InternalUnit::Millimetre) => "mm",
             (_, InternalUnit::Radian) => "rad",
             (_, InternalUnit::Ratio) => "1",
@@ -113,23 +113,15 @@ fn unit_of_component(
     machine: &Machine,
     unknowns: &[InstrumentParameter],
 ) -> Result<Option<InternalUnit>, CodegenError> {
+    let unit = effect.component.unit(unknowns);
     match &effect.component {
-        Component::Axis(name) => match machine.axis_index(&name.axis) {
-            Some(_) if name.freedom.is_angle() => Ok(Some(InternalUnit::Radian)),
-            Some(_) => Ok(Some(InternalUnit::Millimetre)),
-            None => Err(CodegenError::no_axis(machine, effect.id(), &name.axis)),
-        },
-        Component::Instrument { thing, coordinate } => {
-            let own =
-                |unknown: &&InstrumentParameter| unknown.thing == thing && unknown.coordinate == coordinate;
-            let found = unknowns.iter().find(own);
-            found
-                .map(|unknown| Some(unknown.unit))
-                .ok_or_else(|| CodegenError::NoSuchParameter {
-                    parameter: format!("`{}` of the effect `{}`", effect.component, effect.id()),
-                })
+        Component::Axis(name) if machine.axis_index(&name.axis).is_none() => {
+            Err(CodegenError::no_axis(machine, effect.id(), &name.axis))
         }
-        Component::TriggerDelay => Ok(None),
+        Component::Instrument { .. } if unit.is_none() => Err(CodegenError::NoSuchParameter {
+            parameter: format!("`{}` of the effect `{}`", effect.component, effect.id()),
+        }),
+        Component::Axis(_) | Component::Instrument { .. } | Component::TriggerDelay => Ok(unit),
     }
 }
 

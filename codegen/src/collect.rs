@@ -77,9 +77,8 @@ impl Collector<'_, '_> {
     /// is returned separately. Empty for 1.
     fn length_factors(&self, polynomial: &Polynomial) -> (bool, Vec<Tree>) {
         let shared = common(polynomial);
-        let rest = polynomial
-            .terms()
-            .filter_map(|(monomial, coefficient)| Some((monomial.divided_by(&shared)?, coefficient)));
+        let rest =
+            polynomial.terms().filter_map(|(monomial, coefficient)| Some((monomial.divided_by(&shared)?, coefficient)));
         let terms: Vec<Term> = rest.map(|(m, c)| self.length_term((&m, c))).collect();
         let (minus, inner) = as_factor(terms);
         let mut factors = Vec::new();
@@ -134,11 +133,7 @@ impl Collector<'_, '_> {
                 let function = [Operand::Node(id)];
                 let inputs = self.inputs.to_vec();
                 let program = Program::of(arena, inputs, &function, &HashMap::new(), Naming::Labelled);
-                program
-                    .outputs
-                    .into_iter()
-                    .next()
-                    .unwrap_or(Tree::Number(f64::NAN))
+                program.outputs.into_iter().next().unwrap_or(Tree::Number(f64::NAN))
             }
             Atom::Root(root) => Tree::Unary(Unary::Sqrt, Box::new(self.group(self.ring.radicand(root)))),
         }

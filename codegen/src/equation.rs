@@ -69,13 +69,10 @@ impl Equation {
         machine.rotation = options.rotation.unwrap_or(machine.rotation);
         let arena = Arena::new();
         let parameters = parameters(&arena, &machine, source, errors, options)?;
-        let run = Run::<Symbol<'_>>::new(
-            &machine,
-            source,
-            &parameters,
-            &|variable| arena.variable(variable),
-            &|index| arena.variable(parameters[index].clone()),
-        )?;
+        let run =
+            Run::<Symbol<'_>>::new(&machine, source, &parameters, &|variable| arena.variable(variable), &|index| {
+                arena.variable(parameters[index].clone())
+            })?;
         let kind = match run.subject {
             Subject::Station(Station::BallBar(_)) => Kind::Length,
             Subject::Station(Station::Probe(_)) => Kind::Distance,
@@ -83,24 +80,16 @@ impl Equation {
             Subject::Volumetric { .. } => Kind::Volumetric,
         };
         let exact: Vec<Operand> = run.read().into_iter().map(Symbol::operand).collect();
-        let mut vectors = vectors::of_subject(&run.subject, &machine, &run.state, &run.errors, &|slot| {
-            run.unknown(slot)
-        });
+        let mut vectors =
+            vectors::of_subject(&run.subject, &machine, &run.state, &run.errors, &|slot| run.unknown(slot));
         let on_the_way = vectors.clone();
         let inputs = inputs(&arena, &machine, &parameters);
         let symbol = |index: usize| arena.variable(parameters[index].clone());
         let driven_errors = run.driven_errors(&symbol).into_iter();
-        let driven_errors = driven_errors
-            .map(|(variable, value)| (variable, value.operand()))
-            .collect();
+        let driven_errors = driven_errors.map(|(variable, value)| (variable, value.operand())).collect();
         let bar_parameters = run.bar_parameters().map(|unknown| unknown.map(Symbol::operand));
         let whole = curves(&run, &parameters);
-        let written = FormContext {
-            arena: &arena,
-            inputs: &inputs,
-            parameters: &parameters,
-            whole: &whole,
-        };
+        let written = FormContext { arena: &arena, inputs: &inputs, parameters: &parameters, whole: &whole };
         let (outputs, form) = match options.order {
             Order::Exact => (exact.clone(), Form::Exact),
             Order::Bilinear => truncation::bilinear(&run, &exact, &mut vectors, &written)?,
@@ -143,11 +132,7 @@ impl Equation {
     ///
     /// # Errors
     /// If the machine lacks the axis of an error.
-    pub fn volumetric(
-        machine: &Machine,
-        errors: &[ErrorName],
-        options: &Options,
-    ) -> Result<Equation, CodegenError> {
+    pub fn volumetric(machine: &Machine, errors: &[ErrorName], options: &Options) -> Result<Equation, CodegenError> {
         Equation::of(machine, &ToolPoint, errors, options)
     }
 
@@ -221,10 +206,7 @@ fn curves(run: &Run<'_, Symbol<'_>>, parameters: &[Variable]) -> Vec<Operand> {
         _ => false,
     };
     let places = (0..parameters.len()).filter(|index| of_curve(&parameters[*index]));
-    places
-        .flat_map(|index| run.bases(index))
-        .map(Symbol::operand)
-        .collect()
+    places.flat_map(|index| run.bases(index)).map(Symbol::operand).collect()
 }
 
 /// The requested errors, instrument parameters and effect coefficients.
@@ -238,9 +220,8 @@ fn parameters(
     let known = source.subject(&|name: &str| length(arena, name)).unknowns();
     let mut parameters: Vec<Variable> = errors.iter().cloned().map(Variable::Error).collect();
     for index in &options.unknowns {
-        let unknown = known.get(*index).ok_or_else(|| CodegenError::NoSuchParameter {
-            parameter: format!("number {index}"),
-        })?;
+        let unknown =
+            known.get(*index).ok_or_else(|| CodegenError::NoSuchParameter { parameter: format!("number {index}") })?;
         parameters.push(Variable::Instrument(*unknown));
     }
     let coefficients = Coefficient::of_effects(&options.effects, machine, known)?;
@@ -248,9 +229,7 @@ fn parameters(
     // Naming them here fixes their order wherever terms are sorted.
     for (index, parameter) in parameters.iter().enumerate() {
         if parameters[..index].contains(parameter) {
-            return Err(CodegenError::Twice {
-                name: parameter.name(),
-            });
+            return Err(CodegenError::Twice { name: parameter.name() });
         }
         arena.variable(parameter.clone());
     }
@@ -262,10 +241,7 @@ fn inputs(arena: &Arena, machine: &Machine, parameters: &[Variable]) -> Vec<Inpu
     let lengths = variables.iter().filter(|v| matches!(v, Variable::Length(_)));
     let mut inputs: Vec<Input> = lengths.cloned().map(Input::Plain).collect();
     for axis in &machine.axes {
-        let position = Variable::Position {
-            axis: axis.name.clone(),
-            kind: axis.kind,
-        };
+        let position = Variable::Position { axis: axis.name.clone(), kind: axis.kind };
         if variables.contains(&position) {
             match axis.kind {
                 AxisKind::Linear => inputs.push(Input::Plain(position)),

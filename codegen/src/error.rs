@@ -47,9 +47,7 @@ pub enum CodegenError {
         languages: String,
     },
     /// A curve, which has hundreds of terms, in mathematical notation.
-    #[error(
-        "the curve `{effect}` is written as code only: as {languages}; to omit it, name the errors to keep"
-    )]
+    #[error("the curve `{effect}` is written as code only: as {languages}; to omit it, name the errors to keep")]
     CurveForReaders {
         /// The effect.
         effect: String,
@@ -121,10 +119,6 @@ pub enum CodegenError {
 impl CodegenError {
     /// The error named `error` belongs to an axis that the machine does not have.
     pub(crate) fn no_axis(machine: &Machine, error: String, axis: &str) -> Self {
-        CodegenError::NoSuchAxis {
-            error,
-            axis: axis.to_string(),
-            machine: machine.code(),
-        }
+        CodegenError::NoSuchAxis { error, axis: axis.to_string(), machine: machine.code() }
     }
 }

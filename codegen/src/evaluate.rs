@@ -72,17 +72,14 @@ pub fn evaluate<S: Scalar>(
     for id in arena.reachable(outputs) {
         let value = match arena.node(id) {
             Node::Variable(index) => variable(&arena.variable_at(index)),
-            Node::Unary(op, a) => normal_form_of(&values, a)
-                .unary(op)
-                .ok_or(CodegenError::FunctionOfError { function: op })?,
+            Node::Unary(op, a) => {
+                normal_form_of(&values, a).unary(op).ok_or(CodegenError::FunctionOfError { function: op })?
+            }
             Node::Binary(op, a, b) => normal_form_of(&values, a).binary(op, normal_form_of(&values, b)),
         };
         values[id.index()] = Some(value);
     }
-    Ok(outputs
-        .iter()
-        .map(|output| normal_form_of(&values, *output).scalar())
-        .collect())
+    Ok(outputs.iter().map(|output| normal_form_of(&values, *output).scalar()).collect())
 }
 
 /// Evaluates `outputs` over plain numbers.

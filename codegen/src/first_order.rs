@@ -85,9 +85,7 @@ impl FirstOrder {
             let of_bar = coefficient_of(ring, &bar, parameter);
             let of_gain = coefficient_of(ring, &gain, parameter);
             let (coefficient, over_length) = if of_bar.is_zero() && of_gain.is_zero() {
-                let slope = vector
-                    .each_ref()
-                    .map(|component| coefficient_of(ring, component, parameter));
+                let slope = vector.each_ref().map(|component| coefficient_of(ring, component, parameter));
                 (dot(ring, &nominal, &slope), true)
             } else {
                 (&ring.product(&beyond, &of_gain) - &of_bar, false)
@@ -99,11 +97,7 @@ impl FirstOrder {
                 column: Column::Distinct,
             });
         }
-        let mut form = FirstOrder {
-            nominal: vec![square],
-            sensitivities,
-            alternative_length: None,
-        };
+        let mut form = FirstOrder { nominal: vec![square], sensitivities, alternative_length: None };
         form.mark(ring);
         Ok(form)
     }
@@ -119,10 +113,7 @@ impl FirstOrder {
         let none = Operand::constant(0.0);
         let mut form = FirstOrder::of_length(ring, stylus, none, [Some(radius), None], parameters)?;
         let radius = ring.normal_form(radius)?;
-        form.alternative_length = Some(AlternativeLength {
-            sign: 1.0,
-            offset: -&without_errors(ring, &radius),
-        });
+        form.alternative_length = Some(AlternativeLength { sign: 1.0, offset: -&without_errors(ring, &radius) });
         Ok(form)
     }
 
@@ -172,10 +163,7 @@ impl FirstOrder {
         let mut form = FirstOrder {
             sensitivities: parameters.iter().map(sensitivity).collect(),
             nominal: vec![square],
-            alternative_length: Some(AlternativeLength {
-                sign: -1.0,
-                offset: -&b,
-            }),
+            alternative_length: Some(AlternativeLength { sign: -1.0, offset: -&b }),
         };
         form.mark(ring);
         Ok(form)
@@ -187,18 +175,13 @@ impl FirstOrder {
         coordinates: &[Operand],
         parameters: &[Variable],
     ) -> Result<Self, CodegenError> {
-        let forms = coordinates
-            .iter()
-            .map(|coordinate| ring.normal_form(*coordinate))
-            .collect::<Result<Vec<_>, _>>()?;
+        let forms =
+            coordinates.iter().map(|coordinate| ring.normal_form(*coordinate)).collect::<Result<Vec<_>, _>>()?;
         let sensitivities = parameters
             .iter()
             .map(|parameter| Sensitivity {
                 parameter: parameter.clone(),
-                coefficients: forms
-                    .iter()
-                    .map(|form| coefficient_of(ring, form, parameter))
-                    .collect(),
+                coefficients: forms.iter().map(|form| coefficient_of(ring, form, parameter)).collect(),
                 over_length: false,
                 column: Column::Distinct,
             })
@@ -223,15 +206,12 @@ impl FirstOrder {
                 this.column = Column::Zero;
                 continue;
             }
-            let candidates = earlier.iter().filter(|other| {
-                other.column == Column::Distinct && (fixed || other.over_length == this.over_length)
-            });
+            let candidates = earlier
+                .iter()
+                .filter(|other| other.column == Column::Distinct && (fixed || other.over_length == this.over_length));
             for other in candidates {
                 if let Some(factor) = fixed_factor(ring, &this.coefficients, &other.coefficients) {
-                    this.column = Column::Multiple {
-                        of: other.parameter.clone(),
-                        factor,
-                    };
+                    this.column = Column::Multiple { of: other.parameter.clone(), factor };
                     break;
                 }
             }
@@ -273,10 +253,8 @@ fn fixed_factor(ring: &Ring<'_>, a: &[Polynomial], b: &[Polynomial]) -> Option<(
     let (a, b) = (by_motion(a), by_motion(b));
     let same = a.len() == b.len() && a.iter().zip(&b).all(|(a, b)| a.0 == b.0);
     let (first_a, first_b) = (&a.first()?.1, &b.first()?.1);
-    let proportional = same
-        && a.iter()
-            .zip(&b)
-            .all(|((_, x), (_, y))| ring.product(x, first_b) == ring.product(first_a, y));
+    let proportional =
+        same && a.iter().zip(&b).all(|((_, x), (_, y))| ring.product(x, first_b) == ring.product(first_a, y));
     proportional.then(|| match quotient(ring, first_a, first_b) {
         Some(quotient) => (quotient, Polynomial::constant(1.0)),
         None => (first_a.clone(), first_b.clone()),

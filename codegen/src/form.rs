@@ -89,10 +89,7 @@ impl PrintedFirstOrder {
     pub(crate) fn with_named_length(&self, length: &Tree) -> PrintedFirstOrder {
         let root = Tree::Unary(Unary::Sqrt, Box::new(self.nominal[0].clone()));
         let named = |trees: &Vec<Tree>| trees.iter().map(|tree| tree.replaced(&root, length)).collect();
-        PrintedFirstOrder {
-            coefficients: self.coefficients.iter().map(named).collect(),
-            ..self.clone()
-        }
+        PrintedFirstOrder { coefficients: self.coefficients.iter().map(named).collect(), ..self.clone() }
     }
 
     /// The reading without errors, from the length `L₀`.

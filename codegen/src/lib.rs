@@ -2,8 +2,8 @@
 //!
 //! In the order in which one module builds on the other:
 //!
-//! - [`Variable`], [`Coefficient`], [`DriverQuantity`]: the meaning of a symbol; [`symbol`]: the arena of expressions,
-//!   and [`evaluate`](mod@evaluate);
+//! - [`Variable`], [`Coefficient`], [`DriverQuantity`](abbe_model::driver::DriverQuantity): the meaning of
+//!   a symbol; [`symbol`]: the arena of expressions, and [`evaluate`](mod@evaluate);
 //! - [`polynomial`], [`normal_form`]: the exact normal form, in which equality is decided; [`first_order`]: its table
 //!   of sensitivities;
 //! - [`Tree`], [`program`]: an equation as a sequence of steps; [`vectors`], [`touch`]: its named quantities;
@@ -36,7 +36,6 @@
 pub mod check;
 mod coefficient;
 mod collect;
-mod driver_quantity;
 mod effect;
 pub mod equation;
 mod error;
@@ -59,7 +58,6 @@ pub mod vectors;
 
 pub use check::{Checked, check};
 pub use coefficient::Coefficient;
-pub use driver_quantity::DriverQuantity;
 pub use equation::Equation;
 pub use error::CodegenError;
 pub use evaluate::VariableValue;

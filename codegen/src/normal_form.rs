@@ -22,13 +22,7 @@ pub struct Ring<'a> {
 impl<'a> Ring<'a> {
     /// The ring of untruncated expressions.
     pub fn exact(arena: &'a Arena) -> Self {
-        Ring {
-            arena,
-            variables: arena.variables(),
-            order: None,
-            roots: Vec::new(),
-            known: HashMap::new(),
-        }
+        Ring { arena, variables: arena.variables(), order: None, roots: Vec::new(), known: HashMap::new() }
     }
 
     /// The ring of expressions truncated at `order` in errors and instrument parameters: `sin e` is `e`, `cos e` is `1
@@ -40,10 +34,7 @@ impl<'a> Ring<'a> {
         if order > 2 {
             return Err(CodegenError::OrderTooHigh { order });
         }
-        Ok(Ring {
-            order: Some(order),
-            ..Ring::exact(arena)
-        })
+        Ok(Ring { order: Some(order), ..Ring::exact(arena) })
     }
 
     /// The arena.
@@ -75,9 +66,7 @@ impl<'a> Ring<'a> {
             Atom::Variable(id) | Atom::Sin(id) | Atom::Cos(id) => self.variable(id).moves(),
             Atom::Function(id) => {
                 let variables = self.arena.variables_of(&[Operand::Node(id)]);
-                variables
-                    .into_iter()
-                    .any(|variable| self.variable(variable).moves())
+                variables.into_iter().any(|variable| self.variable(variable).moves())
             }
             Atom::Root(root) => self.roots[root].contains(|inner| self.moves(inner)),
         }
@@ -153,9 +142,7 @@ impl<'a> Ring<'a> {
     }
 
     fn of_node(&mut self, id: NodeId) -> Result<Polynomial, CodegenError> {
-        let no = |what: &str| CodegenError::NoPolynomial {
-            what: what.to_string(),
-        };
+        let no = |what: &str| CodegenError::NoPolynomial { what: what.to_string() };
         if self.is_function(id) {
             return if self.order.is_some() && self.contains_errors(Operand::Node(id)) {
                 Err(no("a function of errors"))
@@ -206,9 +193,7 @@ impl<'a> Ring<'a> {
     /// Whether an expression contains an error, an instrument parameter or a coefficient of an effect.
     fn contains_errors(&self, operand: Operand) -> bool {
         let variables = self.arena.variables_of(&[operand]);
-        variables
-            .into_iter()
-            .any(|variable| self.variable(variable).is_small())
+        variables.into_iter().any(|variable| self.variable(variable).is_small())
     }
 
     /// The sine or cosine of a sum of errors in a truncated ring: `x` or `1 − x²/2`.
@@ -258,10 +243,8 @@ impl<'a> Ring<'a> {
 
     /// The product in normal form, truncated at the ring's order.
     pub fn product(&self, a: &Polynomial, b: &Polynomial) -> Polynomial {
-        let beyond = |monomial: &Monomial| {
-            self.order
-                .is_some_and(|order| monomial.degree(|atom| self.is_small(atom)) > order)
-        };
+        let beyond =
+            |monomial: &Monomial| self.order.is_some_and(|order| monomial.degree(|atom| self.is_small(atom)) > order);
         let mut pending: Vec<(Monomial, BigRational)> = a.product(b, beyond).0.into_iter().collect();
         let mut product = Polynomial::default();
         while let Some((mut monomial, coefficient)) = pending.pop() {

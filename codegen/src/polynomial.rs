@@ -68,13 +68,7 @@ impl Monomial {
 
     /// The greatest common divisor.
     pub fn shared_with(&self, other: &Monomial) -> Monomial {
-        let power = |atom: Atom| {
-            other
-                .0
-                .iter()
-                .find(|(own, _)| *own == atom)
-                .map_or(0, |(_, n)| *n)
-        };
+        let power = |atom: Atom| other.0.iter().find(|(own, _)| *own == atom).map_or(0, |(_, n)| *n);
         let shared = self.0.iter().map(|(atom, n)| (*atom, power(*atom).min(*n)));
         Monomial(shared.filter(|(_, n)| *n > 0).collect())
     }

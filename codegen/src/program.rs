@@ -186,11 +186,7 @@ impl Program {
         for id in &nodes {
             operands(arena.node(*id)).for_each(&mut count);
         }
-        let mut builder = Builder {
-            arena,
-            inputs: &inputs,
-            places: HashMap::new(),
-        };
+        let mut builder = Builder { arena, inputs: &inputs, places: HashMap::new() };
         let mut steps = Vec::new();
         let mut temporaries = 0;
         for id in nodes {
@@ -211,11 +207,7 @@ impl Program {
             steps.push(Step { label, value });
         }
         let outputs = outputs.iter().map(|output| builder.tree(*output)).collect();
-        Program {
-            inputs,
-            steps,
-            outputs,
-        }
+        Program { inputs, steps, outputs }
     }
 
     /// Evaluates the outputs for values of the inputs.
@@ -233,9 +225,7 @@ impl Program {
     pub fn operations(&self) -> Operations {
         let mut operations = Operations::default();
         let values = self.steps.iter().map(|step| &step.value);
-        values
-            .chain(&self.outputs)
-            .for_each(|tree| operations.count(tree));
+        values.chain(&self.outputs).for_each(|tree| operations.count(tree));
         operations
     }
 }

@@ -42,35 +42,24 @@ impl<'m, S: Scalar> Run<'m, S> {
         for axis in &machine.axes {
             let held_position = source.held(&axis.name, &length);
             held.push(held_position.is_some());
-            let position = held_position.unwrap_or_else(|| {
-                nominal(Variable::Position {
-                    axis: axis.name.clone(),
-                    kind: axis.kind,
-                })
-            });
+            let position = held_position
+                .unwrap_or_else(|| nominal(Variable::Position { axis: axis.name.clone(), kind: axis.kind }));
             state.push(AxisPosition::new(axis.kind, position));
         }
         let unknowns = subject.unknowns();
-        let movement = AxisStates {
-            machine,
-            state: &state,
-            held: &held,
-        };
+        let movement = AxisStates { machine, state: &state, held: &held };
         let mut slots = vec![Vec::new(); machine.error_slots() + unknowns.len()];
         let mut basis = Vec::new();
         for (index, parameter) in parameters.iter().enumerate() {
             match parameter {
                 Variable::Error(name) => {
                     let slot = machine.error_slot(name);
-                    let slot =
-                        slot.ok_or_else(|| CodegenError::no_axis(machine, name.to_string(), &name.axis))?;
+                    let slot = slot.ok_or_else(|| CodegenError::no_axis(machine, name.to_string(), &name.axis))?;
                     slots[slot].push((index, None));
                 }
                 Variable::Instrument(unknown) => {
                     let slot = unknowns.iter().position(|known| known == unknown);
-                    let slot = slot.ok_or_else(|| CodegenError::NoSuchParameter {
-                        parameter: parameter.meaning(),
-                    })?;
+                    let slot = slot.ok_or_else(|| CodegenError::NoSuchParameter { parameter: parameter.meaning() })?;
                     slots[machine.error_slots() + slot].push((index, None));
                 }
                 Variable::Coefficient(coefficient) => {
@@ -89,14 +78,7 @@ impl<'m, S: Scalar> Run<'m, S> {
                 Variable::Length(_) | Variable::Position { .. } | Variable::Driver(_) => {}
             }
         }
-        let mut run = Run {
-            machine,
-            subject,
-            state,
-            errors: Vec::new(),
-            unknowns: Vec::new(),
-            slots,
-        };
+        let mut run = Run { machine, subject, state, errors: Vec::new(), unknowns: Vec::new(), slots };
         run.seed(small);
         Ok(run)
     }
@@ -105,10 +87,7 @@ impl<'m, S: Scalar> Run<'m, S> {
     pub(crate) fn seed(&mut self, small: &impl Fn(usize) -> S) {
         let zero = S::nominal(S::Nominal::constant(0.0));
         let value = |slot: usize| in_slot(&self.slots[slot], small);
-        self.errors = self.machine.body_errors(
-            |slot| !self.slots[slot].is_empty(),
-            |slot| value(slot).unwrap_or(zero),
-        );
+        self.errors = self.machine.body_errors(|slot| !self.slots[slot].is_empty(), |slot| value(slot).unwrap_or(zero));
         let first = self.machine.error_slots();
         let unknowns = (first..self.slots.len()).filter_map(|slot| Some((slot - first, value(slot)?)));
         self.unknowns = unknowns.collect();
@@ -117,9 +96,7 @@ impl<'m, S: Scalar> Run<'m, S> {
     /// The factor of an effect's coefficient in each slot that it changes.
     pub(crate) fn bases(&self, index: usize) -> impl Iterator<Item = S::Nominal> {
         let shares = self.slots.iter().flatten();
-        shares
-            .filter(move |(parameter, _)| *parameter == index)
-            .filter_map(|(_, basis)| *basis)
+        shares.filter(move |(parameter, _)| *parameter == index).filter_map(|(_, basis)| *basis)
     }
 
     /// The errors and instrument parameters that effects determine, and their values.
@@ -148,9 +125,7 @@ impl<'m, S: Scalar> Run<'m, S> {
     /// The length error of the bar and the gain error of its sensor, if a bar is read and they are included.
     pub(crate) fn bar_parameters(&self) -> [Option<S>; 2] {
         match self.subject {
-            Subject::Station(Station::BallBar(_)) => {
-                [ballbar::BAR, ballbar::GAIN].map(|slot| self.unknown(slot))
-            }
+            Subject::Station(Station::BallBar(_)) => [ballbar::BAR, ballbar::GAIN].map(|slot| self.unknown(slot)),
             _ => [None; 2],
         }
     }
@@ -167,8 +142,7 @@ impl<'m, S: Scalar> Run<'m, S> {
 
     /// The coordinates of the reading.
     pub(crate) fn read(&self) -> Vec<S> {
-        self.subject
-            .read(self.machine, &self.state, &self.errors, |slot| self.unknown(slot))
+        self.subject.read(self.machine, &self.state, &self.errors, |slot| self.unknown(slot))
     }
 
     /// Computes the reading from its coordinate groups: the bar, or the stylus and step of a probe. `None` if the

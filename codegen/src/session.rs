@@ -42,11 +42,7 @@ impl<'s> SessionTest<'s> {
                 planned.positions.iter().map(range).collect()
             }
         };
-        Ok(SessionTest {
-            session,
-            test,
-            ranges,
-        })
+        Ok(SessionTest { session, test, ranges })
     }
 }
 
@@ -62,11 +58,7 @@ impl Source for SessionTest<'_> {
             return None;
         }
         let written = self.test.at_written.get(index).and_then(Option::as_ref);
-        let held_position = if least.is_finite() {
-            least
-        } else {
-            self.test.at[index]
-        };
+        let held_position = if least.is_finite() { least } else { self.test.at[index] };
         Some(written.map_or_else(|| N::constant(held_position), |written| written.evaluate(length)))
     }
 
@@ -77,10 +69,6 @@ impl Source for SessionTest<'_> {
 
     fn range(&self, axis: &str) -> Option<[f64; 2]> {
         let index = self.session.machine.axis_index(axis)?;
-        self.ranges
-            .get(index)
-            .copied()
-            .flatten()
-            .filter(|[least, greatest]| greatest > least)
+        self.ranges.get(index).copied().flatten().filter(|[least, greatest]| greatest > least)
     }
 }

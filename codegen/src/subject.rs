@@ -37,9 +37,7 @@ pub struct ToolPoint;
 
 impl Source for ToolPoint {
     fn subject<N: Nominal>(&self, length: &impl Fn(&str) -> N) -> Subject<N> {
-        Subject::Volumetric {
-            tool: ["X_t", "Y_t", "Z_t"].map(length),
-        }
+        Subject::Volumetric { tool: ["X_t", "Y_t", "Z_t"].map(length) }
     }
 }
 
@@ -74,10 +72,7 @@ impl<N: Nominal> Subject<N> {
         unknown: impl Fn(usize) -> Option<S>,
     ) -> Vec<S> {
         match self {
-            Subject::Station(station) => station
-                .read(machine, state, errors, unknown)
-                .coordinates()
-                .to_vec(),
+            Subject::Station(station) => station.read(machine, state, errors, unknown).coordinates().to_vec(),
             Subject::Volumetric { tool } => {
                 let none = vec![BodyErrors::<S>::NONE; machine.axes.len()];
                 let seen = |errors: &[BodyErrors<S>]| {

@@ -1,8 +1,6 @@
 //! Named symbols: the model's [expressions](abbe_model::expression) over printable variables.
 
-pub use abbe_model::expression::{
-    Adjoints, Binary, Constant, Node, NodeId, Operand, Unary, VariableId, operands,
-};
+pub use abbe_model::expression::{Adjoints, Binary, Constant, Node, NodeId, Operand, Unary, VariableId, operands};
 
 use crate::variable::Variable;
 

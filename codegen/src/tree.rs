@@ -121,9 +121,7 @@ pub(crate) fn sum(terms: Vec<Term>) -> Tree {
         return Tree::Number(0.0);
     };
     let first = if minus { negative(first) } else { first };
-    terms.fold(first, |sum, (minus, term)| {
-        binary(if minus { Binary::Sub } else { Binary::Add }, sum, term)
-    })
+    terms.fold(first, |sum, (minus, term)| binary(if minus { Binary::Sub } else { Binary::Add }, sum, term))
 }
 
 /// The terms of a sum with their signs; true means minus.

@@ -44,18 +44,12 @@ pub(crate) fn bilinear<'a>(
         [] => exact.to_vec(),
         vectors => vectors.iter().flat_map(|vector| vector.components).collect(),
     };
-    let groups = requested
-        .iter()
-        .map(|group| ring.normal_form(*group))
-        .collect::<Result<Vec<Polynomial>, _>>()?;
-    let parameters = inputs
-        .iter()
-        .filter(|input| matches!(input, Input::Plain(v) if v.is_small()));
+    let groups = requested.iter().map(|group| ring.normal_form(*group)).collect::<Result<Vec<Polynomial>, _>>()?;
+    let parameters = inputs.iter().filter(|input| matches!(input, Input::Plain(v) if v.is_small()));
     let complete = parameters.count() <= 12 && {
         let mut whole = Ring::exact(arena);
         whole.keep(written.whole);
-        let forms: Result<Vec<Polynomial>, _> =
-            requested.iter().map(|group| whole.normal_form(*group)).collect();
+        let forms: Result<Vec<Polynomial>, _> = requested.iter().map(|group| whole.normal_form(*group)).collect();
         forms.is_ok_and(|forms| forms == groups)
     };
     let collector = Collector { ring: &ring, inputs };
@@ -70,11 +64,7 @@ pub(crate) fn bilinear<'a>(
         Some(reading) => vec![reading.operand()],
         None => symbols.into_iter().map(Symbol::operand).collect(),
     };
-    let form = Form::Groups {
-        polynomials: groups,
-        printed: trees,
-        complete,
-    };
+    let form = Form::Groups { polynomials: groups, printed: trees, complete };
     Ok((outputs, form))
 }
 
@@ -85,38 +75,22 @@ pub(crate) fn first<'a>(
     vectors: &mut Vec<NamedVector>,
     written: &FormContext<'a, '_>,
 ) -> Result<FormResult, CodegenError> {
-    let &FormContext {
-        arena,
-        inputs,
-        parameters,
-        whole,
-    } = written;
+    let &FormContext { arena, inputs, parameters, whole } = written;
     let mut ring = Ring::truncated(arena, 1)?;
     ring.keep(whole);
     let read_over = read_over(run, vectors);
     let form = match (read_over.as_slice(), &run.subject) {
         ([bar], Subject::Station(Station::BallBar(station))) => {
             let unknowns = run.bar_parameters().map(|unknown| unknown.map(Symbol::operand));
-            FirstOrder::of_length(
-                &mut ring,
-                bar.components,
-                station.bar.operand(),
-                unknowns,
-                parameters,
-            )?
+            FirstOrder::of_length(&mut ring, bar.components, station.bar.operand(), unknowns, parameters)?
         }
         ([stylus, step], Subject::Station(Station::Probe(probe))) => {
             let nominal = probe.radius.operand();
-            let radius = run
-                .probe_geometry()
-                .map_or(nominal, |geometry| geometry.radius.operand());
+            let radius = run.probe_geometry().map_or(nominal, |geometry| geometry.radius.operand());
             match probe.direction {
-                Some(_) => FirstOrder::of_stated_way(
-                    &mut ring,
-                    [stylus.components, step.components],
-                    radius,
-                    parameters,
-                )?,
+                Some(_) => {
+                    FirstOrder::of_stated_way(&mut ring, [stylus.components, step.components], radius, parameters)?
+                }
                 None => FirstOrder::of_way_to_the_axis(&mut ring, stylus.components, radius, parameters)?,
             }
         }
@@ -130,11 +104,7 @@ pub(crate) fn first<'a>(
             .alternative_length
             .as_ref()
             .map(|length| (length.sign, collector.group(&length.offset))),
-        coefficients: form
-            .sensitivities
-            .iter()
-            .map(|s| collect(&s.coefficients))
-            .collect(),
+        coefficients: form.sensitivities.iter().map(|s| collect(&s.coefficients)).collect(),
         factors: form
             .sensitivities
             .iter()

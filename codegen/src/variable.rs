@@ -2,10 +2,10 @@
 
 use abbe_model::axis::AxisKind;
 use abbe_model::component::{ErrorKind, ErrorName};
+use abbe_model::driver::DriverQuantity;
 use abbe_model::instrument::{InstrumentParameter, InternalUnit};
 
 use crate::coefficient::Coefficient;
-use crate::driver_quantity::DriverQuantity;
 
 /// A variable of an expression.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,10 +43,7 @@ impl Variable {
     /// Whether it is small, so that expressions are truncated in it: an error, a parameter of the instrument, a
     /// coefficient of an effect.
     pub fn is_small(&self) -> bool {
-        matches!(
-            self,
-            Variable::Error(_) | Variable::Instrument(_) | Variable::Coefficient(_)
-        )
+        matches!(self, Variable::Error(_) | Variable::Instrument(_) | Variable::Coefficient(_))
     }
 
     /// Whether it varies from reading to reading.
@@ -69,7 +66,7 @@ impl Variable {
     pub fn unit(&self) -> &'static str {
         match self {
             Variable::Instrument(unknown) if unknown.unit == InternalUnit::Ratio => "1",
-            Variable::Driver(followed) => followed.unit(),
+            Variable::Driver(followed) => followed.unit,
             Variable::Coefficient(coefficient) => coefficient.unit(),
             _ if self.is_angle() => "rad",
             _ => "mm",
@@ -101,7 +98,7 @@ impl Variable {
                     coordinate => format!("error of the {thing} in {coordinate}"),
                 }
             }
-            Variable::Driver(followed) => followed.meaning(),
+            Variable::Driver(followed) => followed.meaning.clone(),
             Variable::Coefficient(coefficient) => coefficient.meaning(),
         }
     }
@@ -114,7 +111,7 @@ impl Variable {
             Variable::Error(name) => name.to_string(),
             Variable::Instrument(unknown) if unknown.coordinate.is_empty() => unknown.thing.to_string(),
             Variable::Instrument(unknown) => format!("{}.{}", unknown.thing, unknown.coordinate),
-            Variable::Driver(followed) => followed.meaning(),
+            Variable::Driver(followed) => followed.meaning.clone(),
             Variable::Coefficient(coefficient) => coefficient.id(),
         }
     }
@@ -135,7 +132,7 @@ impl Variable {
                 "" => format!("δ_{}", unknown.thing),
                 coordinate => format!("δ_{}_{coordinate}", unknown.thing),
             },
-            Variable::Driver(followed) => followed.text(),
+            Variable::Driver(followed) => followed.text.clone(),
             Variable::Coefficient(coefficient) => format!("k_{}", coefficient.number),
         }
     }
@@ -147,9 +144,7 @@ impl Variable {
             None => (text, String::new()),
         };
         match self {
-            Variable::Error(name) if symbols == Symbols::Iso => {
-                ("E".to_string(), name.to_string()[1..].to_string())
-            }
+            Variable::Error(name) if symbols == Symbols::Iso => ("E".to_string(), name.to_string()[1..].to_string()),
             _ => split(self.text(symbols)),
         }
     }
@@ -162,7 +157,7 @@ impl Variable {
                 AxisKind::Rotary => format!("angle_{}", axis.to_lowercase()),
             },
             Variable::Instrument(_) => self.text(symbols).replace('δ', "delta"),
-            Variable::Driver(followed) => followed.identifier(),
+            Variable::Driver(followed) => followed.identifier.clone(),
             _ => self.text(symbols).replace('θ', "theta"),
         };
         identifier(&text)
@@ -171,16 +166,8 @@ impl Variable {
 
 /// `text` in lower case, with every character except ASCII letters, digits and underscores replaced.
 pub fn identifier(text: &str) -> String {
-    let mut clean: String = text
-        .chars()
-        .map(|c| {
-            if c.is_ascii_alphanumeric() {
-                c.to_ascii_lowercase()
-            } else {
-                '_'
-            }
-        })
-        .collect();
+    let mut clean: String =
+        text.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '_' }).collect();
     if !clean.starts_with(|c: char| c.is_ascii_alphabetic()) {
         clean.insert(0, 'v');
     }

@@ -36,12 +36,7 @@ pub struct NamedVector {
 impl NamedVector {
     /// The label of one coordinate.
     pub fn label(&self, coordinate: usize) -> Label {
-        Label::Vector {
-            letter: self.letter,
-            frame: self.frame.clone(),
-            prime: self.prime,
-            coordinate,
-        }
+        Label::Vector { letter: self.letter, frame: self.frame.clone(), prime: self.prime, coordinate }
     }
 }
 
@@ -56,11 +51,7 @@ pub(crate) fn of_subject<'a>(
     errors: &[BodyErrors<Symbol<'a>>],
     unknown: &impl Fn(usize) -> Option<Symbol<'a>>,
 ) -> Vec<NamedVector> {
-    let walk = Walk {
-        machine,
-        state,
-        errors,
-    };
+    let walk = Walk { machine, state, errors };
     match subject {
         Subject::Station(Station::BallBar(bar)) => {
             let p = displaced(bar.workpiece_ball, 0, unknown);
@@ -93,18 +84,12 @@ pub(crate) fn of_subject<'a>(
             let geometry = probe.geometry(machine, state, errors, unknown);
             let meaning = "position of the stylus perpendicular to the artefact's axis";
             vectors.push(named("v", geometry.stylus, meaning));
-            vectors.push(named(
-                "u",
-                geometry.step,
-                "the step perpendicular to the artefact's axis",
-            ));
+            vectors.push(named("u", geometry.step, "the step perpendicular to the artefact's axis"));
             vectors
         }
         // The point that does not carry the sensors; the sensors' point is the origin of the difference.
         Subject::Station(Station::RTest(rtest)) => match rtest.setting {
-            Setting::Table => {
-                walk.on_tool_side(("q", "master ball"), displaced(rtest.spindle_ball, 3, unknown))
-            }
+            Setting::Table => walk.on_tool_side(("q", "master ball"), displaced(rtest.spindle_ball, 3, unknown)),
             Setting::Spindle => {
                 walk.on_workpiece_side(("p", "master ball"), displaced(rtest.workpiece_ball, 0, unknown))
             }
@@ -152,11 +137,7 @@ impl<'a> Walk<'_, 'a> {
 
     fn on_workpiece_side(&self, body: Body, point: Point<Symbol<'a>>) -> Vec<NamedVector> {
         let count = self.machine.workpiece_side;
-        self.along(
-            body,
-            point,
-            (0..count).map(|index| (index, Some(index + 1).filter(|outside| *outside < count))),
-        )
+        self.along(body, point, (0..count).map(|index| (index, Some(index + 1).filter(|outside| *outside < count))))
     }
 
     fn on_tool_side(&self, body: Body, point: Point<Symbol<'a>>) -> Vec<NamedVector> {
@@ -181,14 +162,9 @@ impl<'a> Walk<'_, 'a> {
             let axis = &machine.axes[index];
             let outside = outside.map(|outside| &machine.axes[outside].name);
             let frame = outside.cloned().unwrap_or_else(|| "R".to_string());
-            let in_frame =
-                outside.map_or_else(|| "R".to_string(), |name| format!("the frame of axis {name}"));
+            let in_frame = outside.map_or_else(|| "R".to_string(), |name| format!("the frame of axis {name}"));
             let mut add = |point: Point<Symbol<'a>>, prime: bool, meaning: String| {
-                let vector = NamedVector {
-                    frame: frame.clone(),
-                    prime,
-                    ..named(letter, point, &meaning)
-                };
+                let vector = NamedVector { frame: frame.clone(), prime, ..named(letter, point, &meaning) };
                 let known = vectors.iter().any(|known| known.components == vector.components);
                 let new = vector.components.iter().any(|c| matches!(c, Operand::Node(_)));
                 if new && !known && vector.components != start {
@@ -228,13 +204,7 @@ pub(crate) fn adjoint_vectors(vectors: &[NamedVector], adjoints: &Adjoints) -> V
                 "b" => "unit vector of the bar".to_string(),
                 _ => format!("the same transformed back: derivatives by the {}", vector.meaning),
             };
-            NamedVector {
-                letter: "u",
-                frame: vector.frame.clone(),
-                prime: vector.prime,
-                components,
-                meaning,
-            }
+            NamedVector { letter: "u", frame: vector.frame.clone(), prime: vector.prime, components, meaning }
         })
         .collect()
 }

@@ -1,5 +1,6 @@
-//! Measures the duration of a fit with a thousand to a million readings: four ball-bar tests, eight errors and 28 set-up
-//! parameters with priors. Measures a trace of the tests of chapter 5, and a thousand Monte Carlo draws of their fit.
+//! Measures the duration of a fit with a thousand to a million readings: four ball-bar tests, eight errors and 28
+//! set-up parameters with priors. Measures a trace of the tests of chapter 5, and a thousand Monte Carlo draws of their
+//! fit.
 //!
 //! `cargo bench -p abbe-identify --bench fit`. `identify/benches/peers.py` measures the same with other tools.
 #![allow(missing_docs)]
@@ -38,9 +39,7 @@ fn traces(criterion: &mut Criterion) {
     group.sample_size(10).measurement_time(Duration::from_secs(20));
     let session = sessions::chapter_5();
     group.bench_function("chapter 5, nothing to find", |bencher| {
-        bencher.iter(|| {
-            black_box(trace(black_box(&session), &TraceOptions::default(), &|_| true).expect("a trace"))
-        });
+        bencher.iter(|| black_box(trace(black_box(&session), &TraceOptions::default(), &|_| true).expect("a trace")));
     });
     group.finish();
 }
@@ -50,11 +49,7 @@ fn monte_carlo(criterion: &mut Criterion) {
     group.sample_size(10).measurement_time(Duration::from_secs(10));
     let session = sessions::chapter_5();
     let (problem, found) = prepare(&session, 1).expect("a fit");
-    let draws = MonteCarlo {
-        runs: 1_000,
-        seed: 1,
-        coverage: 0.95,
-    };
+    let draws = MonteCarlo { runs: 1_000, seed: 1, coverage: 0.95 };
     group.bench_function("a thousand draws of the fit of chapter 5", |bencher| {
         bencher.iter(|| {
             let mut result = report(&problem, &found);

@@ -51,24 +51,15 @@ fn large_plan() -> Session {
     }
     let file = folder.path().join("session.toml");
     std::fs::write(&file, text).expect("a file in a temporary folder");
-    let options = ReadOptions {
-        allow_outside: true,
-        ..ReadOptions::default()
-    };
+    let options = ReadOptions { allow_outside: true, ..ReadOptions::default() };
     read(&file, &options).expect("a valid session")
 }
 
 fn plans(criterion: &mut Criterion) {
     let large = large_plan();
-    let mut options = PlanOptions {
-        effects: false,
-        ..PlanOptions::default()
-    };
+    let mut options = PlanOptions { effects: false, ..PlanOptions::default() };
     let found = analyse(&large, &options).expect("an analysis");
-    assert_eq!(
-        (found.tests.len(), found.readings, found.parameter_count),
-        (10, 10_000, 62)
-    );
+    assert_eq!((found.tests.len(), found.readings, found.parameter_count), (10, 10_000, 62));
     let mut group = criterion.benchmark_group("plan");
     group.sample_size(10).measurement_time(Duration::from_secs(10));
     for effects in [false, true] {
@@ -79,22 +70,15 @@ fn plans(criterion: &mut Criterion) {
         });
     }
 
-    let chapter5 =
-        read(&sessions().join("chapter5.toml"), &ReadOptions::default()).expect("the ready session");
+    let chapter5 = read(&sessions().join("chapter5.toml"), &ReadOptions::default()).expect("the ready session");
     group.bench_function("analyse/chapter5 with effects", |bench| {
         bench.iter(|| analyse(black_box(&chapter5), &options).expect("an analysis"));
     });
     let (complete, noise) = prepared(&chapter5, &options).expect("a plan");
     let problem = states::problem_by_test(&complete, noise).expect("a problem");
-    let next = ImproveOptions {
-        goal: Goal::WorstUncertainty,
-        tests: 1,
-        by_minute: false,
-    };
+    let next = ImproveOptions { goal: Goal::WorstUncertainty, tests: 1, by_minute: false };
     let variations = TestVariations::default();
-    let entries = improve(&problem, &variations, &next)
-        .expect("a proposal")
-        .candidate_tests;
+    let entries = improve(&problem, &variations, &next).expect("a proposal").candidate_tests;
     group.bench_function(format!("improve/{entries} entries"), |bench| {
         bench.iter(|| improve(black_box(&problem), &variations, &next).expect("a proposal"));
     });

@@ -1,6 +1,7 @@
 //! Measures how time and memory grow with readings, parameters and candidates, and fits the exponents.
 //!
-//! `cargo bench -p abbe-identify --bench scaling`. Memory is the peak of the process less its value before (Linux only).
+//! `cargo bench -p abbe-identify --bench scaling`. Memory is the peak of the process less its value before (Linux
+//! only).
 #![allow(missing_docs)]
 
 use std::hint::black_box;
@@ -36,7 +37,8 @@ fn measured(rounds: usize, work: impl Fn()) -> (f64, f64) {
     (seconds, memory_mb().map_or(0.0, |(peak, _)| peak - before))
 }
 
-/// Prints a curve: size, seconds, memory, and the exponents over the last decade, or over the whole range if it is shorter.
+/// Prints a curve: size, seconds, memory, and the exponents over the last decade, or over the whole range if it is
+/// shorter.
 fn curve(name: &str, points: &[(f64, f64, f64)]) {
     println!("{name}");
     for (size, seconds, memory) in points {
@@ -86,10 +88,7 @@ fn main() {
         });
         points.push((readings as f64, seconds, memory));
     }
-    curve(
-        "trace of four tests without undeclared effects, by readings",
-        &points,
-    );
+    curve("trace of four tests without undeclared effects, by readings", &points);
 
     let session = sessions::chapter_5();
     let ids: Vec<String> = screened_effects(&session, &TraceOptions::default())
@@ -100,22 +99,14 @@ fn main() {
     let mut points = Vec::new();
     for wanted in [10, 100, 1_000, 5_000] {
         // Evenly over the list, so that all families are represented.
-        let mut only: Vec<String> = (0..wanted)
-            .filter_map(|k| ids.get(k * ids.len() / wanted).cloned())
-            .collect();
+        let mut only: Vec<String> = (0..wanted).filter_map(|k| ids.get(k * ids.len() / wanted).cloned()).collect();
         only.dedup();
-        let options = TraceOptions {
-            only,
-            ..TraceOptions::default()
-        };
+        let options = TraceOptions { only, ..TraceOptions::default() };
         let candidates = screened_effects(&session, &options).expect("the library").len();
         let (seconds, memory) = measured(1, || {
             black_box(trace(&session, &options, &|_| true).expect("a trace"));
         });
         points.push((candidates as f64, seconds, memory));
     }
-    curve(
-        "trace of chapter 5 without undeclared effects, by candidates",
-        &points,
-    );
+    curve("trace of chapter 5 without undeclared effects, by candidates", &points);
 }

@@ -1,10 +1,11 @@
 //! The least-squares circle through points of a plane.
 //!
-//! `Σ (x² + y² − 2·a·x − 2·b·y − c)² → min` is linear in the centre `(a, b)` and in `c = ρ² − a² − b²`. It needs no start value and has no
-//! local minima (Jiang 2014, Section 4.2). For points that scatter by σ about a circle of radius ρ, the centre is that of the geometric
-//! least-squares circle of ISO 230-7 up to terms of σ²/ρ.
+//! `Σ (x² + y² − 2·a·x − 2·b·y − c)² → min` is linear in the centre `(a, b)` and in `c = ρ² − a² − b²`. It needs no
+//! start value and has no local minima (Jiang 2014, Section 4.2). For points that scatter by σ about a circle of radius
+//! ρ, the centre is that of the geometric least-squares circle of ISO 230-7 up to terms of σ²/ρ.
 //!
-//! Jiang (2014): X. Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine Tools*, PhD thesis, University of Birmingham.
+//! Jiang (2014): X. Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine Tools*, PhD thesis,
+//! University of Birmingham.
 
 use num_dual::DualNum;
 
@@ -47,10 +48,7 @@ pub fn through<D: DualNum<Primitive = f64> + Copy>(points: &[[D; 2]]) -> Option<
     let a = (sxr * syy - syr * sxy) * half;
     let b = (syr * sxx - sxr * sxy) * half;
     let radius = (sr / D::from(count) + a * a + b * b).sqrt();
-    Some(Circle {
-        centre: [mx + a, my + b],
-        radius,
-    })
+    Some(Circle { centre: [mx + a, my + b], radius })
 }
 
 #[cfg(test)]
@@ -64,11 +62,7 @@ mod tests {
             .map(|(sin, cos)| [3.0 + 2.0 * cos, -1.0 + 2.0 * sin])
             .collect();
         let circle = through(&points).unwrap();
-        let misses = [
-            circle.centre[0] - 3.0,
-            circle.centre[1] + 1.0,
-            circle.radius - 2.0,
-        ];
+        let misses = [circle.centre[0] - 3.0, circle.centre[1] + 1.0, circle.radius - 2.0];
         assert!(misses.iter().all(|miss| miss.abs() < 1e-12), "{misses:?}");
     }
 

@@ -1,9 +1,9 @@
 //! Identified error motions as functions of the position of their own axis, for compensation tables.
 //!
-//! `E(q) = Σ kᵢ·bᵢ(q)` sums the declared effects of one error motion that depend on the position of its own axis or on its direction of
-//! travel. A curve covers the positions through which its axis moved in runs that observe the error. Other positions would be an
-//! extrapolation: there the axis stood still, or no reading observes the error. The covariance of the coefficients gives the uncertainty
-//! at a position, `u²(q) = b(q)ᵀ·Cov·b(q)`.
+//! `E(q) = Σ kᵢ·bᵢ(q)` sums the declared effects of one error motion that depend on the position of its own axis or on
+//! its direction of travel. A curve covers the positions through which its axis moved in runs that observe the error.
+//! Other positions would be an extrapolation: there the axis stood still, or no reading observes the error. The
+//! covariance of the coefficients gives the uncertainty at a position, `u²(q) = b(q)ᵀ·Cov·b(q)`.
 //!
 //! A table over a position cannot hold an effect of time, temperature or speed. Such effects are listed as excluded.
 
@@ -12,7 +12,8 @@ mod range;
 use std::ops::Range;
 
 use abbe_model::component::{ErrorKind, ErrorName};
-use abbe_model::effect::{Component, Driver, DriverSample, Effect, Shape};
+use abbe_model::driver::{Driver, DriverPart, DriverSample};
+use abbe_model::effect::{Component, Effect};
 
 use crate::fit::Fit;
 use crate::parameters::Role;
@@ -37,11 +38,7 @@ pub struct ErrorCurve {
 impl ErrorCurve {
     /// The basis functions of all terms at a position (mm or rad), approached in a direction (+1 or −1).
     fn basis(&self, position: f64, direction: f64) -> Vec<f64> {
-        let sample = DriverSample {
-            value: position,
-            direction,
-            ..DriverSample::default()
-        };
+        let sample = DriverSample { value: position, direction, ..DriverSample::default() };
         let mut basis = Vec::with_capacity(self.coefficients.len());
         for (effect, _) in &self.terms {
             effect.shape.basis(&sample, &mut basis);
@@ -75,17 +72,13 @@ impl ErrorCurve {
 
     fn u_of(&self, basis: &[f64]) -> f64 {
         let rows = self.covariance.iter().zip(basis);
-        let variance: f64 = rows
-            .map(|(row, b)| b * row.iter().zip(basis).map(|(c, d)| c * d).sum::<f64>())
-            .sum();
+        let variance: f64 = rows.map(|(row, b)| b * row.iter().zip(basis).map(|(c, d)| c * d).sum::<f64>()).sum();
         variance.max(0.0).sqrt()
     }
 
     /// Whether it depends on the direction of travel.
     pub fn is_directional(&self) -> bool {
-        self.terms
-            .iter()
-            .any(|(effect, _)| effect.shape == Shape::Backlash)
+        self.terms.iter().any(|(effect, _)| effect.shape.uses() == DriverPart::Direction)
     }
 }
 
@@ -111,10 +104,9 @@ pub fn of_fit(problem: &Problem<'_>, fit: &Fit) -> Compensation {
         }
         match ErrorName::parse(&parameter.id) {
             Some(name) if name.kind == ErrorKind::Location => result.locations.push((name, fit.beta[j])),
-            _ => result.left_out.push(format!(
-                "{}: a constant error motion is not a function of the position",
-                parameter.id
-            )),
+            _ => result
+                .left_out
+                .push(format!("{}: a constant error motion is not a function of the position", parameter.id)),
         }
     }
     for (index, effect) in problem.parameters.effects.iter().enumerate() {
@@ -124,28 +116,17 @@ pub fn of_fit(problem: &Problem<'_>, fit: &Fit) -> Compensation {
         let id = effect.id();
         let mut found = vec![None; effect.shape.coefficients()];
         for (j, parameter) in list.iter().enumerate() {
-            if let Role::Coefficient {
-                effect: of,
-                coefficient,
-            } = parameter.role
+            if let Role::Coefficient { effect: of, coefficient } = parameter.role
                 && of == index
                 && fit.rank.is_identifiable(j)
             {
                 found[coefficient] = Some(j);
             }
         }
-        let fits_table = match &effect.shape {
-            Shape::Lag
-            | Shape::ReversalSpike { .. }
-            | Shape::Drift
-            | Shape::Warmup { .. }
-            | Shape::Constant => false,
-            _ => matches!(&effect.driver, Driver::Axis(driver) if *driver == error.axis),
-        };
+        let own = matches!(&effect.driver, Driver::Axis(driver) if *driver == error.axis);
+        let fits_table = own && effect.shape.fits_position_table();
         if error.kind != ErrorKind::Motion || !fits_table {
-            result.left_out.push(format!(
-                "{id}: a table over the position of its axis cannot represent it"
-            ));
+            result.left_out.push(format!("{id}: a table over the position of its axis cannot represent it"));
             continue;
         }
         if !effect.tests.is_empty() {
@@ -153,19 +134,13 @@ pub fn of_fit(problem: &Problem<'_>, fit: &Fit) -> Compensation {
             result.left_out.push(format!("{id}: {why}"));
             continue;
         }
-        let (Some(axis), Some(coefficients)) = (
-            machine.axis_index(&error.axis),
-            found.into_iter().collect::<Option<Vec<usize>>>(),
-        ) else {
-            result
-                .left_out
-                .push(format!("{id}: not all of its coefficients are identifiable"));
+        let (Some(axis), Some(coefficients)) =
+            (machine.axis_index(&error.axis), found.into_iter().collect::<Option<Vec<usize>>>())
+        else {
+            result.left_out.push(format!("{id}: not all of its coefficients are identifiable"));
             continue;
         };
-        let term = (
-            effect.clone(),
-            coefficients.iter().map(|j| fit.beta[*j]).collect(),
-        );
+        let term = (effect.clone(), coefficients.iter().map(|j| fit.beta[*j]).collect());
         if let Some(curve) = result.curves.iter_mut().find(|curve| curve.error == *error) {
             curve.terms.push(term);
             curve.coefficients.extend(coefficients);

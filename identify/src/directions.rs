@@ -1,13 +1,14 @@
-//! Components of an R-test vector in three frames: the sensor frame, the reference frame R, and the frame of the turning rotary axis.
+//! Components of an R-test vector in three frames: the sensor frame, the reference frame R, and the frame of the
+//! turning rotary axis.
 //!
 //! ```text
 //! x-wise, y-wise, z-wise        d · X, d · Y, d · Z       R's directions: the share of each linear axis is the same at every position
 //! radial, tangential, axial     d · r, d · (a × r), d · a
 //! ```
 //!
-//! `a` is the direction of the turning axis, as carried by the axes beneath it. `r` is the direction from the axis to the ball. For a C
-//! axis with the ball at +X at C = 0, radial and tangential are Eqs. (10) and (11) of Yamaji, Hamabata & Ihara (2014): radial
-//! `X cos C + Y sin C`, tangential `−X sin C + Y cos C`.
+//! `a` is the direction of the turning axis, as carried by the axes beneath it. `r` is the direction from the axis to
+//! the ball. For a C axis with the ball at +X at C = 0, radial and tangential are Eqs. (10) and (11) of Yamaji,
+//! Hamabata & Ihara (2014): radial `X cos C + Y sin C`, tangential `−X sin C + Y cos C`.
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
@@ -99,12 +100,7 @@ struct Frames {
 }
 
 impl Frames {
-    fn at(
-        machine: &Machine,
-        rtest: &RTest<f64>,
-        state: &[AxisPosition<f64>],
-        turning: Option<usize>,
-    ) -> Frames {
+    fn at(machine: &Machine, rtest: &RTest<f64>, state: &[AxisPosition<f64>], turning: Option<usize>) -> Frames {
         let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
         let in_r = |point: [f64; 3]| {
             Vector3::from(match rtest.setting {
@@ -123,16 +119,9 @@ impl Frames {
             let outward = from - along * from.dot(&along);
             let radial = (outward.norm() > ON_THE_AXIS_MM).then(|| outward.normalize())?;
             let tangential = Vector3::from(cross(along.into(), Point(radial.into())).0);
-            Some(Matrix3::from_rows(&[
-                radial.transpose(),
-                tangential.transpose(),
-                along.transpose(),
-            ]))
+            Some(Matrix3::from_rows(&[radial.transpose(), tangential.transpose(), along.transpose()]))
         });
-        Frames {
-            carrier: Matrix3::from_columns(&columns),
-            turning,
-        }
+        Frames { carrier: Matrix3::from_columns(&columns), turning }
     }
 
     fn view(&self, rtest: &RTest<f64>, orientation: &Orientation<f64>, read: &[f64]) -> DirectionFrame {
@@ -147,10 +136,6 @@ impl Frames {
         };
         let sensors = orientation.to_machine(Point(nominal.into())).0;
         let wise = self.carrier * Vector3::from(sensors);
-        DirectionFrame {
-            sensors,
-            wise: wise.into(),
-            turning: self.turning.map(|rows| (rows * wise).into()),
-        }
+        DirectionFrame { sensors, wise: wise.into(), turning: self.turning.map(|rows| (rows * wise).into()) }
     }
 }

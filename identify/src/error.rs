@@ -18,19 +18,16 @@ pub enum IdentifyError {
     )]
     NoUnknowns,
     /// A filter text matches no identifier in the effect library.
-    #[error(
-        "no candidate effect of this session contains `{text}` in its identifier; identifiers look like EZC~C:h2"
-    )]
+    #[error("no candidate effect of this session contains `{text}` in its identifier; identifiers look like EZC~C:h2")]
     NotInTheLibrary {
         /// The filter text.
         text: String,
     },
     /// The filters exclude every candidate effect.
-    #[error(
-        "no candidate effects remain: the exclusions remove every selected effect; exclude fewer effects"
-    )]
+    #[error("no candidate effects remain: the exclusions remove every selected effect; exclude fewer effects")]
     EverythingLeftOut,
-    /// The caller interrupted the computation. A trace that has begun its search returns the effects found so far instead.
+    /// The caller interrupted the computation. A trace that has begun its search returns the effects found so far
+    /// instead.
     #[error("interrupted before there was a result")]
     Interrupted,
     /// The data lack a column that a declared effect needs.

@@ -1,10 +1,10 @@
 //! Cross-validation: the residual of readings that the fit did not use.
 //!
-//! A fold is one run, or a contiguous block where there are no runs, or a seeded set of independent poses. The fit of the other folds does
-//! not use the held-out fold. Let `A` be the normal matrix of all readings and `W` such that `WᵀAW = I`. Let `T = J·W` for the fold's rows
-//! `[J | r]`, and `y` the remaining step in these directions. The step to the fit of the other folds is `W(I − TᵀT)⁻¹(y − Tᵀr)`, with a
-//! matrix no larger than the number of the fold's rows (Woodbury). If the other folds barely determine a direction, their triangular
-//! factors are merged and solved again.
+//! A fold is one run, or a contiguous block where there are no runs, or a seeded set of independent poses. The fit of
+//! the other folds does not use the held-out fold. Let `A` be the normal matrix of all readings and `W` such that
+//! `WᵀAW = I`. Let `T = J·W` for the fold's rows `[J | r]`, and `y` the remaining step in these directions. The step to
+//! the fit of the other folds is `W(I − TᵀT)⁻¹(y − Tᵀr)`, with a matrix no larger than the number of the fold's rows
+//! (Woodbury). If the other folds barely determine a direction, their triangular factors are merged and solved again.
 
 pub(crate) mod folds;
 
@@ -40,8 +40,8 @@ pub fn rms_mm(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> f64 {
     (sum / count.max(1) as f64).sqrt()
 }
 
-/// Holds out each fold in turn. `beta` is the fit of all readings, `triangles` are the factors of the folds there, `whole` is the factor
-/// of all readings and priors, `basis` spans the identifiable directions (parameters × rank).
+/// Holds out each fold in turn. `beta` is the fit of all readings, `triangles` are the factors of the folds there,
+/// `whole` is the factor of all readings and priors, `basis` spans the identifiable directions (parameters × rank).
 ///
 /// # Errors
 /// If the model cannot be evaluated.
@@ -60,9 +60,7 @@ pub fn held_out(
             None => {
                 let mut rest = problem.prior_triangle(beta);
                 let others = triangles.iter().enumerate();
-                others
-                    .filter(|(other, _)| *other != fold)
-                    .for_each(|(_, triangle)| rest.merge(triangle));
+                others.filter(|(other, _)| *other != fold).for_each(|(_, triangle)| rest.merge(triangle));
                 step_without(&rest, beta, basis)
             }
         })
@@ -84,16 +82,10 @@ pub fn held_out(
         Ok(residual)
     });
     // Blocks are in the order of the rows.
-    for (block, residual) in blocks
-        .iter()
-        .zip(predicted.collect::<Result<Vec<_>, IdentifyError>>()?)
-    {
+    for (block, residual) in blocks.iter().zip(predicted.collect::<Result<Vec<_>, IdentifyError>>()?) {
         residuals[block.test].extend(residual.iter());
     }
-    Ok(HeldOut {
-        rms_mm: rms_mm(problem, &residuals),
-        residuals,
-    })
+    Ok(HeldOut { rms_mm: rms_mm(problem, &residuals), residuals })
 }
 
 /// Least share of the information on a direction that the other folds must hold for the update formula.
@@ -112,14 +104,9 @@ impl Directions {
         let (r, c, _) = whole.parts();
         let rank = basis.ncols();
         if rank == 0 {
-            return Ok(Directions {
-                scaled_basis: Mat::zeros(basis.nrows(), 0),
-                step: Mat::zeros(0, 1),
-            });
+            return Ok(Directions { scaled_basis: Mat::zeros(basis.nrows(), 0), step: Mat::zeros(0, 1) });
         }
-        let svd = (&r * basis)
-            .thin_svd()
-            .map_err(|_| IdentifyError::Decomposition)?;
+        let svd = (&r * basis).thin_svd().map_err(|_| IdentifyError::Decomposition)?;
         let singular = svd.S().column_vector();
         let mut scaled_basis = basis * svd.V();
         for (k, mut column) in scaled_basis.col_iter_mut().enumerate() {
@@ -127,10 +114,7 @@ impl Directions {
             column *= faer::Scale(1.0 / singular[k]);
         }
         let right = Mat::from_fn(c.len(), 1, |i, _| c[i]);
-        Ok(Directions {
-            step: svd.U().transpose() * right,
-            scaled_basis,
-        })
+        Ok(Directions { step: svd.U().transpose() * right, scaled_basis })
     }
 
     /// The step to the fit without a fold; `None` if the other folds barely determine a direction.
@@ -147,15 +131,8 @@ impl Directions {
         let t = rows.subcols(0, parameters) * &self.scaled_basis;
         let residual_step = &self.step - t.transpose() * rows.subcols(parameters, 1);
         let leverage = &t * t.transpose();
-        let eigen = leverage
-            .self_adjoint_eigen(faer::Side::Lower)
-            .map_err(|_| IdentifyError::Decomposition)?;
-        let shares: Vec<f64> = eigen
-            .S()
-            .column_vector()
-            .iter()
-            .map(|share| 1.0 - share)
-            .collect();
+        let eigen = leverage.self_adjoint_eigen(faer::Side::Lower).map_err(|_| IdentifyError::Decomposition)?;
+        let shares: Vec<f64> = eigen.S().column_vector().iter().map(|share| 1.0 - share).collect();
         if shares.iter().any(|share| *share < MIN_SHARE) {
             return Ok(None);
         }
@@ -168,17 +145,15 @@ impl Directions {
     }
 }
 
-/// The step from the fit of all readings to that of the readings in `rest`. It is the minimum-norm solution: a direction that the
-/// remaining readings do not determine returns to its nominal value.
+/// The step from the fit of all readings to that of the readings in `rest`. It is the minimum-norm solution: a
+/// direction that the remaining readings do not determine returns to its nominal value.
 fn step_without(rest: &Triangle, beta: &[f64], basis: &Mat<f64>) -> Result<Vec<f64>, IdentifyError> {
     let (r, c, _) = rest.parts();
     let (n, rank) = (basis.nrows(), basis.ncols());
     if rank == 0 {
         return Ok(vec![0.0; n]);
     }
-    let absolute: Vec<f64> = (0..n)
-        .map(|i| c[i] + (i..n).map(|j| r[(i, j)] * beta[j]).sum::<f64>())
-        .collect();
+    let absolute: Vec<f64> = (0..n).map(|i| c[i] + (i..n).map(|j| r[(i, j)] * beta[j]).sum::<f64>()).collect();
     let reduced = &r * basis;
     let svd = reduced.svd().map_err(|_| IdentifyError::Decomposition)?;
     let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
@@ -215,11 +190,7 @@ mod tests {
         let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(1);
         let parameters = 6;
         // Two combinations of the parameters are outside the fitted directions.
-        let basis = Mat::from_fn(
-            parameters,
-            4,
-            |i, k| if i == k { 1.0 } else { 0.1 * (i * k) as f64 },
-        );
+        let basis = Mat::from_fn(parameters, 4, |i, k| if i == k { 1.0 } else { 0.1 * (i * k) as f64 });
         let basis = basis.qr().compute_thin_Q();
         let folds: Vec<Triangle> = (0..5).map(|_| simulated(9, parameters, &mut random)).collect();
         let merged = |folds: &[Triangle], but: usize| {
@@ -249,13 +220,7 @@ mod tests {
         let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(2);
         let parameters = 3;
         let mut others = Triangle::new(parameters);
-        let block = Mat::from_fn(9, parameters + 1, |_, j| {
-            if j == 2 {
-                0.0
-            } else {
-                random.random_range(-1.0..1.0)
-            }
-        });
+        let block = Mat::from_fn(9, parameters + 1, |_, j| if j == 2 { 0.0 } else { random.random_range(-1.0..1.0) });
         others.absorb(block.as_ref());
         let single_fold = simulated(9, parameters, &mut random);
         let mut whole = others.clone();

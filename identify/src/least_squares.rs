@@ -1,8 +1,8 @@
 //! Gauss–Newton iteration with Levenberg–Marquardt damping, on problems in the form of triangular factors.
 //!
-//! In scaled parameters `y = x/d` the step solves `min ‖c − R·D·η‖² + λ‖η‖²` by the singular value decomposition of `R·D`. `λ` is zero as
-//! long as full steps lower the sum of squares. A linear problem therefore takes one step (Marquardt, J. SIAM 11 (1963) 431; Moré, Lecture
-//! Notes in Mathematics 630 (1978) 105).
+//! In scaled parameters `y = x/d` the step solves `min ‖c − R·D·η‖² + λ‖η‖²` by the singular value decomposition of
+//! `R·D`. `λ` is zero as long as full steps lower the sum of squares. A linear problem therefore takes one step
+//! (Marquardt, J. SIAM 11 (1963) 431; Moré, Lecture Notes in Mathematics 630 (1978) 105).
 
 use faer::Mat;
 
@@ -13,7 +13,8 @@ use crate::triangle::Triangle;
 pub trait LeastSquares {
     /// Number of parameters.
     fn parameters(&self) -> usize;
-    /// The triangular factor of `[J | r]` at `x`, with `r = observed − model` and `J = ∂model/∂x`, both divided by the standard deviation.
+    /// The triangular factor of `[J | r]` at `x`, with `r = observed − model` and `J = ∂model/∂x`, both divided by the
+    /// standard deviation.
     ///
     /// # Errors
     /// If the model yields a number that is not finite.
@@ -84,9 +85,7 @@ pub fn minimise(
         let scaled = Mat::from_fn(n, n, |i, j| r[(i, j)] * scale[j]);
         let svd = scaled.svd().map_err(|_| IdentifyError::Decomposition)?;
         let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
-        let projected: Vec<f64> = (0..n)
-            .map(|k| (0..n).map(|i| svd.U()[(i, k)] * c[i]).sum::<f64>())
-            .collect();
+        let projected: Vec<f64> = (0..n).map(|k| (0..n).map(|i| svd.U()[(i, k)] * c[i]).sum::<f64>()).collect();
         let largest = singular.first().copied().unwrap_or(0.0);
         let negligible = largest * 1e-14;
         let step_with = |damping: f64| -> Vec<f64> {
@@ -102,8 +101,8 @@ pub fn minimise(
             }
             step
         };
-        // A step is accepted if the sum of squares falls. Near the minimum the decrease is below rounding and the size of the step
-        // decides.
+        // A step is accepted if the sum of squares falls. Near the minimum the decrease is below rounding and the size
+        // of the step decides.
         let mut accepted = false;
         let mut converged = false;
         let mut next = None;
@@ -115,14 +114,7 @@ pub fn minimise(
                 .zip(&scale)
                 .zip(&x)
                 .map(|((s, d), x)| {
-                    (s / (x.abs()
-                        + if let Scaling::Physical(_) = scaling {
-                            *d
-                        } else {
-                            0.0
-                        })
-                    .max(1e-300))
-                    .abs()
+                    (s / (x.abs() + if let Scaling::Physical(_) = scaling { *d } else { 0.0 }).max(1e-300)).abs()
                 })
                 .fold(0.0, f64::max);
             // Successive steps shrink by about the same factor. This product estimates the next step.
@@ -139,8 +131,7 @@ pub fn minimise(
             // The first attempt is nearly always accepted, so it is linearised at once.
             let sum = if attempt == 0 {
                 next = problem.linearise(&trial).ok();
-                next.as_ref()
-                    .map_or(f64::NAN, |next| next.sum_of_squares_after(&zero_step))
+                next.as_ref().map_or(f64::NAN, |next| next.sum_of_squares_after(&zero_step))
             } else {
                 next = None;
                 problem.sum_of_squares(&trial)
@@ -148,8 +139,7 @@ pub fn minimise(
             let close = relative < SMALLEST_RELATIVE_STEP * 100.0;
             if sum.is_finite() && (sum < current || (close && sum <= current * (1.0 + 1e-9))) {
                 x = trial;
-                converged =
-                    relative < SMALLEST_RELATIVE_STEP || current - sum <= 1e-15 * current && relative < 1e-7;
+                converged = relative < SMALLEST_RELATIVE_STEP || current - sum <= 1e-15 * current && relative < 1e-7;
                 current = sum;
                 damping *= 0.1;
                 if damping < largest * largest * 1e-12 {
@@ -166,11 +156,7 @@ pub fn minimise(
                 accepted = true;
                 break;
             }
-            damping = if damping == 0.0 {
-                largest * largest * 1e-6
-            } else {
-                damping * 10.0
-            };
+            damping = if damping == 0.0 { largest * largest * 1e-6 } else { damping * 10.0 };
         }
         if !accepted {
             break;
@@ -180,16 +166,8 @@ pub fn minimise(
             None => problem.linearise(&x)?,
         };
         if converged {
-            return Ok(LeastSquaresSolution {
-                x,
-                triangle,
-                sum_of_squares: current,
-                iterations: iteration,
-            });
+            return Ok(LeastSquaresSolution { x, triangle, sum_of_squares: current, iterations: iteration });
         }
     }
-    Err(IdentifyError::NoConvergence {
-        iterations: MAX_ITERATIONS,
-        sum_of_squares: current,
-    })
+    Err(IdentifyError::NoConvergence { iterations: MAX_ITERATIONS, sum_of_squares: current })
 }

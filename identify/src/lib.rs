@@ -1,22 +1,26 @@
-//! Identification: estimates of geometric errors with standard uncertainties, and the search for unmodelled effects in the residual.
+//! Identification: estimates of geometric errors with standard uncertainties, and the search for unmodelled effects in
+//! the residual.
 //!
 //! - [`least_squares`], [`triangle`], [`rank`]: numerical core, independent of any machine;
 //! - [`parameters`], [`problem`]: a session as a least-squares problem;
-//! - [`fit`]: parameter estimation; [`heldout`]: cross-validation; [`noise`]: noise standard deviation and autocorrelation;
+//! - [`fit`]: parameter estimation; [`heldout`]: cross-validation; [`noise`]: noise standard deviation and
+//!   autocorrelation;
 //! - [`plausibility`]: consistency of readings and session;
-//! - [`monte_carlo`], [`propagation`]: propagation of distributions by Monte Carlo; [`repeated`]: Type A against Type B uncertainty;
+//! - [`monte_carlo`], [`propagation`]: propagation of distributions by Monte Carlo; [`repeated`]: Type A against Type B
+//!   uncertainty;
 //! - [`compensation`]: identified error motions as functions of the axis position;
 //! - [`circular`]: ball-bar characteristics of ISO 230-4 and the diagnosis of circular tests;
-//! - [`trace`]: search for the unmodelled effect behind the residual; [`effect_description`], [`parameter_description`]: effects and parameters
+//! - [`trace`]: search for the unmodelled effect behind the residual; [`parameter_description`]: parameters
 //!   in words;
 //! - [`plan`]: identifiability and expected uncertainty of a plan, before any measurement;
 //! - [`directions`]: readings and residuals of an R-test by direction;
-//! - [`simulate`]: simulated readings; [`patterns`]: the pattern of each single error in a test; [`quantity`]: values with units;
+//! - [`simulate`]: simulated readings; [`patterns`]: the pattern of each single error in a test; [`quantity`]: values
+//!   with units;
 //! - [`series`]: the columns of a session, reading by reading, for plots;
 //! - [`results`]: the reported results, in the form of the JSON output.
 //!
-//! The example fits a bundled session as declared, then traces it. Beside noise of 0.3 µm the readings contain one unmodelled effect, an
-//! axial motion of the C table of 1.5 µm · cos(2 C + 60°):
+//! The example fits a bundled session as declared, then traces it. Beside noise of 0.3 µm the readings contain one
+//! unmodelled effect, an axial motion of the C table of 1.5 µm · cos(2 C + 60°):
 //!
 //! ```
 //! use std::path::Path;
@@ -45,8 +49,6 @@ pub mod circle;
 pub mod circular;
 pub mod compensation;
 pub mod directions;
-pub mod drivers;
-pub mod effect_description;
 pub mod error;
 pub mod fit;
 pub mod geometric;

@@ -1,8 +1,9 @@
-//! Propagation of distributions by Monte Carlo (JCGM 101): the distribution of a function of uncertain quantities, linear or nonlinear.
+//! Propagation of distributions by Monte Carlo (JCGM 101): the distribution of a function of uncertain quantities,
+//! linear or nonlinear.
 //!
-//! Each run is counted in one histogram per output and then dropped, so memory does not grow with the number of runs. Runs are drawn in
-//! blocks, each from its own stream of the generator. The result depends on the seed and the number of runs, not on the number of
-//! processors.
+//! Each run is counted in one histogram per output and then dropped, so memory does not grow with the number of runs.
+//! Runs are drawn in blocks, each from its own stream of the generator. The result depends on the seed and the number
+//! of runs, not on the number of processors.
 
 use rand_distr::{Distribution as _, StandardNormal};
 use rand_pcg::Pcg64;
@@ -165,7 +166,8 @@ impl Histogram {
         };
         let tail = (1.0 - coverage) / 2.0;
         let symmetric = [quantile(tail), quantile(1.0 - tail)];
-        // The density is equal at both ends of the shortest interval. The search varies the probability of the lower tail.
+        // The density is equal at both ends of the shortest interval. The search varies the probability of the lower
+        // tail.
         const TAIL_STEPS: usize = 400;
         let mut shortest = symmetric;
         for slide in 0..=TAIL_STEPS {
@@ -229,10 +231,7 @@ pub fn propagate<F: Function>(function: &F, draws: &Draws<'_>) -> Vec<Distributi
             count.merge(other);
         }
     }
-    counts
-        .into_iter()
-        .map(|count| count.distribution(draws.coverage))
-        .collect()
+    counts.into_iter().map(|count| count.distribution(draws.coverage)).collect()
 }
 
 /// Empty histograms with ranges from the pilot runs.
@@ -242,33 +241,21 @@ fn pilot<F: Function>(function: &F, draws: &Draws<'_>) -> Vec<Histogram> {
         .map(|block| {
             let runs = F::BLOCK.min(F::PILOT - block * F::BLOCK);
             let mut drawn = Vec::with_capacity(runs as usize * function.outputs());
-            draw(
-                function,
-                draws,
-                PILOT_STREAM + u128::from(block),
-                runs,
-                |outputs| {
-                    drawn.extend_from_slice(outputs);
-                },
-            );
+            draw(function, draws, PILOT_STREAM + u128::from(block), runs, |outputs| {
+                drawn.extend_from_slice(outputs);
+            });
             drawn
         })
         .collect();
     let values = (0..function.outputs()).map(|output| {
-        let runs = blocks
-            .iter()
-            .flat_map(|drawn| drawn.chunks_exact(function.outputs()));
+        let runs = blocks.iter().flat_map(|drawn| drawn.chunks_exact(function.outputs()));
         let column = runs.map(|outputs| outputs[output]);
         column.filter(|value| value.is_finite()).collect::<Vec<f64>>()
     });
     values
         .map(|mut column| {
             column.sort_by(f64::total_cmp);
-            let at = |share: f64| {
-                column
-                    .get(((column.len() as f64 - 1.0) * share) as usize)
-                    .copied()
-            };
+            let at = |share: f64| column.get(((column.len() as f64 - 1.0) * share) as usize).copied();
             let (Some(low), Some(middle), Some(high)) = (at(0.1587), at(0.5), at(0.8413)) else {
                 return Histogram::over(0.0, 1.0);
             };
@@ -284,9 +271,9 @@ fn pilot<F: Function>(function: &F, draws: &Draws<'_>) -> Vec<Histogram> {
 mod tests {
     use super::*;
 
-    /// A triangular distribution over 0 to 1 with mode `m`. Of the probability `1 − p` outside the shortest interval, the share `m` lies
-    /// below it. The shortest interval is thus `m √(1 − p)` to `1 − (1 − m) √(1 − p)`. The symmetric one is `√(m (1 − p) / 2)` to
-    /// `1 − √((1 − m) (1 − p) / 2)`.
+    /// A triangular distribution over 0 to 1 with mode `m`. Of the probability `1 − p` outside the shortest interval,
+    /// the share `m` lies below it. The shortest interval is thus `m √(1 − p)` to `1 − (1 − m) √(1 − p)`. The symmetric
+    /// one is `√(m (1 − p) / 2)` to `1 − √((1 − m) (1 − p) / 2)`.
     #[test]
     fn a_triangular_distribution_has_its_closed_form_intervals() {
         const DRAWS: usize = 200_000;
@@ -294,11 +281,7 @@ mod tests {
         let mut count = Histogram::over(0.5, 0.6);
         for k in 0..DRAWS {
             let share = (k as f64 + 0.5) / DRAWS as f64;
-            count.add(if share < m {
-                (share * m).sqrt()
-            } else {
-                1.0 - ((1.0 - share) * (1.0 - m)).sqrt()
-            });
+            count.add(if share < m { (share * m).sqrt() } else { 1.0 - ((1.0 - share) * (1.0 - m)).sqrt() });
         }
         let found = count.distribution(p);
         let near = |found: f64, wanted: f64, within: f64| {
@@ -307,11 +290,7 @@ mod tests {
         near(found.mean, (1.0 + m) / 3.0, 1e-6);
         near(found.u, ((1.0 - m + m * m) / 18.0).sqrt(), 1e-5);
         near(found.symmetric[0], (m * (1.0 - p) / 2.0).sqrt(), 1e-3);
-        near(
-            found.symmetric[1],
-            1.0 - ((1.0 - m) * (1.0 - p) / 2.0).sqrt(),
-            1e-3,
-        );
+        near(found.symmetric[1], 1.0 - ((1.0 - m) * (1.0 - p) / 2.0).sqrt(), 1e-3);
         // The length of the interval is stationary at its minimum.
         let root = (1.0 - p).sqrt();
         near(found.shortest[0], m * root, 0.01);
@@ -335,10 +314,7 @@ mod tests {
         assert_eq!(found.outside, [4, 2, 4]);
         assert!((found.mean + 2.5 / 4.0).abs() < 1e-12);
         // For eight values in pairs: Σ(x − x̄)² / 7.
-        let square: f64 = [-3.0, -2.0, 0.5, 2.0]
-            .iter()
-            .map(|x: &f64| 2.0 * (x + 0.625).powi(2))
-            .sum();
+        let square: f64 = [-3.0, -2.0, 0.5, 2.0].iter().map(|x: &f64| 2.0 * (x + 0.625).powi(2)).sum();
         assert!((found.u - (square / 7.0).sqrt()).abs() < 1e-12);
         assert_eq!(found.symmetric, [f64::NEG_INFINITY, f64::INFINITY]);
     }

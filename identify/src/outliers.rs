@@ -1,8 +1,9 @@
-//! Detection of outliers: along runs against neighbouring readings, among independent poses against the median residual.
+//! Detection of outliers: along runs against neighbouring readings, among independent poses against the median
+//! residual.
 //!
-//! Structure in the residual must not be excluded. Along a run a residual is therefore compared with the medians of its neighbours on
-//! either side, not with zero (Hampel's identifier: Davies & Gather, J. Am. Stat. Assoc. 88 (1993) 782). Poses have no neighbours. A pose
-//! is an outlier if its residual is a large multiple of the median residual.
+//! Structure in the residual must not be excluded. Along a run a residual is therefore compared with the medians of its
+//! neighbours on either side, not with zero (Hampel's identifier: Davies & Gather, J. Am. Stat. Assoc. 88 (1993) 782).
+//! Poses have no neighbours. A pose is an outlier if its residual is a large multiple of the median residual.
 
 use abbe_model::session::readings::Readings;
 use rayon::prelude::*;
@@ -15,8 +16,8 @@ use crate::problem::Problem;
 const NEIGHBOURS: usize = 5;
 /// Limit along a run, in robust standard deviations: exceeded once in 10⁷ Gaussian readings.
 const OUTLIER_ALONG_RUN: f64 = 5.3;
-/// Limit for a pose, in median residual lengths: exceeded once in 10⁹ Gaussian poses of three coordinates. Unmodelled structure is bounded
-/// and stayed far below it.
+/// Limit for a pose, in median residual lengths: exceeded once in 10⁹ Gaussian poses of three coordinates. Unmodelled
+/// structure is bounded and stayed far below it.
 const OUTLIER_POSE: f64 = 5.0;
 
 /// The outliers of the problem, by test and row.
@@ -27,18 +28,12 @@ pub fn reject(problem: &Problem<'_>, fit: &Fit) -> Vec<Vec<bool>> {
             .residuals
             .iter()
             .map(|residual| {
-                residual
-                    .chunks_exact(coordinates)
-                    .map(|v| v.iter().map(|x| x * x).sum::<f64>().sqrt())
-                    .collect()
+                residual.chunks_exact(coordinates).map(|v| v.iter().map(|x| x * x).sum::<f64>().sqrt()).collect()
             })
             .collect();
         let mut all: Vec<f64> = lengths.iter().flatten().copied().collect();
         let limit = OUTLIER_POSE * median(&mut all);
-        return lengths
-            .iter()
-            .map(|test| test.iter().map(|length| *length > limit).collect())
-            .collect();
+        return lengths.iter().map(|test| test.iter().map(|length| *length > limit).collect()).collect();
     }
     problem
         .tests
@@ -58,12 +53,12 @@ fn reject_along_runs(readings: &Readings, residual: &[f64], coordinates: usize, 
             continue;
         }
         for coordinate in 0..coordinates {
-            let values: Vec<f64> =
-                (run.clone().map(|row| residual[row * coordinates + coordinate])).collect();
+            let values: Vec<f64> = (run.clone().map(|row| residual[row * coordinates + coordinate])).collect();
             let middle: Vec<f64> = values.array_windows().map(|five| median_of_five(*five)).collect();
             let mut deviations: Vec<f64> = Vec::with_capacity(run.len());
             for (row, value) in values.iter().enumerate() {
-                // Beside a step (backlash at a reversal) a reading agrees with one of the two sides. An outlier agrees with neither.
+                // Beside a step (backlash at a reversal) a reading agrees with one of the two sides. An outlier agrees
+                // with neither.
                 let start = row.saturating_sub(NEIGHBOURS);
                 let end = (row + NEIGHBOURS + 1).min(values.len());
                 let from = |side: std::ops::Range<usize>| match side.len() {

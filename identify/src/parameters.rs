@@ -3,12 +3,12 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use abbe_model::effect::{Component, Driver, Effect};
+use abbe_model::driver::{DriverInput, Origin};
+use abbe_model::effect::{Component, Effect};
 use abbe_model::instrument::InternalUnit;
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::{Prior, Session, Test};
 
-use crate::drivers::{self, Origin};
 use crate::error::IdentifyError;
 use crate::unit::Unit;
 
@@ -54,7 +54,8 @@ pub struct SlotContribution {
     pub basis: Option<Arc<Vec<f64>>>,
 }
 
-/// The parameters that affect the readings of one test. A test of a large session depends on few of the session's parameters.
+/// The parameters that affect the readings of one test. A test of a large session depends on few of the session's
+/// parameters.
 #[derive(Clone, Debug, Default)]
 pub struct TestParameters {
     /// The slots that depend on a parameter.
@@ -80,11 +81,7 @@ impl TestParameters {
             let index = parameters.partition_point(|parameter| *parameter < contribution.parameter);
             by_slot[slot].push((index, contribution.basis.clone()));
         }
-        TestParameters {
-            slots,
-            parameters,
-            contributions: by_slot,
-        }
+        TestParameters { slots, parameters, contributions: by_slot }
     }
 }
 
@@ -97,7 +94,8 @@ pub struct Parameters {
     pub contributions: Vec<Vec<SlotContribution>>,
     /// The effects whose coefficients are parameters.
     pub effects: Vec<Effect>,
-    /// Their identifiers: [`Effect::id`]. Effects that differ only in the numbers of their shapes are numbered from the second on.
+    /// Their identifiers: [`Effect::id`]. Effects that differ only in the numbers of their shapes are numbered from the
+    /// second on.
     pub effect_ids: Vec<String>,
 }
 
@@ -111,19 +109,13 @@ pub fn physical_size(unit: InternalUnit) -> f64 {
 }
 
 impl Parameters {
-    /// The declared errors and set-up quantities of a session. `tests` are the tests with readings, `models` their models.
+    /// The declared errors and set-up quantities of a session. `tests` are the tests with readings, `models` their
+    /// models.
     ///
     /// # Errors
     /// If an error belongs to no axis of the machine or is declared twice.
-    pub fn declared(
-        session: &Session,
-        tests: &[&Test],
-        models: &[TestModel<'_>],
-    ) -> Result<Parameters, IdentifyError> {
-        let mut parameters = Parameters {
-            contributions: vec![Vec::new(); tests.len()],
-            ..Parameters::default()
-        };
+    pub fn declared(session: &Session, tests: &[&Test], models: &[TestModel<'_>]) -> Result<Parameters, IdentifyError> {
+        let mut parameters = Parameters { contributions: vec![Vec::new(); tests.len()], ..Parameters::default() };
         for name in &session.unknowns {
             let id = name.to_string();
             let Some(slot) = session.machine.error_slot(name) else {
@@ -132,11 +124,7 @@ impl Parameters {
                     session.machine.name, name.axis
                 )));
             };
-            let unit = if name.freedom.is_angle() {
-                InternalUnit::Radian
-            } else {
-                InternalUnit::Millimetre
-            };
+            let unit = if name.freedom.is_angle() { InternalUnit::Radian } else { InternalUnit::Millimetre };
             let index = parameters.push(Parameter {
                 id,
                 unit: Unit::of(unit),
@@ -146,11 +134,7 @@ impl Parameters {
             })?;
             for (test, model) in models.iter().enumerate() {
                 if model.effective_slots().contains(&slot) {
-                    parameters.contributions[test].push(SlotContribution {
-                        parameter: index,
-                        slot,
-                        basis: None,
-                    });
+                    parameters.contributions[test].push(SlotContribution { parameter: index, slot, basis: None });
                 }
             }
         }
@@ -162,11 +146,7 @@ impl Parameters {
                 }
                 let group = test.group(unknown.shared_by);
                 let dot = if unknown.coordinate.is_empty() { "" } else { "." };
-                let bracket = if group.is_empty() {
-                    String::new()
-                } else {
-                    format!("[{group}]")
-                };
+                let bracket = if group.is_empty() { String::new() } else { format!("[{group}]") };
                 let id = format!("{}{dot}{}{bracket}", unknown.thing, unknown.coordinate);
                 let index = match parameters.list.iter().position(|p| p.id == id) {
                     Some(index) => {
@@ -184,11 +164,7 @@ impl Parameters {
                     })?,
                 };
                 let slot = session.machine.error_slots() + component;
-                parameters.contributions[position].push(SlotContribution {
-                    parameter: index,
-                    slot,
-                    basis: None,
-                });
+                parameters.contributions[position].push(SlotContribution { parameter: index, slot, basis: None });
             }
         }
         Ok(parameters)
@@ -214,7 +190,7 @@ impl Parameters {
         origin: &Origin,
         effect: &Effect,
     ) -> Result<(), IdentifyError> {
-        let size = match drivers::component_unit(session, &effect.component) {
+        let size = match effect.component.unit(session.instrument.unknowns()) {
             Some(unit) => physical_size(unit),
             None if effect.component == Component::TriggerDelay => 0.1,
             None => {
@@ -230,11 +206,7 @@ impl Parameters {
         if self.effects.contains(effect) {
             return Err(IdentifyError::RepeatedUnknown { id: effect.id() });
         }
-        let earlier = self
-            .effects
-            .iter()
-            .filter(|other| other.id() == effect.id())
-            .count();
+        let earlier = self.effects.iter().filter(|other| other.id() == effect.id()).count();
         let id = match earlier {
             0 => effect.id(),
             _ => format!("{}#{}", effect.id(), earlier + 1),
@@ -245,29 +217,27 @@ impl Parameters {
                 continue;
             }
             let Some(readings) = &test.readings else { continue };
-            let axis = drivers::component_axis(session, &effect.component);
-            let samples = drivers::samples(&session.machine, model, readings, origin, &effect.driver, axis)
-                .ok_or_else(|| IdentifyError::MissingDriver {
+            let driver = effect.driver.kind();
+            let input = DriverInput {
+                machine: &session.machine,
+                model,
+                readings,
+                origin,
+                component_axis: effect.component.axis(&session.machine),
+            };
+            let samples = driver.samples(&input).ok_or_else(|| IdentifyError::MissingDriver {
                 effect: effect.id(),
                 driver: effect.driver.to_string(),
                 test: test.name.clone(),
-                column: match effect.driver {
-                    Driver::Time => "time_s".to_string(),
-                    Driver::Temperature => "temperature_c".to_string(),
-                    ref other => other.to_string(),
-                },
+                column: driver.column().map_or_else(|| effect.driver.to_string(), str::to_string),
             })?;
             let effective = model.effective_slots();
-            let columns: Vec<Arc<Vec<f64>>> = drivers::basis_columns(&effect.shape, &samples)
-                .into_iter()
-                .map(Arc::new)
-                .collect();
+            let columns: Vec<Arc<Vec<f64>>> = effect.shape.columns(&samples).into_iter().map(Arc::new).collect();
             for (k, column) in columns.iter().enumerate() {
-                largest[k] = column
-                    .iter()
-                    .fold(largest[k], |most, value| most.max(value.abs()));
+                largest[k] = column.iter().fold(largest[k], |most, value| most.max(value.abs()));
             }
-            for (slot, factor) in drivers::component_slots(session, test, readings, &effect.component) {
+            let parameters = test.station.kind().unknowns();
+            for (slot, factor) in effect.component.slots_in(&session.machine, parameters, readings) {
                 if !effective.contains(&slot) {
                     continue;
                 }
@@ -288,13 +258,10 @@ impl Parameters {
             let dot = if name.is_empty() { "" } else { "." };
             self.push(Parameter {
                 id: format!("{id}{dot}{name}"),
-                unit: drivers::coefficient_unit(session, effect, k),
+                unit: Unit::of_effect(session, effect, k),
                 size: if largest[k] > 0.0 { size / largest[k] } else { size },
                 prior: Prior::Free,
-                role: Role::Coefficient {
-                    effect: number,
-                    coefficient: k,
-                },
+                role: Role::Coefficient { effect: number, coefficient: k },
             })?;
         }
         self.effects.push(effect.clone());
@@ -317,11 +284,7 @@ impl Parameters {
                     match &contribution.basis {
                         None => values.constant[contribution.slot] += coefficient,
                         Some(basis) => {
-                            let index = match values
-                                .varying
-                                .iter()
-                                .position(|(slot, _)| *slot == contribution.slot)
-                            {
+                            let index = match values.varying.iter().position(|(slot, _)| *slot == contribution.slot) {
                                 Some(index) => index,
                                 None => {
                                     values.varying.push((contribution.slot, vec![0.0; model.rows()]));
@@ -329,10 +292,7 @@ impl Parameters {
                                 }
                             };
                             let column = &mut values.varying[index].1;
-                            column
-                                .iter_mut()
-                                .zip(basis.iter())
-                                .for_each(|(sum, b)| *sum += coefficient * b);
+                            column.iter_mut().zip(basis.iter()).for_each(|(sum, b)| *sum += coefficient * b);
                         }
                     }
                 }

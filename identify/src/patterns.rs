@@ -1,8 +1,10 @@
-//! The pattern of each single error in the readings of each test, for visual diagnosis on plots (Jiang 2014, Figs. 3.7 and 3.8).
+//! The pattern of each single error in the readings of each test, for visual diagnosis on plots (Jiang 2014, Figs. 3.7
+//! and 3.8).
 //!
 //! `ΔL_e = L(state; e) − L(state; 0)` by the exact chain, for one error of a stated size at a time, all others zero.
 //!
-//! Jiang (2014): X. Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine Tools*, PhD thesis, University of Birmingham.
+//! Jiang (2014): X. Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine Tools*, PhD thesis,
+//! University of Birmingham.
 
 use abbe_model::session::Session;
 use abbe_model::session::readings::Readings;
@@ -52,16 +54,8 @@ pub struct Patterns {
 /// The session's errors to be estimated, positions of 10 µm and orientations of 0.01°.
 pub fn usual_sizes(session: &Session) -> Vec<Given> {
     let given = |name: &abbe_model::component::ErrorName| {
-        let (value, unit) = if name.freedom.is_angle() {
-            ORIENTATION
-        } else {
-            POSITION
-        };
-        Given {
-            id: name.to_string(),
-            value,
-            unit: unit.to_string(),
-        }
+        let (value, unit) = if name.freedom.is_angle() { ORIENTATION } else { POSITION };
+        Given { id: name.to_string(), value, unit: unit.to_string() }
     };
     session.unknowns.iter().map(given).collect()
 }
@@ -69,21 +63,19 @@ pub fn usual_sizes(session: &Session) -> Vec<Given> {
 /// The pattern of each single error, along the measured or planned path of each test.
 ///
 /// # Errors
-/// If a movement is impossible, a name or unit does not fit the session, or the model yields a number that is not finite.
+/// If a movement is impossible, a name or unit does not fit the session, or the model yields a number that is not
+/// finite.
 pub fn patterns(session: &Session, errors: &[Given]) -> Result<Patterns, IdentifyError> {
     if errors.is_empty() {
         return Err(IdentifyError::Request(
-            "no error to show: `[unknowns] errors` is empty; give at least one error with its size, as in EY0A=10um".into(),
+            "no error to show: `[unknowns] errors` is empty; give at least one error with its size, as in EY0A=10um"
+                .into(),
         ));
     }
     let mut exact = session.clone();
     exact.resolution_mm = None;
     let drawn = |given: Vec<Given>| {
-        let simulation = Simulation {
-            given,
-            noise_mm: Some(0.0),
-            ..Simulation::default()
-        };
+        let simulation = Simulation { given, noise_mm: Some(0.0), ..Simulation::default() };
         Ok::<_, IdentifyError>(simulate(&exact, &simulation)?.readings)
     };
     let without = drawn(Vec::new())?;
@@ -112,8 +104,5 @@ pub fn patterns(session: &Session, errors: &[Given]) -> Result<Patterns, Identif
         }
     }
     let names = session.tests.iter().map(|test| test.name.clone());
-    Ok(Patterns {
-        tests: names.zip(without).collect(),
-        patterns,
-    })
+    Ok(Patterns { tests: names.zip(without).collect(), patterns })
 }

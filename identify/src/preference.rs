@@ -2,12 +2,13 @@
 
 use crate::parameters::{Parameter, Role};
 
-/// The order in which parameters are preferred as pivots of null-space combinations (see [`crate::rank`]). The pivot comes first in its
-/// combination. Holding the pivots at nominal makes the other parameters identifiable.
+/// The order in which parameters are preferred as pivots of null-space combinations (see [`crate::rank`]). The pivot
+/// comes first in its combination. Holding the pivots at nominal makes the other parameters identifiable.
 ///
-/// Location errors come first, coefficients of effects next, set-up quantities last. A combination thus states what one machine error is
-/// confounded with, and an error that is confounded with the set-up is stated in terms of the set-up. Within each kind the order is that
-/// of the identifiers, with numbers compared by value (`EA0J2` before `EA0J10`). The order of declarations has no effect.
+/// Location errors come first, coefficients of effects next, set-up quantities last. A combination thus states what one
+/// machine error is confounded with, and an error that is confounded with the set-up is stated in terms of the set-up.
+/// Within each kind the order is that of the identifiers, with numbers compared by value (`EA0J2` before `EA0J10`). The
+/// order of declarations has no effect.
 pub fn pivot_preference(list: &[Parameter]) -> Vec<usize> {
     let kind = |parameter: &Parameter| match parameter.role {
         Role::Error => 0,
@@ -25,18 +26,9 @@ pub fn natural(id: &str) -> Vec<(u64, String)> {
     let mut rest = id;
     while let Some(first) = rest.chars().next() {
         let digits = first.is_ascii_digit();
-        let end = rest
-            .find(|c: char| c.is_ascii_digit() != digits)
-            .unwrap_or(rest.len());
+        let end = rest.find(|c: char| c.is_ascii_digit() != digits).unwrap_or(rest.len());
         let (piece, after) = rest.split_at(end);
-        pieces.push((
-            if digits {
-                piece.parse().unwrap_or(u64::MAX)
-            } else {
-                0
-            },
-            piece.to_string(),
-        ));
+        pieces.push((if digits { piece.parse().unwrap_or(u64::MAX) } else { 0 }, piece.to_string()));
         rest = after;
     }
     pieces
@@ -59,10 +51,7 @@ mod tests {
             prior: Prior::Free,
             role,
         };
-        let coefficient = Role::Coefficient {
-            effect: 0,
-            coefficient: 0,
-        };
+        let coefficient = Role::Coefficient { effect: 0, coefficient: 0 };
         let mut list = vec![
             parameter("bar[A]", Role::Setup),
             parameter("EX0J10", Role::Error),
@@ -71,20 +60,10 @@ mod tests {
             parameter("EA0J2", Role::Error),
             parameter("EZC~C:h2.cos", coefficient),
         ];
-        let wanted = [
-            "EA0J2",
-            "EX0J2",
-            "EX0J10",
-            "EZC~C:h2.cos",
-            "EZC~C:h2.sin",
-            "bar[A]",
-        ];
+        let wanted = ["EA0J2", "EX0J2", "EX0J10", "EZC~C:h2.cos", "EZC~C:h2.sin", "bar[A]"];
         for _ in 0..list.len() {
             list.rotate_left(1);
-            let names: Vec<&str> = pivot_preference(&list)
-                .iter()
-                .map(|j| list[*j].id.as_str())
-                .collect();
+            let names: Vec<&str> = pivot_preference(&list).iter().map(|j| list[*j].id.as_str()).collect();
             assert_eq!(names, wanted);
         }
     }

@@ -1,8 +1,8 @@
 //! The least-squares problem of a session with readings, over blocks of rows.
 //!
-//! A block is a sequence of consecutive readings of one run. One sweep of the chain times the basis functions gives its rows of `[J | r]`.
-//! The rows are whitened along the run and absorbed into the triangular factor of their test and fold. That factor has one column for each
-//! parameter of the test.
+//! A block is a sequence of consecutive readings of one run. One sweep of the chain times the basis functions gives its
+//! rows of `[J | r]`. The rows are whitened along the run and absorbed into the triangular factor of their test and
+//! fold. That factor has one column for each parameter of the test.
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -16,12 +16,12 @@ use faer::Mat;
 use num_dual::DualNum;
 use rayon::prelude::*;
 
-use crate::drivers::Origin;
 use crate::error::IdentifyError;
 use crate::heldout::folds::Folds;
 use crate::noise::Noise;
 use crate::parameters::{Parameters, TestParameters};
 use crate::triangle::{BLOCK_ROWS, Triangle};
+use abbe_model::driver::Origin;
 
 /// A session with readings, its parameters, and the weights of its readings.
 #[derive(Clone)]
@@ -69,11 +69,7 @@ impl<'a> Problem<'a> {
     /// # Errors
     /// If there are no readings, or an effect cannot be evaluated.
     pub fn new(session: &'a Session, noise: Noise, seed: u64) -> Result<Problem<'a>, IdentifyError> {
-        let tests: Vec<&Test> = session
-            .tests
-            .iter()
-            .filter(|test| test.readings.is_some())
-            .collect();
+        let tests: Vec<&Test> = session.tests.iter().filter(|test| test.readings.is_some()).collect();
         if tests.is_empty() {
             return Err(IdentifyError::NoReadings);
         }
@@ -86,21 +82,12 @@ impl<'a> Problem<'a> {
                 Some(TestModel::new(&session.machine, station, readings))
             })
             .collect();
-        let origin = Origin::of(session);
+        let origin = session.origin();
         let parameters = Parameters::declared(session, &tests, &models)?;
         let rejected = models.iter().map(|model| vec![false; model.rows()]).collect();
         let folds = Folds::of(session, &tests, seed);
-        let mut problem = Problem {
-            session,
-            tests,
-            models,
-            parameters,
-            origin,
-            noise,
-            rejected,
-            folds,
-            test_parameters: Vec::new(),
-        };
+        let mut problem =
+            Problem { session, tests, models, parameters, origin, noise, rejected, folds, test_parameters: Vec::new() };
         problem.update_test_parameters();
         for effect in &session.effects {
             problem.add_effect(effect)?;
@@ -113,28 +100,19 @@ impl<'a> Problem<'a> {
     /// # Errors
     /// See [`Parameters::add_effect`].
     pub fn add_effect(&mut self, effect: &Effect) -> Result<(), IdentifyError> {
-        self.parameters
-            .add_effect(self.session, &self.tests, &self.models, &self.origin, effect)?;
+        self.parameters.add_effect(self.session, &self.tests, &self.models, &self.origin, effect)?;
         self.update_test_parameters();
         Ok(())
     }
 
     fn update_test_parameters(&mut self) {
-        self.test_parameters = self
-            .parameters
-            .contributions
-            .iter()
-            .map(|contributions| TestParameters::of(contributions))
-            .collect();
+        self.test_parameters =
+            self.parameters.contributions.iter().map(|contributions| TestParameters::of(contributions)).collect();
     }
 
     /// Number of readings that are not excluded.
     pub fn readings(&self) -> usize {
-        self.rejected
-            .iter()
-            .flatten()
-            .filter(|rejected| !**rejected)
-            .count()
+        self.rejected.iter().flatten().filter(|rejected| !**rejected).count()
     }
 
     /// Number of scalar coordinates per reading.
@@ -153,7 +131,8 @@ impl<'a> Problem<'a> {
                 runs = std::iter::once(0..readings.rows()).collect();
             }
             for run in runs {
-                // A block must not cut a whitening filter. Without a filter, a block has the number of rows that a factor absorbs at once.
+                // A block must not cut a whitening filter. Without a filter, a block has the number of rows that a
+                // factor absorbs at once.
                 let most = if self.noise.ar_coefficients.is_empty() {
                     (BLOCK_ROWS / self.coordinates()).max(1)
                 } else {
@@ -162,10 +141,7 @@ impl<'a> Problem<'a> {
                 let mut start = run.start;
                 while start < run.end {
                     let end = (start + most).min(run.end);
-                    blocks.push(RowBlock {
-                        test,
-                        rows: start..end,
-                    });
+                    blocks.push(RowBlock { test, rows: start..end });
                     start = end;
                 }
             }
@@ -198,8 +174,8 @@ impl<'a> Problem<'a> {
         &self.test_parameters[test].parameters
     }
 
-    /// The nonzero columns of [`Problem::rows`]: those of [`Problem::own_parameters`], and the residual. `values` belong to the block's
-    /// test.
+    /// The nonzero columns of [`Problem::rows`]: those of [`Problem::own_parameters`], and the residual. `values`
+    /// belong to the block's test.
     ///
     /// # Errors
     /// If the model yields a number that is not finite.
@@ -212,16 +188,13 @@ impl<'a> Problem<'a> {
             return Ok(rows);
         };
         let observed = &readings.observed[scalars];
-        let mut columns: Vec<&mut [f64]> = (rows.col_iter_mut())
-            .filter_map(|column| Some(column.try_as_col_major_mut()?.as_slice_mut()))
-            .collect();
+        let mut columns: Vec<&mut [f64]> =
+            (rows.col_iter_mut()).filter_map(|column| Some(column.try_as_col_major_mut()?.as_slice_mut())).collect();
         let mut bad = None;
         self.models[block.test].sweep(values, &own.slots, block.rows.clone(), |output, start, values| {
             let Some(by) = output.checked_sub(coordinates) else {
                 let first = start * coordinates + output;
-                let residuals = columns[own.parameters.len()][first..]
-                    .iter_mut()
-                    .step_by(coordinates);
+                let residuals = columns[own.parameters.len()][first..].iter_mut().step_by(coordinates);
                 let observed = observed[first..].iter().step_by(coordinates);
                 for (i, (residual, (observed, value))) in residuals.zip(observed.zip(values)).enumerate() {
                     *residual = observed - value;
@@ -235,10 +208,7 @@ impl<'a> Problem<'a> {
                 let column = &mut columns[*parameter];
                 let mut add = |terms: &mut dyn Iterator<Item = f64>| {
                     let entries = column[start * coordinates + by / own.slots.len()..].iter_mut();
-                    entries
-                        .step_by(coordinates)
-                        .zip(terms)
-                        .for_each(|(entry, term)| *entry += term);
+                    entries.step_by(coordinates).zip(terms).for_each(|(entry, term)| *entry += term);
                 };
                 match basis {
                     // A separate loop for the simple case, so that the compiler can vectorise it.
@@ -264,8 +234,8 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The scalar rows of a block that remain after whitening. A row is dropped if its reading, or one within the filter's order before
-    /// it, is an outlier.
+    /// The scalar rows of a block that remain after whitening. A row is dropped if its reading, or one within the
+    /// filter's order before it, is an outlier.
     pub fn kept_rows(&self, block: &RowBlock) -> Vec<usize> {
         let coordinates = self.coordinates();
         let rejected = &self.rejected[block.test];
@@ -281,8 +251,8 @@ impl<'a> Problem<'a> {
             .collect()
     }
 
-    /// Whitens rows along a run, `(x_t − Σ a_k x_{t−k})/σ_innovation`, and drops outliers. Returns the remaining rows and the fold of
-    /// each.
+    /// Whitens rows along a run, `(x_t − Σ a_k x_{t−k})/σ_innovation`, and drops outliers. Returns the remaining rows
+    /// and the fold of each.
     pub fn whiten(&self, rows: &Mat<f64>, block: &RowBlock) -> (Mat<f64>, Vec<usize>) {
         let kept = self.kept_rows(block);
         let folds = self.folds_of(&kept, block).collect();
@@ -372,9 +342,7 @@ impl<'a> Problem<'a> {
                     triangle.absorb(white.as_ref());
                 } else {
                     let chosen: Vec<usize> = (0..folds.len()).filter(|i| folds[*i] == *fold).collect();
-                    triangle.absorb(
-                        Mat::from_fn(chosen.len(), white.ncols(), |i, j| white[(chosen[i], j)]).as_ref(),
-                    );
+                    triangle.absorb(Mat::from_fn(chosen.len(), white.ncols(), |i, j| white[(chosen[i], j)]).as_ref());
                 }
             }
         }
@@ -398,8 +366,8 @@ impl<'a> Problem<'a> {
         self.prior_triangle_about(beta, |_| 0.0, |_| 0.0)
     }
 
-    /// As [`Problem::prior_triangle`], with other prior means: `centre` for each parameter with a Gaussian prior, and an offset in mm
-    /// `longer` for each distance between sockets.
+    /// As [`Problem::prior_triangle`], with other prior means: `centre` for each parameter with a Gaussian prior, and
+    /// an offset in mm `longer` for each distance between sockets.
     pub fn prior_triangle_about(
         &self,
         beta: &[f64],
@@ -431,9 +399,7 @@ impl<'a> Problem<'a> {
                 .map(|i| (coordinate(i, a[i], nominal_a[i]) - coordinate(i + 3, b[i], nominal_b[i])).powi(2))
                 .fold(num_dual::DualSVec64::<6>::from(0.0), |sum, term| sum + term);
             let length = square.sqrt();
-            let gradient = length
-                .eps
-                .unwrap_generic(nalgebra::Const::<6>, nalgebra::Const::<1>);
+            let gradient = length.eps.unwrap_generic(nalgebra::Const::<6>, nalgebra::Const::<1>);
             let mut row = vec![0.0; count + 1];
             for i in 0..3 {
                 row[a[i]] += gradient[i] / distance.u_mm;
@@ -449,21 +415,14 @@ impl<'a> Problem<'a> {
 
     /// The parameters of a socket and its nominal position.
     fn socket(&self, name: &str) -> Option<([usize; 3], [f64; 3])> {
-        let test = self
-            .tests
-            .iter()
-            .position(|test| test.socket.as_deref() == Some(name))?;
+        let test = self.tests.iter().position(|test| test.socket.as_deref() == Some(name))?;
         let Station::Socket(station) = self.models[test].station() else {
             return None;
         };
         let mut indices = [0; 3];
         for (index, coordinate) in indices.iter_mut().zip(["x", "y", "z"]) {
             let id = format!("socket.{coordinate}[{name}]");
-            *index = self
-                .parameters
-                .list
-                .iter()
-                .position(|parameter| parameter.id == id)?;
+            *index = self.parameters.list.iter().position(|parameter| parameter.id == id)?;
         }
         Some((indices, station.socket))
     }
@@ -475,10 +434,7 @@ impl<'a> Problem<'a> {
             .map(|((model, test), values)| {
                 let mut residuals = model.readings_mm(values);
                 let observed = test.readings.iter().flat_map(|readings| &readings.observed);
-                residuals
-                    .iter_mut()
-                    .zip(observed)
-                    .for_each(|(value, observed)| *value = observed - *value);
+                residuals.iter_mut().zip(observed).for_each(|(value, observed)| *value = observed - *value);
                 residuals
             })
             .collect()
@@ -489,8 +445,7 @@ impl<'a> Problem<'a> {
         let residuals = self.residuals(beta);
         let coordinates = self.coordinates();
         let squares = self.blocks().into_par_iter().map(|block| {
-            let residual =
-                &residuals[block.test][block.rows.start * coordinates..block.rows.end * coordinates];
+            let residual = &residuals[block.test][block.rows.start * coordinates..block.rows.end * coordinates];
             let column = Mat::from_fn(residual.len(), 1, |i, _| residual[i]);
             let (white, _) = self.whiten(&column, &block);
             white.col(0).iter().map(|value| value * value).sum::<f64>()

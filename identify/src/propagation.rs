@@ -1,12 +1,13 @@
-//! Monte Carlo of the fit (JCGM 101): readings and set-up priors are simulated about their observed and stated values, and every simulated
-//! session is fitted again, nonlinearly.
+//! Monte Carlo of the fit (JCGM 101): readings and set-up priors are simulated about their observed and stated values,
+//! and every simulated session is fitted again, nonlinearly.
 //!
 //! ```text
 //! Y = argmin Σ ((x_i − L_i(β))/σ)² + Σ ((s_k − β_k)/u_k)²,    x_i ~ N(observed, σ²),  s_k ~ N(stated, u_k²)
 //! ```
 //!
-//! For a linear model `Y` is Gaussian with the covariance of the law of propagation. JCGM 101 (8.1) gives the validation of that law. With
-//! `u = c·10^l`, `c` of one significant digit, the ends of the two coverage intervals may differ by `δ = ½·10^l`.
+//! For a linear model `Y` is Gaussian with the covariance of the law of propagation. JCGM 101 (8.1) gives the
+//! validation of that law. With `u = c·10^l`, `c` of one significant digit, the ends of the two coverage intervals may
+//! differ by `δ = ½·10^l`.
 
 use faer::Mat;
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
@@ -23,7 +24,8 @@ use crate::problem::{Problem, RowBlock};
 use crate::results::{DrawnParameter, FitMonteCarlo, FitResult, Verdict, phases_follow_amplitudes};
 use crate::triangle::{BLOCK_ROWS, Triangle};
 
-/// Number of steps with the curvature of the original fit. After these the simulated session is fitted with its own curvature.
+/// Number of steps with the curvature of the original fit. After these the simulated session is fitted with its own
+/// curvature.
 const MAX_SHARED_STEPS: usize = 8;
 /// Expected decrease of the sum of squares below which the iteration ends: a hundredth of a standard uncertainty.
 const MIN_DECREASE: f64 = 1e-4;
@@ -92,23 +94,17 @@ impl<'p, 'a> Refit<'p, 'a> {
 
     fn beta(&self, z: &[f64]) -> Vec<f64> {
         let basis = &self.fit.rank.identifiable_basis;
-        (0..basis.nrows())
-            .map(|j| (0..z.len()).map(|k| basis[(j, k)] * z[k]).sum())
-            .collect()
+        (0..basis.nrows()).map(|j| (0..z.len()).map(|k| basis[(j, k)] * z[k]).sum()).collect()
     }
 
     /// The identifiable coordinates with the best fit to the inputs.
     fn fitted(&self, deviations: &[f64]) -> Result<Vec<f64>, IdentifyError> {
-        let drawn = SimulatedFit {
-            refit: self,
-            deviations,
-        };
+        let drawn = SimulatedFit { refit: self, deviations };
         let mut z = self.end.clone();
         for _ in 0..MAX_SHARED_STEPS {
             let Ok(descent) = drawn.descent(&z) else { break };
-            let step: Vec<f64> = (0..z.len())
-                .map(|i| (0..z.len()).map(|k| self.inverse[(i, k)] * descent[k]).sum())
-                .collect();
+            let step: Vec<f64> =
+                (0..z.len()).map(|i| (0..z.len()).map(|k| self.inverse[(i, k)] * descent[k]).sum()).collect();
             let fall: f64 = step.iter().zip(&descent).map(|(s, d)| s * d).sum();
             z.iter_mut().zip(&step).for_each(|(z, step)| *z += step);
             if fall < MIN_DECREASE {
@@ -204,9 +200,7 @@ impl SimulatedFit<'_, '_, '_> {
         add(&all, &known);
         self.rows(&beta, |own, rows| add(own, &rows))?;
         let basis = &self.refit.fit.rank.identifiable_basis;
-        Ok((0..basis.ncols())
-            .map(|k| (0..count).map(|j| basis[(j, k)] * whole[j]).sum())
-            .collect())
+        Ok((0..basis.ncols()).map(|k| (0..count).map(|j| basis[(j, k)] * whole[j]).sum()).collect())
     }
 }
 
@@ -242,9 +236,8 @@ impl LeastSquares for SimulatedFit<'_, '_, '_> {
             };
             let start = refit.starts[test];
             let read = model.readings_mm(values);
-            let residual: Vec<f64> = (0..read.len())
-                .map(|i| readings.observed[i] + self.deviations[start + i] - read[i])
-                .collect();
+            let residual: Vec<f64> =
+                (0..read.len()).map(|i| readings.observed[i] + self.deviations[start + i] - read[i]).collect();
             for block in refit.blocks.iter().filter(|block| block.test == test) {
                 let first = block.rows.start * coordinates;
                 let column = Mat::from_fn(block.rows.len() * coordinates, 1, |i, _| residual[first + i]);
@@ -257,7 +250,8 @@ impl LeastSquares for SimulatedFit<'_, '_, '_> {
     }
 }
 
-/// Runs the Monte Carlo and adds it to the result. Parameters for which the two methods disagree report the `u` of the Monte Carlo.
+/// Runs the Monte Carlo and adds it to the result. Parameters for which the two methods disagree report the `u` of the
+/// Monte Carlo.
 ///
 /// # Errors
 /// If nothing is identifiable, or too few simulated sessions can be fitted for a distribution.
@@ -276,13 +270,7 @@ pub fn add_monte_carlo(
     let mean = vec![0.0; refit.u.len()];
     let distributions = monte_carlo::propagate(
         &refit,
-        &Draws {
-            mean: &mean,
-            u: &refit.u,
-            runs: draws.runs,
-            seed: draws.seed,
-            coverage: draws.coverage,
-        },
+        &Draws { mean: &mean, u: &refit.u, runs: draws.runs, seed: draws.seed, coverage: draws.coverage },
     );
     let unconverged = distributions.iter().map(|d| d.outside[2]).max().unwrap_or(0);
     if unconverged * 2 > draws.runs {
@@ -296,16 +284,7 @@ pub fn add_monte_carlo(
         .parameters
         .iter()
         .zip(&distributions)
-        .map(|(parameter, drawn)| {
-            compared(
-                &parameter.id,
-                parameter.value,
-                parameter.u,
-                &parameter.unit,
-                drawn,
-                draws,
-            )
-        })
+        .map(|(parameter, drawn)| compared(&parameter.id, parameter.value, parameter.u, &parameter.unit, drawn, draws))
         .collect();
     for (parameter, drawn) in result.parameters.iter_mut().zip(&parameters) {
         if drawn.verdict != Verdict::Agree {
@@ -315,10 +294,9 @@ pub fn add_monte_carlo(
     phases_follow_amplitudes(&mut result.parameters);
     result.covariance = fit::covariance_of_parameters(problem, fit, &result.parameters);
     if unconverged > 0 {
-        result.warnings.push(format!(
-            "{unconverged} of {} could not be fitted and are excluded",
-            counted(draws.runs, "draw")
-        ));
+        result
+            .warnings
+            .push(format!("{unconverged} of {} could not be fitted and are excluded", counted(draws.runs, "draw")));
     }
     result.monte_carlo = Some(FitMonteCarlo {
         runs: draws.runs,
@@ -331,14 +309,7 @@ pub fn add_monte_carlo(
 }
 
 /// Law of propagation and Monte Carlo for one parameter.
-fn compared(
-    id: &str,
-    value: f64,
-    gum_u: f64,
-    unit: &str,
-    drawn: &Distribution,
-    draws: &MonteCarlo,
-) -> DrawnParameter {
+fn compared(id: &str, value: f64, gum_u: f64, unit: &str, drawn: &Distribution, draws: &MonteCarlo) -> DrawnParameter {
     let normal = Normal::standard();
     let tail = (1.0 - draws.coverage) / 2.0;
     let factor = -normal.inverse_cdf(tail);
@@ -388,17 +359,9 @@ pub fn tolerance(u: f64) -> f64 {
         return 0.0;
     }
     let power = u.log10().floor() as i32;
-    let power = if (u / 10.0_f64.powi(power)).round() >= 10.0 {
-        power + 1
-    } else {
-        power
-    };
+    let power = if (u / 10.0_f64.powi(power)).round() >= 10.0 { power + 1 } else { power };
     // Dividing by a whole power of ten keeps decimals exact.
-    if power < 0 {
-        0.5 / 10.0_f64.powi(-power)
-    } else {
-        0.5 * 10.0_f64.powi(power)
-    }
+    if power < 0 { 0.5 / 10.0_f64.powi(-power) } else { 0.5 * 10.0_f64.powi(power) }
 }
 
 #[cfg(test)]
@@ -410,31 +373,24 @@ mod tests {
     use super::*;
     use crate::fit::prepare;
 
-    /// Three computations for one simulated session agree: the sum of squares of its rows, that of its residuals, and its gradient against
-    /// differences.
+    /// Three computations for one simulated session agree: the sum of squares of its rows, that of its residuals, and
+    /// its gradient against differences.
     #[test]
     fn sum_of_squares_and_gradient_of_a_simulated_session_agree() {
-        let file =
-            Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
         let session = files::session(&file, &ReadOptions::default()).unwrap();
         let (problem, fit) = prepare(&session, 1).unwrap();
         let refit = Refit::new(&problem, &fit).unwrap();
         // Deviations of one standard uncertainty with alternating signs.
         let signs = [1.0, -1.0, 1.0, 1.0, -1.0].iter().cycle();
         let deviations: Vec<f64> = refit.u.iter().zip(signs).map(|(u, sign)| u * sign).collect();
-        let drawn = SimulatedFit {
-            refit: &refit,
-            deviations: &deviations,
-        };
+        let drawn = SimulatedFit { refit: &refit, deviations: &deviations };
         let z = drawn.refit.end.clone();
         let zero_step = vec![0.0; z.len()];
         let whole = drawn.linearise(&z).unwrap().sum_of_squares_after(&zero_step);
         let of_residuals = drawn.sum_of_squares(&z);
         assert!(of_residuals > 0.5 * problem.readings() as f64, "{of_residuals}");
-        assert!(
-            (of_residuals / whole - 1.0).abs() < 1e-9,
-            "{of_residuals} and {whole}"
-        );
+        assert!((of_residuals / whole - 1.0).abs() < 1e-9, "{of_residuals} and {whole}");
         let descent = drawn.descent(&z).unwrap();
         for k in 0..z.len() {
             let by = 1e-2 * refit.inverse[(k, k)].sqrt();
@@ -445,11 +401,7 @@ mod tests {
             };
             let slope = (at(by) - at(-by)) / (2.0 * by);
             let scale = refit.inverse[(k, k)].sqrt();
-            assert!(
-                (slope + 2.0 * descent[k]).abs() * scale < 1e-4,
-                "{k}: {slope} {}",
-                descent[k]
-            );
+            assert!((slope + 2.0 * descent[k]).abs() * scale < 1e-4, "{k}: {slope} {}", descent[k]);
         }
     }
 }

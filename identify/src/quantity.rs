@@ -70,22 +70,17 @@ impl Given {
             )));
         }
         // The longest prefix that is a number: `1e3um` is a thousand µm, and an `e` that starts a unit is no exponent.
-        let number = (1..=quantity.len())
-            .rev()
-            .filter(|end| quantity.is_char_boundary(*end))
-            .find_map(|end| {
-                let value: f64 = quantity[..end].trim_end().parse().ok()?;
-                Some((value, quantity[end..].trim()))
-            });
+        let number = (1..=quantity.len()).rev().filter(|end| quantity.is_char_boundary(*end)).find_map(|end| {
+            let value: f64 = quantity[..end].trim_end().parse().ok()?;
+            Some((value, quantity[end..].trim()))
+        });
         match number {
-            Some((value, _)) if value.is_finite() && value.abs() > LARGEST => Err(IdentifyError::Request(
-                format!("`{id}={quantity}`: {value:e} is too large; the maximum is {LARGEST:e}"),
-            )),
-            Some((value, unit)) if value.is_finite() && (!unit.is_empty() || value == 0.0) => Ok(Given {
-                id: id.to_string(),
-                value,
-                unit: unit.to_string(),
-            }),
+            Some((value, _)) if value.is_finite() && value.abs() > LARGEST => Err(IdentifyError::Request(format!(
+                "`{id}={quantity}`: {value:e} is too large; the maximum is {LARGEST:e}"
+            ))),
+            Some((value, unit)) if value.is_finite() && (!unit.is_empty() || value == 0.0) => {
+                Ok(Given { id: id.to_string(), value, unit: unit.to_string() })
+            }
             Some((value, "")) if value.is_finite() => Err(IdentifyError::Request(format!(
                 "`{id}={quantity}` has no unit; write the unit after the number, as in `{id}={quantity}um` or `{id}={quantity}arcsec`"
             ))),
@@ -100,8 +95,7 @@ impl Given {
     /// # Errors
     /// If the two units are of different quantities.
     pub fn inside(&self, unit: &Unit) -> Result<f64, IdentifyError> {
-        self.in_unit(&unit.name)
-            .map(|value| value / unit.display_per_internal)
+        self.in_unit(&unit.name).map(|value| value / unit.display_per_internal)
     }
 
     /// The value in another unit.
@@ -130,23 +124,17 @@ impl Given {
 
 /// The size of the first unit in the second one.
 fn factor(from: &str, to: &str) -> Option<f64> {
-    [&LENGTHS[..], &ANGLES[..], &TIMES[..], &RATIOS[..]]
-        .into_iter()
-        .find_map(|units| {
-            let of = |name: &str| {
-                units
-                    .iter()
-                    .find(|(unit, _)| *unit == name)
-                    .map(|(_, size)| *size)
-            };
-            Some(of(from)? / of(to)?)
-        })
+    [&LENGTHS[..], &ANGLES[..], &TIMES[..], &RATIOS[..]].into_iter().find_map(|units| {
+        let of = |name: &str| units.iter().find(|(unit, _)| *unit == name).map(|(_, size)| *size);
+        Some(of(from)? / of(to)?)
+    })
 }
 
 /// Reads a file of values, one `EY0A = "35.3 um"` per line, in the order of the file.
 ///
 /// # Errors
-/// If the file cannot be read, is not TOML, or a value is not text with a number and a unit. The message names the file and the entry.
+/// If the file cannot be read, is not TOML, or a value is not text with a number and a unit. The message names the file
+/// and the entry.
 pub fn read(path: &Path) -> Result<Vec<Given>, IdentifyError> {
     let fault = |message: String| IdentifyError::Request(format!("{}: {message}", path.display()));
     let text = files::text(path, "the file of values")?;

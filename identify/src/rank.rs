@@ -1,13 +1,13 @@
 //! Numerical rank of the readings against their noise, and the null space in canonical form.
 //!
-//! The whitened Jacobian is in physical units (1 mm, 0.01 rad). A singular value `s` then means: a change by the physical size along its
-//! direction changes the readings by `s` standard deviations in total. A direction with `s < 1` is not identifiable, because even a gross
-//! error along it is below the noise. No floating-point tolerance is involved: exact null directions of a nominal geometry have singular
-//! values of 10⁻¹⁰ and lower.
+//! The whitened Jacobian is in physical units (1 mm, 0.01 rad). A singular value `s` then means: a change by the
+//! physical size along its direction changes the readings by `s` standard deviations in total. A direction with `s < 1`
+//! is not identifiable, because even a gross error along it is below the noise. No floating-point tolerance is
+//! involved: exact null directions of a nominal geometry have singular values of 10⁻¹⁰ and lower.
 //!
-//! The null space is reported in reduced row echelon form (`echelon`). The form depends on the space and on a fixed order of preference of
-//! the parameters only, not on the basis from the decomposition. The order of preference ([`Rank::decide`]) follows from identifiers.
-//! Neither rounding nor the order of declarations in a session affects it.
+//! The null space is reported in reduced row echelon form (`echelon`). The form depends on the space and on a fixed
+//! order of preference of the parameters only, not on the basis from the decomposition. The order of preference
+//! ([`Rank::decide`]) follows from identifiers. Neither rounding nor the order of declarations in a session affects it.
 
 use faer::prelude::Solve;
 use faer::{Mat, MatRef};
@@ -22,10 +22,11 @@ pub const MIN_IDENTIFIABLE: f64 = 1.0;
 pub struct Rank {
     /// Singular values in descending order, standard deviations per physical size.
     pub singular_values: Vec<f64>,
-    /// A basis of the identifiable space: parameters × rank, in internal units (mm, rad). Each column is one physical size long.
+    /// A basis of the identifiable space: parameters × rank, in internal units (mm, rad). Each column is one physical
+    /// size long.
     pub identifiable_basis: Mat<f64>,
-    /// Null-space combinations in scaled parameters, in reduced row echelon form. Each row is one combination, with 1 at its pivot and 0
-    /// at the pivots of the other rows.
+    /// Null-space combinations in scaled parameters, in reduced row echelon form. Each row is one combination, with 1
+    /// at its pivot and 0 at the pivots of the other rows.
     pub null_combinations: Vec<Vec<f64>>,
     /// The pivot of each row, in the order of preference.
     pub pivots: Vec<usize>,
@@ -34,8 +35,8 @@ pub struct Rank {
 }
 
 impl Rank {
-    /// Decides the rank from `R` (whitened, priors included) and the physical size of each parameter. `preference` lists every parameter
-    /// once, the preferred pivots of null-space combinations first: see `pivot_preference`.
+    /// Decides the rank from `R` (whitened, priors included) and the physical size of each parameter. `preference`
+    /// lists every parameter once, the preferred pivots of null-space combinations first: see `pivot_preference`.
     ///
     /// # Errors
     /// If `R` has entries that are not finite.
@@ -54,39 +55,25 @@ impl Rank {
         let svd = scaled.svd().map_err(|_| IdentifyError::Decomposition)?;
         let singular_values: Vec<f64> = svd.S().column_vector().iter().copied().collect();
         let rounding = singular_values[0] * 1e-13 * n as f64;
-        let rank = singular_values
-            .iter()
-            .filter(|s| **s >= MIN_IDENTIFIABLE && **s > rounding)
-            .count();
+        let rank = singular_values.iter().filter(|s| **s >= MIN_IDENTIFIABLE && **s > rounding).count();
         let v = svd.V();
         let null_space = Mat::from_fn(n, n - rank, |j, k| v[(j, rank + k)]);
-        let (null_combinations, pivots) =
-            combinations(null_space.as_ref(), scaled.as_ref(), preference, MIN_PIVOT);
+        let (null_combinations, pivots) = combinations(null_space.as_ref(), scaled.as_ref(), preference, MIN_PIVOT);
         // At full rank the basis is that of the parameters themselves.
         let identifiable_basis = if rank == n {
             Mat::from_fn(n, n, |i, j| if i == j { size[i] } else { 0.0 })
         } else {
             Mat::from_fn(n, rank, |i, k| v[(i, k)] * size[i])
         };
-        Ok(Rank {
-            singular_values,
-            identifiable_basis,
-            null_combinations,
-            pivots,
-            null_space,
-        })
+        Ok(Rank { singular_values, identifiable_basis, null_combinations, pivots, null_space })
     }
 
-    /// Coordinates of parameters in the identifiable basis, by least squares; null-space parts are dropped. `size` as in [`Rank::decide`].
-    /// Internal units.
+    /// Coordinates of parameters in the identifiable basis, by least squares; null-space parts are dropped. `size` as
+    /// in [`Rank::decide`]. Internal units.
     pub fn coordinates(&self, beta: &[f64], size: &[f64]) -> Vec<f64> {
         // The columns of the basis over `size` are orthonormal.
         (0..self.identifiable_basis.ncols())
-            .map(|k| {
-                (0..beta.len())
-                    .map(|j| self.identifiable_basis[(j, k)] / size[j] * (beta[j] / size[j]))
-                    .sum()
-            })
+            .map(|k| (0..beta.len()).map(|j| self.identifiable_basis[(j, k)] / size[j] * (beta[j] / size[j])).sum())
             .collect()
     }
 
@@ -96,8 +83,8 @@ impl Rank {
     }
 }
 
-/// The combinations of a null space in canonical form (see [`echelon`]), without coefficients that are due to noise, and the pivot of
-/// each. `scaled` is the whitened triangular factor in scaled parameters.
+/// The combinations of a null space in canonical form (see [`echelon`]), without coefficients that are due to noise,
+/// and the pivot of each. `scaled` is the whitened triangular factor in scaled parameters.
 pub fn combinations(
     null_space: MatRef<'_, f64>,
     scaled: MatRef<'_, f64>,
@@ -111,18 +98,12 @@ pub fn combinations(
     (rows, pivots)
 }
 
-/// Drops the smallest coefficients one by one as long as the remaining combination is not identifiable: such coefficients are due to
-/// noise. Coefficients of equal size are tried in reverse order of preference.
+/// Drops the smallest coefficients one by one as long as the remaining combination is not identifiable: such
+/// coefficients are due to noise. Coefficients of equal size are tried in reverse order of preference.
 fn prune(row: &mut [f64], pivot: usize, scaled: MatRef<'_, f64>, preference: &[usize]) {
     let signal = |row: &[f64]| -> f64 {
-        let change: f64 = (0..scaled.nrows())
-            .map(|i| {
-                (0..row.len())
-                    .map(|j| scaled[(i, j)] * row[j])
-                    .sum::<f64>()
-                    .powi(2)
-            })
-            .sum();
+        let change: f64 =
+            (0..scaled.nrows()).map(|i| (0..row.len()).map(|j| scaled[(i, j)] * row[j]).sum::<f64>().powi(2)).sum();
         change.sqrt() / row.iter().map(|v| v * v).sum::<f64>().sqrt()
     };
     // A reported combination is an approximate null direction. Twice the limit is still below the noise.
@@ -143,8 +124,8 @@ fn prune(row: &mut [f64], pivot: usize, scaled: MatRef<'_, f64>, preference: &[u
     }
 }
 
-/// The magnitude of a number in steps of 10⁻⁴ of itself, so that numbers that differ by rounding alone compare equal. It serves as a key
-/// for stable sorts, which leave equal entries in the order of their names.
+/// The magnitude of a number in steps of 10⁻⁴ of itself, so that numbers that differ by rounding alone compare equal.
+/// It serves as a key for stable sorts, which leave equal entries in the order of their names.
 pub fn magnitude(value: f64) -> i64 {
     (value.abs().max(f64::MIN_POSITIVE).ln() * 1e4).round() as i64
 }
@@ -155,33 +136,28 @@ const MAX_PRUNED_SHARE: f64 = 0.02;
 /// Coefficients below this share of the largest coefficient of the combination are rounding errors.
 const ROUNDING_SHARE: f64 = 1e-5;
 
-/// A parameter is a pivot if its part in the remaining null space is at least this share of the largest such part. The share is large
-/// enough for a stable elimination. It is no ratio of round lengths, so that parts of a geometry in round numbers are not equal to it and
-/// rounding cannot decide.
+/// A parameter is a pivot if its part in the remaining null space is at least this share of the largest such part. The
+/// share is large enough for a stable elimination. It is no ratio of round lengths, so that parts of a geometry in
+/// round numbers are not equal to it and rounding cannot decide.
 pub const MIN_PIVOT: f64 = 0.0937;
 
-/// The reduced row echelon form of a space, and the pivot of each row, in the order of preference. Each row has 1 at its own pivot, 0 at
-/// the others, and 0 at coefficients that are rounding errors. `space` is an orthonormal basis (parameters × dimension). The form is the
-/// same for every orthonormal basis of a space. The part of a parameter is the distance of its unit vector's projection from the span of
-/// the earlier pivots' projections. No rotation of the basis changes this distance.
+/// The reduced row echelon form of a space, and the pivot of each row, in the order of preference. Each row has 1 at
+/// its own pivot, 0 at the others, and 0 at coefficients that are rounding errors. `space` is an orthonormal basis
+/// (parameters × dimension). The form is the same for every orthonormal basis of a space. The part of a parameter is
+/// the distance of its unit vector's projection from the span of the earlier pivots' projections. No rotation of the
+/// basis changes this distance.
 ///
 /// A parameter is skipped if its part is smaller than `least` times the largest remaining part.
 pub fn echelon(space: MatRef<'_, f64>, preference: &[usize], least: f64) -> (Vec<Vec<f64>>, Vec<usize>) {
     let (n, dimension) = (space.nrows(), space.ncols());
     // The remaining projection of each parameter, one row each.
-    let mut remaining: Vec<Vec<f64>> = (0..n)
-        .map(|j| (0..dimension).map(|k| space[(j, k)]).collect())
-        .collect();
+    let mut remaining: Vec<Vec<f64>> = (0..n).map(|j| (0..dimension).map(|k| space[(j, k)]).collect()).collect();
     let mut pivots: Vec<usize> = Vec::new();
     while pivots.len() < dimension {
         let length = |j: usize| remaining[j].iter().map(|v| v * v).sum::<f64>().sqrt();
         let free = |j: &usize| !pivots.contains(j);
         let largest = (0..n).filter(free).map(length).fold(0.0, f64::max);
-        let next = preference
-            .iter()
-            .copied()
-            .filter(free)
-            .find(|j| length(*j) >= least * largest);
+        let next = preference.iter().copied().filter(free).find(|j| length(*j) >= least * largest);
         let Some(pivot) = next.filter(|_| largest > ROUNDING_SHARE) else {
             break;
         };
@@ -201,9 +177,7 @@ pub fn echelon(space: MatRef<'_, f64>, preference: &[usize], least: f64) -> (Vec
         return (Vec::new(), Vec::new());
     }
     let at_pivots = Mat::from_fn(count, dimension, |i, k| space[(pivots[i], k)]);
-    let inverse = at_pivots
-        .partial_piv_lu()
-        .solve(Mat::<f64>::identity(count, count));
+    let inverse = at_pivots.partial_piv_lu().solve(Mat::<f64>::identity(count, count));
     let form = space * inverse;
     let rows = (0..count)
         .map(|i| {
@@ -238,15 +212,11 @@ mod tests {
         })
     }
 
-    /// Five parameters with the null space `x0 − x1`, `x1 + 2 x2 − x3`, `x4`. The combinations are those of the equations, for every basis
-    /// of the space and for rounding errors of 10⁻¹⁰.
+    /// Five parameters with the null space `x0 − x1`, `x1 + 2 x2 − x3`, `x4`. The combinations are those of the
+    /// equations, for every basis of the space and for rounding errors of 10⁻¹⁰.
     #[test]
     fn the_canonical_null_space_is_independent_of_the_basis() {
-        let raw = [
-            [1.0, -1.0, 0.0, 0.0, 0.0],
-            [0.0, 1.0, 2.0, -1.0, 0.0],
-            [0.0, 0.0, 0.0, 0.0, 1.0],
-        ];
+        let raw = [[1.0, -1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 2.0, -1.0, 0.0], [0.0, 0.0, 0.0, 0.0, 1.0]];
         // Gram–Schmidt.
         let mut orthonormal: Vec<Vec<f64>> = Vec::new();
         for vector in raw {
@@ -294,8 +264,8 @@ mod tests {
         }
     }
 
-    /// Readings of nine parameters with rank 5. The null space is the same, name by name, for every order of declaration and with rounding
-    /// errors of 10⁻¹¹ in every entry.
+    /// Readings of nine parameters with rank 5. The null space is the same, name by name, for every order of
+    /// declaration and with rounding errors of 10⁻¹¹ in every entry.
     #[test]
     fn the_null_space_is_independent_of_the_order_of_declarations() {
         const N: usize = 9;
@@ -314,10 +284,7 @@ mod tests {
             let rows: Vec<Vec<f64>> = (rank.null_combinations.iter())
                 .map(|row| {
                     let mut by_name = vec![0.0; N];
-                    order
-                        .iter()
-                        .zip(row)
-                        .for_each(|(name, value)| by_name[*name] = *value);
+                    order.iter().zip(row).for_each(|(name, value)| by_name[*name] = *value);
                     by_name
                 })
                 .collect();

@@ -7,8 +7,8 @@
 //! (n − 1)·s²/u² ~ χ²(n − 1)    if the sessions scatter by as much as their fits state
 //! ```
 //!
-//! Set-up quantities are not compared, because every session has its own. Type A and Type B need not agree: a set-up that was not
-//! remounted, or a calibration that all sessions share, contributes to every `u_k` but not to the scatter.
+//! Set-up quantities are not compared, because every session has its own. Type A and Type B need not agree: a set-up
+//! that was not remounted, or a calibration that all sessions share, contributes to every `u_k` but not to the scatter.
 
 use std::collections::BTreeSet;
 
@@ -50,10 +50,7 @@ impl Session {
                 problem.session.machine.code(),
                 tests.join(", ")
             ),
-            parameters: parameters(problem, fit)
-                .into_iter()
-                .filter(|parameter| !setup(&parameter.id))
-                .collect(),
+            parameters: parameters(problem, fit).into_iter().filter(|parameter| !setup(&parameter.id)).collect(),
         }
     }
 }
@@ -65,7 +62,8 @@ pub struct Repeated {
     pub sessions: Vec<String>,
     /// The parameters.
     pub parameters: Vec<RepeatedParameter>,
-    /// Sessions that deviate from the others by more than the uncertainties of the fits explain, the most significant first.
+    /// Sessions that deviate from the others by more than the uncertainties of the fits explain, the most significant
+    /// first.
     pub deviating: Vec<DeviatingSession>,
 }
 
@@ -154,9 +152,7 @@ pub fn compare(sessions: &[Session]) -> Result<Repeated, IdentifyError> {
             (own.value - turns, own.u)
         };
         let values: Vec<(f64, f64)> = sessions.iter().map(of).collect();
-        result
-            .parameters
-            .push(over_sessions(parameter, &values, SIGNIFICANCE / count));
+        result.parameters.push(over_sessions(parameter, &values, SIGNIFICANCE / count));
         if sessions.len() > 2 {
             let significance = SIGNIFICANCE / (count * sessions.len() as f64);
             for (k, by, u, p_value) in deviating_from_others(&values, significance) {
@@ -192,11 +188,7 @@ fn same_plan(first: &Session, other: &Session) -> Result<(), IdentifyError> {
         return Err(fault(format!("it is {}, not {}", other.plan, first.plan)));
     }
     let ids = |session: &Session| -> BTreeSet<String> {
-        session
-            .parameters
-            .iter()
-            .map(|parameter| parameter.id.clone())
-            .collect()
+        session.parameters.iter().map(|parameter| parameter.id.clone()).collect()
     };
     let (own, known) = (ids(other), ids(first));
     if own == known {
@@ -204,17 +196,9 @@ fn same_plan(first: &Session, other: &Session) -> Result<(), IdentifyError> {
     }
     let list = |a: &BTreeSet<String>, b: &BTreeSet<String>| {
         let only: Vec<&str> = a.difference(b).map(String::as_str).collect();
-        if only.is_empty() {
-            "nothing".to_string()
-        } else {
-            only.join(", ")
-        }
+        if only.is_empty() { "nothing".to_string() } else { only.join(", ") }
     };
-    Err(fault(format!(
-        "its readings identify {} in addition, but not {}",
-        list(&own, &known),
-        list(&known, &own)
-    )))
+    Err(fault(format!("its readings identify {} in addition, but not {}", list(&own, &known), list(&known, &own))))
 }
 
 fn over_sessions(parameter: &ParameterResult, values: &[(f64, f64)], significance: f64) -> RepeatedParameter {
@@ -226,9 +210,7 @@ fn over_sessions(parameter: &ParameterResult, values: &[(f64, f64)], significanc
     let ratio = (u_type_b > 0.0).then(|| s / u_type_b);
     let chi_square = ratio.map(|ratio| free * ratio * ratio);
     let law = ChiSquared::new(free).ok();
-    let tails = law
-        .zip(chi_square)
-        .map(|(law, found)| [law.cdf(found), law.sf(found)]);
+    let tails = law.zip(chi_square).map(|(law, found)| [law.cdf(found), law.sf(found)]);
     let p_value = tails.map(|[below, above]| (2.0 * below.min(above)).min(1.0));
     let scatter = match (p_value, tails) {
         (Some(p), Some([below, above])) if p < significance => {
@@ -255,8 +237,8 @@ fn over_sessions(parameter: &ParameterResult, values: &[(f64, f64)], significanc
     }
 }
 
-/// The values that deviate from the mean of the others, the most significant removed first: index, deviation, its standard uncertainty,
-/// its probability.
+/// The values that deviate from the mean of the others, the most significant removed first: index, deviation, its
+/// standard uncertainty, its probability.
 fn deviating_from_others(values: &[(f64, f64)], significance: f64) -> Vec<(usize, f64, f64, f64)> {
     let normal = Normal::standard();
     let mut remaining: Vec<usize> = (0..values.len()).collect();
@@ -270,10 +252,7 @@ fn deviating_from_others(values: &[(f64, f64)], significance: f64) -> Vec<(usize
             let by = x - (sum - x) / others;
             (*k, by, (u * u + (square - u * u) / others.powi(2)).sqrt())
         };
-        let most_significant = remaining
-            .iter()
-            .map(off)
-            .max_by(|a, b| (a.1 / a.2).abs().total_cmp(&(b.1 / b.2).abs()));
+        let most_significant = remaining.iter().map(off).max_by(|a, b| (a.1 / a.2).abs().total_cmp(&(b.1 / b.2).abs()));
         let Some((k, by, u)) = most_significant else { break };
         let p_value = 2.0 * normal.sf((by / u).abs());
         // Zero uncertainties give no probability.

@@ -13,12 +13,10 @@ use crate::circular::CircularTest;
 use crate::plausibility::Plausibility;
 pub use monte_carlo::{DrawnParameter, FitMonteCarlo, Verdict};
 pub(crate) use parameter::phases_follow_amplitudes;
-pub use parameter::{
-    COVERAGE_FACTOR, Combination, Covariance, Interval, NullSpace, ParameterResult, Unobservable,
-};
+pub use parameter::{COVERAGE_FACTOR, Combination, Covariance, Interval, NullSpace, ParameterResult, Unobservable};
 pub use trace::{
-    AlternativeResult, ChangedParameter, CurvePoint, EffectName, EffectResult, ModelResult,
-    RejectedCandidate, Remainder, SeparatingTestResult, SeparationResult, ShapeParameter, TraceResult,
+    AlternativeResult, ChangedParameter, CurvePoint, EffectName, EffectResult, ModelResult, RejectedCandidate,
+    Remainder, SeparatingTestResult, SeparationResult, ShapeParameter, TraceResult,
 };
 
 /// A reading that was excluded as an outlier.
@@ -39,8 +37,8 @@ pub struct Outlier {
 pub struct FitResult {
     /// Standard deviation of one scalar reading, µm.
     pub noise_um: f64,
-    /// Source of `noise_um`: `stated` by the session, `repeats` (repeated readings), or `residual` where there is neither. The residual of the
-    /// declared model also holds what the model lacks.
+    /// Source of `noise_um`: `stated` by the session, `repeats` (repeated readings), or `residual` where there is
+    /// neither. The residual of the declared model also holds what the model lacks.
     pub noise_source: String,
     /// Autoregressive coefficients of the noise along a run; empty for white noise.
     pub noise_ar_coefficients: Vec<f64>,
@@ -68,7 +66,8 @@ pub struct FitResult {
     pub degrees_of_freedom: usize,
     /// The Birge ratio `√(χ²/ν)`. Below 1 where readings scatter less than `noise_um`.
     pub birge_ratio: f64,
-    /// Factor by which the uncertainties are enlarged: the Birge ratio where it is significantly above 1 (p < 0.001), else 1.
+    /// Factor by which the uncertainties are enlarged: the Birge ratio where it is significantly above 1 (p < 0.001),
+    /// else 1.
     pub u_enlargement: f64,
     /// The identifiable parameters.
     pub parameters: Vec<ParameterResult>,

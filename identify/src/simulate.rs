@@ -1,10 +1,11 @@
-//! Simulated readings: the states of a plan, errors and effects with given values, noise, and the resolution of the sensor.
+//! Simulated readings: the states of a plan, errors and effects with given values, noise, and the resolution of the
+//! sensor.
 //!
-//! `reading = round((L(state; errors, set-up, effects) + σ·ν) / r) · r`, with ν standard normal, `r` the resolution, and `L` the chain in
-//! `f64`. The identifiers are those of the results, so that the estimates of a fit can be simulated again.
+//! `reading = round((L(state; errors, set-up, effects) + σ·ν) / r) · r`, with ν standard normal, `r` the resolution,
+//! and `L` the chain in `f64`. The identifiers are those of the results, so that the estimates of a fit can be
+//! simulated again.
 
 use abbe_model::component::ErrorName;
-use abbe_model::effect::Shape;
 use abbe_model::instrument::InstrumentKind;
 use abbe_model::sensitivity::TestModel;
 use abbe_model::session::readings::Readings;
@@ -12,7 +13,6 @@ use abbe_model::session::{Prior, Session, Test, planned};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
-use crate::drivers::Origin;
 use crate::error::IdentifyError;
 use crate::parameters::{Parameters, Role};
 use crate::quantity::Given;
@@ -74,12 +74,11 @@ const SETUP_STREAM: u128 = 0;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 /// # Errors
-/// If the plan cannot be carried out, a name or a unit does not fit the session, or the model yields a number that is not finite.
+/// If the plan cannot be carried out, a name or a unit does not fit the session, or the model yields a number that is
+/// not finite.
 pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated, IdentifyError> {
     if session.instrument == InstrumentKind::Socket {
-        return Err(IdentifyError::Request(
-            "a socket session has no readings to draw: its poses are its data".into(),
-        ));
+        return Err(IdentifyError::Request("a socket session has no readings to draw: its poses are its data".into()));
     }
     let planned = planned::planned_session(session)?;
     let mut given = Vec::with_capacity(simulation.given.len());
@@ -106,7 +105,7 @@ pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated,
         })
         .collect();
     let mut parameters = Parameters::declared(&open, &tests, &models)?;
-    let origin = Origin::of(&open);
+    let origin = open.origin();
     for effect in &session.effects {
         parameters.add_effect(&open, &tests, &models, &origin, effect)?;
     }
@@ -159,19 +158,10 @@ pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated,
         .filter(|(_, value)| **value != 0.0)
         .map(|(parameter, value)| {
             let unit = &parameter.unit;
-            (
-                parameter.id.clone(),
-                value * unit.display_per_internal,
-                unit.name.clone(),
-            )
+            (parameter.id.clone(), value * unit.display_per_internal, unit.name.clone())
         })
         .collect();
-    Ok(Simulated {
-        readings,
-        truth,
-        noise_mm,
-        warnings,
-    })
+    Ok(Simulated { readings, truth, noise_mm, warnings })
 }
 
 /// Rounds to a multiple of a step. Dividing by the whole reciprocal of the step keeps decimals exact.
@@ -185,7 +175,8 @@ fn rounded(value: f64, step: f64) -> f64 {
     }
 }
 
-/// The session with its planned states as readings and every set-up quantity free, so that each has an identifier and a slot.
+/// The session with its planned states as readings and every set-up quantity free, so that each has an identifier and a
+/// slot.
 fn with_free_setups(session: &Session, planned: Vec<Readings>) -> Session {
     let mut open = session.clone();
     for (test, states) in open.tests.iter_mut().zip(planned) {
@@ -206,12 +197,9 @@ fn result_id(session: &Session, id: &str) -> Result<String, IdentifyError> {
     };
     let machine = &session.machine;
     let lower = name.axis.to_lowercase();
-    let axis = machine.axis_index(&name.axis).or_else(|| {
-        machine
-            .axes
-            .iter()
-            .position(|axis| axis.name.to_lowercase() == lower)
-    });
+    let axis = machine
+        .axis_index(&name.axis)
+        .or_else(|| machine.axes.iter().position(|axis| axis.name.to_lowercase() == lower));
     let Some(axis) = axis else {
         let axes: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
         return Err(IdentifyError::Request(format!(
@@ -227,29 +215,19 @@ fn result_id(session: &Session, id: &str) -> Result<String, IdentifyError> {
 
 /// Writes the given values to the parameters. Amplitude and phase of a harmonic become cosine and sine,
 /// `A·cos(nq + φ) = A cos φ · cos nq − A sin φ · sin nq`.
-fn assign(
-    parameters: &Parameters,
-    given: &[(String, &Given)],
-    beta: &mut [f64],
-) -> Result<(), IdentifyError> {
+fn assign(parameters: &Parameters, given: &[(String, &Given)], beta: &mut [f64]) -> Result<(), IdentifyError> {
     let find = |id: &str| parameters.list.iter().position(|parameter| parameter.id == id);
     let mut used = vec![false; given.len()];
     for effect in &parameters.effects {
-        if !matches!(effect.shape, Shape::Harmonic { .. } | Shape::Periodic { .. }) {
+        if !effect.shape.is_wave() {
             continue;
         }
         let id = effect.id();
-        let part = |name: &str| {
-            given
-                .iter()
-                .position(|(known, _)| *known == format!("{id}.{name}"))
-        };
+        let part = |name: &str| given.iter().position(|(known, _)| *known == format!("{id}.{name}"));
         let (amplitude, phase) = (part("amplitude"), part("phase"));
         let Some(amplitude) = amplitude else {
             if phase.is_some() {
-                return Err(IdentifyError::Request(format!(
-                    "`{id}.phase` has a value, but `{id}.amplitude` has none"
-                )));
+                return Err(IdentifyError::Request(format!("`{id}.phase` has a value, but `{id}.amplitude` has none")));
             }
             continue;
         };
@@ -301,10 +279,7 @@ fn unknown_identifier(parameters: &Parameters, id: &str) -> IdentifyError {
             names => format!("coefficients of its effects are {}", names.join(", ")),
         }
     } else {
-        format!(
-            "errors are named as in EY0A; set-up quantities are {}",
-            of(false).join(", ")
-        )
+        format!("errors are named as in EY0A; set-up quantities are {}", of(false).join(", "))
     };
     IdentifyError::Request(format!("the session has no `{id}`; {known}"))
 }
@@ -313,19 +288,16 @@ fn unknown_identifier(parameters: &Parameters, id: &str) -> IdentifyError {
 fn warnings(parameters: &Parameters, beta: &[f64]) -> Vec<String> {
     let mut warnings = Vec::new();
     for (index, (parameter, value)) in parameters.list.iter().zip(beta).enumerate() {
-        let moves = parameters
-            .contributions
-            .iter()
-            .flatten()
-            .any(|contribution| contribution.parameter == index);
+        let moves = parameters.contributions.iter().flatten().any(|contribution| contribution.parameter == index);
         if *value != 0.0 && !moves {
             warnings.push(format!("`{}` affects no reading of these tests", parameter.id));
         }
     }
     for (number, effect) in parameters.effects.iter().enumerate() {
-        let own = parameters.list.iter().zip(beta).filter(
-            |(parameter, _)| matches!(parameter.role, Role::Coefficient { effect, .. } if effect == number),
-        );
+        let own =
+            parameters.list.iter().zip(beta).filter(
+                |(parameter, _)| matches!(parameter.role, Role::Coefficient { effect, .. } if effect == number),
+            );
         if own.into_iter().all(|(_, value)| *value == 0.0) {
             warnings.push(format!(
                 "the declared effect `{}` has no given value: it is zero in these readings",

@@ -22,9 +22,7 @@ pub fn stations(session: &Session, tests: &[&Test]) -> Vec<Station<f64>> {
         if groups[..index].contains(&groups[index]) && !stations[index].kind().is_two_sided() {
             continue;
         }
-        let members: Vec<usize> = (0..tests.len())
-            .filter(|other| groups[*other] == groups[index])
-            .collect();
+        let members: Vec<usize> = (0..tests.len()).filter(|other| groups[*other] == groups[index]).collect();
         match &stations[index] {
             Station::BallBar(_) | Station::Probe(_) | Station::RTest(_) => {}
             Station::Tracker(_) => {
@@ -66,11 +64,7 @@ pub fn stations(session: &Session, tests: &[&Test]) -> Vec<Station<f64>> {
 }
 
 /// The nominal position of the instrument's tool-frame point in R, at every row.
-pub(crate) fn nominal_points(
-    machine: &Machine,
-    station: &Station<f64>,
-    readings: &Readings,
-) -> Vec<Vector3<f64>> {
+pub(crate) fn nominal_points(machine: &Machine, station: &Station<f64>, readings: &Readings) -> Vec<Vector3<f64>> {
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let mut state = Vec::new();
     (0..readings.rows())
@@ -82,7 +76,8 @@ pub(crate) fn nominal_points(
         .collect()
 }
 
-/// The rotation and translation that map `from` onto `to` with the least sum of squares (Kabsch, Acta Cryst. A32 (1976) 922).
+/// The rotation and translation that map `from` onto `to` with the least sum of squares (Kabsch, Acta Cryst. A32 (1976)
+/// 922).
 fn rigid_motion(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> (Matrix3<f64>, Vector3<f64>) {
     if from.is_empty() {
         return (Matrix3::identity(), Vector3::zeros());
@@ -90,11 +85,8 @@ fn rigid_motion(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> (Matrix3<f64>, Ve
     let count = from.len() as f64;
     let centre_from = from.iter().sum::<Vector3<f64>>() / count;
     let centre_to = to.iter().sum::<Vector3<f64>>() / count;
-    let covariance: Matrix3<f64> = from
-        .iter()
-        .zip(to)
-        .map(|(a, b)| (b - centre_to) * (a - centre_from).transpose())
-        .sum();
+    let covariance: Matrix3<f64> =
+        from.iter().zip(to).map(|(a, b)| (b - centre_to) * (a - centre_from).transpose()).sum();
     let svd = covariance.svd(true, true);
     let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
         return (Matrix3::identity(), centre_to - centre_from);

@@ -1,8 +1,9 @@
 //! The triangular factor of a least-squares problem, built from a stream of rows.
 //!
-//! Householder QR reduces the augmented matrix `[J | r]` block by block (tall-skinny QR: Demmel, Grigori, Hoemmen, Langou, SIAM J. Sci.
-//! Comput. 34 (2012) A206). Memory does not grow with the number of readings. The factors of different readings merge into one. With
-//! `[J | r] = Q·[R c; 0 ρ]` the sum of squares after a step `δ` is `‖c − Rδ‖² + ρ²`.
+//! Householder QR reduces the augmented matrix `[J | r]` block by block (tall-skinny QR: Demmel, Grigori, Hoemmen,
+//! Langou, SIAM J. Sci. Comput. 34 (2012) A206). Memory does not grow with the number of readings. The factors of
+//! different readings merge into one. With `[J | r] = Q·[R c; 0 ρ]` the sum of squares after a step `δ` is
+//! `‖c − Rδ‖² + ρ²`.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::qr::no_pivoting::factor;
@@ -12,7 +13,8 @@ use faer::{Mat, MatRef, Par};
 #[derive(Clone, Debug)]
 pub struct Triangle {
     columns: usize,
-    /// Rows with the same normal matrix as the absorbed rows. They are reduced to triangular form only when they are many.
+    /// Rows with the same normal matrix as the absorbed rows. They are reduced to triangular form only when they are
+    /// many.
     factor: Mat<f64>,
 }
 
@@ -22,10 +24,7 @@ pub const BLOCK_ROWS: usize = 1024;
 impl Triangle {
     /// The factor of no rows, for the given number of parameters.
     pub fn new(columns: usize) -> Self {
-        Triangle {
-            columns,
-            factor: Mat::zeros(0, columns + 1),
-        }
+        Triangle { columns, factor: Mat::zeros(0, columns + 1) }
     }
 
     /// Number of parameters.
@@ -43,12 +42,9 @@ impl Triangle {
         let mut stacked = Mat::zeros(kept + block.nrows(), width);
         stacked.get_mut(..kept, ..).copy_from(&self.factor);
         stacked.get_mut(kept.., ..).copy_from(block);
-        // Small blocks (folds of many tests) are collected until they are as many as the columns, then reduced together.
-        self.factor = if stacked.nrows() <= 2 * width {
-            stacked
-        } else {
-            upper(stacked)
-        };
+        // Small blocks (folds of many tests) are collected until they are as many as the columns, then reduced
+        // together.
+        self.factor = if stacked.nrows() <= 2 * width { stacked } else { upper(stacked) };
     }
 
     /// Rows of `[J | r]` with the same normal matrix as the absorbed rows: any number × (parameters + 1).
@@ -61,8 +57,8 @@ impl Triangle {
         self.absorb(other.factor.as_ref());
     }
 
-    /// The same rows over more parameters. `places` gives the index of each of these parameters among all; the rows do not depend on the
-    /// others.
+    /// The same rows over more parameters. `places` gives the index of each of these parameters among all; the rows do
+    /// not depend on the others.
     pub fn over_columns(&self, indices: &[usize], columns: usize) -> Triangle {
         let mut wide = Mat::zeros(self.factor.nrows(), columns + 1);
         for (index, column) in indices.iter().chain([&columns]).zip(self.factor.col_iter()) {
@@ -80,13 +76,7 @@ impl Triangle {
             return self.factor.clone();
         }
         let rows = self.factor.nrows().max(width);
-        let padded = Mat::from_fn(rows, width, |i, j| {
-            if i < self.factor.nrows() {
-                self.factor[(i, j)]
-            } else {
-                0.0
-            }
-        });
+        let padded = Mat::from_fn(rows, width, |i, j| if i < self.factor.nrows() { self.factor[(i, j)] } else { 0.0 });
         upper(padded)
     }
 
@@ -122,14 +112,13 @@ impl Triangle {
 
 /// The factor `R` of a matrix `Q·R` with at least as many rows as columns.
 ///
-/// Matrices of fewer than 40 columns are reduced column by column. The library blocks from 16 columns on, which takes two to four times as
-/// long in this range.
+/// Matrices of fewer than 40 columns are reduced column by column. The library blocks from 16 columns on, which takes
+/// two to four times as long in this range.
 pub(crate) fn upper(mut matrix: Mat<f64>) -> Mat<f64> {
     let (rows, columns) = (matrix.nrows(), matrix.ncols());
     let block_columns = if columns < 40 { 1 } else { 16 };
     let mut reflections = Mat::zeros(block_columns, columns);
-    let scratch =
-        factor::qr_in_place_scratch::<f64>(rows, columns, block_columns, Par::Seq, Default::default());
+    let scratch = factor::qr_in_place_scratch::<f64>(rows, columns, block_columns, Par::Seq, Default::default());
     factor::qr_in_place(
         matrix.as_mut(),
         reflections.as_mut(),

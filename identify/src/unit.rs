@@ -1,8 +1,11 @@
 //! Display units: µm, arcsec, and the units of effects' coefficients.
 
 use abbe_model::axis::AxisKind;
-use abbe_model::effect::{Driver, Shape};
+use abbe_model::driver::Driver;
+use abbe_model::effect::shape::Per;
+use abbe_model::effect::{Effect, Shape};
 use abbe_model::instrument::InternalUnit;
+use abbe_model::session::Session;
 
 /// A unit of reported results.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,13 +27,20 @@ impl Unit {
             InternalUnit::Radian => ("arcsec", ARCSEC),
             InternalUnit::Ratio => ("um/m", 1e6),
         };
-        Unit {
-            name: name.to_string(),
-            display_per_internal,
-        }
+        Unit { name: name.to_string(), display_per_internal }
     }
 
-    /// The unit of coefficient `k` of an effect. `driver_axis` is the kind of the axis that the effect follows, if it follows one.
+    /// The unit in which coefficient `k` of an effect in a session is reported.
+    pub fn of_effect(session: &Session, effect: &Effect, k: usize) -> Unit {
+        let Some(internal_unit) = effect.component.unit(session.instrument.unknowns()) else {
+            return Unit { name: "ms".to_string(), display_per_internal: 1e3 };
+        };
+        let driver_axis = effect.driver.axis_kind(&session.machine);
+        Unit::of_coefficient(internal_unit, &effect.driver, driver_axis, &effect.shape, k)
+    }
+
+    /// The unit of coefficient `k` of an effect. `driver_axis` is the kind of the axis that the effect follows, if it
+    /// follows one.
     ///
     /// | shape | unit of a coefficient, for a component in µm |
     /// |---|---|
@@ -54,31 +64,25 @@ impl Unit {
             1 => per(what),
             _ => per(&format!("{what}^{degree}")),
         };
-        let degree = match shape {
-            Shape::Polynomial { scale, .. } if *scale == 1.0 => Some(k + 1),
-            Shape::Power { degree, scale } if *scale == 1.0 => Some(*degree),
-            _ => None,
-        };
-        match (shape, driver, degree) {
-            (Shape::Lag, ..) => match (component, driver_axis) {
-                (InternalUnit::Millimetre, Some(AxisKind::Linear))
-                | (InternalUnit::Radian, Some(AxisKind::Rotary)) => Unit {
-                    name: "ms".to_string(),
-                    display_per_internal: 1e3,
-                },
+        match (shape.per(k), driver.kind().per()) {
+            (Per::Rate, _) => match (component, driver_axis) {
+                (InternalUnit::Millimetre, Some(AxisKind::Linear)) | (InternalUnit::Radian, Some(AxisKind::Rotary)) => {
+                    Unit { name: "ms".to_string(), display_per_internal: 1e3 }
+                }
                 (_, Some(AxisKind::Linear)) => per("(mm/s)"),
                 _ => per("(rad/s)"),
             },
-            (Shape::Drift, ..) => per("h"),
-            (_, Driver::Gravity, Some(degree)) => per_power("m", degree),
-            (_, Driver::Temperature, Some(degree)) => per_power("K", degree),
-            _ => plain,
+            (Per::Hour, _) => per("h"),
+            (Per::Power(degree), Some(unit)) => per_power(unit, degree),
+            (Per::Power(_), None) | (Per::One, _) => plain,
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use abbe_model::effect::shape::{Harmonic, Polynomial, Power, Warmup};
+
     use super::*;
 
     #[test]
@@ -88,21 +92,15 @@ mod tests {
         let name = |component, driver: &Driver, kind, shape: &Shape, k| {
             Unit::of_coefficient(component, driver, kind, shape, k).name
         };
-        let cubic = |scale: f64| Shape::Polynomial { degree: 3, scale };
-        let square = |scale: f64| Shape::Power { degree: 2, scale };
+        let cubic = |scale: f64| Shape::Polynomial(Polynomial { degree: 3, scale });
+        let square = |scale: f64| Shape::Power(Power { degree: 2, scale });
         for (k, unit) in ["um/K", "um/K^2", "um/K^3"].into_iter().enumerate() {
             assert_eq!(name(Millimetre, &Driver::Temperature, None, &cubic(1.0), k), unit);
         }
-        assert_eq!(
-            name(Radian, &Driver::Gravity, None, &square(1.0), 0),
-            "arcsec/m^2"
-        );
+        assert_eq!(name(Radian, &Driver::Gravity, None, &square(1.0), 0), "arcsec/m^2");
         assert_eq!(name(Radian, &Driver::Gravity, None, &cubic(1.0), 0), "arcsec/m");
         // At another scale the coefficient is the value of the component there.
-        assert_eq!(
-            name(Millimetre, &Driver::Temperature, None, &square(5.0), 0),
-            "um"
-        );
+        assert_eq!(name(Millimetre, &Driver::Temperature, None, &square(5.0), 0), "um");
         let linear = Some(AxisKind::Linear);
         let rotary = Some(AxisKind::Rotary);
         assert_eq!(name(Millimetre, &axis("X"), linear, &cubic(100.0), 2), "um");
@@ -116,11 +114,8 @@ mod tests {
         assert_eq!(name(Radian, &axis("X"), linear, &Shape::Lag, 0), "arcsec/(mm/s)");
         assert_eq!(name(Millimetre, &axis("C"), rotary, &Shape::Lag, 0), "um/(rad/s)");
         assert_eq!(name(Ratio, &axis("X"), linear, &Shape::Lag, 0), "um/m/(mm/s)");
-        for shape in [
-            Shape::Backlash,
-            Shape::Harmonic { order: 2.0 },
-            Shape::Warmup { tau_s: 60.0 },
-        ] {
+        for shape in [Shape::Backlash, Shape::Harmonic(Harmonic { order: 2.0 }), Shape::Warmup(Warmup { tau_s: 60.0 })]
+        {
             assert_eq!(name(Radian, &axis("C"), rotary, &shape, 0), "arcsec");
         }
     }

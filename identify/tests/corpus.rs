@@ -1,4 +1,5 @@
-//! Replays the fuzzer's corpus of errors as they are given in files. The corpus of `abbe-model` is replayed in that crate.
+//! Replays the fuzzer's corpus of errors as they are given in files. The corpus of `abbe-model` is replayed in that
+//! crate.
 
 #[path = "../../fuzz/errors.rs"]
 mod harness;

@@ -25,45 +25,26 @@ fn length(c: f64) -> f64 {
 fn the_offset_of_an_axis_is_found_in_readings_in_memory() {
     let mut session = Session::new(Machine::from_code("[wCAbYXZt]").unwrap(), InstrumentKind::BallBar);
     session.noise_mm = Some(0.1e-3);
-    session.unknowns = ["EX0C", "EY0C"]
-        .iter()
-        .filter_map(|name| ErrorName::parse(name))
-        .collect();
+    session.unknowns = ["EX0C", "EY0C"].iter().filter_map(|name| ErrorName::parse(name)).collect();
     let forward: Vec<f64> = (0..180).map(|k| TAU * f64::from(k) / 180.0).collect();
     let c: Vec<f64> = forward.iter().chain(forward.iter().rev()).copied().collect();
     // Noise without a pattern over C: the fractional part of a multiple of the golden ratio.
     let noise = |row: usize| 0.35e-3 * ((row as f64 * 0.618_033_988_749_895).fract() - 0.5);
     let columns = Columns {
-        observed: c
-            .iter()
-            .enumerate()
-            .map(|(row, c)| length(*c) + noise(row))
-            .collect(),
+        observed: c.iter().enumerate().map(|(row, c)| length(*c) + noise(row)).collect(),
         run: (0..c.len()).map(|row| if row < 180 { 1 } else { 2 }).collect(),
         axes: vec![("C".into(), c)],
         ..Columns::default()
     };
-    let bar = BallBar {
-        workpiece_ball: [0.0, 100.0, 0.0],
-        spindle_ball: [0.0; 3],
-        bar: 125.0,
-    };
+    let bar = BallBar { workpiece_ball: [0.0, 100.0, 0.0], spindle_ball: [0.0; 3], bar: 125.0 };
     let test = NewTest::new("C100", Station::BallBar(bar));
     session.add_test(test.at("Z", 75.0).readings(columns)).unwrap();
     let (problem, found) = fit::prepare(&session, 1).unwrap();
     let report = fit::report(&problem, &found);
     assert_eq!(report.readings, 360);
     for (name, expected) in ["EX0C", "EY0C"].into_iter().zip(OFFSET) {
-        let parameter = report
-            .parameters
-            .iter()
-            .find(|parameter| parameter.id == name)
-            .unwrap();
-        assert!(
-            (parameter.value - expected * 1e3).abs() < 3.0 * parameter.u,
-            "{name}: {}",
-            parameter.value
-        );
+        let parameter = report.parameters.iter().find(|parameter| parameter.id == name).unwrap();
+        assert!((parameter.value - expected * 1e3).abs() < 3.0 * parameter.u, "{name}: {}", parameter.value);
         assert!(parameter.u < 0.02, "{name}: {}", parameter.u);
     }
 }

@@ -1,5 +1,6 @@
-//! Benchmark of the generic chain over columns, against a kernel written by hand and against the chain over num-dual numbers, one reading
-//! at a time: value and eight derivatives of the chapter 5 tests; value and all sensitivities of a five-axis machine.
+//! Benchmark of the generic chain over columns, against a kernel written by hand and against the chain over num-dual
+//! numbers, one reading at a time: value and eight derivatives of the chapter 5 tests; value and all sensitivities of a
+//! five-axis machine.
 //!
 //! `cargo bench -p abbe-model --bench chain`
 #![allow(missing_docs)]
@@ -30,13 +31,7 @@ fn angles(rows: usize, speed: f64) -> Vec<f64> {
 fn readings(rows: usize) -> Readings {
     let still = |value: f64| vec![value; rows];
     Readings {
-        positions: vec![
-            angles(rows, 0.006),
-            angles(rows, 0.0015),
-            still(0.0),
-            still(-LENGTHS[0]),
-            still(0.0),
-        ],
+        positions: vec![angles(rows, 0.006), angles(rows, 0.0015), still(0.0), still(-LENGTHS[0]), still(0.0)],
         ..Readings::default()
     }
 }
@@ -57,10 +52,7 @@ fn station() -> Station<f64> {
 
 fn eight(machine: &Machine) -> Vec<usize> {
     let slot = |name: &&str| machine.error_slot(&ErrorName::parse(name).expect("the name of an error"));
-    NAMES
-        .iter()
-        .map(|name| slot(name).expect("an error of this machine"))
-        .collect()
+    NAMES.iter().map(|name| slot(name).expect("an error of this machine")).collect()
 }
 
 fn chain(criterion: &mut Criterion) {
@@ -68,20 +60,13 @@ fn chain(criterion: &mut Criterion) {
     let slots = eight(&machine);
     for (rows, cache) in [(1_000, "in cache"), (1_000_000, "streaming")] {
         let mut group = criterion.benchmark_group(format!("value and eight derivatives, {cache}"));
-        group
-            .throughput(Throughput::Elements(rows as u64))
-            .sample_size(20);
+        group.throughput(Throughput::Elements(rows as u64)).sample_size(20);
         let (c, a) = (angles(rows, 0.006), angles(rows, 0.0015));
         let columns = [&c, &c, &a, &a];
         let axes: Vec<Vec<f64>> = columns
             .iter()
             .enumerate()
-            .map(|(i, column)| {
-                column
-                    .iter()
-                    .map(|q| if i % 2 == 0 { q.sin() } else { q.cos() })
-                    .collect()
-            })
+            .map(|(i, column)| column.iter().map(|q| if i % 2 == 0 { q.sin() } else { q.cos() }).collect())
             .collect();
         group.bench_function("by hand", |bencher| {
             let mut value = vec![0.0; rows];
@@ -89,13 +74,7 @@ fn chain(criterion: &mut Criterion) {
             bencher.iter(|| {
                 let slopes = gradient.each_mut().map(Vec::as_mut_slice);
                 let columns = [&axes[0][..], &axes[1], &axes[2], &axes[3]];
-                hand::columns(
-                    black_box(&LENGTHS),
-                    black_box(columns),
-                    black_box(&ERRORS),
-                    &mut value,
-                    slopes,
-                );
+                hand::columns(black_box(&LENGTHS), black_box(columns), black_box(&ERRORS), &mut value, slopes);
                 black_box(&mut value);
             });
         });
@@ -127,10 +106,7 @@ fn chain(criterion: &mut Criterion) {
                 unit[place] = 1.0;
                 Some(DualSVec64::<8>::new(ERRORS[place], Derivative::some(unit)))
             };
-            let bodies = machine.body_errors(
-                |slot| dual(slot).is_some(),
-                |slot| dual(slot).unwrap_or(0.0.into()),
-            );
+            let bodies = machine.body_errors(|slot| dual(slot).is_some(), |slot| dual(slot).unwrap_or(0.0.into()));
             bencher.iter(|| {
                 for state in &states {
                     black_box(station.read(&machine, black_box(state), &bodies, |_| None));
@@ -148,9 +124,7 @@ fn all_components(criterion: &mut Criterion) {
     let model = TestModel::new(&machine, station(), &readings(rows));
     // Six error motions per axis, both balls and the bar.
     let motions = (0..machine.error_slots()).filter(|slot| slot % 12 >= 6);
-    let slots: Vec<usize> = motions
-        .chain(machine.error_slots()..machine.error_slots() + 7)
-        .collect();
+    let slots: Vec<usize> = motions.chain(machine.error_slots()..machine.error_slots() + 7).collect();
     let values = SlotValues::zero(model.slots());
     let mut group = criterion.benchmark_group("value and all components of a five-axis machine");
     group.throughput(Throughput::Elements(rows as u64));

@@ -86,8 +86,8 @@ impl Axis {
         })
     }
 
-    /// The degree of freedom in which the axis moves: `EB` for rotation about ±Y, `EX` for translation along ±X. For an oblique
-    /// direction, its largest component decides.
+    /// The degree of freedom in which the axis moves: `EB` for rotation about ±Y, `EX` for translation along ±X. For an
+    /// oblique direction, its largest component decides.
     pub fn own_freedom(&self) -> crate::component::Freedom {
         let mut largest = 0;
         for index in 1..3 {

@@ -1,14 +1,15 @@
 //! The kinematic chain of a machine over an open scalar.
 //!
-//! From the bed outwards `P_w = T_A T_C w` on the workpiece side and `P_s = T_Y T_X T_Z s` on the tool side of `w C A b Y X Z t`,
+//! From the bed outwards `P_w = T_A T_C w` on the workpiece side and `P_s = T_Y T_X T_Z s` on the tool side of
+//! `w C A b Y X Z t`,
 //!
 //! ```text
 //! rotary axis, direction d, origin o:   T(q) = Trans(o) · E0 · E(q) · Rot(d, q) · Trans(−o)
 //! linear axis:                          T(q) = Trans(o + q·d′) · E(q) · Trans(−o),   d′ = d + ω0 × d
 //! ```
 //!
-//! with `E0 = Trans(EX0k, EY0k, EZ0k) · Rx(EA0k) · Ry(EB0k) · Rz(EC0k)` the location errors, `E(q)` the error motions in the same order,
-//! and ω0 the squareness errors `(EA0k, EB0k, EC0k)` of a linear axis.
+//! with `E0 = Trans(EX0k, EY0k, EZ0k) · Rx(EA0k) · Ry(EB0k) · Rz(EC0k)` the location errors, `E(q)` the error motions
+//! in the same order, and ω0 the squareness errors `(EA0k, EB0k, EC0k)` of a linear axis.
 
 use crate::axis::{Axis, AxisKind};
 use crate::code::StructuralCode;
@@ -49,10 +50,7 @@ impl<N: Nominal> AxisPosition<N> {
     pub fn new(kind: AxisKind, value: N) -> Self {
         let turn = match kind {
             AxisKind::Rotary => SinCos::by(value),
-            AxisKind::Linear => SinCos {
-                sin: N::constant(0.0),
-                cos: N::constant(1.0),
-            },
+            AxisKind::Linear => SinCos { sin: N::constant(0.0), cos: N::constant(1.0) },
         };
         AxisPosition { value, turn }
     }
@@ -68,26 +66,18 @@ pub struct BodyErrors<S> {
 
 impl<S: Scalar> BodyErrors<S> {
     /// No errors.
-    pub const NONE: BodyErrors<S> = BodyErrors {
-        location: None,
-        squareness: None,
-        motion: None,
-    };
+    pub const NONE: BodyErrors<S> = BodyErrors { location: None, squareness: None, motion: None };
 
     /// From location errors and error motions, each `[EX, EY, EZ, EA, EB, EC]` in mm and radians.
     pub fn new(kind: AxisKind, rotation: Rotation, location: Option<[S; 6]>, motion: Option<[S; 6]>) -> Self {
         let motion = motion.map(|six| SmallMotion::new(six, rotation));
         match kind {
-            AxisKind::Rotary => BodyErrors {
-                location: location.map(|six| SmallMotion::new(six, rotation)),
-                squareness: None,
-                motion,
-            },
-            AxisKind::Linear => BodyErrors {
-                location: None,
-                squareness: location.map(|six| [six[3], six[4], six[5]]),
-                motion,
-            },
+            AxisKind::Rotary => {
+                BodyErrors { location: location.map(|six| SmallMotion::new(six, rotation)), squareness: None, motion }
+            }
+            AxisKind::Linear => {
+                BodyErrors { location: None, squareness: location.map(|six| [six[3], six[4], six[5]]), motion }
+            }
         }
     }
 }
@@ -107,13 +97,7 @@ impl Machine {
                 let (Some(kind), Some(direction)) = (kind, direction) else {
                     return Err(ModelError::UnknownAxisKind { axis: name.clone() });
                 };
-                Ok(Axis {
-                    name: name.clone(),
-                    kind,
-                    direction,
-                    origin_mm: [0.0; 3],
-                    travel: None,
-                })
+                Ok(Axis { name: name.clone(), kind, direction, origin_mm: [0.0; 3], travel: None })
             })
             .collect::<Result<Vec<_>, _>>()?;
         Ok(Machine {
@@ -159,44 +143,32 @@ impl Machine {
     pub fn error_name(&self, slot: usize) -> ErrorName {
         let within = slot % ERRORS_PER_AXIS;
         ErrorName {
-            kind: if within < 6 {
-                ErrorKind::Location
-            } else {
-                ErrorKind::Motion
-            },
+            kind: if within < 6 { ErrorKind::Location } else { ErrorKind::Motion },
             freedom: crate::component::Freedom::ALL[within % 6],
             axis: self.axes[slot / ERRORS_PER_AXIS].name.clone(),
         }
     }
 
-    /// The slots of the error motions along or about the axis' own direction, each with its direction cosine. Together they are
-    /// equivalent to an offset of the axis position, such as that of a delayed position reading.
+    /// The slots of the error motions along or about the axis' own direction, each with its direction cosine. Together
+    /// they are equivalent to an offset of the axis position, such as that of a delayed position reading.
     pub fn slots_along(&self, axis: usize) -> impl Iterator<Item = (usize, f64)> {
         let turns = usize::from(self.axes[axis].kind == AxisKind::Rotary) * 3;
         let start = axis * ERRORS_PER_AXIS + 6 + turns;
         let shares = self.axes[axis].direction.into_iter().enumerate();
-        shares
-            .filter(|(_, along)| *along != 0.0)
-            .map(move |(i, along)| (start + i, along))
+        shares.filter(|(_, along)| *along != 0.0).map(move |(i, along)| (start + i, along))
     }
 
-    /// The prepared errors of every axis, from the slots for which `carried` holds; the others are exact zeros. `slot(i)` gives the value
-    /// of slot `i`.
+    /// The prepared errors of every axis, from the slots for which `carried` holds; the others are exact zeros.
+    /// `slot(i)` gives the value of slot `i`.
     pub fn body_errors<S: Scalar>(
         &self,
         carried: impl Fn(usize) -> bool,
         slot: impl Fn(usize) -> S,
     ) -> Vec<BodyErrors<S>> {
         let six = |start: usize| {
-            (start..start + 6).any(&carried).then(|| {
-                std::array::from_fn(|i| {
-                    if carried(start + i) {
-                        slot(start + i)
-                    } else {
-                        S::constant(0.0)
-                    }
-                })
-            })
+            (start..start + 6)
+                .any(&carried)
+                .then(|| std::array::from_fn(|i| if carried(start + i) { slot(start + i) } else { S::constant(0.0) }))
         };
         self.axes
             .iter()
@@ -225,34 +197,31 @@ impl Machine {
         errors: &[BodyErrors<S>],
         point: Point<S>,
     ) -> Point<S> {
-        (self.workpiece_side..self.axes.len())
-            .rev()
-            .fold(point, |point, index| self.push(index, state, errors, point))
+        (self.workpiece_side..self.axes.len()).rev().fold(point, |point, index| self.push(index, state, errors, point))
     }
 
-    /// A point of R in the table frame: the inverse of [`Machine::workpiece_point`]. For small-angle errors the inverse of `I + [θ]×` is
-    /// taken as `I − [θ]×`. It is exact to first order and deviates by `θ²` (1e-9 of a length at 6.5″, 0.2 µm in 200 mm at 206″).
+    /// A point of R in the table frame: the inverse of [`Machine::workpiece_point`]. For small-angle errors the inverse
+    /// of `I + [θ]×` is taken as `I − [θ]×`. It is exact to first order and deviates by `θ²` (1e-9 of a length at 6.5″,
+    /// 0.2 µm in 200 mm at 206″).
     pub fn table_point<S: Scalar>(
         &self,
         state: &[AxisPosition<S::Nominal>],
         errors: &[BodyErrors<S>],
         point: Point<S>,
     ) -> Point<S> {
-        (0..self.workpiece_side)
-            .rev()
-            .fold(point, |point, index| self.pull(index, state, errors, point))
+        (0..self.workpiece_side).rev().fold(point, |point, index| self.pull(index, state, errors, point))
     }
 
-    /// A point of R in the tool frame: the inverse of [`Machine::tool_point`]; for small-angle errors see [`Machine::table_point`].
+    /// A point of R in the tool frame: the inverse of [`Machine::tool_point`]; for small-angle errors see
+    /// [`Machine::table_point`].
     pub fn spindle_point<S: Scalar>(
         &self,
         state: &[AxisPosition<S::Nominal>],
         errors: &[BodyErrors<S>],
         point: Point<S>,
     ) -> Point<S> {
-        (self.workpiece_side..self.axes.len()).fold(point, |point, index| {
-            pull(&self.axes[index], &state[index], &errors[index], point)
-        })
+        (self.workpiece_side..self.axes.len())
+            .fold(point, |point, index| pull(&self.axes[index], &state[index], &errors[index], point))
     }
 
     /// Transforms a point from the moved side of axis `index` to its bed side: one step of the chain.
@@ -277,8 +246,8 @@ impl Machine {
         pull(&self.axes[index], &state[index], &errors[index], point)
     }
 
-    /// The moment about axis `index` of a unit weight at `point_mm` of the tool frame (of the table frame for an axis on the workpiece
-    /// side), in mm (newton millimetre per newton): `d · ((p − o) × g)` with the nominal chain.
+    /// The moment about axis `index` of a unit weight at `point_mm` of the tool frame (of the table frame for an axis
+    /// on the workpiece side), in mm (newton millimetre per newton): `d · ((p − o) × g)` with the nominal chain.
     pub fn gravity_moment_mm(&self, index: usize, state: &[AxisPosition<f64>], point_mm: [f64; 3]) -> f64 {
         let none = vec![BodyErrors::<f64>::NONE; self.axes.len()];
         let workpiece = index < self.workpiece_side;
@@ -296,9 +265,7 @@ impl Machine {
             } else {
                 (self.workpiece_side..index).rev().collect()
             };
-            outside.into_iter().fold(Point(point), |point, k| {
-                push(&self.axes[k], &state[k], &none[k], point)
-            })
+            outside.into_iter().fold(Point(point), |point, k| push(&self.axes[k], &state[k], &none[k], point))
         };
         let axis = &self.axes[index];
         let origin = carried(axis.origin_mm).0;
@@ -323,11 +290,7 @@ fn push<S: Scalar>(
     let at_origin = axis.origin_mm == [0.0; 3];
     let to_origin = axis.origin_mm.map(|o| S::Nominal::constant(-o));
     let from_origin = axis.origin_mm.map(S::Nominal::constant);
-    let mut point = if at_origin {
-        point
-    } else {
-        point.shifted(to_origin)
-    };
+    let mut point = if at_origin { point } else { point.shifted(to_origin) };
     if axis.kind == AxisKind::Rotary {
         point = axis.rotate(position.turn, point);
     }
@@ -350,11 +313,7 @@ fn push<S: Scalar>(
             }
         }
     }
-    if at_origin {
-        point
-    } else {
-        point.shifted(from_origin)
-    }
+    if at_origin { point } else { point.shifted(from_origin) }
 }
 
 /// Transforms a point from the bed side of an axis to its moved side: the inverse of [`push`].
@@ -365,11 +324,7 @@ fn pull<S: Scalar>(
     point: Point<S>,
 ) -> Point<S> {
     let at_origin = axis.origin_mm == [0.0; 3];
-    let mut point = if at_origin {
-        point
-    } else {
-        point.shifted(axis.origin_mm.map(|o| S::Nominal::constant(-o)))
-    };
+    let mut point = if at_origin { point } else { point.shifted(axis.origin_mm.map(|o| S::Nominal::constant(-o))) };
     if axis.kind == AxisKind::Linear {
         for i in 0..3 {
             if let Some(along) = travel::<S>(axis, position, i) {
@@ -390,17 +345,10 @@ fn pull<S: Scalar>(
         point = motion.pull(point);
     }
     if axis.kind == AxisKind::Rotary {
-        let back = SinCos {
-            sin: -position.turn.sin,
-            cos: position.turn.cos,
-        };
+        let back = SinCos { sin: -position.turn.sin, cos: position.turn.cos };
         point = axis.rotate(back, point);
     }
-    if at_origin {
-        point
-    } else {
-        point.shifted(axis.origin_mm.map(S::Nominal::constant))
-    }
+    if at_origin { point } else { point.shifted(axis.origin_mm.map(S::Nominal::constant)) }
 }
 
 /// Displacement by a linear axis along coordinate `i`; `None` if its direction has no component there.

@@ -32,10 +32,7 @@ impl StructuralCode {
     /// # Errors
     /// The message names what is missing: `w` at the start, `t` at the end, exactly one `b`, each axis once.
     pub fn parse(text: &str) -> Result<StructuralCode, ModelError> {
-        let fault = |found: String| ModelError::StructuralCode {
-            code: text.to_string(),
-            found,
-        };
+        let fault = |found: String| ModelError::StructuralCode { code: text.to_string(), found };
         let inner = text.trim().trim_start_matches('[').trim_end_matches(']').trim();
         let bodies: Vec<String> = if inner.contains(char::is_whitespace) {
             inner.split_whitespace().map(str::to_string).collect()
@@ -51,19 +48,13 @@ impl StructuralCode {
         let between = &bodies[1..bodies.len() - 1];
         let beds = between.iter().filter(|body| *body == "b").count();
         if beds != 1 {
-            return Err(fault(format!(
-                "it contains {beds} beds `b`; exactly one is needed"
-            )));
+            return Err(fault(format!("it contains {beds} beds `b`; exactly one is needed")));
         }
         if between.len() > MAX_AXES {
-            return Err(fault(format!(
-                "{} bodies; the limit is {MAX_AXES} axes",
-                between.len()
-            )));
+            return Err(fault(format!("{} bodies; the limit is {MAX_AXES} axes", between.len())));
         }
         for (index, body) in between.iter().enumerate() {
-            let named = body.chars().next().is_some_and(char::is_alphabetic)
-                && body.chars().all(char::is_alphanumeric);
+            let named = body.chars().next().is_some_and(char::is_alphabetic) && body.chars().all(char::is_alphanumeric);
             if !named || body == "w" || body == "t" {
                 return Err(fault(format!("`{body}` is not an axis name")));
             }
@@ -72,10 +63,7 @@ impl StructuralCode {
             }
         }
         let bed = between.iter().position(|body| body == "b").unwrap_or(0);
-        Ok(StructuralCode {
-            workpiece_side: between[..bed].to_vec(),
-            tool_side: between[bed + 1..].to_vec(),
-        })
+        Ok(StructuralCode { workpiece_side: between[..bed].to_vec(), tool_side: between[bed + 1..].to_vec() })
     }
 
     /// The axes from workpiece to tool.

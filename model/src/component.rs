@@ -19,14 +19,7 @@ pub enum Freedom {
 
 impl Freedom {
     /// In the order in which errors are applied: X, Y, Z, A, B, C.
-    pub const ALL: [Freedom; 6] = [
-        Freedom::X,
-        Freedom::Y,
-        Freedom::Z,
-        Freedom::A,
-        Freedom::B,
-        Freedom::C,
-    ];
+    pub const ALL: [Freedom; 6] = [Freedom::X, Freedom::Y, Freedom::Z, Freedom::A, Freedom::B, Freedom::C];
 
     /// The index, 0 to 5.
     pub fn index(self) -> usize {
@@ -74,8 +67,8 @@ pub struct ErrorName {
 }
 
 impl ErrorName {
-    /// Parses an ISO 230-1 name (`EX0C`, `EBJ2`) or a literature alias (`e_x0c`, `e_x,0c`, `θ_y0a`, `theta_y0a`). Returns `None` for any
-    /// other text. Does not check that the axis exists.
+    /// Parses an ISO 230-1 name (`EX0C`, `EBJ2`) or a literature alias (`e_x0c`, `e_x,0c`, `θ_y0a`, `theta_y0a`).
+    /// Returns `None` for any other text. Does not check that the axis exists.
     pub fn parse(text: &str) -> Option<ErrorName> {
         let text = text.trim();
         let iso = || {
@@ -92,9 +85,7 @@ impl ErrorName {
                 (rest, true)
             };
             let mut characters = rest.chars();
-            let index = ['x', 'y', 'z']
-                .iter()
-                .position(|c| characters.clone().next() == Some(*c))?;
+            let index = ['x', 'y', 'z'].iter().position(|c| characters.clone().next() == Some(*c))?;
             characters.next();
             let freedom = Freedom::ALL[index + if angle { 3 } else { 0 }];
             let rest = characters.as_str().trim_start_matches(',');
@@ -108,13 +99,8 @@ impl ErrorName {
             Some(axis) => (ErrorKind::Location, axis),
             None => (ErrorKind::Motion, rest),
         };
-        let valid =
-            axis.chars().next().is_some_and(char::is_alphabetic) && axis.chars().all(char::is_alphanumeric);
-        valid.then(|| ErrorName {
-            kind,
-            freedom,
-            axis: axis.to_string(),
-        })
+        let valid = axis.chars().next().is_some_and(char::is_alphabetic) && axis.chars().all(char::is_alphanumeric);
+        valid.then(|| ErrorName { kind, freedom, axis: axis.to_string() })
     }
 
     /// The short name of the literature: `e_x0c`, `θ_z0c`.
@@ -122,11 +108,7 @@ impl ErrorName {
         let index = self.freedom.index();
         let symbol = if self.freedom.is_angle() { "θ" } else { "e" };
         let zero = if self.kind == ErrorKind::Location { "0" } else { "" };
-        format!(
-            "{symbol}_{}{zero}{}",
-            ['x', 'y', 'z'][index % 3],
-            self.axis.to_lowercase()
-        )
+        format!("{symbol}_{}{zero}{}", ['x', 'y', 'z'][index % 3], self.axis.to_lowercase())
     }
 }
 

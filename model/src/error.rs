@@ -16,18 +16,12 @@ pub struct Location {
 impl Location {
     /// The whole file.
     pub fn file(file: &std::path::Path) -> Location {
-        Location {
-            file: file.to_path_buf(),
-            ..Location::default()
-        }
+        Location { file: file.to_path_buf(), ..Location::default() }
     }
 
     /// A line of the file.
     pub fn line(file: &std::path::Path, line: usize) -> Location {
-        Location {
-            line,
-            ..Location::file(file)
-        }
+        Location { line, ..Location::file(file) }
     }
 }
 
@@ -46,9 +40,7 @@ impl std::fmt::Display for Location {
 #[non_exhaustive]
 pub enum ModelError {
     /// An invalid structural code.
-    #[error(
-        "structural code `{code}`: {found}; a code goes from workpiece over bed to tool, as in `w C A b Y X Z t`"
-    )]
+    #[error("structural code `{code}`: {found}; a code goes from workpiece over bed to tool, as in `w C A b Y X Z t`")]
     StructuralCode {
         /// The code as given.
         code: String,
@@ -56,9 +48,7 @@ pub enum ModelError {
         found: String,
     },
     /// An axis whose kind does not follow from its name.
-    #[error(
-        "axis `{axis}` is not an ISO 841 letter; state its `kind` (\"rotary\" or \"linear\") and `direction`"
-    )]
+    #[error("axis `{axis}` is not an ISO 841 letter; state its `kind` (\"rotary\" or \"linear\") and `direction`")]
     UnknownAxisKind {
         /// The axis.
         axis: String,
@@ -73,8 +63,8 @@ pub enum ModelError {
         /// What to do.
         help: Option<String>,
     },
-    /// A file that does not exist in the searched folders, or lies outside the folders that a session may read. Other options for reading
-    /// (a data folder, files outside allowed) may remedy it.
+    /// A file that does not exist in the searched folders, or lies outside the folders that a session may read. Other
+    /// options for reading (a data folder, files outside allowed) may remedy it.
     #[error("{location}: {message}")]
     FileAccess {
         /// File and line that name it.
@@ -123,9 +113,9 @@ impl ModelError {
     pub fn help(&self) -> Option<&str> {
         match self {
             ModelError::Input { help, .. } => help.as_deref(),
-            ModelError::FileAccess { help, .. }
-            | ModelError::Plan { help, .. }
-            | ModelError::Session { help, .. } => Some(help),
+            ModelError::FileAccess { help, .. } | ModelError::Plan { help, .. } | ModelError::Session { help, .. } => {
+                Some(help)
+            }
             _ => None,
         }
     }

@@ -1,7 +1,7 @@
 //! Points, rotations and small rigid motions over the open [`Scalar`].
 //!
-//! Motions transform points; motions are never multiplied. The transformation of a point takes 4 products per rotation and preserves the
-//! sparsity that a product of 4 × 4 matrices of dual numbers would lose.
+//! Motions transform points; motions are never multiplied. The transformation of a point takes 4 products per rotation
+//! and preserves the sparsity that a product of 4 × 4 matrices of dual numbers would lose.
 
 use crate::scalar::{Nominal, Scalar};
 
@@ -65,7 +65,8 @@ impl Coordinate {
         self as usize
     }
 
-    /// The next two axes in cyclic order: Y, Z for X. A positive rotation about `self` turns the first towards the second.
+    /// The next two axes in cyclic order: Y, Z for X. A positive rotation about `self` turns the first towards the
+    /// second.
     fn others(self) -> (usize, usize) {
         ((self.index() + 1) % 3, (self.index() + 2) % 3)
     }
@@ -98,8 +99,8 @@ pub enum Rotation {
     SmallAngle,
 }
 
-/// A small rigid motion: translations in mm, then `Rx(a)·Ry(b)·Rz(c)` with three angles in radians, in the order of location errors and
-/// error motions.
+/// A small rigid motion: translations in mm, then `Rx(a)·Ry(b)·Rz(c)` with three angles in radians, in the order of
+/// location errors and error motions.
 #[derive(Clone, Copy, Debug)]
 pub struct SmallMotion<S> {
     translation: Point<S>,
@@ -123,10 +124,7 @@ impl<S: Scalar> SmallMotion<S> {
             })),
             Rotation::SmallAngle => SmallAngles::SmallAngle([a, b, c]),
         };
-        SmallMotion {
-            translation: Point([x, y, z]),
-            form,
-        }
+        SmallMotion { translation: Point([x, y, z]), form }
     }
 
     /// `Trans · Rx · Ry · Rz · point`.
@@ -148,7 +146,8 @@ impl<S: Scalar> SmallMotion<S> {
         }
     }
 
-    /// `Rzᵀ · Ryᵀ · Rxᵀ · (point − translation)`: the inverse transformation. For small angles `(I − [θ]×)·(point − translation)`.
+    /// `Rzᵀ · Ryᵀ · Rxᵀ · (point − translation)`: the inverse transformation. For small angles
+    /// `(I − [θ]×)·(point − translation)`.
     #[inline(always)]
     pub fn pull(&self, point: Point<S>) -> Point<S> {
         self.rotate_back(point.minus(self.translation))
@@ -157,10 +156,7 @@ impl<S: Scalar> SmallMotion<S> {
     /// The inverse of [`SmallMotion::rotate`].
     #[inline(always)]
     pub fn rotate_back(&self, direction: Point<S>) -> Point<S> {
-        let back = |turn: &SinCos<S>| SinCos {
-            sin: -turn.sin,
-            cos: turn.cos,
-        };
+        let back = |turn: &SinCos<S>| SinCos { sin: -turn.sin, cos: turn.cos };
         match &self.form {
             SmallAngles::Exact([a, b, c]) => {
                 let about_x = turn_about(Coordinate::X, back(a), direction);
@@ -208,11 +204,7 @@ pub fn turn_about<S: Scalar>(axis: Coordinate, turn: SinCos<S>, point: Point<S>)
 
 /// A rotation about a coordinate axis by a nominal angle.
 #[inline(always)]
-pub fn turn_about_nominal<S: Scalar>(
-    axis: Coordinate,
-    turn: SinCos<S::Nominal>,
-    point: Point<S>,
-) -> Point<S> {
+pub fn turn_about_nominal<S: Scalar>(axis: Coordinate, turn: SinCos<S::Nominal>, point: Point<S>) -> Point<S> {
     let (first, second) = axis.others();
     let (u, v) = (point.0[first], point.0[second]);
     let mut turned = point;

@@ -1,14 +1,17 @@
-//! Model of a machine and its tests: a kinematic chain over an open scalar, its error components, the effects on them, and the
-//! instruments.
+//! Model of a machine and its tests: a kinematic chain over an open scalar, its error components, the effects on them,
+//! and the instruments.
 //!
 //! - [`scalar`]: numeric types of the chain; [`expression`]: the symbolic scalar;
 //! - [`frames`], [`axis`], [`chain`]: transformation of points through a machine;
-//! - [`component`], [`effect`]: names of errors, and their dependence on drivers; [`pattern`]: one name for several errors;
+//! - [`component`], [`effect`], [`driver`]: names of errors, and their dependence on drivers; [`pattern`]: one name for
+//!   several errors;
 //! - [`instrument`]: readings from states of the axes;
-//! - [`sensitivity`]: readings and their derivatives by every component; [`replay`]: evaluation over columns of readings;
+//! - [`sensitivity`]: readings and their derivatives by every component; [`replay`]: evaluation over columns of
+//!   readings;
 //! - [`session`]: machine, tests and readings, and their files; [`words`]: counts in messages.
 //!
-//! The chain over plain and dual numbers: the reading of a ball bar, and its derivative by a location error of C, ∂L/∂EX0C = −R·sin C/L₀.
+//! The chain over plain and dual numbers: the reading of a ball bar, and its derivative by a location error of C,
+//! ∂L/∂EX0C = −R·sin C/L₀.
 //!
 //! ```
 //! use abbe_model::chain::{AxisPosition, Machine};
@@ -61,6 +64,7 @@ pub mod axis;
 pub mod chain;
 pub mod code;
 pub mod component;
+pub mod driver;
 pub mod effect;
 pub mod error;
 pub mod expression;

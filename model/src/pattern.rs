@@ -1,7 +1,7 @@
 //! Patterns for several errors: `E?0C` for the six location errors of C, `E?0J*` for those of all joints.
 //!
-//! `?` matches one character, `*` any number of characters, including none. A pattern is compared with the names of ISO 230-1 (`EX0C`)
-//! and of the literature (`e_x0c`).
+//! `?` matches one character, `*` any number of characters, including none. A pattern is compared with the names of ISO
+//! 230-1 (`EX0C`) and of the literature (`e_x0c`).
 
 use crate::axis::AxisKind;
 use crate::chain::Machine;
@@ -50,8 +50,8 @@ pub fn matches(pattern: &str, name: &str) -> bool {
     pattern[p..].iter().all(|c| *c == '*')
 }
 
-/// Every location error and error motion that the chain applies. The order is by axis of the chain, location errors first, each in the
-/// order X, Y, Z, A, B, C. A linear axis has no position errors.
+/// Every location error and error motion that the chain applies. The order is by axis of the chain, location errors
+/// first, each in the order X, Y, Z, A, B, C. A linear axis has no position errors.
 #[must_use]
 pub fn errors(machine: &Machine) -> Vec<ErrorName> {
     let mut errors = Vec::new();
@@ -59,11 +59,7 @@ pub fn errors(machine: &Machine) -> Vec<ErrorName> {
         for kind in [ErrorKind::Location, ErrorKind::Motion] {
             for freedom in Freedom::ALL {
                 if kind == ErrorKind::Motion || axis.kind == AxisKind::Rotary || freedom.is_angle() {
-                    errors.push(ErrorName {
-                        kind,
-                        freedom,
-                        axis: axis.name.clone(),
-                    });
+                    errors.push(ErrorName { kind, freedom, axis: axis.name.clone() });
                 }
             }
         }
@@ -89,9 +85,7 @@ mod tests {
             (None, None) => true,
             (None, Some(_)) => false,
             (Some(('*', rest)), _) => (0..=name.len()).any(|taken| by_definition(rest, &name[taken..])),
-            (Some((c, rest)), Some((first, after))) => {
-                (*c == '?' || c == first) && by_definition(rest, after)
-            }
+            (Some((c, rest)), Some((first, after))) => (*c == '?' || c == first) && by_definition(rest, after),
             (Some(_), None) => false,
         }
     }
@@ -102,9 +96,7 @@ mod tests {
         for _ in 0..longest {
             last = last
                 .iter()
-                .flat_map(|text: &Vec<char>| {
-                    letters.iter().map(move |letter| [&text[..], &[*letter]].concat())
-                })
+                .flat_map(|text: &Vec<char>| letters.iter().map(move |letter| [&text[..], &[*letter]].concat()))
                 .collect();
             all.extend(last.clone());
         }

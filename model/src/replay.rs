@@ -1,9 +1,9 @@
 //! Evaluation of a recorded calculation over columns of readings.
 //!
-//! The chain is recorded once as an [expression](crate::expression). Quantities that are equal for all readings are computed once per
-//! evaluation. Every other operation is done for a block of readings before the next operation. This is a loop of fixed length over plain
-//! arrays, which the compiler vectorises and which makes the cost of decoding the operation small. The intermediate results of a block
-//! stay in the first-level cache.
+//! The chain is recorded once as an [expression](crate::expression). Quantities that are equal for all readings are
+//! computed once per evaluation. Every other operation is done for a block of readings before the next operation. This
+//! is a loop of fixed length over plain arrays, which the compiler vectorises and which makes the cost of decoding the
+//! operation small. The intermediate results of a block stay in the first-level cache.
 //!
 //! A product that is used only by one sum or difference is fused with it: `a·b + c·d` is one operation.
 
@@ -72,8 +72,8 @@ pub struct Replay<V> {
     registers: usize,
     /// The outputs that no operation computes, because they are uniform or given: output index and register.
     not_computed: Vec<(usize, Register)>,
-    /// The computed outputs in the order of their operations: operation index and output index. Each is delivered immediately, so that
-    /// its register can be reused.
+    /// The computed outputs in the order of their operations: operation index and output index. Each is delivered
+    /// immediately, so that its register can be reused.
     computed: Vec<(usize, usize)>,
 }
 
@@ -108,8 +108,9 @@ impl<V: Clone + PartialEq> Replay<V> {
         compiler.replay(&nodes, outputs)
     }
 
-    /// Evaluates the calculation for a number of readings. `given` returns the uniform variables, `column` the varying ones, one value
-    /// per reading. For each block and output, `put` receives the index of the output, the first reading of the block and the values.
+    /// Evaluates the calculation for a number of readings. `given` returns the uniform variables, `column` the varying
+    /// ones, one value per reading. For each block and output, `put` receives the index of the output, the first
+    /// reading of the block and the values.
     pub fn run<'c>(
         &self,
         rows: usize,
@@ -130,19 +131,10 @@ impl<V: Clone + PartialEq> Replay<V> {
         let broadcast = self.broadcast.iter().map(|index| uniform[*index]);
         // One more than the registers: an operation writes there and then swaps with the register that it replaces.
         let mut store = vec![BlockValues([0.0; READINGS]); self.registers + 1];
-        store
-            .iter_mut()
-            .zip(broadcast)
-            .for_each(|(block, value)| block.0.fill(value));
+        store.iter_mut().zip(broadcast).for_each(|(block, value)| block.0.fill(value));
         let mut file: Vec<&mut BlockValues> = store.iter_mut().collect();
         let columns: Vec<&[f64]> = self.columns.iter().map(column).collect();
-        pulp::Arch::new().dispatch(Evaluation {
-            replay: self,
-            rows,
-            columns: &columns,
-            file: &mut file,
-            put,
-        });
+        pulp::Arch::new().dispatch(Evaluation { replay: self, rows, columns: &columns, file: &mut file, put });
     }
 }
 
@@ -249,9 +241,7 @@ impl<V: Clone + PartialEq> Compiler<'_, V> {
     /// The factors of a product that is used only by one sum or difference.
     fn product(&self, operand: Operand) -> Option<[Operand; 2]> {
         match self.arena.node_of(operand)? {
-            Node::Binary(Binary::Mul, a, b) if self.varies(operand) && self.uses[&operand] == [true] => {
-                Some([a, b])
-            }
+            Node::Binary(Binary::Mul, a, b) if self.varies(operand) && self.uses[&operand] == [true] => Some([a, b]),
             _ => None,
         }
     }
@@ -295,10 +285,8 @@ impl<V: Clone + PartialEq> Compiler<'_, V> {
         }
         let mut broadcast = Vec::new();
         let mut register_of: HashMap<Operand, Register> = HashMap::new();
-        for operand in instructions
-            .iter()
-            .flat_map(|(_, instruction)| instruction.operands)
-            .chain(outputs.iter().copied())
+        for operand in
+            instructions.iter().flat_map(|(_, instruction)| instruction.operands).chain(outputs.iter().copied())
         {
             if !self.varies(operand) && !register_of.contains_key(&operand) {
                 register_of.insert(operand, broadcast.len());
@@ -346,9 +334,7 @@ impl<V: Clone + PartialEq> Compiler<'_, V> {
             instructions: allocated,
             registers,
             not_computed: (outputs.iter().enumerate())
-                .filter_map(|(number, output)| {
-                    Some((number, *register_of.get(output)?)).filter(|(_, r)| *r < kept)
-                })
+                .filter_map(|(number, output)| Some((number, *register_of.get(output)?)).filter(|(_, r)| *r < kept))
                 .collect(),
             computed,
         }

@@ -1,9 +1,10 @@
 //! The open scalar: the kinematic chain is written once, and the numeric type decides what it computes.
 //!
-//! Over `f64` the chain simulates. Over a symbol it gives the closed form and, recorded and evaluated over columns, every Jacobian. Over
-//! dual numbers it gives the reference derivatives for both. Two kinds of quantity occur in a chain. *Nominal* quantities (axis
-//! positions, origins, ball positions) are never differentiated; *errors* are. A [`Scalar`] is the type of an error, [`Scalar::Nominal`]
-//! that of a nominal quantity, so that a product of two nominal quantities carries no derivatives:
+//! Over `f64` the chain simulates. Over a symbol it gives the closed form and, recorded and evaluated over columns,
+//! every Jacobian. Over dual numbers it gives the reference derivatives for both. Two kinds of quantity occur in a
+//! chain. *Nominal* quantities (axis positions, origins, ball positions) are never differentiated; *errors* are. A
+//! [`Scalar`] is the type of an error, [`Scalar::Nominal`] that of a nominal quantity, so that a product of two nominal
+//! quantities carries no derivatives:
 //!
 //! | scalar | nominal | result of the chain |
 //! |---|---|---|

@@ -1,9 +1,10 @@
 //! Readings of a test and their derivatives by every component, computed through the chain.
 //!
-//! A *slot* is a component of the chain: the machine's errors ([`crate::chain::ERRORS_PER_AXIS`] per axis), then the instrument's
-//! parameters. The chain is recorded once per test over symbols. Reverse accumulation gives its derivatives by all slots at the cost of a
-//! few readings, whatever the number of slots. Both are [evaluated](crate::replay) over the columns of readings. An axis that does not
-//! move in a test is a constant of the recording. A slot that is zero and not requested is omitted.
+//! A *slot* is a component of the chain: the machine's errors ([`crate::chain::ERRORS_PER_AXIS`] per axis), then the
+//! instrument's parameters. The chain is recorded once per test over symbols. Reverse accumulation gives its
+//! derivatives by all slots at the cost of a few readings, whatever the number of slots. Both are
+//! [evaluated](crate::replay) over the columns of readings. An axis that does not move in a test is a constant of the
+//! recording. A slot that is zero and not requested is omitted.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -30,10 +31,7 @@ pub struct SlotValues {
 impl SlotValues {
     /// All zero, for a test with this number of slots.
     pub fn zero(slots: usize) -> Self {
-        SlotValues {
-            constant: vec![0.0; slots],
-            varying: Vec::new(),
-        }
+        SlotValues { constant: vec![0.0; slots], varying: Vec::new() }
     }
 
     fn varies(&self, slot: usize) -> bool {
@@ -89,11 +87,7 @@ enum AxisColumn {
     /// Equal in all rows.
     Fixed(AxisPosition<f64>),
     /// Positions, and for a rotary axis their sines and cosines, computed once.
-    Moving {
-        position: Vec<f64>,
-        sine: Vec<f64>,
-        cosine: Vec<f64>,
-    },
+    Moving { position: Vec<f64>, sine: Vec<f64>, cosine: Vec<f64> },
 }
 
 impl AxisColumn {
@@ -106,27 +100,16 @@ impl AxisColumn {
             AxisKind::Rotary => positions.iter().map(|position| position.sin_cos()).unzip(),
             AxisKind::Linear => (Vec::new(), Vec::new()),
         };
-        AxisColumn::Moving {
-            position: positions.to_vec(),
-            sine,
-            cosine,
-        }
+        AxisColumn::Moving { position: positions.to_vec(), sine, cosine }
     }
 
     fn at(&self, row: usize) -> AxisPosition<f64> {
         match self {
             AxisColumn::Fixed(position) => *position,
-            AxisColumn::Moving {
-                position,
-                sine,
-                cosine,
-            } => AxisPosition {
+            AxisColumn::Moving { position, sine, cosine } => AxisPosition {
                 value: position[row],
                 turn: match sine.get(row) {
-                    Some(sin) => SinCos {
-                        sin: *sin,
-                        cos: cosine[row],
-                    },
+                    Some(sin) => SinCos { sin: *sin, cos: cosine[row] },
                     None => SinCos { sin: 0.0, cos: 1.0 },
                 },
             },
@@ -151,9 +134,7 @@ impl<'a> TestModel<'a> {
         TestModel {
             machine,
             station,
-            axis_columns: axes
-                .map(|(axis, positions)| AxisColumn::new(axis.kind, positions))
-                .collect(),
+            axis_columns: axes.map(|(axis, positions)| AxisColumn::new(axis.kind, positions)).collect(),
             rows: readings.rows(),
             recorded: Arc::default(),
         }
@@ -179,8 +160,9 @@ impl<'a> TestModel<'a> {
         self.machine.error_slots() + self.station.kind().unknowns().len()
     }
 
-    /// The slots that can affect a reading of this test: the applied errors of the axes between ball and bed (a linear axis has no
-    /// position errors), and all parameters of the instrument. Without a workpiece point, the axes on the workpiece side are excluded.
+    /// The slots that can affect a reading of this test: the applied errors of the axes between ball and bed (a linear
+    /// axis has no position errors), and all parameters of the instrument. Without a workpiece point, the axes on the
+    /// workpiece side are excluded.
     pub fn effective_slots(&self) -> Vec<usize> {
         let two_sided = self.station.kind().is_two_sided();
         let machine = (0..self.machine.error_slots()).filter(|slot| {
@@ -194,13 +176,11 @@ impl<'a> TestModel<'a> {
 
     /// Positions of the axes in a row.
     pub fn state(&self, row: usize) -> Vec<AxisPosition<f64>> {
-        self.axis_columns
-            .iter()
-            .map(|axis_column| axis_column.at(row))
-            .collect()
+        self.axis_columns.iter().map(|axis_column| axis_column.at(row)).collect()
     }
 
-    /// The recorded chain: the coordinates of the reading, then for each of them its derivatives by the requested slots.
+    /// The recorded chain: the coordinates of the reading, then for each of them its derivatives by the requested
+    /// slots.
     fn recording(&self, values: &SlotValues, derivatives: &[usize]) -> Arc<Replay<Quantity>> {
         let mut included: Vec<bool> = values.constant.iter().map(|value| *value != 0.0).collect();
         derivatives.iter().for_each(|slot| included[*slot] = true);
@@ -208,10 +188,7 @@ impl<'a> TestModel<'a> {
             .filter(|slot| included[*slot] || values.varies(*slot))
             .map(|slot| (slot, values.varies(slot)))
             .collect();
-        let key = RecordingKey {
-            slots,
-            derivatives: derivatives.to_vec(),
-        };
+        let key = RecordingKey { slots, derivatives: derivatives.to_vec() };
         // After a panic in another thread every recording is either complete or absent.
         let mut recorded = self.recorded.lock().unwrap_or_else(PoisonError::into_inner);
         match recorded.get(&key) {
@@ -232,10 +209,7 @@ impl<'a> TestModel<'a> {
                 .map(|(index, (axis, axis_column))| match axis_column {
                     AxisColumn::Fixed(position) => AxisPosition {
                         value: constant(position.value),
-                        turn: SinCos {
-                            sin: constant(position.turn.sin),
-                            cos: constant(position.turn.cos),
-                        },
+                        turn: SinCos { sin: constant(position.turn.sin), cos: constant(position.turn.cos) },
                     },
                     AxisColumn::Moving { .. } => AxisPosition {
                         value: arena.variable(Quantity::Position(index)),
@@ -244,34 +218,20 @@ impl<'a> TestModel<'a> {
                                 sin: arena.variable(Quantity::Sine(index)),
                                 cos: arena.variable(Quantity::Cosine(index)),
                             },
-                            AxisKind::Linear => SinCos {
-                                sin: constant(0.0),
-                                cos: constant(1.0),
-                            },
+                            AxisKind::Linear => SinCos { sin: constant(0.0), cos: constant(1.0) },
                         },
                     },
                 })
                 .collect();
-        let slots: HashMap<usize, Symbol<'_, Quantity>> = (key.slots.iter())
-            .map(|&(slot, varies)| (slot, arena.variable(Quantity::Slot { slot, varies })))
-            .collect();
-        let bodies = self
-            .machine
-            .body_errors(|slot| slots.contains_key(&slot), |slot| slots[&slot]);
+        let slots: HashMap<usize, Symbol<'_, Quantity>> =
+            (key.slots.iter()).map(|&(slot, varies)| (slot, arena.variable(Quantity::Slot { slot, varies }))).collect();
+        let bodies = self.machine.body_errors(|slot| slots.contains_key(&slot), |slot| slots[&slot]);
         let first = self.machine.error_slots();
         let station = self.station.map(|number| constant(*number));
-        let reading = station.read(self.machine, &state, &bodies, |unknown| {
-            slots.get(&(first + unknown)).copied()
-        });
-        let coordinates: Vec<Operand> = reading
-            .coordinates()
-            .iter()
-            .map(|value| value.operand())
-            .collect();
+        let reading = station.read(self.machine, &state, &bodies, |unknown| slots.get(&(first + unknown)).copied());
+        let coordinates: Vec<Operand> = reading.coordinates().iter().map(|value| value.operand()).collect();
         let by: Vec<Operand> = key.derivatives.iter().map(|slot| slots[slot].operand()).collect();
-        let gradients = coordinates
-            .iter()
-            .flat_map(|coordinate| arena.gradient(*coordinate, &by));
+        let gradients = coordinates.iter().flat_map(|coordinate| arena.gradient(*coordinate, &by));
         let outputs: Vec<Operand> = coordinates.iter().copied().chain(gradients).collect();
         Replay::new(&arena, &outputs, |quantity| match quantity {
             Quantity::Slot { varies, .. } => *varies,
@@ -279,9 +239,10 @@ impl<'a> TestModel<'a> {
         })
     }
 
-    /// Computes the readings of a range of rows and their derivatives by the slots, block by block, so that they need not be in memory
-    /// together. `put` receives the index of an output, the first row of the block relative to the start of the range, and one value per
-    /// row. Outputs are the coordinates of the reading in mm, then for each coordinate its derivatives by the slots.
+    /// Computes the readings of a range of rows and their derivatives by the slots, block by block, so that they need
+    /// not be in memory together. `put` receives the index of an output, the first row of the block relative to the
+    /// start of the range, and one value per row. Outputs are the coordinates of the reading in mm, then for each
+    /// coordinate its derivatives by the slots.
     pub fn sweep(
         &self,
         values: &SlotValues,
@@ -290,15 +251,10 @@ impl<'a> TestModel<'a> {
         put: impl FnMut(usize, usize, &[f64]),
     ) {
         let recording = self.recording(values, derivatives);
-        let varying: HashMap<usize, Vec<f64>> = (values.varying.iter())
-            .map(|(slot, _)| (*slot, values.column(*slot, rows.clone())))
-            .collect();
+        let varying: HashMap<usize, Vec<f64>> =
+            (values.varying.iter()).map(|(slot, _)| (*slot, values.column(*slot, rows.clone()))).collect();
         let axis_column = |axis: usize| match &self.axis_columns[axis] {
-            AxisColumn::Moving {
-                position,
-                sine,
-                cosine,
-            } => [position, sine, cosine].map(|column| column.as_slice()),
+            AxisColumn::Moving { position, sine, cosine } => [position, sine, cosine].map(|column| column.as_slice()),
             AxisColumn::Fixed(_) => [&[][..]; 3],
         };
         recording.run(
@@ -353,8 +309,6 @@ fn scatter(into: &mut [f64], coordinates: usize, coordinate: usize, start: usize
         into[start..start + column.len()].copy_from_slice(column);
         return;
     }
-    let targets = into[start * coordinates + coordinate..]
-        .iter_mut()
-        .step_by(coordinates);
+    let targets = into[start * coordinates + coordinate..].iter_mut().step_by(coordinates);
     targets.zip(column).for_each(|(target, value)| *target = *value);
 }

@@ -37,18 +37,11 @@ sweep = { axis = "C", from_deg = 0, to_deg = 180, step_deg = 90, feed_deg_min = 
 "#;
 
 fn ball_bar() -> Station<f64> {
-    Station::BallBar(BallBar {
-        workpiece_ball: [0.0, 100.0, 0.0],
-        spindle_ball: [0.0; 3],
-        bar: 125.0,
-    })
+    Station::BallBar(BallBar { workpiece_ball: [0.0, 100.0, 0.0], spindle_ball: [0.0; 3], bar: 125.0 })
 }
 
 fn empty() -> Session {
-    Session::new(
-        Machine::from_code("w C A b Y X Z t").unwrap(),
-        InstrumentKind::BallBar,
-    )
+    Session::new(Machine::from_code("w C A b Y X Z t").unwrap(), InstrumentKind::BallBar)
 }
 
 fn columns() -> Columns {
@@ -113,62 +106,28 @@ fn an_unusable_test_is_refused_and_the_session_unchanged() {
         rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
         origin: [0.0; 3],
     });
-    let no_bar = Station::BallBar(BallBar {
-        workpiece_ball: [0.0, 100.0, 0.0],
-        spindle_ball: [0.0; 3],
-        bar: 0.0,
-    });
+    let no_bar = Station::BallBar(BallBar { workpiece_ball: [0.0, 100.0, 0.0], spindle_ball: [0.0; 3], bar: 0.0 });
     for (bad, expected) in [
         (test(), "two tests have the name \"C100\""),
         (NewTest::new(" ", ball_bar()), "a test without a name"),
-        (
-            NewTest::new("T", tracker),
-            "its instrument is a tracker, that of the session a ballbar",
-        ),
+        (NewTest::new("T", tracker), "its instrument is a tracker, that of the session a ballbar"),
         (NewTest::new("T", no_bar), "`bar` is 0; it must be greater than 0"),
         (NewTest::new("T", ball_bar()), "neither readings nor a motion"),
-        (
-            NewTest::new("T", ball_bar()).prior("mirror", Prior::Free),
-            "a ballbar has no `mirror`",
-        ),
-        (
-            NewTest::new("T", ball_bar()).prior("bar", Prior::Gaussian(-1.0)),
-            "the standard uncertainty of `bar` is -1",
-        ),
+        (NewTest::new("T", ball_bar()).prior("mirror", Prior::Free), "a ballbar has no `mirror`"),
+        (NewTest::new("T", ball_bar()).prior("bar", Prior::Gaussian(-1.0)), "the standard uncertainty of `bar` is -1"),
         (with(&|columns| columns.axes[0].0 = "Q".into()), "has no axis `Q`"),
         (with(&|columns| columns.axes.clear()), "no positions of an axis"),
-        (
-            with(&|columns| columns.axes[0].1.truncate(2)),
-            "positions of C: 2 where 3 are expected",
-        ),
-        (
-            with(&|columns| columns.observed[1] = f64::NAN),
-            "observed values is NaN (item 2)",
-        ),
+        (with(&|columns| columns.axes[0].1.truncate(2)), "positions of C: 2 where 3 are expected"),
+        (with(&|columns| columns.observed[1] = f64::NAN), "observed values is NaN (item 2)"),
         (with(&|columns| columns.observed[1] = 1e13), "too large"),
-        (
-            with(&|columns| columns.observed.truncate(1)),
-            "not enough for a fit",
-        ),
-        (
-            with(&|columns| columns.run.truncate(1)),
-            "run numbers: 1 where 3 are expected",
-        ),
-        (
-            with(&|columns| columns.time_s[2] = 0.5),
-            "time decreases: 0.5 s after 1 s",
-        ),
-        (
-            with(&|columns| columns.observed = vec![0.001; 3]),
-            "a bar of 125.0000 mm read 0.001 mm",
-        ),
+        (with(&|columns| columns.observed.truncate(1)), "not enough for a fit"),
+        (with(&|columns| columns.run.truncate(1)), "run numbers: 1 where 3 are expected"),
+        (with(&|columns| columns.time_s[2] = 0.5), "time decreases: 0.5 s after 1 s"),
+        (with(&|columns| columns.observed = vec![0.001; 3]), "a bar of 125.0000 mm read 0.001 mm"),
         (test_at("C", 0.0), "cannot reach between its balls"),
     ] {
         let fault = session.add_test(bad).unwrap_err();
-        assert!(
-            fault.to_string().contains(expected),
-            "`{expected}` is not in\n{fault}"
-        );
+        assert!(fault.to_string().contains(expected), "`{expected}` is not in\n{fault}");
         assert!(matches!(fault, ModelError::Session { .. }) && fault.help().is_some());
         assert!(fault.location().is_none());
         assert_eq!(session.tests.len(), 1);
@@ -176,7 +135,5 @@ fn an_unusable_test_is_refused_and_the_session_unchanged() {
 }
 
 fn test_at(axis: &str, position: f64) -> NewTest {
-    NewTest::new("low", ball_bar())
-        .at(axis, position)
-        .readings(columns())
+    NewTest::new("low", ball_bar()).at(axis, position).readings(columns())
 }

@@ -26,20 +26,13 @@ fn available(test: &str, path: PathBuf) -> Option<PathBuf> {
     if path.exists() {
         return Some(path);
     }
-    assert!(
-        std::env::var("CI").as_deref() != Ok("true"),
-        "{test}: {} is not there, and CI needs it",
-        path.display()
-    );
+    assert!(std::env::var("CI").as_deref() != Ok("true"), "{test}: {} is not there, and CI needs it", path.display());
     println!("skipped: {test} (no data folder)");
     None
 }
 
 fn ready(name: &str) -> Session {
-    let options = ReadOptions {
-        data_directory: Some(data()),
-        ..ReadOptions::default()
-    };
+    let options = ReadOptions { data_directory: Some(data()), ..ReadOptions::default() };
     files::session(&workspace().join("sessions").join(name), &options).unwrap()
 }
 
@@ -49,22 +42,14 @@ fn the_samples_of_an_independent_simulator_read() {
         return;
     };
     let rows = |name: &str| -> (Session, Vec<usize>) {
-        let session =
-            files::session(&samples.join(name).join("session.toml"), &ReadOptions::default()).unwrap();
-        let rows = session
-            .tests
-            .iter()
-            .map(|test| test.readings.as_ref().unwrap().rows())
-            .collect();
+        let session = files::session(&samples.join(name).join("session.toml"), &ReadOptions::default()).unwrap();
+        let rows = session.tests.iter().map(|test| test.readings.as_ref().unwrap().rows()).collect();
         (session, rows)
     };
     let (clean, counts) = rows("rotary-clean");
     assert_eq!(counts, [722, 722, 1442, 1442]);
     let unknowns: Vec<String> = clean.unknowns.iter().map(ToString::to_string).collect();
-    assert_eq!(
-        unknowns,
-        ["EY0A", "EZ0A", "EB0A", "EC0A", "EX0C", "EY0C", "EA0C", "EB0C"]
-    );
+    assert_eq!(unknowns, ["EY0A", "EZ0A", "EB0A", "EC0A", "EX0C", "EY0C", "EA0C", "EB0C"]);
     assert_eq!(clean.noise_mm, Some(0.3e-3));
     assert!(clean.warnings.is_empty(), "{:?}", clean.warnings);
     let a100 = &clean.tests[0];
@@ -108,29 +93,15 @@ fn the_kuka_session_reads_and_its_sockets_nearly_close() {
     let session = ready("kuka-iiwa14/session.toml");
     assert_eq!(session.unknowns.len(), 42);
     assert_eq!(session.socket_distances.len(), 3);
-    let poses: usize = session
-        .tests
-        .iter()
-        .map(|test| test.readings.as_ref().unwrap().rows())
-        .sum();
+    let poses: usize = session.tests.iter().map(|test| test.readings.as_ref().unwrap().rows()).sum();
     assert_eq!(poses, 180);
     let (ball, rms_mm) = fitted_ball(&session);
-    assert!(
-        (rms_mm - 0.55).abs() < 0.01,
-        "with ball and sockets fitted the closure is {rms_mm:.3} mm"
-    );
+    assert!((rms_mm - 0.55).abs() < 0.01, "with ball and sockets fitted the closure is {rms_mm:.3} mm");
     let Station::Socket(station) = &session.tests[0].station else {
         panic!("the KUKA session is one of sockets");
     };
-    let off = (0..3)
-        .map(|i| (station.ball[i] - ball[i]).powi(2))
-        .sum::<f64>()
-        .sqrt();
-    assert!(
-        off < 1.0,
-        "the session's ball {:?} lies {off:.3} mm from {ball:?}",
-        station.ball
-    );
+    let off = (0..3).map(|i| (station.ball[i] - ball[i]).powi(2)).sum::<f64>().sqrt();
+    assert!(off < 1.0, "the session's ball {:?} lies {off:.3} mm from {ball:?}", station.ball);
 }
 
 /// The ball in the tool frame and the root mean square closure, after a fit of ball and sockets with nominal joints.
@@ -145,11 +116,7 @@ fn fitted_ball(session: &Session) -> ([f64; 3], f64) {
             readings.state(&session.machine, row, &mut state);
             let ball = |point| session.machine.tool_point::<f64>(&state, &none, Point(point)).0;
             let origin = ball([0.0; 3]);
-            let along = [
-                ball([1.0, 0.0, 0.0]),
-                ball([0.0, 1.0, 0.0]),
-                ball([0.0, 0.0, 1.0]),
-            ];
+            let along = [ball([1.0, 0.0, 0.0]), ball([0.0, 1.0, 0.0]), ball([0.0, 0.0, 1.0])];
             for i in 0..3 {
                 let mut equation = vec![0.0; unknowns];
                 for j in 0..3 {

@@ -4,7 +4,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use abbe_model::chain::BodyErrors;
-use abbe_model::effect::{Component, Driver, Effect, Shape};
+use abbe_model::driver::Driver;
+use abbe_model::effect::shape::{Curve, Harmonic, Local, Periodic, Polynomial, Power, ReversalSpike, Steps, Warmup};
+use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::files::table::csv;
 use abbe_model::files::{self, ReadOptions};
 use abbe_model::files::{toml::write, whole};
@@ -13,9 +15,7 @@ use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test};
 
 fn ready(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../sessions")
-        .join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions").join(name)
 }
 
 fn plan(name: &str) -> Session {
@@ -29,9 +29,7 @@ fn nominal(session: &Session, test: &Test, readings: &Readings) -> Vec<f64> {
     (0..readings.rows())
         .map(|row| {
             readings.state(&session.machine, row, &mut state);
-            test.station
-                .read::<f64>(&session.machine, &state, &none, |_| None)
-                .coordinates()[0]
+            test.station.read::<f64>(&session.machine, &state, &none, |_| None).coordinates()[0]
         })
         .collect()
 }
@@ -56,17 +54,9 @@ fn the_three_methods_are_plans_in_which_the_bar_fits() {
         assert_eq!(session.tests.len(), 4, "{chapter}");
         assert_eq!(session.unknowns.len(), 8, "{chapter}");
         assert!(session.warnings.is_empty());
-        for (test, readings) in session
-            .tests
-            .iter()
-            .zip(planned::planned_session(&session).unwrap())
-        {
+        for (test, readings) in session.tests.iter().zip(planned::planned_session(&session).unwrap()) {
             for length in nominal(&session, test, &readings) {
-                let bar = if test.name.ends_with("150") {
-                    149.9946
-                } else {
-                    99.9881
-                };
+                let bar = if test.name.ends_with("150") { 149.9946 } else { 99.9881 };
                 assert!((length - bar).abs() < 0.012, "{chapter} {}: {length}", test.name);
             }
         }
@@ -128,10 +118,7 @@ fn a_plan_beyond_the_travel_is_refused() {
     let test = "bar_mm = 100\nworkpiece_ball_mm = [150, 0, 0]\n\
                 path = { kind = \"circle\", plane = \"XY\", radius_mm = 100, step_deg = 1 }";
     let message = one_test(test).unwrap_err().to_string();
-    assert!(
-        message.contains("axis `X` goes to 250.000 mm; its travel is -200 to 200 mm"),
-        "{message}"
-    );
+    assert!(message.contains("axis `X` goes to 250.000 mm; its travel is -200 to 200 mm"), "{message}");
 }
 
 #[test]
@@ -144,60 +131,20 @@ fn written_effects_read_back_equal() {
     };
     let mut effects = vec![
         effect("EX0C", "time", Shape::Drift),
-        effect("EZC", "C", Shape::Harmonic { order: 2.0 }),
-        effect("EZC", "C", Shape::Harmonic { order: 0.5 }),
-        effect(
-            "EXX",
-            "X",
-            Shape::Polynomial {
-                degree: 3,
-                scale: 250.0,
-            },
-        ),
-        effect(
-            "ECC",
-            "C",
-            Shape::Power {
-                degree: 2,
-                scale: 1.0,
-            },
-        ),
-        effect("EXX", "X", Shape::Periodic { period: 10.0 }),
-        effect("EXC", "C", Shape::Periodic { period: 0.1 }),
+        effect("EZC", "C", Shape::Harmonic(Harmonic { order: 2.0 })),
+        effect("EZC", "C", Shape::Harmonic(Harmonic { order: 0.5 })),
+        effect("EXX", "X", Shape::Polynomial(Polynomial { degree: 3, scale: 250.0 })),
+        effect("ECC", "C", Shape::Power(Power { degree: 2, scale: 1.0 })),
+        effect("EXX", "X", Shape::Periodic(Periodic { period: 10.0 })),
+        effect("EXC", "C", Shape::Periodic(Periodic { period: 0.1 })),
         effect("EYY", "Y", Shape::Backlash),
         effect("EYY", "Y", Shape::Lag),
-        effect("EYY", "Y", Shape::ReversalSpike { width: 1.5 }),
-        effect("bar", "time", Shape::Warmup { tau_s: 1234.5 }),
-        effect(
-            "workpiece_ball.z",
-            "temperature",
-            Shape::Polynomial {
-                degree: 1,
-                scale: 1.0,
-            },
-        ),
-        effect(
-            "EAA",
-            "gravity",
-            Shape::Polynomial {
-                degree: 1,
-                scale: 1.0,
-            },
-        ),
-        effect(
-            "EXX",
-            "X",
-            Shape::Steps {
-                at: vec![-50.0, 0.1, 50.0],
-            },
-        ),
-        effect(
-            "ECC",
-            "C",
-            Shape::Steps {
-                at: vec![0.3, 1.0, 2.0_f64.to_radians()],
-            },
-        ),
+        effect("EYY", "Y", Shape::ReversalSpike(ReversalSpike { width: 1.5 })),
+        effect("bar", "time", Shape::Warmup(Warmup { tau_s: 1234.5 })),
+        effect("workpiece_ball.z", "temperature", Shape::Polynomial(Polynomial { degree: 1, scale: 1.0 })),
+        effect("EAA", "gravity", Shape::Polynomial(Polynomial { degree: 1, scale: 1.0 })),
+        effect("EXX", "X", Shape::Steps(Steps { at: vec![-50.0, 0.1, 50.0] })),
+        effect("ECC", "C", Shape::Steps(Steps { at: vec![0.3, 1.0, 2.0_f64.to_radians()] })),
         effect("EZC", "none", Shape::Constant),
         effect("trigger", "none", Shape::Constant),
     ];
@@ -206,27 +153,18 @@ fn written_effects_read_back_equal() {
         effects.push(effect(
             "EZC",
             "C",
-            Shape::Local {
-                centre: if degrees % 2 == 0 {
-                    centre.to_radians()
-                } else {
-                    centre.sqrt()
-                },
+            Shape::Local(Local {
+                centre: if degrees % 2 == 0 { centre.to_radians() } else { centre.sqrt() },
                 width: 12.0_f64.to_radians(),
                 recurs: (degrees % 3 > 0).then_some(std::f64::consts::TAU),
-            },
+            }),
         ));
     }
     for closed in [true, false] {
         effects.push(effect(
             "EZA",
             "A",
-            Shape::Curve {
-                from: -20.0_f64.to_radians(),
-                to: 70.0_f64.to_radians(),
-                intervals: 9,
-                closed,
-            },
+            Shape::Curve(Curve { from: -20.0_f64.to_radians(), to: 70.0_f64.to_radians(), intervals: 9, closed }),
         ));
     }
     effects[1].tests = vec!["C100".into(), "C150".into()];
@@ -237,11 +175,7 @@ fn written_effects_read_back_equal() {
     let text = write::with_effects(&original, &effects, &session.machine);
     assert!(text.starts_with(&original));
     let folder = tempfile::tempdir().unwrap();
-    fs::copy(
-        ready("hermle-c600u/machine.toml"),
-        folder.path().join("machine.toml"),
-    )
-    .unwrap();
+    fs::copy(ready("hermle-c600u/machine.toml"), folder.path().join("machine.toml")).unwrap();
     let written = folder.path().join("session.toml");
     whole::write(&written, &text).unwrap();
     let read = files::session(&written, &ReadOptions::default()).unwrap();
@@ -262,13 +196,7 @@ fn a_plan_becomes_a_measured_session() {
     for (test, mut readings) in session.tests.iter().zip(plans) {
         readings.observed = nominal(&session, test, &readings);
         let name = format!("{}.csv", test.name);
-        csv::write(
-            &folder.path().join(&name),
-            &session.machine,
-            &test.station,
-            &readings,
-        )
-        .unwrap();
+        csv::write(&folder.path().join(&name), &session.machine, &test.station, &readings).unwrap();
         data.push((test.name.clone(), name));
         measured.push(readings);
     }
@@ -278,11 +206,7 @@ fn a_plan_becomes_a_measured_session() {
     // Applied again to the result, the names of the files are replaced, not added.
     assert_eq!(write::with_data(&text, &written, &data).unwrap(), text);
     fs::write(&written, text).unwrap();
-    fs::copy(
-        ready("hermle-c600u/machine.toml"),
-        folder.path().join("machine.toml"),
-    )
-    .unwrap();
+    fs::copy(ready("hermle-c600u/machine.toml"), folder.path().join("machine.toml")).unwrap();
     let read = files::session(&written, &ReadOptions::default()).unwrap();
     for (test, before) in read.tests.iter().zip(&measured) {
         let after = test.readings.as_ref().unwrap();
@@ -307,11 +231,7 @@ fn sockets_named_by_a_column_become_tests() {
                 ball_u_um = inf\n\n[[socket_distance]]\nbetween = [\"a\", \"b\"]\nmm = 50\nu_um = 100\n\n\
                 [[effect]]\ncomponent = \"ECJ1\"\nshape = \"harmonic\"\norder = 1\ntests = [\"T\"]\n";
     fs::write(&path, text).unwrap();
-    fs::write(
-        folder.path().join("T.csv"),
-        "socket,J1_rad\na,0\nb,0.5\na,0.001\n",
-    )
-    .unwrap();
+    fs::write(folder.path().join("T.csv"), "socket,J1_rad\na,0\nb,0.5\na,0.001\n").unwrap();
     let session = files::session(&path, &ReadOptions::default()).unwrap();
     let names: Vec<&str> = session.tests.iter().map(|test| test.name.as_str()).collect();
     assert_eq!(names, ["T/a", "T/b"]);
@@ -343,11 +263,7 @@ fn missing_runs_are_reported() {
                 }
             }
             fs::write(folder.path().join("t.csv"), data).unwrap();
-            let ball = if columns == "c_deg" {
-                "[100, 0, 0]"
-            } else {
-                "[0, 0, 0]"
-            };
+            let ball = if columns == "c_deg" { "[100, 0, 0]" } else { "[0, 0, 0]" };
             let text = format!(
                 "[machine]\nchain = \"w C b Y X Z t\"\n[machine.axis.C]\n[machine.axis.X]\n[machine.axis.Y]\n[machine.axis.Z]\n\n\
                  [instrument]\nkind = \"ballbar\"\n\n[unknowns]\nerrors = []\n\n[[test]]\nname = \"T\"\ndata = \"t.csv\"\n\
@@ -369,19 +285,13 @@ fn missing_runs_are_reported() {
         ] {
             let warnings = one_way(runs);
             assert_eq!(warnings.len(), 1, "{movement}: {warnings:?}");
-            assert!(
-                warnings[0].contains(found) && warnings[0].contains("both_directions = false"),
-                "{warnings:?}"
-            );
+            assert!(warnings[0].contains(found) && warnings[0].contains("both_directions = false"), "{warnings:?}");
         }
         assert!(one_way(&[true, true]).is_empty());
         // Runs without run numbers are not counted as zero.
         let warnings = unseparated();
         assert_eq!(warnings.len(), 1, "{movement}: {warnings:?}");
-        assert!(
-            warnings[0].contains("run 1 goes forward and backward under one number"),
-            "{warnings:?}"
-        );
+        assert!(warnings[0].contains("run 1 goes forward and backward under one number"), "{warnings:?}");
         for (runs, found) in [
             (&[true, false, true][..], "2 runs forward and 1 backward"),
             (&[true, true, true, true][..], "4 runs forward and 0 backward"),

@@ -9,17 +9,9 @@ pub const FAULTS: [&str; 6] = ["fault", "value", "u (k=1)", "unit", "share", "on
 
 /// The test and its path.
 pub fn heading(test: &CircularTest) -> String {
-    let radius = test
-        .radius_mm
-        .map_or(String::new(), |radius| format!(", radius {radius:.1} mm"));
-    let feed = test
-        .feed_mm_min
-        .map_or(String::new(), |feed| format!(", {feed:.0} mm/min"));
-    let arc = if test.arc_deg < 359.0 {
-        format!(", {:.0}°", test.arc_deg)
-    } else {
-        String::new()
-    };
+    let radius = test.radius_mm.map_or(String::new(), |radius| format!(", radius {radius:.1} mm"));
+    let feed = test.feed_mm_min.map_or(String::new(), |feed| format!(", {feed:.0} mm/min"));
+    let arc = if test.arc_deg < 359.0 { format!(", {:.0}°", test.arc_deg) } else { String::new() };
     format!("{}: circular path of {}{radius}{feed}{arc}", test.test, test.axes)
 }
 
@@ -42,7 +34,8 @@ pub fn direction_rows(test: &CircularTest) -> Vec<Vec<String>> {
 /// Circular tests that the first screen shows.
 const MAX_TESTS: usize = 6;
 
-/// Prints the figures of circular tests, one row per test; with `all`, the figures of each direction, the diagnosis and its limitations.
+/// Prints the figures of circular tests, one row per test; with `all`, the figures of each direction, the diagnosis and
+/// its limitations.
 pub fn print(tests: &[CircularTest], all: bool) {
     if all {
         tests.iter().for_each(print_in_full);
@@ -66,14 +59,11 @@ pub fn print(tests: &[CircularTest], all: bool) {
 /// The figures of a test in one row.
 fn test_row(test: &CircularTest) -> Vec<String> {
     let figure = |um: Option<f64>| um.map_or("–".to_string(), |um| format!("{um:.2}"));
-    let arc = if test.arc_deg < 359.0 {
-        format!("{}, {:.0}°", test.axes, test.arc_deg)
-    } else {
-        test.axes.clone()
-    };
-    let fault = test.diagnosis.first().map_or(String::new(), |fault| {
-        format!("{} {}, {:.0} %", fault.fault, fault.axes, fault.share_percent)
-    });
+    let arc = if test.arc_deg < 359.0 { format!("{}, {:.0}°", test.axes, test.arc_deg) } else { test.axes.clone() };
+    let fault = test
+        .diagnosis
+        .first()
+        .map_or(String::new(), |fault| format!("{} {}, {:.0} %", fault.fault, fault.axes, fault.share_percent));
     vec![
         test.test.clone(),
         arc,
@@ -88,11 +78,9 @@ fn print_in_full(test: &CircularTest) {
     say!("\n{}", heading(test));
     let rows = direction_rows(test);
     table::print(&["direction", "runs", "G, µm", "F max, µm", "F min, µm"], &rows);
-    if let (Some(both), Some(mean), Some(hysteresis)) = (
-        test.bidirectional_circular_deviation_um,
-        test.mean_bidirectional_radial_deviation_um,
-        test.hysteresis_um,
-    ) {
+    if let (Some(both), Some(mean), Some(hysteresis)) =
+        (test.bidirectional_circular_deviation_um, test.mean_bidirectional_radial_deviation_um, test.hysteresis_um)
+    {
         say!("  both directions: G(b) {both:.2} µm, D {mean:.2} µm, H {hysteresis:.2} µm");
     }
     if !test.diagnosis.is_empty() {

@@ -1,10 +1,14 @@
-//! `abbe fit --compensation`: estimated errors as compensation tables of controls, as far as their formats are publicly documented.
+//! `abbe fit --compensation`: estimated errors as compensation tables of controls, as far as their formats are publicly
+//! documented.
 //!
-//! - **LinuxCNC** `COMP_FILE` of type 0 (INI Configuration, `[JOINT_n]`): nominal, actual forward, actual reverse; the control adds nominal less actual.
-//!   It reads three numbers per line and ignores the rest (`usrmotLoadComp` in `usrmotintf.cc`). The uncertainty follows them.
-//! - **Heidenhain** `.COM` (Technical Manual MANUALplus 620, 6.10.3): columns AXISPOS, BACKLASH, and one for each axis; points of the error curve
-//!   (Technical Manual TNC 406/306, 4-21), positive where the travel is too long (TNC 407, 1.6.3). The frame of the file is not publicly documented.
-//! - **Beckhoff** TF5280 (and ISG kernel) ISG CSV format: the errors by their names of ISO 230, in mm and rad over mm and degrees.
+//! - **LinuxCNC** `COMP_FILE` of type 0 (INI Configuration, `[JOINT_n]`): nominal, actual forward, actual reverse; the
+//!   control adds nominal less actual. It reads three numbers per line and ignores the rest (`usrmotLoadComp` in
+//!   `usrmotintf.cc`). The uncertainty follows them.
+//! - **Heidenhain** `.COM` (Technical Manual MANUALplus 620, 6.10.3): columns AXISPOS, BACKLASH, and one for each axis;
+//!   points of the error curve (Technical Manual TNC 406/306, 4-21), positive where the travel is too long (TNC 407,
+//!   1.6.3). The frame of the file is not publicly documented.
+//! - **Beckhoff** TF5280 (and ISG kernel) ISG CSV format: the errors by their names of ISO 230, in mm and rad over mm
+//!   and degrees.
 
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -85,14 +89,7 @@ impl CompensationArguments {
             return Ok(());
         };
         let compensation = compensation::of_fit(problem, fit);
-        write(
-            &problem.session.machine,
-            &compensation,
-            control,
-            self.points,
-            folder,
-            tables,
-        )
+        write(&problem.session.machine, &compensation, control, self.points, folder, tables)
     }
 }
 
@@ -115,10 +112,7 @@ fn write(
         Control::Beckhoff => beckhoff(machine, compensation, points, &mut left_out),
     };
     if files.is_empty() {
-        let all = left_out
-            .iter()
-            .map(|line| format!("\n  {line}"))
-            .collect::<String>();
+        let all = left_out.iter().map(|line| format!("\n  {line}")).collect::<String>();
         return Err(Failure::Other(format!(
             "no error can be compensated in this format: declare error motions as [[effect]], as `abbe trace --write` does, and fit again{all}"
         )));
@@ -156,10 +150,7 @@ fn write(
             );
         }
     }
-    say!(
-        "  standard uncertainty (k = 1) of each point: {}",
-        uncertainty::FILE
-    );
+    say!("  standard uncertainty (k = 1) of each point: {}", uncertainty::FILE);
     for line in &left_out {
         say!("  not in the tables: {line}");
     }
@@ -167,14 +158,10 @@ fn write(
 }
 
 /// Equidistant positions that all of these curves cover, internal units.
-fn positions<'c>(
-    curves: impl IntoIterator<Item = &'c ErrorCurve>,
-    points: usize,
-) -> impl Iterator<Item = f64> {
+fn positions<'c>(curves: impl IntoIterator<Item = &'c ErrorCurve>, points: usize) -> impl Iterator<Item = f64> {
     let ranges = curves.into_iter().map(|curve| &curve.range);
-    let (from, to) = ranges.fold((f64::NEG_INFINITY, f64::INFINITY), |(from, to), range| {
-        (from.max(range.start), to.min(range.end))
-    });
+    let (from, to) =
+        ranges.fold((f64::NEG_INFINITY, f64::INFINITY), |(from, to), range| (from.max(range.start), to.min(range.end)));
     // Curves without a common position have no table.
     let points = if from < to { points } else { 0 };
     (0..points).map(move |k| from + (to - from) * k as f64 / (points - 1) as f64)
@@ -188,13 +175,12 @@ fn in_file_unit(kind: AxisKind, value: f64) -> f64 {
     }
 }
 
-/// The axis that moves in the freedom of an error, and the change of its position that equals an error of 1 in R (tool against workpiece, rotary
-/// axes at zero).
+/// The axis that moves in the freedom of an error, and the change of its position that equals an error of 1 in R (tool
+/// against workpiece, rotary axes at zero).
 fn as_position(machine: &Machine, curve: &ErrorCurve) -> Option<(usize, f64)> {
     let side = |axis: usize| if axis < machine.workpiece_side { -1.0 } else { 1.0 };
     let freedom = curve.error.freedom;
-    let moves =
-        |axis: usize| machine.axes[axis].own_freedom() == freedom && machine.axes[axis].principal().is_some();
+    let moves = |axis: usize| machine.axes[axis].own_freedom() == freedom && machine.axes[axis].principal().is_some();
     // The axis of the error before another axis with the same freedom.
     let axis = std::iter::once(curve.axis)
         .chain((0..machine.axes.len()).filter(|_| !freedom.is_angle()))
@@ -203,19 +189,11 @@ fn as_position(machine: &Machine, curve: &ErrorCurve) -> Option<(usize, f64)> {
     Some((axis, side(curve.axis) / (side(axis) * sign)))
 }
 
-fn linuxcnc(
-    machine: &Machine,
-    compensation: &Compensation,
-    points: usize,
-    left_out: &mut Vec<String>,
-) -> Vec<NewFile> {
+fn linuxcnc(machine: &Machine, compensation: &Compensation, points: usize, left_out: &mut Vec<String>) -> Vec<NewFile> {
     let mut files = Vec::new();
     for curve in &compensation.curves {
         let Some((axis, factor)) = as_position(machine, curve).filter(|(axis, _)| *axis == curve.axis) else {
-            left_out.push(format!(
-                "{}: COMP_FILE compensates the positioning of a joint only",
-                curve.error
-            ));
+            left_out.push(format!("{}: COMP_FILE compensates the positioning of a joint only", curve.error));
             continue;
         };
         let kind = machine.axes[axis].kind;
@@ -249,10 +227,8 @@ fn heidenhain(
         for curve in compensation.curves.iter().filter(|curve| curve.axis == axis) {
             match as_position(machine, curve) {
                 Some((column, factor)) => columns.push((curve, column, factor)),
-                None => left_out.push(format!(
-                    "{}: a column of a .COM table compensates the position of an axis",
-                    curve.error
-                )),
+                None => left_out
+                    .push(format!("{}: a column of a .COM table compensates the position of an axis", curve.error)),
             }
         }
         if columns.is_empty() {
@@ -280,16 +256,8 @@ fn heidenhain(
                 let _ = write!(text, " {:>12.6}", in_file_unit(kind, factor * curve.at(q, -1.0)));
             }
             for (curve, column, factor) in &columns {
-                let value = if *column == axis {
-                    curve.at(q, 1.0)
-                } else {
-                    curve.mean_at(q)
-                };
-                let _ = write!(
-                    text,
-                    " {:>12.6}",
-                    in_file_unit(machine.axes[*column].kind, factor * value)
-                );
+                let value = if *column == axis { curve.at(q, 1.0) } else { curve.mean_at(q) };
+                let _ = write!(text, " {:>12.6}", in_file_unit(machine.axes[*column].kind, factor * value));
             }
             text.push('\n');
         }
@@ -298,12 +266,7 @@ fn heidenhain(
     files
 }
 
-fn beckhoff(
-    machine: &Machine,
-    compensation: &Compensation,
-    points: usize,
-    left_out: &mut Vec<String>,
-) -> Vec<NewFile> {
+fn beckhoff(machine: &Machine, compensation: &Compensation, points: usize, left_out: &mut Vec<String>) -> Vec<NewFile> {
     let letter = |name: &str| matches!(name, "X" | "Y" | "Z" | "A" | "B" | "C");
     let mut blocks = Vec::new();
     let named: Vec<_> = compensation
@@ -318,30 +281,17 @@ fn beckhoff(
         })
         .collect();
     if !named.is_empty() {
-        let names: Vec<String> = named
-            .iter()
-            .map(|(name, _)| format!("{name}")[1..].to_string())
-            .collect();
+        let names: Vec<String> = named.iter().map(|(name, _)| format!("{name}")[1..].to_string()).collect();
         let values: Vec<String> = named.iter().map(|(_, value)| format!("{value:.9}")).collect();
-        blocks.push(format!(
-            "// Position errors, mm and rad\n{}\n",
-            table(&[names, values])
-        ));
+        blocks.push(format!("// Position errors, mm and rad\n{}\n", table(&[names, values])));
     }
     for (index, axis) in machine.axes.iter().enumerate() {
-        let curves: Vec<&ErrorCurve> = compensation
-            .curves
-            .iter()
-            .filter(|curve| curve.axis == index)
-            .collect();
+        let curves: Vec<&ErrorCurve> = compensation.curves.iter().filter(|curve| curve.axis == index).collect();
         if curves.is_empty() {
             continue;
         }
         if !letter(&axis.name) {
-            left_out.push(format!(
-                "error motions of {}: the format has axes X, Y, Z, A, B, C only",
-                axis.name
-            ));
+            left_out.push(format!("error motions of {}: the format has axes X, Y, Z, A, B, C only", axis.name));
             continue;
         }
         for curve in curves.iter().filter(|curve| curve.is_directional()) {
@@ -383,10 +333,7 @@ fn locations(compensation: &Compensation) -> impl Iterator<Item = String> + '_ {
 
 /// A curve whose table contains only the mean of both directions.
 fn without_direction(curve: &ErrorCurve) -> String {
-    format!(
-        "{}: the difference between the directions; the table contains the mean of both",
-        curve.error
-    )
+    format!("{}: the difference between the directions; the table contains the mean of both", curve.error)
 }
 
 /// Cells aligned by spaces, as in the examples of the manual.

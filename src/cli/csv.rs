@@ -25,8 +25,7 @@ impl Rows {
 
     fn parameters(&mut self, section: &str, parameters: &[ParameterResult]) {
         for parameter in parameters {
-            let meaning =
-                ErrorName::parse(&parameter.id).map_or(String::new(), |name| compensation::words(&name));
+            let meaning = ErrorName::parse(&parameter.id).map_or(String::new(), |name| compensation::words(&name));
             self.row([
                 section.to_string(),
                 parameter.id.clone(),
@@ -49,31 +48,15 @@ impl Rows {
             let of = |figure: &str| format!("{figure}({}{})", test.axes, direction.direction);
             for (id, meaning, value) in [
                 (of("G"), "circular deviation", direction.circular_deviation_um),
-                (
-                    of("Fmax"),
-                    "radial deviation, greatest",
-                    direction.radial_deviation_max_um,
-                ),
-                (
-                    of("Fmin"),
-                    "radial deviation, least",
-                    direction.radial_deviation_min_um,
-                ),
+                (of("Fmax"), "radial deviation, greatest", direction.radial_deviation_max_um),
+                (of("Fmin"), "radial deviation, least", direction.radial_deviation_min_um),
             ] {
                 self.figure(&section, &id, meaning, value, "um");
             }
         }
         for (id, meaning, value) in [
-            (
-                "G(b)",
-                "bidirectional circular deviation",
-                test.bidirectional_circular_deviation_um,
-            ),
-            (
-                "D",
-                "mean bidirectional radial deviation",
-                test.mean_bidirectional_radial_deviation_um,
-            ),
+            ("G(b)", "bidirectional circular deviation", test.bidirectional_circular_deviation_um),
+            ("D", "mean bidirectional radial deviation", test.mean_bidirectional_radial_deviation_um),
             ("H", "circular hysteresis", test.hysteresis_um),
         ] {
             if let Some(value) = value {
@@ -85,16 +68,9 @@ impl Rows {
                 self.row([
                     section.clone(),
                     format!("{} {}", fault.fault, value.id),
-                    format!(
-                        "{} of {}, {:.1} % of the path",
-                        fault.fault, fault.axes, fault.share_percent
-                    ),
+                    format!("{} of {}, {:.1} % of the path", fault.fault, fault.axes, fault.share_percent),
                     value.value.to_string(),
-                    if value.u > 0.0 {
-                        value.u.to_string()
-                    } else {
-                        String::new()
-                    },
+                    if value.u > 0.0 { value.u.to_string() } else { String::new() },
                     value.unit.clone(),
                 ]);
             }

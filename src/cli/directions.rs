@@ -10,17 +10,7 @@ use super::failure::Failure;
 use super::output;
 
 /// Columns of one direction frame.
-const DIRECTIONS: [&str; 9] = [
-    "dx",
-    "dy",
-    "dz",
-    "x_wise",
-    "y_wise",
-    "z_wise",
-    "radial",
-    "tangential",
-    "axial",
-];
+const DIRECTIONS: [&str; 9] = ["dx", "dy", "dz", "x_wise", "y_wise", "z_wise", "radial", "tangential", "axial"];
 
 /// Writes the file.
 pub fn write(problem: &Problem<'_>, fit: &Fit, path: &Path) -> Result<(), Failure> {
@@ -49,8 +39,5 @@ pub fn write(problem: &Problem<'_>, fit: &Fit, path: &Path) -> Result<(), Failur
 fn micrometres(view: &DirectionFrame) -> Vec<String> {
     let along = view.sensors.iter().chain(&view.wise).map(Some);
     let about = (0..3).map(|k| view.turning.as_ref().map(|turning| &turning[k]));
-    along
-        .chain(about)
-        .map(|mm| mm.map_or(String::new(), |mm| format!("{:.4}", mm * 1e3)))
-        .collect()
+    along.chain(about).map(|mm| mm.map_or(String::new(), |mm| format!("{:.4}", mm * 1e3))).collect()
 }

@@ -80,9 +80,9 @@ struct FormArguments {
     /// Example: --rotation small-angle
     #[arg(long, value_enum)]
     rotation: Option<RotationArgument>,
-    /// Parameters in the equation, separated by commas; all others are zero. Errors (EX0C, e_x0c) or patterns of errors (E?0C); for a session also
-    /// parameters of the instrument (bar, workpiece_ball.x) and declared effects (EZC~C:h2) [default: for a session its errors and declared effects,
-    /// for a machine all errors].
+    /// Parameters in the equation, separated by commas; all others are zero. Errors (EX0C, e_x0c) or patterns of errors
+    /// (E?0C); for a session also parameters of the instrument (bar, workpiece_ball.x) and declared effects (EZC~C:h2)
+    /// [default: for a session its errors and declared effects, for a machine all errors].
     ///
     /// Example: --errors EX0C,EY0C,E?0A
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
@@ -92,8 +92,8 @@ struct FormArguments {
     /// Example: --symbols iso
     #[arg(long, value_enum, default_value = "literature")]
     symbols: SymbolsArgument,
-    /// Add the derivatives with respect to all parameters in the equation: in code for every order; in text, LaTeX and Typst for the exact length of
-    /// a bar.
+    /// Add the derivatives with respect to all parameters in the equation: in code for every order; in text, LaTeX and
+    /// Typst for the exact length of a bar.
     #[arg(long)]
     gradient: bool,
     /// Write the equation to a file instead of standard output.
@@ -168,9 +168,7 @@ impl EquationParameters {
             match Component::parse(name) {
                 Some(Component::Axis(error)) => parameters.errors.push(error),
                 Some(Component::Instrument { thing, coordinate }) => {
-                    let place = of_instrument
-                        .iter()
-                        .position(|u| u.thing == thing && u.coordinate == coordinate);
+                    let place = of_instrument.iter().position(|u| u.thing == thing && u.coordinate == coordinate);
                     let name_of = |u: &InstrumentParameter| Variable::Instrument(*u).name();
                     parameters.instrument.push(place.ok_or_else(|| {
                         let has = match of_instrument {
@@ -194,13 +192,10 @@ impl EquationParameters {
     }
 }
 
-/// The declared effects with a name such as `EZC~C:h2`. Effects that differ only in the numbers of their shapes share a name.
+/// The declared effects with a name such as `EZC~C:h2`. Effects that differ only in the numbers of their shapes share a
+/// name.
 fn named(name: &str, effects: &[Effect]) -> Result<Vec<Effect>, Failure> {
-    let found: Vec<Effect> = effects
-        .iter()
-        .filter(|effect| effect.id() == name)
-        .cloned()
-        .collect();
+    let found: Vec<Effect> = effects.iter().filter(|effect| effect.id() == name).cloned().collect();
     if found.is_empty() {
         let declared: Vec<String> = effects.iter().map(Effect::id).collect();
         let has = match declared.as_slice() {
@@ -252,10 +247,7 @@ fn read(arguments: &super::SessionArguments) -> Result<(Session, SourceMap), Fai
         Ok(found) => return Ok(found),
         Err(fault) => fault,
     };
-    let plan_only = ReadOptions {
-        read_data: false,
-        ..arguments.options()
-    };
+    let plan_only = ReadOptions { read_data: false, ..arguments.options() };
     match files::session_with_sources(&arguments.session, &plan_only) {
         Ok(found) => {
             tell(Kind::Note, &fault.to_string());
@@ -277,35 +269,18 @@ pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
     let Some(test) = session.tests.iter().find(|test| test.name == arguments.test) else {
         let names: Vec<&str> = session.tests.iter().map(|test| test.name.as_str()).collect();
         let names = names.join(", ");
-        return Err(Failure::Other(format!(
-            "no test `{}`; the session has {names}",
-            arguments.test
-        )));
+        return Err(Failure::Other(format!("no test `{}`; the session has {names}", arguments.test)));
     };
     let source = SessionTest::new(&session, test)?;
     let form = &arguments.form;
-    let effects: Vec<Effect> = session
-        .effects
-        .iter()
-        .filter(|effect| effect.acts_in(&test.name))
-        .cloned()
-        .collect();
-    let mut parameters = EquationParameters::parse(
-        &form.errors,
-        &session.machine,
-        session.instrument.unknowns(),
-        &effects,
-    )?;
+    let effects: Vec<Effect> = session.effects.iter().filter(|effect| effect.acts_in(&test.name)).cloned().collect();
+    let mut parameters =
+        EquationParameters::parse(&form.errors, &session.machine, session.instrument.unknowns(), &effects)?;
     if form.errors.is_empty() {
         parameters.errors.clone_from(&session.unknowns);
         parameters.effects = effects;
     }
-    let equation = Equation::of(
-        &session.machine,
-        &source,
-        &parameters.errors,
-        &form.options(&parameters),
-    )?;
+    let equation = Equation::of(&session.machine, &source, &parameters.errors, &form.options(&parameters))?;
     form.write(&equation, &source)
 }
 
@@ -316,12 +291,7 @@ pub fn run_volumetric(arguments: &VolumetricArguments, quiet: bool) -> Result<()
     let read = std::iter::once(&arguments.machine).chain(arguments.map.functions());
     outputs.refuse_overwrite(read.map(PathBuf::as_path))?;
     if arguments.map.wanted() {
-        return super::map::run(
-            &arguments.machine,
-            &machine,
-            &arguments.map,
-            outputs.tables(quiet),
-        );
+        return super::map::run(&arguments.machine, &machine, &arguments.map, outputs.tables(quiet));
     }
     let form = &arguments.form;
     let mut parameters = EquationParameters::parse(&form.errors, &machine, &[], &[])?;

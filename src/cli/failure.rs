@@ -77,9 +77,7 @@ impl Failure {
             let name = location.file.display().to_string();
             let source = visible(&source);
             let config = Config::default().with_index_type(IndexType::Byte);
-            let label = Label::new((name.clone(), span.clone()))
-                .with_message("here")
-                .with_color(Color::Red);
+            let label = Label::new((name.clone(), span.clone())).with_message("here").with_color(Color::Red);
             let report = Report::build(ReportKind::Error, (name.clone(), span.clone()))
                 .with_config(config)
                 .with_label(label)
@@ -104,9 +102,7 @@ impl Failure {
             Failure::Model(ModelError::Input { help: Some(help), .. }) => tell(Kind::Help, help),
             Failure::Model(ModelError::FileAccess { help, .. }) => tell(
                 Kind::Help,
-                &format!(
-                    "{help} (`--data DIR` names the data folder, `--allow-outside` allows files outside)"
-                ),
+                &format!("{help} (`--data DIR` names the data folder, `--allow-outside` allows files outside)"),
             ),
             _ => {}
         }

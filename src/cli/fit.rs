@@ -10,8 +10,8 @@ use super::failure::Failure;
 use super::message::print_warnings;
 use super::report::ReportArguments;
 use super::{
-    CommonArguments, SessionArguments, compensation, csv, directions, geometric, json, read_session,
-    repeated, residuals, self_calibration,
+    CommonArguments, SessionArguments, compensation, csv, directions, geometric, json, read_session, repeated,
+    residuals, self_calibration,
 };
 
 /// Examples of `abbe fit`.
@@ -38,7 +38,8 @@ enum Method {
     Full,
     /// Position errors from the centre of one circle per axis (Jiang 2014, Section 4.2), beside the full fit.
     Circle,
-    /// Orientation errors from the cone of the bar with its extension (Jiang 2014, Sections 4.2.1, 5.2), beside the full fit.
+    /// Orientation errors from the cone of the bar with its extension (Jiang 2014, Sections 4.2.1, 5.2), beside the
+    /// full fit.
     Cone,
     /// Orientation errors from circles in two planes along each axis (Jiang 2014, Section 6.1.2), beside the full fit.
     TwoPlane,
@@ -55,7 +56,8 @@ pub struct FitArguments {
     common: CommonArguments,
     #[command(flatten)]
     report: ReportArguments,
-    /// List everything that the first screen folds: set-up parameters, directions and diagnosis of ball-bar figures, null-space directions, outliers.
+    /// List everything that the first screen folds: set-up parameters, directions and diagnosis of ball-bar figures,
+    /// null-space directions, outliers.
     #[arg(long)]
     all: bool,
     /// Method of identification.
@@ -63,20 +65,22 @@ pub struct FitArguments {
     /// Example: --method two-plane
     #[arg(long, value_enum, default_value = "full")]
     method: Method,
-    /// Write readings and residuals of an R-test by direction: of the sensors, along X, Y and Z, radial, tangential and axial.
+    /// Write readings and residuals of an R-test by direction: of the sensors, along X, Y and Z, radial, tangential and
+    /// axial.
     ///
     /// Example: --views views.csv
     #[arg(long, value_name = "FILE.csv")]
     views: Option<PathBuf>,
-    /// Write reading and residual of every reading as CSV: test, run, line, axis positions, reading, residual in µm, residual over the noise standard
-    /// deviation, and whether the reading counts or is an outlier (full fit only).
+    /// Write reading and residual of every reading as CSV: test, run, line, axis positions, reading, residual in µm,
+    /// residual over the noise standard deviation, and whether the reading counts or is an outlier (full fit only).
     ///
     /// Example: --residuals residuals.csv
     #[arg(long, value_name = "FILE.csv")]
     residuals: Option<PathBuf>,
     #[command(flatten)]
     draws: self_calibration::DrawArguments,
-    /// Compare with further sessions of the same plan: standard uncertainty from the scatter of the fits (Type A) beside that of each fit (Type B).
+    /// Compare with further sessions of the same plan: standard uncertainty from the scatter of the fits (Type A)
+    /// beside that of each fit (Type B).
     ///
     /// Example: --repeat day2/session.toml day3/session.toml
     #[arg(
@@ -99,12 +103,8 @@ pub struct FitArguments {
 pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     arguments.report.check()?;
     arguments.compensation.check()?;
-    let others = [
-        arguments.csv.as_ref(),
-        arguments.views.as_ref(),
-        arguments.residuals.as_ref(),
-        arguments.report.file(),
-    ];
+    let others =
+        [arguments.csv.as_ref(), arguments.views.as_ref(), arguments.residuals.as_ref(), arguments.report.file()];
     let outputs = arguments.common.outputs(&others)?;
     let tables = outputs.tables(arguments.common.quiet);
     if !arguments.repeat.is_empty() {
@@ -131,8 +131,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     }
     if arguments.method == Method::SelfCalibration && arguments.report.asked() {
         return Err(Failure::CommandLine(
-            "`--report` and `--plots` show the full fit and the geometric methods: leave out `--method`"
-                .to_string(),
+            "`--report` and `--plots` show the full fit and the geometric methods: leave out `--method`".to_string(),
         ));
     }
     if arguments.method == Method::SelfCalibration {
@@ -146,13 +145,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     };
     if let Some(method) = geometric {
         arguments.draws.refuse()?;
-        return geometric::run(
-            (&session, &sources),
-            method,
-            &arguments.common,
-            &arguments.report,
-            tables,
-        );
+        return geometric::run((&session, &sources), method, &arguments.common, &arguments.report, tables);
     }
     let draws = arguments.draws.draws(arguments.common.seed)?;
     let (problem, fit) = abbe::identify::fit::prepare(&session, arguments.common.seed)?;
@@ -179,9 +172,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     if arguments.report.asked() {
         let document = crate::report::fit::document(&problem, &fit, &result)?;
         let method = crate::report::fit::method(&result);
-        arguments
-            .report
-            .write(&document, &method, (&session, &sources), arguments.common.seed)?;
+        arguments.report.write(&document, &method, (&session, &sources), arguments.common.seed)?;
     }
     arguments.compensation.run(&problem, &fit, tables)
 }

@@ -7,8 +7,9 @@ use super::failure::Failure;
 /// A file to write: its name in the folder and its contents.
 pub type NewFile = (String, String);
 
-/// Writes files into a folder. They are first written into a temporary folder beside it, where `check_files` reads them. Then they are moved: a new
-/// folder in one step; into an existing folder one file after the other, in their order.
+/// Writes files into a folder. They are first written into a temporary folder beside it, where `check_files` reads
+/// them. Then they are moved: a new folder in one step; into an existing folder one file after the other, in their
+/// order.
 ///
 /// A folder that is not empty is refused, unless `force` allows to replace files with these names. Other files stay.
 pub fn write(
@@ -25,20 +26,15 @@ pub fn write(
     };
     std::fs::create_dir_all(parent).map_err(fault)?;
     // The temporary folder is on the same file system, so that renaming works.
-    let made = tempfile::Builder::new()
-        .prefix(".abbe-")
-        .tempdir_in(parent)
-        .map_err(fault)?;
+    let made = tempfile::Builder::new().prefix(".abbe-").tempdir_in(parent).map_err(fault)?;
     let whole = made.path().join("whole");
     std::fs::create_dir(&whole).map_err(fault)?;
     for (name, contents) in files {
         // An error names the final path, not the temporary one.
-        super::output::write_whole(&whole.join(name), contents.as_ref()).map_err(
-            |failure| match failure {
-                Failure::Write { source, .. } => self::fault(&folder.join(name), source),
-                other => other,
-            },
-        )?;
+        super::output::write_whole(&whole.join(name), contents.as_ref()).map_err(|failure| match failure {
+            Failure::Write { source, .. } => self::fault(&folder.join(name), source),
+            other => other,
+        })?;
     }
     check_files(&whole)?;
     if present {
@@ -52,10 +48,7 @@ pub fn write(
 }
 
 fn fault(folder: &Path, source: std::io::Error) -> Failure {
-    Failure::Write {
-        path: folder.display().to_string(),
-        source,
-    }
+    Failure::Write { path: folder.display().to_string(), source }
 }
 
 /// Whether the folder exists. `force` is the option of the user, if the command has one.
@@ -69,17 +62,10 @@ pub fn check(folder: &Path, force: Option<bool>) -> Result<bool, Failure> {
         ));
     }
     if folder.is_file() {
-        return Err(Failure::Other(format!(
-            "{}: this is a file; name a folder",
-            folder.display()
-        )));
+        return Err(Failure::Other(format!("{}: this is a file; name a folder", folder.display())));
     }
     let present = folder.is_dir();
-    let occupied = present
-        && std::fs::read_dir(folder)
-            .map_err(|source| fault(folder, source))?
-            .next()
-            .is_some();
+    let occupied = present && std::fs::read_dir(folder).map_err(|source| fault(folder, source))?.next().is_some();
     if occupied && force != Some(true) {
         let or = match force {
             Some(_) => ", or use --force to replace files with the same names",

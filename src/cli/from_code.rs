@@ -23,11 +23,7 @@ struct Body {
 
 impl Body {
     fn side(&self) -> Side {
-        if self.on_table {
-            Side::Workpiece
-        } else {
-            Side::Tool
-        }
+        if self.on_table { Side::Workpiece } else { Side::Tool }
     }
 }
 
@@ -36,8 +32,7 @@ pub fn files(code: &str) -> Result<Vec<NewFile>, Failure> {
     let parsed = StructuralCode::parse(code).map_err(|fault| Failure::Other(fault.to_string()))?;
     let mut bodies = Vec::new();
     for (index, name) in parsed.axes().enumerate() {
-        let (Some(kind), Some(direction)) = (AxisKind::of_letter(name), Axis::direction_of_letter(name))
-        else {
+        let (Some(kind), Some(direction)) = (AxisKind::of_letter(name), Axis::direction_of_letter(name)) else {
             return Err(Failure::Other(format!(
                 "axis `{name}` of `{code}` is no letter of ISO 841 (X Y Z U V W are linear, A B C rotary), so its kind is not known; \
                  `abbe new DIR --template ur10` shows a machine whose axes state their kind and direction"
@@ -51,14 +46,9 @@ pub fn files(code: &str) -> Result<Vec<NewFile>, Failure> {
         });
     }
     if bodies.is_empty() {
-        return Err(Failure::Other(format!(
-            "`{code}` has no axis; a code such as [wCXbYZAt] is expected"
-        )));
+        return Err(Failure::Other(format!("`{code}` has no axis; a code such as [wCXbYZAt] is expected")));
     }
-    Ok(vec![
-        ("machine.toml".into(), machine(&parsed, &bodies)),
-        ("plan.toml".into(), plan::text(&bodies)),
-    ])
+    Ok(vec![("machine.toml".into(), machine(&parsed, &bodies)), ("plan.toml".into(), plan::text(&bodies))])
 }
 
 fn machine(code: &StructuralCode, bodies: &[Body]) -> String {
@@ -116,11 +106,7 @@ fn machine(code: &StructuralCode, bodies: &[Body]) -> String {
                 let _ = writeln!(
                     text,
                     "# Smallest and largest position, degrees. Enter the travel of the machine.\ntravel_deg = {}",
-                    if body.along == 2 {
-                        "[-360, 360]"
-                    } else {
-                        "[-120, 120]"
-                    }
+                    if body.along == 2 { "[-360, 360]" } else { "[-120, 120]" }
                 );
             }
         }

@@ -36,11 +36,7 @@ pub fn run(
 }
 
 fn print(result: &Comparison) {
-    say!(
-        "{}, {}",
-        counted(result.readings, "reading"),
-        screen::noise(result.noise_um, &result.noise_source)
-    );
+    say!("{}, {}", counted(result.readings, "reading"), screen::noise(result.noise_um, &result.noise_source));
     say!("\nOffset of each axis at the fixed ball from its nominal position:");
     let rows: Vec<Vec<String>> = result
         .centres
@@ -64,16 +60,7 @@ fn print(result: &Comparison) {
             })
         })
         .collect();
-    table::print(
-        &[
-            "test",
-            "centre",
-            "offset, µm",
-            "u",
-            "first-order shares, in µm and ″",
-        ],
-        &rows,
-    );
+    table::print(&["test", "centre", "offset, µm", "u", "first-order shares, in µm and ″"], &rows);
     say!(
         "\n{} beside the full fit, with standard uncertainty u and bias (on noise-free readings with the errors of the full fit):",
         result.method

@@ -1,4 +1,5 @@
-//! Ctrl-C: the first interrupt ends a search and keeps its results. A second one, or one without results, ends the program.
+//! Ctrl-C: the first interrupt ends a search and keeps its results. A second one, or one without results, ends the
+//! program.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -17,18 +18,14 @@ pub struct Interrupts {
 }
 
 impl Interrupts {
-    /// Handles Ctrl-C from now on, with messages above the progress bar. An interrupt before [`Interrupts::keep_results`] ends the program.
+    /// Handles Ctrl-C from now on, with messages above the progress bar. An interrupt before
+    /// [`Interrupts::keep_results`] ends the program.
     pub fn handled(bar: ProgressBar) -> Interrupts {
-        let interrupts = Interrupts {
-            came: Arc::new(AtomicBool::new(false)),
-            at_once: Arc::new(AtomicBool::new(true)),
-        };
+        let interrupts =
+            Interrupts { came: Arc::new(AtomicBool::new(false)), at_once: Arc::new(AtomicBool::new(true)) };
         let handler = interrupts.clone();
         if ctrlc::set_handler(move || handler.handle(&bar)).is_err() {
-            tell(
-                Kind::Warning,
-                "Ctrl-C cannot be handled; it ends the program without a result",
-            );
+            tell(Kind::Warning, "Ctrl-C cannot be handled; it ends the program without a result");
         }
         interrupts
     }

@@ -1,4 +1,5 @@
-//! JSON documents: the result of a command with its inputs and options, so that a program can repeat the command and check what it reads.
+//! JSON documents: the result of a command with its inputs and options, so that a program can repeat the command and
+//! check what it reads.
 
 use std::any::TypeId;
 use std::path::Path;
@@ -27,10 +28,7 @@ pub struct InputFile {
 
 impl From<Input> for InputFile {
     fn from(input: Input) -> InputFile {
-        InputFile {
-            file: input.path,
-            sha256: Some(input.sha256),
-        }
+        InputFile { file: input.path, sha256: Some(input.sha256) }
     }
 }
 
@@ -61,24 +59,15 @@ impl Origin {
         let mut inputs = Vec::with_capacity(sources.files.len());
         for stamp in &sources.files {
             inputs.push(if stamp.is_regular() {
-                provenance::stamped(stamp)
-                    .map_err(|fault| unreadable(&stamp.file, &fault))?
-                    .into()
+                provenance::stamped(stamp).map_err(|fault| unreadable(&stamp.file, &fault))?.into()
             } else {
-                InputFile {
-                    file: stamp.file.display().to_string(),
-                    sha256: None,
-                }
+                InputFile { file: stamp.file.display().to_string(), sha256: None }
             });
         }
         let file = sources.file.display().to_string();
         let own = inputs.iter().find(|input| input.file == file);
         Ok(Origin {
-            session: Some(SessionFile {
-                sha256: own.and_then(|input| input.sha256.clone()),
-                file,
-                inputs,
-            }),
+            session: Some(SessionFile { sha256: own.and_then(|input| input.sha256.clone()), file, inputs }),
             inputs: Vec::new(),
         })
     }
@@ -93,10 +82,7 @@ impl Origin {
                 .map(InputFile::from)
                 .map_err(|fault| unreadable(file, &fault.to_string()))
         });
-        Ok(Origin {
-            session: None,
-            inputs: inputs.collect::<Result<_, _>>()?,
-        })
+        Ok(Origin { session: None, inputs: inputs.collect::<Result<_, _>>()? })
     }
 
     /// Adds the files of a further session.
@@ -110,10 +96,7 @@ impl Origin {
 }
 
 fn unreadable(file: &Path, fault: &str) -> Failure {
-    Failure::Other(format!(
-        "{}: cannot be read again for its checksum in the JSON document: {fault}",
-        file.display()
-    ))
+    Failure::Other(format!("{}: cannot be read again for its checksum in the JSON document: {fault}", file.display()))
 }
 
 /// The document of a command: what it was, and its result.
@@ -135,7 +118,8 @@ pub struct Document<'r, T> {
     /// Seed of all random numbers.
     #[serde(skip_serializing_if = "Option::is_none")]
     seed: Option<u64>,
-    /// The options on the command line, by their long names: `true` for a flag, a number, a string, or an array of them for a repeated option.
+    /// The options on the command line, by their long names: `true` for a flag, a number, a string, or an array of them
+    /// for a repeated option.
     options: Map<String, Value>,
     /// The result.
     #[serde(flatten)]
@@ -146,12 +130,7 @@ pub struct Document<'r, T> {
 ///
 /// # Errors
 /// If the result is no JSON, or the file cannot be written.
-pub fn write<T: Serialize>(
-    path: &Path,
-    origin: Origin,
-    seed: Option<u64>,
-    result: &T,
-) -> Result<(), Failure> {
+pub fn write<T: Serialize>(path: &Path, origin: Origin, seed: Option<u64>, result: &T) -> Result<(), Failure> {
     let (command, options) = command_line();
     let document = Document {
         schema_version: SCHEMA_VERSION,
@@ -173,12 +152,7 @@ pub fn write<T: Serialize>(
 ///
 /// # Errors
 /// See [`Origin::of_session`] and [`write()`].
-pub fn write_of_session<T: Serialize>(
-    path: &Path,
-    sources: &SourceMap,
-    seed: u64,
-    result: &T,
-) -> Result<(), Failure> {
+pub fn write_of_session<T: Serialize>(path: &Path, sources: &SourceMap, seed: u64, result: &T) -> Result<(), Failure> {
     write(path, Origin::of_session(sources)?, Some(seed), result)
 }
 
@@ -191,9 +165,7 @@ fn command_line() -> (String, Map<String, Value>) {
     };
     match matches.subcommand() {
         Some((name, own)) => {
-            let options = parser
-                .find_subcommand(name)
-                .map_or(Map::new(), |command| options(command, own));
+            let options = parser.find_subcommand(name).map_or(Map::new(), |command| options(command, own));
             (name.to_string(), options)
         }
         None => (String::new(), Map::new()),
@@ -218,9 +190,7 @@ fn options(command: &clap::Command, matches: &ArgMatches) -> Map<String, Value> 
             Value::Bool(true)
         } else {
             let raw = matches.get_raw(id).into_iter().flatten();
-            let mut values: Vec<Value> = raw
-                .map(|value| typed(argument, &value.to_string_lossy()))
-                .collect();
+            let mut values: Vec<Value> = raw.map(|value| typed(argument, &value.to_string_lossy())).collect();
             match values.len() {
                 1 if !takes_several(argument) => values.remove(0),
                 _ => Value::Array(values),
@@ -232,9 +202,7 @@ fn options(command: &clap::Command, matches: &ArgMatches) -> Map<String, Value> 
 }
 
 fn takes_several(argument: &Arg) -> bool {
-    let several = argument
-        .get_num_args()
-        .is_some_and(|range| range.max_values() > 1);
+    let several = argument.get_num_args().is_some_and(|range| range.max_values() > 1);
     several || argument.get_value_delimiter().is_some() || matches!(argument.get_action(), ArgAction::Append)
 }
 
@@ -279,9 +247,6 @@ mod tests {
         let matches = parser.clone().try_get_matches_from(line).unwrap();
         let (name, own) = matches.subcommand().unwrap();
         let found = options(parser.find_subcommand(name).unwrap(), own);
-        assert_eq!(
-            Value::Object(found),
-            json!({"max_effects": 2, "only": ["EZC", "~time"]})
-        );
+        assert_eq!(Value::Object(found), json!({"max_effects": 2, "only": ["EZC", "~time"]}));
     }
 }

@@ -31,21 +31,10 @@ pub struct MapArguments {
     #[arg(long, value_name = "N", requires = "map", default_value_t = 5)]
     places: usize,
     /// Where an axis stands in the map, or its own number of places: `A=30` (mm or degrees), `X:11`; may be repeated.
-    #[arg(
-        long = "axis",
-        value_name = "AXIS=AT|AXIS:N",
-        requires = "map",
-        allow_hyphen_values = true
-    )]
+    #[arg(long = "axis", value_name = "AXIS=AT|AXIS:N", requires = "map", allow_hyphen_values = true)]
     axes: Vec<String>,
     /// The tool point in the tool frame.
-    #[arg(
-        long,
-        value_name = "X,Y,Z",
-        requires = "map",
-        value_delimiter = ',',
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "X,Y,Z", requires = "map", value_delimiter = ',', allow_hyphen_values = true)]
     tool_mm: Vec<f64>,
     /// Add the commands of the linear axes that cancel the error, and what they leave.
     #[arg(long, requires = "map")]
@@ -73,12 +62,7 @@ impl MapArguments {
 }
 
 /// Runs `abbe volumetric --map`.
-pub fn run(
-    machine_file: &Path,
-    machine: &Machine,
-    arguments: &MapArguments,
-    tables: bool,
-) -> Result<(), Failure> {
+pub fn run(machine_file: &Path, machine: &Machine, arguments: &MapArguments, tables: bool) -> Result<(), Failure> {
     let (Some(path), Some(file)) = (&arguments.map, &arguments.functions) else {
         return Err(Failure::Other("--map and --functions go together".into()));
     };
@@ -87,17 +71,11 @@ pub fn run(
         [] => [0.0; 3],
         [x, y, z] if [x, y, z].iter().all(|mm: &f64| mm.abs() <= LARGEST) => [x, y, z],
         _ => {
-            return Err(Failure::Other(format!(
-                "--tool-mm: three numbers of {LARGEST:e} at most, as in 0,0,-120"
-            )));
+            return Err(Failure::Other(format!("--tool-mm: three numbers of {LARGEST:e} at most, as in 0,0,-120")));
         }
     };
     let grid = grid(machine, arguments)?;
-    let erring = MachineWithErrors {
-        machine,
-        functions: &functions,
-        tool_mm,
-    };
+    let erring = MachineWithErrors { machine, functions: &functions, tool_mm };
     let (places, summary) = volumetric::map(&erring, &grid, arguments.compensate)?;
     output::write_whole(path, &csv(machine, &places)?)?;
     if tables {
@@ -131,11 +109,7 @@ fn grid(machine: &Machine, arguments: &MapArguments) -> Result<Vec<Vec<f64>>, Fa
         if number.is_nan() || (sign == ':' && (number < 1.0 || number.fract() != 0.0)) {
             return Err(fault());
         }
-        let most = if sign == ':' {
-            volumetric::MAX_POINTS as f64
-        } else {
-            LARGEST
-        };
+        let most = if sign == ':' { volumetric::MAX_POINTS as f64 } else { LARGEST };
         if number.abs() > most {
             return Err(Failure::Other(format!("--axis {text}: {most:e} is the most")));
         }
@@ -173,9 +147,7 @@ fn grid(machine: &Machine, arguments: &MapArguments) -> Result<Vec<Vec<f64>>, Fa
         Ok(match count {
             0 => return Err(Failure::Other("--places 0: a map has at least one place".into())),
             1 => vec![0.5 * (least + greatest)],
-            _ => (0..count)
-                .map(|k| least + (greatest - least) * k as f64 / (count - 1) as f64)
-                .collect(),
+            _ => (0..count).map(|k| least + (greatest - least) * k as f64 / (count - 1) as f64).collect(),
         })
     };
     (0..machine.axes.len()).map(along).collect()
@@ -193,9 +165,7 @@ fn csv(machine: &Machine, places: &[VolumetricPoint]) -> Result<Vec<u8>, Failure
     let norm = |e: [f64; 3]| e.iter().map(|x| x * x).sum::<f64>().sqrt() * 1e3;
     let row = |place: &VolumetricPoint| {
         let at = machine.axes.iter().zip(&place.positions);
-        let mut cells: Vec<String> = at
-            .map(|(axis, q)| format!("{:.6}", axis.kind.to_display(*q)))
-            .collect();
+        let mut cells: Vec<String> = at.map(|(axis, q)| format!("{:.6}", axis.kind.to_display(*q))).collect();
         cells.extend(place.nominal_mm.iter().map(|p| format!("{p:.6}")));
         cells.extend(place.error_mm.iter().map(|e| format!("{:.6}", e * 1e3)));
         cells.push(format!("{:.6}", norm(place.error_mm)));
@@ -210,31 +180,15 @@ fn csv(machine: &Machine, places: &[VolumetricPoint]) -> Result<Vec<u8>, Failure
 }
 
 fn print(summary: &Summary, functions: usize, path: &str) {
-    say!(
-        "{path}: {}, {}",
-        counted(summary.points, "place"),
-        counted(functions, "error function")
-    );
-    let at: Vec<String> = summary
-        .largest_at
-        .iter()
-        .map(|at| format!("{} {:.1}", at.axis, at.position))
-        .collect();
+    say!("{path}: {}, {}", counted(summary.points, "place"), counted(functions, "error function"));
+    let at: Vec<String> = summary.largest_at.iter().map(|at| format!("{} {:.1}", at.axis, at.position)).collect();
     say!("largest at {}\n", at.join(", "));
     let row = |name: String, size: &volumetric::Size| {
-        vec![
-            name,
-            format!("{:.3}", size.largest_um),
-            format!("{:.3}", size.rms_um),
-        ]
+        vec![name, format!("{:.3}", size.largest_um), format!("{:.3}", size.rms_um)]
     };
     let mut rows = vec![row("error vector".into(), &summary.error)];
     let coordinates = &summary.coordinates;
-    for (name, size) in [
-        ("X", &coordinates.x),
-        ("Y", &coordinates.y),
-        ("Z", &coordinates.z),
-    ] {
+    for (name, size) in [("X", &coordinates.x), ("Y", &coordinates.y), ("Z", &coordinates.z)] {
         rows.push(row(format!("its {name}"), size));
     }
     for share in &summary.by_axis {

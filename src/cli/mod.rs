@@ -44,7 +44,8 @@ use clap::{Args, CommandFactory, Parser, Subcommand};
 use failure::Failure;
 use output::Outputs;
 
-/// Identify geometric errors of machine tools, robots and other serial chains: identifiability, estimates with uncertainties, unmodelled effects.
+/// Identify geometric errors of machine tools, robots and other serial chains: identifiability, estimates with
+/// uncertainties, unmodelled effects.
 #[derive(Parser)]
 #[command(name = "abbe", version, max_term_width = 110, after_help = EXAMPLES)]
 struct Arguments {
@@ -135,11 +136,7 @@ pub struct SessionArguments {
 impl SessionArguments {
     /// Options of the reader.
     fn options(&self) -> ReadOptions {
-        ReadOptions {
-            data_directory: self.data.clone(),
-            read_data: true,
-            allow_outside: self.allow_outside,
-        }
+        ReadOptions { data_directory: self.data.clone(), read_data: true, allow_outside: self.allow_outside }
     }
 }
 
@@ -246,10 +243,7 @@ mod tests {
     fn examples_of_options_are_accepted() {
         let command = Arguments::command();
         for (command, option) in options_with_values(&command) {
-            let text = option
-                .get_long_help()
-                .map(ToString::to_string)
-                .unwrap_or_default();
+            let text = option.get_long_help().map(ToString::to_string).unwrap_or_default();
             for example in text.lines().filter_map(|line| line.strip_prefix("Example: ")) {
                 let required: &[&str] = match command.get_name() {
                     "equation" => &["SESSION", "--test", "T"],
@@ -266,12 +260,7 @@ mod tests {
                 let words = ["abbe", command.get_name()].into_iter();
                 let words = words.chain(required.iter().copied()).chain(example.split(' '));
                 let parsed = Arguments::command().try_get_matches_from(words);
-                assert!(
-                    parsed.is_ok(),
-                    "{}: {example}: {}",
-                    command.get_name(),
-                    parsed.unwrap_err()
-                );
+                assert!(parsed.is_ok(), "{}: {example}: {}", command.get_name(), parsed.unwrap_err());
             }
         }
     }

@@ -79,54 +79,24 @@ const TEMPLATES: &[Template] = &[
         files: &[
             ("machine.toml", include_str!("../../sessions/r-test/machine.toml")),
             ("plan.toml", include_str!("../../sessions/r-test/plan.toml")),
-            (
-                "machine-b.toml",
-                include_str!("../../sessions/r-test/machine-b.toml"),
-            ),
-            (
-                "session.toml",
-                include_str!("../../sessions/r-test/measured/session.toml"),
-            ),
+            ("machine-b.toml", include_str!("../../sessions/r-test/machine-b.toml")),
+            ("session.toml", include_str!("../../sessions/r-test/measured/session.toml")),
             ("BK1.csv", include_str!("../../sessions/r-test/measured/BK1.csv")),
             ("BK2.csv", include_str!("../../sessions/r-test/measured/BK2.csv")),
-            (
-                "C-alone.csv",
-                include_str!("../../sessions/r-test/measured/C-alone.csv"),
-            ),
+            ("C-alone.csv", include_str!("../../sessions/r-test/measured/C-alone.csv")),
         ],
     },
     Template {
         name: "self-calibration",
         about: "rotary table probed on an uncalibrated cylinder; a plan, and readings simulated from it",
         files: &[
-            (
-                "machine.toml",
-                include_str!("../../sessions/self-calibration/machine.toml"),
-            ),
-            (
-                "plan.toml",
-                include_str!("../../sessions/self-calibration/session.toml"),
-            ),
-            (
-                "session.toml",
-                include_str!("../../sessions/self-calibration/measured/session.toml"),
-            ),
-            (
-                "1a.csv",
-                include_str!("../../sessions/self-calibration/measured/1a.csv"),
-            ),
-            (
-                "1b.csv",
-                include_str!("../../sessions/self-calibration/measured/1b.csv"),
-            ),
-            (
-                "2.csv",
-                include_str!("../../sessions/self-calibration/measured/2.csv"),
-            ),
-            (
-                "3.csv",
-                include_str!("../../sessions/self-calibration/measured/3.csv"),
-            ),
+            ("machine.toml", include_str!("../../sessions/self-calibration/machine.toml")),
+            ("plan.toml", include_str!("../../sessions/self-calibration/session.toml")),
+            ("session.toml", include_str!("../../sessions/self-calibration/measured/session.toml")),
+            ("1a.csv", include_str!("../../sessions/self-calibration/measured/1a.csv")),
+            ("1b.csv", include_str!("../../sessions/self-calibration/measured/1b.csv")),
+            ("2.csv", include_str!("../../sessions/self-calibration/measured/2.csv")),
+            ("3.csv", include_str!("../../sessions/self-calibration/measured/3.csv")),
         ],
     },
     Template {
@@ -138,68 +108,26 @@ const TEMPLATES: &[Template] = &[
         name: "table-and-head",
         about: "five-axis machine with a rotary table and a tilting head; ball-bar plan of chapter 7, and simulated readings",
         files: &[
-            (
-                "machine.toml",
-                include_str!("../../sessions/table-and-head/machine.toml"),
-            ),
-            (
-                "plan.toml",
-                include_str!("../../sessions/table-and-head/session.toml"),
-            ),
-            (
-                "session.toml",
-                include_str!("../../sessions/table-and-head/measured/session.toml"),
-            ),
-            (
-                "A100.csv",
-                include_str!("../../sessions/table-and-head/measured/A100.csv"),
-            ),
-            (
-                "A150.csv",
-                include_str!("../../sessions/table-and-head/measured/A150.csv"),
-            ),
-            (
-                "C100.csv",
-                include_str!("../../sessions/table-and-head/measured/C100.csv"),
-            ),
-            (
-                "C150.csv",
-                include_str!("../../sessions/table-and-head/measured/C150.csv"),
-            ),
+            ("machine.toml", include_str!("../../sessions/table-and-head/machine.toml")),
+            ("plan.toml", include_str!("../../sessions/table-and-head/session.toml")),
+            ("session.toml", include_str!("../../sessions/table-and-head/measured/session.toml")),
+            ("A100.csv", include_str!("../../sessions/table-and-head/measured/A100.csv")),
+            ("A150.csv", include_str!("../../sessions/table-and-head/measured/A150.csv")),
+            ("C100.csv", include_str!("../../sessions/table-and-head/measured/C100.csv")),
+            ("C150.csv", include_str!("../../sessions/table-and-head/measured/C150.csv")),
         ],
     },
     Template {
         name: "tilting-head",
         about: "five-axis machine with a tilting head; ball-bar plan of chapter 7, and simulated readings",
         files: &[
-            (
-                "machine.toml",
-                include_str!("../../sessions/tilting-head/machine.toml"),
-            ),
-            (
-                "plan.toml",
-                include_str!("../../sessions/tilting-head/session.toml"),
-            ),
-            (
-                "session.toml",
-                include_str!("../../sessions/tilting-head/measured/session.toml"),
-            ),
-            (
-                "B100.csv",
-                include_str!("../../sessions/tilting-head/measured/B100.csv"),
-            ),
-            (
-                "B150.csv",
-                include_str!("../../sessions/tilting-head/measured/B150.csv"),
-            ),
-            (
-                "C100.csv",
-                include_str!("../../sessions/tilting-head/measured/C100.csv"),
-            ),
-            (
-                "C150.csv",
-                include_str!("../../sessions/tilting-head/measured/C150.csv"),
-            ),
+            ("machine.toml", include_str!("../../sessions/tilting-head/machine.toml")),
+            ("plan.toml", include_str!("../../sessions/tilting-head/session.toml")),
+            ("session.toml", include_str!("../../sessions/tilting-head/measured/session.toml")),
+            ("B100.csv", include_str!("../../sessions/tilting-head/measured/B100.csv")),
+            ("B150.csv", include_str!("../../sessions/tilting-head/measured/B150.csv")),
+            ("C100.csv", include_str!("../../sessions/tilting-head/measured/C100.csv")),
+            ("C150.csv", include_str!("../../sessions/tilting-head/measured/C150.csv")),
         ],
     },
     Template {
@@ -232,11 +160,7 @@ pub fn run(arguments: &NewArguments, quiet: bool) -> Result<(), Failure> {
 
 /// Lists the templates, one per line.
 fn list() {
-    let width = TEMPLATES
-        .iter()
-        .map(|template| template.name.len())
-        .max()
-        .unwrap_or(0);
+    let width = TEMPLATES.iter().map(|template| template.name.len()).max().unwrap_or(0);
     for template in TEMPLATES {
         say!("  {:width$}  {}", template.name, template.about);
     }
@@ -249,13 +173,8 @@ fn names() -> String {
 
 fn template(name: &str) -> Result<Vec<folder::NewFile>, Failure> {
     let Some(template) = TEMPLATES.iter().find(|template| template.name == name) else {
-        return Err(Failure::Other(format!(
-            "no template `{name}`; the templates are {}",
-            names()
-        )));
+        return Err(Failure::Other(format!("no template `{name}`; the templates are {}", names())));
     };
     let files = template.files.iter();
-    Ok(files
-        .map(|(name, text)| (name.to_string(), text.to_string()))
-        .collect())
+    Ok(files.map(|(name, text)| (name.to_string(), text.to_string())).collect())
 }

@@ -9,14 +9,13 @@ use abbe::model::files::SourceMap;
 use super::failure::Failure;
 use super::message::{Kind, tell};
 
-/// Writes a file through a temporary one beside it, so that a reader finds the old file or the whole new one, whatever happens meanwhile.
+/// Writes a file through a temporary one beside it, so that a reader finds the old file or the whole new one, whatever
+/// happens meanwhile.
 ///
-/// What is no file (a pipe, a terminal, `/dev/stdout`) is written to as it is: nothing may take its place. `-` is standard output.
+/// What is no file (a pipe, a terminal, `/dev/stdout`) is written to as it is: nothing may take its place. `-` is
+/// standard output.
 pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), Failure> {
-    let fault = |source| Failure::Write {
-        path: path.display().to_string(),
-        source,
-    };
+    let fault = |source| Failure::Write { path: path.display().to_string(), source };
     check(path)?;
     if is_standard_output(path) {
         write_out(contents);
@@ -24,10 +23,7 @@ pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), Failure> {
     }
     if is_stream(path) {
         let mut stream = OpenOptions::new().append(true).open(path).map_err(fault)?;
-        return stream
-            .write_all(contents)
-            .and_then(|()| stream.flush())
-            .map_err(fault);
+        return stream.write_all(contents).and_then(|()| stream.flush()).map_err(fault);
     }
     // A symbolic link stays one: what it leads to is replaced.
     let place = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
@@ -73,12 +69,7 @@ pub fn folder_of(path: &Path) -> &Path {
 
 /// An error where a file cannot come to lie: said before the work, not after it.
 pub fn check(path: &Path) -> Result<(), Failure> {
-    let refused = |why: String| {
-        Err(Failure::Other(format!(
-            "{}: cannot be written: {why}",
-            path.display()
-        )))
-    };
+    let refused = |why: String| Err(Failure::Other(format!("{}: cannot be written: {why}", path.display())));
     if is_standard_output(path) {
         return Ok(());
     }
@@ -88,10 +79,9 @@ pub fn check(path: &Path) -> Result<(), Failure> {
         Ok(found) if found.is_file() && found.permissions().readonly() => {
             refused("the file is write-protected; take that off, or name another".into())
         }
-        _ if !folder.is_dir() => refused(format!(
-            "there is no folder {}; make it first, or name another",
-            folder.display()
-        )),
+        _ if !folder.is_dir() => {
+            refused(format!("there is no folder {}; make it first, or name another", folder.display()))
+        }
         _ => Ok(()),
     }
 }
@@ -142,11 +132,7 @@ impl Outputs {
     /// If one of them would replace a file that is read.
     pub fn refuse_overwrite<'r>(&self, read: impl IntoIterator<Item = &'r Path>) -> Result<(), Failure> {
         for file in read {
-            if let Some(output) = self
-                .0
-                .iter()
-                .find(|output| !is_stream(output) && is_same(output, file))
-            {
+            if let Some(output) = self.0.iter().find(|output| !is_stream(output) && is_same(output, file)) {
                 return Err(Failure::Other(format!(
                     "{}: cannot be written: it is one of the files that are read; name another",
                     output.display()
@@ -173,44 +159,35 @@ pub fn line(text: std::fmt::Arguments<'_>) {
     write_out(format!("{text}\n").as_bytes());
 }
 
-/// Writes to standard output. If the reader has closed the pipe, the program ends; if the output cannot be written, it ends with an error.
+/// Writes to standard output. If the reader has closed the pipe, the program ends; if the output cannot be written, it
+/// ends with an error.
 fn write_out(contents: &[u8]) {
     let mut out = std::io::stdout().lock();
     if let Err(fault) = out.write_all(contents).and_then(|()| out.flush()) {
         if fault.kind() == std::io::ErrorKind::BrokenPipe {
             std::process::exit(0);
         }
-        tell(
-            Kind::Error,
-            &format!("standard output: cannot be written: {fault}"),
-        );
+        tell(Kind::Error, &format!("standard output: cannot be written: {fault}"));
         std::process::exit(1);
     }
 }
 
-/// A cell that a spreadsheet takes for text: one that begins as a formula does (`=`, `+`, `-`, `@`) and is no number stands behind an apostrophe.
+/// A cell that a spreadsheet takes for text: one that begins as a formula does (`=`, `+`, `-`, `@`) and is no number
+/// stands behind an apostrophe.
 ///
 /// Names in a table come from session files, which others may have written.
 pub fn cell(text: String) -> String {
     let formula = text.trim_start().starts_with(['=', '+', '-', '@']) || text.starts_with(['\t', '\r', '\n']);
-    if formula && text.parse::<f64>().is_err() {
-        format!("'{text}")
-    } else {
-        text
-    }
+    if formula && text.parse::<f64>().is_err() { format!("'{text}") } else { text }
 }
 
 /// A table as CSV: cells that hold a separator stand in quotes.
 pub fn csv(header: &[String], rows: impl IntoIterator<Item = Vec<String>>) -> Result<Vec<u8>, Failure> {
     let fault = |error: String| Failure::Other(format!("the table cannot be written as CSV: {error}"));
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer
-        .write_record(header.iter().cloned().map(cell))
-        .map_err(|error| fault(error.to_string()))?;
+    writer.write_record(header.iter().cloned().map(cell)).map_err(|error| fault(error.to_string()))?;
     for row in rows {
-        writer
-            .write_record(row.into_iter().map(cell))
-            .map_err(|error| fault(error.to_string()))?;
+        writer.write_record(row.into_iter().map(cell)).map_err(|error| fault(error.to_string()))?;
     }
     writer.into_inner().map_err(|error| fault(error.to_string()))
 }

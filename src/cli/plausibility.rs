@@ -26,26 +26,15 @@ pub fn print(plausibility: &Plausibility) {
         })
         .collect();
     if !rows.is_empty() {
-        table::print(
-            &["set-up parameter", "estimate", "stated u", "unit", "pull"],
-            &rows,
-        );
+        table::print(&["set-up parameter", "estimate", "stated u", "unit", "pull"], &rows);
     }
     match plausibility.suggestions.as_slice() {
         [] => say!("No single mistake among those tried explains this."),
-        [one] => say!(
-            "Explained if {} (residual {}).",
-            one.words,
-            table::micrometres(one.rms_um)
-        ),
+        [one] => say!("Explained if {} (residual {}).", one.words, table::micrometres(one.rms_um)),
         several => {
             say!("Explained by one of these, which the readings do not separate:");
             for suggestion in several {
-                say!(
-                    "  {} (residual {})",
-                    suggestion.words,
-                    table::micrometres(suggestion.rms_um)
-                );
+                say!("  {} (residual {})", suggestion.words, table::micrometres(suggestion.rms_um));
             }
         }
     }

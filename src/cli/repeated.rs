@@ -17,41 +17,25 @@ pub fn run(
     common: &CommonArguments,
     outputs: &Outputs,
 ) -> Result<(), Failure> {
-    let all: Vec<&Path> = std::iter::once(&first.session)
-        .chain(repeat)
-        .map(PathBuf::as_path)
-        .collect();
+    let all: Vec<&Path> = std::iter::once(&first.session).chain(repeat).map(PathBuf::as_path).collect();
     let mut sessions = Vec::with_capacity(all.len());
     let mut origin = Origin::default();
     for (place, path) in all.iter().enumerate() {
         let twice = all[..place].iter().any(|earlier| output::is_same(earlier, path));
         if twice {
-            return Err(Failure::Other(format!(
-                "{} is named twice; name each repeated session once",
-                path.display()
-            )));
+            return Err(Failure::Other(format!("{} is named twice; name each repeated session once", path.display())));
         }
-        let arguments = SessionArguments {
-            session: path.to_path_buf(),
-            ..first.clone()
-        };
+        let arguments = SessionArguments { session: path.to_path_buf(), ..first.clone() };
         let (session, sources) = read_session(&arguments, outputs)?;
         if common.json.is_some() {
             origin.add(Origin::of_session(&sources)?);
         }
         let (problem, fit) = abbe::identify::fit::prepare(&session, common.seed)?;
         let report = abbe::identify::fit::report(&problem, &fit);
-        let named: Vec<String> = report
-            .warnings
-            .iter()
-            .map(|warning| format!("{}: {warning}", path.display()))
-            .collect();
+        let named: Vec<String> =
+            report.warnings.iter().map(|warning| format!("{}: {warning}", path.display())).collect();
         message::print_warnings(&named);
-        sessions.push(repeated::Session::new(
-            &path.display().to_string(),
-            &problem,
-            &fit,
-        ));
+        sessions.push(repeated::Session::new(&path.display().to_string(), &problem, &fit));
     }
     let result = repeated::compare(&sessions)?;
     if outputs.tables(common.quiet) {
@@ -64,10 +48,7 @@ pub fn run(
 }
 
 fn print(result: &Repeated) {
-    say!(
-        "{} of one plan, each fitted separately\n",
-        counted(result.sessions.len(), "session")
-    );
+    say!("{} of one plan, each fitted separately\n", counted(result.sessions.len(), "session"));
     let rows: Vec<Vec<String>> = result
         .parameters
         .iter()
@@ -96,20 +77,7 @@ fn print(result: &Repeated) {
             ]
         })
         .collect();
-    table::print(
-        &[
-            "parameter",
-            "mean",
-            "s/√n (A)",
-            "s (A)",
-            "u (B)",
-            "unit",
-            "s/u",
-            "p",
-            "",
-        ],
-        &rows,
-    );
+    table::print(&["parameter", "mean", "s/√n (A)", "s (A)", "u (B)", "unit", "s/u", "p", ""], &rows);
     say!(
         "\nType A: from the scatter of the sessions, s/√n of their mean, s of one session. Type B: standard uncertainty u of one fit.\n\
          p: probability of such a ratio s/u by chance."
@@ -136,8 +104,5 @@ fn print(result: &Repeated) {
             ]
         })
         .collect();
-    table::print(
-        &["session", "parameter", "deviation", "u", "unit", "deviation/u"],
-        &rows,
-    );
+    table::print(&["session", "parameter", "deviation", "u", "unit", "deviation/u"], &rows);
 }

@@ -21,7 +21,8 @@ pub struct ReportArguments {
     /// Example: --report report.html
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
-    /// Write each plot of the report into a new or empty folder, as SVG, and as PNG if the program is built with the feature `png`.
+    /// Write each plot of the report into a new or empty folder, as SVG, and as PNG if the program is built with the
+    /// feature `png`.
     ///
     /// Example: --plots plots
     #[arg(long, value_name = "DIR")]

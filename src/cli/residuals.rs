@@ -15,11 +15,7 @@ use super::output;
 pub fn write(problem: &Problem<'_>, fit: &Fit, path: &Path) -> Result<(), Failure> {
     let machine = &problem.session.machine;
     let coordinates = problem.coordinates();
-    let labels: &[&str] = if coordinates == 3 {
-        &["_x", "_y", "_z"]
-    } else {
-        &[""]
-    };
+    let labels: &[&str] = if coordinates == 3 { &["_x", "_y", "_z"] } else { &[""] };
     let mut header: Vec<String> = ["test", "run", "line"].map(String::from).to_vec();
     header.extend(machine.axes.iter().map(|axis| axis.column("")));
     header.extend(labels.iter().map(|label| format!("reading{label}_mm")));
@@ -44,19 +40,8 @@ pub fn write(problem: &Problem<'_>, fit: &Fit, path: &Path) -> Result<(), Failur
             }));
             let residuals = &fit.residuals[number][own];
             cells.extend(residuals.iter().map(|mm| format!("{:.4}", mm * 1e3)));
-            cells.extend(
-                residuals
-                    .iter()
-                    .map(|mm| format!("{:.4}", mm / problem.noise.sigma_mm)),
-            );
-            cells.push(
-                if problem.rejected[number][row] {
-                    "outlier"
-                } else {
-                    "yes"
-                }
-                .into(),
-            );
+            cells.extend(residuals.iter().map(|mm| format!("{:.4}", mm / problem.noise.sigma_mm)));
+            cells.push(if problem.rejected[number][row] { "outlier" } else { "yes" }.into());
             rows.push(cells);
         }
     }

@@ -83,19 +83,24 @@ pub fn run(arguments: &SchemaArguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The session's schema with that of the machine in it.
+/// The session's schema with that of the machine and the keys of all shapes in it.
 fn session() -> Result<Value, Failure> {
     let mut session = parsed(schema::SESSION)?;
     let mut machine = parsed(schema::MACHINE)?;
     // A schema within a schema is a resource of its own: its references start from it.
     machine["$id"] = json!("machine");
     session["$defs"]["machine"] = machine;
+    let properties = &mut session["$defs"]["effect"]["properties"];
+    if let (Some(properties), Value::Object(of_shapes)) =
+        (properties.as_object_mut(), parsed(&schema::effect_properties())?)
+    {
+        properties.extend(of_shapes);
+    }
     Ok(session)
 }
 
 fn parsed(text: &str) -> Result<Value, Failure> {
-    serde_json::from_str(text)
-        .map_err(|error| Failure::Other(format!("a schema of this program is no JSON: {error}")))
+    serde_json::from_str(text).map_err(|error| Failure::Other(format!("a schema of this program is no JSON: {error}")))
 }
 
 /// The schema of a command's document.
@@ -115,12 +120,9 @@ fn of<T: JsonSchema + 'static>() -> Value {
 fn close(schema: &mut Value) {
     match schema {
         Value::Object(entries) => {
-            if entries.get("properties").is_some_and(Value::is_object)
-                && entries.get("type") == Some(&json!("object"))
+            if entries.get("properties").is_some_and(Value::is_object) && entries.get("type") == Some(&json!("object"))
             {
-                entries
-                    .entry("additionalProperties")
-                    .or_insert(Value::Bool(false));
+                entries.entry("additionalProperties").or_insert(Value::Bool(false));
             }
             entries.values_mut().for_each(close);
         }

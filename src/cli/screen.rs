@@ -1,4 +1,5 @@
-//! Parts of the first screens of `fit` and `trace`: the table of errors, the folded set-up parameters, what is confounded, the next steps.
+//! Parts of the first screens of `fit` and `trace`: the table of errors, the folded set-up parameters, what is
+//! confounded, the next steps.
 
 use std::path::Path;
 
@@ -19,11 +20,7 @@ const MAX_ERRORS: usize = 20;
 /// Prints the first lines of a list and the number of the others; every line with `all`.
 pub fn list(lines: &[String], indent: &str, all: bool) {
     // One line more costs no more room than the number of the others.
-    let shown = if all || lines.len() <= MAX_LISTED + 1 {
-        lines.len()
-    } else {
-        MAX_LISTED
-    };
+    let shown = if all || lines.len() <= MAX_LISTED + 1 { lines.len() } else { MAX_LISTED };
     for line in &lines[..shown] {
         say!("{indent}{line}");
     }
@@ -34,10 +31,7 @@ pub fn list(lines: &[String], indent: &str, all: bool) {
 
 /// `identifiable` of `count` parameters, and the rank.
 pub fn rank(identifiable: usize, count: usize, rank: usize) -> String {
-    format!(
-        "{identifiable} of {} identifiable (numerical rank {rank})",
-        counted(count, "parameter")
-    )
+    format!("{identifiable} of {} identifiable (numerical rank {rank})", counted(count, "parameter"))
 }
 
 /// The parameters of a fit, errors and coefficients of effects apart from set-up parameters.
@@ -57,25 +51,15 @@ impl<'r> Estimates<'r> {
         elsewhere: impl Fn(&str) -> bool,
     ) -> Estimates<'r> {
         let list = &problem.parameters.list;
-        let is_setup = |result: &&ParameterResult| {
-            list.iter()
-                .any(|p: &Parameter| p.role == Role::Setup && p.id == result.id)
-        };
-        let (setup, errors) = parameters
-            .iter()
-            .filter(|p| !elsewhere(&p.id))
-            .partition(is_setup);
+        let is_setup =
+            |result: &&ParameterResult| list.iter().any(|p: &Parameter| p.role == Role::Setup && p.id == result.id);
+        let (setup, errors) = parameters.iter().filter(|p| !elsewhere(&p.id)).partition(is_setup);
         let pulls = Pulls::of(problem, fit).each.into_iter();
-        Estimates {
-            errors,
-            setup,
-            pulls: pulls
-                .map(|pull| (list[pull.parameter].id.as_str(), pull))
-                .collect(),
-        }
+        Estimates { errors, setup, pulls: pulls.map(|pull| (list[pull.parameter].id.as_str(), pull)).collect() }
     }
 
-    /// Prints the errors in a table and the set-up parameters in one line; the set-up parameters in a table too with `all`.
+    /// Prints the errors in a table and the set-up parameters in one line; the set-up parameters in a table too with
+    /// `all`.
     pub fn print(&self, all: bool) {
         if !self.errors.is_empty() {
             say!(
@@ -107,10 +91,7 @@ impl<'r> Estimates<'r> {
             Some((id, pull)) => format!(", largest pull {:.1} ({id})", pull.pull.abs()),
             None => String::new(),
         };
-        say!(
-            "  {}{largest}; --all lists them",
-            counted(self.setup.len(), "set-up parameter")
-        );
+        say!("  {}{largest}; --all lists them", counted(self.setup.len(), "set-up parameter"));
     }
 
     /// Whether this is a set-up parameter.
@@ -121,11 +102,7 @@ impl<'r> Estimates<'r> {
     /// All errors, or the most significant ones in the order of the session.
     fn shown(&self, all: bool) -> Vec<&'r ParameterResult> {
         let ratio = |p: &ParameterResult| {
-            if p.u > 0.0 {
-                (p.value / p.u).abs()
-            } else {
-                f64::INFINITY
-            }
+            if p.u > 0.0 { (p.value / p.u).abs() } else { f64::INFINITY }
         };
         let mut order: Vec<usize> = (0..self.errors.len()).collect();
         if !all && order.len() > MAX_ERRORS {
@@ -151,11 +128,7 @@ impl<'r> Estimates<'r> {
                 ]
             })
             .collect();
-        table::print_aligned(
-            &["parameter", "value", "u", "unit", "pull", "meaning"],
-            &rows,
-            &[0, 3, 5],
-        );
+        table::print_aligned(&["parameter", "value", "u", "unit", "pull", "meaning"], &rows, &[0, 3, 5]);
     }
 
     /// The set-up parameter that the readings move furthest from its stated value, in standard deviations.
@@ -179,22 +152,10 @@ pub fn print_parameters(parameters: &[&ParameterResult]) {
             // Rounded to the same place.
             let (expanded, _) = table::value_and_u(p.expanded_u, p.u);
             let mark = if p.significant { "*" } else { "" };
-            vec![
-                p.id.clone(),
-                value,
-                u,
-                expanded,
-                table::unit(&p.unit),
-                mark.to_string(),
-                p.meaning.clone(),
-            ]
+            vec![p.id.clone(), value, u, expanded, table::unit(&p.unit), mark.to_string(), p.meaning.clone()]
         })
         .collect();
-    table::print_aligned(
-        &["parameter", "value", "u", "U", "unit", "", "meaning"],
-        &rows,
-        &[0, 4, 5, 6],
-    );
+    table::print_aligned(&["parameter", "value", "u", "U", "unit", "", "meaning"], &rows, &[0, 4, 5, 6]);
 }
 
 /// Prints what the readings leave open: null-space directions, then outliers. One line where there is nothing.
@@ -208,10 +169,7 @@ pub fn print_missing(null_space: &[Unobservable], outliers: &[Outlier], all: boo
     } else {
         let directions = counted(null_space.len(), "null-space direction");
         say!("\nConfounded: {directions} (a combination that leaves every reading unchanged)");
-        let lines: Vec<String> = null_space
-            .iter()
-            .map(|item| table::with_symbols(&item.why))
-            .collect();
+        let lines: Vec<String> = null_space.iter().map(|item| table::with_symbols(&item.why)).collect();
         list(&lines, "  ", all);
     }
     if outliers.is_empty() {
@@ -227,10 +185,7 @@ pub fn print_missing(null_space: &[Unobservable], outliers: &[Outlier], all: boo
         )
     };
     let is_are = if outliers.len() == 1 { "is" } else { "are" };
-    say!(
-        "{} {is_are} excluded as outliers:",
-        counted(outliers.len(), "reading")
-    );
+    say!("{} {is_are} excluded as outliers:", counted(outliers.len(), "reading"));
     let mut sorted: Vec<&Outlier> = outliers.iter().collect();
     if !all {
         sorted.sort_by(|a, b| b.residual_um.abs().total_cmp(&a.residual_um.abs()));
@@ -247,11 +202,7 @@ pub fn print_next(steps: &[Step]) {
         return;
     }
     say!("\nNext:");
-    let width = steps
-        .iter()
-        .map(|(step, _)| step.chars().count())
-        .max()
-        .unwrap_or(0);
+    let width = steps.iter().map(|(step, _)| step.chars().count()).max().unwrap_or(0);
     for (step, purpose) in steps {
         let padding = " ".repeat(width - step.chars().count());
         say!("  {step}{padding}  {purpose}");
@@ -262,11 +213,7 @@ pub fn print_next(steps: &[Step]) {
 pub fn command(verb: &str, session: &SessionArguments, options: &str) -> String {
     let quoted = |path: &Path| {
         let path = path.display().to_string();
-        if path.contains(char::is_whitespace) {
-            format!("\"{path}\"")
-        } else {
-            path
-        }
+        if path.contains(char::is_whitespace) { format!("\"{path}\"") } else { path }
     };
     let mut words = vec!["abbe".to_string(), verb.to_string(), quoted(&session.session)];
     if let Some(data) = &session.data {

@@ -13,7 +13,8 @@ use super::{CommonArguments, json, message, screen, table};
 /// Monte Carlo propagation of a self-calibration or of the full fit.
 #[derive(Args)]
 pub struct DrawArguments {
-    /// Propagate distributions by Monte Carlo with this number of runs (JCGM 101), for the full fit and for a self-calibration.
+    /// Propagate distributions by Monte Carlo with this number of runs (JCGM 101), for the full fit and for a
+    /// self-calibration.
     ///
     /// Example: --monte-carlo 100000
     #[arg(long, value_name = "RUNS")]
@@ -56,11 +57,7 @@ impl DrawArguments {
                 self.coverage
             )));
         }
-        Ok(Some(MonteCarlo {
-            runs,
-            seed,
-            coverage: self.coverage,
-        }))
+        Ok(Some(MonteCarlo { runs, seed, coverage: self.coverage }))
     }
 }
 
@@ -112,10 +109,7 @@ fn print(result: &SelfCalibration) {
         screen::print_parameters(&[radius]);
     }
     if !result.parameters.is_empty() {
-        say!(
-            "\nPosition of axis {}, by the least-squares circle of its displacements:",
-            result.axis
-        );
+        say!("\nPosition of axis {}, by the least-squares circle of its displacements:", result.axis);
         screen::print_parameters(&result.parameters.iter().collect::<Vec<_>>());
         say!("\nThe same, from the angles of rotation:");
         screen::print_parameters(&result.parameters_by_turn.iter().collect::<Vec<_>>());

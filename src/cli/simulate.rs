@@ -122,12 +122,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
         files::session(&path, &files::ReadOptions::default())?;
         Ok(())
     })?;
-    report(
-        (&session, &sources),
-        &simulated,
-        arguments,
-        outputs.tables(arguments.common.quiet),
-    )
+    report((&session, &sources), &simulated, arguments, outputs.tables(arguments.common.quiet))
 }
 
 /// The files; `session.toml` is the last, so that the others exist when it does.
@@ -164,16 +159,8 @@ fn files(
 
 /// A portable file name for the data of a test, different from those of other tests.
 fn data_name(test: &str, taken: &[(String, String)]) -> String {
-    let plain: String = test
-        .chars()
-        .map(|c| {
-            if c.is_alphanumeric() || matches!(c, '-' | '_' | '.') {
-                c
-            } else {
-                '-'
-            }
-        })
-        .collect();
+    let plain: String =
+        test.chars().map(|c| if c.is_alphanumeric() || matches!(c, '-' | '_' | '.') { c } else { '-' }).collect();
     let plain = plain.trim_start_matches('.');
     let mut name = format!("{plain}.csv");
     let mut number = 2;
@@ -226,11 +213,7 @@ fn report(
         truth: simulated
             .truth
             .iter()
-            .map(|(id, value, unit)| TrueValue {
-                id: id.clone(),
-                value: *value,
-                unit: unit.clone(),
-            })
+            .map(|(id, value, unit)| TrueValue { id: id.clone(), value: *value, unit: unit.clone() })
             .collect(),
         warnings: simulated.warnings.clone(),
     };
@@ -256,13 +239,7 @@ fn print(session: &Session, report: &SimulationResult, seed: u64) {
     let rows: Vec<Vec<String>> = report
         .truth
         .iter()
-        .map(|value| {
-            vec![
-                value.id.clone(),
-                format!("{:.4}", value.value),
-                table::unit(&value.unit),
-            ]
-        })
+        .map(|value| vec![value.id.clone(), format!("{:.4}", value.value), table::unit(&value.unit)])
         .collect();
     if rows.is_empty() {
         say!("No error is given: the readings are those of the nominal machine.");

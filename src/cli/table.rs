@@ -40,19 +40,13 @@ pub fn print_aligned(header: &[&str], rows: &[Vec<String>], left: &[usize]) {
 
 /// The symbol for the unit in a result: `µm` for `um`, `″` for `arcsec`, `°` for `deg`.
 pub fn unit(name: &str) -> String {
-    name.replace("arcsec", "″")
-        .replace("um", "µm")
-        .replace("deg", "°")
+    name.replace("arcsec", "″").replace("um", "µm").replace("deg", "°")
 }
 
 /// A number with the symbol of its unit: `1.2 µm`, `3.4″`.
 pub fn quantity(number: &str, unit_name: &str) -> String {
     let unit = unit(unit_name);
-    let space = if matches!(unit.as_str(), "″" | "°" | "") {
-        ""
-    } else {
-        " "
-    };
+    let space = if matches!(unit.as_str(), "″" | "°" | "") { "" } else { " " };
     format!("{number}{space}{unit}")
 }
 
@@ -73,9 +67,7 @@ fn places(u: f64) -> usize {
 pub fn value_and_u(value: f64, u: f64) -> (String, String) {
     let places = places(u);
     let rounded = format!("{value:.places$}");
-    let unsigned = rounded
-        .strip_prefix('-')
-        .filter(|digits| digits.bytes().all(|digit| matches!(digit, b'0' | b'.')));
+    let unsigned = rounded.strip_prefix('-').filter(|digits| digits.bytes().all(|digit| matches!(digit, b'0' | b'.')));
     let value = unsigned.map_or_else(|| rounded.clone(), str::to_string);
     (value, format!("{u:.places$}"))
 }

@@ -18,9 +18,7 @@ use super::failure::Failure;
 use super::interrupt::Interrupts;
 use super::message::{Kind, tell};
 use super::report::ReportArguments;
-use super::{
-    CommonArguments, SessionArguments, compensation, csv, json, message, output, read_session, residuals,
-};
+use super::{CommonArguments, SessionArguments, compensation, csv, json, message, output, read_session, residuals};
 
 /// Examples of `abbe trace`.
 pub const HELP: &str = "Examples:
@@ -47,7 +45,8 @@ pub struct TraceArguments {
     common: CommonArguments,
     #[command(flatten)]
     report: ReportArguments,
-    /// List everything that the first screen folds: all aliases, set-up parameters, null-space directions, outliers, rejected candidates.
+    /// List everything that the first screen folds: all aliases, set-up parameters, null-space directions, outliers,
+    /// rejected candidates.
     #[arg(long)]
     all: bool,
     /// Maximum number of effects (default: until the held-out error stops improving).
@@ -78,8 +77,9 @@ pub struct TraceArguments {
     /// Example: --csv trace.csv
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Write reading and residual of every reading as CSV, for the model with the found effects: test, run, line, axis positions, reading, residual in µm,
-    /// residual over the noise standard deviation, and whether the reading counts or is an outlier.
+    /// Write reading and residual of every reading as CSV, for the model with the found effects: test, run, line, axis
+    /// positions, reading, residual in µm, residual over the noise standard deviation, and whether the reading counts
+    /// or is an outlier.
     ///
     /// Example: --residuals residuals.csv
     #[arg(long, value_name = "FILE.csv")]
@@ -92,12 +92,8 @@ pub struct TraceArguments {
 pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     arguments.report.check()?;
     arguments.compensation.check()?;
-    let others = [
-        arguments.csv.as_ref(),
-        arguments.write.as_ref(),
-        arguments.residuals.as_ref(),
-        arguments.report.file(),
-    ];
+    let others =
+        [arguments.csv.as_ref(), arguments.write.as_ref(), arguments.residuals.as_ref(), arguments.report.file()];
     let outputs = arguments.common.outputs(&others)?;
     let tables = outputs.tables(arguments.common.quiet);
     let (session, sources) = read_session(&arguments.session, &outputs)?;
@@ -177,9 +173,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     if arguments.report.asked() {
         let document = crate::report::trace::document(&trace)?;
         let method = crate::report::trace::method(&trace.result);
-        arguments
-            .report
-            .write(&document, &method, (&session, &sources), arguments.common.seed)?;
+        arguments.report.write(&document, &method, (&session, &sources), arguments.common.seed)?;
     }
     if trace.result.interrupted {
         if arguments.compensation.wanted() {
@@ -211,15 +205,7 @@ fn list(session: &abbe::model::session::Session, options: &TraceOptions) -> Resu
         let candidates = counted(of_family.len(), "candidate");
         say!("{}: {candidates}, {seen} detectable", family.name);
         for entry in of_family {
-            say!(
-                "  {} {}",
-                if entry.observable {
-                    "detectable    "
-                } else {
-                    "not detectable"
-                },
-                entry.id
-            );
+            say!("  {} {}", if entry.observable { "detectable    " } else { "not detectable" }, entry.id);
         }
     }
     Ok(())

@@ -1,4 +1,5 @@
-//! Uniqueness of the effects of a trace, and the tests that separate them from their aliases, in words for terminal and report.
+//! Uniqueness of the effects of a trace, and the tests that separate them from their aliases, in words for terminal and
+//! report.
 
 use abbe::identify::results::{EffectName, EffectResult, SeparatingTestResult, TraceResult};
 
@@ -13,23 +14,18 @@ pub fn headline(result: &TraceResult) -> Option<String> {
     match result.effects.as_slice() {
         [] => None,
         [one] => Some(format!("{}: {}", standing(one, screened), in_short(one))),
-        all if all.iter().all(|effect| effect.unique) => Some(format!(
-            "{} effects, each unique among {screened} candidates screened",
-            all.len()
-        )),
+        all if all.iter().all(|effect| effect.unique) => {
+            Some(format!("{} effects, each unique among {screened} candidates screened", all.len()))
+        }
         few if few.len() <= MAX_LISTED => {
             let each = few.iter().enumerate();
-            let each: Vec<String> = each
-                .map(|(k, effect)| format!("effect {} is {}", k + 1, standing(effect, screened)))
-                .collect();
+            let each: Vec<String> =
+                each.map(|(k, effect)| format!("effect {} is {}", k + 1, standing(effect, screened))).collect();
             Some(each.join("; "))
         }
         many => {
-            let alike: Vec<usize> = many
-                .iter()
-                .map(|effect| effect.explanation_count)
-                .filter(|count| *count > 1)
-                .collect();
+            let alike: Vec<usize> =
+                many.iter().map(|effect| effect.explanation_count).filter(|count| *count > 1).collect();
             let unique = many.len() - alike.len();
             let most = alike.iter().copied().max().unwrap_or(1);
             Some(format!(
@@ -55,10 +51,7 @@ fn in_short(effect: &EffectResult) -> String {
     let others = effect.aliases.iter().map(|alias| alias.meaning.as_str());
     let mut part = "";
     let mut named: Vec<String> = Vec::new();
-    for meaning in std::iter::once(effect.name.meaning.as_str())
-        .chain(others)
-        .take(MAX_NAMED)
-    {
+    for meaning in std::iter::once(effect.name.meaning.as_str()).chain(others).take(MAX_NAMED) {
         match meaning.split_once(": ") {
             Some((same, what)) if same == part => named.push(what.to_string()),
             split => {
@@ -75,21 +68,18 @@ fn in_short(effect: &EffectResult) -> String {
     named.join(", or ")
 }
 
-/// One sentence per proposed test, with the aliases that it separates; then the aliases that no proposed test separates.
+/// One sentence per proposed test, with the aliases that it separates; then the aliases that no proposed test
+/// separates.
 pub fn tests(effect: &EffectResult, name: impl Fn(&EffectName) -> String) -> Vec<String> {
-    let mut sentences: Vec<String> = (effect.separating_tests.iter().enumerate())
-        .map(|(k, test)| sentence(test, k > 0))
-        .collect();
+    let mut sentences: Vec<String> =
+        (effect.separating_tests.iter().enumerate()).map(|(k, test)| sentence(test, k > 0)).collect();
     if let Some(last) = effect.separating_tests.last() {
         let remaining: Vec<String> = (last.alternatives.iter())
             .filter(|alternative| !alternative.separated)
             .map(|alternative| name(&alternative.name))
             .collect();
         if !remaining.is_empty() {
-            sentences.push(format!(
-                "no proposed test separates it from {}",
-                remaining.join("; ")
-            ));
+            sentences.push(format!("no proposed test separates it from {}", remaining.join("; ")));
         }
     } else if !effect.unique {
         sentences.push("no test is proposed that separates it from its aliases".to_string());
@@ -99,27 +89,15 @@ pub fn tests(effect: &EffectResult, name: impl Fn(&EffectName) -> String) -> Vec
 
 /// A proposed test and the aliases that it separates; a `further` one, those that the tests before it leave.
 fn sentence(test: &SeparatingTestResult, further: bool) -> String {
-    let (then, remaining) = if further {
-        ("then ", "remaining ")
-    } else {
-        ("", "")
-    };
+    let (then, remaining) = if further { ("then ", "remaining ") } else { ("", "") };
     let aliases = match (test.separated_count, test.alternative_count) {
         (_, 1) => format!("the {remaining}alias"),
         (separates, of) if separates == of => format!("all {of} {remaining}aliases"),
         (separates, of) => format!("{separates} of {of} {remaining}aliases"),
     };
-    let separated = || {
-        test.alternatives
-            .iter()
-            .filter(|alternative| alternative.separated)
-    };
-    let after = separated()
-        .map(|alternative| alternative.after_sigma)
-        .fold(f64::INFINITY, f64::min);
-    let before = separated()
-        .map(|alternative| alternative.before_sigma)
-        .fold(0.0, f64::max);
+    let separated = || test.alternatives.iter().filter(|alternative| alternative.separated);
+    let after = separated().map(|alternative| alternative.after_sigma).fold(f64::INFINITY, f64::min);
+    let before = separated().map(|alternative| alternative.before_sigma).fold(0.0, f64::max);
     format!(
         "{then}{} separates it from {aliases} in {:.0} min: by at least {after:.1} standard deviations, without the test by at most {before:.1}",
         test.test, test.duration_min

@@ -23,16 +23,7 @@ pub fn error_rows(result: &Comparison) -> Vec<Vec<String>> {
         let (value, u) = pair(row.value, row.u);
         let (full, full_u) = pair(row.full_value, row.full_u);
         let [of_method, of_full] = [bias(row.bias), bias(row.full_bias)];
-        vec![
-            row.id.clone(),
-            value,
-            u,
-            of_method,
-            full,
-            full_u,
-            of_full,
-            table::unit(&row.unit),
-        ]
+        vec![row.id.clone(), value, u, of_method, full, full_u, of_full, table::unit(&row.unit)]
     };
     result.errors.iter().map(row).collect()
 }

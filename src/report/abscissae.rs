@@ -14,7 +14,8 @@ pub struct PlotAxis {
     pub is_angle: bool,
 }
 
-/// Abscissae of a test with their values: the angle or position of its traversal, or for separate poses each axis that moves.
+/// Abscissae of a test with their values: the angle or position of its traversal, or for separate poses each axis that
+/// moves.
 pub fn axes_of(problem: &Problem<'_>, test: &TestSeries, number: usize) -> Vec<(PlotAxis, Vec<f64>)> {
     let is_traversal = test.stretches.iter().all(|stretch| stretch.forward.is_some());
     let readings = problem.tests[number].readings.as_ref();
@@ -26,11 +27,7 @@ pub fn axes_of(problem: &Problem<'_>, test: &TestSeries, number: usize) -> Vec<(
         } else {
             "number"
         };
-        let axis = PlotAxis {
-            name: test.way.name.clone(),
-            unit,
-            is_angle: test.way.is_angle,
-        };
+        let axis = PlotAxis { name: test.way.name.clone(), unit, is_angle: test.way.is_angle };
         return vec![(axis, test.way.values.clone())];
     };
     let of = |axis: &usize| {

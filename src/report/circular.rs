@@ -1,7 +1,7 @@
 //! Ball-bar figures by ISO 230-4, and the diagnosis of machine faults.
 //!
-//! ISO 230-4:2022 uses the terms circular and radial *error*. The edition of 2005 used *deviation*, and the symbols are from there. The hysteresis is
-//! from the edition of 1996.
+//! ISO 230-4:2022 uses the terms circular and radial *error*. The edition of 2005 used *deviation*, and the symbols are
+//! from there. The hysteresis is from the edition of 1996.
 
 use abbe::identify::circular::CircularTest;
 use maud::{Markup, html};
@@ -37,14 +37,8 @@ pub fn section(tests: &[CircularTest]) -> Markup {
 /// Figures of both directions together.
 fn both(test: &CircularTest) -> Vec<Vec<String>> {
     [
-        (
-            "bidirectional circular error (G(b))",
-            test.bidirectional_circular_deviation_um,
-        ),
-        (
-            "mean bidirectional radial error (D)",
-            test.mean_bidirectional_radial_deviation_um,
-        ),
+        ("bidirectional circular error (G(b))", test.bidirectional_circular_deviation_um),
+        ("mean bidirectional radial error (D)", test.mean_bidirectional_radial_deviation_um),
         ("circular hysteresis (H, edition of 1996)", test.hysteresis_um),
     ]
     .into_iter()

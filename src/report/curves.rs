@@ -6,6 +6,7 @@ use abbe::identify::problem::Problem;
 use abbe::identify::series::lengths;
 use abbe::identify::series::sensitivities::{self as sensitivity, Sensitivity, TestSensitivities};
 use abbe::identify::series::spectrum::Spectrum;
+use abbe::model::effect::shape::Harmonic;
 use abbe::model::effect::{Effect, Shape};
 use abbe::model::words::counted;
 use maud::{Markup, html};
@@ -65,23 +66,10 @@ pub fn histogram(session: &SessionPlots<'_>, models: [&str; 2]) -> Plot {
         x: (Scale::over(0.0, maximum, ACROSS, 7), "residual, µm".to_string()),
         y: (Scale::rounded(0.0, highest, UP, 5), "readings".to_string()),
         series: vec![
-            Series {
-                class: "before",
-                source: None,
-                mark: Mark::Line,
-                points: before,
-            },
-            Series {
-                class: "after",
-                source: None,
-                mark: Mark::Line,
-                points: after,
-            },
+            Series { class: "before", source: None, mark: Mark::Line, points: before },
+            Series { class: "after", source: None, mark: Mark::Line, points: after },
         ],
-        legend: vec![
-            ("before", models[0].to_string()),
-            ("after", models[1].to_string()),
-        ],
+        legend: vec![("before", models[0].to_string()), ("after", models[1].to_string())],
         over: html! {},
     }
     .plot()
@@ -89,11 +77,8 @@ pub fn histogram(session: &SessionPlots<'_>, models: [&str; 2]) -> Plot {
 
 /// Residuals of the session over time. Without time: in the order of the readings.
 pub fn over_time(session: &SessionPlots<'_>) -> Plot {
-    let has_time = session
-        .problem
-        .tests
-        .iter()
-        .all(|test| test.readings.as_ref().is_some_and(|r| !r.time_s.is_empty()));
+    let has_time =
+        session.problem.tests.iter().all(|test| test.readings.as_ref().is_some_and(|r| !r.time_s.is_empty()));
     // Time, residual before and residual after of each test. The script of the page hides a test by its class.
     let mut tests: Vec<[Vec<f64>; 3]> = Vec::new();
     let mut preceding = 0;
@@ -103,33 +88,23 @@ pub fn over_time(session: &SessionPlots<'_>) -> Plot {
             let minutes = |t: &f64| (t - session.problem.origin.time_s) / 60.0;
             readings.time_s.iter().map(minutes).collect()
         } else {
-            (preceding..preceding + readings.rows())
-                .map(|row| row as f64 + 1.0)
-                .collect()
+            (preceding..preceding + readings.rows()).map(|row| row as f64 + 1.0).collect()
         };
         preceding += readings.rows();
         let of = |values: &[f64]| lengths(values, session.series.coordinates);
         tests.push([time, of(&view.before_um), of(&view.after_um)]);
     }
-    let classes: Vec<[String; 2]> = (0..tests.len())
-        .map(|test| ["before", "after"].map(|when| format!("{when} of-test-{test}")))
-        .collect();
+    let classes: Vec<[String; 2]> =
+        (0..tests.len()).map(|test| ["before", "after"].map(|when| format!("{when} of-test-{test}"))).collect();
     let intervals = (TIME_INTERVALS / tests.len().max(1)).max(MIN_INTERVALS);
     let of = |time: &[f64], values: &[f64]| -> Vec<(f64, f64)> {
         let extremes = decimate::interval_extremes(time, values, intervals);
-        extremes
-            .into_iter()
-            .flat_map(|(centre, minimum, maximum)| [(centre, minimum), (centre, maximum)])
-            .collect()
+        extremes.into_iter().flat_map(|(centre, minimum, maximum)| [(centre, minimum), (centre, maximum)]).collect()
     };
     let all = |column: usize| tests.iter().flat_map(move |test| test[column].iter().copied());
     let [low, high] = span(all(0));
     let [minimum, maximum] = span(all(1).chain(all(2)));
-    let (abscissa, unit) = if has_time {
-        ("time", "min")
-    } else {
-        ("reading", "in the order of the files")
-    };
+    let (abscissa, unit) = if has_time { ("time", "min") } else { ("reading", "in the order of the files") };
     Lines {
         name: "residual-over-time".to_string(),
         title: format!("Residual against {abscissa}"),
@@ -163,27 +138,21 @@ pub fn over_time(session: &SessionPlots<'_>) -> Plot {
     .plot()
 }
 
-/// Amplitude spectrum of the residual of a test. `maximum` is the largest amplitude of all spectra, so that they share one scale.
+/// Amplitude spectrum of the residual of a test. `maximum` is the largest amplitude of all spectra, so that they share
+/// one scale.
 pub fn spectrum_plot(spectrum: &Spectrum, maximum: f64, effects: &[Effect]) -> Plot {
     let orders = spectrum.before_um.len() as f64;
-    let x = Scale {
-        step: 5.0,
-        ..Scale::over(0.0, orders + 1.0, ACROSS, 8)
-    };
+    let x = Scale { step: 5.0, ..Scale::over(0.0, orders + 1.0, ACROSS, 8) };
     // The upper fifth is left free for the names of found effects.
     let y = Scale::over(0.0, (maximum * 1.25).max(1e-6), UP, 5);
     let stems = |values: &[f64], shift: f64| -> Vec<(f64, f64)> {
-        values
-            .iter()
-            .enumerate()
-            .map(|(k, v)| (k as f64 + 1.0 + shift, *v))
-            .collect()
+        values.iter().enumerate().map(|(k, v)| (k as f64 + 1.0 + shift, *v)).collect()
     };
     let mut found: Vec<(f64, String)> = effects
         .iter()
         .filter(|effect| effect.driver.to_string() == spectrum.over && effect.acts_in(&spectrum.of))
         .filter_map(|effect| match effect.shape {
-            Shape::Harmonic { order } => Some((order, effect.id())),
+            Shape::Harmonic(Harmonic { order }) => Some((order, effect.id())),
             _ => None,
         })
         .filter(|(order, _)| *order <= orders)
@@ -212,18 +181,8 @@ pub fn spectrum_plot(spectrum: &Spectrum, maximum: f64, effects: &[Effect]) -> P
         x: (x, format!("order, cycles per turn of {}", spectrum.over)),
         y: (y, "amplitude, µm".to_string()),
         series: vec![
-            Series {
-                class: "before",
-                source: None,
-                mark: Mark::Stems,
-                points: stems(&spectrum.before_um, -0.16),
-            },
-            Series {
-                class: "after",
-                source: None,
-                mark: Mark::Stems,
-                points: stems(&spectrum.after_um, 0.16),
-            },
+            Series { class: "before", source: None, mark: Mark::Stems, points: stems(&spectrum.before_um, -0.16) },
+            Series { class: "after", source: None, mark: Mark::Stems, points: stems(&spectrum.after_um, 0.16) },
         ],
         legend,
         over,
@@ -231,18 +190,16 @@ pub fn spectrum_plot(spectrum: &Spectrum, maximum: f64, effects: &[Effect]) -> P
     .plot()
 }
 
-/// Effect of single errors on each test: 10 µm and 0.01° (Table 3.1 of Jiang (2014)) at 5 µm per division (Figs. 3.7 and 3.8 there). Instruments with three
-/// coordinates have curves of each coordinate. Separate poses have one RMS sensitivity per error.
+/// Effect of single errors on each test: 10 µm and 0.01° (Table 3.1 of Jiang (2014)) at 5 µm per division (Figs. 3.7
+/// and 3.8 there). Instruments with three coordinates have curves of each coordinate. Separate poses have one RMS
+/// sensitivity per error.
 ///
-/// Jiang (2014): Xiaogeng Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine Tools*, PhD thesis, University of Birmingham, 2014.
+/// Jiang (2014): Xiaogeng Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine Tools*, PhD thesis,
+/// University of Birmingham, 2014.
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn sensitivities(
-    document: &mut Document,
-    problem: &Problem<'_>,
-    beta: &[f64],
-) -> Result<Markup, IdentifyError> {
+pub fn sensitivities(document: &mut Document, problem: &Problem<'_>, beta: &[f64]) -> Result<Markup, IdentifyError> {
     const DIVISION_UM: f64 = 5.0;
     if problem.folds.kind == FoldKind::Poses {
         let plots = pose_sensitivities(&sensitivity::over_poses(problem, beta)?);
@@ -309,10 +266,7 @@ fn amount(unit_name: &str) -> Option<(f64, &'static str)> {
 fn polar_sensitivities(test: &TestSensitivities, columns: &[Sensitivity], um: f64) -> Plot {
     let size = PolarSize::SMALL;
     let per_row = 3;
-    let drawn: Vec<_> = columns
-        .iter()
-        .filter_map(|c| Some((c, amount(&c.unit)?)))
-        .collect();
+    let drawn: Vec<_> = columns.iter().filter_map(|c| Some((c, amount(&c.unit)?))).collect();
     let rows = drawn.len().div_ceil(per_row).max(1);
     let row_height = size.side + 22.0;
     let inner = html! {
@@ -329,10 +283,7 @@ fn polar_sensitivities(test: &TestSensitivities, columns: &[Sensitivity], um: f6
     Plot::new(
         format!("patterns-{}", test.test),
         format!("{}: deviation caused by single errors", test.test),
-        format!(
-            "{} µm per division, first order. Errors without influence on the test are omitted.",
-            text(um, um)
-        ),
+        format!("{} µm per division, first order. Errors without influence on the test are omitted.", text(um, um)),
         [super::plot::WIDTH, row_height * rows as f64 + 6.0],
         inner,
     )
@@ -344,46 +295,23 @@ fn curves(test: &TestSensitivities, columns: &[Sensitivity]) -> Plot {
     let values = span(columns.iter().flat_map(|c| c.values.iter().copied()));
     let x = Scale::over(range[0], range[1], ACROSS, 9);
     let x = if test.way.is_angle { x.in_degrees() } else { x };
-    let points = |column: &Sensitivity| {
-        test.way
-            .values
-            .iter()
-            .copied()
-            .zip(column.values.iter().copied())
-            .collect()
-    };
+    let points = |column: &Sensitivity| test.way.values.iter().copied().zip(column.values.iter().copied()).collect();
     let (name, title) = match test.coordinate {
-        Some(coordinate) => (
-            format!("{}-{coordinate}", test.test),
-            format!("{}: sensitivity of {coordinate}", test.test),
-        ),
+        Some(coordinate) => {
+            (format!("{}-{coordinate}", test.test), format!("{}: sensitivity of {coordinate}", test.test))
+        }
         None => (test.test.clone(), format!("{}: sensitivity", test.test)),
     };
     Lines {
         name: format!("sensitivity-{name}"),
         title,
         caption: "Change of the reading per unit of each error, along the first run.".to_string(),
-        x: (
-            x,
-            format!(
-                "{}, {}",
-                test.way.name,
-                if test.way.is_angle { "°" } else { "mm" }
-            ),
-        ),
-        y: (
-            Scale::rounded(values[0].min(0.0), values[1].max(0.0), UP, 6),
-            "µm per unit".to_string(),
-        ),
+        x: (x, format!("{}, {}", test.way.name, if test.way.is_angle { "°" } else { "mm" })),
+        y: (Scale::rounded(values[0].min(0.0), values[1].max(0.0), UP, 6), "µm per unit".to_string()),
         series: columns
             .iter()
             .zip(CLASSES)
-            .map(|(column, class)| Series {
-                class,
-                source: None,
-                mark: Mark::Line,
-                points: points(column),
-            })
+            .map(|(column, class)| Series { class, source: None, mark: Mark::Line, points: points(column) })
             .collect(),
         legend: columns
             .iter()

@@ -2,8 +2,8 @@
 
 /// Returns the rows to draw, in ascending order.
 ///
-/// The range of the abscissa is divided into `intervals` equal intervals. In each interval, the rows with the minimum and the maximum of every series
-/// are kept. The first and the last row are kept too.
+/// The range of the abscissa is divided into `intervals` equal intervals. In each interval, the rows with the minimum
+/// and the maximum of every series are kept. The first and the last row are kept too.
 pub fn decimated_rows(abscissa: &[f64], series: &[&[f64]], intervals: usize) -> Vec<usize> {
     let rows = abscissa.len();
     if rows <= 2 * intervals {
@@ -19,16 +19,8 @@ pub fn decimated_rows(abscissa: &[f64], series: &[&[f64]], intervals: usize) -> 
             let interval = (((abscissa[row] - low) / width) as usize).min(intervals - 1);
             let (minimum, maximum) = extremes[interval].unwrap_or((row, row));
             extremes[interval] = Some((
-                if values[row] < values[minimum] {
-                    row
-                } else {
-                    minimum
-                },
-                if values[row] > values[maximum] {
-                    row
-                } else {
-                    maximum
-                },
+                if values[row] < values[minimum] { row } else { minimum },
+                if values[row] > values[maximum] { row } else { maximum },
             ));
         }
         for (minimum, maximum) in extremes.into_iter().flatten() {
@@ -41,7 +33,8 @@ pub fn decimated_rows(abscissa: &[f64], series: &[&[f64]], intervals: usize) -> 
     (0..rows).filter(|row| kept[*row]).collect()
 }
 
-/// Returns centre, minimum and maximum of each of `intervals` equal intervals of the abscissa. Empty intervals are omitted.
+/// Returns centre, minimum and maximum of each of `intervals` equal intervals of the abscissa. Empty intervals are
+/// omitted.
 pub fn interval_extremes(abscissa: &[f64], values: &[f64], intervals: usize) -> Vec<(f64, f64, f64)> {
     let low = abscissa.iter().copied().fold(f64::INFINITY, f64::min);
     let high = abscissa.iter().copied().fold(f64::NEG_INFINITY, f64::max);

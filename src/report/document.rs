@@ -44,11 +44,7 @@ pub struct KeyFigure {
 impl KeyFigure {
     /// A key figure.
     pub fn new(label: &'static str, value: impl Into<String>, note: impl Into<String>) -> KeyFigure {
-        KeyFigure {
-            label,
-            value: value.into(),
-            note: note.into(),
-        }
+        KeyFigure { label, value: value.into(), note: note.into() }
     }
 }
 
@@ -59,16 +55,13 @@ impl Document {
         self.sections.push((anchor, heading.to_string(), contents));
     }
 
-    /// Adds plots to the document and returns their figures. Plots of one width stand in columns; plots of several widths share rows.
+    /// Adds plots to the document and returns their figures. Plots of one width stand in columns; plots of several
+    /// widths share rows.
     pub fn show(&mut self, plots: impl IntoIterator<Item = Plot>) -> Markup {
         let plots: Vec<Plot> = plots.into_iter().collect();
         let widths: Vec<f64> = plots.iter().map(|plot| plot.size[0]).collect();
         let is_mixed = widths.windows(2).any(|pair| pair[0] != pair[1]);
-        let layout = if is_mixed {
-            "figures row"
-        } else {
-            "figures columns"
-        };
+        let layout = if is_mixed { "figures row" } else { "figures columns" };
         let width = widths.first().copied().unwrap_or_default();
         let markup = html! {
             @if !plots.is_empty() {
@@ -87,10 +80,7 @@ impl Document {
         left: impl IntoIterator<Item = Plot>,
         right: impl IntoIterator<Item = Plot>,
     ) -> Markup {
-        let [left, right] = [
-            left.into_iter().collect(),
-            right.into_iter().collect::<Vec<Plot>>(),
-        ];
+        let [left, right] = [left.into_iter().collect(), right.into_iter().collect::<Vec<Plot>>()];
         let markup = html! {
             div class="beside" {
                 div class="figures row" { @for plot in &left { (plot.figure()) } }
@@ -106,11 +96,7 @@ impl Document {
         let wanted = plot.name.clone();
         let mut number = 2;
         // Names differ by more than case, because many file systems ignore case.
-        while self
-            .plots
-            .iter()
-            .any(|other| other.name.eq_ignore_ascii_case(&plot.name))
-        {
+        while self.plots.iter().any(|other| other.name.eq_ignore_ascii_case(&plot.name)) {
             plot.name = format!("{wanted}-{number}");
             number += 1;
         }
@@ -120,9 +106,7 @@ impl Document {
 
 /// A table. Columns of words are aligned to the left, columns of numbers to the right.
 pub fn table(header: &[&str], rows: &[Vec<String>]) -> Markup {
-    let class: Vec<Option<&str>> = (0..header.len())
-        .map(|column| column_class(rows, column))
-        .collect();
+    let class: Vec<Option<&str>> = (0..header.len()).map(|column| column_class(rows, column)).collect();
     html! {
         div class="scroll" {
             table {
@@ -135,14 +119,8 @@ pub fn table(header: &[&str], rows: &[Vec<String>]) -> Markup {
 
 /// CSS class of a column: that of words if more cells start with a letter than with anything else.
 fn column_class(rows: &[Vec<String>], column: usize) -> Option<&'static str> {
-    let cells = || {
-        rows.iter()
-            .filter_map(|row| row.get(column))
-            .filter(|cell| !cell.is_empty())
-    };
-    let words = cells()
-        .filter(|cell| cell.starts_with(char::is_alphabetic))
-        .count();
+    let cells = || rows.iter().filter_map(|row| row.get(column)).filter(|cell| !cell.is_empty());
+    let words = cells().filter(|cell| cell.starts_with(char::is_alphabetic)).count();
     let is_long = cells().any(|cell| cell.chars().count() > MAX_UNWRAPPED && cell.contains(' '));
     match (2 * words > cells().count(), is_long) {
         (true, true) => Some("word-column long"),
@@ -173,7 +151,5 @@ pub fn folded(summary: &str, contents: &Markup) -> Markup {
 /// Text with a capital first letter.
 pub fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
-    letters.next().map_or(String::new(), |first| {
-        first.to_uppercase().chain(letters).collect()
-    })
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
 }

@@ -31,21 +31,9 @@ pub fn section(document: &mut Document, trace: &TraceOutcome<'_>) -> Markup {
         .iter()
         .enumerate()
         .map(|(number, effect)| {
-            let competing = trace
-                .competing_effects
-                .get(number)
-                .filter(|_| number < MAX_RANKED);
-            let id = trace
-                .effects
-                .get(number)
-                .map(|effect| effect.id())
-                .unwrap_or_default();
-            block(
-                document,
-                result,
-                effect,
-                competing.map(|all| (all.as_slice(), id.as_str())),
-            )
+            let competing = trace.competing_effects.get(number).filter(|_| number < MAX_RANKED);
+            let id = trace.effects.get(number).map(|effect| effect.id()).unwrap_or_default();
+            block(document, result, effect, competing.map(|all| (all.as_slice(), id.as_str())))
         })
         .collect();
     let convergence = (!trace.steps.is_empty()).then(|| convergence(trace));
@@ -125,29 +113,14 @@ fn estimate(effect: &EffectResult) -> String {
     }
     let values = effect.parameters.iter().map(|parameter| {
         let (value, u) = value_and_u(parameter.value, parameter.u);
-        // The text after the last dot is the coefficient, unless the component contains the dot: `spindle_ball.y~time:drift`.
-        let coefficient = parameter
-            .id
-            .rsplit_once('.')
-            .map_or("", |(_, coefficient)| coefficient);
-        let coefficient = if coefficient.contains('~') {
-            ""
-        } else {
-            coefficient
-        };
-        let separator = if coefficient.ends_with(|c: char| c.is_ascii_digit()) {
-            ":"
-        } else {
-            ""
-        };
-        format!("{coefficient}{separator} {value} ± {u} {}", unit(&parameter.unit))
-            .trim()
-            .to_string()
+        // The text after the last dot is the coefficient, unless the component contains the dot:
+        // `spindle_ball.y~time:drift`.
+        let coefficient = parameter.id.rsplit_once('.').map_or("", |(_, coefficient)| coefficient);
+        let coefficient = if coefficient.contains('~') { "" } else { coefficient };
+        let separator = if coefficient.ends_with(|c: char| c.is_ascii_digit()) { ":" } else { "" };
+        format!("{coefficient}{separator} {value} ± {u} {}", unit(&parameter.unit)).trim().to_string()
     });
-    let numbers = effect
-        .shape_parameters
-        .iter()
-        .map(|number| with_minus_signs(&unit(&shape_number(number))));
+    let numbers = effect.shape_parameters.iter().map(|number| with_minus_signs(&unit(&shape_number(number))));
     values.chain(numbers).collect::<Vec<_>>().join(", ")
 }
 
@@ -203,20 +176,10 @@ fn explanation(effect: &EffectName, outcomes: &[String]) -> Markup {
 
 /// Separation of the selected effect from an alternative by a test.
 fn separation(alias: &EffectName, test: &SeparatingTestResult) -> String {
-    let found = test
-        .alternatives
-        .iter()
-        .find(|alternative| &alternative.name == alias);
+    let found = test.alternatives.iter().find(|alternative| &alternative.name == alias);
     found.map_or("separated before".to_string(), |alternative| {
-        let sign = if alternative.separated {
-            "✓"
-        } else {
-            "✗ not separated:"
-        };
-        format!(
-            "{sign} {:.1} → {:.1} σ",
-            alternative.before_sigma, alternative.after_sigma
-        )
+        let sign = if alternative.separated { "✓" } else { "✗ not separated:" };
+        format!("{sign} {:.1} → {:.1} σ", alternative.before_sigma, alternative.after_sigma)
     })
 }
 
@@ -224,38 +187,23 @@ fn separation(alias: &EffectName, test: &SeparatingTestResult) -> String {
 fn curve(effect: &EffectResult) -> Plot {
     let line = |multiple: f64| {
         let points = effect.curve.iter();
-        points
-            .map(|p| (p.at, p.value + multiple * p.u))
-            .collect::<Vec<_>>()
+        points.map(|p| (p.at, p.value + multiple * p.u)).collect::<Vec<_>>()
     };
     let [low, high] = span(effect.curve.iter().map(|p| p.at));
-    let [minimum, maximum] = span(
-        effect
-            .curve
-            .iter()
-            .flat_map(|p| [p.value - 2.0 * p.u, p.value + 2.0 * p.u]),
-    );
+    let [minimum, maximum] = span(effect.curve.iter().flat_map(|p| [p.value - 2.0 * p.u, p.value + 2.0 * p.u]));
     let series = [("after", 0.0), ("found-line", 2.0), ("found-line", -2.0)];
     Lines {
         name: format!("curve-{}-{}", effect.name.component, effect.name.driver),
         title: format!("{} over {}", effect.name.component, effect.name.driver),
         caption: "The curve excludes the components that are collinear with location errors.".to_string(),
-        x: (
-            Scale::over(low, high, ACROSS, 8),
-            format!("{}, {}", effect.name.driver, unit(&effect.curve_at_unit)),
-        ),
+        x: (Scale::over(low, high, ACROSS, 8), format!("{}, {}", effect.name.driver, unit(&effect.curve_at_unit))),
         y: (
             Scale::rounded(minimum.min(0.0), maximum.max(0.0), UP, 6),
             format!("{}, {}", effect.name.component, unit(&effect.curve_unit)),
         ),
         series: series
             .iter()
-            .map(|(class, multiple)| Series {
-                class,
-                source: None,
-                mark: Mark::Line,
-                points: line(*multiple),
-            })
+            .map(|(class, multiple)| Series { class, source: None, mark: Mark::Line, points: line(*multiple) })
             .collect(),
         legend: vec![("after", "curve".into()), ("found-line", "± 2 u".into())],
         over: html! {},
@@ -267,23 +215,14 @@ fn curve(effect: &EffectResult) -> Plot {
 fn convergence(trace: &TraceOutcome<'_>) -> Plot {
     let before = trace.result.before.heldout_rms_um;
     let mut points = vec![(0.0, before)];
-    points.extend(
-        trace
-            .steps
-            .iter()
-            .enumerate()
-            .map(|(k, step)| (k as f64 + 1.0, step.heldout_rms_um)),
-    );
+    points.extend(trace.steps.iter().enumerate().map(|(k, step)| (k as f64 + 1.0, step.heldout_rms_um)));
     let maximum = points.iter().map(|p| p.1).fold(0.0, f64::max);
     let steps = trace.steps.len() as f64;
     let is_named = trace.steps.len() <= MAX_NAMED;
     // Names need space to the right of the last point.
     let width = if is_named { 1.5 * steps } else { steps + 0.5 };
     let x = Scale::over(0.0, width, ACROSS, 10);
-    let x = Scale {
-        step: x.step.max(1.0),
-        ..x
-    };
+    let x = Scale { step: x.step.max(1.0), ..x };
     let y = Scale::rounded(0.0, maximum * 1.05, UP, 5);
     let over = html! {
         @for (number, step) in trace.steps.iter().enumerate() {
@@ -310,12 +249,7 @@ fn convergence(trace: &TraceOutcome<'_>) -> Plot {
         caption: "Held-out error after each addition. Later steps can exchange an added effect.".to_string(),
         x: (x, "additions".to_string()),
         y: (y, "held-out rms, µm".to_string()),
-        series: vec![Series {
-            class: "after",
-            source: None,
-            mark: Mark::Line,
-            points,
-        }],
+        series: vec![Series { class: "after", source: None, mark: Mark::Line, points }],
         legend,
         over,
     }
@@ -343,10 +277,6 @@ fn ranking(competing: &[CompetingEffect], id: &str) -> Plot {
         "Evidence together with the rest of the model: −ln P minus the complexity penalty.".to_string(),
         "evidence, −ln P",
         &rows,
-        &[
-            ("key-named", "selected"),
-            ("key-alias", "indistinguishable"),
-            ("key-other", "rejected"),
-        ],
+        &[("key-named", "selected"), ("key-alias", "indistinguishable"), ("key-other", "rejected")],
     )
 }

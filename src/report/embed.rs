@@ -16,22 +16,14 @@ pub const MAX_SLIDERS: usize = 40;
 
 /// Encodes numbers as 16-bit integers: `value = offset + scale · k`, `k` from −32767 to 32767.
 fn quantised(values: impl Iterator<Item = f64> + Clone) -> Value {
-    let (low, high) = values
-        .clone()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-            (l.min(v), h.max(v))
-        });
+    let (low, high) = values.clone().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
     if !(high - low).is_finite() {
         return json!({"o": 0.0, "s": 0.0, "d": ""});
     }
     let (offset, scale) = ((low + high) / 2.0, (high - low) / 65534.0);
     let bytes: Vec<u8> = values
         .flat_map(|value| {
-            let k = if scale > 0.0 {
-                ((value - offset) / scale).round() as i16
-            } else {
-                0
-            };
+            let k = if scale > 0.0 { ((value - offset) / scale).round() as i16 } else { 0 };
             k.to_le_bytes()
         })
         .collect();
@@ -107,19 +99,11 @@ pub fn csv(session: &SessionPlots<'_>) -> String {
     let machine = &session.problem.session.machine;
     let mut text = String::from("test,file_line,run,time_s");
     for axis in &machine.axes {
-        let unit = if axis.kind == abbe::model::axis::AxisKind::Rotary {
-            "deg"
-        } else {
-            "mm"
-        };
+        let unit = if axis.kind == abbe::model::axis::AxisKind::Rotary { "deg" } else { "mm" };
         text.push_str(&format!(",{}_{unit}", axis.name));
     }
     let coordinates = session.series.coordinates;
-    let names: &[&str] = if coordinates == 3 {
-        &["_x", "_y", "_z"]
-    } else {
-        &[""]
-    };
+    let names: &[&str] = if coordinates == 3 { &["_x", "_y", "_z"] } else { &[""] };
     for column in ["deviation", "residual_before", "residual_after"] {
         for name in names {
             text.push_str(&format!(",{column}{name}_um"));
@@ -139,11 +123,7 @@ pub fn csv(session: &SessionPlots<'_>) -> String {
             number(&mut text, readings.time_s.get(row).map(|t| format!("{t:.3}")));
             for (axis, column) in machine.axes.iter().zip(&readings.positions) {
                 let rotary = axis.kind == abbe::model::axis::AxisKind::Rotary;
-                let value = if rotary {
-                    column[row].to_degrees()
-                } else {
-                    column[row]
-                };
+                let value = if rotary { column[row].to_degrees() } else { column[row] };
                 // `write!` to a string always succeeds.
                 let _ = write!(text, ",{value:.5}");
             }
@@ -161,11 +141,7 @@ pub fn csv(session: &SessionPlots<'_>) -> String {
 /// A field of a CSV file.
 fn quoted(field: &str) -> String {
     let field = crate::cli::output::cell(field.to_string());
-    if field.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", field.replace('"', "\"\""))
-    } else {
-        field
-    }
+    if field.contains([',', '"', '\n', '\r']) { format!("\"{}\"", field.replace('"', "\"\"")) } else { field }
 }
 
 /// Compresses text in zlib format (`deflate` in browsers) and encodes it in base64.
@@ -187,10 +163,7 @@ mod tests {
         let number = |key: &str| encoded[key].as_f64().unwrap();
         for (value, pair) in values.iter().zip(bytes.chunks(2)) {
             let found = number("o") + number("s") * f64::from(i16::from_le_bytes([pair[0], pair[1]]));
-            assert!(
-                (found - value).abs() <= 0.5 * 65.375 / 65534.0 + 1e-9,
-                "{found} {value}"
-            );
+            assert!((found - value).abs() <= 0.5 * 65.375 / 65534.0 + 1e-9, "{found} {value}");
         }
     }
 
@@ -200,9 +173,7 @@ mod tests {
         let text = "test,µm\n\"a,b\",1.25\n".repeat(40);
         let bytes = STANDARD.decode(compressed(&text)).unwrap();
         let mut found = String::new();
-        flate2::read::ZlibDecoder::new(bytes.as_slice())
-            .read_to_string(&mut found)
-            .unwrap();
+        flate2::read::ZlibDecoder::new(bytes.as_slice()).read_to_string(&mut found).unwrap();
         assert_eq!(found, text);
     }
 }

@@ -45,17 +45,10 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
     plausibility::section(&mut document, &result.plausibility);
     let section = values::section(&mut document, problem, &result.parameters, None);
     document.section("Values", section);
-    let before = if session.is_polar() {
-        "nominal machine and set-up"
-    } else {
-        "nominal machine, fitted set-up"
-    };
+    let before = if session.is_polar() { "nominal machine and set-up" } else { "nominal machine, fitted set-up" };
     let section = residuals::section(&mut document, &session, &spectra, [before, "fit"]);
     document.section("Residuals", section);
-    document.section(
-        "Next test",
-        next(result, candidate_tests::has_candidates(problem)),
-    );
+    document.section("Next test", next(result, candidate_tests::has_candidates(problem)));
     let section = readings::traces(&mut document, &session);
     document.section("Traces", section);
     if !result.circular.is_empty() {
@@ -76,10 +69,7 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
 /// Verdict in two sentences: identifiability, and agreement of residual and noise.
 fn verdict(result: &FitResult) -> String {
     let identifiable = match result.parameter_count.saturating_sub(result.rank) {
-        0 => format!(
-            "All {} are identifiable.",
-            counted(result.parameter_count, "parameter")
-        ),
+        0 => format!("All {} are identifiable.", counted(result.parameter_count, "parameter")),
         _ => format!(
             "{} of {} identifiable (numerical rank {}).",
             result.identifiable.len(),
@@ -90,10 +80,7 @@ fn verdict(result: &FitResult) -> String {
     let agreement = if result.noise_source == "residual" {
         "The noise is estimated from the residual, so that the residual cannot test the model. `abbe trace` searches for unmodelled effects.".to_string()
     } else if result.u_enlargement > 1.0 {
-        format!(
-            "The residual exceeds the noise by a factor of {:.2}: the model lacks an effect.",
-            result.u_enlargement
-        )
+        format!("The residual exceeds the noise by a factor of {:.2}: the model lacks an effect.", result.u_enlargement)
     } else {
         "The residual agrees with the noise.".to_string()
     };
@@ -117,9 +104,7 @@ fn figures(problem: &Problem<'_>, result: &FitResult) -> Vec<KeyFigure> {
         summary::held_out(&quality, None),
         summary::rank(result.rank, result.parameter_count),
     ];
-    let length = result.rms_3d_um.map_or("scalar readings".to_string(), |rms| {
-        format!("vector: {}", um(rms))
-    });
+    let length = result.rms_3d_um.map_or("scalar readings".to_string(), |rms| format!("vector: {}", um(rms)));
     figures.push(KeyFigure::new("Residual rms", um(result.rms_um), length));
     figures.push(summary::readings(problem, result.readings, result.outliers.len()));
     figures

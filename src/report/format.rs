@@ -58,17 +58,9 @@ pub fn value_and_u(value: f64, u: f64) -> (String, String) {
 /// An integer with a thin space between thousands.
 pub fn integer(value: usize) -> String {
     let digits = value.to_string();
-    let groups: Vec<&str> = digits
-        .as_bytes()
-        .rchunks(3)
-        .rev()
-        .filter_map(|group| std::str::from_utf8(group).ok())
-        .collect();
-    if digits.len() < 5 {
-        digits
-    } else {
-        groups.join("\u{202f}")
-    }
+    let groups: Vec<&str> =
+        digits.as_bytes().rchunks(3).rev().filter_map(|group| std::str::from_utf8(group).ok()).collect();
+    if digits.len() < 5 { digits } else { groups.join("\u{202f}") }
 }
 
 /// The noise of a result and its source. The residual of a model is not called noise.

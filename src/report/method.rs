@@ -25,10 +25,7 @@ pub fn method(result: &Comparison) -> Markup {
 /// The report.
 pub fn document(problem: &Problem<'_>, result: &Comparison) -> Document {
     let mut document = Document {
-        title: format!(
-            "{}: {} method and full fit",
-            problem.session.machine.name, result.method
-        ),
+        title: format!("{}: {} method and full fit", problem.session.machine.name, result.method),
         verdict: format!(
             "The {} method reduces the rms residual of its tests from {2} to {1}. The rms residual of the full fit in all tests is {3}.",
             result.method,

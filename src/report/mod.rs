@@ -1,12 +1,16 @@
-//! HTML reports and plots. Each report is one file without external resources. The calculations are in `abbe::identify`.
+//! HTML reports and plots. Each report is one file without external resources. The calculations are in
+//! `abbe::identify`.
 //!
-//! - [`document`], [`page`]: contents of a report, and the page around them. [`provenance`]: inputs, version and command line.
+//! - [`document`], [`page`]: contents of a report, and the page around them. [`provenance`]: inputs, version and
+//!   command line.
 //! - [`fit`], [`trace`], [`plan`], [`method`], [`next_test`]: the report of each command.
 //! - [`summary`], [`values`], [`residuals`], [`effects`], [`readings`], [`circular`], [`plausibility`]: sections.
-//! - [`plots`], [`curves`]: plots of readings and of derived quantities. [`abscissae`]: what they are plotted against. [`decimate`]: decimation that keeps extremes. [`embed`]: data in the page.
+//! - [`plots`], [`curves`]: plots of readings and of derived quantities. [`abscissae`]: what they are plotted against.
+//!   [`decimate`]: decimation that keeps extremes. [`embed`]: data in the page.
 //! - [`plot`]: types of plots as SVG and PNG. [`format`]: text of values and units.
 //!
-//! All text passes through templates that escape markup. Only the SVG drawings, the style sheets and the script of this module are inserted verbatim.
+//! All text passes through templates that escape markup. Only the SVG drawings, the style sheets and the script of this
+//! module are inserted verbatim.
 
 pub mod abscissae;
 pub mod circular;

@@ -83,10 +83,7 @@ fn proposed(document: &mut Document, found: &Improvement) -> Markup {
     let shown = document.show([bars(
         "next-test".to_string(),
         "Plan with each proposed test".to_string(),
-        format!(
-            "{}. The tests are added one after another.",
-            capitalised(&unit(&found.criterion))
-        ),
+        format!("{}. The tests are added one after another.", capitalised(&unit(&found.criterion))),
         &unit(&found.criterion),
         &bar_rows,
         &[],
@@ -95,13 +92,7 @@ fn proposed(document: &mut Document, found: &Improvement) -> Markup {
     let others: Vec<Vec<String>> = found
         .alternatives
         .iter()
-        .map(|other| {
-            vec![
-                other.test.clone(),
-                digits(other.after),
-                format!("{:.1}", other.duration_min),
-            ]
-        })
+        .map(|other| vec![other.test.clone(), digits(other.after), format!("{:.1}", other.duration_min)])
         .collect();
     html! {
         @if !rows.is_empty() {
@@ -127,11 +118,7 @@ fn row((number, step): (usize, &ProposedTest)) -> Vec<String> {
     vec![
         (number + 1).to_string(),
         digits(step.after),
-        format!(
-            "{:.1}{}",
-            step.duration_min,
-            if step.new_setup { " with set-up" } else { "" }
-        ),
+        format!("{:.1}{}", step.duration_min, if step.new_setup { " with set-up" } else { "" }),
         point(step.workpiece_ball_mm),
         point(step.spindle_ball_mm),
         step.bar_mm.to_string(),
@@ -149,10 +136,7 @@ fn uncertainties(found: &Improvement) -> Markup {
         .enumerate()
         .map(|(k, before)| {
             let with = found.steps.iter().map(|step| digits(step.uncertainties[k].u));
-            [before.id.clone(), digits(before.u)]
-                .into_iter()
-                .chain(with)
-                .collect()
+            [before.id.clone(), digits(before.u)].into_iter().chain(with).collect()
         })
         .collect();
     let header: Vec<&str> = header.iter().map(String::as_str).collect();

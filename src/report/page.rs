@@ -101,11 +101,8 @@ fn summary(document: &Document) -> Markup {
 
 /// Colours, then the style sheets of page and plots.
 fn style() -> String {
-    let colours = |list: &[(&str, &str)]| -> String {
-        list.iter()
-            .map(|(name, colour)| format!("--{name}:{colour};"))
-            .collect()
-    };
+    let colours =
+        |list: &[(&str, &str)]| -> String { list.iter().map(|(name, colour)| format!("--{name}:{colour};")).collect() };
     let (light, dark) = (colours(&LIGHT), colours(&DARK));
     format!(
         ":root{{color-scheme:light dark;{light}}}\n@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}\n{PAGE_STYLE}{STYLE}"

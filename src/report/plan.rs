@@ -40,9 +40,7 @@ pub fn document(problem: &Problem<'_>, analysis: &PlanAnalysis) -> Result<Docume
             counted(analysis.errors.len(), "error"),
             counted(analysis.readings, "reading"),
             counted(analysis.tests.len(), "test"),
-            analysis
-                .moving_min
-                .map_or(String::new(), |min| format!(", {min:.0} min of movement")),
+            analysis.moving_min.map_or(String::new(), |min| format!(", {min:.0} min of movement")),
             limit(analysis),
         ),
         figures: figures(problem, analysis),
@@ -65,10 +63,7 @@ pub fn document(problem: &Problem<'_>, analysis: &PlanAnalysis) -> Result<Docume
     );
     let section = confounding(&mut document, analysis);
     document.section("Correlation and confounding", section);
-    document.section(
-        "Next test",
-        next(analysis, candidate_tests::has_candidates(problem)),
-    );
+    document.section("Next test", next(analysis, candidate_tests::has_candidates(problem)));
     let beta = vec![0.0; problem.parameters.list.len()];
     let section = curves::sensitivities(&mut document, problem, &beta)?;
     document.section("Sensitivity of each test", section);
@@ -81,11 +76,7 @@ pub fn document(problem: &Problem<'_>, analysis: &PlanAnalysis) -> Result<Docume
 fn figures(problem: &Problem<'_>, analysis: &PlanAnalysis) -> Vec<KeyFigure> {
     let identifiable = analysis.errors.iter().filter(|error| error.u.is_some()).count();
     let mut figures = vec![
-        KeyFigure::new(
-            "Identifiable errors",
-            format!("{identifiable} of {}", analysis.errors.len()),
-            "",
-        ),
+        KeyFigure::new("Identifiable errors", format!("{identifiable} of {}", analysis.errors.len()), ""),
         summary::rank(analysis.rank, analysis.parameter_count),
     ];
     figures.extend(worst(analysis).into_iter().map(|error| {
@@ -101,11 +92,7 @@ fn figures(problem: &Problem<'_>, analysis: &PlanAnalysis) -> Vec<KeyFigure> {
     figures.push(KeyFigure::new(
         "Readings",
         integer(analysis.readings),
-        format!(
-            "{}; noise {}",
-            counted(problem.tests.len(), "test"),
-            um(analysis.noise_um)
-        ),
+        format!("{}; noise {}", counted(problem.tests.len(), "test"), um(analysis.noise_um)),
     ));
     figures
 }
@@ -125,20 +112,16 @@ fn worst(analysis: &PlanAnalysis) -> Vec<&ErrorAnalysis> {
 
 /// The largest contribution to the variance of an error.
 fn contribution(error: &ErrorAnalysis) -> String {
-    error.budget.first().map_or(String::new(), |part| {
-        format!("{:.0} % of the variance from {}", 100.0 * part.share, part.source)
-    })
+    error
+        .budget
+        .first()
+        .map_or(String::new(), |part| format!("{:.0} % of the variance from {}", 100.0 * part.share, part.source))
 }
 
 /// Sentences about the worst determined errors.
 fn limit(analysis: &PlanAnalysis) -> String {
     let sentences = worst(analysis).into_iter().map(|error| {
-        format!(
-            " {} is the worst determined error in {}: {}.",
-            error.id,
-            unit(&error.unit),
-            contribution(error)
-        )
+        format!(" {} is the worst determined error in {}: {}.", error.id, unit(&error.unit), contribution(error))
     });
     sentences.collect()
 }
@@ -154,10 +137,7 @@ fn uncertainties(errors: &[ErrorAnalysis]) -> Vec<Plot> {
                 .filter_map(|error| Some((error, error.u?)))
                 .flat_map(|(error, u)| {
                     let known = error.conditional_u.unwrap_or(u);
-                    [
-                        (error.id.clone(), u, Fill::Named),
-                        (format!("{}, conditional", error.id), known, Fill::Alias),
-                    ]
+                    [(error.id.clone(), u, Fill::Named), (format!("{}, conditional", error.id), known, Fill::Alias)]
                 })
                 .take(2 * MAX_ROWS)
                 .collect();
@@ -176,24 +156,15 @@ fn uncertainties(errors: &[ErrorAnalysis]) -> Vec<Plot> {
 /// A row of the table of predicted uncertainties.
 fn row(error: &ErrorAnalysis) -> Vec<String> {
     let figure = |u: Option<f64>| u.map_or("not identifiable".to_string(), |u| value_and_u(u, u).0);
-    let budget: Vec<String> = error
-        .budget
-        .iter()
-        .take(3)
-        .map(|part| format!("{} {:.0} %", part.source, 100.0 * part.share))
-        .collect();
+    let budget: Vec<String> =
+        error.budget.iter().take(3).map(|part| format!("{} {:.0} %", part.source, 100.0 * part.share)).collect();
     vec![
         error.id.clone(),
         figure(error.u),
         unit(&error.unit),
         figure(error.conditional_u),
-        format!(
-            "{:.3} µm/{} in {}",
-            error.sensitivity.largest,
-            unit(&error.unit),
-            error.sensitivity.largest_in_test
-        )
-        .replace('-', "\u{2212}"),
+        format!("{:.3} µm/{} in {}", error.sensitivity.largest, unit(&error.unit), error.sensitivity.largest_in_test)
+            .replace('-', "\u{2212}"),
         budget.join(", "),
     ]
 }
@@ -213,14 +184,9 @@ fn confounding(document: &mut Document, analysis: &PlanAnalysis) -> Markup {
             .take(MAX_ROWS)
             .map(|effect| {
                 let biases = effect.biases.iter().take(2);
-                let biases: Vec<String> = biases
-                    .map(|bias| format!("{} {:.3} {}", bias.id, bias.per_unit, unit(&bias.unit)))
-                    .collect();
-                vec![
-                    effect.id.clone(),
-                    format!("{:.2} %", 100.0 * effect.residual_share),
-                    biases.join(", "),
-                ]
+                let biases: Vec<String> =
+                    biases.map(|bias| format!("{} {:.3} {}", bias.id, bias.per_unit, unit(&bias.unit))).collect();
+                vec![effect.id.clone(), format!("{:.2} %", 100.0 * effect.residual_share), biases.join(", ")]
             })
             .collect::<Vec<_>>()
     });

@@ -11,10 +11,7 @@ pub fn section(document: &mut Document, plausibility: &Plausibility) {
     if plausibility.conflicts.is_empty() {
         return;
     }
-    let conflicts = plausibility
-        .conflicts
-        .iter()
-        .map(|conflict| conflict.words.clone());
+    let conflicts = plausibility.conflicts.iter().map(|conflict| conflict.words.clone());
     let suggestions = (plausibility.suggestions.iter())
         .map(|suggestion| format!("{} (residual {})", suggestion.words, um(suggestion.rms_um)));
     let introduction = match plausibility.suggestions.len() {

@@ -16,7 +16,8 @@ use super::plot::{Plot, polar};
 const TRAVERSAL_INTERVALS: usize = 360;
 /// Intervals of an axis for readings at separate poses.
 const POSE_INTERVALS: usize = 150;
-/// Number of evenly spaced poses that are drawn in addition to the extremes, so that the plot shows the whole distribution.
+/// Number of evenly spaced poses that are drawn in addition to the extremes, so that the plot shows the whole
+/// distribution.
 const POSE_SAMPLE: usize = 500;
 /// Maximum number of tests with plots of their own. The data of the page contain all tests.
 pub const MAX_TESTS: usize = 12;
@@ -89,10 +90,7 @@ impl<'d> SessionPlots<'d> {
                                 .flat_map(|(_, values)| {
                                     decimate::decimated_rows(&part(values), &columns, POSE_INTERVALS)
                                 })
-                                .chain(
-                                    (0..stretch.rows.len())
-                                        .step_by(stretch.rows.len().div_ceil(POSE_SAMPLE).max(1)),
-                                )
+                                .chain((0..stretch.rows.len()).step_by(stretch.rows.len().div_ceil(POSE_SAMPLE).max(1)))
                                 .collect()
                         };
                         kept.sort_unstable();
@@ -102,11 +100,7 @@ impl<'d> SessionPlots<'d> {
                     .collect()
             })
             .collect();
-        SessionPlots {
-            problem,
-            series,
-            rows,
-        }
+        SessionPlots { problem, series, rows }
     }
 
     /// Whether the readings are lengths, which a polar plot shows about a nominal circle.
@@ -116,15 +110,12 @@ impl<'d> SessionPlots<'d> {
 
     /// RMS of the change of the residual from the first to the second model, µm.
     fn change_um(test: &TestSeries) -> f64 {
-        let squares = test
-            .before_um
-            .iter()
-            .zip(&test.after_um)
-            .map(|(before, after)| (before - after).powi(2));
+        let squares = test.before_um.iter().zip(&test.after_um).map(|(before, after)| (before - after).powi(2));
         (squares.sum::<f64>() / test.after_um.len().max(1) as f64).sqrt()
     }
 
-    /// Whether the second model changes the residual of a test by at least [`MIN_CHANGE`] of the noise. If no test changes, all count as affected.
+    /// Whether the second model changes the residual of a test by at least [`MIN_CHANGE`] of the noise. If no test
+    /// changes, all count as affected.
     pub fn is_affected(&self, number: usize) -> bool {
         let min_um = MIN_CHANGE * self.problem.noise.sigma_mm * 1e3;
         let changes = |test: &TestSeries| Self::change_um(test) >= min_um;
@@ -137,12 +128,7 @@ impl<'d> SessionPlots<'d> {
         let coordinates = self.series.coordinates;
         let rejected = &self.problem.rejected[number];
         [&test.before_um, &test.after_um].map(|values| {
-            let counted = || {
-                values
-                    .iter()
-                    .enumerate()
-                    .filter(|(i, _)| !rejected[i / coordinates])
-            };
+            let counted = || values.iter().enumerate().filter(|(i, _)| !rejected[i / coordinates]);
             (counted().map(|(_, v)| v * v).sum::<f64>() / counted().count().max(1) as f64).sqrt()
         })
     }
@@ -174,14 +160,7 @@ impl<'d> SessionPlots<'d> {
             .collect();
         let um = um.unwrap_or_else(|| division_um(traversals.iter().flat_map(|traversal| &traversal.points)));
         let caption = "Magnified about the nominal circle.".to_string();
-        let mut plot = polar::plot(
-            format!("{name}-{}", test.name),
-            title,
-            caption,
-            &test.way.name,
-            &traversals,
-            um,
-        );
+        let mut plot = polar::plot(format!("{name}-{}", test.name), title, caption, &test.way.name, &traversals, um);
         let size = PolarSize::LARGE;
         plot.interaction = json!({
             "kind": "polar", "test": number, "column": column.name(), "x0": size.side / 2.0, "y0": size.side / 2.0,
@@ -195,8 +174,7 @@ impl<'d> SessionPlots<'d> {
     pub fn polar_deviation(&self, number: usize) -> Option<Plot> {
         let test = &self.series.tests[number];
         let title = format!("{}: deviation from nominal", test.name);
-        (self.is_polar() && test.way.is_angle)
-            .then(|| self.polar(number, Column::Deviation, "trace", title, None))
+        (self.is_polar() && test.way.is_angle).then(|| self.polar(number, Column::Deviation, "trace", title, None))
     }
 
     /// Whether the second model changes any residual. Otherwise the plots show one residual.
@@ -206,11 +184,7 @@ impl<'d> SessionPlots<'d> {
 
     /// The residuals that the plots show.
     fn residual_columns(&self) -> &'static [Column] {
-        if self.has_change() {
-            &[Column::Before, Column::After]
-        } else {
-            &[Column::After]
-        }
+        if self.has_change() { &[Column::Before, Column::After] } else { &[Column::After] }
     }
 
     /// Polar plots of the residuals of a test, at one magnification.
@@ -220,18 +194,11 @@ impl<'d> SessionPlots<'d> {
             return None;
         }
         let maximum = |values: &[f64]| values.iter().map(|v| v.abs()).fold(0.0, f64::max);
-        let um =
-            super::plot::scale::round_up(maximum(&test.before_um).max(maximum(&test.after_um)) / DIVISIONS);
+        let um = super::plot::scale::round_up(maximum(&test.before_um).max(maximum(&test.after_um)) / DIVISIONS);
         let plot = |column: &Column| {
             let model = models[usize::from(*column == Column::After)];
             let name = format!("residual-{}", column.name());
-            self.polar(
-                number,
-                *column,
-                &name,
-                format!("{}: residual, {model}", test.name),
-                Some(um),
-            )
+            self.polar(number, *column, &name, format!("{}: residual, {model}", test.name), Some(um))
         };
         Some(self.residual_columns().iter().map(plot).collect())
     }
@@ -248,10 +215,7 @@ impl<'d> SessionPlots<'d> {
 
     fn against(&self, number: usize, columns: &[Column]) -> Vec<Plot> {
         let test = &self.series.tests[number];
-        let values: Vec<Vec<f64>> = columns
-            .iter()
-            .map(|c| lengths(c.of(test), self.series.coordinates))
-            .collect();
+        let values: Vec<Vec<f64>> = columns.iter().map(|c| lengths(c.of(test), self.series.coordinates)).collect();
         axes_of(self.problem, test, number)
             .into_iter()
             .map(|(axis, abscissa)| self.against_axis(number, columns, &values, &axis, &abscissa))
@@ -277,11 +241,7 @@ impl<'d> SessionPlots<'d> {
             Scale::rounded(0.0, maximum, UP, 5)
         } else if is_deviation {
             let um = super::plot::scale::round_up(minimum.abs().max(maximum.abs()) / DIVISIONS);
-            Scale {
-                values: [-DIVISIONS * um, DIVISIONS * um],
-                coordinates: UP,
-                step: um,
-            }
+            Scale { values: [-DIVISIONS * um, DIVISIONS * um], coordinates: UP, step: um }
         } else {
             Scale::rounded(minimum.min(0.0), maximum.max(0.0), UP, 6)
         };
@@ -291,17 +251,10 @@ impl<'d> SessionPlots<'d> {
             .iter()
             .zip(values)
             .flat_map(|(column, values)| {
-                test.stretches
-                    .iter()
-                    .enumerate()
-                    .map(move |(k, stretch)| (*column, values, k, stretch))
+                test.stretches.iter().enumerate().map(move |(k, stretch)| (*column, values, k, stretch))
             })
             .map(|(column, values, k, stretch)| Series {
-                class: if is_deviation {
-                    class_of(stretch.forward)
-                } else {
-                    column.name()
-                },
+                class: if is_deviation { class_of(stretch.forward) } else { column.name() },
                 source: Some((k, column.name())),
                 mark,
                 points: self.points(number, k, abscissa, values),
@@ -326,27 +279,14 @@ impl<'d> SessionPlots<'d> {
             (false, true) => "length of the residual",
             (false, false) => "residual",
         };
-        let key = if is_pose {
-            axis.name.clone()
-        } else {
-            "x".to_string()
-        };
+        let key = if is_pose { axis.name.clone() } else { "x".to_string() };
         let mut plot = Lines {
-            name: format!(
-                "{}-{}-over-{}",
-                if is_deviation { "deviation" } else { "residual" },
-                test.name,
-                axis.name
-            ),
+            name: format!("{}-{}-over-{}", if is_deviation { "deviation" } else { "residual" }, test.name, axis.name),
             title: format!("{}: {quantity} against {}", test.name, axis.name),
             caption: if is_deviation {
                 "Observed minus nominal reading.".to_string()
             } else {
-                let text = if columns.len() == 1 {
-                    ""
-                } else {
-                    "Before: red, dashed or large. After: blue."
-                };
+                let text = if columns.len() == 1 { "" } else { "Before: red, dashed or large. After: blue." };
                 text.to_string()
             },
             x: (x, format!("{}, {}", axis.name, axis.unit)),
@@ -356,11 +296,8 @@ impl<'d> SessionPlots<'d> {
             over: html! {},
         }
         .plot();
-        let (um, px) = if is_deviation && !three {
-            (y.step, y.per_unit().abs() * y.step)
-        } else {
-            (1.0, y.per_unit().abs())
-        };
+        let (um, px) =
+            if is_deviation && !three { (y.step, y.per_unit().abs() * y.step) } else { (1.0, y.per_unit().abs()) };
         plot.interaction = json!({
             "kind": "line", "test": number, "column": columns[0].name(), "abscissa": key, "x0": x.at(0.0), "kx": x.per_unit(),
             "y0": y.at(0.0), "px": px, "um": um, "scaled": is_deviation && !three,

@@ -34,10 +34,7 @@ impl Provenance {
     ///
     /// # Errors
     /// If a file changed after it was read, or cannot be read. The error holds the path and the cause.
-    pub fn of(
-        (session, sources): (&Session, &SourceMap),
-        seed: u64,
-    ) -> Result<Provenance, (PathBuf, String)> {
+    pub fn of((session, sources): (&Session, &SourceMap), seed: u64) -> Result<Provenance, (PathBuf, String)> {
         let inputs = sources
             .files
             .iter()
@@ -78,10 +75,7 @@ pub fn input(path: PathBuf) -> std::io::Result<Input> {
     Ok(Input {
         path: path.display().to_string(),
         bytes: contents.len(),
-        sha256: Sha256::digest(&contents)
-            .iter()
-            .map(|byte| format!("{byte:02x}"))
-            .collect(),
+        sha256: Sha256::digest(&contents).iter().map(|byte| format!("{byte:02x}")).collect(),
     })
 }
 
@@ -106,10 +100,7 @@ mod tests {
         let path = folder.path().join("abc");
         std::fs::write(&path, "abc").unwrap();
         let found = input(path).unwrap();
-        assert_eq!(
-            found.sha256,
-            "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
-        );
+        assert_eq!(found.sha256, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
     }
 
     #[test]

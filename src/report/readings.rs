@@ -1,4 +1,5 @@
-//! Sections of readings, shared by several reports: traces, correlations, confounded parameters, outliers and the machine.
+//! Sections of readings, shared by several reports: traces, correlations, confounded parameters, outliers and the
+//! machine.
 
 use abbe::identify::fit::Fit;
 use abbe::identify::parameters::Role;
@@ -29,10 +30,7 @@ pub fn add_data(document: &mut Document, session: &SessionPlots<'_>, parameters:
         .map(|k| {
             let share = &session.series.shares[k];
             let is_same = |p: &&ParameterResult| {
-                p.id == share.id
-                    || p.id
-                        .strip_prefix(&share.id)
-                        .is_some_and(|rest| rest.starts_with('.'))
+                p.id == share.id || p.id.strip_prefix(&share.id).is_some_and(|rest| rest.starts_with('.'))
             };
             let value = parameters.iter().find(is_same).map(|p| {
                 let (value, u) = value_and_u(p.value, p.u);
@@ -53,10 +51,8 @@ pub fn add_data(document: &mut Document, session: &SessionPlots<'_>, parameters:
 
 /// Deviations from nominal with switches and sliders. Tests that the model does not change are folded.
 pub fn traces(document: &mut Document, session: &SessionPlots<'_>) -> Markup {
-    let (affected, unaffected): (Vec<usize>, Vec<usize>) = session
-        .tests()
-        .map(|(number, _)| number)
-        .partition(|number| session.is_affected(*number));
+    let (affected, unaffected): (Vec<usize>, Vec<usize>) =
+        session.tests().map(|(number, _)| number).partition(|number| session.is_affected(*number));
     let mut of_tests = |numbers: &[usize]| {
         let plots: Vec<Vec<Plot>> = numbers
             .iter()
@@ -99,10 +95,8 @@ pub fn correlations(document: &mut Document, problem: &Problem<'_>, fit: &Fit) -
     let all = ids.len();
     ids.truncate(MAX_CORRELATED);
     matrix.truncate(MAX_CORRELATED);
-    let matrix: Vec<Vec<Option<f64>>> = matrix
-        .into_iter()
-        .map(|row| row.into_iter().take(MAX_CORRELATED).map(Some).collect())
-        .collect();
+    let matrix: Vec<Vec<Option<f64>>> =
+        matrix.into_iter().map(|row| row.into_iter().take(MAX_CORRELATED).map(Some).collect()).collect();
     if ids.len() < 2 {
         return html! { p { "Fewer than two errors are identifiable, so that there is no correlation." } };
     }
@@ -119,7 +113,8 @@ pub fn correlation_map(ids: &[String], matrix: &[Vec<Option<f64>>]) -> Plot {
     heat::map(
         "correlation".to_string(),
         "Correlation".to_string(),
-        "Below the diagonal: the area of a symbol is the magnitude. Above the diagonal: the value, if it fits.".to_string(),
+        "Below the diagonal: the area of a symbol is the magnitude. Above the diagonal: the value, if it fits."
+            .to_string(),
         ids,
         matrix,
     )
@@ -128,10 +123,8 @@ pub fn correlation_map(ids: &[String], matrix: &[Vec<Option<f64>>]) -> Plot {
 /// The kinematic chain with the estimated errors.
 pub fn machine(document: &mut Document, problem: &Problem<'_>) -> Markup {
     let list = problem.parameters.list.iter();
-    let mut errors: Vec<String> = list
-        .filter(|parameter| parameter.role == Role::Error)
-        .map(|parameter| parameter.id.clone())
-        .collect();
+    let mut errors: Vec<String> =
+        list.filter(|parameter| parameter.role == Role::Error).map(|parameter| parameter.id.clone()).collect();
     errors.extend(problem.parameters.effect_ids.iter().cloned());
     document.show([chain::plot(&problem.session.machine, &errors)])
 }
@@ -156,12 +149,7 @@ pub fn outliers(outliers: &[Outlier]) -> Markup {
     let rows: Vec<Vec<String>> = outliers
         .iter()
         .map(|outlier| {
-            vec![
-                outlier.test.clone(),
-                outlier.file.clone(),
-                outlier.line.to_string(),
-                um(outlier.residual_um),
-            ]
+            vec![outlier.test.clone(), outlier.file.clone(), outlier.line.to_string(), um(outlier.residual_um)]
         })
         .collect();
     let rows = table(&["test", "file", "line", "residual"], &rows);

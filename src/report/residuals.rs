@@ -14,33 +14,22 @@ use super::plots::{MAX_TESTS, SessionPlots};
 const MAX_ROWS: usize = 20;
 
 /// Residuals of every test before and after, by the names of the two models. Tests that do not change are folded.
-pub fn section(
-    document: &mut Document,
-    session: &SessionPlots<'_>,
-    spectra: &[Spectrum],
-    models: [&str; 2],
-) -> Markup {
+pub fn section(document: &mut Document, session: &SessionPlots<'_>, spectra: &[Spectrum], models: [&str; 2]) -> Markup {
     let maximum = spectra
         .iter()
         .flat_map(|spectrum| spectrum.before_um.iter().chain(&spectrum.after_um))
         .copied()
         .fold(0.0, f64::max);
-    let (affected, unaffected): (Vec<usize>, Vec<usize>) = session
-        .tests()
-        .map(|(number, _)| number)
-        .partition(|number| session.is_affected(*number));
+    let (affected, unaffected): (Vec<usize>, Vec<usize>) =
+        session.tests().map(|(number, _)| number).partition(|number| session.is_affected(*number));
     let is_polar = session.is_polar() && session.tests().any(|(_, test)| test.way.is_angle);
     let mut of_tests = |numbers: &[usize]| {
         if is_polar {
-            let blocks: Vec<Markup> = numbers
-                .iter()
-                .map(|number| block(document, session, *number, spectra, maximum, models))
-                .collect();
+            let blocks: Vec<Markup> =
+                numbers.iter().map(|number| block(document, session, *number, spectra, maximum, models)).collect();
             html! { @for block in &blocks { (block) } }
         } else {
-            let plots = numbers
-                .iter()
-                .flat_map(|number| straight(session, *number, spectra, maximum));
+            let plots = numbers.iter().flat_map(|number| straight(session, *number, spectra, maximum));
             document.show(plots.collect::<Vec<_>>())
         }
     };
@@ -62,15 +51,8 @@ pub fn section(
 
 /// Heading of the folded tests: their number and names.
 pub fn unaffected_heading(session: &SessionPlots<'_>, numbers: &[usize]) -> String {
-    let names: Vec<&str> = numbers
-        .iter()
-        .map(|number| session.series.tests[*number].name.as_str())
-        .collect();
-    format!(
-        "{} without a change of the residual: {}",
-        counted(names.len(), "test"),
-        names.join(", ")
-    )
+    let names: Vec<&str> = numbers.iter().map(|number| session.series.tests[*number].name.as_str()).collect();
+    format!("{} without a change of the residual: {}", counted(names.len(), "test"), names.join(", "))
 }
 
 /// Plots of one test: polar plots on the left, plots with straight axes on the right.
@@ -130,10 +112,7 @@ fn test_table(session: &SessionPlots<'_>, models: [&str; 2]) -> Markup {
     }
     let table = table(&header, &rows);
     if rows.len() > MAX_ROWS {
-        folded(
-            &format!("RMS residual of {}", counted(rows.len(), "test")),
-            &table,
-        )
+        folded(&format!("RMS residual of {}", counted(rows.len(), "test")), &table)
     } else {
         table
     }

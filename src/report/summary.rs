@@ -38,19 +38,14 @@ impl Quality<'_> {
     }
 
     fn ratio(&self) -> String {
-        self.reduced_chi_square()
-            .map_or("–".to_string(), |ratio| format!("{ratio:.2}"))
+        self.reduced_chi_square().map_or("–".to_string(), |ratio| format!("{ratio:.2}"))
     }
 }
 
 /// χ²/ν of a model, compared with that of a first model if there is one.
 pub fn chi_square(model: &Quality<'_>, before: Option<&Quality<'_>>) -> KeyFigure {
     if !model.is_testable() {
-        return KeyFigure::new(
-            "χ²/ν",
-            "not testable",
-            "The noise is estimated from the residual itself.",
-        );
+        return KeyFigure::new("χ²/ν", "not testable", "The noise is estimated from the residual itself.");
     }
     let freedom = format!(
         "χ²\u{a0}=\u{a0}{}, ν\u{a0}=\u{a0}{}; expected:\u{a0}1",
@@ -86,10 +81,9 @@ pub fn held_out(model: &Quality<'_>, before: Option<&Quality<'_>>) -> KeyFigure 
 pub fn rank(rank: usize, parameters: usize) -> KeyFigure {
     let note = match parameters.saturating_sub(rank) {
         0 => "all parameters identifiable".to_string(),
-        deficit => format!(
-            "rank deficiency {deficit}: {} of parameters not identifiable",
-            counted(deficit, "combination")
-        ),
+        deficit => {
+            format!("rank deficiency {deficit}: {} of parameters not identifiable", counted(deficit, "combination"))
+        }
     };
     KeyFigure::new("Rank", format!("{rank} of {parameters}"), note)
 }

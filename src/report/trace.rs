@@ -38,16 +38,12 @@ fn verdict(result: &TraceResult) -> String {
     };
     let sentence = match result.verdict.as_str() {
         "clean" => "The residual of the declared model agrees with noise.".to_string(),
-        "incomplete" => format!(
-            "The search was {}. Effects may be missing.",
-            result.interruption()
-        ),
+        "incomplete" => format!("The search was {}. Effects may be missing.", result.interruption()),
         "explained" => format!("{subject} the residual of the declared model."),
         "partly-explained" => {
             format!("{subject} a part of the residual of the declared model. Structure remains.")
         }
-        _ => "The residual of the declared model has structure that no effect of the library explains."
-            .to_string(),
+        _ => "The residual of the declared model has structure that no effect of the library explains.".to_string(),
     };
     match uniqueness::headline(result) {
         Some(headline) => format!("{sentence} {}.", capitalised(&headline)),
@@ -86,11 +82,7 @@ pub fn document(trace: &TraceOutcome<'_>) -> Result<Document, IdentifyError> {
         &mut document,
         &session,
         &spectra,
-        if result.effects.is_empty() {
-            ["declared model"; 2]
-        } else {
-            ["declared model", "with the found effects"]
-        },
+        if result.effects.is_empty() { ["declared model"; 2] } else { ["declared model", "with the found effects"] },
     );
     document.section(
         "Residuals",
@@ -101,10 +93,7 @@ pub fn document(trace: &TraceOutcome<'_>) -> Result<Document, IdentifyError> {
     );
     let section = effects::section(&mut document, trace);
     document.section("Effects and competing explanations", section);
-    document.section(
-        "Next test",
-        next(result, candidate_tests::has_candidates(problem)),
-    );
+    document.section("Next test", next(result, candidate_tests::has_candidates(problem)));
     let section = readings::traces(&mut document, &session);
     document.section("Traces", section);
     let section = readings::correlations(&mut document, problem, &trace.after_fit);
@@ -148,37 +137,23 @@ fn figures(trace: &TraceOutcome<'_>) -> Vec<KeyFigure> {
         [one] if one.unique => figures.push(KeyFigure::new(
             "Uniqueness",
             "unique",
-            format!(
-                "among {} detectable candidates",
-                integer(result.candidates_detectable)
-            ),
+            format!("among {} detectable candidates", integer(result.candidates_detectable)),
         )),
         [one] => figures.push(KeyFigure::new(
             "Uniqueness",
             format!("1 of {}", one.explanation_count),
             "indistinguishable explanations",
         )),
-        many => figures.push(KeyFigure::new(
-            "Uniqueness",
-            format!("{unique} of {}", many.len()),
-            "effects are unique",
-        )),
+        many => figures.push(KeyFigure::new("Uniqueness", format!("{unique} of {}", many.len()), "effects are unique")),
     }
-    let (structure, relation) = if result.remainder.structured {
-        ("significant", "≤")
-    } else {
-        ("not significant", "=")
-    };
+    let (structure, relation) =
+        if result.remainder.structured { ("significant", "≤") } else { ("not significant", "=") };
     figures.push(KeyFigure::new(
         "Remaining structure",
         structure,
         format!("p {relation} {:.3}", result.remainder.p_value),
     ));
-    figures.push(summary::readings(
-        &trace.after,
-        result.readings,
-        result.outliers.len(),
-    ));
+    figures.push(summary::readings(&trace.after, result.readings, result.outliers.len()));
     figures
 }
 
@@ -186,11 +161,7 @@ fn figures(trace: &TraceOutcome<'_>) -> Vec<KeyFigure> {
 fn changes(problem: &Problem<'_>, result: &TraceResult) -> Markup {
     let sentence = |parameter: &ChangedParameter| {
         let (change, u) = value_and_u(parameter.change, parameter.u);
-        format!(
-            "{} changed by {change} {} (u = {u}).",
-            parameter.id,
-            unit(&parameter.unit)
-        )
+        format!("{} changed by {change} {} (u = {u}).", parameter.id, unit(&parameter.unit))
     };
     let (setup, values): (Vec<_>, Vec<_>) =
         (result.changed_parameters.iter()).partition(|parameter| values::is_setup(problem, &parameter.id));

@@ -40,8 +40,7 @@ pub fn section(
 /// Whether a parameter belongs to the set-up.
 pub fn is_setup(problem: &Problem<'_>, id: &str) -> bool {
     let list = &problem.parameters.list;
-    list.iter()
-        .any(|parameter| parameter.role == Role::Setup && parameter.id == id)
+    list.iter().any(|parameter| parameter.role == Role::Setup && parameter.id == id)
 }
 
 /// Finds the value of the same parameter in another model.
@@ -74,15 +73,8 @@ fn value_table(values: &[&ParameterResult], before: Option<&[ParameterResult]>) 
             row
         })
         .collect();
-    let mut header = vec![
-        "parameter",
-        "value",
-        "u (k\u{a0}=\u{a0}1)",
-        "U\u{a0}=\u{a0}2u",
-        "unit",
-        "significant",
-        "meaning",
-    ];
+    let mut header =
+        vec!["parameter", "value", "u (k\u{a0}=\u{a0}1)", "U\u{a0}=\u{a0}2u", "unit", "significant", "meaning"];
     if before.is_some() {
         header.push("before, ± u");
     }
@@ -97,10 +89,7 @@ fn plots(
     name: &str,
     title: &str,
 ) -> Markup {
-    let bar = |parameter: &ParameterResult| Value {
-        value: parameter.value,
-        u: parameter.u,
-    };
+    let bar = |parameter: &ParameterResult| Value { value: parameter.value, u: parameter.u };
     let mut plots: Vec<Plot> = Vec::new();
     for unit_name in units(values.iter().map(|value| value.unit.as_str())) {
         let rows: Vec<Row> = values
@@ -114,11 +103,7 @@ fn plots(
             .collect();
         let parts = rows.len().div_ceil(MAX_ROWS);
         for (number, rows) in rows.chunks(MAX_ROWS).enumerate() {
-            let part = if parts > 1 {
-                format!(" ({} of {parts})", number + 1)
-            } else {
-                String::new()
-            };
+            let part = if parts > 1 { format!(" ({} of {parts})", number + 1) } else { String::new() };
             plots.push(bars::values(
                 format!("{name}-{}-{}", unit_name.replace('/', "-per-"), number + 1),
                 format!("{title} in {}{part}", unit(unit_name)),

@@ -1,4 +1,5 @@
-//! The kinematic chain of any structural code with ISO 841 letters, axes along R through its origin, and the ball-bar reading on it.
+//! The kinematic chain of any structural code with ISO 841 letters, axes along R through its origin, and the ball-bar
+//! reading on it.
 
 use super::pose::{Axis, Joint};
 use nalgebra::Vector3;
@@ -21,7 +22,8 @@ pub struct Chain {
     pub tool_side: Vec<Link>,
 }
 
-/// Errors of machine and set-up: location errors `[EX, EY, EZ, EA, EB, EC]` of each axis in mm and rad, both balls and the bar in mm.
+/// Errors of machine and set-up: location errors `[EX, EY, EZ, EA, EB, EC]` of each axis in mm and rad, both balls and
+/// the bar in mm.
 #[derive(Clone, Debug, Default)]
 pub struct ChainErrors {
     /// By letter; axes that are not listed have no error.
@@ -50,14 +52,7 @@ impl Chain {
                 'C' => (Joint::Rotary, Vector3::z()),
                 other => panic!("no axis `{other}`"),
             };
-            Link {
-                letter: *letter,
-                axis: Axis {
-                    joint,
-                    direction,
-                    origin_mm: Vector3::zeros(),
-                },
-            }
+            Link { letter: *letter, axis: Axis { joint, direction, origin_mm: Vector3::zeros() } }
         };
         Chain {
             workpiece_side: inner[..bed].iter().rev().map(link).collect(),
@@ -78,9 +73,7 @@ impl Chain {
             side.iter().rev().fold(ball, |point, link| {
                 let location = out.location.iter().find(|(letter, _)| *letter == link.letter);
                 let location = location.map_or([0.0; 6], |(_, errors)| *errors);
-                link.axis
-                    .motion(position(link.letter), &location, &[0.0; 6])
-                    .apply(point)
+                link.axis.motion(position(link.letter), &location, &[0.0; 6]).apply(point)
             })
         };
         let workpiece = carried(&self.workpiece_side, workpiece_ball_mm, out.workpiece_ball);

@@ -13,20 +13,15 @@ use std::path::PathBuf;
 
 /// The folder of the samples: beside the folder that `ABBE_DATA` names, otherwise beside the workspace.
 fn samples() -> PathBuf {
-    let data = std::env::var_os("ABBE_DATA").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
-        PathBuf::from,
-    );
+    let data = std::env::var_os("ABBE_DATA")
+        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
     data.join("../sample")
 }
 
 /// Whether the samples exist. Without them a test prints that it is skipped; in CI it fails.
 fn samples_exist(test: &str) -> bool {
     let found = samples().is_dir();
-    assert!(
-        found || std::env::var("CI").as_deref() != Ok("true"),
-        "{test}: no samples, and CI needs them"
-    );
+    assert!(found || std::env::var("CI").as_deref() != Ok("true"), "{test}: no samples, and CI needs them");
     if !found {
         println!("skipped: {test} (no data folder)");
     }
@@ -59,15 +54,8 @@ fn readings(name: &str, plan: &Plan) -> Vec<Row> {
             assert_eq!(f64::from(instant.run), fields[1], "{name}: {line}");
             for axis in AxisName::ALL {
                 let position = instant.commanded.position[axis.index()];
-                let shown = if axis.is_rotary() {
-                    position.to_degrees()
-                } else {
-                    position
-                };
-                assert!(
-                    (shown - fields[2 + axis.index()]).abs() < 1e-6,
-                    "{name}: {line}: {shown}"
-                );
+                let shown = if axis.is_rotary() { position.to_degrees() } else { position };
+                assert!((shown - fields[2 + axis.index()]).abs() < 1e-6, "{name}: {line}: {shown}");
             }
             rows.push(Row::taken(rows.len(), fields[7]));
         }
@@ -105,13 +93,11 @@ fn rotary_rms_um(name: &str, effects: &[Injected]) -> f64 {
     (squares.sum::<f64>() / rows.len() as f64).sqrt()
 }
 
-/// 2 µm as in the truth file, which states no phase: 0.4 rad reproduces the readings, and a fit agrees within its uncertainty.
+/// 2 µm as in the truth file, which states no phase: 0.4 rad reproduces the readings, and a fit agrees within its
+/// uncertainty.
 fn axial_third_order() -> Injected {
     let component = Component::Motion(Freedom::Z, AxisName::C);
-    let shape = Shape::Harmonic {
-        order: 3,
-        phase_deg: 0.4_f64.to_degrees(),
-    };
+    let shape = Shape::Harmonic { order: 3, phase_deg: 0.4_f64.to_degrees() };
     Injected::new(component, Driver::Axis(AxisName::C), shape, 2.0)
 }
 
@@ -123,11 +109,7 @@ fn measured(rows: Vec<Row>) -> SimulatedSession {
         noise: Noise::White { sigma_um: 0.3 },
         outlier_rows: Vec::new(),
     };
-    SimulatedSession {
-        files: Vec::new(),
-        rows,
-        truth,
-    }
+    SimulatedSession { files: Vec::new(), rows, truth }
 }
 
 #[test]
@@ -165,11 +147,7 @@ fn a_fit_of_rotary_axial_h3_finds_amplitude_and_phase() {
     let fit = oracle.fit(&draw, &[axial_third_order()]);
     let (cosine, u_cosine) = fit.get("effect 0").unwrap();
     let (sine, u_sine) = fit.get("effect 1").unwrap();
-    println!(
-        "rotary-axial-h3: {:.3} um at {:.2} deg",
-        cosine.hypot(sine),
-        (-sine).atan2(cosine).to_degrees()
-    );
+    println!("rotary-axial-h3: {:.3} um at {:.2} deg", cosine.hypot(sine), (-sine).atan2(cosine).to_degrees());
     assert!((cosine - 2.0 * 0.4_f64.cos()).abs() < 3.0 * u_cosine);
     assert!((sine + 2.0 * 0.4_f64.sin()).abs() < 3.0 * u_sine);
 }
@@ -183,19 +161,12 @@ fn circle_backlash_y_is_reproduced_to_its_noise_with_its_lost_motion() {
     let rows = readings("circle-backlash-y", &plan);
     let draw = measured(rows);
     let oracle = Oracle::on(plan, Noise::White { sigma_um: 0.3 });
-    let backlash = Injected::new(
-        Component::Motion(Freedom::Y, AxisName::Y),
-        Driver::Axis(AxisName::Y),
-        Shape::Backlash,
-        1.0,
-    );
+    let backlash =
+        Injected::new(Component::Motion(Freedom::Y, AxisName::Y), Driver::Axis(AxisName::Y), Shape::Backlash, 1.0);
     // The truth file does not state the set-up offsets of the circles: they are fitted together with the amplitude.
     let fit = oracle.fit(&draw, std::slice::from_ref(&backlash));
     let (amplitude, u) = fit.get("effect 0").unwrap();
-    println!(
-        "circle-backlash-y: {:.4} um, lost motion {amplitude:.3} um, u {u:.3}",
-        fit.rms_um
-    );
+    println!("circle-backlash-y: {:.4} um, lost motion {amplitude:.3} um, u {u:.3}", fit.rms_um);
     assert!((0.29..0.32).contains(&fit.rms_um), "{}", fit.rms_um);
     assert!((amplitude - 4.0).abs() < 3.0 * u, "{amplitude} ± {u}");
 }

@@ -47,14 +47,7 @@ pub enum Freedom {
 
 impl Freedom {
     /// All six.
-    pub const ALL: [Freedom; 6] = [
-        Freedom::X,
-        Freedom::Y,
-        Freedom::Z,
-        Freedom::A,
-        Freedom::B,
-        Freedom::C,
-    ];
+    pub const ALL: [Freedom; 6] = [Freedom::X, Freedom::Y, Freedom::Z, Freedom::A, Freedom::B, Freedom::C];
 
     /// 0 to 5.
     pub fn index(self) -> usize {
@@ -115,12 +108,7 @@ impl Component {
 
     /// Reads the name that [`fmt::Display`] writes, and `sensor` for `gain`.
     pub fn parse(text: &str) -> Option<Component> {
-        let cartesian = |letter: &str| {
-            ["x", "y", "z"]
-                .iter()
-                .position(|name| *name == letter)
-                .map(Cartesian)
-        };
+        let cartesian = |letter: &str| ["x", "y", "z"].iter().position(|name| *name == letter).map(Cartesian);
         if let Some(letter) = text.strip_prefix("workpiece_ball.") {
             return cartesian(letter).map(Component::WorkpieceBall);
         }
@@ -134,9 +122,7 @@ impl Component {
             _ => {}
         }
         let rest = text.strip_prefix('E')?;
-        let freedom = Freedom::ALL
-            .into_iter()
-            .find(|freedom| rest.starts_with(&format!("{freedom:?}")))?;
+        let freedom = Freedom::ALL.into_iter().find(|freedom| rest.starts_with(&format!("{freedom:?}")))?;
         let rest = &rest[1..];
         let axis = |name: &str| AxisName::ALL.into_iter().find(|axis| format!("{axis:?}") == name);
         match rest.strip_prefix('0') {

@@ -1,7 +1,7 @@
 //! Injected effects: the error of a component is an amplitude times a shape.
 //!
-//! Signs and units. Amplitudes are in the unit of the component (µm for lengths, arcsec for angles, % for the sensor's gain, ms for
-//! the trigger); of a lag they are in ms.
+//! Signs and units. Amplitudes are in the unit of the component (µm for lengths, arcsec for angles, % for the sensor's
+//! gain, ms for the trigger); of a lag they are in ms.
 //!
 //! | shape | component = amplitude × |
 //! |---|---|
@@ -63,50 +63,20 @@ pub enum Profile {
 #[allow(missing_docs)]
 pub enum Shape {
     Constant,
-    Polynomial {
-        degree: u32,
-    },
-    Harmonic {
-        order: u32,
-        phase_deg: f64,
-    },
-    Periodic {
-        period: f64,
-        phase_deg: f64,
-    },
+    Polynomial { degree: u32 },
+    Harmonic { order: u32, phase_deg: f64 },
+    Periodic { period: f64, phase_deg: f64 },
     Backlash,
     Lag,
-    ReversalSpike {
-        decay: Decay,
-    },
-    Local {
-        centre: f64,
-        width: f64,
-        profile: Profile,
-    },
-    Steps {
-        at: Vec<f64>,
-        heights: Vec<f64>,
-    },
+    ReversalSpike { decay: Decay },
+    Local { centre: f64, width: f64, profile: Profile },
+    Steps { at: Vec<f64>, heights: Vec<f64> },
     Drift,
-    Warmup {
-        tau_s: f64,
-    },
-    Remount {
-        after_test: usize,
-    },
-    Modulated {
-        order: u32,
-        period_s: f64,
-    },
-    Chirp {
-        cycles: f64,
-    },
-    Plateaus {
-        edges: Vec<f64>,
-        levels: Vec<f64>,
-        sharpness: f64,
-    },
+    Warmup { tau_s: f64 },
+    Remount { after_test: usize },
+    Modulated { order: u32, period_s: f64 },
+    Chirp { cycles: f64 },
+    Plateaus { edges: Vec<f64>, levels: Vec<f64>, sharpness: f64 },
 }
 
 /// One effect that is injected into the plant.
@@ -125,29 +95,17 @@ pub struct Injected {
 impl Injected {
     /// An effect from component, driver, shape and amplitude.
     pub fn new(component: Component, driver: Driver, shape: Shape, amplitude: f64) -> Injected {
-        Injected {
-            component,
-            driver,
-            shape,
-            amplitude,
-        }
+        Injected { component, driver, shape, amplitude }
     }
 
     /// The unit of the amplitude: `um`, `arcsec`, `percent` or `ms`.
     pub fn unit(&self) -> &'static str {
-        if self.shape == Shape::Lag {
-            "ms"
-        } else {
-            self.component.unit()
-        }
+        if self.shape == Shape::Lag { "ms" } else { self.component.unit() }
     }
 
     /// The same effect with another amplitude, in [`Injected::unit`].
     pub fn with_amplitude(&self, amplitude: f64) -> Injected {
-        Injected {
-            amplitude,
-            ..self.clone()
-        }
+        Injected { amplitude, ..self.clone() }
     }
 
     /// The error of the component at an instant: mm, rad, s or a ratio.
@@ -155,8 +113,8 @@ impl Injected {
         self.amplitude * unit_size(self.unit()) * self.basis(instant)
     }
 
-    /// Displaces the bodies. A lag along the motion of an axis changes the true axis position; every other effect displaces
-    /// its component.
+    /// Displaces the bodies. A lag along the motion of an axis changes the true axis position; every other effect
+    /// displaces its component.
     pub fn displace(&self, instant: &Instant, displacement: &mut Displacement) {
         let value = self.value(instant);
         match (&self.shape, self.component) {
@@ -190,38 +148,24 @@ impl Injected {
                 };
                 -of_axis(driver, &instant.direction) * (-spent).exp()
             }
-            Shape::Local {
-                centre,
-                width,
-                profile,
-            } => local_feature(
-                distance(driver, shown(driver, instant), *centre) / width,
-                *profile,
-            ),
+            Shape::Local { centre, width, profile } => {
+                local_feature(distance(driver, shown(driver, instant), *centre) / width, *profile)
+            }
             Shape::Steps { at, heights } => {
                 let here = shown(driver, instant);
-                at.iter()
-                    .zip(heights)
-                    .filter(|(at, _)| here >= **at)
-                    .map(|(_, height)| height)
-                    .sum()
+                at.iter().zip(heights).filter(|(at, _)| here >= **at).map(|(_, height)| height).sum()
             }
             Shape::Drift => instant.share_of_session,
             Shape::Warmup { tau_s } => 1.0 - (-instant.time_s / tau_s).exp(),
             Shape::Remount { after_test } => f64::from(instant.test > *after_test),
             Shape::Modulated { order, period_s } => {
-                (f64::from(*order) * position(driver, instant)).sin()
-                    * (2.0 * PI * instant.time_s / period_s).sin()
+                (f64::from(*order) * position(driver, instant)).sin() * (2.0 * PI * instant.time_s / period_s).sin()
             }
             Shape::Chirp { cycles } => {
                 let turns = normalised(driver, instant) * 0.5;
                 (2.0 * PI * cycles * turns * turns).sin()
             }
-            Shape::Plateaus {
-                edges,
-                levels,
-                sharpness,
-            } => {
+            Shape::Plateaus { edges, levels, sharpness } => {
                 let here = shown(driver, instant);
                 // The levels differ between tests, so no single function of the position explains them.
                 let level = |k: usize| levels[(k + 3 * instant.test) % levels.len()];
@@ -242,11 +186,7 @@ impl Injected {
                 Shape::Periodic { period, .. } => Shape::Periodic { period, phase_deg },
                 _ => self.shape.clone(),
             };
-            Injected {
-                shape,
-                amplitude: 1.0,
-                ..self.clone()
-            }
+            Injected { shape, amplitude: 1.0, ..self.clone() }
         };
         match self.shape {
             Shape::Harmonic { .. } | Shape::Periodic { .. } => vec![at_phase(0.0), at_phase(-90.0)],

@@ -48,18 +48,7 @@ impl Family {
     /// The families that can affect a kind of session. The oracle decides whether a member is detectable.
     pub fn of(kind: Kind) -> Vec<Family> {
         use Family::*;
-        let always = [
-            Polynomial,
-            Periodic,
-            Backlash,
-            ReversalSpike,
-            Local,
-            Steps,
-            Drift,
-            Warmup,
-            Temperature,
-            Remount,
-        ];
+        let always = [Polynomial, Periodic, Backlash, ReversalSpike, Local, Steps, Drift, Warmup, Temperature, Remount];
         let special: &[Family] = match kind {
             Kind::Rotary => &[Harmonic, Gravity, CrossAxis],
             Kind::TiltedTable => &[Harmonic, Gravity, CrossAxis],
@@ -95,27 +84,13 @@ pub fn random_member(family: Family, kind: Kind, random: &mut impl Rng) -> Injec
     let effect = |component, driver, shape| Injected::new(component, driver, shape, 1.0);
     match family {
         Family::Harmonic => {
-            let rotary: Vec<AxisName> = kind
-                .moving_axes()
-                .into_iter()
-                .filter(|axis| axis.is_rotary())
-                .collect();
+            let rotary: Vec<AxisName> = kind.moving_axes().into_iter().filter(|axis| axis.is_rotary()).collect();
             let axis = pick(&rotary, random);
             let order = pick(&[1, 2, 3, 4, 5, 6, 7, 8, 17, 36], random);
             let component = Component::Motion(pick(&Freedom::ALL, random), axis);
-            effect(
-                component,
-                Driver::Axis(axis),
-                Shape::Harmonic { order, phase_deg },
-            )
+            effect(component, Driver::Axis(axis), Shape::Harmonic { order, phase_deg })
         }
-        Family::Polynomial => effect(
-            motion,
-            own,
-            Shape::Polynomial {
-                degree: pick(&[1, 2, 3], random),
-            },
-        ),
+        Family::Polynomial => effect(motion, own, Shape::Polynomial { degree: pick(&[1, 2, 3], random) }),
         Family::Periodic => {
             let period = period(kind, axis) * (1.0 + random.random::<f64>());
             effect(motion, own, Shape::Periodic { period, phase_deg })
@@ -135,55 +110,25 @@ pub fn random_member(family: Family, kind: Kind, random: &mut impl Rng) -> Injec
             let centre = low + (high - low) * (0.15 + 0.7 * random.random::<f64>());
             let width = (high - low) * (0.03 + 0.05 * random.random::<f64>());
             let profile = pick(&[Profile::Gaussian, Profile::RaisedCosine], random);
-            effect(
-                motion,
-                own,
-                Shape::Local {
-                    centre,
-                    width,
-                    profile,
-                },
-            )
+            effect(motion, own, Shape::Local { centre, width, profile })
         }
         Family::Steps => {
             let [low, high] = range(kind, axis);
             let count = pick(&[3, 4, 5], random);
             let at = (0..count)
-                .map(|k| {
-                    low + (high - low) * (f64::from(k) + 0.2 + 0.6 * random.random::<f64>())
-                        / f64::from(count)
-                })
+                .map(|k| low + (high - low) * (f64::from(k) + 0.2 + 0.6 * random.random::<f64>()) / f64::from(count))
                 .collect();
-            let heights = (0..count)
-                .map(|_| pick(&[-1.0, 1.0], random) * (0.5 + random.random::<f64>()))
-                .collect();
+            let heights = (0..count).map(|_| pick(&[-1.0, 1.0], random) * (0.5 + random.random::<f64>())).collect();
             effect(motion, own, Shape::Steps { at, heights })
         }
         Family::Drift => effect(thermal, Driver::Time, Shape::Drift),
         Family::Warmup => {
-            let tau_s = if kind.moving_axes()[0].is_rotary() {
-                300.0
-            } else {
-                60.0
-            };
-            effect(
-                thermal,
-                Driver::Time,
-                Shape::Warmup {
-                    tau_s: tau_s * (0.5 + random.random::<f64>()),
-                },
-            )
+            let tau_s = if kind.moving_axes()[0].is_rotary() { 300.0 } else { 60.0 };
+            effect(thermal, Driver::Time, Shape::Warmup { tau_s: tau_s * (0.5 + random.random::<f64>()) })
         }
-        Family::Temperature => effect(
-            Component::Bar,
-            Driver::Temperature,
-            Shape::Polynomial { degree: 1 },
-        ),
+        Family::Temperature => effect(Component::Bar, Driver::Temperature, Shape::Polynomial { degree: 1 }),
         Family::Gravity => {
-            let freedom = pick(
-                &[Freedom::Y, Freedom::Z, Freedom::A, Freedom::B, Freedom::C],
-                random,
-            );
+            let freedom = pick(&[Freedom::Y, Freedom::Z, Freedom::A, Freedom::B, Freedom::C], random);
             let component = Component::Motion(freedom, AxisName::A);
             effect(component, Driver::Gravity, Shape::Polynomial { degree: 1 })
         }
@@ -191,33 +136,19 @@ pub fn random_member(family: Family, kind: Kind, random: &mut impl Rng) -> Injec
             let freedom = pick(&[Freedom::X, Freedom::Y, Freedom::A, Freedom::B], random);
             let component = Component::Location(freedom, AxisName::C);
             let shape = if random.random() {
-                Shape::Polynomial {
-                    degree: pick(&[1, 2], random),
-                }
+                Shape::Polynomial { degree: pick(&[1, 2], random) }
             } else {
-                Shape::Harmonic {
-                    order: pick(&[1, 2], random),
-                    phase_deg,
-                }
+                Shape::Harmonic { order: pick(&[1, 2], random), phase_deg }
             };
             effect(component, Driver::Axis(AxisName::A), shape)
         }
-        Family::Squareness => effect(
-            Component::Location(Freedom::C, AxisName::Y),
-            Driver::Nothing,
-            Shape::Constant,
-        ),
+        Family::Squareness => effect(Component::Location(Freedom::C, AxisName::Y), Driver::Nothing, Shape::Constant),
         Family::Remount => {
             let tests = kind.tests(10.0);
-            let shared: Vec<usize> = (0..tests.len() - 1)
-                .filter(|k| tests[*k].setup == tests[k + 1].setup)
-                .collect();
+            let shared: Vec<usize> = (0..tests.len() - 1).filter(|k| tests[*k].setup == tests[k + 1].setup).collect();
             let after_test = pick(&shared, random);
             let letter = Cartesian(pick(&[0, 1, 2], random));
-            let component = pick(
-                &[Component::WorkpieceBall(letter), Component::SpindleBall(letter)],
-                random,
-            );
+            let component = pick(&[Component::WorkpieceBall(letter), Component::SpindleBall(letter)], random);
             effect(component, Driver::Time, Shape::Remount { after_test })
         }
         Family::SensorGain => effect(Component::Sensor, Driver::Nothing, Shape::Constant),
@@ -225,29 +156,20 @@ pub fn random_member(family: Family, kind: Kind, random: &mut impl Rng) -> Injec
     }
 }
 
-/// An effect that no entry of the library describes, at unit amplitude: a harmonic whose amplitude varies with time, a chirp
-/// along a turn (which only a nonparametric curve describes), or plateaus whose levels differ between tests.
+/// An effect that no entry of the library describes, at unit amplitude: a harmonic whose amplitude varies with time, a
+/// chirp along a turn (which only a nonparametric curve describes), or plateaus whose levels differ between tests.
 pub fn outside_library(kind: Kind, random: &mut impl Rng) -> Injected {
     let axis = *kind.moving_axes().last().unwrap_or(&AxisName::C);
-    let freedom = if axis.is_rotary() {
-        Freedom::X
-    } else {
-        axis.own_freedom()
-    };
+    let freedom = if axis.is_rotary() { Freedom::X } else { axis.own_freedom() };
     let component = Component::Motion(freedom, axis);
     let [low, high] = range(kind, axis);
     let shape = match random.random_range(0..3) {
-        0 if axis.is_rotary() => Shape::Modulated {
-            order: random.random_range(4..8),
-            period_s: 150.0 + 150.0 * random.random::<f64>(),
-        },
-        1 if axis.is_rotary() => Shape::Chirp {
-            cycles: 8.3 + 5.0 * random.random::<f64>(),
-        },
+        0 if axis.is_rotary() => {
+            Shape::Modulated { order: random.random_range(4..8), period_s: 150.0 + 150.0 * random.random::<f64>() }
+        }
+        1 if axis.is_rotary() => Shape::Chirp { cycles: 8.3 + 5.0 * random.random::<f64>() },
         _ => Shape::Plateaus {
-            edges: (1..8)
-                .map(|k| low + (high - low) * (f64::from(k) + 0.4 * random.random::<f64>()) / 8.4)
-                .collect(),
+            edges: (1..8).map(|k| low + (high - low) * (f64::from(k) + 0.4 * random.random::<f64>()) / 8.4).collect(),
             levels: (0..8).map(|_| 2.0 * random.random::<f64>() - 1.0).collect(),
             sharpness: 25.0 / (high - low),
         },
@@ -255,9 +177,10 @@ pub fn outside_library(kind: Kind, random: &mut impl Rng) -> Injected {
     Injected::new(component, Driver::Axis(axis), shape, 1.0)
 }
 
-/// All effects of the plant that can be confounded with `like` in a kind of session, at unit amplitude: all components of all
-/// moving axes with harmonics, polynomials, backlash and lag; location errors, balls and bar that drift, warm up or are remounted;
-/// constants; and, if the shape of `like` has positions or periods, that shape in every other component.
+/// All effects of the plant that can be confounded with `like` in a kind of session, at unit amplitude: all components
+/// of all moving axes with harmonics, polynomials, backlash and lag; location errors, balls and bar that drift, warm up
+/// or are remounted; constants; and, if the shape of `like` has positions or periods, that shape in every other
+/// component.
 pub fn catalogue(kind: Kind, like: &Injected) -> Vec<Injected> {
     let mut entries = Vec::new();
     let mut shapes = vec![Shape::Backlash, Shape::Lag];
@@ -276,19 +199,10 @@ pub fn catalogue(kind: Kind, like: &Injected) -> Vec<Injected> {
     };
     for axis in kind.moving_axes() {
         for component in Freedom::ALL.map(|freedom| Component::Motion(freedom, axis)) {
-            shapes
-                .iter()
-                .for_each(|shape| add(component, Driver::Axis(axis), shape));
+            shapes.iter().for_each(|shape| add(component, Driver::Axis(axis), shape));
             if axis.is_rotary() {
                 for order in &orders {
-                    add(
-                        component,
-                        Driver::Axis(axis),
-                        &Shape::Harmonic {
-                            order: *order,
-                            phase_deg: 0.0,
-                        },
-                    );
+                    add(component, Driver::Axis(axis), &Shape::Harmonic { order: *order, phase_deg: 0.0 });
                 }
             }
         }
@@ -309,19 +223,8 @@ pub fn catalogue(kind: Kind, like: &Injected) -> Vec<Injected> {
     }
     for component in Freedom::ALL.map(|freedom| Component::Location(freedom, AxisName::C)) {
         for degree in 1..=2 {
-            add(
-                component,
-                Driver::Axis(AxisName::A),
-                &Shape::Polynomial { degree },
-            );
-            add(
-                component,
-                Driver::Axis(AxisName::A),
-                &Shape::Harmonic {
-                    order: degree,
-                    phase_deg: 0.0,
-                },
-            );
+            add(component, Driver::Axis(AxisName::A), &Shape::Polynomial { degree });
+            add(component, Driver::Axis(AxisName::A), &Shape::Harmonic { order: degree, phase_deg: 0.0 });
         }
     }
     for component in [Component::Sensor, Component::Trigger] {

@@ -14,16 +14,11 @@ const STATED_NOISE_UM: f64 = 0.3;
 
 /// `session.toml`, `machine.toml` and one data file per test.
 pub fn session_files(plan: &Plan, rows: &[Row], temperature_column: bool) -> Vec<(String, String)> {
-    let mut files = vec![
-        ("session.toml".to_string(), session_toml(plan)),
-        ("machine.toml".to_string(), machine_toml(plan.kind)),
-    ];
+    let mut files =
+        vec![("session.toml".to_string(), session_toml(plan)), ("machine.toml".to_string(), machine_toml(plan.kind))];
     for (index, test) in plan.tests.iter().enumerate() {
         let rows = rows.iter().filter(|row| plan.instants[row.instant].test == index);
-        files.push((
-            format!("{}.csv", test.name),
-            data_csv(plan, rows, temperature_column),
-        ));
+        files.push((format!("{}.csv", test.name), data_csv(plan, rows, temperature_column)));
     }
     files
 }
@@ -36,11 +31,7 @@ fn data_csv<'a>(plan: &Plan, rows: impl Iterator<Item = &'a Row>, temperature_co
         let _ = write!(text, "{:.3},{}", instant.time_s, instant.run);
         for axis in AxisName::ALL {
             let position = instant.commanded.position[axis.index()];
-            let shown = if axis.is_rotary() {
-                position.to_degrees()
-            } else {
-                position
-            };
+            let shown = if axis.is_rotary() { position.to_degrees() } else { position };
             let _ = write!(text, ",{shown:.6}");
         }
         if temperature_column {
@@ -74,11 +65,7 @@ fn session_toml(plan: &Plan) -> String {
             setup = test.setup,
         );
         if plan.shared_mounts {
-            let _ = write!(
-                text,
-                "spindle_setup = \"S1\"\nbar_setup = \"{}\"\n",
-                bar_setup(test)
-            );
+            let _ = write!(text, "spindle_setup = \"S1\"\nbar_setup = \"{}\"\n", bar_setup(test));
         }
         let _ = write!(
             text,
@@ -101,17 +88,16 @@ fn machine_toml(kind: Kind) -> String {
     )
 }
 
-/// The true values: PIGEs as `[value, unit]`, set-up offsets in µm by the names of results, effects with amplitude and unit, noise.
+/// The true values: PIGEs as `[value, unit]`, set-up offsets in µm by the names of results, effects with amplitude and
+/// unit, noise.
 pub fn truth_json(truth: &Truth) -> Value {
     let noise = match truth.noise {
         Noise::White { .. } => json!({ "kind": "white" }),
         Noise::Serial { coefficient, .. } => json!({ "kind": "serial", "coefficient": coefficient }),
         Noise::Outliers { share, .. } => json!({ "kind": "outliers", "share": share }),
     };
-    let piges: serde_json::Map<String, Value> = truth
-        .piges()
-        .map(|(id, value, unit)| (id.to_string(), json!([value, unit])))
-        .collect();
+    let piges: serde_json::Map<String, Value> =
+        truth.piges().map(|(id, value, unit)| (id.to_string(), json!([value, unit]))).collect();
     let setup: serde_json::Map<String, Value> = truth
         .unknowns
         .iter()

@@ -37,19 +37,15 @@ impl Oracle {
         self.fit_rows(&rows, effects)
     }
 
-    /// Root mean square of the held-out residual, µm. Each fold holds out the traversals of one number in every test and fits all
-    /// others. Outliers are excluded.
+    /// Root mean square of the held-out residual, µm. Each fold holds out the traversals of one number in every test
+    /// and fits all others. Outliers are excluded.
     pub fn heldout_rms_um(&self, draw: &SimulatedSession, effects: &[Injected]) -> f64 {
         let run_of = |row: &Row| self.plan.instants[row.instant].run;
         let runs = draw.rows.iter().map(run_of).max().unwrap_or(0);
         let (mut sum, mut count) = (0.0, 0_u32);
         for run in 1..=runs {
-            let (left_out, fitted): (Vec<Row>, Vec<Row>) = draw
-                .rows
-                .iter()
-                .copied()
-                .filter(|row| !row.outlier)
-                .partition(|row| run_of(row) == run);
+            let (left_out, fitted): (Vec<Row>, Vec<Row>) =
+                draw.rows.iter().copied().filter(|row| !row.outlier).partition(|row| run_of(row) == run);
             let fit = self.fit_rows(&fitted, effects);
             let residuals = self.residuals_um(&left_out, &fit.values, effects);
             sum += residuals.norm_squared();
@@ -80,10 +76,7 @@ impl Oracle {
         let places: Vec<usize> = rows.iter().map(|row| row.instant).collect();
         let bases: Vec<Injected> = effects.iter().flat_map(Injected::basis_effects).collect();
         let unknowns = self.plan.unknowns.len();
-        let mut columns = self
-            .base
-            .select_rows(&places)
-            .insert_columns(unknowns, bases.len(), 0.0);
+        let mut columns = self.base.select_rows(&places).insert_columns(unknowns, bases.len(), 0.0);
         for (k, basis) in bases.iter().enumerate() {
             let column = self.column(basis).select_rows(&places);
             columns.set_column(unknowns + k, &column);
@@ -108,39 +101,25 @@ impl Oracle {
         let residual = self.residuals_um(rows, values.as_slice(), effects);
         let names = self.plan.unknowns.iter().map(|unknown| unknown.id.clone());
         Fit {
-            ids: names
-                .chain((0..bases.len()).map(|k| format!("effect {k}")))
-                .collect(),
+            ids: names.chain((0..bases.len()).map(|k| format!("effect {k}"))).collect(),
             values: values.as_slice().to_vec(),
-            u: inverse
-                .diagonal()
-                .iter()
-                .map(|variance| variance.sqrt())
-                .collect(),
+            u: inverse.diagonal().iter().map(|variance| variance.sqrt()).collect(),
             rms_um: (residual.norm_squared() / rows.len() as f64).sqrt(),
         }
     }
 }
 
-/// The inverse of a symmetric matrix whose rows and columns are first scaled to a unit diagonal. A zero column, which no reading
-/// responds to, has variance zero.
+/// The inverse of a symmetric matrix whose rows and columns are first scaled to a unit diagonal. A zero column, which
+/// no reading responds to, has variance zero.
 fn inverse_scaled(mut normal: DMatrix<f64>) -> DMatrix<f64> {
     let size = normal.nrows();
-    let scales = DVector::from_fn(size, |k, _| {
-        if normal[(k, k)] > 0.0 {
-            1.0 / normal[(k, k)].sqrt()
-        } else {
-            0.0
-        }
-    });
+    let scales = DVector::from_fn(size, |k, _| if normal[(k, k)] > 0.0 { 1.0 / normal[(k, k)].sqrt() } else { 0.0 });
     for row in 0..size {
         for column in 0..size {
             normal[(row, column)] *= scales[row] * scales[column];
         }
     }
-    let mut inverse = normal
-        .pseudo_inverse(1e-13)
-        .unwrap_or_else(|_| DMatrix::zeros(size, size));
+    let mut inverse = normal.pseudo_inverse(1e-13).unwrap_or_else(|_| DMatrix::zeros(size, size));
     for row in 0..size {
         for column in 0..size {
             inverse[(row, column)] *= scales[row] * scales[column];

@@ -10,8 +10,8 @@ use std::f64::consts::FRAC_PI_2;
 pub enum Kind {
     /// Chapter 5 of the thesis: A100, A150, C100, C150, one workpiece ball.
     Rotary,
-    /// Chapter 4 of the thesis: the ball for the A tests at +Y, remounted at +X for the C tests. (There the first is mounted on
-    /// the A table; here it is mounted on the C table, which is at zero.)
+    /// Chapter 4 of the thesis: the ball for the A tests at +Y, remounted at +X for the C tests. (There the first is
+    /// mounted on the A table; here it is mounted on the C table, which is at zero.)
     Chapter4,
     /// Chapter 6 of the thesis: A tests at X = ±550 mm, C tests at two heights, four mounts.
     Chapter6,
@@ -21,7 +21,8 @@ pub enum Kind {
     LinearCircles,
     /// The same with the squareness EC0Y as a parameter.
     SquarenessCircles,
-    /// The same circles about a centre with a declared offset of (0.5, 0.3) mm: makes sensor gain and delay identifiable.
+    /// The same circles about a centre with a declared offset of (0.5, 0.3) mm: makes sensor gain and delay
+    /// identifiable.
     EccentricCircles,
     /// BK2 of ISO 10791-6: C turns, X and Y follow; radial, tangential, axial, and tangential three times as fast.
     Simultaneous,
@@ -40,10 +41,11 @@ impl Kind {
         Kind::Simultaneous,
     ];
 
-    /// The step for about that many readings in the whole session: degrees of A (C alone has twice that step), or of the path angle
-    /// if linear axes move.
+    /// The step for about that many readings in the whole session: degrees of A (C alone has twice that step), or of
+    /// the path angle if linear axes move.
     pub fn step_deg(self, readings: usize) -> f64 {
-        // Number of quarter turns of a session: 8 traversals of A and 8 of C at twice the step, 16 of C, 8 circles, 16 circles.
+        // Number of quarter turns of a session: 8 traversals of A and 8 of C at twice the step, 16 of C, 8 circles, 16
+        // circles.
         let turns = match self {
             Kind::Rotary | Kind::Chapter4 | Kind::Chapter6 => 6.0,
             Kind::TiltedTable | Kind::LinearCircles => 8.0,
@@ -65,40 +67,19 @@ impl Kind {
                 tilt("A100", 100.0, [0.0, 100.0, 0.0], "P1", 0.0, step_deg),
                 tilt("A150", 150.0, [0.0, 100.0, 0.0], "P1", -offset_mm, step_deg),
                 table("C100", 100.0, [0.0, 100.0, 0.0], "P1", zero, step_deg),
-                table(
-                    "C150",
-                    150.0,
-                    [0.0, 100.0, 0.0],
-                    "P1",
-                    with(zero, AxisName::Z, x(offset_mm)),
-                    step_deg,
-                ),
+                table("C150", 150.0, [0.0, 100.0, 0.0], "P1", with(zero, AxisName::Z, x(offset_mm)), step_deg),
             ],
             Kind::Chapter4 => vec![
                 tilt("A100", 100.0, [0.0, 100.0, 0.0], "P1", 0.0, step_deg),
                 tilt("A150", 150.0, [0.0, 100.0, 0.0], "P1", -offset_mm, step_deg),
                 table("C100", 100.0, [100.0, 0.0, 0.0], "P2", zero, step_deg),
-                table(
-                    "C150",
-                    150.0,
-                    [100.0, 0.0, 0.0],
-                    "P2",
-                    with(zero, AxisName::Z, x(offset_mm)),
-                    step_deg,
-                ),
+                table("C150", 150.0, [100.0, 0.0, 0.0], "P2", with(zero, AxisName::Z, x(offset_mm)), step_deg),
             ],
             Kind::Chapter6 => vec![
                 tilt("A-plus", 100.0, [550.0, 100.0, 0.0], "P1", 550.0, step_deg),
                 tilt("A-minus", 100.0, [-550.0, 100.0, 0.0], "P2", -550.0, step_deg),
                 table("C0", 100.0, [100.0, 0.0, 0.0], "P3", zero, step_deg),
-                table(
-                    "C78",
-                    100.0,
-                    [100.0, 0.0, 78.0],
-                    "P4",
-                    with(zero, AxisName::Z, x(78.0)),
-                    step_deg,
-                ),
+                table("C78", 100.0, [100.0, 0.0, 78.0], "P4", with(zero, AxisName::Z, x(78.0)), step_deg),
             ],
             Kind::TiltedTable => [-20.0_f64, 0.0, 30.0, 60.0]
                 .into_iter()
@@ -106,22 +87,11 @@ impl Kind {
                     let tilted = with(zero, AxisName::A, Motion::Stands(tilt_deg.to_radians()));
                     let at = with(tilted, AxisName::Z, x(offset_mm * tilt_deg.to_radians().cos()));
                     let at = with(at, AxisName::Y, x(-offset_mm * tilt_deg.to_radians().sin()));
-                    table(
-                        &format!("C-at-A{tilt_deg}"),
-                        150.0,
-                        [0.0, 100.0, 0.0],
-                        "P1",
-                        at,
-                        step_deg,
-                    )
+                    table(&format!("C-at-A{tilt_deg}"), 150.0, [0.0, 100.0, 0.0], "P1", at, step_deg)
                 })
                 .collect(),
             Kind::LinearCircles | Kind::SquarenessCircles | Kind::EccentricCircles => {
-                let centre = if self == Kind::EccentricCircles {
-                    [0.5, 0.3, 0.0]
-                } else {
-                    [0.0; 3]
-                };
+                let centre = if self == Kind::EccentricCircles { [0.5, 0.3, 0.0] } else { [0.0; 3] };
                 [1000.0, 3000.0]
                     .into_iter()
                     .map(|feed_mm_min| Test {
@@ -141,11 +111,7 @@ impl Kind {
                     name: name.to_string(),
                     stated: stated([100.0, 0.0, 0.0], 100.0),
                     setup: "P1".to_string(),
-                    motions: with(
-                        with(circle(radius_mm, phase_rad), AxisName::C, Motion::Turns),
-                        AxisName::Z,
-                        x(z_mm),
-                    ),
+                    motions: with(with(circle(radius_mm, phase_rad), AxisName::C, Motion::Turns), AxisName::Z, x(z_mm)),
                     range_deg: [0.0, 360.0],
                     step_deg,
                     speed_deg_s,
@@ -211,19 +177,11 @@ fn default_unknowns() -> Vec<Component> {
 }
 
 fn stated(workpiece_ball_mm: [f64; 3], bar_mm: f64) -> Stated {
-    Stated {
-        workpiece_ball_mm,
-        spindle_ball_mm: [0.0; 3],
-        bar_mm,
-    }
+    Stated { workpiece_ball_mm, spindle_ball_mm: [0.0; 3], bar_mm }
 }
 
 fn circle(radius_mm: f64, phase_rad: f64) -> [Motion; 5] {
-    let circles = |phase_rad| Motion::Circles {
-        centre_mm: 0.0,
-        radius_mm,
-        phase_rad,
-    };
+    let circles = |phase_rad| Motion::Circles { centre_mm: 0.0, radius_mm, phase_rad };
     let motions = with(all_stand(), AxisName::X, circles(phase_rad));
     with(motions, AxisName::Y, circles(phase_rad - FRAC_PI_2))
 }

@@ -72,11 +72,7 @@ pub struct Machine {
 impl Default for Machine {
     /// The Hermle C600U of the samples: every axis along a direction of R through its origin.
     fn default() -> Machine {
-        let axis = |joint, direction| Axis {
-            joint,
-            direction,
-            origin_mm: Vector3::zeros(),
-        };
+        let axis = |joint, direction| Axis { joint, direction, origin_mm: Vector3::zeros() };
         Machine {
             axes: [
                 axis(Joint::Linear, Vector3::x()),
@@ -100,9 +96,7 @@ impl Machine {
     ) -> Vector3<f64> {
         axes.iter().rev().fold(point_mm, |point, axis| {
             let i = axis.index();
-            self.axes[i]
-                .motion(position[i], &displacement.location[i], &displacement.motion[i])
-                .apply(point)
+            self.axes[i].motion(position[i], &displacement.location[i], &displacement.motion[i]).apply(point)
         })
     }
 
@@ -118,23 +112,13 @@ impl Machine {
     }
 
     /// `P_s` in R, mm.
-    pub fn tool_point(
-        &self,
-        position: &[f64; 5],
-        displacement: &Displacement,
-        point_mm: [f64; 3],
-    ) -> Vector3<f64> {
+    pub fn tool_point(&self, position: &[f64; 5], displacement: &Displacement, point_mm: [f64; 3]) -> Vector3<f64> {
         let point = Vector3::from(point_mm) + Vector3::from(displacement.spindle_ball);
-        self.carried(
-            &[AxisName::Y, AxisName::X, AxisName::Z],
-            position,
-            displacement,
-            point,
-        )
+        self.carried(&[AxisName::Y, AxisName::X, AxisName::Z], position, displacement, point)
     }
 
-    /// The reading without noise and rounding, mm: the true distance minus the error of the bar, with the gain error of the sensor
-    /// applied about the stated length.
+    /// The reading without noise and rounding, mm: the true distance minus the error of the bar, with the gain error of
+    /// the sensor applied about the stated length.
     pub fn reading_mm(&self, commanded: &Commanded, stated: &Stated, displacement: &Displacement) -> f64 {
         let position: [f64; 5] = std::array::from_fn(|i| {
             commanded.position[i] + displacement.position[i] - commanded.velocity[i] * displacement.delay
@@ -145,7 +129,8 @@ impl Machine {
         stated.bar_mm + deviation * (1.0 + displacement.gain)
     }
 
-    /// The moment of a unit weight at the workpiece ball about the A axis, mm: `d · ((p − o) × g)` with g = −Z and the nominal chain.
+    /// The moment of a unit weight at the workpiece ball about the A axis, mm: `d · ((p − o) × g)` with g = −Z and the
+    /// nominal chain.
     pub fn gravity_moment_a_mm(&self, position: &[f64; 5], workpiece_ball_mm: [f64; 3]) -> f64 {
         let axis = &self.axes[AxisName::A.index()];
         let ball = self.workpiece_point(position, &Displacement::default(), workpiece_ball_mm);

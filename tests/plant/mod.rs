@@ -1,8 +1,8 @@
 //! The plant: an independent simulator for tests, which shares no code with `abbe-model`.
 //!
-//! Motions are exact rigid motions with unit quaternions, errors are displaced bodies, and no formula is of first order. A [`Recipe`]
-//! makes a [`SimulatedSession`]: the files that Abbe reads, which declare no effect, and the true values. An [`Oracle`] knows the effect and gives
-//! bounds for the results.
+//! Motions are exact rigid motions with unit quaternions, errors are displaced bodies, and no formula is of first
+//! order. A [`Recipe`] makes a [`SimulatedSession`]: the files that Abbe reads, which declare no effect, and the true
+//! values. An [`Oracle`] knows the effect and gives bounds for the results.
 //!
 //! ```text
 //! let effect = Injected::new(EZC, Driver::Axis(AxisName::C), Shape::Harmonic { order: 3, phase_deg: 0.0 }, 2.0);

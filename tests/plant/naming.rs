@@ -10,8 +10,8 @@ pub struct EffectLabel {
     pub component: String,
     /// An axis, `time`, `temperature`, `gravity`, or `none` for a constant.
     pub driver: String,
-    /// `constant`, `polynomial`, `harmonic`, `periodic`, `backlash`, `lag`, `reversal-spike`, `local`, `steps`, `drift`, `warmup`; a
-    /// remount is `steps` in `time`; `outside` for an effect without a name.
+    /// `constant`, `polynomial`, `harmonic`, `periodic`, `backlash`, `lag`, `reversal-spike`, `local`, `steps`,
+    /// `drift`, `warmup`; a remount is `steps` in `time`; `outside` for an effect without a name.
     pub shape: String,
     /// Order of a harmonic, degree of a polynomial.
     pub order: Option<u32>,
@@ -40,16 +40,12 @@ pub fn named(effect: &Injected) -> EffectLabel {
         Shape::Warmup { .. } => ("warmup", None),
         Shape::Modulated { .. } | Shape::Chirp { .. } | Shape::Plateaus { .. } => ("outside", None),
     };
-    EffectLabel {
-        component: effect.component.to_string(),
-        driver,
-        shape: shape.to_string(),
-        order,
-    }
+    EffectLabel { component: effect.component.to_string(), driver, shape: shape.to_string(), order }
 }
 
-/// The effect of a name, at unit amplitude and zero phase. Numbers that a name does not state (period, centre and width, decay,
-/// positions of steps, time constant) come from `like` if that has the same shape. `None` if the plant has no such effect.
+/// The effect of a name, at unit amplitude and zero phase. Numbers that a name does not state (period, centre and
+/// width, decay, positions of steps, time constant) come from `like` if that has the same shape. `None` if the plant
+/// has no such effect.
 pub fn from_name(name: &EffectLabel, like: &Injected) -> Option<Injected> {
     let component = Component::parse(&name.component)?;
     let driver = match name.driver.as_str() {
@@ -57,20 +53,13 @@ pub fn from_name(name: &EffectLabel, like: &Injected) -> Option<Injected> {
         "temperature" => Driver::Temperature,
         "gravity" => Driver::Gravity,
         "none" => Driver::Nothing,
-        letter => Driver::Axis(
-            AxisName::ALL
-                .into_iter()
-                .find(|axis| format!("{axis:?}") == letter)?,
-        ),
+        letter => Driver::Axis(AxisName::ALL.into_iter().find(|axis| format!("{axis:?}") == letter)?),
     };
     let shape = match name.shape.as_str() {
         "constant" => Shape::Constant,
         "polynomial" | "power" => Shape::Polynomial { degree: name.order? },
         "constant-per-mount" if matches!(like.shape, Shape::Remount { .. }) => like.shape.clone(),
-        "harmonic" => Shape::Harmonic {
-            order: name.order?,
-            phase_deg: 0.0,
-        },
+        "harmonic" => Shape::Harmonic { order: name.order?, phase_deg: 0.0 },
         "backlash" => Shape::Backlash,
         "lag" => Shape::Lag,
         "drift" => Shape::Drift,

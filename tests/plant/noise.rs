@@ -34,19 +34,13 @@ impl Noise {
     /// Standard deviation of a reading that is not an outlier, µm, before rounding.
     pub fn sigma_um(self) -> f64 {
         match self {
-            Noise::White { sigma_um } | Noise::Serial { sigma_um, .. } | Noise::Outliers { sigma_um, .. } => {
-                sigma_um
-            }
+            Noise::White { sigma_um } | Noise::Serial { sigma_um, .. } | Noise::Outliers { sigma_um, .. } => sigma_um,
         }
     }
 
     /// Correlation of neighbouring readings within a traversal.
     pub fn coefficient(self) -> f64 {
-        if let Noise::Serial { coefficient, .. } = self {
-            coefficient
-        } else {
-            0.0
-        }
+        if let Noise::Serial { coefficient, .. } = self { coefficient } else { 0.0 }
     }
 
     /// Standard deviation of a reading that is not an outlier, µm, with rounding.

@@ -1,7 +1,8 @@
-//! The oracle: bounds for an observer who knows the injected effect. It gives the smallest significant amplitude, the aliases and the
-//! attainable held-out error.
+//! The oracle: bounds for an observer who knows the injected effect. It gives the smallest significant amplitude, the
+//! aliases and the attainable held-out error.
 //!
-//! Columns are central differences on the plant. One oracle serves a kind of session, noise and step; it depends on no random draw.
+//! Columns are central differences on the plant. One oracle serves a kind of session, noise and step; it depends on no
+//! random draw.
 
 use super::component::{AxisName, Cartesian, Component, Freedom, unit_size};
 use super::effect::{Injected, Shape};
@@ -16,10 +17,12 @@ use nalgebra::{DMatrix, DVector};
 use rand::Rng;
 use std::collections::HashMap;
 
-/// Prior standard uncertainty of the errors of the machine, µm or arcsec: hardly informative, but every design has full rank.
+/// Prior standard uncertainty of the errors of the machine, µm or arcsec: hardly informative, but every design has full
+/// rank.
 pub(super) const WEAK_U: f64 = 1000.0;
 
-/// Smallest share of a column that remains after projection on the present model; a smaller one counts as not identifiable.
+/// Smallest share of a column that remains after projection on the present model; a smaller one counts as not
+/// identifiable.
 const MIN_REMAINING_SHARE: f64 = 1e-3;
 
 /// Changes of a reading below this are rounding errors of the difference, µm.
@@ -39,7 +42,8 @@ pub struct Oracle {
     sensitivities: HashMap<Component, Vec<f64>>,
     /// µm of reading per µm or arcsec of each parameter.
     pub(super) base: DMatrix<f64>,
-    /// Orthonormal basis of the column space of the parameters in the whitened readings, with the priors as additional rows.
+    /// Orthonormal basis of the column space of the parameters in the whitened readings, with the priors as additional
+    /// rows.
     parameter_space: DMatrix<f64>,
 }
 
@@ -51,17 +55,11 @@ impl Oracle {
 
     /// The oracle of a plan.
     pub fn on(plan: Plan, noise: Noise) -> Oracle {
-        let sensitivities: HashMap<Component, Vec<f64>> = components()
-            .into_iter()
-            .map(|component| (component, sensitivity(&plan, component)))
-            .collect();
+        let sensitivities: HashMap<Component, Vec<f64>> =
+            components().into_iter().map(|component| (component, sensitivity(&plan, component))).collect();
         let base = DMatrix::from_fn(plan.instants.len(), plan.unknowns.len(), |row, column| {
             let unknown = &plan.unknowns[column];
-            if unknown.in_test[plan.instants[row].test] {
-                sensitivities[&unknown.component][row]
-            } else {
-                0.0
-            }
+            if unknown.in_test[plan.instants[row].test] { sensitivities[&unknown.component][row] } else { 0.0 }
         });
         let every_row: Vec<usize> = (0..plan.instants.len()).collect();
         let mut whitened = whiten(&plan, noise, &every_row, base.clone());
@@ -71,13 +69,7 @@ impl Oracle {
             whitened[(every_row.len() + k, k)] = 1.0 / unknown.prior_u_um.unwrap_or(WEAK_U);
         }
         let parameter_space = whitened.qr().q();
-        Oracle {
-            plan,
-            noise,
-            sensitivities,
-            base,
-            parameter_space,
-        }
+        Oracle { plan, noise, sensitivities, base, parameter_space }
     }
 
     /// µm of reading per unit of amplitude, by instant, to first order.
@@ -91,11 +83,7 @@ impl Oracle {
 
     /// The columns that span the effect at any phase.
     pub fn columns(&self, effect: &Injected) -> DMatrix<f64> {
-        let columns: Vec<_> = effect
-            .basis_effects()
-            .iter()
-            .map(|basis| self.column(basis))
-            .collect();
+        let columns: Vec<_> = effect.basis_effects().iter().map(|basis| self.column(basis)).collect();
         DMatrix::from_columns(&columns)
     }
 
@@ -111,7 +99,8 @@ impl Oracle {
         (projected, lengths)
     }
 
-    /// Orthonormal basis of the response to several effects that the parameters do not explain; no column if none is identifiable.
+    /// Orthonormal basis of the response to several effects that the parameters do not explain; no column if none is
+    /// identifiable.
     fn response(&self, effects: &[Injected]) -> DMatrix<f64> {
         let mut basis: Vec<DVector<f64>> = Vec::new();
         for effect in effects {
@@ -129,16 +118,13 @@ impl Oracle {
                 }
             }
         }
-        if basis.is_empty() {
-            DMatrix::zeros(self.parameter_space.nrows(), 0)
-        } else {
-            DMatrix::from_columns(&basis)
-        }
+        if basis.is_empty() { DMatrix::zeros(self.parameter_space.nrows(), 0) } else { DMatrix::from_columns(&basis) }
     }
 
-    /// The amplitude, in [`Injected::unit`], at which the expected test statistic of the effect reaches the critical value of `z`
-    /// standard deviations for one amplitude. With an unknown phase (cosine and sine) the critical value is that of χ² with two degrees
-    /// of freedom at the same probability, and the amplitude that of the phase of this effect. Infinite if it is not identifiable.
+    /// The amplitude, in [`Injected::unit`], at which the expected test statistic of the effect reaches the critical
+    /// value of `z` standard deviations for one amplitude. With an unknown phase (cosine and sine) the critical value
+    /// is that of χ² with two degrees of freedom at the same probability, and the amplitude that of the phase of this
+    /// effect. Infinite if it is not identifiable.
     pub fn smallest_significant_amplitude(&self, effect: &Injected, z: f64) -> f64 {
         let (projected, lengths) = self.projected(effect);
         let coordinates = DVector::from_vec(effect.coordinates());
@@ -147,47 +133,35 @@ impl Oracle {
         if response <= MIN_REMAINING_SHARE * length || response == 0.0 {
             return f64::INFINITY;
         }
-        let level = if coordinates.len() == 1 {
-            z * z
-        } else {
-            -2.0 * two_sided_tail(z).ln()
-        };
+        let level = if coordinates.len() == 1 { z * z } else { -2.0 * two_sided_tail(z).ln() };
         level.sqrt() / response
     }
 
-    /// The share of the projected response of this effect that lies in the readings. The rest lies in the priors: it shifts the
-    /// set-up parameters and leaves no structure in the residual.
+    /// The share of the projected response of this effect that lies in the readings. The rest lies in the priors: it
+    /// shifts the set-up parameters and leaves no structure in the residual.
     pub fn share_in_readings(&self, effect: &Injected) -> f64 {
         let direction = self.direction(effect);
         direction.rows(0, self.plan.instants.len()).norm_squared()
     }
 
-    /// The cosine of the largest principal angle between the projected responses of two effects: 1 for effects that are confounded, 0 if
-    /// either is not identifiable.
+    /// The cosine of the largest principal angle between the projected responses of two effects: 1 for effects that are
+    /// confounded, 0 if either is not identifiable.
     pub fn largest_angle_cosine(&self, a: &Injected, b: &Injected) -> f64 {
-        let (a, b) = (
-            self.response(std::slice::from_ref(a)),
-            self.response(std::slice::from_ref(b)),
-        );
+        let (a, b) = (self.response(std::slice::from_ref(a)), self.response(std::slice::from_ref(b)));
         if a.ncols() == 0 || b.ncols() == 0 {
             return 0.0;
         }
-        a.tr_mul(&b)
-            .singular_values()
-            .iter()
-            .copied()
-            .fold(f64::INFINITY, f64::min)
-            .min(1.0)
+        a.tr_mul(&b).singular_values().iter().copied().fold(f64::INFINITY, f64::min).min(1.0)
     }
 
-    /// The share of this effect (at its phase) that another effect explains at any phase: the cosine of the angle between its projected
-    /// response and the subspace of the other.
+    /// The share of this effect (at its phase) that another effect explains at any phase: the cosine of the angle
+    /// between its projected response and the subspace of the other.
     pub fn explained_share(&self, effect: &Injected, other: &Injected) -> f64 {
         self.share(&self.direction(effect), std::slice::from_ref(other))
     }
 
-    /// The same for several effects together, each with its own amplitude: polynomials of every degree up to one, a curve as
-    /// harmonics, steps of free height, both members of a pair.
+    /// The same for several effects together, each with its own amplitude: polynomials of every degree up to one, a
+    /// curve as harmonics, steps of free height, both members of a pair.
     pub fn explained_share_of(&self, effect: &Injected, others: &[Injected]) -> f64 {
         self.share(&self.direction(effect), others)
     }
@@ -198,25 +172,23 @@ impl Oracle {
         let response = projected * DVector::from_vec(effect.coordinates());
         let length: f64 = lengths.iter().map(|length| length * length).sum::<f64>().sqrt();
         let norm = response.norm();
-        if norm > MIN_REMAINING_SHARE * length {
-            response / norm
-        } else {
-            response * 0.0
-        }
+        if norm > MIN_REMAINING_SHARE * length { response / norm } else { response * 0.0 }
     }
 
     fn share(&self, direction: &DVector<f64>, others: &[Injected]) -> f64 {
         self.response(others).tr_mul(direction).norm().min(1.0)
     }
 
-    /// The strength of an effect at its amplitude, in standard deviations: the square root of the χ² gain of the truth without noise.
+    /// The strength of an effect at its amplitude, in standard deviations: the square root of the χ² gain of the truth
+    /// without noise.
     pub fn strength_sigma(&self, effect: &Injected) -> f64 {
         let (projected, _) = self.projected(effect);
         (projected * DVector::from_vec(effect.coordinates())).norm() * effect.amplitude.abs()
     }
 
-    /// The aliases of this effect: every entry of the catalogue that explains at least `cosine` of it, and every entry whose expected χ²
-    /// gain is below that of the truth by at most `sigma` squared. Best first; the truth is one of them.
+    /// The aliases of this effect: every entry of the catalogue that explains at least `cosine` of it, and every entry
+    /// whose expected χ² gain is below that of the truth by at most `sigma` squared. Best first; the truth is one of
+    /// them.
     pub fn alias_class(&self, effect: &Injected, cosine: f64, sigma: f64) -> Vec<Alias> {
         let direction = self.direction(effect);
         let strength = self.strength_sigma(effect);
@@ -225,12 +197,7 @@ impl Oracle {
             .map(|other| {
                 let share = self.share(&direction, std::slice::from_ref(&other));
                 let deficit_sigma = strength * (1.0 - share * share).max(0.0).sqrt();
-                Alias {
-                    name: named(&other),
-                    effect: other,
-                    share,
-                    deficit_sigma,
-                }
+                Alias { name: named(&other), effect: other, share, deficit_sigma }
             })
             .filter(|alias| alias.share >= cosine || alias.deficit_sigma <= sigma)
             .collect();
@@ -238,17 +205,14 @@ impl Oracle {
         class
     }
 
-    /// A random detectable effect, at `factor` times the smallest significant amplitude (z = 1.96). Effects that would need an
-    /// unrealistic amplitude, or that affect the priors rather than the readings, are drawn again.
+    /// A random detectable effect, at `factor` times the smallest significant amplitude (z = 1.96). Effects that would
+    /// need an unrealistic amplitude, or that affect the priors rather than the readings, are drawn again.
     pub fn random_detectable(&self, factor: f64, random: &mut impl Rng) -> Injected {
         loop {
             let effect = families::random_effect(self.plan.kind, random);
             // A spindle ball with a mount for each test is anywhere within its prior: no remount.
             let allowed = self.plan.shared_mounts
-                || !matches!(
-                    (&effect.shape, effect.component),
-                    (Shape::Remount { .. }, Component::SpindleBall(_))
-                );
+                || !matches!((&effect.shape, effect.component), (Shape::Remount { .. }, Component::SpindleBall(_)));
             let smallest = self.smallest_significant_amplitude(&effect, 1.96);
             let allowed = allowed && self.share_in_readings(&effect) > 0.5;
             if allowed && smallest < largest_sensible(effect.unit()) {
@@ -257,13 +221,11 @@ impl Oracle {
         }
     }
 
-    /// Two random effects that are detectable and separable, each at `factor` times its own smallest significant amplitude.
+    /// Two random effects that are detectable and separable, each at `factor` times its own smallest significant
+    /// amplitude.
     pub fn random_pair(&self, factor: f64, random: &mut impl Rng) -> [Injected; 2] {
         loop {
-            let pair = [
-                self.random_detectable(factor, random),
-                self.random_detectable(factor, random),
-            ];
+            let pair = [self.random_detectable(factor, random), self.random_detectable(factor, random)];
             let [a, b] = &pair;
             let share = self.explained_share(a, b).max(self.explained_share(b, a));
             if share < PAIR_SHARE {
@@ -273,7 +235,8 @@ impl Oracle {
     }
 }
 
-/// Largest permitted collinearity of two effects of one session: cosine of the angle between the responses, in both directions.
+/// Largest permitted collinearity of two effects of one session: cosine of the angle between the responses, in both
+/// directions.
 const PAIR_SHARE: f64 = 0.5;
 
 /// An alias of a true effect.

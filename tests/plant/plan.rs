@@ -72,52 +72,17 @@ impl Plan {
             }
         };
         let setups: Vec<String> = tests.iter().map(|test| test.setup.clone()).collect();
-        let mounts: Vec<String> = tests
-            .iter()
-            .map(|test| {
-                if shared_mounts {
-                    "S1".to_string()
-                } else {
-                    test.name.clone()
-                }
-            })
-            .collect();
-        let bars: Vec<String> = tests
-            .iter()
-            .map(|test| {
-                if shared_mounts {
-                    bar_setup(test)
-                } else {
-                    test.name.clone()
-                }
-            })
-            .collect();
+        let mounts: Vec<String> =
+            tests.iter().map(|test| if shared_mounts { "S1".to_string() } else { test.name.clone() }).collect();
+        let bars: Vec<String> =
+            tests.iter().map(|test| if shared_mounts { bar_setup(test) } else { test.name.clone() }).collect();
         for (i, letter) in [".x", ".y", ".z"].into_iter().enumerate() {
             let axis = Cartesian(i);
-            add(
-                Component::WorkpieceBall(axis),
-                letter,
-                "workpiece_ball",
-                &setups,
-                kind.workpiece_ball_u_um(),
-            );
-            add(
-                Component::SpindleBall(axis),
-                letter,
-                "spindle_ball",
-                &mounts,
-                SPINDLE_BALL_U_UM,
-            );
+            add(Component::WorkpieceBall(axis), letter, "workpiece_ball", &setups, kind.workpiece_ball_u_um());
+            add(Component::SpindleBall(axis), letter, "spindle_ball", &mounts, SPINDLE_BALL_U_UM);
         }
         add(Component::Bar, "", "bar", &bars, BAR_U_UM);
-        Plan {
-            kind,
-            shared_mounts,
-            machine,
-            tests,
-            unknowns,
-            instants,
-        }
+        Plan { kind, shared_mounts, machine, tests, unknowns, instants }
     }
 
     /// The reading without noise and rounding, mm; `values` are those of [`Plan::unknowns`] in µm and arcsec.

@@ -22,45 +22,29 @@ pub fn turn_about(direction: Vector3<f64>, angle_rad: f64) -> UnitQuaternion<f64
 impl Pose {
     /// No motion.
     pub fn identity() -> Pose {
-        Pose {
-            turn: UnitQuaternion::identity(),
-            shift_mm: Vector3::zeros(),
-        }
+        Pose { turn: UnitQuaternion::identity(), shift_mm: Vector3::zeros() }
     }
 
     /// `Trans(shift_mm)`.
     pub fn slide(shift_mm: Vector3<f64>) -> Pose {
-        Pose {
-            turn: UnitQuaternion::identity(),
-            shift_mm,
-        }
+        Pose { turn: UnitQuaternion::identity(), shift_mm }
     }
 
     /// `Rot(direction, angle_rad)`.
     pub fn rotation(direction: Vector3<f64>, angle_rad: f64) -> Pose {
-        Pose {
-            turn: turn_about(direction, angle_rad),
-            shift_mm: Vector3::zeros(),
-        }
+        Pose { turn: turn_about(direction, angle_rad), shift_mm: Vector3::zeros() }
     }
 
     /// A displaced body: `Trans(EX, EY, EZ) · Rx(EA) · Ry(EB) · Rz(EC)` from `[EX, EY, EZ, EA, EB, EC]` in mm and rad.
     pub fn displaced(six: &[f64; 6]) -> Pose {
-        let turn = turn_about(Vector3::x(), six[3])
-            * turn_about(Vector3::y(), six[4])
-            * turn_about(Vector3::z(), six[5]);
-        Pose {
-            turn,
-            shift_mm: Vector3::new(six[0], six[1], six[2]),
-        }
+        let turn =
+            turn_about(Vector3::x(), six[3]) * turn_about(Vector3::y(), six[4]) * turn_about(Vector3::z(), six[5]);
+        Pose { turn, shift_mm: Vector3::new(six[0], six[1], six[2]) }
     }
 
     /// `self · inner`: `inner` acts on a point first.
     pub fn then_inner(self, inner: Pose) -> Pose {
-        Pose {
-            turn: self.turn * inner.turn,
-            shift_mm: self.shift_mm + self.turn * inner.shift_mm,
-        }
+        Pose { turn: self.turn * inner.turn, shift_mm: self.shift_mm + self.turn * inner.shift_mm }
     }
 
     /// The moved point, mm.
@@ -93,8 +77,8 @@ impl Axis {
     /// The motion of the axis at `position` (mm or rad) with its location errors and error motions, each
     /// `[EX, EY, EZ, EA, EB, EC]` in mm and rad.
     ///
-    /// Rotary: `Trans(o) · E0 · E(q) · Rot(d, q) · Trans(−o)`. Linear: `Trans(o + q d′) · E(q) · Trans(−o)` with `d′ = d + ω0 × d`,
-    /// where ω0 are the rotations of the location errors; their translations have no effect.
+    /// Rotary: `Trans(o) · E0 · E(q) · Rot(d, q) · Trans(−o)`. Linear: `Trans(o + q d′) · E(q) · Trans(−o)` with
+    /// `d′ = d + ω0 × d`, where ω0 are the rotations of the location errors; their translations have no effect.
     pub fn motion(&self, position: f64, location: &[f64; 6], motion: &[f64; 6]) -> Pose {
         let back = Pose::slide(-self.origin_mm);
         match self.joint {
@@ -115,9 +99,5 @@ impl Axis {
 }
 
 fn displaced_unless_zero(six: &[f64; 6]) -> Pose {
-    if *six == [0.0; 6] {
-        Pose::identity()
-    } else {
-        Pose::displaced(six)
-    }
+    if *six == [0.0; 6] { Pose::identity() } else { Pose::displaced(six) }
 }

@@ -32,8 +32,9 @@ pub struct Recipe {
 }
 
 impl Recipe {
-    /// About 1,500 readings with white noise of 0.3 µm and no effect. The spindle ball stays mounted between the tests of
-    /// [`Kind::TiltedTable`]; in the other kinds every test has its own mount and bar calibration, as in the samples.
+    /// About 1,500 readings with white noise of 0.3 µm and no effect. The spindle ball stays mounted between the tests
+    /// of [`Kind::TiltedTable`]; in the other kinds every test has its own mount and bar calibration, as in the
+    /// samples.
     pub fn new(kind: Kind, seed: u64) -> Recipe {
         Recipe {
             kind,
@@ -60,10 +61,7 @@ impl Recipe {
 
     /// Sets the approximate number of readings.
     pub fn readings(self, readings: usize) -> Recipe {
-        Recipe {
-            step_deg: self.kind.step_deg(readings),
-            ..self
-        }
+        Recipe { step_deg: self.kind.step_deg(readings), ..self }
     }
 
     /// The plan of the session; the same for every seed, noise and effect.
@@ -95,10 +93,7 @@ impl Recipe {
         let runs = plan.instants.chunk_by(|a, b| (a.test, a.run) == (b.test, b.run));
         for run in runs {
             let first = rows.len();
-            for (i, (noise_um, outlier)) in traversal(self.noise, run.len(), &mut random)
-                .into_iter()
-                .enumerate()
-            {
+            for (i, (noise_um, outlier)) in traversal(self.noise, run.len(), &mut random).into_iter().enumerate() {
                 let dropped = random.random::<f64>() < self.dropped_share;
                 let true_mm = plan.reading_mm(&run[i], &values, &self.effects);
                 let reading_um = (true_mm * 1e3 + noise_um) / RESOLUTION_UM;
@@ -125,16 +120,9 @@ impl Recipe {
                 .collect(),
             effects: self.effects.clone(),
             noise: self.noise,
-            outlier_rows: rows
-                .iter()
-                .filter(|row| row.outlier)
-                .map(|row| row.instant)
-                .collect(),
+            outlier_rows: rows.iter().filter(|row| row.outlier).map(|row| row.instant).collect(),
         };
-        let follows_temperature = self
-            .effects
-            .iter()
-            .any(|effect| effect.driver == Driver::Temperature);
+        let follows_temperature = self.effects.iter().any(|effect| effect.driver == Driver::Temperature);
         let files = files::session_files(plan, &rows, self.temperature_column || follows_temperature);
         SimulatedSession { files, rows, truth }
     }
@@ -160,12 +148,7 @@ pub struct Row {
 impl Row {
     /// A reading from another source.
     pub fn taken(instant: usize, length_mm: f64) -> Row {
-        Row {
-            instant,
-            length_mm,
-            outlier: false,
-            dropped: false,
-        }
+        Row { instant, length_mm, outlier: false, dropped: false }
     }
 }
 
@@ -198,10 +181,7 @@ pub struct Truth {
 impl Truth {
     /// The true value of a parameter in µm or arcsec.
     pub fn value(&self, id: &str) -> Option<f64> {
-        self.unknowns
-            .iter()
-            .find(|known| known.id == id)
-            .map(|known| known.value)
+        self.unknowns.iter().find(|known| known.id == id).map(|known| known.value)
     }
 
     /// The errors of the machine: name, value, unit (`um` or `arcsec`).
@@ -231,9 +211,7 @@ impl SimulatedSession {
     /// If the folder or a file cannot be written.
     pub fn write(&self, folder: &Path) -> std::io::Result<()> {
         std::fs::create_dir_all(folder)?;
-        self.files
-            .iter()
-            .try_for_each(|(name, text)| std::fs::write(folder.join(name), text))
+        self.files.iter().try_for_each(|(name, text)| std::fs::write(folder.join(name), text))
     }
 
     /// Writes the true values to `NAME.json` in another folder.

@@ -1,7 +1,8 @@
-//! The R-test of the plant: three sensors about a master ball, each of which reads the displacement of the ball along its direction.
+//! The R-test of the plant: three sensors about a master ball, each of which reads the displacement of the ball along
+//! its direction.
 //!
-//! Nest and ball are separate bodies. The nest moves with the table or the spindle and is displaced and rotated with it. A sensor
-//! reads along its present direction in R. No reading is transformed by angles.
+//! Nest and ball are separate bodies. The nest moves with the table or the spindle and is displaced and rotated with
+//! it. A sensor reads along its present direction in R. No reading is transformed by angles.
 
 use super::component::{AxisName, Component, unit_size};
 use super::effect::Injected;
@@ -38,15 +39,12 @@ pub struct Nest {
 impl Nest {
     /// Sensors along X, Y and Z.
     pub fn along_the_axes(on: NestOn) -> Nest {
-        Nest {
-            on,
-            directions: [Vector3::x(), Vector3::y(), Vector3::z()],
-            misaligned: [0.0; 3],
-        }
+        Nest { on, directions: [Vector3::x(), Vector3::y(), Vector3::z()], misaligned: [0.0; 3] }
     }
 }
 
-/// The readings of the three sensors, mm: the displacement of the point in the spindle from the point on the table along each.
+/// The readings of the three sensors, mm: the displacement of the point in the spindle from the point on the table
+/// along each.
 pub fn reading_mm(
     machine: &Machine,
     nest: &Nest,
@@ -69,10 +67,8 @@ pub fn reading_mm(
         body.then_inner(motion)
     });
     let [omega, phi, theta] = nest.misaligned;
-    let mounted =
-        turn_about(Vector3::y(), -phi) * turn_about(Vector3::z(), -theta) * turn_about(Vector3::x(), -omega);
-    nest.directions
-        .map(|direction| (body.turn * (mounted * direction)).dot(&(spindle - table)))
+    let mounted = turn_about(Vector3::y(), -phi) * turn_about(Vector3::z(), -theta) * turn_about(Vector3::x(), -omega);
+    nest.directions.map(|direction| (body.turn * (mounted * direction)).dot(&(spindle - table)))
 }
 
 /// A session of R-tests on the plant.
@@ -133,10 +129,7 @@ impl Session {
 
     /// The sensor readings without noise, µm.
     fn counted_um(&self, machine: &Machine, instant: &Instant, mount_mm: [f64; 3]) -> [f64; 3] {
-        let mut displacement = Displacement {
-            workpiece_ball: mount_mm,
-            ..Displacement::default()
-        };
+        let mut displacement = Displacement { workpiece_ball: mount_mm, ..Displacement::default() };
         for (component, value) in &self.errors {
             displacement.add(*component, value * unit_size(component.unit()));
         }

@@ -1,4 +1,5 @@
-//! The schedule of a session: commanded path of each traversal over time, with velocity, direction and reversals of every axis.
+//! The schedule of a session: commanded path of each traversal over time, with velocity, direction and reversals of
+//! every axis.
 
 use super::component::AxisName;
 use super::machine::{Commanded, Machine, Stated};
@@ -37,11 +38,7 @@ pub enum Motion {
     /// Equal to the path angle.
     Turns,
     /// `centre + radius · cos(angle + phase)`, mm and rad.
-    Circles {
-        centre_mm: f64,
-        radius_mm: f64,
-        phase_rad: f64,
-    },
+    Circles { centre_mm: f64, radius_mm: f64, phase_rad: f64 },
 }
 
 /// One test: traversals of one path, forward and backward.
@@ -129,10 +126,8 @@ struct PathPoint {
 
 fn at_angle(machine: &Machine, test: &Test, place: PathPoint) -> Instant {
     let states = test.motions.map(|motion| axis_state(motion, &place));
-    let commanded = Commanded {
-        position: states.map(|state| state.position),
-        velocity: states.map(|state| state.velocity),
-    };
+    let commanded =
+        Commanded { position: states.map(|state| state.position), velocity: states.map(|state| state.velocity) };
     Instant {
         test: place.test,
         run: place.run,
@@ -159,13 +154,9 @@ struct AxisState {
 
 fn axis_state(motion: Motion, place: &PathPoint) -> AxisState {
     match motion {
-        Motion::Stands(position) => AxisState {
-            position,
-            velocity: 0.0,
-            direction: 0.0,
-            since_reversal_s: 0.0,
-            way: 0.0,
-        },
+        Motion::Stands(position) => {
+            AxisState { position, velocity: 0.0, direction: 0.0, since_reversal_s: 0.0, way: 0.0 }
+        }
         Motion::Turns => {
             let since_reversal_s = place.since_start_s + OVERSHOOT_S;
             AxisState {
@@ -176,11 +167,7 @@ fn axis_state(motion: Motion, place: &PathPoint) -> AxisState {
                 way: since_reversal_s * place.rate.abs(),
             }
         }
-        Motion::Circles {
-            centre_mm,
-            radius_mm,
-            phase_rad,
-        } => {
+        Motion::Circles { centre_mm, radius_mm, phase_rad } => {
             let angle = place.angle_rad + phase_rad;
             // The axis reverses at multiples of π; at the point itself it has not reversed yet.
             let travelled = (angle * place.rate.signum()).rem_euclid(PI);

@@ -29,20 +29,13 @@ pub fn whiten(plan: &Plan, noise: Noise, rows: &[usize], mut columns: DMatrix<f6
                 noise.coefficient().powi(gap)
             });
             let kept = carried * carried;
-            (
-                carried,
-                (variance * (1.0 - kept) + rounding * (1.0 + kept)).sqrt(),
-            )
+            (carried, (variance * (1.0 - kept) + rounding * (1.0 + kept)).sqrt())
         })
         .collect();
     for mut column in columns.column_iter_mut() {
         for k in (0..steps.len()).rev() {
             let (carried, scale) = steps[k];
-            let before = if carried == 0.0 {
-                0.0
-            } else {
-                carried * column[k - 1]
-            };
+            let before = if carried == 0.0 { 0.0 } else { carried * column[k - 1] };
             column[k] = (column[k] - before) / scale;
         }
     }

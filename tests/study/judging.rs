@@ -29,8 +29,8 @@ pub fn is(name: &EffectName, truth: &Injected) -> bool {
     }
 }
 
-/// The found effect that is the truth or has it among its aliases. A period that divides a turn, within the resolution of a turn, is that
-/// harmonic.
+/// The found effect that is the truth or has it among its aliases. A period that divides a turn, within the resolution
+/// of a turn, is that harmonic.
 pub fn found<'r>(outcome: &'r TracedSession, truth: &Injected) -> Option<&'r EffectResult> {
     let oracle = oracle(outcome.kind, outcome.noise);
     let is_truth = |name: &EffectName| {
@@ -42,13 +42,11 @@ pub fn found<'r>(outcome: &'r TracedSession, truth: &Injected) -> Option<&'r Eff
                     .is_some_and(|other| oracle.explained_share(truth, &other) > 0.99)
     };
     let effects = &outcome.result.effects;
-    effects
-        .iter()
-        .find(|effect| is_truth(&effect.name) || effect.aliases.iter().any(is_truth))
+    effects.iter().find(|effect| is_truth(&effect.name) || effect.aliases.iter().any(is_truth))
 }
 
-/// The surplus members of an alias set, the named effect included: effects of the plant that neither belong to the alias class of the
-/// truth nor lie within `sigma` standard deviations of it.
+/// The surplus members of an alias set, the named effect included: effects of the plant that neither belong to the
+/// alias class of the truth nor lie within `sigma` standard deviations of it.
 pub fn surplus_aliases(
     outcome: &TracedSession,
     effect: &EffectResult,
@@ -62,11 +60,9 @@ pub fn surplus_aliases(
         .filter_map(|name| {
             let remounted = matches!(truth.shape, Shape::Remount { .. }) && !name.tests.is_empty();
             let name = match remounted {
-                // A ball that moves between tests is a constant of those tests in the result and a step in time in the plant.
-                true => EffectLabel {
-                    component: name.component.clone(),
-                    ..named(truth)
-                },
+                // A ball that moves between tests is a constant of those tests in the result and a step in time in the
+                // plant.
+                true => EffectLabel { component: name.component.clone(), ..named(truth) },
                 false => name_in_plant(name),
             };
             let other = from_name(&name, truth)?;
@@ -86,10 +82,7 @@ pub fn surplus_aliases(
 fn with_any_time_constant(effect: &Injected) -> Vec<Injected> {
     match effect.shape {
         Shape::Warmup { .. } => [30.0, 60.0, 120.0, 240.0, 480.0, 960.0, 1920.0, 3840.0]
-            .map(|tau_s| Injected {
-                shape: Shape::Warmup { tau_s },
-                ..effect.clone()
-            })
+            .map(|tau_s| Injected { shape: Shape::Warmup { tau_s }, ..effect.clone() })
             .to_vec(),
         _ => vec![effect.clone()],
     }
@@ -107,11 +100,7 @@ pub fn pulls(outcome: &TracedSession, model: &ModelResult) -> Pulls {
 /// A short form of a name.
 pub fn short(name: &EffectName) -> String {
     let order = name.order.map(|order| format!("{order}")).unwrap_or_default();
-    let tests = if name.tests.is_empty() {
-        String::new()
-    } else {
-        format!("[{}]", name.tests.join("+"))
-    };
+    let tests = if name.tests.is_empty() { String::new() } else { format!("[{}]", name.tests.join("+")) };
     format!("{}~{}:{}{order}{tests}", name.component, name.driver, name.shape)
 }
 
@@ -161,10 +150,7 @@ pub fn summary(outcome: &TracedSession, mark: &str) -> String {
         .map(|rejected| {
             let (fall, u) = (rejected.heldout_decrease_um, rejected.u_heldout_decrease_um);
             let name = short(&rejected.name);
-            format!(
-                "\n        REJECTED {name} (p {:.3}, held out falls by {fall:.5} ± {u:.5})",
-                rejected.p_value
-            )
+            format!("\n        REJECTED {name} (p {:.3}, held out falls by {fall:.5} ± {u:.5})", rejected.p_value)
         })
         .collect();
     format!(

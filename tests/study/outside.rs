@@ -38,8 +38,8 @@ fn an_effect_that_the_library_lacks_gets_no_wrong_name() {
     assert!(honest.is_consistent_with_at_least(0.90), "{honest}");
 }
 
-/// A harmonic whose amplitude varies with time gives a peak in the spectrum of the differences of repeats. It is no autocorrelation of
-/// the noise (session 41: sixth order, white noise with outliers).
+/// A harmonic whose amplitude varies with time gives a peak in the spectrum of the differences of repeats. It is no
+/// autocorrelation of the noise (session 41: sixth order, white noise with outliers).
 #[test]
 fn a_harmonic_of_varying_amplitude_is_not_attributed_to_noise() {
     for outcome in &run(41..42, outside_case) {

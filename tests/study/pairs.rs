@@ -15,10 +15,7 @@ fn pair(number: usize) -> (Kind, Noise, Vec<Injected>) {
 
 fn hits(outcome: &TracedSession) -> usize {
     let truths = &outcome.draw.truth.effects;
-    truths
-        .iter()
-        .filter(|truth| found(outcome, truth).is_some())
-        .count()
+    truths.iter().filter(|truth| found(outcome, truth).is_some()).count()
 }
 
 #[test]
@@ -43,8 +40,8 @@ fn both_of_a_pair_are_found() {
     assert!(both.is_consistent_with_at_least(0.90), "{both}");
 }
 
-/// Two compliances that partly cancel each other have little gain individually (session 43). A drifting ball leaves a different cycle
-/// in every run, which is structure and no autocorrelation of the noise (session 60).
+/// Two compliances that partly cancel each other have little gain individually (session 43). A drifting ball leaves a
+/// different cycle in every run, which is structure and no autocorrelation of the noise (session 60).
 #[test]
 fn pairs_that_partly_cancel_or_resemble_autocorrelation_are_found() {
     for number in [43, 60] {

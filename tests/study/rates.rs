@@ -36,16 +36,12 @@ impl Rate {
     /// Whether the count is consistent with a rate of at least `rate`.
     pub fn is_consistent_with_at_least(self, rate: f64) -> bool {
         // P(at most k hits) = I_{1−rate}(n − k, k + 1).
-        self.hits == self.of
-            || beta_reg((self.of - self.hits) as f64, self.hits as f64 + 1.0, 1.0 - rate) > CHANCE
+        self.hits == self.of || beta_reg((self.of - self.hits) as f64, self.hits as f64 + 1.0, 1.0 - rate) > CHANCE
     }
 
     /// Whether the count is consistent with a rate of at most `rate`.
     pub fn is_consistent_with_at_most(self, rate: f64) -> bool {
-        let misses = Rate {
-            hits: self.of - self.hits,
-            of: self.of,
-        };
+        let misses = Rate { hits: self.of - self.hits, of: self.of };
         misses.is_consistent_with_at_least(1.0 - rate)
     }
 }
@@ -53,11 +49,7 @@ impl Rate {
 impl std::fmt::Display for Rate {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let (share, error) = (100.0 * self.share(), 100.0 * self.standard_error());
-        write!(
-            formatter,
-            "{} of {} = {share:.1} ± {error:.1} %",
-            self.hits, self.of
-        )
+        write!(formatter, "{} of {} = {share:.1} ± {error:.1} %", self.hits, self.of)
     }
 }
 

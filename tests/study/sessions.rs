@@ -16,14 +16,8 @@ use crate::plant::{Injected, Kind, Noise, Oracle, Recipe, SimulatedSession};
 /// The kinds of noise of a study.
 pub const NOISES: [Noise; 3] = [
     Noise::White { sigma_um: 0.3 },
-    Noise::Serial {
-        sigma_um: 0.3,
-        coefficient: 0.8,
-    },
-    Noise::Outliers {
-        sigma_um: 0.3,
-        share: 0.01,
-    },
+    Noise::Serial { sigma_um: 0.3, coefficient: 0.8 },
+    Noise::Outliers { sigma_um: 0.3, share: 0.01 },
 ];
 
 /// The significance level of trace, 0.5 % two-sided, in standard deviations.
@@ -71,16 +65,8 @@ pub fn oracle(kind: Kind, noise: Noise) -> Arc<Oracle> {
     type Shared = Mutex<HashMap<String, Arc<OnceLock<Arc<Oracle>>>>>;
     static ORACLES: OnceLock<Shared> = OnceLock::new();
     let key = format!("{kind:?} {noise:?}");
-    let place = ORACLES
-        .get_or_init(Shared::default)
-        .lock()
-        .unwrap()
-        .entry(key)
-        .or_default()
-        .clone();
-    place
-        .get_or_init(|| Arc::new(Oracle::new(&Recipe::new(kind, 0).noise(noise))))
-        .clone()
+    let place = ORACLES.get_or_init(Shared::default).lock().unwrap().entry(key).or_default().clone();
+    place.get_or_init(|| Arc::new(Oracle::new(&Recipe::new(kind, 0).noise(noise)))).clone()
 }
 
 /// The effect at a multiple of the smallest amplitude that is significant for the oracle at the level of trace.
@@ -104,8 +90,8 @@ pub struct TracedSession {
     pub seconds: f64,
 }
 
-/// Runs a study: `make` gives kind, noise and effects for each number. `ABBE_STUDY_FIRST` is added to every number, so that a rule can
-/// be tuned on other sessions than those that validate it.
+/// Runs a study: `make` gives kind, noise and effects for each number. `ABBE_STUDY_FIRST` is added to every number, so
+/// that a rule can be tuned on other sessions than those that validate it.
 pub fn run(
     numbers: std::ops::Range<usize>,
     make: impl Fn(usize) -> (Kind, Noise, Vec<Injected>) + Sync,
@@ -119,21 +105,10 @@ pub fn run(
         .map(|number| {
             let (kind, noise, effects) = make(number);
             let oracle = oracle(kind, noise);
-            let recipe = Recipe {
-                effects,
-                ..Recipe::new(kind, 7000 + number as u64)
-            }
-            .noise(noise);
+            let recipe = Recipe { effects, ..Recipe::new(kind, 7000 + number as u64) }.noise(noise);
             let draw = recipe.draw_on(&oracle.plan);
             let (result, seconds) = traced(&draw, number);
-            TracedSession {
-                number,
-                kind,
-                noise,
-                draw,
-                result,
-                seconds,
-            }
+            TracedSession { number, kind, noise, draw, result, seconds }
         })
         .collect()
 }

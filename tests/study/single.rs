@@ -15,8 +15,8 @@ fn study(factor: f64) -> Vec<TracedSession> {
     })
 }
 
-/// An alias lies within 2 σ of the named effect with noise. One that is more than 4 σ behind without noise does so in one session of
-/// fourteen.
+/// An alias lies within 2 σ of the named effect with noise. One that is more than 4 σ behind without noise does so in
+/// one session of fourteen.
 const FAR_SIGMA: f64 = 4.0;
 
 #[derive(Default)]
@@ -53,8 +53,7 @@ fn tally(outcomes: &[TracedSession]) -> Tally {
                 println!("SURPLUS in {:?}: {surplus_aliases:?}", named(truth));
             }
         }
-        let best =
-            oracle(outcome.kind, outcome.noise).heldout_rms_um(&outcome.draw, &outcome.draw.truth.effects);
+        let best = oracle(outcome.kind, outcome.noise).heldout_rms_um(&outcome.draw, &outcome.draw.truth.effects);
         let ratio = outcome.result.after.heldout_rms_um / best;
         tally.held_out.push(ratio);
         tally.near.count((ratio - 1.0).abs() <= 0.05);
@@ -88,14 +87,8 @@ fn print(factor: f64, tally: &Tally) {
     println!("| the same and nothing else claimed | {} |", tally.alone);
     println!("| truth named first | {} |", tally.named_first);
     println!("| more than one effect claimed | {} |", tally.more);
-    println!(
-        "| alias sets with a surplus member beyond 2 sigma | {} |",
-        tally.surplus
-    );
-    println!(
-        "| alias sets with a surplus member beyond {FAR_SIGMA} sigma | {} |",
-        tally.far
-    );
+    println!("| alias sets with a surplus member beyond 2 sigma | {} |", tally.surplus);
+    println!("| alias sets with a surplus member beyond {FAR_SIGMA} sigma | {} |", tally.far);
     println!("| held-out rms within 5 % of the oracle's | {} |", tally.near);
     println!(
         "| held-out rms over the oracle's, median and 95 % | {:.3}, {:.3} |",
@@ -125,17 +118,10 @@ fn an_effect_at_five_times_the_smallest_is_found() {
     assert!(tally.near.is_consistent_with_at_least(0.90), "{}", tally.near);
     // Tolerance: four standard errors of a root mean square.
     let (rms, count) = (tally.after.rms(), tally.after.0.len() as f64);
-    assert!(
-        rms < 1.2 * (1.0 + 4.0 / (2.0 * count).sqrt()),
-        "pulls {rms} of {count}"
-    );
+    assert!(rms < 1.2 * (1.0 + 4.0 / (2.0 * count).sqrt()), "pulls {rms} of {count}");
     // Few effects bias the parameters with which they are confounded; a small study may contain none.
     let many = sessions() >= 64;
-    assert!(
-        !many || tally.before.rms() > rms,
-        "no bias before: {}",
-        tally.before.rms()
-    );
+    assert!(!many || tally.before.rms() > rms, "no bias before: {}", tally.before.rms());
 }
 
 #[test]

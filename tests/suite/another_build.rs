@@ -1,4 +1,5 @@
-//! Another build of the same sources gives the same output: every printed line, and the numbers of the JSON within rounding.
+//! Another build of the same sources gives the same output: every printed line, and the numbers of the JSON within
+//! rounding.
 //!
 //! `ABBE_OTHER` names the other binary, such as `target/release/abbe`. Without it the tests compare nothing and pass.
 
@@ -20,7 +21,8 @@ fn other() -> Option<PathBuf> {
     Some(fs::canonicalize(&named).unwrap_or_else(|cause| panic!("ABBE_OTHER={}: {cause}", named.display())))
 }
 
-/// Collects the differences of two documents beyond rounding in `found`, and the largest difference within rounding in `gap`.
+/// Collects the differences of two documents beyond rounding in `found`, and the largest difference within rounding in
+/// `gap`.
 fn differences(path: &str, a: &Value, b: &Value, found: &mut Vec<String>, gap: &mut f64) {
     match (a, b) {
         (Value::Number(a), Value::Number(b)) => {
@@ -87,21 +89,14 @@ fn the_same(session: &str, more: &str, commands: &[Vec<&str>]) {
         if !more.is_empty() {
             // Coarse steps, so that a search takes seconds.
             let text = fs::read_to_string(&plan).unwrap();
-            let text = text
-                .replace("step_deg = 0.25", "step_deg = 3")
-                .replace("step_deg = 0.5", "step_deg = 6");
+            let text = text.replace("step_deg = 0.25", "step_deg = 3").replace("step_deg = 0.5", "step_deg = 6");
             fs::write(&plan, text + more).unwrap();
         }
         outputs(binary, folder.path(), commands)
     };
     let this = copied(Path::new(env!("CARGO_BIN_EXE_abbe")));
     for ((command, this), other) in commands.iter().zip(this).zip(copied(&other)) {
-        let lines: Vec<_> = this
-            .0
-            .lines()
-            .zip(other.0.lines())
-            .filter(|(a, b)| a != b)
-            .collect();
+        let lines: Vec<_> = this.0.lines().zip(other.0.lines()).filter(|(a, b)| a != b).collect();
         assert!(lines.is_empty(), "{command:?}: {lines:#?}");
         assert_eq!(this.0.lines().count(), other.0.lines().count(), "{command:?}");
         let (mut found, mut gap) = (Vec::new(), 0.0);
@@ -117,18 +112,10 @@ fn the_same(session: &str, more: &str, commands: &[Vec<&str>]) {
 #[test]
 fn measured_sessions() {
     for session in ["hermle-c600u", "table-and-head", "tilting-head"] {
-        the_same(
-            &format!("{session}/measured"),
-            "",
-            &[vec!["fit", "session.toml"], vec!["trace", "session.toml"]],
-        );
+        the_same(&format!("{session}/measured"), "", &[vec!["fit", "session.toml"], vec!["trace", "session.toml"]]);
     }
     the_same("r-test/measured", "", &[vec!["fit", "session.toml"]]);
-    the_same(
-        "self-calibration/measured",
-        "",
-        &[vec!["fit", "session.toml", "--method", "self-calibration"]],
-    );
+    the_same("self-calibration/measured", "", &[vec!["fit", "session.toml", "--method", "self-calibration"]]);
 }
 
 #[test]

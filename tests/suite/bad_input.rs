@@ -1,4 +1,5 @@
-//! Unusable input at the command line: exit status 1, and a message that states the location, the finding and the remedy.
+//! Unusable input at the command line: exit status 1, and a message that states the location, the finding and the
+//! remedy.
 
 use std::fs;
 
@@ -21,8 +22,7 @@ workpiece_ball_mm = [0, 100, 0]
 spindle_ball_mm = [0, 0, 0]
 "#;
 
-const DATA: &str =
-    "time_s,run,c_deg,length_mm\n0,1,0,99.9990\n1,1,90,100.0010\n2,1,180,100.0000\n3,1,270,99.9995\n";
+const DATA: &str = "time_s,run,c_deg,length_mm\n0,1,0,99.9990\n1,1,90,100.0010\n2,1,180,100.0000\n3,1,270,99.9995\n";
 
 /// The message of `abbe fit` for an unusable session of three files.
 #[track_caller]
@@ -51,46 +51,29 @@ fn holds(stderr: &str, parts: &[&str]) {
 #[track_caller]
 fn with_session(from: &str, to: &str, parts: &[&str]) {
     assert!(SESSION.contains(from), "{from}");
-    holds(
-        &message_of(MACHINE, &SESSION.replacen(from, to, 1), Some(DATA)),
-        parts,
-    );
+    holds(&message_of(MACHINE, &SESSION.replacen(from, to, 1), Some(DATA)), parts);
 }
 
 #[track_caller]
 fn with_machine(from: &str, to: &str, parts: &[&str]) {
     assert!(MACHINE.contains(from), "{from}");
-    holds(
-        &message_of(&MACHINE.replacen(from, to, 1), SESSION, Some(DATA)),
-        parts,
-    );
+    holds(&message_of(&MACHINE.replacen(from, to, 1), SESSION, Some(DATA)), parts);
 }
 
 #[track_caller]
 fn with_data(from: &str, to: &str, parts: &[&str]) {
     assert!(DATA.contains(from), "{from}");
-    holds(
-        &message_of(MACHINE, SESSION, Some(&DATA.replace(from, to))),
-        parts,
-    );
+    holds(&message_of(MACHINE, SESSION, Some(&DATA.replace(from, to))), parts);
 }
 
 #[test]
 fn the_unchanged_session_is_valid() {
     let folder = tempfile::tempdir().unwrap();
-    for (name, text) in [
-        ("machine.toml", MACHINE),
-        ("session.toml", SESSION),
-        ("C100.csv", DATA),
-    ] {
+    for (name, text) in [("machine.toml", MACHINE), ("session.toml", SESSION), ("C100.csv", DATA)] {
         fs::write(folder.path().join(name), text).unwrap();
     }
     let output = abbe(&["fit", text(&folder.path().join("session.toml"))]);
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
 #[test]
@@ -98,29 +81,18 @@ fn an_unknown_key() {
     with_session(
         "noise_um",
         "nois_um",
-        &[
-            "session.toml:6",
-            "has the unknown key `nois_um`",
-            "did you mean `noise_um`?",
-        ],
+        &["session.toml:6", "has the unknown key `nois_um`", "did you mean `noise_um`?"],
     );
 }
 
 #[test]
 fn an_unknown_column() {
-    with_data(
-        "c_deg",
-        "c_degree",
-        &["C100.csv:1", "`c_degree`", "did you mean `c_deg`?"],
-    );
+    with_data("c_deg", "c_degree", &["C100.csv:1", "`c_degree`", "did you mean `c_deg`?"]);
 }
 
 #[test]
 fn a_missing_data_file() {
-    holds(
-        &message_of(MACHINE, SESSION, None),
-        &["session.toml:10", "C100.csv", "--data"],
-    );
+    holds(&message_of(MACHINE, SESSION, None), &["session.toml:10", "C100.csv", "--data"]);
 }
 
 #[test]
@@ -131,23 +103,13 @@ fn text_in_a_numeric_cell() {
 #[test]
 fn a_decimal_comma_undeclared() {
     let comma = "time_s;run;c_deg;length_mm\n0;1;0;99,9990\n1;1;90;100,0010\n";
-    let session = SESSION.replace(
-        "data = \"C100.csv\"",
-        "data = \"C100.csv\"\nformat = { separator = \";\" }",
-    );
-    holds(
-        &message_of(MACHINE, &session, Some(comma)),
-        &["C100.csv:2", "99,9990", "decimal = \",\""],
-    );
+    let session = SESSION.replace("data = \"C100.csv\"", "data = \"C100.csv\"\nformat = { separator = \";\" }");
+    holds(&message_of(MACHINE, &session, Some(comma)), &["C100.csv:2", "99,9990", "decimal = \",\""]);
 }
 
 #[test]
 fn a_time_that_runs_backwards() {
-    with_data(
-        "2,1,180",
-        "0.5,1,180",
-        &["C100.csv:4", "time_s", "time decreases"],
-    );
+    with_data("2,1,180", "0.5,1,180", &["C100.csv:4", "time_s", "time decreases"]);
 }
 
 #[test]
@@ -159,37 +121,24 @@ fn not_a_number() {
 fn an_empty_data_file() {
     holds(&message_of(MACHINE, SESSION, Some("")), &["C100.csv", "empty"]);
     let header = DATA.lines().next().unwrap();
-    holds(
-        &message_of(MACHINE, SESSION, Some(header)),
-        &["C100.csv", "a header without readings"],
-    );
+    holds(&message_of(MACHINE, SESSION, Some(header)), &["C100.csv", "a header without readings"]);
 }
 
 #[test]
 fn one_reading() {
     let one: Vec<&str> = DATA.lines().take(2).collect();
-    holds(
-        &message_of(MACHINE, SESSION, Some(&one.join("\n"))),
-        &["C100.csv", "one reading"],
-    );
+    holds(&message_of(MACHINE, SESSION, Some(&one.join("\n"))), &["C100.csv", "one reading"]);
 }
 
 #[test]
 fn duplicate_test_names() {
     let test = &SESSION[SESSION.find("[[test]]").unwrap()..];
-    holds(
-        &message_of(MACHINE, &format!("{SESSION}\n{test}"), Some(DATA)),
-        &["session.toml:16", "C100"],
-    );
+    holds(&message_of(MACHINE, &format!("{SESSION}\n{test}"), Some(DATA)), &["session.toml:16", "C100"]);
 }
 
 #[test]
 fn a_chain_without_its_bed() {
-    with_machine(
-        "w C A b Y X Z t",
-        "w C A Y X Z t",
-        &["machine.toml:1", "0 beds `b`", "w C A b Y X Z t"],
-    );
+    with_machine("w C A b Y X Z t", "w C A Y X Z t", &["machine.toml:1", "0 beds `b`", "w C A b Y X Z t"]);
 }
 
 #[test]
@@ -200,13 +149,8 @@ fn an_axis_without_a_table_and_a_table_without_an_axis() {
 
 #[test]
 fn an_effect_on_an_axis_that_the_machine_lacks() {
-    let effect =
-        "[[effect]]\ncomponent = \"EZB\"\ndriver = \"C\"\nshape = \"harmonic\"\norder = 2\n\n[[test]]";
-    with_session(
-        "[[test]]",
-        effect,
-        &["session.toml:9", "has no axis `B`", "its axes are C, A, Y, X, Z"],
-    );
+    let effect = "[[effect]]\ncomponent = \"EZB\"\ndriver = \"C\"\nshape = \"harmonic\"\norder = 2\n\n[[test]]";
+    with_session("[[test]]", effect, &["session.toml:9", "has no axis `B`", "its axes are C, A, Y, X, Z"]);
 }
 
 #[test]
@@ -214,20 +158,12 @@ fn a_bar_that_cannot_reach() {
     with_session(
         "[0, 100, 0]",
         "[0, 100, 60]",
-        &[
-            "session.toml:8",
-            "a bar of 100.0000 mm cannot reach",
-            "116.619 mm apart",
-            "degrees read as radians",
-        ],
+        &["session.toml:8", "a bar of 100.0000 mm cannot reach", "116.619 mm apart", "degrees read as radians"],
     );
     // Degrees in a column of radians: the balls keep their distance at 0 only.
     let session = SESSION.replace("spindle_ball_mm = [0, 0, 0]", "spindle_ball_mm = [0, 100, 100]");
     let data = "a_rad,length_mm\n0,100.0\n30,100.0\n60,100.0\n";
-    holds(
-        &message_of(MACHINE, &session, Some(data)),
-        &["cannot reach", "degrees read as radians"],
-    );
+    holds(&message_of(MACHINE, &session, Some(data)), &["cannot reach", "degrees read as radians"]);
 }
 
 #[test]
@@ -277,10 +213,7 @@ fn options_that_exclude_one_another() {
     ] {
         let output = abbe(&line.split(' ').collect::<Vec<_>>());
         assert_eq!(output.status.code(), Some(2), "{line}");
-        holds(
-            &String::from_utf8(output.stderr).unwrap(),
-            &["cannot be used with"],
-        );
+        holds(&String::from_utf8(output.stderr).unwrap(), &["cannot be used with"]);
     }
     for line in [
         "fit s.toml --points 9",
@@ -308,50 +241,30 @@ fn options_that_exclude_one_another() {
 
 #[test]
 fn help_has_examples_and_status_0() {
-    for arguments in [
-        &["--help"][..],
-        &["fit", "--help"],
-        &["simulate", "--help"],
-        &["new", "--help"],
-    ] {
+    for arguments in [&["--help"][..], &["fit", "--help"], &["simulate", "--help"], &["new", "--help"]] {
         let output = abbe(arguments);
         assert!(output.status.success());
-        assert!(
-            String::from_utf8(output.stdout).unwrap().contains("Example"),
-            "{arguments:?}"
-        );
+        assert!(String::from_utf8(output.stdout).unwrap().contains("Example"), "{arguments:?}");
     }
 }
 
-/// A text of `--only` or `--exclude` that no identifier contains is an error; otherwise the result would suggest that the effect is absent.
+/// A text of `--only` or `--exclude` that no identifier contains is an error; otherwise the result would suggest that
+/// the effect is absent.
 #[test]
 fn an_effect_that_the_library_does_not_have() {
     let session = super::ready("hermle-c600u/measured/session.toml");
     let asked = |words: &[&str]| abbe(&[&["trace", super::text(&session)], words].concat());
-    for words in [
-        &["--only", "EZB"][..],
-        &["--only", "EZC", "--only", "harmonics"],
-        &["--list", "--only", "ezc"],
-    ] {
+    for words in [&["--only", "EZB"][..], &["--only", "EZC", "--only", "harmonics"], &["--list", "--only", "ezc"]] {
         let output = asked(words);
         assert_eq!(output.status.code(), Some(1), "{words:?}");
         let stderr = String::from_utf8(output.stderr).unwrap();
         let misspelt = words[words.len() - 1];
-        holds(
-            &stderr,
-            &[
-                &format!("contains `{misspelt}` in its identifier"),
-                "abbe trace --list",
-            ],
-        );
+        holds(&stderr, &[&format!("contains `{misspelt}` in its identifier"), "abbe trace --list"]);
     }
     for words in [&["--exclude", ""][..], &["--only", "EZC", "--exclude", "ZC"]] {
         let output = asked(words);
         assert_eq!(output.status.code(), Some(1), "{words:?}");
-        holds(
-            &String::from_utf8(output.stderr).unwrap(),
-            &["no candidate effects remain"],
-        );
+        holds(&String::from_utf8(output.stderr).unwrap(), &["no candidate effects remain"]);
     }
     let output = asked(&["--only", "gain", "--exclude", "gravitation"]);
     assert!(output.status.success());
@@ -366,12 +279,7 @@ fn more_tests_than_the_limit() {
         let output = abbe(&["plan", super::text(&plan), "--no-effects", "--improve", tests]);
         assert_eq!(output.status.code(), Some(1));
         let stderr = String::from_utf8(output.stderr).unwrap();
-        holds(
-            &stderr,
-            &[&format!(
-                "`--improve {tests}`: a number of tests from 1 to 24 is expected"
-            )],
-        );
+        holds(&stderr, &[&format!("`--improve {tests}`: a number of tests from 1 to 24 is expected")]);
     }
 }
 
@@ -380,10 +288,6 @@ fn invalid_files() {
     for path in ["nowhere/session.toml", "."] {
         let output = abbe(&["fit", path]);
         assert_eq!(output.status.code(), Some(1));
-        assert!(
-            String::from_utf8(output.stderr)
-                .unwrap()
-                .contains("the session file")
-        );
+        assert!(String::from_utf8(output.stderr).unwrap().contains("the session file"));
     }
 }

@@ -12,8 +12,8 @@ const RADIUS_MM: f64 = 100.0;
 const FEED_MM_S: f64 = 20.0;
 const STEP: f64 = PI / 360.0;
 
-/// A reading of a circle: path angle, path direction, direction of each axis, path angle since the reversal of each axis, and the end of
-/// that reversal.
+/// A reading of a circle: path angle, path direction, direction of each axis, path angle since the reversal of each
+/// axis, and the end of that reversal.
 struct At {
     angle: f64,
     path: f64,
@@ -21,7 +21,8 @@ struct At {
     turned: [Option<(f64, f64)>; 2],
 }
 
-/// Writes a session of a circle in XY with the tool displaced by `error`, mm along X and Y: exact geometry, no formula of the diagnosis.
+/// Writes a session of a circle in XY with the tool displaced by `error`, mm along X and Y: exact geometry, no formula
+/// of the diagnosis.
 fn circle(folder: &Path, directions: &[f64], time: bool, error: impl Fn(&At) -> [f64; 2]) -> Value {
     let mut rows = String::from(if time { "time_s," } else { "" });
     rows.push_str("run,x_mm,y_mm,length_mm\n");
@@ -30,11 +31,7 @@ fn circle(folder: &Path, directions: &[f64], time: bool, error: impl Fn(&At) -> 
         for path in directions {
             run += 1;
             for k in 0..=720 {
-                let angle = if *path > 0.0 {
-                    k as f64 * STEP
-                } else {
-                    TAU - k as f64 * STEP
-                };
+                let angle = if *path > 0.0 { k as f64 * STEP } else { TAU - k as f64 * STEP };
                 // The reading at a reversal belongs to the travel before it.
                 let middle = angle - path * STEP / 2.0;
                 let middle = if k == 0 { angle + path * STEP / 2.0 } else { middle };
@@ -45,12 +42,7 @@ fn circle(folder: &Path, directions: &[f64], time: bool, error: impl Fn(&At) -> 
                     let again = (passed / PI).floor();
                     (passed > 0.0).then(|| (passed - again * PI, if again == 0.0 { end } else { -end }))
                 });
-                let at = At {
-                    angle,
-                    path: *path,
-                    travels,
-                    turned,
-                };
+                let at = At { angle, path: *path, travels, turned };
                 let off = error(&at);
                 let (x, y) = (RADIUS_MM * angle.cos(), RADIUS_MM * angle.sin());
                 let length = (x + off[0]).hypot(y + off[1]);
@@ -83,8 +75,7 @@ fn figures(session: &Path) -> Vec<Value> {
 
 fn fault<'v>(test: &'v Value, fault: &str, axes: &str) -> Option<&'v Value> {
     let all = test["diagnosis"].as_array().unwrap();
-    all.iter()
-        .find(|found| found["fault"] == fault && found["axes"] == axes)
+    all.iter().find(|found| found["fault"] == fault && found["axes"] == axes)
 }
 
 /// A figure of a fault with its uncertainty.
@@ -97,10 +88,7 @@ fn figure(test: &Value, name: &str, axes: &str, id: &str) -> (f64, f64) {
 
 fn is(test: &Value, name: &str, axes: &str, id: &str, expected: f64, within: f64) {
     let (value, _) = figure(test, name, axes, id);
-    assert!(
-        (value - expected).abs() < within,
-        "{name} of {axes}, {id}: {value}, not {expected}"
-    );
+    assert!((value - expected).abs() < within, "{name} of {axes}, {id}: {value}, not {expected}");
 }
 
 fn um(test: &Value, key: &str) -> f64 {
@@ -118,9 +106,7 @@ fn a_cubic_is_not_called_cyclic() {
             let test = circle(folder.path(), &[1.0, -1.0], true, |at| {
                 // A linear congruential generator, independent of the generators of the workspace.
                 let mut state = drawn.borrow_mut();
-                **state = state
-                    .wrapping_mul(6364136223846793005)
-                    .wrapping_add(1442695040888963407);
+                **state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
                 let random = ((**state >> 33) as f64 / (1_u64 << 31) as f64 - 0.5) * 3.46 * noise;
                 let q = [at.angle.cos(), at.angle.sin()];
                 let mut off = [random * q[0], random * q[1]];
@@ -136,19 +122,15 @@ fn a_cubic_is_not_called_cyclic() {
             let sign = if axis == 0 { 1.0 } else { -1.0 };
             is(&test, "scale mismatch", "XY", "ratio", sign * 40.0, 0.5);
             let undetermined = test["not_identifiable"].to_string();
-            assert!(
-                undetermined.contains("third-order errors of X and Y are confounded"),
-                "{undetermined}"
-            );
+            assert!(undetermined.contains("third-order errors of X and Y are confounded"), "{undetermined}");
         }
     }
-    let test = circle(folder.path(), &[1.0, -1.0], true, |at| {
-        [0.0, 2e-3 * at.angle.cos().powi(3)]
-    });
+    let test = circle(folder.path(), &[1.0, -1.0], true, |at| [0.0, 2e-3 * at.angle.cos().powi(3)]);
     is(&test, "third-order straightness", "XY", "difference", 2.0, 0.05);
 }
 
-/// Signs in the diagnosis are those of the effects of the same name, for either direction of the axes and either side of the machine.
+/// Signs in the diagnosis are those of the effects of the same name, for either direction of the axes and either side
+/// of the machine.
 #[test]
 fn figures_have_the_signs_of_error_motions() {
     let folder = tempfile::tempdir().unwrap();
@@ -205,12 +187,7 @@ fn figures_have_the_signs_of_error_motions() {
 #[test]
 fn an_outlier_is_excluded() {
     let folder = tempfile::tempdir().unwrap();
-    let ellipse = |at: &At| {
-        [
-            40e-6 * RADIUS_MM * at.angle.cos(),
-            10e-6 * RADIUS_MM * at.angle.sin(),
-        ]
-    };
+    let ellipse = |at: &At| [40e-6 * RADIUS_MM * at.angle.cos(), 10e-6 * RADIUS_MM * at.angle.sin()];
     let outwards = |at: &At, mm: f64| [mm * at.angle.cos(), mm * at.angle.sin()];
     for (chip_mm, there) in [(0.03, 137), (-0.02, 400)] {
         let test = circle(folder.path(), &[1.0, -1.0], true, |at| {
@@ -220,10 +197,7 @@ fn an_outlier_is_excluded() {
             [smooth[0] + chip[0], smooth[1] + chip[1]]
         });
         for direction in test["directions"].as_array().unwrap() {
-            assert!(
-                (um(direction, "circular_deviation_um") - 3.0).abs() < 0.01,
-                "{test}"
-            );
+            assert!((um(direction, "circular_deviation_um") - 3.0).abs() < 0.01, "{test}");
             assert!((um(direction, "radial_deviation_max_um") - 4.0).abs() < 0.01);
             assert!((um(direction, "radial_deviation_min_um") - 1.0).abs() < 0.01);
         }
@@ -240,16 +214,11 @@ fn every_fault_agrees_with_its_closed_form() {
     let q = |at: &At| [RADIUS_MM * at.angle.cos(), RADIUS_MM * at.angle.sin()];
 
     // The scale of X exceeds that of Y by 30 ppm: an ellipse.
-    let test = circle(folder.path(), &both, true, |at| {
-        [40e-6 * q(at)[0], 10e-6 * q(at)[1]]
-    });
+    let test = circle(folder.path(), &both, true, |at| [40e-6 * q(at)[0], 10e-6 * q(at)[1]]);
     is(&test, "scale mismatch", "XY", "ratio", 30.0, 0.01);
     is(&test, "scale mismatch", "XY", "over_diameter", 6.0, 0.002);
     for direction in test["directions"].as_array().unwrap() {
-        assert!(
-            (um(direction, "circular_deviation_um") - 3.0).abs() < 0.006,
-            "{test}"
-        );
+        assert!((um(direction, "circular_deviation_um") - 3.0).abs() < 0.006, "{test}");
         assert!((um(direction, "radial_deviation_max_um") - 4.0).abs() < 0.006);
         assert!((um(direction, "radial_deviation_min_um") - 1.0).abs() < 0.006);
     }
@@ -266,10 +235,7 @@ fn every_fault_agrees_with_its_closed_form() {
 
     // X lags by 0.3 ms, Y by 0.1 ms.
     let test = circle(folder.path(), &both, true, |at| {
-        let speed = [
-            -at.path * FEED_MM_S * at.angle.sin(),
-            at.path * FEED_MM_S * at.angle.cos(),
-        ];
+        let speed = [-at.path * FEED_MM_S * at.angle.sin(), at.path * FEED_MM_S * at.angle.cos()];
         [-0.3e-3 * speed[0], -0.1e-3 * speed[1]]
     });
     is(&test, "servo mismatch", "XY", "delay", 0.2, 1e-3);
@@ -278,17 +244,14 @@ fn every_fault_agrees_with_its_closed_form() {
     assert!((um(&test, "hysteresis_um") - 4.0).abs() < 0.01, "{test}");
 
     // X loses 3 µm at its positive end and 1 µm at the other.
-    let test = circle(folder.path(), &both, true, |at| {
-        [-0.5 * (2e-3 + 1e-3 * at.angle.cos()) * at.travels[0], 0.0]
-    });
+    let test = circle(folder.path(), &both, true, |at| [-0.5 * (2e-3 + 1e-3 * at.angle.cos()) * at.travels[0], 0.0]);
     is(&test, "backlash", "X", "X+", 3.0, 0.02);
     is(&test, "backlash", "X", "X-", 1.0, 0.02);
     is(&test, "backlash", "Y", "Y+", 0.0, 0.02);
 
     // X has a lateral play of 2 µm along Y and a bow of 5 µm.
-    let test = circle(folder.path(), &both, true, |at| {
-        [0.0, -0.5 * 2e-3 * at.travels[0] + 5e-3 * at.angle.cos().powi(2)]
-    });
+    let test =
+        circle(folder.path(), &both, true, |at| [0.0, -0.5 * 2e-3 * at.travels[0] + 5e-3 * at.angle.cos().powi(2)]);
     is(&test, "lateral play", "X", "play", 2.0, 0.02);
     is(&test, "straightness", "X", "sagitta", 5.0, 0.02);
     is(&test, "straightness", "Y", "sagitta", 0.0, 0.02);
@@ -315,9 +278,7 @@ fn every_fault_agrees_with_its_closed_form() {
 #[test]
 fn quantities_that_one_direction_does_not_determine_are_listed() {
     let folder = tempfile::tempdir().unwrap();
-    let test = circle(folder.path(), &[1.0], false, |at| {
-        [-20e-6 * RADIUS_MM * at.angle.sin(), 0.0]
-    });
+    let test = circle(folder.path(), &[1.0], false, |at| [-20e-6 * RADIUS_MM * at.angle.sin(), 0.0]);
     assert!(fault(&test, "servo mismatch", "XY").is_none() && fault(&test, "lateral play", "X").is_none());
     is(&test, "squareness", "XY", "angle", 20.0, 0.01);
     let undetermined = test["not_identifiable"].to_string();
@@ -330,27 +291,18 @@ fn quantities_that_one_direction_does_not_determine_are_listed() {
     // Without time a lag is stated as a length.
     let test = circle(folder.path(), &[1.0, -1.0], false, |_| [0.0, 0.0]);
     let undetermined = test["not_identifiable"].to_string();
-    assert!(
-        undetermined.contains("not in ms") && undetermined.contains("one feed"),
-        "{undetermined}"
-    );
+    assert!(undetermined.contains("not in ms") && undetermined.contains("one feed"), "{undetermined}");
     figure(&test, "servo mismatch", "XY", "lag");
 }
 
 #[test]
 fn the_faults_of_the_plant_are_found_within_their_uncertainty() {
-    let motion = |freedom, axis, shape, size| {
-        Injected::new(Component::Motion(freedom, axis), Driver::Axis(axis), shape, size)
-    };
+    let motion =
+        |freedom, axis, shape, size| Injected::new(Component::Motion(freedom, axis), Driver::Axis(axis), shape, size);
     let backlash = motion(Freedom::Y, AxisName::Y, Shape::Backlash, 4.0);
     let play = motion(Freedom::Y, AxisName::X, Shape::Backlash, 1.5);
     let lag = motion(Freedom::X, AxisName::X, Shape::Lag, 0.05);
-    let square = Injected::new(
-        Component::Location(Freedom::C, AxisName::Y),
-        Driver::Nothing,
-        Shape::Constant,
-        3.0,
-    );
+    let square = Injected::new(Component::Location(Freedom::C, AxisName::Y), Driver::Nothing, Shape::Constant, 3.0);
     let mut pulls = Vec::new();
     for seed in 0..4 {
         let mut recipe = Recipe::new(Kind::LinearCircles, 40 + seed);
@@ -374,16 +326,10 @@ fn the_faults_of_the_plant_are_found_within_their_uncertainty() {
             ] {
                 let (value, u) = figure(&test, name, axes, id);
                 pulls.push((value - expected) / u);
-                assert!(
-                    (value - expected).abs() < 4.5 * u,
-                    "{name} {axes} {id}: {value} ± {u}, not {expected}"
-                );
+                assert!((value - expected).abs() < 4.5 * u, "{name} {axes} {id}: {value} ± {u}, not {expected}");
             }
             assert!(um(&test, "diagnosis_rms_um") < 0.35, "{test}");
-            assert!(
-                test["not_identifiable"].to_string().contains("compare with XY-F"),
-                "{test}"
-            );
+            assert!(test["not_identifiable"].to_string().contains("compare with XY-F"), "{test}");
         }
     }
     let rms = (pulls.iter().map(|pull| pull * pull).sum::<f64>() / pulls.len() as f64).sqrt();
@@ -397,23 +343,17 @@ fn rotary_axes_have_figures_without_a_diagnosis() {
     let axial_motion = Injected::new(
         Component::Motion(Freedom::X, AxisName::C),
         Driver::Axis(AxisName::C),
-        Shape::Harmonic {
-            order: 3,
-            phase_deg: 0.0,
-        },
+        Shape::Harmonic { order: 3, phase_deg: 0.0 },
         5.0,
     );
     let folder = tempfile::tempdir().unwrap();
-    Recipe::new(Kind::Rotary, 7)
-        .with(axial_motion)
-        .draw()
-        .write(folder.path())
-        .unwrap();
+    Recipe::new(Kind::Rotary, 7).with(axial_motion).draw().write(folder.path()).unwrap();
     let tests = figures(&folder.path().join("session.toml"));
     let c = tests.iter().find(|test| test["test"] == "C100").unwrap();
     assert_eq!(c["axes"], "C");
     assert!(c.get("diagnosis").is_none() && c.get("radius_mm").is_none());
-    // EXC of order 3 along a stationary bar gives orders 2 and 4 of half its size: 5·cos 3θ·cos θ, a range of twice 5 µm plus the noise.
+    // EXC of order 3 along a stationary bar gives orders 2 and 4 of half its size: 5·cos 3θ·cos θ, a range of twice 5
+    // µm plus the noise.
     let g = um(c, "bidirectional_circular_deviation_um");
     assert!((8.0..12.5).contains(&g), "{c}");
 }
@@ -439,9 +379,7 @@ fn the_sample_of_another_simulator_is_diagnosed() {
 #[test]
 fn a_short_arc_is_reported_as_an_arc() {
     let folder = tempfile::tempdir().unwrap();
-    circle(folder.path(), &[1.0, -1.0], true, |at| {
-        [40e-6 * RADIUS_MM * at.angle.cos(), 0.0]
-    });
+    circle(folder.path(), &[1.0, -1.0], true, |at| [40e-6 * RADIUS_MM * at.angle.cos(), 0.0]);
     let file = folder.path().join("xy.csv");
     let table = std::fs::read_to_string(&file).unwrap();
     let kept: Vec<&str> = table
@@ -463,8 +401,5 @@ fn a_short_arc_is_reported_as_an_arc() {
     );
     // 40 µm/m of X alone, from the centre of the set-up: 40·cos²θ·R, between 30° and 90°.
     let direction = &test["directions"][0];
-    assert!(
-        (um(direction, "circular_deviation_um") - 3.0).abs() < 0.06,
-        "{test}"
-    );
+    assert!((um(direction, "circular_deviation_um") - 3.0).abs() < 0.06, "{test}");
 }

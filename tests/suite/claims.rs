@@ -1,5 +1,5 @@
-//! The rule of a claim: an effect exceeds the null distribution *and* lowers the held-out error by more than the standard error of the
-//! fall. It holds for any run column.
+//! The rule of a claim: an effect exceeds the null distribution *and* lowers the held-out error by more than the
+//! standard error of the fall. It holds for any run column.
 
 use abbe::identify::results::{EffectName, TraceResult};
 use abbe::identify::trace::{TraceOptions, trace};
@@ -18,10 +18,7 @@ fn session_of(recipe: &Recipe) -> Session {
 }
 
 fn traced(session: &Session, significance: f64) -> TraceResult {
-    let options = TraceOptions {
-        significance,
-        ..TraceOptions::default()
-    };
+    let options = TraceOptions { significance, ..TraceOptions::default() };
     trace(session, &options, &|_| true).unwrap().result
 }
 
@@ -30,11 +27,7 @@ fn assert_consistent(result: &TraceResult, what: &str) {
     let found = !result.effects.is_empty();
     let named = matches!(result.verdict.as_str(), "explained" | "partly-explained");
     assert!(found || !named, "{what}: {}", result.verdict);
-    assert_eq!(
-        result.verdict == "clean",
-        !found && !result.remainder.structured,
-        "{what}"
-    );
+    assert_eq!(result.verdict == "clean", !found && !result.remainder.structured, "{what}");
     if found {
         assert_ne!(result.residual_before, "no structure beyond noise", "{what}");
         let (before, after) = (result.before.heldout_rms_um, result.after.heldout_rms_um);
@@ -44,14 +37,12 @@ fn assert_consistent(result: &TraceResult, what: &str) {
         assert!((after / before - 1.0).abs() < 1e-9, "{what}: {before} {after}");
     }
     for rejected in &result.rejected_candidates {
-        assert!(
-            rejected.heldout_decrease_um <= rejected.u_heldout_decrease_um,
-            "{what}: {rejected:?}"
-        );
+        assert!(rejected.heldout_decrease_um <= rejected.u_heldout_decrease_um, "{what}: {rejected:?}");
     }
 }
 
-/// Noise of 0.3 µm for which a backlash of 0.076 ± 0.020 µm exceeds the whole null distribution, although the held-out error does not fall.
+/// Noise of 0.3 µm for which a backlash of 0.076 ± 0.020 µm exceeds the whole null distribution, although the held-out
+/// error does not fall.
 #[test]
 fn an_effect_that_does_not_lower_the_held_out_error_is_not_claimed() {
     let recipe = Recipe::new(Kind::TiltedTable, 27_035);
@@ -61,8 +52,8 @@ fn an_effect_that_does_not_lower_the_held_out_error_is_not_claimed() {
     assert_consistent(&result, &result.residual_before);
 }
 
-/// White noise of 0.20 µm without an effect. At a significance level at which candidates exceed the null distribution, the held-out error
-/// must reject them.
+/// White noise of 0.20 µm without an effect. At a significance level at which candidates exceed the null distribution,
+/// the held-out error must reject them.
 #[test]
 fn noise_beyond_the_null_distribution_fails_the_held_out_rule() {
     let mut rejected = 0;
@@ -92,25 +83,20 @@ fn mislabel(session: &mut Session, how: &str) {
     }
 }
 
-/// The verdict does not depend on the numbers of the runs, and a warning names a column that does not number traversals.
+/// The verdict does not depend on the numbers of the runs, and a warning names a column that does not number
+/// traversals.
 #[test]
 fn mislabelled_runs_cause_neither_false_claims_nor_missed_effects() {
     let axial_motion = Injected::new(
         Component::Motion(Freedom::Z, AxisName::C),
         Driver::Axis(AxisName::C),
-        Shape::Harmonic {
-            order: 3,
-            phase_deg: 20.0,
-        },
+        Shape::Harmonic { order: 3, phase_deg: 20.0 },
         1.0,
     );
     let is_axial_motion =
         |name: &EffectName| name.component == "EZC" && name.shape == "harmonic" && name.order == Some(3);
     for effects in [vec![], vec![axial_motion]] {
-        let recipe = Recipe {
-            effects,
-            ..Recipe::new(Kind::Rotary, 11)
-        };
+        let recipe = Recipe { effects, ..Recipe::new(Kind::Rotary, 11) };
         let session = session_of(&recipe);
         for how in MISLABELLED {
             let mut session = session.clone();
@@ -127,10 +113,7 @@ fn mislabelled_runs_cause_neither_false_claims_nor_missed_effects() {
             } else {
                 assert_eq!(result.verdict, "clean", "{what}");
             }
-            let named = result
-                .warnings
-                .iter()
-                .any(|warning| warning.contains("`run` column"));
+            let named = result.warnings.iter().any(|warning| warning.contains("`run` column"));
             assert_eq!(named, how != "all one", "{what}: {:?}", result.warnings);
         }
     }

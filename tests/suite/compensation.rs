@@ -1,4 +1,5 @@
-//! Compensation tables evaluated as by the control: the correction of the command is the identified curve with the opposite sign.
+//! Compensation tables evaluated as by the control: the correction of the command is the identified curve with the
+//! opposite sign.
 
 use std::path::Path;
 
@@ -25,12 +26,7 @@ fn identified(folder: &Path) -> std::path::PathBuf {
         path = { kind = \"follow\", axis = \"C\", offset = \"tangential\", step_deg = 1 }\n";
     std::fs::write(&plan, text_of).unwrap();
     let out = folder.join("run");
-    let mut arguments = vec![
-        "simulate".to_string(),
-        text(&plan).into(),
-        "--out".into(),
-        text(&out).into(),
-    ];
+    let mut arguments = vec!["simulate".to_string(), text(&plan).into(), "--out".into(), text(&out).into()];
     for (flag, value) in [
         ("--error", "EX0C=12um"),
         ("--error", "EC0Y=5arcsec"),
@@ -52,40 +48,23 @@ fn identified(folder: &Path) -> std::path::PathBuf {
 /// The coefficients that `abbe fit` reports; the expected curves use only these.
 fn coefficients(folder: &Path, session: &Path) -> impl Fn(&str) -> f64 {
     let file = folder.join("fit.json");
-    assert!(
-        abbe(&["fit", text(session), "--json", text(&file)])
-            .status
-            .success()
-    );
+    assert!(abbe(&["fit", text(session), "--json", text(&file)]).status.success());
     let fit: Value = serde_json::from_slice(&std::fs::read(file).unwrap()).unwrap();
     move |id: &str| {
         let parameters = fit["parameters"].as_array().unwrap();
         let found = parameters.iter().find(|parameter| parameter["id"] == id);
-        found.unwrap_or_else(|| panic!("{id} in {parameters:?}"))["value"]
-            .as_f64()
-            .unwrap()
+        found.unwrap_or_else(|| panic!("{id} in {parameters:?}"))["value"].as_f64().unwrap()
     }
 }
 
 fn tables(session: &Path, out: &Path, control: &str) -> String {
-    let run = abbe(&[
-        "fit",
-        text(session),
-        "--compensation",
-        text(out),
-        "--control",
-        control,
-        "--points",
-        "41",
-    ]);
+    let run = abbe(&["fit", text(session), "--compensation", text(out), "--control", control, "--points", "41"]);
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
     String::from_utf8(run.stdout).unwrap()
 }
 
 fn numbers(line: &str) -> Vec<f64> {
-    line.split_whitespace()
-        .map(|cell| cell.parse().unwrap())
-        .collect()
+    line.split_whitespace().map(|cell| cell.parse().unwrap()).collect()
 }
 
 #[test]
@@ -109,32 +88,17 @@ fn tables_correct_by_the_negative_identified_curve() {
     let out = folder.join("linuxcnc");
     let printed = tables(&session, &out, "linuxcnc");
     assert!(printed.contains("COMP_FILE_TYPE = 0"), "{printed}");
-    assert!(
-        printed.contains("EYX: COMP_FILE compensates the positioning of a joint only"),
-        "{printed}"
-    );
-    assert!(
-        printed.contains("EXX~X:lag: a table over the position"),
-        "{printed}"
-    );
-    assert!(
-        printed.contains("EX0C: a location error belongs in the kinematics"),
-        "{printed}"
-    );
+    assert!(printed.contains("EYX: COMP_FILE compensates the positioning of a joint only"), "{printed}");
+    assert!(printed.contains("EXX~X:lag: a table over the position"), "{printed}");
+    assert!(printed.contains("EX0C: a location error belongs in the kinematics"), "{printed}");
     type Curve<'c> = &'c dyn Fn(f64, f64) -> f64;
     // Y counts against Y of R: an error of +e of its body in R is a positioning error of −e.
-    let expected: [(&str, Curve<'_>); 3] = [
-        ("X", &|x, _| exx(x)),
-        ("Y", &|_, direction| -eyy(direction)),
-        ("C", &|c, _| ecc_deg(c)),
-    ];
+    let expected: [(&str, Curve<'_>); 3] =
+        [("X", &|x, _| exx(x)), ("Y", &|_, direction| -eyy(direction)), ("C", &|c, _| ecc_deg(c))];
     for (axis, error) in expected {
         let table = std::fs::read_to_string(out.join(format!("{axis}.comp"))).unwrap();
         // The uncertainty follows the three numbers that the control reads.
-        let rows: Vec<Vec<f64>> = table
-            .lines()
-            .map(|line| numbers(&line.replace("# u", "")))
-            .collect();
+        let rows: Vec<Vec<f64>> = table.lines().map(|line| numbers(&line.replace("# u", ""))).collect();
         assert_eq!(rows.len(), 41);
         // The uncertainty of a polynomial is zero at its zero.
         assert!(rows.iter().all(|row| (0.0..1e-3).contains(&row[3])) && rows[0][3] > 0.0);
@@ -143,11 +107,7 @@ fn tables_correct_by_the_negative_identified_curve() {
             for (column, direction) in [(1, 1.0), (2, -1.0)] {
                 let correction = row[0] - row[column];
                 let error = error(row[0], direction);
-                assert!(
-                    (correction + error).abs() < 2e-6,
-                    "{axis} at {}: {correction}, error {error}",
-                    row[0]
-                );
+                assert!((correction + error).abs() < 2e-6, "{axis} at {}: {correction}, error {error}", row[0]);
             }
         }
     }
@@ -157,24 +117,15 @@ fn tables_correct_by_the_negative_identified_curve() {
     tables(&session, &out, "heidenhain");
     let table = std::fs::read_to_string(out.join("X.COM")).unwrap();
     let mut lines = table.lines();
-    assert_eq!(
-        lines.next().unwrap().split_whitespace().collect::<Vec<_>>(),
-        ["AXISPOS", "X", "Y"]
-    );
+    assert_eq!(lines.next().unwrap().split_whitespace().collect::<Vec<_>>(), ["AXISPOS", "X", "Y"]);
     for row in lines.map(numbers) {
         assert!((row[1] - exx(row[0])).abs() < 2e-6, "{row:?}");
     }
     let table = std::fs::read_to_string(out.join("Y.COM")).unwrap();
     let mut lines = table.lines();
-    assert_eq!(
-        lines.next().unwrap().split_whitespace().collect::<Vec<_>>(),
-        ["AXISPOS", "BACKLASH", "Y"]
-    );
+    assert_eq!(lines.next().unwrap().split_whitespace().collect::<Vec<_>>(), ["AXISPOS", "BACKLASH", "Y"]);
     for row in lines.map(numbers) {
-        assert!(
-            (row[1] + eyy(-1.0)).abs() < 2e-6 && (row[2] + eyy(1.0)).abs() < 2e-6,
-            "{row:?}"
-        );
+        assert!((row[1] + eyy(-1.0)).abs() < 2e-6 && (row[2] + eyy(1.0)).abs() < 2e-6, "{row:?}");
     }
 
     // Beckhoff reads the errors, mm and rad, in blocks separated by #.
@@ -185,27 +136,14 @@ fn tables_correct_by_the_negative_identified_curve() {
         "{printed}"
     );
     let file = std::fs::read_to_string(out.join("volcomp.csv")).unwrap();
-    assert!(
-        file.contains("// standard uncertainty (k = 1), mm and rad: position, EXX, EYX"),
-        "{file}"
-    );
-    let blocks: Vec<Vec<&str>> = file
-        .split("#\n")
-        .map(|block| block.lines().filter(|line| !line.starts_with("//")).collect())
-        .collect();
-    assert_eq!(
-        blocks[0][0].split_whitespace().collect::<Vec<_>>(),
-        ["X0C", "C0Y"]
-    );
+    assert!(file.contains("// standard uncertainty (k = 1), mm and rad: position, EXX, EYX"), "{file}");
+    let blocks: Vec<Vec<&str>> =
+        file.split("#\n").map(|block| block.lines().filter(|line| !line.starts_with("//")).collect()).collect();
+    assert_eq!(blocks[0][0].split_whitespace().collect::<Vec<_>>(), ["X0C", "C0Y"]);
     let location = numbers(blocks[0][1]);
     assert!((location[0] - 1e-3 * value("EX0C")).abs() < 1e-8);
     assert!((location[1] - (value("EC0Y") / 3600.0).to_radians()).abs() < 1e-9);
-    let block = |axis: &str| {
-        blocks
-            .iter()
-            .find(|block| block[0].split_whitespace().next() == Some(axis))
-            .unwrap()
-    };
+    let block = |axis: &str| blocks.iter().find(|block| block[0].split_whitespace().next() == Some(axis)).unwrap();
     for row in block("X")[1..].iter().map(|line| numbers(line)) {
         assert!((row[1] - exx(row[0])).abs() < 1e-7, "{row:?}");
     }
@@ -223,30 +161,19 @@ fn csv_and_json_hold_the_same_results() {
     let run = abbe(&["fit", text(&session), "--csv", text(&csv), "--json", text(&json)]);
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
     let written = std::fs::read_to_string(csv).unwrap();
-    assert!(
-        written.starts_with("# Errors by their names of ISO 230-1")
-            && written.contains("actual less nominal")
-    );
-    let mut reader = csv::ReaderBuilder::new()
-        .comment(Some(b'#'))
-        .from_reader(written.as_bytes());
+    assert!(written.starts_with("# Errors by their names of ISO 230-1") && written.contains("actual less nominal"));
+    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(written.as_bytes());
     let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
     let fit: Value = serde_json::from_slice(&std::fs::read(json).unwrap()).unwrap();
     for parameter in fit["parameters"].as_array().unwrap() {
         let row = rows.iter().find(|row| parameter["id"] == row[1]).unwrap();
-        assert_eq!(
-            row[3].parse::<f64>().unwrap(),
-            parameter["value"].as_f64().unwrap()
-        );
+        assert_eq!(row[3].parse::<f64>().unwrap(), parameter["value"].as_f64().unwrap());
         assert_eq!(row[4].parse::<f64>().unwrap(), parameter["u"].as_f64().unwrap());
         assert_eq!(parameter["unit"], row[5]);
     }
     let meaning = |id: &str| rows.iter().find(|row| &row[1] == id).unwrap()[2].to_string();
     assert_eq!(meaning("EX0C"), "error of the position of C in direction X");
-    assert_eq!(
-        meaning("EC0Y"),
-        "error of the orientation of Y in direction C (about Z)"
-    );
+    assert_eq!(meaning("EC0Y"), "error of the orientation of Y in direction C (about Z)");
     assert!(rows.iter().any(|row| &row[0] == "circle XY" && &row[1] == "G(b)"));
 }
 
@@ -255,38 +182,22 @@ fn effects_without_a_curve_have_no_table() {
     let measured = super::ready("hermle-c600u/measured/session.toml");
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("tables");
-    let run = abbe(&[
-        "fit",
-        text(&measured),
-        "--compensation",
-        text(&out),
-        "--control",
-        "linuxcnc",
-    ]);
+    let run = abbe(&["fit", text(&measured), "--compensation", text(&out), "--control", "linuxcnc"]);
     assert_eq!(run.status.code(), Some(1));
     let message = String::from_utf8_lossy(&run.stderr).into_owned();
     assert!(
-        message.contains("no error can be compensated in this format")
-            && message.contains("EY0A: a location error"),
+        message.contains("no error can be compensated in this format") && message.contains("EY0A: a location error"),
         "{message}"
     );
     assert!(!out.exists());
-    let few = [
-        "fit",
-        text(&measured),
-        "--compensation",
-        text(&out),
-        "--control",
-        "beckhoff",
-        "--points",
-        "1",
-    ];
+    let few = ["fit", text(&measured), "--compensation", text(&out), "--control", "beckhoff", "--points", "1"];
     let run = abbe(&few);
     assert_eq!(run.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&run.stderr).contains("`--points 1`: a number from 2 to 256"));
 }
 
-/// A session in which X moves over ±100 mm in one test and is stationary at −300 mm in another; EXX is a polynomial over X.
+/// A session in which X moves over ±100 mm in one test and is stationary at −300 mm in another; EXX is a polynomial
+/// over X.
 fn standing_apart(folder: &Path, seed: u64) -> std::path::PathBuf {
     let plan = folder.join("plan.toml");
     let text_of = "[machine]\nchain = \"w C b X Y Z t\"\naxis.C = { origin_mm = [-300, 0, 0] }\naxis.X = {}\naxis.Y = {}\naxis.Z = {}\n\
@@ -322,13 +233,7 @@ fn points(out: &Path) -> Vec<(String, f64, String, f64, f64)> {
     rows.map(|row| {
         let number = |k: usize| row[k].parse::<f64>().unwrap();
         assert_eq!((&row[2], &row[6]), ("mm", "um"));
-        (
-            row[0].to_string(),
-            number(1),
-            row[3].to_string(),
-            number(4),
-            number(5),
-        )
+        (row[0].to_string(), number(1), row[3].to_string(), number(4), number(5))
     })
     .collect()
 }
@@ -342,15 +247,9 @@ fn a_table_ends_at_the_travel_of_its_axis_and_states_its_uncertainty() {
         let out = folder.path().join(format!("tables{seed}"));
         tables(&session, &out, "linuxcnc");
         let table = std::fs::read_to_string(out.join("X.comp")).unwrap();
-        let at: Vec<f64> = table
-            .lines()
-            .map(|line| numbers(&line.replace("# u", ""))[0])
-            .collect();
+        let at: Vec<f64> = table.lines().map(|line| numbers(&line.replace("# u", ""))[0]).collect();
         // The circle moves X from −100 to 100 mm; at −300 mm it is stationary.
-        assert!(
-            (at[0] + 100.0).abs() < 1.5 && (at[40] - 100.0).abs() < 1.5,
-            "{at:?}"
-        );
+        assert!((at[0] + 100.0).abs() < 1.5 && (at[40] - 100.0).abs() < 1.5, "{at:?}");
         let found = points(&out);
         assert_eq!(found.len(), 41);
         for (error, position, direction, value, u) in found {
@@ -377,14 +276,7 @@ fn a_stationary_axis_has_no_table() {
     let only_c = format!("{}{}", &text_of[..tests[0]], &text_of[tests[1]..]);
     std::fs::write(&session, only_c.replace("order = 2", "order = 1")).unwrap();
     let out = folder.path().join("none");
-    let run = abbe(&[
-        "fit",
-        text(&session),
-        "--compensation",
-        text(&out),
-        "--control",
-        "linuxcnc",
-    ]);
+    let run = abbe(&["fit", text(&session), "--compensation", text(&out), "--control", "linuxcnc"]);
     let printed = String::from_utf8_lossy(&run.stderr).into_owned();
     assert_eq!(run.status.code(), Some(1), "{printed}");
     assert!(

@@ -4,8 +4,7 @@ use std::path::PathBuf;
 
 /// A file or folder of the public data. If it does not exist, the test prints that it is skipped; in CI it fails.
 pub fn data(test: &str, path: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("ABBE_DATA")
-        .map_or_else(|| super::workspace().join("../shared/data"), PathBuf::from);
+    let folder = std::env::var_os("ABBE_DATA").map_or_else(|| super::workspace().join("../shared/data"), PathBuf::from);
     let found = folder.join(path);
     if found.exists() {
         return Some(found);

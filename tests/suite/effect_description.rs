@@ -3,12 +3,14 @@
 use std::collections::{BTreeSet, HashMap};
 use std::fmt::Write;
 
-use abbe::identify::effect_description::{explanations, meaning};
 use abbe::identify::problem::Problem;
 use abbe::identify::trace::library;
 use abbe::model::chain::Machine;
 use abbe::model::component::{ErrorKind, Freedom};
-use abbe::model::effect::{Component, Driver, Effect, Shape};
+use abbe::model::driver::Driver;
+use abbe::model::effect::description::{explanations, meaning};
+use abbe::model::effect::shape::{Harmonic, Periodic, Power, Steps, Warmup};
+use abbe::model::effect::{Component, Effect, Shape};
 use abbe::model::files::{ReadOptions, session as read};
 use abbe::model::session::Session;
 
@@ -80,20 +82,12 @@ fn every_candidate_of_the_library_has_its_own_description() {
             let effect = candidate.effect;
             let words = meaning(&session.machine, &effect);
             let text = words.to_string();
-            assert!(
-                !words.part.trim().is_empty() && !words.what.trim().is_empty(),
-                "{}",
-                effect.id()
-            );
+            assert!(!words.part.trim().is_empty() && !words.what.trim().is_empty(), "{}", effect.id());
             let is_identifier = match &effect.component {
                 Component::Axis(name) => text.contains(&name.to_string()),
                 _ => false,
             };
-            assert!(
-                !is_identifier && !text.contains(['~', '_']),
-                "{}: {text}",
-                effect.id()
-            );
+            assert!(!is_identifier && !text.contains(['~', '_']), "{}: {text}", effect.id());
             if let Some(other) = described.insert(text.clone(), effect.clone()) {
                 panic!("{text}: {effect:?} and {other:?}");
             }
@@ -123,90 +117,35 @@ fn descriptions_name_the_part_and_its_motion() {
         };
         meaning(machine, &effect).to_string()
     };
-    let power = Shape::Power {
-        degree: 1,
-        scale: 1.0,
-    };
-    let harmonic = |order: f64| Shape::Harmonic { order };
-    let steps = Shape::Steps {
-        at: vec![-84.72, 40.0],
-    };
+    let power = Shape::Power(Power { degree: 1, scale: 1.0 });
+    let harmonic = |order: f64| Shape::Harmonic(Harmonic { order });
+    let steps = Shape::Steps(Steps { at: vec![-84.72, 40.0] });
     for (component, driver, shape, expected) in [
         ("EZC", "C", harmonic(2.0), "C table: axial motion twice per turn"),
         ("EAC", "C", harmonic(1.0), "C table: tilt about X once per turn"),
-        (
-            "EXC",
-            "C",
-            harmonic(17.0),
-            "C table: radial motion in X 17 times per turn",
-        ),
-        (
-            "EBB",
-            "B",
-            harmonic(3.0),
-            "B head: angular positioning error 3 times per turn",
-        ),
-        (
-            "EX0B",
-            "C",
-            harmonic(1.0),
-            "B head: position of the axis in X once per turn of the C table",
-        ),
-        (
-            "EXX",
-            "X",
-            power.clone(),
-            "X slide: positioning error in proportion to its position",
-        ),
-        (
-            "EXX",
-            "X",
-            Shape::Backlash,
-            "X slide: lost motion (backlash) at reversal",
-        ),
+        ("EXC", "C", harmonic(17.0), "C table: radial motion in X 17 times per turn"),
+        ("EBB", "B", harmonic(3.0), "B head: angular positioning error 3 times per turn"),
+        ("EX0B", "C", harmonic(1.0), "B head: position of the axis in X once per turn of the C table"),
+        ("EXX", "X", power.clone(), "X slide: positioning error in proportion to its position"),
+        ("EXX", "X", Shape::Backlash, "X slide: lost motion (backlash) at reversal"),
         (
             "EYX",
             "X",
-            Shape::Periodic { period: 13.777 },
+            Shape::Periodic(Periodic { period: 13.777 }),
             "X slide: straightness error in Y, repeating every 13.78 mm",
         ),
-        (
-            "EXX",
-            "X",
-            steps,
-            "X slide: positioning error, steps at −84.72 mm, 40.00 mm",
-        ),
-        (
-            "EXX",
-            "X",
-            Shape::Lag,
-            "X slide: lag behind the command in proportion to the speed",
-        ),
-        (
-            "EC0Y",
-            "time",
-            Shape::Drift,
-            "Y slide: squareness error about Z, drifting with time",
-        ),
-        (
-            "EX0C",
-            "temperature",
-            power.clone(),
-            "C table: position of the axis in X, following the temperature",
-        ),
+        ("EXX", "X", steps, "X slide: positioning error, steps at −84.72 mm, 40.00 mm"),
+        ("EXX", "X", Shape::Lag, "X slide: lag behind the command in proportion to the speed"),
+        ("EC0Y", "time", Shape::Drift, "Y slide: squareness error about Z, drifting with time"),
+        ("EX0C", "temperature", power.clone(), "C table: position of the axis in X, following the temperature"),
         (
             "workpiece_ball.x",
             "time",
-            Shape::Warmup { tau_s: 200.0 },
+            Shape::Warmup(Warmup { tau_s: 200.0 }),
             "workpiece ball: shift in X, warming up with a time constant of 200.0 s",
         ),
         ("bar", "none", Shape::Constant, "bar: length, constant"),
-        (
-            "trigger",
-            "none",
-            Shape::Constant,
-            "readings: delay behind the positions, constant",
-        ),
+        ("trigger", "none", Shape::Constant, "readings: delay behind the positions, constant"),
     ] {
         assert_eq!(words(&machine, component, driver, shape), expected);
     }
@@ -215,10 +154,7 @@ fn descriptions_name_the_part_and_its_motion() {
         words(&robot, "EBJ2", "gravity", power),
         "joint J2: angular positioning error under gravity (compliance)"
     );
-    assert_eq!(
-        words(&robot, "EBJ2", "J2", harmonic(1.0)),
-        "joint J2: angular positioning error once per turn"
-    );
+    assert_eq!(words(&robot, "EBJ2", "J2", harmonic(1.0)), "joint J2: angular positioning error once per turn");
 }
 
 /// Each part of the machine is named once, in the order of first occurrence.
@@ -226,24 +162,16 @@ fn descriptions_name_the_part_and_its_motion() {
 fn explanations_are_grouped_by_part() {
     let machine = circle().machine;
     let of = |freedom: Freedom, axis: &str, order: f64| {
-        let name = abbe::model::component::ErrorName {
-            kind: ErrorKind::Motion,
-            freedom,
-            axis: axis.to_string(),
-        };
+        let name = abbe::model::component::ErrorName { kind: ErrorKind::Motion, freedom, axis: axis.to_string() };
         let effect = Effect {
             component: Component::Axis(name),
             driver: Driver::Axis(axis.to_string()),
-            shape: Shape::Harmonic { order },
+            shape: Shape::Harmonic(Harmonic { order }),
             tests: Vec::new(),
         };
         meaning(&machine, &effect)
     };
-    let all = [
-        of(Freedom::Z, "C", 2.0),
-        of(Freedom::Y, "B", 1.0),
-        of(Freedom::A, "C", 1.0),
-    ];
+    let all = [of(Freedom::Z, "C", 2.0), of(Freedom::Y, "B", 1.0), of(Freedom::A, "C", 1.0)];
     assert_eq!(
         explanations(&all),
         "C table: axial motion twice per turn, or tilt about X once per turn; or B head: axial motion once per turn"

@@ -1,4 +1,5 @@
-//! The commands `abbe equation` and `abbe volumetric`: every language, every option, and the messages for invalid requests.
+//! The commands `abbe equation` and `abbe volumetric`: every language, every option, and the messages for invalid
+//! requests.
 
 use std::fs;
 use std::path::PathBuf;
@@ -46,15 +47,8 @@ fn of_library(language: &OutputLanguage, errors: &[&str], options: &Options) -> 
     let session = files::session(&plan(), &ReadOptions::default()).unwrap();
     let test = session.tests.iter().find(|test| test.name == "A150").unwrap();
     let source = SessionTest::new(&session, test).unwrap();
-    let named: Vec<ErrorName> = errors
-        .iter()
-        .map(|name| ErrorName::parse(name).unwrap())
-        .collect();
-    let errors = if errors.is_empty() {
-        &session.unknowns
-    } else {
-        &named
-    };
+    let named: Vec<ErrorName> = errors.iter().map(|name| ErrorName::parse(name).unwrap()).collect();
+    let errors = if errors.is_empty() { &session.unknowns } else { &named };
     let equation = Equation::of(&session.machine, &source, errors, options).unwrap();
     let checked = check(&equation, &source).unwrap();
     language.print(&checked).unwrap().trim_end().to_string() + "\n"
@@ -67,47 +61,18 @@ fn every_option_reaches_the_library_in_every_language() {
         let a150 = ["equation", text(&plan), "--test", "A150", "--as", language.word];
         assert_eq!(printed(&a150), of_library(language, &[], &Options::default()));
         let forms = [
-            (
-                "bilinear",
-                Order::Bilinear,
-                "small-angle",
-                Rotation::SmallAngle,
-                "iso",
-                Symbols::Iso,
-            ),
-            (
-                "first",
-                Order::First,
-                "exact",
-                Rotation::Exact,
-                "literature",
-                Symbols::Literature,
-            ),
+            ("bilinear", Order::Bilinear, "small-angle", Rotation::SmallAngle, "iso", Symbols::Iso),
+            ("first", Order::First, "exact", Rotation::Exact, "literature", Symbols::Literature),
         ];
         for (order_word, order, rotation_word, rotation, symbols_word, symbols) in forms {
-            let options = Options {
-                order,
-                rotation: Some(rotation),
-                symbols,
-                ..Options::default()
-            };
-            let form = [
-                "--order",
-                order_word,
-                "--rotation",
-                rotation_word,
-                "--symbols",
-                symbols_word,
-            ];
+            let options = Options { order, rotation: Some(rotation), symbols, ..Options::default() };
+            let form = ["--order", order_word, "--rotation", rotation_word, "--symbols", symbols_word];
             let kept = ["--errors", "e_y0a,EX0C,EA0C"];
             let found = printed(&[&a150[..], &form, &kept].concat());
             let expected = of_library(language, &["EY0A", "EX0C", "EA0C"], &options);
             assert_eq!(found, expected, "{} {order_word}", language.word);
         }
-        let options = Options {
-            gradient: true,
-            ..Options::default()
-        };
+        let options = Options { gradient: true, ..Options::default() };
         let found = printed(&[&a150[..], &["--gradient"]].concat());
         assert_eq!(found, of_library(language, &[], &options));
     }
@@ -135,16 +100,10 @@ fn the_error_vector_in_every_language() {
     }
     outputs.dedup();
     assert_eq!(outputs.len(), LANGUAGES.len());
-    let first = printed(&[
-        "volumetric",
-        text(&machine),
-        "--order",
-        "first",
-        "--errors",
-        "EX0C,EXX,EZC",
-    ]);
+    let first = printed(&["volumetric", text(&machine), "--order", "first", "--errors", "EX0C,EXX,EZC"]);
     for line in [
-        // By hand at the machine without errors: Δ = Rz(−C)·Rx(−A)·(displacement of the tool − displacement of the table).
+        // By hand at the machine without errors: Δ = Rz(−C)·Rx(−A)·(displacement of the tool − displacement of the
+        // table).
         "∂Δ.x/∂e_x0c = −c_c\n",
         "∂Δ.y/∂e_x0c = s_c\n",
         "∂Δ.x/∂e_xx  = c_c   (a constant multiple of that of e_x0c)",
@@ -155,20 +114,12 @@ fn the_error_vector_in_every_language() {
     }
 }
 
-/// First order of the C test without extension, by hand: L₀ = R, and ∂L/∂e is the unit vector of the bar, (−sin C, cos C, 0), times the
-/// displacement by the error. H − Z_CA stays a symbol although H = Z_CA.
+/// First order of the C test without extension, by hand: L₀ = R, and ∂L/∂e is the unit vector of the bar, (−sin C, cos
+/// C, 0), times the displacement by the error. H − Z_CA stays a symbol although H = Z_CA.
 #[test]
 fn the_first_order_is_a_sum_and_a_table() {
-    let found = printed(&[
-        "equation",
-        text(&plan()),
-        "--test",
-        "A100",
-        "--order",
-        "first",
-        "--rotation",
-        "small-angle",
-    ]);
+    let found =
+        printed(&["equation", text(&plan()), "--test", "A100", "--order", "first", "--rotation", "small-angle"]);
     for line in [
         "L    ≈ L_0 + S/L_0",
         "∂L/∂e_y0a = (R·c_a − (H − Z_CA)·s_a)/L_0\n",
@@ -186,33 +137,21 @@ fn the_first_order_is_a_sum_and_a_table() {
 /// The vector whose norm is the length, and its unit vector u = b/L propagated back through the chain.
 #[test]
 fn derivatives_are_printed_as_a_propagated_unit_vector() {
-    let a150 = [
-        "equation",
-        text(&plan()),
-        "--test",
-        "A150",
-        "--rotation",
-        "small-angle",
-        "--gradient",
-    ]
-    .map(str::to_string);
+    let a150 =
+        ["equation", text(&plan()), "--test", "A150", "--rotation", "small-angle", "--gradient"].map(str::to_string);
     let a150: Vec<&str> = a150.iter().map(String::as_str).collect();
     let found = printed(&a150);
-    for line in [
-        "L = √(b.x² + b.y² + b.z²)",
-        "unit vector of the bar",
-        "∂L/∂e_y0a = u.y\n",
-        "∂L/∂e_z0a = u.z\n",
-    ] {
+    for line in ["L = √(b.x² + b.y² + b.z²)", "unit vector of the bar", "∂L/∂e_y0a = u.y\n", "∂L/∂e_z0a = u.z\n"]
+    {
         assert!(found.contains(line), "`{line}` is not in\n{found}");
     }
     refused(
         &[&a150[..], &["--order", "bilinear"]].concat(),
-        &["derivatives of a bilinear form", "rust, c, python or matlab"],
+        &["derivatives of a bilinear form", "rust, c, python, matlab or julia"],
     );
     refused(
         &["volumetric", text(&machine()), "--gradient", "--as", "latex"],
-        &["derivatives of the error vector", "rust, c, python or matlab"],
+        &["derivatives of the error vector", "rust, c, python, matlab or julia"],
     );
 }
 
@@ -241,10 +180,7 @@ fn a_measured_session_has_equations_too() {
     let output = abbe(&[&["equation", text(&alone)][..], &asked].concat());
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.success(), "{stderr}");
-    assert!(
-        stderr.contains("A100.csv") && stderr.contains("made without readings"),
-        "{stderr}"
-    );
+    assert!(stderr.contains("A100.csv") && stderr.contains("made without readings"), "{stderr}");
     let found = String::from_utf8(output.stdout).unwrap();
     assert!(found.contains("position of axis X"), "{found}");
 }
@@ -259,29 +195,19 @@ fn a_file_is_written_whole_or_not_at_all() {
     assert_eq!(printed(&[&latex[..], &["--out", text(&file)]].concat()), "");
     assert_eq!(fs::read_to_string(&file).unwrap().trim_end(), shown.trim_end());
     // If the file cannot be written, the old file is unchanged and no temporary file remains.
-    refused(
-        &[&latex[..], &["--errors", "EX0B", "--out", text(&file)]].concat(),
-        &["EX0B"],
-    );
+    refused(&[&latex[..], &["--errors", "EX0B", "--out", text(&file)]].concat(), &["EX0B"]);
     assert_eq!(fs::read_to_string(&file).unwrap().trim_end(), shown.trim_end());
     let nowhere = folder.path().join("none/a150.tex");
     refused(
         &[&latex[..], &["--out", text(&nowhere)]].concat(),
-        &[
-            "a150.tex: cannot be written",
-            "there is no folder",
-            "make it first",
-        ],
+        &["a150.tex: cannot be written", "there is no folder", "make it first"],
     );
-    refused(
-        &[&latex[..], &["--out", text(folder.path())]].concat(),
-        &["cannot be written", "this is a folder"],
-    );
+    refused(&[&latex[..], &["--out", text(folder.path())]].concat(), &["cannot be written", "this is a folder"]);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
-/// By hand: a stylus at (x, y) is √(x² + y²) from the axis; a shift of the cylinder along X reduces the reading by its component along
-/// the probing direction.
+/// By hand: a stylus at (x, y) is √(x² + y²) from the axis; a shift of the cylinder along X reduces the reading by its
+/// component along the probing direction.
 #[test]
 fn the_reading_of_a_probe_in_every_language() {
     let session = ready("self-calibration/session.toml");
@@ -310,17 +236,7 @@ fn the_reading_of_a_probe_in_every_language() {
         ("matlab", "probe_distance("),
     ] {
         for order in ["exact", "bilinear", "first"] {
-            let page = of(
-                "3",
-                &[
-                    "--as",
-                    language,
-                    "--order",
-                    order,
-                    "--errors",
-                    "EX0C,artefact.x,form",
-                ],
-            );
+            let page = of("3", &["--as", language, "--order", order, "--errors", "EX0C,artefact.x,form"]);
             assert!(page.contains(start), "{language} {order}: {page}");
         }
     }
@@ -341,42 +257,20 @@ fn invalid_requests_are_refused_with_the_reason() {
         let arguments = a150(more);
         refused(&arguments.iter().map(String::as_str).collect::<Vec<_>>(), parts);
     };
-    refused(
-        &["equation", text(&plan), "--test", "A200"],
-        &["no test `A200`", "A100, A150, C100, C150"],
-    );
-    refused_with(
-        &["--errors", "EQ0C"],
-        &["`EQ0C` is no parameter of an equation", "EX0C"],
-    );
-    refused_with(
-        &["--errors", "EX0B"],
-        &["`EX0B` is an error of axis `B`", "does not have"],
-    );
+    refused(&["equation", text(&plan), "--test", "A200"], &["no test `A200`", "A100, A150, C100, C150"]);
+    refused_with(&["--errors", "EQ0C"], &["`EQ0C` is no parameter of an equation", "EX0C"]);
+    refused_with(&["--errors", "EX0B"], &["`EX0B` is an error of axis `B`", "does not have"]);
     refused_with(&["--errors", "EX0C,e_x0c"], &["`EX0C` is named twice"]);
-    refused_with(
-        &["--errors", "tracker.a"],
-        &["another instrument", "workpiece_ball.x"],
-    );
-    refused(
-        &["equation", "none.toml", "--test", "A150"],
-        &["none.toml", "cannot be read"],
-    );
+    refused_with(&["--errors", "tracker.a"], &["another instrument", "workpiece_ball.x"]);
+    refused(&["equation", "none.toml", "--test", "A150"], &["none.toml", "cannot be read"]);
     refused(&["volumetric", "none.toml"], &["none.toml", "cannot be read"]);
     refused(&["volumetric", text(&plan)], &["chapter5.toml:1", "no `chain`"]);
-    refused(
-        &["volumetric", text(&machine), "--errors", "bar"],
-        &["`bar`", "an error vector has no parameters"],
-    );
+    refused(&["volumetric", text(&machine), "--errors", "bar"], &["`bar`", "an error vector has no parameters"]);
     let folder = tempfile::tempdir().unwrap();
     let broken = folder.path().join("machine.toml");
     fs::write(&broken, "chain = \"w C A Y X Z t\"\n").unwrap();
     refused(&["volumetric", text(&broken)], &["machine.toml:1", "0 beds `b`"]);
-    for arguments in [
-        &["--as", "fortran"][..],
-        &["--order", "second"],
-        &["--rotation", "big"],
-    ] {
+    for arguments in [&["--as", "fortran"][..], &["--order", "second"], &["--rotation", "big"]] {
         let all = [&["volumetric", text(&machine)][..], arguments].concat();
         let output = abbe(&all);
         assert_eq!(output.status.code(), Some(2));
@@ -384,18 +278,15 @@ fn invalid_requests_are_refused_with_the_reason() {
     }
 }
 
-/// A Python with NumPy: that of `ABBE_PYTHON`, otherwise that of the system. Without one the test prints that it is skipped; in CI it
-/// fails.
+/// A Python with NumPy: that of `ABBE_PYTHON`, otherwise that of the system. Without one the test prints that it is
+/// skipped; in CI it fails.
 pub(super) fn python(test: &str) -> Option<String> {
     let own = std::env::var("ABBE_PYTHON").unwrap_or_default();
     let runs = |name: &String| {
         let ran = Command::new(name).args(["-c", "import numpy"]).output();
         ran.is_ok_and(|output| output.status.success())
     };
-    let found = [own, "python3".to_string()]
-        .into_iter()
-        .filter(|name| !name.is_empty())
-        .find(runs);
+    let found = [own, "python3".to_string()].into_iter().filter(|name| !name.is_empty()).find(runs);
     if found.is_none() {
         assert!(std::env::var("CI").is_err(), "no python with numpy");
         eprintln!("skipped {test}: no python with numpy");
@@ -403,8 +294,8 @@ pub(super) fn python(test: &str) -> Option<String> {
     found
 }
 
-/// The printed Python, run by Python, against the length of a triangle. Without errors the balls of the C test without extension are R
-/// apart at any C. With the axis displaced by 0.3 mm in X the length is √(R² + 0.09 − 2·0.3·R·sin C).
+/// The printed Python, run by Python, against the length of a triangle. Without errors the balls of the C test without
+/// extension are R apart at any C. With the axis displaced by 0.3 mm in X the length is √(R² + 0.09 − 2·0.3·R·sin C).
 #[test]
 fn printed_code_runs_unchanged() {
     let Some(python) = python("printed_code_runs_unchanged") else {
@@ -435,10 +326,6 @@ for c in [0.0, 0.7, 2.0, -2.5]:
     assert abs(float(value) - expected) < 1e-12 * expected, (value, expected)
     assert abs(float(gradient[0]) - slope) < 1e-12, (gradient, slope)
 ";
-    let ran = Command::new(python)
-        .current_dir(folder.path())
-        .args(["-c", script])
-        .output()
-        .unwrap();
+    let ran = Command::new(python).current_dir(folder.path()).args(["-c", script]).output().unwrap();
     assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
 }

@@ -44,12 +44,8 @@ fn declared_effects_appear_where_they_act() {
         printed(&[&start[..], more].concat())
     };
     let c100 = asked("C100", &[]);
-    for part in [
-        "e_zc  = k_1·cos(2·θ_c) + k_2·sin(2·θ_c)",
-        "δ_bar = k_3·(1 − exp(−t/900))",
-        "e_x0c",
-        "EZC~C:h2.cos",
-    ] {
+    for part in ["e_zc  = k_1·cos(2·θ_c) + k_2·sin(2·θ_c)", "δ_bar = k_3·(1 − exp(−t/900))", "e_x0c", "EZC~C:h2.cos"]
+    {
         assert!(c100.contains(part), "`{part}` is not in\n{c100}");
     }
     assert!(!c100.contains("EBA~A"), "{c100}");
@@ -63,23 +59,14 @@ fn declared_effects_appear_where_they_act() {
         let arguments = ["equation", text(&file), "--test", "C100", "--errors", names];
         refused(&arguments, parts);
     };
-    refuse(
-        "EZC~C:h3",
-        &["no effect is called `EZC~C:h3`", "EZC~C:h2, bar~time:warmup"],
-    );
+    refuse("EZC~C:h3", &["no effect is called `EZC~C:h3`", "EZC~C:h2, bar~time:warmup"]);
     refuse("EBA~A:backlash", &["no effect is called `EBA~A:backlash`"]);
-    let long = session(
-        folder.path(),
-        "[[effect]]\ncomponent = \"EZC\"\nshape = \"curve\"\nintervals = 90\n",
-    );
-    refused(
-        &["equation", text(&long), "--test", "C100"],
-        &["`EZC~C:curve` has 90 coefficients", "fewer intervals"],
-    );
+    let long = session(folder.path(), "[[effect]]\ncomponent = \"EZC\"\nshape = \"curve\"\nintervals = 90\n");
+    refused(&["equation", text(&long), "--test", "C100"], &["`EZC~C:curve` has 90 coefficients", "fewer intervals"]);
 }
 
-/// Python runs the printed code. The ball of the C test moves in Z by e = k₁ cos 2C + k₂ sin 2C on a radius of 100 mm, and the bar
-/// expands by k₃ (1 − exp(−t/900)), so the reading is √(R² + e²) minus the expansion.
+/// Python runs the printed code. The ball of the C test moves in Z by e = k₁ cos 2C + k₂ sin 2C on a radius of 100 mm,
+/// and the bar expands by k₃ (1 − exp(−t/900)), so the reading is √(R² + e²) minus the expansion.
 #[test]
 fn printed_effects_run_unchanged() {
     let Some(python) = python("printed_effects_run_unchanged") else {
@@ -89,15 +76,7 @@ fn printed_effects_run_unchanged() {
     let file = session(folder.path(), EFFECTS);
     let module = folder.path().join("c100.py");
     let names = "EZC~C:h2,bar~time:warmup";
-    let start = [
-        "equation",
-        text(&file),
-        "--test",
-        "C100",
-        "--as",
-        "python",
-        "--gradient",
-    ];
+    let start = ["equation", text(&file), "--test", "C100", "--as", "python", "--gradient"];
     printed(&[&start[..], &["--errors", names, "--out", text(&module)]].concat());
     let script = "
 import math, c100
@@ -112,10 +91,6 @@ for c, t in [(0.0, 0.0), (0.7, 300.0), (2.0, 900.0), (-2.5, 5000.0)]:
     for found, expected in zip(gradient, slopes):
         assert abs(float(found) - expected) < 1e-12, (gradient, slopes)
 ";
-    let ran = Command::new(python)
-        .current_dir(folder.path())
-        .args(["-c", script])
-        .output()
-        .unwrap();
+    let ran = Command::new(python).current_dir(folder.path()).args(["-c", script]).output().unwrap();
     assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
 }

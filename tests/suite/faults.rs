@@ -1,5 +1,5 @@
-//! Faults of the environment: full disks, outputs that cannot be written, pipes, links. The command succeeds, or a message states the
-//! reason and existing files are unchanged.
+//! Faults of the environment: full disks, outputs that cannot be written, pipes, links. The command succeeds, or a
+//! message states the reason and existing files are unchanged.
 #![cfg(unix)]
 
 use std::fs;
@@ -80,9 +80,7 @@ impl TestFolder {
 
     pub fn names(&self) -> Vec<String> {
         let entries = fs::read_dir(self.0.path()).unwrap();
-        let mut names: Vec<String> = entries
-            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-            .collect();
+        let mut names: Vec<String> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
         names.sort();
         names
     }
@@ -100,23 +98,14 @@ fn refused(output: &Output, parts: &[&str]) {
 
 #[track_caller]
 fn done(output: &Output) {
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
 #[test]
 fn a_session_that_reads_outside_its_folder_needs_permission() {
     let place = TestFolder::new();
     fs::create_dir(place.at("inner")).unwrap();
-    place.put(
-        "inner/session.toml",
-        &SESSION
-            .replace("NAME", "XY")
-            .replace("circle.csv", "../circle.csv"),
-    );
+    place.put("inner/session.toml", &SESSION.replace("NAME", "XY").replace("circle.csv", "../circle.csv"));
     for command in [
         "fit inner/session.toml",
         "plan inner/session.toml",
@@ -124,14 +113,7 @@ fn a_session_that_reads_outside_its_folder_needs_permission() {
         "simulate inner/session.toml --out new",
     ] {
         let output = place.shell(&format!("abbe {command}"));
-        refused(
-            &output,
-            &[
-                "session.toml:",
-                "is outside the session's folder",
-                "--allow-outside",
-            ],
-        );
+        refused(&output, &["session.toml:", "is outside the session's folder", "--allow-outside"]);
         done(&place.shell(&format!("abbe {command} --allow-outside")));
     }
     // A folder on the command line is permitted.
@@ -149,20 +131,13 @@ fn a_full_standard_output() {
 fn a_closed_pipe_ends_without_a_message() {
     let place = TestFolder::new();
     let output = place.shell("abbe fit session.toml | head -n 1");
-    assert!(
-        output.stderr.is_empty(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
 #[test]
 fn a_full_device_for_a_file() {
     let place = TestFolder::new();
-    refused(
-        &place.fit(&["--json", "/dev/full"]),
-        &["/dev/full: cannot be written", "No space left"],
-    );
+    refused(&place.fit(&["--json", "/dev/full"]), &["/dev/full: cannot be written", "No space left"]);
     let device = fs::metadata("/dev/full").unwrap().file_type();
     assert!(device.is_char_device(), "/dev/full was replaced");
 }
@@ -170,20 +145,14 @@ fn a_full_device_for_a_file() {
 #[test]
 fn a_full_disk_leaves_existing_files_unchanged() {
     // The limit on the file size is one block: the same error as on a full disk.
-    for (option, file) in [
-        ("--report", "out.html"),
-        ("--json", "out.json"),
-        ("--csv", "out.csv"),
-        ("--plots", "plots"),
-    ] {
+    for (option, file) in [("--report", "out.html"), ("--json", "out.json"), ("--csv", "out.csv"), ("--plots", "plots")]
+    {
         let place = TestFolder::new();
         if option != "--plots" {
             place.put(file, "old");
         }
         let before = place.names();
-        let output = place.shell(&format!(
-            "trap '' XFSZ; ulimit -f 0; exec abbe fit session.toml {option} {file}"
-        ));
+        let output = place.shell(&format!("trap '' XFSZ; ulimit -f 0; exec abbe fit session.toml {option} {file}"));
         refused(&output, &[file, "cannot be written", "File too large"]);
         assert_eq!(place.names(), before, "{option}");
         if option != "--plots" {
@@ -197,10 +166,7 @@ fn standard_output_as_a_file() {
     let place = TestFolder::new();
     let piped = place.shell("abbe fit session.toml --json /dev/stdout | cat");
     let printed = String::from_utf8(piped.stdout).unwrap();
-    assert!(
-        printed.contains("readings, noise") && printed.contains("\"rms_um\""),
-        "{printed}"
-    );
+    assert!(printed.contains("readings, noise") && printed.contains("\"rms_um\""), "{printed}");
     done(&place.shell("abbe fit session.toml --json /dev/stdout > both.txt"));
     assert_eq!(fs::read_to_string(place.at("both.txt")).unwrap(), printed);
 }
@@ -211,10 +177,7 @@ fn a_write_protected_file() {
     place.put("out.json", "old");
     fs::set_permissions(place.at("out.json"), fs::Permissions::from_mode(0o444)).unwrap();
     let output = place.fit(&["--json", text(&place.at("out.json"))]);
-    refused(
-        &output,
-        &["out.json: cannot be written: the file is write-protected"],
-    );
+    refused(&output, &["out.json: cannot be written: the file is write-protected"]);
     assert!(output.stdout.is_empty(), "refused before the work");
     assert_eq!(fs::read_to_string(place.at("out.json")).unwrap(), "old");
 }
@@ -224,21 +187,14 @@ fn an_output_that_would_replace_an_input() {
     let place = TestFolder::new();
     place.put("errors.toml", "EC0Y = \"5 arcsec\"\n");
     place.put("machine.toml", "chain = \"w b X t\"\n[axis.X]\n");
-    place.put(
-        "functions.toml",
-        "[[function]]\nerror = \"EXX\"\nof = \"X\"\nat_mm = [0, 1]\nvalues_um = [0, 1]\n",
-    );
+    place.put("functions.toml", "[[function]]\nerror = \"EXX\"\nof = \"X\"\nat_mm = [0, 1]\nvalues_um = [0, 1]\n");
     symlink(place.at("circle.csv"), place.at("link.csv")).unwrap();
     fs::create_dir(place.at("plans")).unwrap();
-    let outside = SESSION
-        .replace("NAME", "circle")
-        .replace("\"circle.csv\"", "\"../circle.csv\"");
+    let outside = SESSION.replace("NAME", "circle").replace("\"circle.csv\"", "\"../circle.csv\"");
     place.put("plans/session.toml", &outside);
     let held = |place: &TestFolder| {
         let files = place.names().into_iter().filter(|name| name != "plans");
-        files
-            .map(|name| (fs::read_to_string(place.at(&name)).unwrap(), name))
-            .collect::<Vec<_>>()
+        files.map(|name| (fs::read_to_string(place.at(&name)).unwrap(), name)).collect::<Vec<_>>()
     };
     let before = held(&place);
     for (line, name) in [
@@ -248,26 +204,11 @@ fn an_output_that_would_replace_an_input() {
         ("fit session.toml --json link.csv", "link.csv"),
         ("trace session.toml --quiet --write session.toml", "session.toml"),
         ("plan session.toml --no-effects --json circle.csv", "circle.csv"),
-        (
-            "equation session.toml --test XY --out session.toml",
-            "session.toml",
-        ),
-        (
-            "simulate session.toml --out run --errors errors.toml --json errors.toml",
-            "errors.toml",
-        ),
-        (
-            "simulate plans/session.toml --allow-outside --out . --force",
-            "circle.csv",
-        ),
-        (
-            "volumetric machine.toml --map functions.toml --functions functions.toml",
-            "functions.toml",
-        ),
-        (
-            "volumetric machine.toml --map map.csv --functions functions.toml --json machine.toml",
-            "machine.toml",
-        ),
+        ("equation session.toml --test XY --out session.toml", "session.toml"),
+        ("simulate session.toml --out run --errors errors.toml --json errors.toml", "errors.toml"),
+        ("simulate plans/session.toml --allow-outside --out . --force", "circle.csv"),
+        ("volumetric machine.toml --map functions.toml --functions functions.toml", "functions.toml"),
+        ("volumetric machine.toml --map map.csv --functions functions.toml --json machine.toml", "machine.toml"),
     ] {
         let why = format!("{name}: cannot be written: it is one of the files that are read; name another");
         refused(&place.shell(&format!("abbe {line}")), &[&why]);
@@ -288,10 +229,7 @@ fn an_output_that_would_replace_an_input() {
 fn a_missing_folder() {
     let place = TestFolder::new();
     let output = place.fit(&["--csv", text(&place.at("nowhere/out.csv"))]);
-    refused(
-        &output,
-        &["out.csv: cannot be written: there is no folder", "make it first"],
-    );
+    refused(&output, &["out.csv: cannot be written: there is no folder", "make it first"]);
     assert!(output.stdout.is_empty(), "refused before the work");
 }
 
@@ -299,33 +237,21 @@ fn a_missing_folder() {
 fn a_file_for_a_folder() {
     let place = TestFolder::new();
     place.put("file", "");
-    refused(
-        &place.fit(&["--json", text(&place.at("file/out.json"))]),
-        &["there is no folder"],
-    );
-    refused(
-        &place.fit(&["--plots", text(&place.at("file"))]),
-        &["file: this is a file; name a folder"],
-    );
+    refused(&place.fit(&["--json", text(&place.at("file/out.json"))]), &["there is no folder"]);
+    refused(&place.fit(&["--plots", text(&place.at("file"))]), &["file: this is a file; name a folder"]);
 }
 
 #[test]
 fn a_folder_for_a_file() {
     let place = TestFolder::new();
-    refused(
-        &place.fit(&["--json", text(place.0.path())]),
-        &["this is a folder; name a file in it"],
-    );
+    refused(&place.fit(&["--json", text(place.0.path())]), &["this is a folder; name a file in it"]);
 }
 
 #[test]
 #[cfg(target_os = "linux")]
 fn a_write_protected_folder() {
     let place = TestFolder::new();
-    refused(
-        &place.fit(&["--json", "/proc/out.json"]),
-        &["/proc/out.json: cannot be written"],
-    );
+    refused(&place.fit(&["--json", "/proc/out.json"]), &["/proc/out.json: cannot be written"]);
 }
 
 #[test]
@@ -336,15 +262,8 @@ fn a_link_stays_a_link_and_permissions_stay() {
     symlink("real.json", place.at("link.json")).unwrap();
     done(&place.fit(&["--json", text(&place.at("link.json"))]));
     assert!(fs::symlink_metadata(place.at("link.json")).unwrap().is_symlink());
-    assert!(
-        fs::read_to_string(place.at("real.json"))
-            .unwrap()
-            .contains("\"rms_um\"")
-    );
-    assert_eq!(
-        fs::metadata(place.at("real.json")).unwrap().permissions().mode() & 0o777,
-        0o600
-    );
+    assert!(fs::read_to_string(place.at("real.json")).unwrap().contains("\"rms_um\""));
+    assert_eq!(fs::metadata(place.at("real.json")).unwrap().permissions().mode() & 0o777, 0o600);
 }
 
 #[test]
@@ -360,19 +279,9 @@ fn a_pipe_for_a_session() {
     assert_eq!(result(&fitted.stdout), result(&place.fit(&[]).stdout));
     // Input from a pipe is used as read, and has no checksum afterwards.
     done(&place.shell("cat session.toml | abbe simulate /dev/stdin --data . --out new"));
-    assert!(
-        fs::read_to_string(place.at("new/session.toml"))
-            .unwrap()
-            .contains("name = \"XY\"")
-    );
+    assert!(fs::read_to_string(place.at("new/session.toml")).unwrap().contains("name = \"XY\""));
     let report = place.shell("cat session.toml | abbe fit /dev/stdin --data . --report out.html");
-    refused(
-        &report,
-        &[
-            "/dev/stdin: cannot be read again for its checksum",
-            "can be read only once",
-        ],
-    );
+    refused(&report, &["/dev/stdin: cannot be read again for its checksum", "can be read only once"]);
     assert!(!place.at("out.html").exists());
 }
 
@@ -384,14 +293,8 @@ fn cells_at_opposite_corners_of_a_sheet() {
     sheet.write_string(0, 0, "x_mm").unwrap();
     sheet.write_number(1_048_575, 16_383, 1.0).unwrap();
     book.save(place.at("far.xlsx")).unwrap();
-    place.put(
-        "session.toml",
-        &SESSION.replace("NAME", "XY").replace("circle.csv", "far.xlsx"),
-    );
-    refused(
-        &place.fit(&[]),
-        &["far.xlsx: cells from column 1 to column 16384; the limit is 1000 columns"],
-    );
+    place.put("session.toml", &SESSION.replace("NAME", "XY").replace("circle.csv", "far.xlsx"));
+    refused(&place.fit(&[]), &["far.xlsx: cells from column 1 to column 16384; the limit is 1000 columns"]);
 }
 
 #[test]
@@ -400,20 +303,11 @@ fn names_that_are_formulas_are_text_in_a_spreadsheet() {
         let place = TestFolder::new();
         place.put("session.toml", &SESSION.replace("NAME", name));
         let table = place.at("patterns.csv");
-        done(&abbe(&[
-            "plan",
-            text(&place.at("session.toml")),
-            "--patterns",
-            text(&table),
-        ]));
+        done(&abbe(&["plan", text(&place.at("session.toml")), "--patterns", text(&table)]));
         let mut reader = csv::Reader::from_path(&table).unwrap();
         let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
         assert!(!rows.is_empty());
-        assert!(
-            rows.iter().all(|row| row[0] == format!("'{name}")),
-            "{name}: {:?}",
-            rows[0]
-        );
+        assert!(rows.iter().all(|row| row[0] == format!("'{name}")), "{name}: {:?}", rows[0]);
         // Numbers stay numbers, including negative ones.
         assert!(rows.iter().any(|row| row[row.len() - 1].starts_with('-')));
     }
@@ -423,10 +317,7 @@ fn names_that_are_formulas_are_text_in_a_spreadsheet() {
 fn control_characters_are_not_shown() {
     let place = TestFolder::new();
     let table = fs::read_to_string(place.at("circle.csv")).unwrap();
-    place.put(
-        "circle.csv",
-        &table.replace("length_mm", "\x1b]0;owned\x07\x1b[2J"),
-    );
+    place.put("circle.csv", &table.replace("length_mm", "\x1b]0;owned\x07\x1b[2J"));
     let output = place.fit(&[]);
     refused(&output, &["circle.csv:1", "?]0;owned??[2J"]);
     assert!(!output.stderr.contains(&0x1b));
@@ -436,10 +327,7 @@ fn control_characters_are_not_shown() {
 fn names_of_files_that_are_not_utf8() {
     use std::os::unix::ffi::OsStrExt;
     let place = TestFolder::new();
-    let odd = place
-        .0
-        .path()
-        .join(std::ffi::OsStr::from_bytes(b"caf\xe9 \xc3\xa4"));
+    let odd = place.0.path().join(std::ffi::OsStr::from_bytes(b"caf\xe9 \xc3\xa4"));
     fs::create_dir(&odd).unwrap();
     for name in ["session.toml", "circle.csv"] {
         fs::copy(place.at(name), odd.join(name)).unwrap();

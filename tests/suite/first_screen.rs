@@ -14,27 +14,18 @@ fn printed(command: &str, session: &str, more: &[&str]) -> (String, Value) {
     assert!(output.status.success(), "{said}");
     let said: Vec<&str> = said.lines().filter(|line| !line.starts_with("  + ")).collect();
     let screen = String::from_utf8(output.stdout).unwrap() + &said.join("\n");
-    (
-        screen,
-        serde_json::from_str(&std::fs::read_to_string(&file).unwrap()).unwrap(),
-    )
+    (screen, serde_json::from_str(&std::fs::read_to_string(&file).unwrap()).unwrap())
 }
 
 /// The identifiers of a result's parameters, those of errors and those of set-up parameters.
 fn ids(parameters: &Value) -> (Vec<&str>, Vec<&str>) {
-    let ids = parameters
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|p| p["id"].as_str().unwrap());
+    let ids = parameters.as_array().unwrap().iter().map(|p| p["id"].as_str().unwrap());
     ids.partition(|id| id.starts_with('E'))
 }
 
 /// The line whose first word this is.
 fn row<'s>(screen: &'s str, first: &str) -> Option<&'s str> {
-    screen
-        .lines()
-        .find(|line| line.split_whitespace().next() == Some(first))
+    screen.lines().find(|line| line.split_whitespace().next() == Some(first))
 }
 
 #[test]
@@ -44,40 +35,19 @@ fn a_fit_of_four_tests_has_at_most_40_lines() {
     println!("{screen}");
     assert!(screen.lines().count() <= 40, "{} lines", screen.lines().count());
     assert!(screen.lines().all(|line| line.chars().count() < 170));
-    for words in [
-        "numerical rank",
-        "identifiable",
-        "standard uncertainty",
-        "χ²/ν = ",
-        "held out",
-    ] {
+    for words in ["numerical rank", "identifiable", "standard uncertainty", "χ²/ν = ", "held out"] {
         assert!(screen.contains(words), "`{words}` is not in\n{screen}");
     }
     // Goodness of fit, rank, estimates, what is confounded, what to do next: in this order.
-    let order = [
-        "Goodness of fit",
-        "numerical rank",
-        "EY0A",
-        "set-up parameters",
-        "confounded",
-        "Next:",
-    ];
+    let order = ["Goodness of fit", "numerical rank", "EY0A", "set-up parameters", "confounded", "Next:"];
     let places: Vec<usize> = order.iter().map(|words| screen.find(words).unwrap()).collect();
     assert!(places.is_sorted(), "{places:?}\n{screen}");
     let (errors, setup) = ids(&fit["parameters"]);
     assert_eq!((errors.len(), setup.len()), (8, 19));
     for id in errors {
         let row = row(&screen, id).unwrap();
-        let parameter = fit["parameters"]
-            .as_array()
-            .unwrap()
-            .iter()
-            .find(|p| p["id"] == id)
-            .unwrap();
-        let (value, u) = (
-            parameter["value"].as_f64().unwrap(),
-            parameter["u"].as_f64().unwrap(),
-        );
+        let parameter = fit["parameters"].as_array().unwrap().iter().find(|p| p["id"] == id).unwrap();
+        let (value, u) = (parameter["value"].as_f64().unwrap(), parameter["u"].as_f64().unwrap());
         assert_eq!(row.contains(" * "), value.abs() > 2.0 * u, "{row}");
         assert!(row.ends_with(parameter["meaning"].as_str().unwrap()), "{row}");
     }
@@ -97,29 +67,19 @@ fn a_trace_states_uniqueness_in_the_first_three_lines() {
     assert!(first[0].starts_with("Verdict: explained"), "{first:?}");
     let standing = format!("1 of {count} indistinguishable explanations");
     assert!(first.iter().any(|line| line.contains(&standing)), "{first:?}");
-    let order = [
-        "Verdict",
-        "indistinguishable",
-        "before",
-        "after",
-        "1. EZC over C",
-        "EY0A",
-        "What to measure next",
-        "Next:",
-    ];
+    let order =
+        ["Verdict", "indistinguishable", "before", "after", "1. EZC over C", "EY0A", "What to measure next", "Next:"];
     let places: Vec<usize> = order.iter().map(|words| screen.find(words).unwrap()).collect();
     assert!(places.is_sorted(), "{places:?}\n{screen}");
     assert!(screen.lines().count() <= 60, "{} lines", screen.lines().count());
     // Three aliases, and the number of the others.
     let listed = screen.lines().filter(|line| line.starts_with("     or ")).count() as u64;
     let others = count.as_u64().unwrap() - 1 - listed;
-    assert!(
-        screen.contains(&format!("     … {others} more; --all lists them")),
-        "{screen}"
-    );
+    assert!(screen.contains(&format!("     … {others} more; --all lists them")), "{screen}");
 }
 
-/// The verdict names the error with the largest standard uncertainty, 1 µm counting as 1″, and the largest part of its variance.
+/// The verdict names the error with the largest standard uncertainty, 1 µm counting as 1″, and the largest part of its
+/// variance.
 #[test]
 fn a_plan_ends_in_its_worst_error_and_what_limits_it() {
     for (session, more) in [
@@ -130,25 +90,14 @@ fn a_plan_ends_in_its_worst_error_and_what_limits_it() {
     ] {
         let (screen, plan) = printed("plan", session, &[&["--no-effects"], more].concat());
         let u = |error: &Value| error["u"].as_f64();
-        let errors = plan["errors"]
-            .as_array()
-            .unwrap()
-            .iter()
-            .filter(|error| u(error).is_some());
-        let worst = errors
-            .max_by(|a, b| u(a).unwrap().total_cmp(&u(b).unwrap()))
-            .unwrap();
+        let errors = plan["errors"].as_array().unwrap().iter().filter(|error| u(error).is_some());
+        let worst = errors.max_by(|a, b| u(a).unwrap().total_cmp(&u(b).unwrap())).unwrap();
         let (_, verdict) = screen.rsplit_once("\nVerdict: ").unwrap();
         println!("{session} {more:?}: {verdict}");
         let id = worst["id"].as_str().unwrap();
-        assert!(
-            verdict.contains(&format!("{id} is worst determined: u = ")),
-            "{worst:#}"
-        );
+        assert!(verdict.contains(&format!("{id} is worst determined: u = ")), "{worst:#}");
         let parts = worst["budget"].as_array().unwrap();
-        let noise = parts.iter().find(|part| part["source"] == "noise").unwrap()["share"]
-            .as_f64()
-            .unwrap();
+        let noise = parts.iter().find(|part| part["source"] == "noise").unwrap()["share"].as_f64().unwrap();
         if noise >= 0.5 {
             assert!(verdict.contains("The noise limits it"), "{noise}");
         } else {
@@ -172,19 +121,12 @@ fn a_plan_names_errors_that_are_not_identifiable() {
     // Without the tests of A.
     let first = plan.find("[[test]]\nname = \"C100\"").unwrap();
     let without = format!("{}{}", &plan[..plan.find("[[test]]").unwrap()], &plan[first..]);
-    std::fs::copy(
-        ready("hermle-c600u/machine.toml"),
-        folder.path().join("machine.toml"),
-    )
-    .unwrap();
+    std::fs::copy(ready("hermle-c600u/machine.toml"), folder.path().join("machine.toml")).unwrap();
     let file = folder.path().join("plan.toml");
     std::fs::write(&file, without).unwrap();
     let output = abbe(&["plan", text(&file), "--no-effects"]);
     let screen = String::from_utf8(output.stdout).unwrap();
     let (_, verdict) = screen.rsplit_once("\nVerdict: ").unwrap();
     let first = verdict.lines().next().unwrap();
-    assert!(
-        first.contains("EC0A") && first.ends_with(" not identifiable by these tests."),
-        "{screen}"
-    );
+    assert!(first.contains("EC0A") && first.ends_with(" not identifiable by these tests."), "{screen}");
 }

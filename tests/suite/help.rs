@@ -66,9 +66,7 @@ fn every_example_of_the_help_runs() {
     for command in commands {
         let of_command = examples(&help(&[command, "--help"]));
         assert!(
-            of_command
-                .iter()
-                .any(|line| line.starts_with(&format!("abbe {command}"))),
+            of_command.iter().any(|line| line.starts_with(&format!("abbe {command}"))),
             "abbe {command} --help has no example"
         );
         if ["new", "simulate"].contains(&command) {
@@ -86,11 +84,7 @@ fn every_example_of_the_help_runs() {
             .current_dir(folder.path())
             .output()
             .unwrap();
-        assert!(
-            run.status.success(),
-            "{line}: {}",
-            String::from_utf8_lossy(&run.stderr)
-        );
+        assert!(run.status.success(), "{line}: {}", String::from_utf8_lossy(&run.stderr));
     }
 }
 
@@ -103,15 +97,7 @@ fn completions_are_written_for_every_shell() {
         }
     }
     // bash accepts its completion script.
-    let mut bash = Command::new("bash")
-        .arg("-n")
-        .stdin(std::process::Stdio::piped())
-        .spawn()
-        .unwrap();
-    std::io::Write::write_all(
-        bash.stdin.as_mut().unwrap(),
-        &abbe(&["completions", "bash"]).stdout,
-    )
-    .unwrap();
+    let mut bash = Command::new("bash").arg("-n").stdin(std::process::Stdio::piped()).spawn().unwrap();
+    std::io::Write::write_all(bash.stdin.as_mut().unwrap(), &abbe(&["completions", "bash"]).stdout).unwrap();
     assert!(bash.wait().unwrap().success());
 }

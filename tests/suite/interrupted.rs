@@ -29,9 +29,7 @@ fn start(arguments: &[&str]) -> Child {
 }
 
 fn interrupt(child: &Child) {
-    let sent = Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
-        .status();
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
     assert!(sent.unwrap().success());
 }
 
@@ -40,10 +38,7 @@ fn until_the_first_effect(child: &mut Child) -> (BufReader<ChildStderr>, String)
     let mut messages = BufReader::new(child.stderr.take().unwrap());
     let mut stderr = String::new();
     while !stderr.lines().any(|line| line.starts_with("  + ")) {
-        assert!(
-            messages.read_line(&mut stderr).unwrap() > 0,
-            "no effect is found: {stderr}"
-        );
+        assert!(messages.read_line(&mut stderr).unwrap() > 0, "no effect is found: {stderr}");
     }
     (messages, stderr)
 }
@@ -86,18 +81,11 @@ fn an_interrupted_trace_exits_with_130_and_every_output_says_so() {
     assert_eq!(result["verdict"], "incomplete");
     let effects = result["effects"].as_array().unwrap();
     assert_eq!(effects.len(), 1);
-    assert_eq!(
-        (effects[0]["component"].as_str(), effects[0]["order"].as_f64()),
-        (Some("EZC"), Some(2.0))
-    );
+    assert_eq!((effects[0]["component"].as_str(), effects[0]["order"].as_f64()), (Some("EZC"), Some(2.0)));
     // The found effect is fitted: the simulated amplitude is 1.5 µm.
     let amplitude = effects[0]["parameters"][0]["value"].as_f64().unwrap();
     assert!((amplitude - 1.5).abs() < 0.1, "{amplitude}");
-    assert!(
-        read(&csv)
-            .lines()
-            .any(|line| line.starts_with("search,interrupted,"))
-    );
+    assert!(read(&csv).lines().any(|line| line.starts_with("search,interrupted,")));
     assert!(read(&next).starts_with("# The trace was interrupted after 1 effect"));
     assert!(read(&report).contains("interrupted after 1 effect"));
 }
@@ -127,10 +115,7 @@ fn a_second_interruption_ends_the_program_at_once() {
     let mut stderr = String::new();
     messages.read_to_string(&mut stderr).unwrap();
     assert_eq!(child.wait().unwrap().code(), Some(INTERRUPTED), "{stderr}");
-    assert!(
-        stderr.contains("interrupted; nothing more is written"),
-        "{stderr}"
-    );
+    assert!(stderr.contains("interrupted; nothing more is written"), "{stderr}");
 }
 
 /// A fit has no partial result: the signal ends the program, and nothing is written.
@@ -139,14 +124,7 @@ fn an_interrupted_fit_ends_by_the_signal() {
     let folder = tempfile::tempdir().unwrap();
     let json = folder.path().join("fit.json");
     let session = ready("hermle-c600u/measured/session.toml");
-    let mut child = start(&[
-        "fit",
-        text(&session),
-        "--monte-carlo",
-        "1000000",
-        "--json",
-        text(&json),
-    ]);
+    let mut child = start(&["fit", text(&session), "--monte-carlo", "1000000", "--json", text(&json)]);
     std::thread::sleep(Duration::from_millis(200));
     interrupt(&child);
     assert_eq!(child.wait().unwrap().signal(), Some(2));
@@ -186,11 +164,7 @@ fn a_trace_can_be_interrupted_anywhere() {
         // Models that are trained in parallel may query at the same time.
         assert!(asked <= until + 16, "asked {} times more", asked - until);
         let result: &TraceResult = &found.result;
-        assert!(
-            result.interrupted && result.verdict == "incomplete",
-            "{until}: {}",
-            result.verdict
-        );
+        assert!(result.interrupted && result.verdict == "incomplete", "{until}: {}", result.verdict);
         assert_eq!(result.effects.len(), found.effects.len());
         assert_eq!(
             result.interruption(),
@@ -200,26 +174,13 @@ fn a_trace_can_be_interrupted_anywhere() {
                 if found.effects.len() == 1 { "" } else { "s" }
             )
         );
-        assert!(
-            result
-                .warnings
-                .iter()
-                .any(|warning| warning.contains("interrupted"))
-        );
+        assert!(result.warnings.iter().any(|warning| warning.contains("interrupted")));
         assert_eq!(found.after.parameters.effects, found.effects);
         // The session states its noise of 0.3 µm; the residual is 0.55 µm until the effect is found.
         let found_it = ids(&found) == ["EZC~C:h2"];
         assert!(found_it || found.effects.is_empty(), "{:?}", ids(&found));
-        assert_eq!(
-            result.after.rms_um < 0.31,
-            found_it,
-            "{until}: {}",
-            result.after.rms_um
-        );
+        assert_eq!(result.after.rms_um < 0.31, found_it, "{until}: {}", result.after.rms_um);
         effects.push(found.effects.len());
     }
-    assert!(
-        effects.is_sorted() && effects.contains(&0) && effects.contains(&1),
-        "{effects:?}"
-    );
+    assert!(effects.is_sorted() && effects.contains(&0) && effects.contains(&1), "{effects:?}");
 }

@@ -1,4 +1,5 @@
-//! JSON documents state where they come from, and their figures agree with one another. `--residuals` writes what the figures follow from.
+//! JSON documents state where they come from, and their figures agree with one another. `--residuals` writes what the
+//! figures follow from.
 
 use std::process::Command;
 
@@ -28,14 +29,7 @@ fn a_document_states_version_command_inputs_and_options() {
     let session = ready("hermle-c600u/measured/session.toml");
     let folder = tempfile::tempdir().unwrap();
     let residuals = folder.path().join("residuals.csv");
-    let fit = document(&[
-        "fit",
-        text(&session),
-        "--seed",
-        "7",
-        "--residuals",
-        text(&residuals),
-    ]);
+    let fit = document(&["fit", text(&session), "--seed", "7", "--residuals", text(&residuals)]);
     assert_eq!(fit["schema_version"], 2);
     assert_eq!(fit["tool_version"], env!("CARGO_PKG_VERSION"));
     assert_eq!((&fit["command"], &fit["seed"]), (&json!("fit"), &json!(7)));
@@ -70,10 +64,7 @@ fn the_map_of_a_machine_names_its_two_files() {
         "--places",
         "2",
     ]);
-    let files: Vec<&str> = array(&map["inputs"])
-        .iter()
-        .map(|input| input["file"].as_str().unwrap())
-        .collect();
+    let files: Vec<&str> = array(&map["inputs"]).iter().map(|input| input["file"].as_str().unwrap()).collect();
     assert_eq!(files, [text(&machine), text(&errors)]);
     assert_eq!(map["options"]["places"], 2);
     assert!(map.get("session").is_none());
@@ -105,33 +96,21 @@ fn uncertainties_covariance_and_chi_square_agree() {
     assert!((ratio.sqrt() / number(&fit["birge_ratio"]) - 1.0).abs() < 1e-12);
     let meaning = |id: &str| {
         let own = parameters.iter().find(|parameter| parameter["id"] == id);
-        own.unwrap_or_else(|| panic!("{id}"))["meaning"]
-            .as_str()
-            .unwrap()
-            .to_string()
+        own.unwrap_or_else(|| panic!("{id}"))["meaning"].as_str().unwrap().to_string()
     };
-    assert_eq!(
-        meaning("EB0C"),
-        "C table: inclination of the axis about Y (squareness to X)"
-    );
-    assert_eq!(
-        meaning("EA0C"),
-        "C table: inclination of the axis about X (squareness to Y)"
-    );
+    assert_eq!(meaning("EB0C"), "C table: inclination of the axis about Y (squareness to X)");
+    assert_eq!(meaning("EA0C"), "C table: inclination of the axis about X (squareness to Y)");
     assert_eq!(meaning("bar[A100]"), "A100: bar length");
 }
 
-/// Balls at unknown positions leave directions unidentifiable. Each row of the null space is a combination of `unobservable`.
+/// Balls at unknown positions leave directions unidentifiable. Each row of the null space is a combination of
+/// `unobservable`.
 #[test]
 fn the_null_space_has_the_rows_of_the_unobservable_combinations() {
     let plan = std::fs::read_to_string(ready("hermle-c600u/chapter5.toml")).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("plan.toml");
-    std::fs::copy(
-        ready("hermle-c600u/machine.toml"),
-        folder.path().join("machine.toml"),
-    )
-    .unwrap();
+    std::fs::copy(ready("hermle-c600u/machine.toml"), folder.path().join("machine.toml")).unwrap();
     // The set-up has no priors.
     let free = plan
         .replace("_ball_u_um = [2, 2, 2]", "_ball_u_um = [inf, inf, inf]")
@@ -144,10 +123,7 @@ fn the_null_space_has_the_rows_of_the_unobservable_combinations() {
     let rows = array(&space["vectors"]);
     assert!(!rows.is_empty());
     assert_eq!(rows.len(), unobservable.len());
-    assert_eq!(
-        number(&fit["rank"]) + rows.len() as f64,
-        number(&fit["parameter_count"])
-    );
+    assert_eq!(number(&fit["rank"]) + rows.len() as f64, number(&fit["parameter_count"]));
     for (row, item) in rows.iter().zip(unobservable) {
         for (id, value) in array(&space["ids"]).iter().zip(array(row)) {
             let own = item["combination"].get(id.as_str().unwrap());
@@ -160,18 +136,12 @@ fn the_null_space_has_the_rows_of_the_unobservable_combinations() {
 fn residuals_are_those_of_the_figures() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("residuals.csv");
-    for (session, coordinates) in [
-        ("hermle-c600u/measured/session.toml", 1),
-        ("r-test/measured/session.toml", 3),
-    ] {
+    for (session, coordinates) in [("hermle-c600u/measured/session.toml", 1), ("r-test/measured/session.toml", 3)] {
         let fit = document(&["fit", text(&ready(session)), "--residuals", text(&path)]);
         let mut reader = csv::Reader::from_path(&path).unwrap();
         let header: Vec<String> = reader.headers().unwrap().iter().map(String::from).collect();
-        let columns = |prefix: &str| -> Vec<usize> {
-            (0..header.len())
-                .filter(|k| header[*k].starts_with(prefix))
-                .collect()
-        };
+        let columns =
+            |prefix: &str| -> Vec<usize> { (0..header.len()).filter(|k| header[*k].starts_with(prefix)).collect() };
         let (residual, standardised) = (columns("residual"), columns("standardised"));
         assert_eq!((residual.len(), standardised.len()), (coordinates, coordinates));
         assert_eq!(columns("reading").len(), coordinates);

@@ -107,19 +107,14 @@ fn one_line(text: &str) -> String {
 /// A table of the fields of an object, without those of the envelope.
 fn table(page: &mut String, object: &Value, left_out: &[String]) {
     page.push_str("| field | type | unit | meaning |\n|---|---|---|---|\n");
-    let required: Vec<&str> = object["required"].as_array().map_or(Vec::new(), |names| {
-        names.iter().filter_map(Value::as_str).collect()
-    });
+    let required: Vec<&str> =
+        object["required"].as_array().map_or(Vec::new(), |names| names.iter().filter_map(Value::as_str).collect());
     for (name, field) in object["properties"].as_object().unwrap_or(&Map::new()) {
         if left_out.contains(name) {
             continue;
         }
         let description = field["description"].as_str().unwrap_or_default();
-        let optional = if required.contains(&name.as_str()) {
-            ""
-        } else {
-            ", *optional*"
-        };
+        let optional = if required.contains(&name.as_str()) { "" } else { ", *optional*" };
         writeln!(
             page,
             "| `{name}` | {}{optional} | {} | {} |",
@@ -145,12 +140,7 @@ fn definition(page: &mut String, name: &str, schema: &Value) {
     page.push_str("| value | meaning |\n|---|---|\n");
     for choice in schema["oneOf"].as_array().into_iter().flatten() {
         let text = one_line(choice["description"].as_str().unwrap_or_default());
-        writeln!(
-            page,
-            "| `{}` | {text} |",
-            choice["const"].as_str().unwrap_or_default()
-        )
-        .unwrap();
+        writeln!(page, "| `{}` | {text} |", choice["const"].as_str().unwrap_or_default()).unwrap();
     }
     page.push('\n');
 }
@@ -165,14 +155,8 @@ fn generated() -> String {
         }
     }
     // The fields before the result are those that all commands with a session have.
-    let fields = |schema: &Value| -> Vec<String> {
-        schema["properties"]
-            .as_object()
-            .unwrap()
-            .keys()
-            .cloned()
-            .collect()
-    };
+    let fields =
+        |schema: &Value| -> Vec<String> { schema["properties"].as_object().unwrap().keys().cloned().collect() };
     let shared: Vec<String> = fields(&schemas[0])
         .into_iter()
         .filter(|name| schemas.iter().all(|schema| fields(schema).contains(name)))
@@ -180,10 +164,7 @@ fn generated() -> String {
         .collect();
     let mut page = HEAD.to_string();
     page.push_str("\n## Every document\n\n");
-    let others: Vec<String> = fields(&schemas[0])
-        .into_iter()
-        .filter(|name| !shared.contains(name))
-        .collect();
+    let others: Vec<String> = fields(&schemas[0]).into_iter().filter(|name| !shared.contains(name)).collect();
     table(&mut page, &schemas[0], &others);
     page.push_str("## Commands\n\n");
     for ((command, subject), schema) in COMMANDS.iter().zip(&schemas) {

@@ -1,7 +1,7 @@
 //! Killed at any time, `abbe` leaves the old file or the complete new one.
 //!
-//! `ABBE_KILLS` is the number of kills (24 by default). Half of them occur at a random time of the run, half within a few milliseconds
-//! after the first output file appears.
+//! `ABBE_KILLS` is the number of kills (24 by default). Half of them occur at a random time of the run, half within a
+//! few milliseconds after the first output file appears.
 #![cfg(unix)]
 
 use std::collections::BTreeMap;
@@ -76,8 +76,7 @@ fn start(place: &TestFolder, command: &str) -> Child {
 
 /// Whether a name is that of a temporary file or folder that a killed program leaves behind.
 fn is_temporary(name: &str) -> bool {
-    name.split('/')
-        .any(|part| part.starts_with(".tmp") || part.starts_with(".abbe-"))
+    name.split('/').any(|part| part.starts_with(".tmp") || part.starts_with(".abbe-"))
 }
 
 /// Asserts that each file is the old or the complete new one. Returns the number of new files.
@@ -89,27 +88,16 @@ fn whole(found: &Files, old: &Files, new: &Files, command: &str) -> usize {
             bytes.len()
         );
     }
-    assert!(
-        old.keys().all(|name| found.contains_key(name)),
-        "{command}: a file is gone"
-    );
+    assert!(old.keys().all(|name| found.contains_key(name)), "{command}: a file is gone");
     // The folder of plots appears in one step.
     let plots = |files: &Files| files.keys().filter(|name| name.starts_with("plots/")).count();
-    assert!(
-        [0, plots(new)].contains(&plots(found)),
-        "{command}: {} plots",
-        plots(found)
-    );
-    found
-        .iter()
-        .filter(|(name, bytes)| new.get(*name) == Some(*bytes) && old.get(*name) != Some(*bytes))
-        .count()
+    assert!([0, plots(new)].contains(&plots(found)), "{command}: {} plots", plots(found));
+    found.iter().filter(|(name, bytes)| new.get(*name) == Some(*bytes) && old.get(*name) != Some(*bytes)).count()
 }
 
 #[test]
 fn a_killed_program_leaves_old_files_or_complete_new_ones() {
-    let kills: usize =
-        std::env::var("ABBE_KILLS").map_or(24, |text| text.parse().expect("ABBE_KILLS is a number"));
+    let kills: usize = std::env::var("ABBE_KILLS").map_or(24, |text| text.parse().expect("ABBE_KILLS is a number"));
     let mut random = Pcg64Mcg::seed_from_u64(9);
     let (mut before, mut between, mut after) = (0, 0, 0);
     for (index, (command, outputs)) in COMMANDS.into_iter().enumerate() {
@@ -119,15 +107,8 @@ fn a_killed_program_leaves_old_files_or_complete_new_ones() {
         assert!(start(&untouched, command).wait().unwrap().success(), "{command}");
         let whole_run = began.elapsed();
         let new = files(untouched.0.path());
-        let written = new
-            .iter()
-            .filter(|(name, bytes)| old.get(*name) != Some(*bytes))
-            .count();
-        assert!(
-            written >= outputs.len() && !new.keys().any(|name| is_temporary(name)),
-            "{command}: {:?}",
-            new.keys()
-        );
+        let written = new.iter().filter(|(name, bytes)| old.get(*name) != Some(*bytes)).count();
+        assert!(written >= outputs.len() && !new.keys().any(|name| is_temporary(name)), "{command}: {:?}", new.keys());
         for number in (index..kills).step_by(COMMANDS.len()) {
             let place = prepared(outputs);
             let names = place.names();
@@ -149,7 +130,5 @@ fn a_killed_program_leaves_old_files_or_complete_new_ones() {
             }
         }
     }
-    println!(
-        "{kills} kills: {before} before the first file was there, {between} between, {after} after the last"
-    );
+    println!("{kills} kills: {before} before the first file was there, {between} between, {after} after the last");
 }

@@ -31,10 +31,7 @@ fn test_folder() -> TestFolder {
 }
 
 const MESSAGES: &[(&[&str], &[&str])] = &[
-    (
-        &["fit", "key.toml"],
-        &["error: ", "help: did you mean `noise_um`?"],
-    ),
+    (&["fit", "key.toml"], &["error: ", "help: did you mean `noise_um`?"]),
     (&["fit", "nowhere.toml"], &["error: "]),
     (&["fit", "session.toml", "--plots", "-"], &["error: "]),
     (&["fot"], &["error: "]),
@@ -60,10 +57,7 @@ fn messages_have_one_form() {
         let stderr = String::from_utf8(output.stderr).unwrap();
         assert!(stderr.starts_with(starts[0]), "{arguments:?}: {stderr}");
         for start in *starts {
-            assert!(
-                stderr.lines().any(|line| line.starts_with(start)),
-                "{start}: {stderr}"
-            );
+            assert!(stderr.lines().any(|line| line.starts_with(start)), "{start}: {stderr}");
         }
         for other in ["Error:", "Help:", "Warning:"] {
             assert!(!stderr.contains(other), "{arguments:?}: {stderr}");
@@ -71,10 +65,7 @@ fn messages_have_one_form() {
     }
     // The message shows the line.
     let stderr = String::from_utf8(run(&place, &["fit", "key.toml"], &[]).stderr).unwrap();
-    assert!(
-        stderr.contains("key.toml:8") && stderr.contains("noise_umm = 0.3"),
-        "{stderr}"
-    );
+    assert!(stderr.contains("key.toml:8") && stderr.contains("noise_umm = 0.3"), "{stderr}");
 }
 
 #[test]
@@ -116,15 +107,9 @@ fn a_terminal_has_colour() {
         String::from_utf8(output.stdout).unwrap()
     };
     let stderr = on_terminal(&[]);
-    assert!(
-        stderr.starts_with('\u{1b}') && plain(&stderr).starts_with("error: "),
-        "{stderr}"
-    );
+    assert!(stderr.starts_with('\u{1b}') && plain(&stderr).starts_with("error: "), "{stderr}");
     let stderr = on_terminal(&[("NO_COLOR", "1")]);
-    assert!(
-        stderr.starts_with("error: ") && !stderr.contains('\u{1b}'),
-        "{stderr}"
-    );
+    assert!(stderr.starts_with("error: ") && !stderr.contains('\u{1b}'), "{stderr}");
 }
 
 #[test]
@@ -138,17 +123,11 @@ fn one_test_and_two_tests() {
     };
     let one = fs::read_to_string(place.at("session.toml")).unwrap();
     let test = &one[one.find("[[test]]").unwrap()..];
-    place.put(
-        "two.toml",
-        &format!("{one}\n{}", test.replace("\"XY\"", "\"again\"")),
-    );
+    place.put("two.toml", &format!("{one}\n{}", test.replace("\"XY\"", "\"again\"")));
     assert!(simulate("a", "session.toml").contains("90 readings of 1 test,"));
     assert!(simulate("b", "two.toml").contains("180 readings of 2 tests,"));
     let planned = run(&place, &["plan", "session.toml", "--no-effects"], &[]);
     let planned = String::from_utf8(planned.stdout).unwrap();
-    assert!(
-        planned.contains("\n90 readings in 1 test, 1 set-up,"),
-        "{planned}"
-    );
+    assert!(planned.contains("\n90 readings in 1 test, 1 set-up,"), "{planned}");
     assert!(planned.contains("of 1 error identifiable;"), "{planned}");
 }

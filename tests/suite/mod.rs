@@ -75,10 +75,7 @@ pub fn ready(name: &str) -> PathBuf {
 
 /// Runs the command `abbe`.
 pub fn abbe(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_abbe"))
-        .args(arguments)
-        .output()
-        .expect("the command starts")
+    Command::new(env!("CARGO_BIN_EXE_abbe")).args(arguments).output().expect("the command starts")
 }
 
 /// A path as an argument.

@@ -10,21 +10,11 @@ fn every_template_is_copied_and_reads() {
     let listed = abbe(&["new", "--list"]);
     assert!(listed.status.success());
     let listed = String::from_utf8(listed.stdout).unwrap();
-    let names: Vec<&str> = listed
-        .lines()
-        .filter_map(|line| line.split_whitespace().next())
-        .collect();
+    let names: Vec<&str> = listed.lines().filter_map(|line| line.split_whitespace().next()).collect();
     assert!(
-        [
-            "hermle-c600u",
-            "hermle-c600u-measured",
-            "kuka-iiwa14",
-            "self-calibration",
-            "ur10",
-            "volumetric"
-        ]
-        .iter()
-        .all(|name| names.contains(name))
+        ["hermle-c600u", "hermle-c600u-measured", "kuka-iiwa14", "self-calibration", "ur10", "volumetric"]
+            .iter()
+            .all(|name| names.contains(name))
     );
     let folder = tempfile::tempdir().unwrap();
     for name in names {
@@ -39,10 +29,8 @@ fn every_template_is_copied_and_reads() {
                 assert!(!functions::read(&path, &machine).unwrap().is_empty());
                 sessions += 1;
             } else if file.ends_with(".toml") && file != "machine.toml" {
-                let options = ReadOptions {
-                    read_data: !["kuka-iiwa14", "ur10"].contains(&name),
-                    ..ReadOptions::default()
-                };
+                let options =
+                    ReadOptions { read_data: !["kuka-iiwa14", "ur10"].contains(&name), ..ReadOptions::default() };
                 files::session(&path, &options).unwrap();
                 sessions += 1;
             }
@@ -52,11 +40,7 @@ fn every_template_is_copied_and_reads() {
         let again = abbe(&["new", text(&made), "--template", name]);
         assert_eq!(again.status.code(), Some(1));
         assert!(String::from_utf8_lossy(&again.stderr).contains("exists and is not empty"));
-        assert!(
-            abbe(&["new", text(&made), "--template", name, "--force"])
-                .status
-                .success()
-        );
+        assert!(abbe(&["new", text(&made), "--template", name, "--force"]).status.success());
     }
     let nothing_else = std::fs::read_dir(folder.path()).unwrap().count();
     assert_eq!(nothing_else, 1, "temporary folders are left behind");
@@ -68,21 +52,14 @@ fn an_unknown_template_is_refused_with_the_list_of_templates() {
     let output = abbe(&["new", text(&folder.path().join("a")), "--template", "hermle"]);
     assert_eq!(output.status.code(), Some(1));
     let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(
-        stderr.contains("no template `hermle`") && stderr.contains("kuka-iiwa14"),
-        "{stderr}"
-    );
+    assert!(stderr.contains("no template `hermle`") && stderr.contains("kuka-iiwa14"), "{stderr}");
 }
 
 #[test]
 fn any_structural_code_gives_a_plan_that_runs() {
     use super::topologies::{FIGURE_1_1, TABLE_1_1};
     let folder = tempfile::tempdir().unwrap();
-    let mut codes: Vec<String> = TABLE_1_1
-        .iter()
-        .chain(&FIGURE_1_1)
-        .map(|code| code.to_string())
-        .collect();
+    let mut codes: Vec<String> = TABLE_1_1.iter().chain(&FIGURE_1_1).map(|code| code.to_string()).collect();
     codes.extend(
         [
             "[wXYbZt]",
@@ -103,22 +80,11 @@ fn any_structural_code_gives_a_plan_that_runs() {
     for (index, code) in codes.iter().enumerate() {
         let made = folder.path().join(index.to_string());
         let run = abbe(&["new", text(&made), "--from-code", code]);
-        assert!(
-            run.status.success(),
-            "{code}: {}",
-            String::from_utf8_lossy(&run.stderr)
-        );
+        assert!(run.status.success(), "{code}: {}", String::from_utf8_lossy(&run.stderr));
         let machine = files::machine(&made.join("machine.toml")).unwrap();
-        assert_eq!(
-            machine.code().replace(' ', ""),
-            code.replace(' ', "").trim_matches(['[', ']'])
-        );
+        assert_eq!(machine.code().replace(' ', ""), code.replace(' ', "").trim_matches(['[', ']']));
         let plan = abbe(&["plan", text(&made.join("plan.toml")), "--no-effects"]);
-        assert!(
-            plan.status.success(),
-            "{code}: {}",
-            String::from_utf8_lossy(&plan.stderr)
-        );
+        assert!(plan.status.success(), "{code}: {}", String::from_utf8_lossy(&plan.stderr));
         let stderr = String::from_utf8_lossy(&plan.stderr).into_owned();
         assert!(!stderr.contains("warning"), "{code}: {stderr}");
         // Every line with a value has a comment above it or beside it.
@@ -134,15 +100,9 @@ fn any_structural_code_gives_a_plan_that_runs() {
                 } else if line.starts_with("  \"") {
                     assert!(line.contains('#'), "{code}: {file}: {line}");
                 } else {
-                    let group = [
-                        "spindle_ball",
-                        "spindle_setup",
-                        "bar_setup",
-                        "bar_u_um",
-                        "direction",
-                    ]
-                    .iter()
-                    .any(|key| line.starts_with(key));
+                    let group = ["spindle_ball", "spindle_setup", "bar_setup", "bar_u_um", "direction"]
+                        .iter()
+                        .any(|key| line.starts_with(key));
                     assert!(explained || group, "{code}: {file}: {line}");
                     explained = false;
                 }
@@ -151,10 +111,7 @@ fn any_structural_code_gives_a_plan_that_runs() {
     }
     for (code, message) in [
         ("[wCAYXZt]", "it contains 0 beds"),
-        (
-            "w b J1 J2 t",
-            "axis `J1` of `w b J1 J2 t` is no letter of ISO 841",
-        ),
+        ("w b J1 J2 t", "axis `J1` of `w b J1 J2 t` is no letter of ISO 841"),
         ("wbt", "has no axis"),
     ] {
         let output = abbe(&["new", text(&folder.path().join("no")), "--from-code", code]);

@@ -19,33 +19,20 @@ struct Certified<const N: usize> {
 
 impl<const N: usize> Certified<N> {
     fn parse(text: &str) -> Certified<N> {
-        let mut certified = Certified {
-            starts: [[0.0; N]; 2],
-            values: [0.0; N],
-            deviations: [0.0; N],
-            readings: Vec::new(),
-        };
-        let numbers = |line: &str| -> Vec<f64> {
-            line.split_whitespace()
-                .map_while(|word| word.parse().ok())
-                .collect()
-        };
+        let mut certified =
+            Certified { starts: [[0.0; N]; 2], values: [0.0; N], deviations: [0.0; N], readings: Vec::new() };
+        let numbers =
+            |line: &str| -> Vec<f64> { line.split_whitespace().map_while(|word| word.parse().ok()).collect() };
         for k in 0..N {
             let label = format!("b{} =", k + 1);
-            let line = text
-                .lines()
-                .find_map(|line| line.trim().strip_prefix(&label))
-                .unwrap();
+            let line = text.lines().find_map(|line| line.trim().strip_prefix(&label)).unwrap();
             let [a, b, value, deviation] = numbers(line)[..] else {
                 panic!("{line}");
             };
             (certified.starts[0][k], certified.starts[1][k]) = (a, b);
             (certified.values[k], certified.deviations[k]) = (value, deviation);
         }
-        let data = text
-            .lines()
-            .skip_while(|line| !line.trim().starts_with("Data:   y"))
-            .skip(1);
+        let data = text.lines().skip_while(|line| !line.trim().starts_with("Data:   y")).skip(1);
         for line in data {
             if let [y, x] = numbers(line)[..] {
                 certified.readings.push((y, x));
@@ -104,10 +91,7 @@ fn holds<const N: usize>(name: &str, model: impl Fn(&[Dual<N>; N], f64) -> Dual<
         return;
     };
     let certified = Certified::<N>::parse(&std::fs::read_to_string(path).unwrap());
-    let problem = Regression {
-        readings: &certified.readings,
-        model,
-    };
+    let problem = Regression { readings: &certified.readings, model };
     for (number, start) in certified.starts.iter().enumerate() {
         let solution = minimise(&problem, start, &Scaling::Columns).unwrap();
         let freedom = (certified.readings.len() - N) as f64;

@@ -8,7 +8,8 @@ use super::{abbe, ready, text};
 const R: f64 = 100.0;
 const BARS: [f64; 2] = [99.9881, 149.9946];
 
-/// `ΔL·L₀` for one unit of the error for the ball at (0, R, 0), the spindle ball at (−D, 0, 0), C at 0 (first order of Eqs. 3.20, 3.21).
+/// `ΔL·L₀` for one unit of the error for the ball at (0, R, 0), the spindle ball at (−D, 0, 0), C at 0 (first order of
+/// Eqs. 3.20, 3.21).
 fn numerator(error: &str, a: f64, d: f64) -> f64 {
     match error {
         "EY0A" => R * a.cos(),
@@ -29,13 +30,10 @@ fn the_patterns_of_the_a_axis_are_those_of_the_thesis() {
     let found = patterns(&session, &usual_sizes(&session)).unwrap();
     let mut compared = 0;
     for pattern in found.patterns.iter().filter(|p| p.test.starts_with('A')) {
-        let (_, states) = found
-            .tests
-            .iter()
-            .find(|(name, _)| *name == pattern.test)
-            .unwrap();
+        let (_, states) = found.tests.iter().find(|(name, _)| *name == pattern.test).unwrap();
         let axis = session.machine.axis_index("A").unwrap();
-        // The ball is at R although the calibrated bar is slightly shorter: the length without errors is that of the geometry.
+        // The ball is at R although the calibrated bar is slightly shorter: the length without errors is that of the
+        // geometry.
         let d = match pattern.test.as_str() {
             "A100" => 0.0,
             _ => (BARS[1].powi(2) - R * R).sqrt(),
@@ -68,40 +66,21 @@ fn the_file_holds_every_reading_of_every_error() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("patterns.csv");
     let session = ready("hermle-c600u/chapter5.toml");
-    let output = abbe(&[
-        "plan",
-        text(&session),
-        "--patterns",
-        text(&file),
-        "--error",
-        "e_y0a=10um",
-        "--error",
-        "bar[A150]=1um",
-    ]);
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    let output =
+        abbe(&["plan", text(&session), "--patterns", text(&file), "--error", "e_y0a=10um", "--error", "bar[A150]=1um"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let screen = String::from_utf8(output.stdout).unwrap();
     assert!(screen.contains("A150  bar[A150]"), "{screen}");
     let written = std::fs::read_to_string(&file).unwrap();
     let mut lines = written.lines();
-    assert_eq!(
-        lines.next(),
-        Some("test,error,size,unit,run,c_deg,a_deg,y_mm,x_mm,z_mm,deviation_um")
-    );
+    assert_eq!(lines.next(), Some("test,error,size,unit,run,c_deg,a_deg,y_mm,x_mm,z_mm,deviation_um"));
     let mut bars = 0;
     for line in lines {
         let cells: Vec<&str> = line.split(',').collect();
         assert_eq!(cells.len(), 11, "{line}");
         if cells[1] == "bar[A150]" {
             // A bar that is longer than stated reduces the readings by the same amount, in its own test only.
-            let expected = if cells[0] == "A150" {
-                "-1.000000"
-            } else {
-                "0.000000"
-            };
+            let expected = if cells[0] == "A150" { "-1.000000" } else { "0.000000" };
             assert_eq!(cells[10], expected, "{line}");
             bars += 1;
         }

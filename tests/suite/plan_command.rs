@@ -15,11 +15,7 @@ fn json(arguments: &[&str]) -> Value {
     all.extend(arguments);
     all.extend(["--json", text(&file)]);
     let output = abbe(&all);
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     serde_json::from_str(&std::fs::read_to_string(file).unwrap()).unwrap()
 }
 
@@ -36,46 +32,26 @@ fn the_terminal_and_the_json_agree() {
         assert!(screen.contains(error["id"].as_str().unwrap()));
     }
     assert!(screen.contains("only A150 makes EB0A, EC0A"));
-    assert!(
-        screen.contains("EC0A is confounded with y of the spindle ball in A150: 1″ : −0.54 µm"),
-        "{screen}"
-    );
-    assert!(
-        screen.lines().all(|line| line.chars().count() < 170),
-        "a line too long for a screen"
-    );
+    assert!(screen.contains("EC0A is confounded with y of the spindle ball in A150: 1″ : −0.54 µm"), "{screen}");
+    assert!(screen.lines().all(|line| line.chars().count() < 170), "a line too long for a screen");
     // A second run gives the same.
-    assert_eq!(
-        screen,
-        String::from_utf8(abbe(&["plan", &session, "--all"]).stdout).unwrap()
-    );
+    assert_eq!(screen, String::from_utf8(abbe(&["plan", &session, "--all"]).stdout).unwrap());
 }
 
 #[test]
 fn the_effects_list_what_a_clean_residual_does_not_exclude() {
     let plan = json(&[&chapter_5()]);
     let effects = plan["effects"]["effects"].as_array().unwrap();
-    let verdict = |id: &str| {
-        effects
-            .iter()
-            .find(|effect| effect["id"] == id)
-            .map(|effect| effect["verdict"].clone())
-    };
+    let verdict = |id: &str| effects.iter().find(|effect| effect["id"] == id).map(|effect| effect["verdict"].clone());
     // At one height and one radius the tilt of C at order 1 is confounded with the axial motion at order 2.
     assert_eq!(verdict("EZC~C:h3").unwrap(), "detectable");
     assert_eq!(verdict("EZC~C:h1").unwrap(), "confounded");
     // The spindle ball lies on the C axis: C tests do not respond to ECC, and in A tests it is a constant at C = 0.
     assert_eq!(verdict("ECC~C:h2").unwrap(), "confounded");
-    let bound = |id: &str| {
-        effects.iter().find(|effect| effect["id"] == id).unwrap()["detectable_amplitude"]
-            .as_f64()
-            .unwrap()
-    };
+    let bound =
+        |id: &str| effects.iter().find(|effect| effect["id"] == id).unwrap()["detectable_amplitude"].as_f64().unwrap();
     assert!(bound("EZC~C:h3") < 0.1, "{}", bound("EZC~C:h3"));
-    for effect in effects
-        .iter()
-        .filter(|effect| effect["detectable_amplitude"].is_f64())
-    {
+    for effect in effects.iter().filter(|effect| effect["detectable_amplitude"].is_f64()) {
         let searched = effect["detectable_amplitude_screened"].as_f64();
         assert!(
             searched.is_none_or(|searched| searched > effect["detectable_amplitude"].as_f64().unwrap()),
@@ -88,40 +64,19 @@ fn the_effects_list_what_a_clean_residual_does_not_exclude() {
 fn invalid_requests_fail_with_the_reason() {
     let session = chapter_5();
     for (arguments, words) in [
-        (
-            vec!["plan", &session, "--separate", "EZC~C:q2,EAC~C:h1"],
-            "similar ones: EZC~C:h1",
-        ),
-        (
-            vec!["plan", &session, "--separate", "EZC~C:h2"],
-            "two different effects",
-        ),
+        (vec!["plan", &session, "--separate", "EZC~C:q2,EAC~C:h1"], "similar ones: EZC~C:h1"),
+        (vec!["plan", &session, "--separate", "EZC~C:h2"], "two different effects"),
         (vec!["plan", &session, "--noise-um", "0"], "is expected"),
-        (
-            vec!["plan", &session, "--improve", "--bars-mm", "0"],
-            "a length of at least 1 mm",
-        ),
-        (
-            vec!["plan", &session, "--improve", "--bars-mm", "20"],
-            "no candidate test",
-        ),
+        (vec!["plan", &session, "--improve", "--bars-mm", "0"], "a length of at least 1 mm"),
+        (vec!["plan", &session, "--improve", "--bars-mm", "20"], "no candidate test"),
         (vec!["plan", &session, "--clearance-mm", "1,2"], "six lengths"),
-        (
-            vec!["plan", &session, "--improve", "--sweep-shares", "1.5"],
-            "no share",
-        ),
+        (vec!["plan", &session, "--improve", "--sweep-shares", "1.5"], "no share"),
         (vec!["plan", &session, "--improve", "--feeds", "0"], "no multiple"),
-        (
-            vec!["plan", &session, "--improve", "--setup-min=-1"],
-            "at least 0",
-        ),
+        (vec!["plan", &session, "--improve", "--setup-min=-1"], "at least 0"),
     ] {
         let output = abbe(&arguments);
         let message = String::from_utf8_lossy(&output.stderr).to_string();
-        assert!(
-            matches!(output.status.code(), Some(1 | 2)),
-            "{arguments:?}: {message}"
-        );
+        assert!(matches!(output.status.code(), Some(1 | 2)), "{arguments:?}: {message}");
         assert!(message.contains(words), "{arguments:?}: {message}");
     }
 }
@@ -133,8 +88,7 @@ fn sweeps_can_shrink_until_an_uncertainty_doubles() {
     assert_eq!(ranges.len(), 4);
     for range in ranges {
         let planned = range["range"]["high"].as_f64().unwrap() - range["range"]["low"].as_f64().unwrap();
-        let least = range["minimum_range"]["high"].as_f64().unwrap()
-            - range["minimum_range"]["low"].as_f64().unwrap();
+        let least = range["minimum_range"]["high"].as_f64().unwrap() - range["minimum_range"]["low"].as_f64().unwrap();
         assert!(least > 0.0 && least < planned, "{range}");
     }
 }
@@ -156,8 +110,7 @@ fn a_warning_names_a_test_beyond_the_travel_of_the_sensor() {
         String::from_utf8(abbe(&arguments).stderr).unwrap()
     };
     assert!(
-        warnings(&[])
-            .contains("A150: the distance of the balls differs from the bar length by up to 1.50 mm"),
+        warnings(&[]).contains("A150: the distance of the balls differs from the bar length by up to 1.50 mm"),
         "{}",
         warnings(&[])
     );

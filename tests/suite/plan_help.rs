@@ -6,7 +6,8 @@ use abbe::identify::plan::states;
 use abbe::model::files::{ReadOptions, session as read};
 use abbe::model::session::Session;
 
-/// The `[machine]` table of a structural code with the axis directions of ISO 841 and, if stated, the travel of rotary axes.
+/// The `[machine]` table of a structural code with the axis directions of ISO 841 and, if stated, the travel of rotary
+/// axes.
 pub fn machine(code: &str, travel_deg: Option<[i32; 2]>) -> String {
     let mut text = format!("[machine]\nname = \"{code}\"\nchain = \"{code}\"\n");
     for letter in code.chars().filter(char::is_ascii_uppercase) {
@@ -44,12 +45,8 @@ pub fn noise_um(um: f64) -> Noise {
 /// The linearisation of a plan, with the names of its parameters.
 pub fn linearised(session: &Session) -> (Vec<String>, Linearisation) {
     let complete = states::complete(session, true).unwrap();
-    let problem =
-        states::problem_by_test(&complete, noise_um(session.noise_mm.unwrap_or(3e-4) * 1e3)).unwrap();
+    let problem = states::problem_by_test(&complete, noise_um(session.noise_mm.unwrap_or(3e-4) * 1e3)).unwrap();
     let list = &problem.parameters.list;
     let linear = Linearisation::of(&problem, &vec![0.0; list.len()]).unwrap();
-    (
-        list.iter().map(|parameter| parameter.id.clone()).collect(),
-        linear,
-    )
+    (list.iter().map(|parameter| parameter.id.clone()).collect(), linear)
 }

@@ -1,4 +1,5 @@
-//! The three methods of the thesis: identifiability and uncertainty, and the disagreement of chapters 4 and 5 on θ_y0a and θ_y0c.
+//! The three methods of the thesis: identifiability and uncertainty, and the disagreement of chapters 4 and 5 on θ_y0a
+//! and θ_y0c.
 
 use abbe::identify::plan::results::PlanAnalysis;
 use abbe::identify::plan::{PlanOptions, analyse};
@@ -12,11 +13,7 @@ fn method(chapter: usize, setup_um: f64) -> Session {
     for test in &mut session.tests {
         for prior in &mut test.priors {
             if matches!(prior, Prior::Gaussian(_)) {
-                *prior = if setup_um > 0.0 {
-                    Prior::Gaussian(setup_um * 1e-3)
-                } else {
-                    Prior::Known
-                };
+                *prior = if setup_um > 0.0 { Prior::Gaussian(setup_um * 1e-3) } else { Prior::Known };
             }
         }
     }
@@ -24,49 +21,23 @@ fn method(chapter: usize, setup_um: f64) -> Session {
 }
 
 fn analysis(chapter: usize, setup_um: f64, effects: bool) -> PlanAnalysis {
-    analyse(
-        &method(chapter, setup_um),
-        &PlanOptions {
-            effects,
-            ..PlanOptions::default()
-        },
-    )
-    .unwrap()
+    analyse(&method(chapter, setup_um), &PlanOptions { effects, ..PlanOptions::default() }).unwrap()
 }
 
 fn u(analysis: &PlanAnalysis, id: &str) -> f64 {
-    analysis
-        .errors
-        .iter()
-        .find(|error| error.id == id)
-        .and_then(|error| error.u)
-        .unwrap()
+    analysis.errors.iter().find(|error| error.id == id).and_then(|error| error.u).unwrap()
 }
 
 fn rho(analysis: &PlanAnalysis, a: &str, b: &str) -> f64 {
-    let place = |id: &str| {
-        analysis
-            .correlation
-            .ids
-            .iter()
-            .position(|other| other == id)
-            .unwrap()
-    };
+    let place = |id: &str| analysis.correlation.ids.iter().position(|other| other == id).unwrap();
     analysis.correlation.matrix[place(a)][place(b)].unwrap()
 }
 
 /// Bias of an error, in its unit per unit of an effect, with its sign.
 fn bias(analysis: &PlanAnalysis, effect: &str, error: &str) -> f64 {
     let effects = &analysis.effects.as_ref().unwrap().effects;
-    let found = effects
-        .iter()
-        .find(|found| found.id == effect)
-        .unwrap_or_else(|| panic!("{effect} is not there"));
-    found
-        .biases
-        .iter()
-        .find(|bias| bias.id == error)
-        .map_or(0.0, |bias| bias.per_unit)
+    let found = effects.iter().find(|found| found.id == effect).unwrap_or_else(|| panic!("{effect} is not there"));
+    found.biases.iter().find(|bias| bias.id == error).map_or(0.0, |bias| bias.per_unit)
 }
 
 /// Tables 4.2, 4.3, 5.2, 5.3, 6.3 and 6.4: standard deviations over ten repetitions, µm and arcsec.
@@ -89,18 +60,11 @@ fn each_method_identifies_all_eight_errors_with_the_set_up_priors() {
         for (id, repeated) in REPEATED {
             let error = plan.errors.iter().find(|error| error.id == id).unwrap();
             let total: f64 = error.budget.iter().map(|part| part.share).sum();
-            assert!(
-                (total - 1.0).abs() < 2e-3,
-                "{chapter} {id}: shares come to {total}"
-            );
+            assert!((total - 1.0).abs() < 2e-3, "{chapter} {id}: shares come to {total}");
             let noise = error.budget.iter().find(|part| part.source == "noise").unwrap().u;
             // The repeatability of the thesis lies between that of white noise of 0.3 µm and that of a new set-up.
             assert!(noise < repeated[chapter - 4], "{chapter} {id}: {noise}");
-            assert!(
-                u(&plan, id) > repeated[chapter - 4],
-                "{chapter} {id}: {}",
-                u(&plan, id)
-            );
+            assert!(u(&plan, id) > repeated[chapter - 4], "{chapter} {id}: {}", u(&plan, id));
         }
     }
 }
@@ -116,21 +80,14 @@ fn chapters_4_and_5_agree_on_the_sum_and_disagree_on_its_parts() {
 
     let plans = [analysis(4, 1.0, false), analysis(5, 1.0, false)];
     for plan in &plans {
-        assert!(
-            (rho(plan, "EB0A", "EB0C") + 0.707).abs() < 0.01,
-            "{}",
-            rho(plan, "EB0A", "EB0C")
-        );
+        assert!((rho(plan, "EB0A", "EB0C") + 0.707).abs() < 0.01, "{}", rho(plan, "EB0A", "EB0C"));
     }
     let both = |id: &str| u(&plans[0], id).hypot(u(&plans[1], id));
     // The repeatability does not explain the difference.
     assert!(difference[0] / 0.557_f64.hypot(0.427) > 10.0);
     // A spindle ball with u = 1 µm in every test explains it at about two standard deviations.
     let ratio = [difference[0] / both("EB0A"), difference[1] / both("EB0C")];
-    println!(
-        "difference over predicted: EB0A {:+.2}, EB0C {:+.2}",
-        ratio[0], ratio[1]
-    );
+    println!("difference over predicted: EB0A {:+.2}, EB0C {:+.2}", ratio[0], ratio[1]);
     assert!((2.0..2.5).contains(&ratio[0]) && (-2.0..-1.4).contains(&ratio[1]));
 }
 
@@ -148,22 +105,11 @@ fn an_offset_of_the_spindle_ball_between_two_tests_explains_both_differences_wit
     assert!((bias(&plan, sideways, c).abs() - 1.845).abs() < 0.01);
     // Each is completely confounded: the residual is clean at any size.
     for effect in [height, sideways] {
-        let found = plan
-            .effects
-            .as_ref()
-            .unwrap()
-            .effects
-            .iter()
-            .find(|found| found.id == effect)
-            .unwrap();
+        let found = plan.effects.as_ref().unwrap().effects.iter().find(|found| found.id == effect).unwrap();
         assert_eq!(found.verdict, "confounded", "{effect}");
         assert!(found.detectable_amplitude.is_none());
     }
-    println!(
-        "4.3 µm: EB0A {:+.2}″, EB0C {:+.2}″",
-        4.3 * per_um,
-        4.3 * bias(&plan, height, c)
-    );
+    println!("4.3 µm: EB0A {:+.2}″, EB0C {:+.2}″", 4.3 * per_um, 4.3 * bias(&plan, height, c));
 }
 
 #[test]
@@ -173,10 +119,7 @@ fn a_repeatable_straightness_of_x_biases_both_chapters_alike() {
     for error in ["EB0A", "EB0C"] {
         let (a, b) = (bias(&four, effect, error), bias(&five, effect, error));
         assert!(a.abs() > 1.0, "{error}: {a}");
-        assert!(
-            (a - b).abs() < 0.01 * a.abs(),
-            "{error}: {a} in chapter 4, {b} in chapter 5"
-        );
+        assert!((a - b).abs() < 0.01 * a.abs(), "{error}: {a} in chapter 4, {b} in chapter 5");
     }
 }
 
@@ -186,27 +129,15 @@ fn the_table_in_the_docs_agrees_with_the_computation() {
     for (column, chapter) in [4, 5, 6].into_iter().enumerate() {
         let plan = analysis(chapter, 1.0, false);
         let mut one = method(chapter, 1.0);
-        one.tests
-            .iter_mut()
-            .for_each(|test| test.spindle_setup = "one".to_string());
-        let one = analyse(
-            &one,
-            &PlanOptions {
-                effects: false,
-                ..PlanOptions::default()
-            },
-        )
-        .unwrap();
+        one.tests.iter_mut().for_each(|test| test.spindle_setup = "one".to_string());
+        let one = analyse(&one, &PlanOptions { effects: false, ..PlanOptions::default() }).unwrap();
         for error in &plan.errors {
             let start = format!("| `{}` |", error.id);
             let row = docs.lines().find(|line| line.starts_with(&start)).unwrap();
             let cells: Vec<&str> = row.split('|').map(str::trim).collect();
             let printed = |k: usize| cells[3 + 4 * column + k].parse::<f64>().unwrap();
             let noise = error.budget.iter().find(|part| part.source == "noise").unwrap().u;
-            for (k, value) in [noise, error.u.unwrap(), u(&one, &error.id)]
-                .into_iter()
-                .enumerate()
-            {
+            for (k, value) in [noise, error.u.unwrap(), u(&one, &error.id)].into_iter().enumerate() {
                 assert!(
                     (printed(k) - value).abs() <= 0.006 * value,
                     "{chapter} {}: {} for {value}",

@@ -6,7 +6,9 @@ use abbe::identify::plan::effects::effects;
 use abbe::identify::plan::results::EffectDetectability;
 use abbe::identify::plan::states;
 use abbe::identify::trace::library;
-use abbe::model::effect::{Driver, Shape};
+use abbe::model::driver::Driver;
+use abbe::model::effect::Shape;
+use abbe::model::effect::shape::Power;
 use abbe::model::session::Session;
 
 use super::plan_help::{machine, noise_um, session};
@@ -31,7 +33,7 @@ fn judged(plan: &Session) -> Vec<EffectDetectability> {
     let complete = states::complete(plan, true).unwrap();
     let problem = states::problem_by_test(&complete, noise_um(NOISE_UM)).unwrap();
     for candidate in library::candidates(&problem).unwrap() {
-        if let Shape::Power { scale, .. } = candidate.effect.shape {
+        if let Shape::Power(Power { scale, .. }) = candidate.effect.shape {
             let expected = match &candidate.effect.driver {
                 Driver::Axis(name) if name == "C" => PI,
                 Driver::Axis(_) => 100.0,
@@ -43,8 +45,8 @@ fn judged(plan: &Session) -> Vec<EffectDetectability> {
     effects(&problem).unwrap().effects
 }
 
-/// The detectable amplitude, µm, of an effect whose response at each position is `signal`: numerical least squares with the bar length as
-/// the second parameter.
+/// The detectable amplitude, µm, of an effect whose response at each position is `signal`: numerical least squares with
+/// the bar length as the second parameter.
 fn closed_form(positions: impl Iterator<Item = f64>, signal: impl Fn(f64) -> [f64; 2]) -> f64 {
     let weight = 1.0 / NOISE_UM.powi(2);
     let (mut own, mut cross, mut bar) = (0.0, 0.0, 1.0 / BAR_U_UM.powi(2));
@@ -61,23 +63,15 @@ fn closed_form(positions: impl Iterator<Item = f64>, signal: impl Fn(f64) -> [f6
 fn check(judged: &[EffectDetectability], id: &str, expected: f64) {
     let found = judged.iter().find(|effect| effect.id == id).unwrap();
     let detectable = found.detectable_amplitude.unwrap();
-    println!(
-        "{id}: {detectable:.4} {}, closed form {expected:.4} um",
-        found.unit
-    );
+    println!("{id}: {detectable:.4} {}, closed form {expected:.4} um", found.unit);
     assert_eq!(found.unit, "um", "{id}");
-    assert!(
-        (detectable / expected - 1.0).abs() < 1e-3,
-        "{id}: {detectable} for {expected}"
-    );
+    assert!((detectable / expected - 1.0).abs() < 1e-3, "{id}: {detectable} for {expected}");
 }
 
 #[test]
 fn a_power_of_a_rotary_axis_is_stated_at_half_a_turn() {
     for (from, to) in [(-45, 45), (-90, 30), (100, 170)] {
-        let plan = upright(&format!(
-            "axis = \"C\", from_deg = {from}, to_deg = {to}, step_deg = 1"
-        ));
+        let plan = upright(&format!("axis = \"C\", from_deg = {from}, to_deg = {to}, step_deg = 1"));
         let judged = judged(&plan);
         for power in 1..=3 {
             let positions = (from..=to).map(f64::from);
@@ -90,19 +84,13 @@ fn a_power_of_a_rotary_axis_is_stated_at_half_a_turn() {
 #[test]
 fn a_power_of_a_linear_axis_is_stated_at_100_mm() {
     for (from, to) in [(-20, 20), (-5, 25)] {
-        let plan = upright(&format!(
-            "axis = \"X\", from_mm = {from}, to_mm = {to}, step_mm = 0.5"
-        ));
+        let plan = upright(&format!("axis = \"X\", from_mm = {from}, to_mm = {to}, step_mm = 0.5"));
         let judged = judged(&plan);
         for power in 1..=3 {
             let positions = (2 * from..=2 * to).map(|half| 0.5 * f64::from(half));
             // The bar is inclined: the reading is the cosine of the displacement along Z.
             let signal = |x: f64| [(x / 100.0).powi(power) * 100.0 / x.hypot(100.0), 1.0];
-            check(
-                &judged,
-                &format!("EZX~X:power{power}"),
-                closed_form(positions, signal),
-            );
+            check(&judged, &format!("EZX~X:power{power}"), closed_form(positions, signal));
         }
     }
 }

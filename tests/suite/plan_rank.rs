@@ -5,11 +5,7 @@ use super::plan_help::{linearised, machine, session};
 const D: f64 = 111.803;
 
 fn head(errors: &str) -> String {
-    let unknowns = if errors.is_empty() {
-        String::new()
-    } else {
-        format!("[unknowns]\nerrors = [{errors}]\n")
-    };
+    let unknowns = if errors.is_empty() { String::new() } else { format!("[unknowns]\nerrors = [{errors}]\n") };
     let machine = machine("w C A b Y X Z t", None);
     format!("{machine}\n[instrument]\nkind = \"ballbar\"\nnoise_um = 0.3\n{unknowns}")
 }
@@ -28,19 +24,11 @@ fn known(name: &str, axis: &str, ball: [f64; 3], spindle: [f64; 3]) -> String {
 fn rank(height: f64, spindles: &[(&str, [f64; 3])]) -> (usize, Vec<String>) {
     let mut text = head("");
     for (number, (axis, spindle)) in spindles.iter().enumerate() {
-        text.push_str(&known(
-            &format!("{axis}{number}"),
-            axis,
-            [0.0, 100.0, height],
-            *spindle,
-        ));
+        text.push_str(&known(&format!("{axis}{number}"), axis, [0.0, 100.0, height], *spindle));
     }
     let (ids, linear) = linearised(&session(&text));
-    let not_identifiable = ids
-        .iter()
-        .enumerate()
-        .filter(|(j, _)| !linear.rank.is_identifiable(*j))
-        .map(|(_, id)| id.clone());
+    let not_identifiable =
+        ids.iter().enumerate().filter(|(j, _)| !linear.rank.is_identifiable(*j)).map(|(_, id)| id.clone());
     (linear.rank.identifiable_basis.ncols(), not_identifiable.collect())
 }
 
@@ -61,8 +49,8 @@ fn the_eight_errors_have_rank_six_seven_and_eight() {
     assert_eq!(rank(50.0, &five), (8, Vec::new()));
 }
 
-/// PDGEs of C of orders 1 to 3 in one test at one radius and one height, with free set-ups and radial, tangential and axial readings:
-/// rank, number of parameters, and the coefficients that are identifiable individually.
+/// PDGEs of C of orders 1 to 3 in one test at one radius and one height, with free set-ups and radial, tangential and
+/// axial readings: rank, number of parameters, and the coefficients that are identifiable individually.
 fn individually_identifiable(orders: std::ops::RangeInclusive<usize>) -> (usize, usize, Vec<String>) {
     let mut text = head("\"EX0C\", \"EY0C\", \"EA0C\", \"EB0C\"");
     for offset in ["radial", "tangential", "axial"] {
@@ -80,12 +68,8 @@ fn individually_identifiable(orders: std::ops::RangeInclusive<usize>) -> (usize,
         }
     }
     let (ids, linear) = linearised(&session(&text));
-    let identifiable = ids
-        .iter()
-        .enumerate()
-        .filter(|(j, _)| linear.rank.is_identifiable(*j))
-        .map(|(_, id)| id.clone())
-        .collect();
+    let identifiable =
+        ids.iter().enumerate().filter(|(j, _)| linear.rank.is_identifiable(*j)).map(|(_, id)| id.clone()).collect();
     (linear.rank.identifiable_basis.ncols(), ids.len(), identifiable)
 }
 

@@ -14,11 +14,7 @@ use super::{abbe, ready, text};
 /// A session from the text of its file, with the machine of chapter 5.
 fn session(contents: &str) -> Session {
     let folder = tempfile::tempdir().unwrap();
-    std::fs::copy(
-        ready("hermle-c600u/machine.toml"),
-        folder.path().join("machine.toml"),
-    )
-    .unwrap();
+    std::fs::copy(ready("hermle-c600u/machine.toml"), folder.path().join("machine.toml")).unwrap();
     let path = folder.path().join("session.toml");
     std::fs::write(&path, contents).unwrap();
     let mut session = files::session(&path, &ReadOptions::default()).unwrap();
@@ -38,20 +34,12 @@ fn measured(plan: &Session, simulation: &Simulation) -> (Session, Vec<(String, f
 fn drawn(session: &Session, runs: u64, seed: u64) -> FitMonteCarlo {
     let (problem, fit) = prepare(session, 1).unwrap();
     let mut result = report(&problem, &fit);
-    let draws = MonteCarlo {
-        runs,
-        seed,
-        coverage: 0.95,
-    };
+    let draws = MonteCarlo { runs, seed, coverage: 0.95 };
     add_monte_carlo(&problem, &fit, &draws, &mut result).unwrap();
     let drawn = result.monte_carlo.unwrap();
     for (parameter, own) in result.parameters.iter().zip(&drawn.parameters) {
         assert_eq!(parameter.id, own.id);
-        let quoted = if own.verdict == Verdict::Agree {
-            own.gum_u
-        } else {
-            own.u
-        };
+        let quoted = if own.verdict == Verdict::Agree { own.gum_u } else { own.u };
         assert_eq!(parameter.u, quoted);
     }
     drawn
@@ -60,19 +48,10 @@ fn drawn(session: &Session, runs: u64, seed: u64) -> FitMonteCarlo {
 /// The plan of chapter 5 with a reading every 15°.
 fn linear() -> Session {
     let whole = std::fs::read_to_string(ready("hermle-c600u/chapter5.toml")).unwrap();
-    let coarse = whole
-        .replace("step_deg = 0.25", "step_deg = 15")
-        .replace("step_deg = 0.5", "step_deg = 15");
+    let coarse = whole.replace("step_deg = 0.25", "step_deg = 15").replace("step_deg = 0.5", "step_deg = 15");
     let plan = session(&coarse);
-    let given = super::recovery::THESIS
-        .iter()
-        .map(|text| Given::parse(text).unwrap());
-    let simulation = Simulation {
-        given: given.collect(),
-        draw_setups: true,
-        seed: 5,
-        ..Simulation::default()
-    };
+    let given = super::recovery::THESIS.iter().map(|text| Given::parse(text).unwrap());
+    let simulation = Simulation { given: given.collect(), draw_setups: true, seed: 5, ..Simulation::default() };
     measured(&plan, &simulation).0
 }
 
@@ -90,11 +69,7 @@ fn monte_carlo_and_propagation_agree_for_a_linear_model() {
         assert!(off.abs() < 0.035, "{}: {off}", parameter.id);
         assert_ne!(parameter.verdict, Verdict::Differ, "{parameter:?}");
     }
-    let agree = found
-        .parameters
-        .iter()
-        .filter(|p| p.verdict == Verdict::Agree)
-        .count();
+    let agree = found.parameters.iter().filter(|p| p.verdict == Verdict::Agree).count();
     assert!(agree * 10 >= found.parameters.len() * 8, "{agree}");
 }
 
@@ -102,10 +77,7 @@ fn monte_carlo_and_propagation_agree_for_a_linear_model() {
 fn the_same_bytes_for_any_number_of_threads() {
     let session = linear();
     let with = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let found = pool.install(|| drawn(&session, 1000, 9));
         serde_json::to_string(&found).unwrap()
     };
@@ -119,8 +91,8 @@ fn the_same_bytes_for_any_number_of_threads() {
 const R: f64 = 50.0;
 const U_MM: f64 = 0.8;
 
-/// A short bar whose spindle ball has u = 0.8 mm along the axis of C: the estimated error of the bar length depends on the square of that
-/// offset.
+/// A short bar whose spindle ball has u = 0.8 mm along the axis of C: the estimated error of the bar length depends on
+/// the square of that offset.
 fn bent() -> Session {
     session(&format!(
         "[machine]\nfile = \"machine.toml\"\n[instrument]\nkind = \"ballbar\"\nnoise_um = 0.3\n[unknowns]\nerrors = [\"EX0C\", \"EY0C\"]\n\
@@ -148,19 +120,10 @@ fn monte_carlo_and_propagation_differ_for_a_quadratic_set_up() {
     // Standard deviation of the mean of twelve readings.
     assert!((bar.gum_u - 0.3 / 12.0_f64.sqrt()).abs() < 1e-3, "{}", bar.gum_u);
     // z is Gaussian: |z| is below 2.2414 u with 97.5 %, below 0.0313 u with 2.5 %.
-    assert!(
-        (bar.symmetric_interval.high - bar.value - longer_um(2.2414)).abs() < 0.8,
-        "{bar:?}"
-    );
-    assert!(
-        (bar.symmetric_interval.low - bar.value - longer_um(0.0313)).abs() < 0.2,
-        "{bar:?}"
-    );
+    assert!((bar.symmetric_interval.high - bar.value - longer_um(2.2414)).abs() < 0.8, "{bar:?}");
+    assert!((bar.symmetric_interval.low - bar.value - longer_um(0.0313)).abs() < 0.2, "{bar:?}");
     // The shortest interval starts at the edge: |z| is below 1.96 u with 95 %.
-    assert!(
-        (bar.shortest_interval.high - bar.value - longer_um(1.96)).abs() < 1.0,
-        "{bar:?}"
-    );
+    assert!((bar.shortest_interval.high - bar.value - longer_um(1.96)).abs() < 1.0, "{bar:?}");
     let mean = U_MM.powi(2) / (2.0 * R) * 1e3;
     assert!((bar.mean - bar.value - mean).abs() < 0.2, "{bar:?}");
     // The parameters with a linear response still agree.
@@ -174,49 +137,20 @@ fn monte_carlo_and_propagation_differ_for_a_quadratic_set_up() {
 fn the_command_states_which_uncertainty_to_quote() {
     let folder = tempfile::tempdir().unwrap();
     let plan = folder.path().join("plan.toml");
-    std::fs::copy(
-        ready("hermle-c600u/machine.toml"),
-        folder.path().join("machine.toml"),
-    )
-    .unwrap();
+    std::fs::copy(ready("hermle-c600u/machine.toml"), folder.path().join("machine.toml")).unwrap();
     let contents = "[machine]\nfile = \"machine.toml\"\n[instrument]\nkind = \"ballbar\"\nnoise_um = 0.3\n[unknowns]\nerrors = [\"EX0C\", \"EY0C\"]\n\
          [[test]]\nname = \"C\"\nbar_mm = 50\nworkpiece_ball_mm = [50, 0, 0]\nspindle_ball_mm = [0, 0, 0]\nspindle_ball_u_um = [0, 0, 800]\n\
          bar_u_um = inf\nsweep = { axis = \"C\", from_deg = 0, to_deg = 330, step_deg = 30, runs = 1, both_directions = false }\n";
     std::fs::write(&plan, contents).unwrap();
     let run = folder.path().join("run");
-    assert!(
-        abbe(&["simulate", text(&plan), "--out", text(&run)])
-            .status
-            .success()
-    );
+    assert!(abbe(&["simulate", text(&plan), "--out", text(&run)]).status.success());
     let session = run.join("session.toml");
-    let session = if session.exists() {
-        session
-    } else {
-        run.join("plan.toml")
-    };
+    let session = if session.exists() { session } else { run.join("plan.toml") };
     let json = folder.path().join("fit.json");
-    let output = abbe(&[
-        "fit",
-        text(&session),
-        "--monte-carlo",
-        "10000",
-        "--all",
-        "--json",
-        text(&json),
-    ]);
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    let output = abbe(&["fit", text(&session), "--monte-carlo", "10000", "--all", "--json", text(&json)]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let screen = String::from_utf8(output.stdout).unwrap();
-    let line = |id: &str| {
-        screen
-            .lines()
-            .find(|line| line.trim_start().starts_with(id))
-            .unwrap()
-    };
+    let line = |id: &str| screen.lines().find(|line| line.trim_start().starts_with(id)).unwrap();
     assert!(line("bar[C]").ends_with("Monte Carlo"), "{screen}");
     assert!(line("EX0C").ends_with("GUM"), "{screen}");
     let found: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
@@ -230,14 +164,6 @@ fn the_command_states_which_uncertainty_to_quote() {
         assert!(stderr.contains(part), "{stderr}");
     };
     refused(1, &["--monte-carlo", "100"], "at least 10000 runs are needed");
-    refused(
-        1,
-        &["--monte-carlo", "10000", "--coverage", "1"],
-        "a probability between",
-    );
-    refused(
-        2,
-        &["--monte-carlo", "10000", "--method", "circle"],
-        "`--monte-carlo` works with the full fit",
-    );
+    refused(1, &["--monte-carlo", "10000", "--coverage", "1"], "a probability between");
+    refused(2, &["--monte-carlo", "10000", "--method", "circle"], "`--monte-carlo` works with the full fit");
 }

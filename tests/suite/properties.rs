@@ -1,5 +1,5 @@
-//! Properties of the fit of every session on any machine: results depend on the measurement, not on the order of tests, rows or
-//! parameters, nor on the unit or the handedness of the frame.
+//! Properties of the fit of every session on any machine: results depend on the measurement, not on the order of tests,
+//! rows or parameters, nor on the unit or the handedness of the frame.
 
 #[path = "../../model/tests/properties/machines.rs"]
 mod machines;
@@ -12,7 +12,9 @@ use abbe::identify::problem::Problem;
 use abbe::identify::results::FitResult;
 use abbe::model::axis::AxisKind;
 use abbe::model::component::{ErrorKind, ErrorName, Freedom};
-use abbe::model::effect::{Component, Driver, Effect, Shape};
+use abbe::model::driver::Driver;
+use abbe::model::effect::shape::Periodic;
+use abbe::model::effect::{Component, Effect, Shape};
 use abbe::model::files::{self, ReadOptions};
 use abbe::model::instrument::Station;
 use abbe::model::instrument::ballbar::BallBar;
@@ -35,7 +37,8 @@ const TESTS: usize = 3;
 const RUNS: usize = 2;
 const ROWS_A_RUN: usize = 14;
 
-/// A random session in memory: a few tests of a bar or an R-test at random positions of a random machine, with readings.
+/// A random session in memory: a few tests of a bar or an R-test at random positions of a random machine, with
+/// readings.
 fn sessions() -> impl Strategy<Value = Session> {
     let balls = vec((point(), point()), TESTS);
     (machines(), balls, any::<bool>(), any::<u64>())
@@ -47,11 +50,7 @@ fn session(drawn: &Drawn, balls: &[([f64; 3], [f64; 3])], bar: bool, seed: u64) 
     let mut random = Pcg64::seed_from_u64(seed);
     let tests = balls.iter().enumerate().map(|(number, (table, tool))| {
         let station = if bar {
-            Station::BallBar(BallBar {
-                workpiece_ball: *table,
-                spindle_ball: *tool,
-                bar: 100.0,
-            })
+            Station::BallBar(BallBar { workpiece_ball: *table, spindle_ball: *tool, bar: 100.0 })
         } else {
             Station::RTest(RTest {
                 setting: Setting::Table,
@@ -62,9 +61,7 @@ fn session(drawn: &Drawn, balls: &[([f64; 3], [f64; 3])], bar: bool, seed: u64) 
         };
         let rows = RUNS * ROWS_A_RUN;
         let column = |reach: f64, random: &mut Pcg64| -> Vec<f64> {
-            (0..rows)
-                .map(|_| reach * (2.0 * random.random::<f64>() - 1.0))
-                .collect()
+            (0..rows).map(|_| reach * (2.0 * random.random::<f64>() - 1.0)).collect()
         };
         let mut readings = Readings {
             run: (0..rows).map(|row| (row / ROWS_A_RUN) as i64 + 1).collect(),
@@ -139,8 +136,8 @@ fn fitted(session: &Session) -> FitResult {
     result
 }
 
-/// Asserts equal fits: every value agrees with `expected` of the other session within `within` standard uncertainties, the tolerance of the
-/// iteration.
+/// Asserts equal fits: every value agrees with `expected` of the other session within `within` standard uncertainties,
+/// the tolerance of the iteration.
 #[track_caller]
 fn same(
     one: &FitResult,
@@ -158,10 +155,7 @@ fn same(
     for (id, (value, u)) in &one {
         let (other_value, other_u) = other[id];
         let (value, u) = (expected(id, *value), expected(id, *u).abs());
-        prop_assert!(
-            (value - other_value).abs() <= within * u,
-            "{id}: {value} {other_value} ± {u}"
-        );
+        prop_assert!((value - other_value).abs() <= within * u, "{id}: {value} {other_value} ± {u}");
         prop_assert!((u - other_u).abs() <= within * u, "{id}: u {u} {other_u}");
     }
     Ok(())
@@ -245,7 +239,7 @@ proptest! {
                 axis: axis.name.clone(),
             }),
             driver: Driver::Axis(axis.name.clone()),
-            shape: Shape::Periodic { period: 0.7 },
+            shape: Shape::Periodic(Periodic { period: 0.7 }),
             tests: Vec::new(),
         };
         let mut with = session.clone();
@@ -268,27 +262,19 @@ proptest! {
 
 #[test]
 fn the_drawn_errors_are_recovered() {
-    // The fits of the properties above find the errors: the pulls of the identifiable parameters of a few sessions have unit variance.
+    // The fits of the properties above find the errors: the pulls of the identifiable parameters of a few sessions have
+    // unit variance.
     let mut runner = proptest::test_runner::TestRunner::new(cases(1));
     let (mut square, mut count) = (0.0, 0);
     for _ in 0..40 {
         let drawn = machines().new_tree(&mut runner).unwrap().current();
-        let balls = vec((point(), point()), TESTS)
-            .new_tree(&mut runner)
-            .unwrap()
-            .current();
+        let balls = vec((point(), point()), TESTS).new_tree(&mut runner).unwrap().current();
         let session = session(&drawn, &balls, true, 5);
         for parameter in fitted(&session).parameters {
-            let Some(slot) =
-                ErrorName::parse(&parameter.id).and_then(|name| session.machine.error_slot(&name))
-            else {
+            let Some(slot) = ErrorName::parse(&parameter.id).and_then(|name| session.machine.error_slot(&name)) else {
                 continue;
             };
-            let outside = if is_angle(slot) {
-                3600.0 * 180.0 / std::f64::consts::PI
-            } else {
-                1e3
-            };
+            let outside = if is_angle(slot) { 3600.0 * 180.0 / std::f64::consts::PI } else { 1e3 };
             square += ((parameter.value - 0.1 * drawn.errors[slot] * outside) / parameter.u).powi(2);
             count += 1;
         }
@@ -297,8 +283,5 @@ fn the_drawn_errors_are_recovered() {
     println!("{count} errors, mean square of pulls {variance:.3}");
     assert!(count > 100);
     // Pulls of one session are correlated, so the tolerance is five standard deviations of independent pulls.
-    assert!(
-        (variance - 1.0).abs() < 5.0 * (2.0 / f64::from(count)).sqrt(),
-        "{variance}"
-    );
+    assert!((variance - 1.0).abs() < 5.0 * (2.0 / f64::from(count)).sqrt(), "{variance}");
 }

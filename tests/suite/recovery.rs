@@ -1,4 +1,5 @@
-//! The fit of a simulated session recovers the simulated errors: exactly without noise, and within the stated uncertainty with noise.
+//! The fit of a simulated session recovers the simulated errors: exactly without noise, and within the stated
+//! uncertainty with noise.
 
 use abbe::identify::fit::{Fit, prepare};
 use abbe::identify::problem::Problem;
@@ -23,11 +24,8 @@ pub const THESIS: [&str; 8] = [
 const ISO: [&str; 8] = ["EY0A", "EZ0A", "EX0C", "EY0C", "EB0A", "EC0A", "EA0C", "EB0C"];
 
 fn plan(chapter: &str) -> Session {
-    let mut session = files::session(
-        &super::ready(&format!("hermle-c600u/{chapter}.toml")),
-        &ReadOptions::default(),
-    )
-    .unwrap();
+    let mut session =
+        files::session(&super::ready(&format!("hermle-c600u/{chapter}.toml")), &ReadOptions::default()).unwrap();
     session.resolution_mm = None;
     session
 }
@@ -53,10 +51,7 @@ fn found(problem: &Problem<'_>, fit: &Fit, id: &str) -> (f64, f64) {
     let place = list.iter().position(|parameter| parameter.id == id).unwrap();
     assert!(fit.rank.is_identifiable(place), "{id} is not identifiable");
     let outside = list[place].unit.display_per_internal;
-    (
-        fit.beta[place] * outside,
-        fit.covariance[(place, place)].sqrt() * outside,
-    )
+    (fit.beta[place] * outside, fit.covariance[(place, place)].sqrt() * outside)
 }
 
 #[test]
@@ -65,11 +60,7 @@ fn without_noise_the_errors_of_the_thesis_are_recovered_exactly() {
         let mut plan = plan(chapter);
         // The balls are at their nominal positions, with the priors of the session.
         plan.noise_mm = Some(0.3e-3);
-        let simulation = Simulation {
-            given: given(),
-            noise_mm: Some(0.0),
-            ..Simulation::default()
-        };
+        let simulation = Simulation { given: given(), noise_mm: Some(0.0), ..Simulation::default() };
         let (session, truth) = measured(&plan, &simulation);
         let (problem, fit) = prepare(&session, 1).unwrap();
         let mut worst = 0.0_f64;
@@ -77,10 +68,7 @@ fn without_noise_the_errors_of_the_thesis_are_recovered_exactly() {
             let (_, value, unit) = truth.iter().find(|(known, ..)| known == id).unwrap();
             let (estimate, _) = found(&problem, &fit, id);
             worst = worst.max((estimate - value).abs());
-            assert!(
-                (estimate - value).abs() < 1e-6,
-                "{chapter} {id}: {estimate} for {value} {unit}"
-            );
+            assert!((estimate - value).abs() < 1e-6, "{chapter} {id}: {estimate} for {value} {unit}");
         }
         println!("{chapter}: worst difference {worst:.1e} um or arcsec");
     }
@@ -98,21 +86,11 @@ fn pulls_have_mean_0_and_standard_deviation_1_over_200_draws() {
     let draws: Vec<Vec<f64>> = (0..DRAWS)
         .into_par_iter()
         .map(|seed| {
-            let simulation = Simulation {
-                given: given(),
-                draw_setups: true,
-                seed,
-                ..Simulation::default()
-            };
+            let simulation = Simulation { given: given(), draw_setups: true, seed, ..Simulation::default() };
             let (session, truth) = measured(&plan, &simulation);
             let (problem, fit) = prepare(&session, 1).unwrap();
             let list = &problem.parameters.list;
-            assert!(
-                list.iter()
-                    .filter(|p| matches!(p.prior, Prior::Gaussian(_)))
-                    .count()
-                    == 19
-            );
+            assert!(list.iter().filter(|p| matches!(p.prior, Prior::Gaussian(_))).count() == 19);
             list.iter()
                 .map(|parameter| {
                     let (_, value, _) = truth.iter().find(|(id, ..)| *id == parameter.id).unwrap();
@@ -127,18 +105,11 @@ fn pulls_have_mean_0_and_standard_deviation_1_over_200_draws() {
     let (problem, _) = prepare(&session, 1).unwrap();
     for (index, parameter) in problem.parameters.list.iter().enumerate() {
         let mean = draws.iter().map(|pulls| pulls[index]).sum::<f64>() / count;
-        let square = draws
-            .iter()
-            .map(|pulls| (pulls[index] - mean).powi(2))
-            .sum::<f64>();
+        let square = draws.iter().map(|pulls| (pulls[index] - mean).powi(2)).sum::<f64>();
         let deviation = (square / (count - 1.0)).sqrt();
         println!("{:24} mean {mean:6.3} sd {deviation:.3}", parameter.id);
         // Three standard deviations of the mean and of the standard deviation of that many values.
         assert!(mean.abs() < 3.0 / count.sqrt(), "{}: mean {mean}", parameter.id);
-        assert!(
-            (deviation - 1.0).abs() < 3.0 / (2.0 * count).sqrt(),
-            "{}: sd {deviation}",
-            parameter.id
-        );
+        assert!((deviation - 1.0).abs() < 3.0 / (2.0 * count).sqrt(), "{}: sd {deviation}", parameter.id);
     }
 }

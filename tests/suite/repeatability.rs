@@ -1,7 +1,8 @@
 //! The same input, seed and binary give the same bytes for any number of threads.
 //!
-//! Every command runs twice with the same files, once with one thread and once with two, each in a folder of its own. Standard output and
-//! all files of the folder are compared byte by byte. Each run is a process, so hash tables have different seeds.
+//! Every command runs twice with the same files, once with one thread and once with two, each in a folder of its own.
+//! Standard output and all files of the folder are compared byte by byte. Each run is a process, so hash tables have
+//! different seeds.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -17,10 +18,7 @@ fn contents(folder: &Path, files: &mut BTreeMap<PathBuf, Vec<u8>>, root: &Path) 
         if path.is_dir() {
             contents(&path, files, root);
         } else {
-            files.insert(
-                path.strip_prefix(root).unwrap().to_path_buf(),
-                fs::read(&path).unwrap(),
-            );
+            files.insert(path.strip_prefix(root).unwrap().to_path_buf(), fs::read(&path).unwrap());
         }
     }
 }
@@ -39,11 +37,7 @@ fn outputs(input: &[(&str, String)], threads: &str, commands: &[Vec<&str>]) -> B
             .env("RAYON_NUM_THREADS", threads)
             .output()
             .expect("the command starts");
-        assert!(
-            output.status.success(),
-            "{arguments:?}: {}",
-            String::from_utf8_lossy(&output.stderr)
-        );
+        assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
         printed.extend(output.stdout);
         printed.extend(output.stderr);
     }
@@ -57,19 +51,11 @@ fn outputs(input: &[(&str, String)], threads: &str, commands: &[Vec<&str>]) -> B
 fn the_same(input: &[(&str, String)], commands: &[Vec<&str>]) -> usize {
     let one = outputs(input, "1", commands);
     let two = outputs(input, "2", commands);
-    assert_eq!(
-        one.keys().collect::<Vec<_>>(),
-        two.keys().collect::<Vec<_>>(),
-        "other files"
-    );
+    assert_eq!(one.keys().collect::<Vec<_>>(), two.keys().collect::<Vec<_>>(), "other files");
     for (name, bytes) in &one {
         let differs = bytes.iter().zip(&two[name]).position(|(a, b)| a != b);
         let lengths = (bytes.len(), two[name].len());
-        assert!(
-            bytes == &two[name],
-            "{}: differs at byte {differs:?}, lengths {lengths:?}",
-            name.display()
-        );
+        assert!(bytes == &two[name], "{}: differs at byte {differs:?}, lengths {lengths:?}", name.display());
     }
     one.len()
 }
@@ -77,18 +63,15 @@ fn the_same(input: &[(&str, String)], commands: &[Vec<&str>]) -> usize {
 /// The plan of chapter 5 with coarse steps, so that a search takes seconds, and its machine.
 fn plan() -> Vec<(&'static str, String)> {
     let read = |name: &str| fs::read_to_string(ready(&format!("hermle-c600u/{name}"))).unwrap();
-    let plan = read("chapter5.toml")
-        .replace("step_deg = 0.25", "step_deg = 3")
-        .replace("step_deg = 0.5", "step_deg = 6");
+    let plan =
+        read("chapter5.toml").replace("step_deg = 0.25", "step_deg = 3").replace("step_deg = 0.5", "step_deg = 6");
     vec![("plan.toml", plan), ("machine.toml", read("machine.toml"))]
 }
 
 /// The same with an axial error motion that the simulated session does not declare.
 fn with_axial_motion() -> Vec<(&'static str, String)> {
     let mut input = plan();
-    input[0]
-        .1
-        .push_str("\n[[effect]]\ncomponent = \"EZC\"\nshape = \"harmonic\"\norder = 2\n");
+    input[0].1.push_str("\n[[effect]]\ncomponent = \"EZC\"\nshape = \"harmonic\"\norder = 2\n");
     input
 }
 
@@ -97,15 +80,7 @@ const SEEDS: [&str; 3] = ["1", "2", "3"];
 fn simulate(seed: &str) -> Vec<&str> {
     let effect = "EZC~C:h2.amplitude=1.5um";
     let errors = ["--error", "EY0A=35.3um", "--error", "EB0A=-1.29arcsec"];
-    let mut arguments = vec![
-        "simulate",
-        "plan.toml",
-        "--out",
-        "run",
-        "--draw-setups",
-        "--seed",
-        seed,
-    ];
+    let mut arguments = vec!["simulate", "plan.toml", "--out", "run", "--draw-setups", "--seed", seed];
     arguments.extend(errors);
     arguments.extend(["--effect", effect, "--hide-effects"]);
     arguments
@@ -132,14 +107,7 @@ fn a_fit() {
                     "--plots",
                     "plots",
                 ],
-                vec![
-                    "fit",
-                    "run/session.toml",
-                    "--method",
-                    "cone",
-                    "--json",
-                    "cone.json",
-                ],
+                vec!["fit", "run/session.toml", "--method", "cone", "--json", "cone.json"],
             ],
         );
         assert!(files > 12, "{files}");
@@ -182,26 +150,8 @@ fn a_plan() {
         the_same(
             &plan(),
             &[
-                vec![
-                    "plan",
-                    "plan.toml",
-                    "--seed",
-                    seed,
-                    "--json",
-                    "plan.json",
-                    "--report",
-                    "plan.html",
-                ],
-                vec![
-                    "plan",
-                    "plan.toml",
-                    "--seed",
-                    seed,
-                    "--improve",
-                    "1",
-                    "--json",
-                    "improve.json",
-                ],
+                vec!["plan", "plan.toml", "--seed", seed, "--json", "plan.json", "--report", "plan.html"],
+                vec!["plan", "plan.toml", "--seed", seed, "--improve", "1", "--json", "improve.json"],
             ],
         );
     }
@@ -212,10 +162,7 @@ fn monte_carlo() {
     // Two tests of the four, because each draw is a complete fit.
     let mut input = plan();
     let (head, tests) = input[0].1.split_once("[[test]]").unwrap();
-    let tests: Vec<&str> = tests
-        .split("[[test]]")
-        .filter(|test| test.contains("name = \"C1"))
-        .collect();
+    let tests: Vec<&str> = tests.split("[[test]]").filter(|test| test.contains("name = \"C1")).collect();
     assert_eq!(tests.len(), 2);
     input[0].1 = format!("{head}[[test]]{}", tests.join("[[test]]")).replace("step_deg = 6", "step_deg = 30");
     for seed in SEEDS {
@@ -223,16 +170,7 @@ fn monte_carlo() {
             &input,
             &[
                 vec!["simulate", "plan.toml", "--out", "run", "--seed", seed],
-                vec![
-                    "fit",
-                    "run/session.toml",
-                    "--seed",
-                    seed,
-                    "--monte-carlo",
-                    "10000",
-                    "--json",
-                    "fit.json",
-                ],
+                vec!["fit", "run/session.toml", "--seed", seed, "--monte-carlo", "10000", "--json", "fit.json"],
             ],
         );
     }
@@ -266,26 +204,8 @@ fn equations_and_maps() {
         &plan(),
         &[
             vec!["equation", "plan.toml", "--test", "A150", "--order", "first"],
-            vec![
-                "equation",
-                "plan.toml",
-                "--test",
-                "C150",
-                "--as",
-                "c",
-                "--gradient",
-                "--out",
-                "c150.c",
-            ],
-            vec![
-                "volumetric",
-                machine,
-                "--map",
-                "map.csv",
-                "--functions",
-                errors,
-                "--compensate",
-            ],
+            vec!["equation", "plan.toml", "--test", "C150", "--as", "c", "--gradient", "--out", "c150.c"],
+            vec!["volumetric", machine, "--map", "map.csv", "--functions", errors, "--compensate"],
         ],
     );
 }

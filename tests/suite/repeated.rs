@@ -14,15 +14,9 @@ use super::{abbe, ready, text};
 /// The plan of chapter 5 with a reading every 10°.
 fn plan() -> Session {
     let whole = std::fs::read_to_string(ready("hermle-c600u/chapter5.toml")).unwrap();
-    let coarse = whole
-        .replace("step_deg = 0.25", "step_deg = 10")
-        .replace("step_deg = 0.5", "step_deg = 10");
+    let coarse = whole.replace("step_deg = 0.25", "step_deg = 10").replace("step_deg = 0.5", "step_deg = 10");
     let folder = tempfile::tempdir().unwrap();
-    std::fs::copy(
-        ready("hermle-c600u/machine.toml"),
-        folder.path().join("machine.toml"),
-    )
-    .unwrap();
+    std::fs::copy(ready("hermle-c600u/machine.toml"), folder.path().join("machine.toml")).unwrap();
     let path = folder.path().join("session.toml");
     std::fs::write(&path, coarse).unwrap();
     let mut session = files::session(&path, &ReadOptions::default()).unwrap();
@@ -37,18 +31,9 @@ fn session(plan: &Session, seed: u64, draw_setups: bool, changed: Option<&str>) 
         given.retain(|other| other.id != changed.id);
         given.push(changed);
     }
-    let simulation = Simulation {
-        given,
-        draw_setups,
-        seed,
-        ..Simulation::default()
-    };
+    let simulation = Simulation { given, draw_setups, seed, ..Simulation::default() };
     let mut measured = plan.clone();
-    for (test, readings) in measured
-        .tests
-        .iter_mut()
-        .zip(simulate(plan, &simulation).unwrap().readings)
-    {
+    for (test, readings) in measured.tests.iter_mut().zip(simulate(plan, &simulation).unwrap().readings) {
         test.readings = Some(readings);
     }
     let (problem, fit) = prepare(&measured, 1).unwrap();
@@ -82,11 +67,7 @@ fn sessions_with_new_set_ups_scatter_by_the_stated_uncertainty() {
             .find(|given| given.id == parameter.id || literature(&given.id) == parameter.id)
             .unwrap()
             .value;
-        assert!(
-            (mean - truth).abs() < 4.0 * u,
-            "{}: {mean} {truth} {u}",
-            parameter.id
-        );
+        assert!((mean - truth).abs() < 4.0 * u, "{}: {mean} {truth} {u}", parameter.id);
     }
     // Both tests of a group of five have a level of 1 %; of forty groups hardly more than two exceed it.
     let groups: Vec<Repeated> = all.chunks(5).map(|group| compare(group).unwrap()).collect();
@@ -109,22 +90,12 @@ fn a_session_with_a_bias_is_named() {
     let plan = plan();
     // 10 µm on a position with u = 1 µm in one session.
     for biased in [0_u64, 3] {
-        let one = |seed| {
-            session(
-                &plan,
-                400 + seed,
-                true,
-                (seed == biased).then_some("EZ0A=-23.4um"),
-            )
-        };
+        let one = |seed| session(&plan, 400 + seed, true, (seed == biased).then_some("EZ0A=-23.4um"));
         let group: Vec<Fitted> = (0..5).map(one).collect();
         let result = compare(&group).unwrap();
         let off = &result.deviating;
         assert_eq!(off.len(), 1, "{off:?}");
-        assert_eq!(
-            (off[0].session.as_str(), off[0].id.as_str()),
-            (group[biased as usize].name.as_str(), "EZ0A")
-        );
+        assert_eq!((off[0].session.as_str(), off[0].id.as_str()), (group[biased as usize].name.as_str(), "EZ0A"));
         assert!((off[0].deviation - 10.0).abs() < 4.0 * off[0].u, "{off:?}");
         let parameter = result.parameters.iter().find(|p| p.id == "EZ0A").unwrap();
         assert_eq!(parameter.scatter, Scatter::More);
@@ -136,11 +107,7 @@ fn a_session_with_a_bias_is_named() {
 fn sessions_on_one_mounting_scatter_less() {
     let plan = plan();
     let result = compare(&sessions(&plan, 0..20, false)).unwrap();
-    let less = result
-        .parameters
-        .iter()
-        .filter(|p| p.scatter == Scatter::Less)
-        .count();
+    let less = result.parameters.iter().filter(|p| p.scatter == Scatter::Less).count();
     assert!(less >= 4, "{:?}", result.parameters);
     assert!(result.deviating.is_empty());
 }
@@ -151,47 +118,18 @@ fn the_command_compares_files() {
     let plan = ready("tilting-head/session.toml");
     let run = |seed: &str| {
         let out = folder.path().join(format!("day{seed}"));
-        let output = abbe(&[
-            "simulate",
-            text(&plan),
-            "--out",
-            text(&out),
-            "--draw-setups",
-            "--seed",
-            seed,
-        ]);
-        assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
+        let output = abbe(&["simulate", text(&plan), "--out", text(&out), "--draw-setups", "--seed", seed]);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         out.join("session.toml")
     };
     let files = ["1", "2", "3"].map(run);
     let json = folder.path().join("repeat.json");
-    let output = abbe(&[
-        "fit",
-        text(&files[0]),
-        "--repeat",
-        text(&files[1]),
-        text(&files[2]),
-        "--json",
-        text(&json),
-    ]);
+    let output = abbe(&["fit", text(&files[0]), "--repeat", text(&files[1]), text(&files[2]), "--json", text(&json)]);
     let screen = String::from_utf8(output.stdout).unwrap();
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let found: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
     for parameter in found["parameters"].as_array().unwrap() {
-        let values: Vec<f64> = parameter["values"]
-            .as_array()
-            .unwrap()
-            .iter()
-            .map(|v| v.as_f64().unwrap())
-            .collect();
+        let values: Vec<f64> = parameter["values"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect();
         let mean = values.iter().sum::<f64>() / 3.0;
         assert!((parameter["mean"].as_f64().unwrap() - mean).abs() < 1e-9);
         let s = (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 2.0).sqrt();
@@ -210,10 +148,6 @@ fn the_command_compares_files() {
     refused(1, &["--repeat", text(&files[0])], "is named twice");
     let other = ready("hermle-c600u/measured/session.toml");
     refused(1, &["--repeat", text(&other)], "is not a repeat of");
-    refused(
-        2,
-        &["--repeat", text(&files[1]), "--method", "cone"],
-        "`--repeat` compares full fits",
-    );
+    refused(2, &["--repeat", text(&files[1]), "--method", "cone"], "`--repeat` compares full fits");
     refused(1, &["--repeat", text(&plan)], "has no readings");
 }

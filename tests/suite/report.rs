@@ -15,9 +15,10 @@ fn session(path: &Path) -> Session {
     files::session(path, &ReadOptions::default()).unwrap()
 }
 
-/// `∂L/∂error` to first order, derived independently of the chain: ball at (0, R, 0), spindle ball at (−D, 0, 0), so that for a rotation of A
-/// `L₀ = √(R² + D²)`, with `ca = cos A`, `sa = sin A` (Jiang (2014), Eqs. 3.20 and 3.21, to first order).
-/// Jiang (2014): Xiaogeng Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine Tools*, PhD thesis, University of Birmingham, 2014.
+/// `∂L/∂error` to first order, derived independently of the chain: ball at (0, R, 0), spindle ball at (−D, 0, 0), so
+/// that for a rotation of A `L₀ = √(R² + D²)`, with `ca = cos A`, `sa = sin A` (Jiang (2014), Eqs. 3.20 and 3.21, to
+/// first order). Jiang (2014): Xiaogeng Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine
+/// Tools*, PhD thesis, University of Birmingham, 2014.
 #[test]
 fn sensitivities_agree_with_the_closed_form() {
     let session = session(&ready("hermle-c600u/chapter5.toml"));
@@ -45,11 +46,7 @@ fn sensitivities_agree_with_the_closed_form() {
                     other => panic!("{other} moves no reading of {name}"),
                 };
                 let value = pattern.values[k];
-                assert!(
-                    (value - wanted).abs() < 1e-6,
-                    "{name} {}: {value} {wanted}",
-                    pattern.id
-                );
+                assert!((value - wanted).abs() < 1e-6, "{name} {}: {value} {wanted}", pattern.id);
                 compared += 1;
             }
         }
@@ -57,8 +54,8 @@ fn sensitivities_agree_with_the_closed_form() {
     assert!(compared > 1000);
 }
 
-/// Coordinates of a vector: a table displaced along +X displaces its nest, so that the vector from nest to ball, in the frame of a table at C, changes by
-/// −(cos C, −sin C, 0).
+/// Coordinates of a vector: a table displaced along +X displaces its nest, so that the vector from nest to ball, in the
+/// frame of a table at C, changes by −(cos C, −sin C, 0).
 #[test]
 fn the_sensitivities_of_an_r_test_are_those_of_each_coordinate() {
     let session = session(&ready("r-test/measured/session.toml"));
@@ -66,21 +63,16 @@ fn the_sensitivities_of_an_r_test_are_those_of_each_coordinate() {
     let beta = vec![0.0; problem.parameters.list.len()];
     let found = sensitivities::sensitivities(&problem, &beta).unwrap();
     for (coordinate, wanted) in [("dx", (|c: f64| -c.cos()) as fn(f64) -> f64), ("dy", |c| c.sin())] {
-        let of = |test: &&sensitivities::TestSensitivities| {
-            test.test == "C-alone" && test.coordinate == Some(coordinate)
-        };
+        let of =
+            |test: &&sensitivities::TestSensitivities| test.test == "C-alone" && test.coordinate == Some(coordinate);
         let test = found.iter().find(of).unwrap();
         let own = test.columns.iter().find(|column| column.id == "EX0C").unwrap();
         for (angle, value) in test.way.values.iter().zip(&own.values) {
             let wanted = wanted(angle.to_radians());
-            assert!(
-                (value - wanted).abs() < 1e-9,
-                "{coordinate} at {angle}: {value} {wanted}"
-            );
+            assert!((value - wanted).abs() < 1e-9, "{coordinate} at {angle}: {value} {wanted}");
         }
     }
-    let vertical =
-        |test: &&sensitivities::TestSensitivities| test.test == "C-alone" && test.coordinate == Some("dz");
+    let vertical = |test: &&sensitivities::TestSensitivities| test.test == "C-alone" && test.coordinate == Some("dz");
     let vertical = found.iter().find(vertical).unwrap();
     assert!(vertical.columns.iter().all(|column| column.id != "EX0C"));
 }
@@ -91,10 +83,7 @@ fn the_sensitivity_of_poses_to_a_shift_is_one() {
     let Some(series) = data("the_sensitivity_of_poses_to_a_shift_is_one", "landgraf_ur10") else {
         return;
     };
-    let options = ReadOptions {
-        data_directory: series.parent().map(Path::to_path_buf),
-        ..ReadOptions::default()
-    };
+    let options = ReadOptions { data_directory: series.parent().map(Path::to_path_buf), ..ReadOptions::default() };
     let session = files::session(&ready("ur10/session.toml"), &options).unwrap();
     let (problem, fit) = abbe::identify::fit::prepare(&session, 1).unwrap();
     let found = sensitivities::over_poses(&problem, &vec![0.0; fit.beta.len()]).unwrap();
@@ -112,28 +101,15 @@ fn methods_and_next_tests_have_reports() {
     let at = |name: &str| folder.path().join(name);
     let written = |arguments: &[&str], name: &str| {
         let (page, json, plots) = (at(&format!("{name}.html")), at(&format!("{name}.json")), at(name));
-        let outputs = [
-            ["--report", text(&page)],
-            ["--json", text(&json)],
-            ["--plots", text(&plots)],
-        ];
+        let outputs = [["--report", text(&page)], ["--json", text(&json)], ["--plots", text(&plots)]];
         let output = abbe(&[arguments, &["-q"], &outputs.concat()].concat());
-        assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let json: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap();
         (std::fs::read_to_string(page).unwrap(), json)
     };
     let measured = ready("hermle-c600u/measured/session.toml");
     let (page, json) = written(&["fit", text(&measured), "--method", "cone"], "cone");
-    let error = json["errors"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .find(|error| error["id"] == "EB0A")
-        .unwrap();
+    let error = json["errors"].as_array().unwrap().iter().find(|error| error["id"] == "EB0A").unwrap();
     let bias = format!("{:.4}", error["bias"].as_f64().unwrap()).replace('-', "\u{2212}");
     assert!(page.contains(&bias), "no bias {bias}");
     assert!(page.contains("cone, ± 2 u") && page.contains("full fit, ± 2 u"));
@@ -144,33 +120,22 @@ fn methods_and_next_tests_have_reports() {
     let test = step["test"].as_str().unwrap().replace('&', "&amp;");
     assert!(page.contains(&test), "no test {test}");
     let after = step["after"].as_f64().unwrap();
-    let cells = page
-        .split("<td")
-        .filter_map(|cell| cell.split_once('>')?.1.split('<').next());
+    let cells = page.split("<td").filter_map(|cell| cell.split_once('>')?.1.split('<').next());
     let mut shown = cells.filter_map(|cell| cell.parse::<f64>().ok());
-    assert!(
-        shown.any(|value| (value / after - 1.0).abs() < 0.006),
-        "no figure {after}"
-    );
+    assert!(shown.any(|value| (value / after - 1.0).abs() < 0.006), "no figure {after}");
     assert!(page.contains("Minimum sweep ranges"));
     assert!(at("next/next-test.svg").exists());
 }
 
-/// A share is the change of the modelled readings if the parameters of the share are set to zero: a difference, not a derivative.
+/// A share is the change of the modelled readings if the parameters of the share are set to zero: a difference, not a
+/// derivative.
 #[test]
 fn shares_agree_with_differences_of_the_model() {
     let session = session(&ready("hermle-c600u/measured/session.toml"));
     let (problem, fit) = abbe::identify::fit::prepare(&session, 1).unwrap();
     let views = views(&problem, &fit, None).unwrap();
     assert!(views.second_order_um < 0.05, "{}", views.second_order_um);
-    assert_eq!(
-        views
-            .shares
-            .iter()
-            .filter(|share| share.cause == Cause::Error)
-            .count(),
-        8
-    );
+    assert_eq!(views.shares.iter().filter(|share| share.cause == Cause::Error).count(), 8);
     for (k, share) in views.shares.iter().enumerate() {
         let mut without = fit.beta.clone();
         share.unknowns.iter().for_each(|j| without[*j] = 0.0);
@@ -178,12 +143,7 @@ fn shares_agree_with_differences_of_the_model() {
         for (test, view) in views.tests.iter().enumerate() {
             for (i, share_um) in view.shares_um[k].iter().enumerate() {
                 let lost_um = (residuals[test][i] - fit.residuals[test][i]) * 1e3;
-                assert!(
-                    (lost_um - share_um).abs() < 0.05,
-                    "{} in {}: {lost_um} {share_um}",
-                    share.id,
-                    view.name
-                );
+                assert!((lost_um - share_um).abs() < 0.05, "{} in {}: {lost_um} {share_um}", share.id, view.name);
             }
         }
     }
@@ -195,10 +155,7 @@ fn a_trace_reports_the_steps_of_its_search_and_the_competing_explanations() {
     let session = session(&ready("hermle-c600u/measured/session.toml"));
     let trace = abbe::identify::trace::trace(&session, &Default::default(), &|_| true).unwrap();
     let [competing_effects] = trace.competing_effects.as_slice() else {
-        panic!(
-            "one effect was simulated, {} were found",
-            trace.competing_effects.len()
-        );
+        panic!("one effect was simulated, {} were found", trace.competing_effects.len());
     };
     let of = |id: &str| competing_effects.iter().find(|effect| effect.id == id).unwrap();
     assert!(of("EZC~C:h2").named && !of("EZC~C:h2").alias);
@@ -206,9 +163,7 @@ fn a_trace_reports_the_steps_of_its_search_and_the_competing_explanations() {
         assert!(of(id).alias && !of(id).named, "{id}");
     }
     assert!(competing_effects.is_sorted_by(|a, b| a.evidence >= b.evidence));
-    let rejected = competing_effects
-        .iter()
-        .filter(|effect| !effect.named && !effect.alias);
+    let rejected = competing_effects.iter().filter(|effect| !effect.named && !effect.alias);
     for effect in rejected {
         assert!(effect.evidence < of("EZC~C:h2").evidence - 2.0, "{}", effect.id);
     }
@@ -230,21 +185,9 @@ pub fn with_markup_in_names(folder: &Path) {
         assert!(text.contains(old), "{file} has no {old}");
         std::fs::write(&path, text.replacen(old, new, 1)).unwrap();
     };
-    edit(
-        "machine.toml",
-        "name = \"Hermle C600U\"",
-        "name = '''<script>window.hit = 1</script>'''",
-    );
-    edit(
-        "session.toml",
-        "name = \"C150\"",
-        "name = '''C150</script><img src=x onerror=\"window.hit=2\">&amp;'''",
-    );
-    edit(
-        "session.toml",
-        "setup = \"P1\"",
-        "setup = '''P1<img src=x onerror=\"window.hit=3\">'''",
-    );
+    edit("machine.toml", "name = \"Hermle C600U\"", "name = '''<script>window.hit = 1</script>'''");
+    edit("session.toml", "name = \"C150\"", "name = '''C150</script><img src=x onerror=\"window.hit=2\">&amp;'''");
+    edit("session.toml", "setup = \"P1\"", "setup = '''P1<img src=x onerror=\"window.hit=3\">'''");
     let data = "A100<img src=x onerror=\"window.hit=4\">.csv";
     std::fs::rename(folder.join("A100.csv"), folder.join(data)).unwrap();
     edit("session.toml", "\"A100.csv\"", &format!("'{data}'"));
@@ -255,19 +198,9 @@ fn names_with_markup_are_text_in_a_report() {
     let folder = tempfile::tempdir().unwrap();
     with_markup_in_names(folder.path());
     let (report, plots) = (folder.path().join("fit.html"), folder.path().join("plots"));
-    let output = abbe(&[
-        "fit",
-        text(&folder.path().join("session.toml")),
-        "--report",
-        text(&report),
-        "--plots",
-        text(&plots),
-    ]);
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    let output =
+        abbe(&["fit", text(&folder.path().join("session.toml")), "--report", text(&report), "--plots", text(&plots)]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let page = std::fs::read_to_string(&report).unwrap();
     assert!(!page.contains("<script>window") && !page.contains("<img"));
     assert!(page.contains("&lt;script&gt;window.hit = 1&lt;/script&gt;"));
@@ -289,10 +222,8 @@ fn plots_are_written_completely_or_not_at_all() {
     let session = ready("hermle-c600u/measured/session.toml");
     let arguments = ["trace", text(&session), "--quiet", "--plots", text(&plots)];
     assert!(abbe(&arguments).status.success());
-    let mut names: Vec<String> = std::fs::read_dir(&plots)
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-        .collect();
+    let mut names: Vec<String> =
+        std::fs::read_dir(&plots).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
     names.sort();
     for wanted in [
         "trace-C150",
@@ -324,19 +255,13 @@ fn plots_are_written_completely_or_not_at_all() {
         assert!(output.status.success(), "{message}");
     } else {
         assert_eq!(output.status.code(), Some(2));
-        assert!(
-            output.stdout.is_empty() && message.contains("--features png"),
-            "{message}"
-        );
+        assert!(output.stdout.is_empty() && message.contains("--features png"), "{message}");
     }
     // A folder that is not empty is refused before the calculation.
     let again = abbe(&arguments);
     let message = String::from_utf8_lossy(&again.stderr).into_owned();
     assert_eq!(again.status.code(), Some(1));
-    assert!(
-        again.stdout.is_empty() && message.contains("not empty; name another"),
-        "{message}"
-    );
+    assert!(again.stdout.is_empty() && message.contains("not empty; name another"), "{message}");
     let nowhere = folder.path().join("no/such/report.html");
     let refused = abbe(&["fit", text(&session), "--report", text(&nowhere)]);
     assert_eq!(refused.status.code(), Some(1));
@@ -353,18 +278,10 @@ fn a_report_of_6000_readings_is_under_3_mb() {
     draw.write(folder.path()).unwrap();
     let path = folder.path().join("session.toml");
     let tests = session(&path).tests;
-    let rows: usize = tests
-        .iter()
-        .flat_map(|test| &test.readings)
-        .map(|r| r.rows())
-        .sum();
+    let rows: usize = tests.iter().flat_map(|test| &test.readings).map(|r| r.rows()).sum();
     assert!(rows >= 5_900, "{rows} readings");
     let report = folder.path().join("fit.html");
-    assert!(
-        abbe(&["fit", text(&path), "--report", text(&report)])
-            .status
-            .success()
-    );
+    assert!(abbe(&["fit", text(&path), "--report", text(&report)]).status.success());
     let bytes = std::fs::metadata(&report).unwrap().len() as usize;
     assert!(bytes < MAX_BYTES, "{bytes} bytes");
 }
@@ -379,22 +296,11 @@ fn a_report_of_11911_poses_is_under_3_mb_and_names_its_inputs() {
     let folder = tempfile::tempdir().unwrap();
     let report = folder.path().join("fit.html");
     let path = ready("ur10/session.toml");
-    let output = abbe(&[
-        "fit",
-        text(&path),
-        "--data",
-        text(root),
-        "--report",
-        text(&report),
-    ]);
+    let output = abbe(&["fit", text(&path), "--data", text(root), "--report", text(&report)]);
     assert!(output.status.success());
     let page = std::fs::read_to_string(&report).unwrap();
     assert!(page.len() < MAX_BYTES, "{} bytes", page.len());
-    for input in [
-        "sessions/ur10/session.toml",
-        "sessions/ur10/machine.toml",
-        "measurements_grid.csv",
-    ] {
+    for input in ["sessions/ur10/session.toml", "sessions/ur10/machine.toml", "measurements_grid.csv"] {
         assert!(page.contains(input), "{input}");
     }
 }

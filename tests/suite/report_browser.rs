@@ -1,6 +1,8 @@
-//! Reports in a browser: no console messages, no requests, sliders that agree with the closed form, and a layout without overflow.
+//! Reports in a browser: no console messages, no requests, sliders that agree with the closed form, and a layout
+//! without overflow.
 //!
-//! A script is added to a copy of the page. Chromium runs it and prints the document. Without Chromium the tests are skipped with a message.
+//! A script is added to a copy of the page. Chromium runs it and prints the document. Without Chromium the tests are
+//! skipped with a message.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -13,23 +15,19 @@ use super::report::with_markup_in_names;
 use super::{abbe, ready, text};
 
 fn chromium(test: &str) -> Option<&'static str> {
-    let found = ["chromium", "chromium-browser", "google-chrome"]
-        .into_iter()
-        .find(|name| {
-            let version = Command::new(name).arg("--version").output();
-            version.is_ok_and(|output| output.status.success())
-        });
+    let found = ["chromium", "chromium-browser", "google-chrome"].into_iter().find(|name| {
+        let version = Command::new(name).arg("--version").output();
+        version.is_ok_and(|output| output.status.success())
+    });
     if found.is_none() {
-        assert!(
-            std::env::var("CI").as_deref() != Ok("true"),
-            "{test}: no Chromium, and CI needs it"
-        );
+        assert!(std::env::var("CI").as_deref() != Ok("true"), "{test}: no Chromium, and CI needs it");
         println!("skipped: {test} (no Chromium)");
     }
     found
 }
 
-/// Opens a page of this width (px) with a script added to it. Returns the value of the script and the messages on the console.
+/// Opens a page of this width (px) with a script added to it. Returns the value of the script and the messages on the
+/// console.
 fn run(browser: &str, page: &Path, width: u32, script: &str) -> (Value, Vec<String>) {
     let profile = tempfile::tempdir().unwrap();
     let copy = profile.path().join("page.html");
@@ -56,10 +54,7 @@ fn run(browser: &str, page: &Path, width: u32, script: &str) -> (Value, Vec<Stri
             "--virtual-time-budget=8000",
             "--dump-dom",
         ])
-        .arg(format!(
-            "--user-data-dir={}",
-            profile.path().join("profile").display()
-        ))
+        .arg(format!("--user-data-dir={}", profile.path().join("profile").display()))
         .arg(format!("--window-size={width},900"))
         .arg(format!("file://{}", copy.display()))
         .output()
@@ -69,16 +64,8 @@ fn run(browser: &str, page: &Path, width: u32, script: &str) -> (Value, Vec<Stri
         .split("<pre id=\"found\">")
         .nth(1)
         .and_then(|rest| rest.split("</pre>").next())
-        .unwrap_or_else(|| {
-            panic!(
-                "the script did not end:\n{}",
-                String::from_utf8_lossy(&output.stderr)
-            )
-        });
-    let found = found
-        .replace("&lt;", "<")
-        .replace("&gt;", ">")
-        .replace("&amp;", "&");
+        .unwrap_or_else(|| panic!("the script did not end:\n{}", String::from_utf8_lossy(&output.stderr)));
+    let found = found.replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&");
     let console = String::from_utf8_lossy(&output.stderr)
         .lines()
         .filter(|line| line.contains("CONSOLE"))
@@ -90,11 +77,7 @@ fn run(browser: &str, page: &Path, width: u32, script: &str) -> (Value, Vec<Stri
 fn report(folder: &Path, command: &str, session: &Path) -> PathBuf {
     let page = folder.join(format!("{command}.html"));
     let output = abbe(&[command, text(session), "--quiet", "--report", text(&page)]);
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     page
 }
 
@@ -124,11 +107,7 @@ fn pages_request_nothing_and_sliders_agree_with_the_closed_form() {
     let name = "pages_request_nothing_and_sliders_agree_with_the_closed_form";
     let Some(browser) = chromium(name) else { return };
     let folder = tempfile::tempdir().unwrap();
-    let page = report(
-        folder.path(),
-        "trace",
-        &ready("hermle-c600u/measured/session.toml"),
-    );
+    let page = report(folder.path(), "trace", &ready("hermle-c600u/measured/session.toml"));
     let script = format!(
         "{HELPERS}
         const trace = plot('polar', 'deviation', 'C150');
@@ -164,16 +143,10 @@ fn pages_request_nothing_and_sliders_agree_with_the_closed_form() {
     assert_eq!(console, Vec::<String>::new());
     assert_eq!(found["fault"], Value::Null, "{found}");
     assert_eq!(found["requests"], 0);
-    // C rotates the ball at (0, R, 0); the spindle ball is at (0, 0, D). To first order ∂L/∂EX0C = −R·sin C/L₀. The error is −36.29 µm, and its removal
-    // subtracts this share.
-    let numbers = |key: &str| -> Vec<f64> {
-        found[key]
-            .as_array()
-            .unwrap()
-            .iter()
-            .map(|v| v.as_f64().unwrap())
-            .collect()
-    };
+    // C rotates the ball at (0, R, 0); the spindle ball is at (0, 0, D). To first order ∂L/∂EX0C = −R·sin C/L₀. The
+    // error is −36.29 µm, and its removal subtracts this share.
+    let numbers =
+        |key: &str| -> Vec<f64> { found[key].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect() };
     let (angles, moves, half) = (numbers("angles"), numbers("moves"), numbers("half"));
     assert!(moves.len() > 100);
     for ((angle, moved), half) in angles.iter().zip(&moves).zip(&half) {
@@ -192,16 +165,10 @@ fn pages_request_nothing_and_sliders_agree_with_the_closed_form() {
     // C100 is the third test. Its series before and after are hidden in the plot over time.
     assert_eq!(found["over"], serde_json::json!(["of-test-2", "of-test-2"]));
     let tip = found["tip"].as_str().unwrap();
-    assert!(
-        tip.starts_with("C150, run ") && tip.contains("deviation") && tip.contains("line "),
-        "{tip}"
-    );
+    assert!(tip.starts_with("C150, run ") && tip.contains("deviation") && tip.contains("line "), "{tip}");
     // A header and all readings, not decimated.
     assert_eq!(found["rows"], 2417);
-    assert!(
-        found["wide"].as_f64().unwrap() <= 1280.0,
-        "the page scrolls sideways"
-    );
+    assert!(found["wide"].as_f64().unwrap() <= 1280.0, "the page scrolls sideways");
 }
 
 #[test]
@@ -219,17 +186,11 @@ fn reports_of_plan_and_fit_write_nothing_to_the_console() {
     for page in [plan, fit] {
         let (found, console) = run(browser, &page, 1280, script);
         assert_eq!(console, Vec::<String>::new());
-        assert_eq!(
-            (&found["requests"], &found["hit"], &found["images"]),
-            (&0.into(), &0.into(), &0.into())
-        );
+        assert_eq!((&found["requests"], &found["hit"], &found["images"]), (&0.into(), &0.into(), &0.into()));
         if page.ends_with("fit.html") {
             assert_eq!(found["title"], "Fit of <script>window.hit = 1</script>");
             let label = " C150</script><img src=x onerror=\"window.hit=2\">&amp;";
-            assert!(
-                found["labels"].as_array().unwrap().iter().any(|l| l == label),
-                "{found}"
-            );
+            assert!(found["labels"].as_array().unwrap().iter().any(|l| l == label), "{found}");
         }
     }
 }
@@ -238,14 +199,14 @@ fn reports_of_plan_and_fit_write_nothing_to_the_console() {
 fn framed(folder: &Path, page: &Path) -> PathBuf {
     let source = STANDARD.encode(std::fs::read(page).unwrap());
     let frame = folder.join("frame.html");
-    let html = format!(
-        "<html><head></head><body><script type='text/plain' id='source'>{source}</script></body></html>"
-    );
+    let html =
+        format!("<html><head></head><body><script type='text/plain' id='source'>{source}</script></body></html>");
     std::fs::write(&frame, html).unwrap();
     frame
 }
 
-/// Opens all folded parts, then lists what exceeds its container: the page, elements outside scroll boxes, and text outside its plot.
+/// Opens all folded parts, then lists what exceeds its container: the page, elements outside scroll boxes, and text
+/// outside its plot.
 const OVERFLOW: &str = "
     const bytes = Uint8Array.from(atob(document.getElementById('source').textContent), (c) => c.charCodeAt(0));
     const frame = document.createElement('iframe');
@@ -302,11 +263,7 @@ fn a_trace_shows_its_values_within_1500_px_and_folds_unaffected_tests() {
         return;
     };
     let folder = tempfile::tempdir().unwrap();
-    let page = report(
-        folder.path(),
-        "trace",
-        &ready("hermle-c600u/measured/session.toml"),
-    );
+    let page = report(folder.path(), "trace", &ready("hermle-c600u/measured/session.toml"));
     let script = "
         const table = document.querySelector('#values table');
         const isFolded = (test) => Boolean(document.querySelector(`#residuals svg[aria-label^=\"${test}\"]`).closest('details:not([open])'));
@@ -321,11 +278,7 @@ fn a_trace_shows_its_values_within_1500_px_and_folds_unaffected_tests() {
     assert_eq!(found["rows"], 11, "{found}");
     assert!(found["bottom"].as_f64().unwrap() <= 1500.0, "{found}");
     // The simulator changed the axial motion of C only, which C150 alone measures.
-    assert_eq!(
-        found["folded"],
-        serde_json::json!([true, true, true, false]),
-        "{found}"
-    );
+    assert_eq!(found["folded"], serde_json::json!([true, true, true, false]), "{found}");
     assert_eq!(found["beside"], true, "{found}");
     // The selected effect and its 8 alternatives, to the right of the values of the effect.
     assert_eq!(found["alternatives"], 9, "{found}");

@@ -13,10 +13,7 @@ pub fn session_on_public_data(test: &str, name: &str, path: &str) -> Option<Sess
     let found = data(test, path)?;
     let depth = path.split('/').count();
     let folder = found.ancestors().nth(depth)?.to_path_buf();
-    let options = ReadOptions {
-        data_directory: Some(folder),
-        ..ReadOptions::default()
-    };
+    let options = ReadOptions { data_directory: Some(folder), ..ReadOptions::default() };
     Some(files::session(&ready(name), &options).unwrap())
 }
 
@@ -58,11 +55,7 @@ fn ur10_with_every_location_error() {
     for unobservable in &result.unobservable {
         assert!(!unobservable.combination.is_empty() && !unobservable.why.is_empty());
         for parameter in &result.parameters {
-            assert!(
-                !unobservable.combination.contains_key(&parameter.id),
-                "{}",
-                parameter.id
-            );
+            assert!(!unobservable.combination.contains_key(&parameter.id), "{}", parameter.id);
         }
     }
 }

@@ -91,11 +91,7 @@ fn equations_7_to_9_are_the_small_angle_form_and_omit_only_the_squares() {
             -x * theta + y + z * omega,
             x * phi + y * phi * theta + z * omega * phi * theta - y * omega + z,
         ];
-        let at = |rotation| {
-            Orientation::new([omega, phi, theta], rotation)
-                .to_machine(Point([x, y, z]))
-                .0
-        };
+        let at = |rotation| Orientation::new([omega, phi, theta], rotation).to_machine(Point([x, y, z])).0;
         near(at(Rotation::SmallAngle), printed, 1e-15);
         let half = |a: f64, b: f64| 0.5 * (a * a + b * b);
         let exact = at(Rotation::Exact);
@@ -114,10 +110,7 @@ fn everything(machine: &Machine, random: &mut Pcg64) -> (Displacement, SlotValue
     let mut displacement = Displacement::default();
     for axis in AxisName::ALL {
         for freedom in Freedom::ALL {
-            for component in [
-                Component::Motion(freedom, axis),
-                Component::Location(freedom, axis),
-            ] {
+            for component in [Component::Motion(freedom, axis), Component::Location(freedom, axis)] {
                 let value = uniform(random, if freedom.is_angle() { 5e-4 } else { 0.1 });
                 displacement.add(component, value);
                 let name = ErrorName::parse(&component.to_string()).unwrap();
@@ -141,34 +134,21 @@ fn both_settings_agree_with_the_plant() {
     let mut random = Pcg64::seed_from_u64(2);
     for case in 0..200 {
         let on = [NestOn::Table, NestOn::Spindle][case % 2];
-        let [workpiece_ball_mm, spindle_ball_mm] =
-            [(); 2].map(|()| [(); 3].map(|()| uniform(&mut random, 200.0)));
+        let [workpiece_ball_mm, spindle_ball_mm] = [(); 2].map(|()| [(); 3].map(|()| uniform(&mut random, 200.0)));
         let raw = case % 4 < 2;
         let mut nest = Nest::along_the_axes(on);
         if raw {
-            nest.directions =
-                [(); 3].map(|()| Vector3::from([(); 3].map(|()| uniform(&mut random, 1.0))).normalize());
+            nest.directions = [(); 3].map(|()| Vector3::from([(); 3].map(|()| uniform(&mut random, 1.0))).normalize());
         }
         nest.misaligned = [(); 3].map(|()| uniform(&mut random, 0.02));
         let (displacement, mut slots) = everything(&machine, &mut random);
         for (i, angle) in nest.misaligned.into_iter().enumerate() {
             slots.constant[machine.error_slots() + 6 + i] = angle;
         }
-        let position: [f64; 5] = std::array::from_fn(|i| {
-            uniform(
-                &mut random,
-                if AxisName::ALL[i].is_rotary() { 3.0 } else { 250.0 },
-            )
-        });
-        let stated = Stated {
-            workpiece_ball_mm,
-            spindle_ball_mm,
-            bar_mm: 0.0,
-        };
-        let commanded = Commanded {
-            position,
-            velocity: [0.0; 5],
-        };
+        let position: [f64; 5] =
+            std::array::from_fn(|i| uniform(&mut random, if AxisName::ALL[i].is_rotary() { 3.0 } else { 250.0 }));
+        let stated = Stated { workpiece_ball_mm, spindle_ball_mm, bar_mm: 0.0 };
+        let commanded = Commanded { position, velocity: [0.0; 5] };
         let plant = plant::machine::Machine::default();
         let expected = plant::rtest::reading_mm(&plant, &nest, &commanded, &stated, &displacement);
         let station = Station::RTest(RTest {
@@ -180,18 +160,9 @@ fn both_settings_agree_with_the_plant() {
             spindle_ball: spindle_ball_mm,
             sensors: raw.then(|| nest.directions.map(|direction| direction.into())),
         });
-        let of_axis = |name: &str| {
-            AxisName::ALL
-                .iter()
-                .position(|axis| format!("{axis:?}") == name)
-                .unwrap()
-        };
+        let of_axis = |name: &str| AxisName::ALL.iter().position(|axis| format!("{axis:?}") == name).unwrap();
         let readings = Readings {
-            positions: machine
-                .axes
-                .iter()
-                .map(|axis| vec![position[of_axis(&axis.name)]])
-                .collect(),
+            positions: machine.axes.iter().map(|axis| vec![position[of_axis(&axis.name)]]).collect(),
             ..Readings::default()
         };
         let model = TestModel::new(&machine, station, &readings);
@@ -205,9 +176,7 @@ fn both_settings_agree_with_the_plant() {
 fn radial_and_tangential_are_equations_10_and_11() {
     for on in [NestOn::Table, NestOn::Spindle] {
         let folder = tempfile::tempdir().unwrap();
-        super::rtest_findings::bk2_without_effects(on)
-            .write(folder.path())
-            .unwrap();
+        super::rtest_findings::bk2_without_effects(on).write(folder.path()).unwrap();
         let session = files::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
         let (problem, fit) = prepare(&session, 1).unwrap();
         let all = views(&problem, &fit).unwrap();
@@ -218,11 +187,7 @@ fn radial_and_tangential_are_equations_10_and_11() {
             let (sin, cos) = angles[row].sin_cos();
             let [x, y, z] = viewed.reading.wise;
             let [radial, tangential, axial] = viewed.reading.turning.unwrap();
-            near(
-                [radial, tangential, axial],
-                [x * cos + y * sin, -x * sin + y * cos, z],
-                1e-12,
-            );
+            near([radial, tangential, axial], [x * cos + y * sin, -x * sin + y * cos, z], 1e-12);
             // The readings: with sensors on the table they rotate with C, with sensors in the spindle they do not.
             let read = &readings.observed[3 * row..3 * row + 3];
             let expected = match on {
@@ -243,10 +208,7 @@ fn a_programmed_feed_takes_the_time_of_the_diagonal() {
     let first = planned.runs()[0].clone();
     let taken_s = planned.time_s[first.end - 1] - planned.time_s[first.start];
     let diagonal = (std::f64::consts::TAU * 100.0).hypot(360.0);
-    assert!(
-        (taken_s - diagonal / 1000.0 * 60.0).abs() < 1e-9 * taken_s,
-        "{taken_s}"
-    );
+    assert!((taken_s - diagonal / 1000.0 * 60.0).abs() < 1e-9 * taken_s, "{taken_s}");
 }
 
 /// BK1 and BK2: the ball stays in the nest, nominally.
@@ -266,19 +228,10 @@ fn linear_axes_that_follow_keep_the_ball_in_the_nest() {
                     axis.kind == AxisKind::Linear && column.iter().any(|q| (q - column[0]).abs() > 1.0)
                 })
                 .count();
-            assert_eq!(
-                moving,
-                if test.name == "C-alone" { 0 } else { 2 },
-                "{}",
-                test.name
-            );
+            assert_eq!(moving, if test.name == "C-alone" { 0 } else { 2 }, "{}", test.name);
             let model = TestModel::new(&session.machine, test.station.clone(), &planned);
             let nominal = model.readings_mm(&SlotValues::zero(model.slots()));
-            assert!(
-                nominal.iter().all(|reading| reading.abs() < 1e-9),
-                "{}",
-                test.name
-            );
+            assert!(nominal.iter().all(|reading| reading.abs() < 1e-9), "{}", test.name);
         }
     }
 }

@@ -1,5 +1,5 @@
-//! The effects that Yamaji, Hamabata & Ihara (HPC 2014, Section 7) found with an R-test, found by trace in readings of the plant. The
-//! session files declare no effect; only the assertions use the true effects.
+//! The effects that Yamaji, Hamabata & Ihara (HPC 2014, Section 7) found with an R-test, found by trace in readings of
+//! the plant. The session files declare no effect; only the assertions use the true effects.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -15,21 +15,13 @@ const R_MM: f64 = 100.0;
 const H_MM: f64 = 60.0;
 
 fn circles(phase_rad: f64) -> Motion {
-    Motion::Circles {
-        centre_mm: 0.0,
-        radius_mm: R_MM,
-        phase_rad,
-    }
+    Motion::Circles { centre_mm: 0.0, radius_mm: R_MM, phase_rad }
 }
 
 fn test(name: &str, workpiece_ball_mm: [f64; 3], motions: [Motion; 5]) -> Test {
     Test {
         name: name.to_string(),
-        stated: Stated {
-            workpiece_ball_mm,
-            spindle_ball_mm: [0.0; 3],
-            bar_mm: 0.0,
-        },
+        stated: Stated { workpiece_ball_mm, spindle_ball_mm: [0.0; 3], bar_mm: 0.0 },
         setup: name.to_string(),
         motions,
         range_deg: [0.0, 360.0],
@@ -44,44 +36,26 @@ fn bk2() -> Test {
     let motions = with(all_stand(), AxisName::C, Motion::Turns);
     let motions = with(motions, AxisName::X, circles(0.0));
     let motions = with(motions, AxisName::Y, circles(-FRAC_PI_2));
-    test(
-        "BK2",
-        [R_MM, 0.0, H_MM],
-        with(motions, AxisName::Z, Motion::Stands(H_MM)),
-    )
+    test("BK2", [R_MM, 0.0, H_MM], with(motions, AxisName::Z, Motion::Stands(H_MM)))
 }
 
 /// C alone under a ball on its axis.
 fn c_alone() -> Test {
     let motions = with(all_stand(), AxisName::C, Motion::Turns);
-    test(
-        "C-alone",
-        [0.0, 0.0, H_MM],
-        with(motions, AxisName::Z, Motion::Stands(H_MM)),
-    )
+    test("C-alone", [0.0, 0.0, H_MM], with(motions, AxisName::Z, Motion::Stands(H_MM)))
 }
 
 /// BK1: A turns the nest, and Y and Z follow.
 fn bk1() -> Test {
     let motions = with(all_stand(), AxisName::A, Motion::Turns);
     let motions = with(motions, AxisName::Y, circles(0.0));
-    test(
-        "BK1",
-        [0.0, R_MM, 0.0],
-        with(motions, AxisName::Z, circles(-FRAC_PI_2)),
-    )
+    test("BK1", [0.0, R_MM, 0.0], with(motions, AxisName::Z, circles(-FRAC_PI_2)))
 }
 
 fn errors_of(axis: AxisName) -> Vec<Component> {
     use Freedom::{A, B, C, X, Y, Z};
-    let freedoms = if axis == AxisName::A {
-        [Y, Z, B, C]
-    } else {
-        [X, Y, A, B]
-    };
-    freedoms
-        .map(|freedom| Component::Location(freedom, axis))
-        .to_vec()
+    let freedoms = if axis == AxisName::A { [Y, Z, B, C] } else { [X, Y, A, B] };
+    freedoms.map(|freedom| Component::Location(freedom, axis)).to_vec()
 }
 
 fn session(on: NestOn, tests: Vec<Test>, declared: Vec<Component>, effects: Vec<Injected>) -> Session {
@@ -98,19 +72,11 @@ fn session(on: NestOn, tests: Vec<Test>, declared: Vec<Component>, effects: Vec<
 }
 
 fn motion(freedom: Freedom, axis: AxisName, shape: Shape, amplitude: f64) -> Injected {
-    Injected::new(
-        Component::Motion(freedom, axis),
-        Driver::Axis(axis),
-        shape,
-        amplitude,
-    )
+    Injected::new(Component::Motion(freedom, axis), Driver::Axis(axis), shape, amplitude)
 }
 
 fn steps(at: &[f64], heights: &[f64]) -> Shape {
-    Shape::Steps {
-        at: at.to_vec(),
-        heights: heights.to_vec(),
-    }
+    Shape::Steps { at: at.to_vec(), heights: heights.to_vec() }
 }
 
 /// Pitch-error compensation in coarse increments, as in the control of Machine A.
@@ -145,15 +111,9 @@ fn traced<T>(session: &Session, examine: impl FnOnce(&TraceOutcome<'_>) -> T) ->
 
 /// The staircase that trace finds for a component: positions and heights, µm.
 fn staircase(outcome: &TraceOutcome<'_>, component: &str) -> Option<Vec<(f64, f64)>> {
-    let number = outcome
-        .effects
-        .iter()
-        .position(|effect| effect.component.to_string() == component)?;
+    let number = outcome.effects.iter().position(|effect| effect.component.to_string() == component)?;
     let effect = &outcome.result.effects[number];
-    let at = effect
-        .shape_parameters
-        .iter()
-        .find(|number| number.name == "at")?;
+    let at = effect.shape_parameters.iter().find(|number| number.name == "at")?;
     assert_eq!(at.unit, "mm");
     let heights = effect.parameters.iter().map(|height| height.value);
     Some(at.values.iter().copied().zip(heights).collect())
@@ -161,27 +121,16 @@ fn staircase(outcome: &TraceOutcome<'_>, component: &str) -> Option<Vec<(f64, f6
 
 /// The value of a staircase at a position, µm.
 fn height(stairs: &[(f64, f64)], at: f64) -> f64 {
-    stairs
-        .iter()
-        .filter(|(edge, _)| at >= *edge)
-        .map(|(_, height)| height)
-        .sum()
+    stairs.iter().filter(|(edge, _)| at >= *edge).map(|(_, height)| height).sum()
 }
 
 /// The largest difference of two staircases away from their steps, after a common offset is removed, µm.
 fn furthest(found: &[(f64, f64)], truth: &[(f64, f64)]) -> f64 {
-    let places: Vec<f64> = (-95..=95)
-        .map(f64::from)
-        .filter(|place| truth.iter().all(|(edge, _)| (place - edge).abs() > 5.0))
-        .collect();
-    let differences: Vec<f64> = places
-        .iter()
-        .map(|place| height(found, *place) - height(truth, *place))
-        .collect();
+    let places: Vec<f64> =
+        (-95..=95).map(f64::from).filter(|place| truth.iter().all(|(edge, _)| (place - edge).abs() > 5.0)).collect();
+    let differences: Vec<f64> = places.iter().map(|place| height(found, *place) - height(truth, *place)).collect();
     let mean = differences.iter().sum::<f64>() / differences.len() as f64;
-    differences
-        .iter()
-        .fold(0.0, |most, difference| (difference - mean).abs().max(most))
+    differences.iter().fold(0.0, |most, difference| (difference - mean).abs().max(most))
 }
 
 fn pairs(at: &[f64], heights: &[f64]) -> Vec<(f64, f64)> {
@@ -196,21 +145,16 @@ fn steps_of_pitch_compensation_are_found_in_x_and_in_y() {
     traced(&session, |outcome| {
         assert_eq!(outcome.result.verdict, "explained");
         assert_eq!(outcome.effects.len(), 2);
-        let x = furthest(
-            &staircase(outcome, "EXX").unwrap(),
-            &pairs(&X_STEPS_MM, &X_HEIGHTS_UM),
-        );
-        let y = furthest(
-            &staircase(outcome, "EYY").unwrap(),
-            &pairs(&Y_STEPS_MM, &Y_HEIGHTS_UM),
-        );
+        let x = furthest(&staircase(outcome, "EXX").unwrap(), &pairs(&X_STEPS_MM, &X_HEIGHTS_UM));
+        let y = furthest(&staircase(outcome, "EYY").unwrap(), &pairs(&Y_STEPS_MM, &Y_HEIGHTS_UM));
         println!("staircases within {x:.2} µm in X and {y:.2} µm in Y");
         assert!(x < 0.5 && y < 0.5, "{x} {y}");
         assert!(outcome.result.after.heldout_rms_um < 0.32);
     });
 }
 
-/// In BK2 a C axis that jumps where X passes 18 mm is confounded with a step of X: only the test of C alone separates them (Figs. 13, 14).
+/// In BK2 a C axis that jumps where X passes 18 mm is confounded with a step of X: only the test of C alone separates
+/// them (Figs. 13, 14).
 #[test]
 fn the_test_of_c_alone_separates_steps_of_c_from_steps_of_x() {
     let jump_deg = (18.0 / R_MM).acos().to_degrees();
@@ -218,11 +162,7 @@ fn the_test_of_c_alone_separates_steps_of_c_from_steps_of_x() {
     let effects = vec![motion(Freedom::X, AxisName::C, jumps, 1.0)];
     let of = |tests| session(NestOn::Table, tests, errors_of(AxisName::C), effects.clone());
     traced(&of(vec![bk2()]), |outcome| {
-        assert!(
-            staircase(outcome, "EXX").is_some(),
-            "BK2 alone blames X: {:?}",
-            outcome.result.effects
-        );
+        assert!(staircase(outcome, "EXX").is_some(), "BK2 alone blames X: {:?}", outcome.result.effects);
     });
     traced(&of(vec![bk2(), c_alone()]), |outcome| {
         assert_eq!(outcome.result.verdict, "explained");
@@ -247,22 +187,14 @@ fn a_ball_bar_on_x_and_y_alone_shows_the_same_steps() {
     assert!(away < 0.6, "{away}");
 }
 
-/// Figs. 17 and 18: an ellipse at 45° from the squareness of Y and Z, and waves from the straightness of Y, with the sensors on either
-/// body.
+/// Figs. 17 and 18: an ellipse at 45° from the squareness of Y and Z, and waves from the straightness of Y, with the
+/// sensors on either body.
 #[test]
 fn squareness_and_cyclic_straightness_of_y_are_found_in_bk1() {
     let squareness = Component::Location(Freedom::A, AxisName::Z);
     let effects = vec![
         Injected::new(squareness, Driver::Nothing, Shape::Constant, 25.0),
-        motion(
-            Freedom::Z,
-            AxisName::Y,
-            Shape::Periodic {
-                period: 25.0,
-                phase_deg: 40.0,
-            },
-            1.5,
-        ),
+        motion(Freedom::Z, AxisName::Y, Shape::Periodic { period: 25.0, phase_deg: 40.0 }, 1.5),
     ];
     for on in [NestOn::Table, NestOn::Spindle] {
         let session = session(on, vec![bk1()], errors_of(AxisName::A), effects.clone());
@@ -273,10 +205,7 @@ fn squareness_and_cyclic_straightness_of_y_are_found_in_bk1() {
             // BK1 determines the squareness of Y and Z, not which of the two axes is tilted.
             let square = &result.effects[0];
             let mut names = std::iter::once(&square.name).chain(&square.aliases);
-            assert!(
-                names.any(|name| name.component == "EA0Z" && name.shape == "constant"),
-                "{square:?}"
-            );
+            assert!(names.any(|name| name.component == "EA0Z" && name.shape == "constant"), "{square:?}");
             assert!(square.name.shape == "constant" && square.name.component.starts_with("EA0"));
             let angle = &square.parameters[0];
             assert!((angle.value.abs() - 25.0).abs() < 4.0 * angle.u, "{angle:?}");
@@ -288,11 +217,7 @@ fn squareness_and_cyclic_straightness_of_y_are_found_in_bk1() {
             let [amplitude, phase] = [0, 1].map(|k| &harmonic.parameters[k]);
             assert!((amplitude.value - 1.5).abs() < 4.0 * amplitude.u, "{amplitude:?}");
             assert!((phase.value - 40.0).abs() < 4.0 * phase.u, "{phase:?}");
-            assert!(
-                result.after.heldout_rms_um < 0.32,
-                "{}",
-                result.after.heldout_rms_um
-            );
+            assert!(result.after.heldout_rms_um < 0.32, "{}", result.after.heldout_rms_um);
         });
     }
 }

@@ -1,5 +1,5 @@
-//! `abbe schema`: files and results are what their schema says. The validator is a crate of its own; which keys a table has is asked of the
-//! readers, which know nothing of the schema.
+//! `abbe schema`: files and results are what their schema says. The validator is a crate of its own; which keys a table
+//! has is asked of the readers, which know nothing of the schema.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -12,11 +12,7 @@ use super::{abbe, ready, text, workspace};
 /// A schema as the command prints it.
 fn schema(subject: &str) -> Value {
     let printed = abbe(&["schema", subject]);
-    assert!(
-        printed.status.success(),
-        "{}",
-        String::from_utf8_lossy(&printed.stderr)
-    );
+    assert!(printed.status.success(), "{}", String::from_utf8_lossy(&printed.stderr));
     serde_json::from_slice(&printed.stdout).unwrap()
 }
 
@@ -25,10 +21,7 @@ fn validator(subject: &str) -> Validator {
 }
 
 fn faults(validator: &Validator, value: &Value) -> Vec<String> {
-    validator
-        .iter_errors(value)
-        .map(|fault| format!("{}: {fault}", fault.instance_path()))
-        .collect()
+    validator.iter_errors(value).map(|fault| format!("{}: {fault}", fault.instance_path())).collect()
 }
 
 /// A TOML text as JSON. JSON has no `inf`.
@@ -42,9 +35,7 @@ fn as_json(text: &str) -> Value {
             toml::Value::String(text) => json!(text),
             toml::Value::Datetime(date) => json!(date.to_string()),
             toml::Value::Array(items) => items.into_iter().map(value).collect(),
-            toml::Value::Table(table) => {
-                Value::Object(table.into_iter().map(|(k, v)| (k, value(v))).collect())
-            }
+            toml::Value::Table(table) => Value::Object(table.into_iter().map(|(k, v)| (k, value(v))).collect()),
         }
     }
     value(toml::Value::Table(text.parse().unwrap()))
@@ -73,26 +64,15 @@ fn bundled_files_hold_and_misspelt_keys_do_not() {
         if file.ends_with("errors.toml") {
             continue;
         }
-        let schema = if file.ends_with("machine.toml") {
-            &machine
-        } else {
-            &session
-        };
+        let schema = if file.ends_with("machine.toml") { &machine } else { &session };
         let value = as_json(&written);
         assert_eq!(faults(schema, &value), Vec::<String>::new(), "{}", file.display());
-        for (right, wrong) in [
-            ("direction", "directoin"),
-            ("bar_mm", "bar_m"),
-            ("kind", "knid"),
-            ("step_deg", "step_degree"),
-        ] {
+        for (right, wrong) in
+            [("direction", "directoin"), ("bar_mm", "bar_m"), ("kind", "knid"), ("step_deg", "step_degree")]
+        {
             let misspelt = written.replacen(&format!("{right} ="), &format!("{wrong} ="), 1);
             if misspelt != written {
-                assert!(
-                    !schema.is_valid(&as_json(&misspelt)),
-                    "{}: {wrong}",
-                    file.display()
-                );
+                assert!(!schema.is_valid(&as_json(&misspelt)), "{}: {wrong}", file.display());
             }
         }
     }
@@ -115,12 +95,7 @@ fn known_to_the_reader(session: &str) -> BTreeSet<String> {
 }
 
 fn properties(schema: &Value) -> BTreeSet<String> {
-    schema["properties"]
-        .as_object()
-        .unwrap()
-        .keys()
-        .cloned()
-        .collect()
+    schema["properties"].as_object().unwrap().keys().cloned().collect()
 }
 
 const SESSION: &str = "INSTRUMENT
@@ -143,14 +118,7 @@ fn with(place: &str, instrument: &str, test: &str, effect: &str) -> String {
     let at = |mark: &str| if mark == place { "zz = 1\n" } else { "" };
     for (mark, contents) in [
         ("UNKNOWNS", format!("[unknowns]\nerrors = []\n{}", at("UNKNOWNS"))),
-        (
-            "INSTRUMENT",
-            format!(
-                "{}[instrument]\nkind = \"{instrument}\"\n{}",
-                at("ROOT"),
-                at("INSTRUMENT")
-            ),
-        ),
+        ("INSTRUMENT", format!("{}[instrument]\nkind = \"{instrument}\"\n{}", at("ROOT"), at("INSTRUMENT"))),
         ("ROOT", String::new()),
         ("MACHINE", at("MACHINE").to_string()),
         ("AXIS", at("AXIS").to_string()),
@@ -160,11 +128,7 @@ fn with(place: &str, instrument: &str, test: &str, effect: &str) -> String {
         session = session.replacen(&format!("{mark}\n"), &format!("{contents}\n"), 1);
     }
     // The other axes need nothing.
-    session.replacen(
-        "[machine.axis.C]",
-        "axis.X = {}\naxis.Y = {}\naxis.Z = {}\n[machine.axis.C]",
-        1,
-    )
+    session.replacen("[machine.axis.C]", "axis.X = {}\naxis.Y = {}\naxis.Z = {}\n[machine.axis.C]", 1)
 }
 
 const BAR: &str = "bar_mm = 100\nworkpiece_ball_mm = [100, 0, 0]\nspindle_ball_mm = [0, 0, 0]";
@@ -194,28 +158,15 @@ fn the_session_schema_has_the_keys_that_the_reader_knows() {
     assert_eq!(known, properties(&machine));
 
     let mut known = BTreeSet::new();
-    for (instrument, own) in [
-        ("ballbar", BAR),
-        ("tracker", TARGET),
-        ("socket", BALL),
-        ("probe", PROBE),
-        ("r-test", NEST),
-    ] {
-        known.extend(known_to_the_reader(&with(
-            "TEST",
-            instrument,
-            &format!("{own}\n{SWEEP}"),
-            "",
-        )));
+    for (instrument, own) in
+        [("ballbar", BAR), ("tracker", TARGET), ("socket", BALL), ("probe", PROBE), ("r-test", NEST)]
+    {
+        known.extend(known_to_the_reader(&with("TEST", instrument, &format!("{own}\n{SWEEP}"), "")));
     }
     assert_eq!(known, properties(&defs("test")));
 
-    let moving =
-        |movement: &str| known_to_the_reader(&with("", "ballbar", &format!("{BAR}\n{movement}"), ""));
-    assert_eq!(
-        moving(&SWEEP.replace(" }", ", zz = 1 }")),
-        properties(&defs("sweep"))
-    );
+    let moving = |movement: &str| known_to_the_reader(&with("", "ballbar", &format!("{BAR}\n{movement}"), ""));
+    assert_eq!(moving(&SWEEP.replace(" }", ", zz = 1 }")), properties(&defs("sweep")));
     for (index, path) in [
         "kind = \"list\"",
         "kind = \"circle\", plane = \"XY\", radius_mm = 100, step_deg = 1",
@@ -232,10 +183,7 @@ fn the_session_schema_has_the_keys_that_the_reader_knows() {
         let expected = properties(&session["$defs"]["path"]["oneOf"][index]);
         assert_eq!(known, expected, "{path}");
     }
-    for (table, at) in [
-        ("format", "[test.format]\nheader = true"),
-        ("format", "[format]\nheader = true"),
-    ] {
+    for (table, at) in [("format", "[test.format]\nheader = true"), ("format", "[format]\nheader = true")] {
         let known = known_to_the_reader(&with("", "ballbar", &sweeping, &format!("{at}\nzz = 1")));
         assert_eq!(known, properties(&defs(table)));
     }
@@ -268,14 +216,7 @@ fn written(arguments: &[&str]) -> Value {
 }
 
 /// The fields in front of every result of a session.
-const ENVELOPE: [&str; 6] = [
-    "schema_version",
-    "tool_version",
-    "command",
-    "session",
-    "seed",
-    "options",
-];
+const ENVELOPE: [&str; 6] = ["schema_version", "tool_version", "command", "session", "seed", "options"];
 
 fn has_exactly(value: &Value, design: &[&str], added: &[&str]) {
     let found: BTreeSet<&str> = value.as_object().unwrap().keys().map(String::as_str).collect();
@@ -292,14 +233,7 @@ fn results_hold_and_have_the_fields_of_the_design() {
     assert_eq!(faults(&validator("fit"), &fit), Vec::<String>::new());
     has_exactly(
         &fit,
-        &[
-            "noise_um",
-            "readings",
-            "rms_um",
-            "heldout_rms_um",
-            "parameters",
-            "unobservable",
-        ],
+        &["noise_um", "readings", "rms_um", "heldout_rms_um", "parameters", "unobservable"],
         &[
             &ENVELOPE[..],
             &[
@@ -323,16 +257,8 @@ fn results_hold_and_have_the_fields_of_the_design() {
         .concat(),
     );
     let of_a_parameter = ["expanded_u", "significant", "meaning"];
-    has_exactly(
-        &fit["parameters"][0],
-        &["id", "value", "u", "unit"],
-        &of_a_parameter,
-    );
-    has_exactly(
-        &schema("fit")["$defs"]["Unobservable"]["properties"],
-        &["combination", "why"],
-        &[],
-    );
+    has_exactly(&fit["parameters"][0], &["id", "value", "u", "unit"], &of_a_parameter);
+    has_exactly(&schema("fit")["$defs"]["Unobservable"]["properties"], &["combination", "why"], &[]);
     let mut other = fit.clone();
     other["rms_mm"] = json!(1.0);
     assert!(!validator("fit").is_valid(&other));
@@ -370,31 +296,13 @@ fn results_hold_and_have_the_fields_of_the_design() {
         has_exactly(
             &trace[model],
             &["rms_um", "heldout_rms_um", "parameters"],
-            &[
-                "noise_um",
-                "rank",
-                "parameter_count",
-                "chi_square",
-                "degrees_of_freedom",
-                "identifiable",
-                "covariance",
-            ],
+            &["noise_um", "rank", "parameter_count", "chi_square", "degrees_of_freedom", "identifiable", "covariance"],
         );
     }
     let effect = &trace["effects"][0];
     has_exactly(
         effect,
-        &[
-            "component",
-            "driver",
-            "shape",
-            "order",
-            "parameters",
-            "p_value",
-            "rms_gain_um",
-            "aliases",
-            "separated_by",
-        ],
+        &["component", "driver", "shape", "order", "parameters", "p_value", "rms_gain_um", "aliases", "separated_by"],
         &[
             "family",
             "heldout_rms_um",
@@ -406,11 +314,7 @@ fn results_hold_and_have_the_fields_of_the_design() {
             "separating_tests",
         ],
     );
-    has_exactly(
-        &effect["parameters"][0],
-        &["id", "value", "u", "unit"],
-        &of_a_parameter,
-    );
+    has_exactly(&effect["parameters"][0], &["id", "value", "u", "unit"], &of_a_parameter);
     assert!(effect["order"].is_u64(), "{effect}");
     has_exactly(
         &schema("trace")["$defs"]["EffectName"]["properties"],
@@ -432,36 +336,10 @@ fn the_other_results_hold() {
     for (subject, arguments) in [
         ("plan", vec!["plan", text(&plan)]),
         ("next-test", vec!["plan", text(&plan), "--range"]),
-        (
-            "patterns",
-            vec!["plan", text(&plan), "--patterns", text(&patterns)],
-        ),
-        (
-            "next-test",
-            vec!["plan", text(&plan), "--separate", "EZC~C:h2,EAC~C:h1"],
-        ),
-        (
-            "self-calibration",
-            vec![
-                "fit",
-                text(&calibration),
-                "--method",
-                "self-calibration",
-                "--monte-carlo",
-                "10000",
-            ],
-        ),
-        (
-            "simulate",
-            vec![
-                "simulate",
-                text(&plan),
-                "--out",
-                text(&out),
-                "--error",
-                "EY0A=10um",
-            ],
-        ),
+        ("patterns", vec!["plan", text(&plan), "--patterns", text(&patterns)]),
+        ("next-test", vec!["plan", text(&plan), "--separate", "EZC~C:h2,EAC~C:h1"]),
+        ("self-calibration", vec!["fit", text(&calibration), "--method", "self-calibration", "--monte-carlo", "10000"]),
+        ("simulate", vec!["simulate", text(&plan), "--out", text(&out), "--error", "EY0A=10um"]),
         (
             "map",
             vec![
@@ -482,28 +360,13 @@ fn the_other_results_hold() {
         ),
     ] {
         let result = written(&arguments);
-        assert_eq!(
-            faults(&validator(subject), &result),
-            Vec::<String>::new(),
-            "{subject}"
-        );
+        assert_eq!(faults(&validator(subject), &result), Vec::<String>::new(), "{subject}");
     }
     // A circle has the most to say.
     let (mine, run) = (folder.path().join("mine"), folder.path().join("circles"));
-    assert!(
-        abbe(&["new", text(&mine), "--from-code", "[wXbYZt]"])
-            .status
-            .success()
-    );
+    assert!(abbe(&["new", text(&mine), "--from-code", "[wXbYZt]"]).status.success());
     let circles = mine.join("plan.toml");
-    written(&[
-        "simulate",
-        text(&circles),
-        "--out",
-        text(&run),
-        "--error",
-        "EC0Y=8arcsec",
-    ]);
+    written(&["simulate", text(&circles), "--out", text(&run), "--error", "EC0Y=8arcsec"]);
     let circles = written(&["fit", text(&run.join("session.toml"))]);
     assert_eq!(faults(&validator("fit"), &circles), Vec::<String>::new());
     has_exactly(
@@ -515,12 +378,7 @@ fn the_other_results_hold() {
     let session = out.join("session.toml");
     let again = folder.path().join("again");
     written(&["simulate", text(&plan), "--out", text(&again), "--seed", "2"]);
-    let repeated = written(&[
-        "fit",
-        text(&session),
-        "--repeat",
-        text(&again.join("session.toml")),
-    ]);
+    let repeated = written(&["fit", text(&session), "--repeat", text(&again.join("session.toml"))]);
     assert_eq!(faults(&validator("repeat"), &repeated), Vec::<String>::new());
     let compared = written(&["fit", text(&session), "--method", "cone"]);
     assert_eq!(faults(&validator("geometric"), &compared), Vec::<String>::new());

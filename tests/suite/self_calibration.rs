@@ -1,8 +1,8 @@
-//! Self-calibration by probing (Zimmermann & Ibaraki 2020) against the tables of the paper and against readings from plane geometry.
+//! Self-calibration by probing (Zimmermann & Ibaraki 2020) against the tables of the paper and against readings from
+//! plane geometry.
 
 use abbe::identify::self_calibration::{
-    Calibration, Equations, Function, MonteCarlo, Reference, calibrate, conditions, rank_before, reduce,
-    solve,
+    Calibration, Equations, Function, MonteCarlo, Reference, calibrate, conditions, rank_before, reduce, solve,
 };
 use abbe::identify::simulate::{Simulation, simulate};
 use abbe::model::component::ErrorName;
@@ -45,11 +45,7 @@ fn plan(count: usize, second_deg: f64) -> Session {
             &format!("x_mm = \"R * {cos:.15}\", y_mm = \"R * {sin:.15}\"").replace("* -", "* (0 - 1) * "),
         );
     let folder = tempfile::tempdir().unwrap();
-    std::fs::copy(
-        ready("self-calibration/machine.toml"),
-        folder.path().join("machine.toml"),
-    )
-    .unwrap();
+    std::fs::copy(ready("self-calibration/machine.toml"), folder.path().join("machine.toml")).unwrap();
     let path = folder.path().join("session.toml");
     std::fs::write(&path, edited).unwrap();
     files::session(&path, &ReadOptions::default()).unwrap()
@@ -58,10 +54,7 @@ fn plan(count: usize, second_deg: f64) -> Session {
 /// The plan with readings of the nominal machine.
 fn unmoved(count: usize, second_deg: f64) -> Session {
     let mut session = plan(count, second_deg);
-    let simulation = Simulation {
-        noise_mm: Some(0.0),
-        ..Simulation::default()
-    };
+    let simulation = Simulation { noise_mm: Some(0.0), ..Simulation::default() };
     let simulated = simulate(&session, &simulation).unwrap();
     for (test, readings) in session.tests.iter_mut().zip(simulated.readings) {
         test.readings = Some(readings);
@@ -80,10 +73,7 @@ fn as_in_the_paper(session: &mut Session) {
 fn expanded_um(calibration: &Calibration, covariance: &faer::Mat<f64>) -> [[f64; 4]; 7] {
     ANGLES_OF_TABLE_5.map(|angle| {
         Function::ALL.map(|function| {
-            let column = calibration
-                .equations
-                .column(function, angle.to_radians())
-                .unwrap();
+            let column = calibration.equations.column(function, angle.to_radians()).unwrap();
             2e3 * covariance[(column, column)].max(0.0).sqrt()
         })
     })
@@ -91,12 +81,8 @@ fn expanded_um(calibration: &Calibration, covariance: &faer::Mat<f64>) -> [[f64;
 
 /// Number of cells of Table 5 beyond the permitted difference, and the largest difference.
 fn off(found: &[[f64; 4]; 7]) -> (usize, f64) {
-    let differences: Vec<f64> = found
-        .iter()
-        .flatten()
-        .zip(TABLE_5.iter().flatten())
-        .map(|(found, printed)| (found - printed).abs())
-        .collect();
+    let differences: Vec<f64> =
+        found.iter().flatten().zip(TABLE_5.iter().flatten()).map(|(found, printed)| (found - printed).abs()).collect();
     let worst = differences.iter().copied().fold(0.0, f64::max);
     (differences.iter().filter(|d| **d > CELL).count(), worst)
 }
@@ -104,10 +90,7 @@ fn off(found: &[[f64; 4]; 7]) -> (usize, f64) {
 #[test]
 fn table_5_is_reproduced_in_every_cell() {
     let mut session = unmoved(8, 45.0);
-    for (reference, unknowns, worst_cell) in [
-        (Reference::Estimated, 27, 0.252),
-        (Reference::FirstReading, 26, 0.308),
-    ] {
+    for (reference, unknowns, worst_cell) in [(Reference::Estimated, 27, 0.252), (Reference::FirstReading, 26, 0.308)] {
         if reference == Reference::FirstReading {
             as_in_the_paper(&mut session);
         }
@@ -145,17 +128,14 @@ fn the_printed_sign_of_test_3_does_not_reproduce_table_5() {
     assert!(worst > 2.5, "{worst}");
 }
 
-/// Table 6 prints 3.68 and 3.10 µm. The algebraic circle of draws about readings of zero reproduces them: there the radius of the circle
-/// is due to noise alone. About a circle with the radius of that of Table 4 the same fit gives 2.93 and 3.10 µm.
+/// Table 6 prints 3.68 and 3.10 µm. The algebraic circle of draws about readings of zero reproduces them: there the
+/// radius of the circle is due to noise alone. About a circle with the radius of that of Table 4 the same fit gives
+/// 2.93 and 3.10 µm.
 #[test]
 fn table_6_is_the_circle_through_draws_about_zero() {
     let mut session = unmoved(8, 45.0);
     as_in_the_paper(&mut session);
-    let draws = MonteCarlo {
-        runs: 400_000,
-        seed: 1,
-        coverage: 0.95,
-    };
+    let draws = MonteCarlo { runs: 400_000, seed: 1, coverage: 0.95 };
     let about_zero = calibrate(&session).unwrap();
     let expanded = |calibration: &Calibration| {
         let distributions = calibration.monte_carlo(&draws);
@@ -165,13 +145,7 @@ fn table_6_is_the_circle_through_draws_about_zero() {
     assert!((x - 3.68).abs() < 0.05 && (y - 3.10).abs() < 0.05, "{x} {y}");
 
     let mut as_measured = plan(8, 45.0);
-    touched(
-        &mut as_measured,
-        &Touched {
-            axis: [3.0e-3, 5.1e-3],
-            ..Touched::default()
-        },
-    );
+    touched(&mut as_measured, &Touched { axis: [3.0e-3, 5.1e-3], ..Touched::default() });
     as_in_the_paper(&mut as_measured);
     let [x, y] = expanded(&calibrate(&as_measured).unwrap());
     assert!((x - 2.93).abs() < 0.05 && (y - 3.10).abs() < 0.05, "{x} {y}");
@@ -190,7 +164,8 @@ struct Touched {
     noise: (f64, u64),
 }
 
-/// Readings by plane geometry: intersection of the ray from the origin at the angle of the probe with the circle of the rotated cylinder.
+/// Readings by plane geometry: intersection of the ray from the origin at the angle of the probe with the circle of the
+/// rotated cylinder.
 fn touched(session: &mut Session, case: &Touched) {
     let radius = 45.0;
     let mut random = Pcg64::seed_from_u64(case.noise.1);
@@ -203,10 +178,7 @@ fn touched(session: &mut Session, case: &Touched) {
             // The table rotates clockwise by C.
             let (sin, cos) = readings.positions[c][row].sin_cos();
             let from = [case.cylinder[0] - case.axis[0], case.cylinder[1] - case.axis[1]];
-            let centre = [
-                case.axis[0] + cos * from[0] + sin * from[1],
-                case.axis[1] - sin * from[0] + cos * from[1],
-            ];
+            let centre = [case.axis[0] + cos * from[0] + sin * from[1], case.axis[1] - sin * from[0] + cos * from[1]];
             let angle = commanded_y.atan2(commanded_x);
             let direction = [angle.cos(), angle.sin()];
             // A squareness of Y displaces the tip along X in proportion to Y.
@@ -222,7 +194,8 @@ fn touched(session: &mut Session, case: &Touched) {
     }
 }
 
-/// A probe that does not move straight towards the axis, on a table at 30° whose axis is displaced by 0.2 mm: line and circle in the plane.
+/// A probe that does not move straight towards the axis, on a table at 30° whose axis is displaced by 0.2 mm: line and
+/// circle in the plane.
 #[test]
 fn a_declared_direction_is_the_one_that_is_probed_along() {
     let machine = plan(8, 45.0).machine;
@@ -233,10 +206,7 @@ fn a_declared_direction_is_the_one_that_is_probed_along() {
         stylus: [0.0; 3],
         direction: Some([-0.8, 0.6, 0.0]),
     });
-    let mut readings = Readings {
-        positions: vec![vec![0.0]; machine.axes.len()],
-        ..Readings::default()
-    };
+    let mut readings = Readings { positions: vec![vec![0.0]; machine.axes.len()], ..Readings::default() };
     let place = |name: &str| machine.axis_index(name).unwrap();
     readings.positions[place("C")][0] = 30.0_f64.to_radians();
     readings.positions[place("X")][0] = 58.0;
@@ -253,7 +223,8 @@ fn a_declared_direction_is_the_one_that_is_probed_along() {
     assert!((found - expected).abs() < 1e-11, "{found} {expected}");
 }
 
-/// Section 5.2 and Table 9: the origin moves to eight points of a 40 µm square, so axis and artefact have the opposite offset.
+/// Section 5.2 and Table 9: the origin moves to eight points of a 40 µm square, so axis and artefact have the opposite
+/// offset.
 #[test]
 fn shifted_origins_come_back_within_their_uncertainty() {
     let shifts = [
@@ -289,10 +260,7 @@ fn shifted_origins_come_back_within_their_uncertainty() {
                 }
             }
             // The errors of the linear axes have not changed: there is only a squareness.
-            for (angle, value) in calibration.equations.angles[2]
-                .iter()
-                .zip(calibration.values_mm(Function::Linear))
-            {
+            for (angle, value) in calibration.equations.angles[2].iter().zip(calibration.values_mm(Function::Linear)) {
                 let expected = -0.5 * 45.0 * case.squareness * (2.0 * angle).sin();
                 let u = if noise > 0.0 { 4.0 * 2.3e-3 } else { 2e-4 };
                 assert!((value - expected).abs() < u, "{angle}: {value} {expected}");
@@ -305,40 +273,25 @@ fn shifted_origins_come_back_within_their_uncertainty() {
 
 #[test]
 fn any_number_of_angles_and_any_second_direction() {
-    for (count, second) in [
-        (5, 72.0),
-        (6, 60.0),
-        (7, 360.0 / 7.0),
-        (7, 720.0 / 7.0),
-        (8, 135.0),
-        (12, 30.0),
-        (36, 10.0),
-    ] {
+    for (count, second) in
+        [(5, 72.0), (6, 60.0), (7, 360.0 / 7.0), (7, 720.0 / 7.0), (8, 135.0), (12, 30.0), (36, 10.0)]
+    {
         let mut session = plan(count, second);
-        let case = Touched {
-            axis: [4e-3, -3e-3],
-            cylinder: [0.030, 0.010],
-            ..Touched::default()
-        };
+        let case = Touched { axis: [4e-3, -3e-3], cylinder: [0.030, 0.010], ..Touched::default() };
         touched(&mut session, &case);
         let calibration = calibrate(&session).unwrap();
         assert_eq!(calibration.equations.columns(), 4 * count);
         assert_eq!(calibration.rank_before, 4 * count - 2, "N = {count}");
-        assert!(
-            calibration.solution.identifiable.iter().all(|seen| *seen),
-            "N = {count}"
-        );
+        assert!(calibration.solution.identifiable.iter().all(|seen| *seen), "N = {count}");
         let report = calibration.report(&session, None);
         for (parameter, expected) in report.parameters.iter().zip([4.0, -3.0]) {
-            assert!(
-                (parameter.value - expected).abs() < 0.05,
-                "N = {count}: {parameter:?}"
-            );
+            assert!((parameter.value - expected).abs() < 0.05, "N = {count}: {parameter:?}");
         }
     }
 }
 
-/// With eight angles, a second direction at 90° connects only every second angle: one further combination is not identifiable.
+/// With eight angles, a second direction at 90° connects only every second angle: one further combination is not
+/// identifiable.
 #[test]
 fn a_direction_that_divides_the_angles_leaves_named_combinations_unidentified() {
     let session = unmoved(8, 90.0);
@@ -350,45 +303,25 @@ fn a_direction_that_divides_the_angles_leaves_named_combinations_unidentified() 
     let stderr = report.functions.iter().flat_map(|function| &function.points);
     assert!(stderr.clone().any(|point| point.value_um.is_none()));
     assert!(report.parameters.is_empty());
-    assert!(
-        report
-            .warnings
-            .iter()
-            .any(|warning| warning.contains("the position of the axis is not estimated"))
-    );
+    assert!(report.warnings.iter().any(|warning| warning.contains("the position of the axis is not estimated")));
 }
 
 #[test]
 fn monte_carlo_agrees_with_the_law_of_propagation_and_is_repeatable() {
     let mut session = plan(8, 45.0);
-    let case = Touched {
-        axis: [0.3, 0.51],
-        ..Touched::default()
-    };
+    let case = Touched { axis: [0.3, 0.51], ..Touched::default() };
     touched(&mut session, &case);
     let calibration = calibrate(&session).unwrap();
-    let draws = |seed| MonteCarlo {
-        runs: 200_001,
-        seed,
-        coverage: 0.95,
-    };
+    let draws = |seed| MonteCarlo { runs: 200_001, seed, coverage: 0.95 };
     let drawn = calibration.monte_carlo(&draws(1));
-    for (k, distribution) in drawn
-        .iter()
-        .take(calibration.solution.values_mm.len())
-        .enumerate()
-    {
+    for (k, distribution) in drawn.iter().take(calibration.solution.values_mm.len()).enumerate() {
         let u = calibration.solution.covariance[(k, k)].sqrt();
         let total: u64 = distribution.counts.iter().sum::<u64>() + distribution.outside.iter().sum::<u64>();
         assert_eq!(total, 200_001);
         if u < 1e-9 {
             continue;
         }
-        assert!(
-            (distribution.u / u - 1.0).abs() < 0.008,
-            "{k}: {} {u}",
-            distribution.u
-        );
+        assert!((distribution.u / u - 1.0).abs() < 0.008, "{k}: {} {u}", distribution.u);
         assert!((distribution.mean - calibration.solution.values_mm[k]).abs() < 0.01 * u);
         for interval in [distribution.shortest, distribution.symmetric] {
             let half = 0.5 * (interval[1] - interval[0]) / u;
@@ -399,10 +332,7 @@ fn monte_carlo_agrees_with_the_law_of_propagation_and_is_repeatable() {
     let report = calibration.report(&session, None);
     let by_law = report.parameters.iter().chain(&report.parameters_by_turn);
     for (distribution, parameter) in drawn[calibration.solution.values_mm.len()..].iter().zip(by_law) {
-        assert!(
-            (distribution.u * 1e3 / parameter.u - 1.0).abs() < 0.008,
-            "{parameter:?}"
-        );
+        assert!((distribution.u * 1e3 / parameter.u - 1.0).abs() < 0.008, "{parameter:?}");
     }
     // The same seed on one thread gives the same bits; another seed does not.
     let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
@@ -427,10 +357,7 @@ fn noise_that_is_not_stated_follows_from_repeated_cycles() {
             }
         }
         session.noise_mm = None;
-        let case = Touched {
-            noise: (0.8e-3, random.random()),
-            ..Touched::default()
-        };
+        let case = Touched { noise: (0.8e-3, random.random()), ..Touched::default() };
         touched(&mut session, &case);
         let calibration = calibrate(&session).unwrap();
         assert!(!calibration.sigma_stated);
@@ -443,11 +370,7 @@ fn noise_that_is_not_stated_follows_from_repeated_cycles() {
 #[test]
 fn a_session_of_another_kind_is_refused_with_a_remedy() {
     let refused = |session: &Session| Equations::of(session).unwrap_err().to_string();
-    let bar = files::session(
-        &ready("hermle-c600u/measured/session.toml"),
-        &ReadOptions::default(),
-    )
-    .unwrap();
+    let bar = files::session(&ready("hermle-c600u/measured/session.toml"), &ReadOptions::default()).unwrap();
     assert!(refused(&bar).contains("instrument is a ballbar"));
     assert!(refused(&plan(8, 45.0)).contains("no readings"));
     let mut two = unmoved(8, 45.0);

@@ -56,20 +56,9 @@ fn the_same_seed_gives_the_same_bytes_and_another_does_not() {
     let folder = tempfile::tempdir().unwrap();
     let out = |name: &str| folder.path().join(name);
     for (name, seed) in [("a", "1"), ("b", "1"), ("c", "2")] {
-        simulated(
-            &chapter5(),
-            &out(name),
-            &["--error", "EY0A=35.3um", "--seed", seed, "--draw-setups"],
-        );
+        simulated(&chapter5(), &out(name), &["--error", "EY0A=35.3um", "--seed", seed, "--draw-setups"]);
     }
-    for file in [
-        "session.toml",
-        "machine.toml",
-        "A100.csv",
-        "A150.csv",
-        "C100.csv",
-        "C150.csv",
-    ] {
+    for file in ["session.toml", "machine.toml", "A100.csv", "A150.csv", "C100.csv", "C150.csv"] {
         let of = |name: &str| fs::read(out(name).join(file)).unwrap();
         assert!(of("a") == of("b"), "{file}");
         assert_eq!(of("a") == of("c"), !file.ends_with(".csv"), "{file}");
@@ -78,10 +67,7 @@ fn the_same_seed_gives_the_same_bytes_and_another_does_not() {
     assert_eq!(session.tests.len(), 4);
     for value in &session.tests[2].readings.as_ref().unwrap().observed {
         let steps = value / 1e-4;
-        assert!(
-            (steps - steps.round()).abs() < 1e-6,
-            "{value} is no multiple of 0.1 um"
-        );
+        assert!((steps - steps.round()).abs() < 1e-6, "{value} is no multiple of 0.1 um");
     }
 }
 
@@ -91,32 +77,18 @@ fn amplitude_and_phase_are_those_of_the_independent_plant() {
     let folder = tempfile::tempdir().unwrap();
     let plan = small_plan(folder.path());
     let (still, moved) = (folder.path().join("still"), folder.path().join("moved"));
-    let exact = fs::read_to_string(&plan)
-        .unwrap()
-        .replace("resolution_um = 0.1\n", "");
+    let exact = fs::read_to_string(&plan).unwrap().replace("resolution_um = 0.1\n", "");
     fs::write(&plan, exact).unwrap();
     simulated(&plan, &still, &["--noise-um", "0"]);
-    let effect = [
-        "--effect",
-        "EZC~C:h2.amplitude=1.5um",
-        "--effect",
-        "EZC~C:h2.phase=60deg",
-    ];
-    simulated(
-        &plan,
-        &moved,
-        &[&effect[..], &["--noise-um", "0", "--hide-effects"]].concat(),
-    );
+    let effect = ["--effect", "EZC~C:h2.amplitude=1.5um", "--effect", "EZC~C:h2.phase=60deg"];
+    simulated(&plan, &moved, &[&effect[..], &["--noise-um", "0", "--hide-effects"]].concat());
     let (still, moved) = (session(&still), session(&moved));
     assert_eq!((still.effects.len(), moved.effects.len()), (1, 0));
     assert_eq!(moved.noise_mm, Some(0.0));
     let injected = Injected::new(
         Component::Motion(Freedom::Z, AxisName::C),
         Driver::Axis(AxisName::C),
-        Shape::Harmonic {
-            order: 2,
-            phase_deg: 60.0,
-        },
+        Shape::Harmonic { order: 2, phase_deg: 60.0 },
         1.5,
     );
     let machine = plant::machine::Machine::default();
@@ -127,10 +99,7 @@ fn amplitude_and_phase_are_those_of_the_independent_plant() {
         // The axes of the plant: X, Y, Z, A, C.
         let position = [0.0, 0.0, height, 0.0, *c];
         let mut displacement = plant::machine::Displacement::default();
-        displacement.add(
-            injected.component,
-            1.5e-3 * (2.0 * c + 60.0_f64.to_radians()).cos(),
-        );
+        displacement.add(injected.component, 1.5e-3 * (2.0 * c + 60.0_f64.to_radians()).cos());
         let table = machine.workpiece_point(&position, &displacement, [0.0, 100.0, 0.0]);
         let tool = machine.tool_point(&position, &displacement, [0.0; 3]);
         let length = (table - tool).norm();
@@ -144,10 +113,7 @@ fn the_text_of_the_plan_is_kept_except_for_data_and_noise() {
     let plan = small_plan(folder.path());
     let out = folder.path().join("deep/er/out");
     let printed = simulated(&plan, &out, &["--noise-um", "0.5"]);
-    assert!(
-        printed.contains("146 readings of 1 test,") && printed.contains("noise 0.500 µm"),
-        "{printed}"
-    );
+    assert!(printed.contains("146 readings of 1 test,") && printed.contains("noise 0.500 µm"), "{printed}");
     let text = fs::read_to_string(out.join("session.toml")).unwrap();
     for part in [
         "# test radius: distance of the pivot from the axis (Table 3.1)",
@@ -168,36 +134,19 @@ fn errors_come_from_a_file_and_the_command_line_overrides_it() {
     let folder = tempfile::tempdir().unwrap();
     let plan = small_plan(folder.path());
     let errors = folder.path().join("errors.toml");
-    fs::write(
-        &errors,
-        "e_y0c = \"10 um\"\n\"bar[C 150]\" = \"0.4um\"\nEB0C = \"1 arcsec\"\n",
-    )
-    .unwrap();
-    let printed = simulated(
-        &plan,
-        &folder.path().join("out"),
-        &["--errors", text(&errors), "--error", "EB0C=-2arcsec"],
-    );
-    let row = |id: &str| {
-        printed
-            .lines()
-            .find(|line| line.trim().starts_with(id))
-            .map(str::to_string)
-    };
+    fs::write(&errors, "e_y0c = \"10 um\"\n\"bar[C 150]\" = \"0.4um\"\nEB0C = \"1 arcsec\"\n").unwrap();
+    let printed =
+        simulated(&plan, &folder.path().join("out"), &["--errors", text(&errors), "--error", "EB0C=-2arcsec"]);
+    let row = |id: &str| printed.lines().find(|line| line.trim().starts_with(id)).map(str::to_string);
     assert!(row("EY0C").unwrap().contains("10.0000"), "{printed}");
     assert!(row("bar[C 150]").unwrap().contains("0.4000"), "{printed}");
     assert!(row("EB0C").unwrap().contains("-2.0000"), "{printed}");
-    for (bad, message) in [
-        ("EY0C = 10", "`EY0C` is not text"),
-        ("EY0C = \"10\"", "has no unit"),
-        ("EY0C = ", "errors.toml: "),
-    ] {
+    for (bad, message) in
+        [("EY0C = 10", "`EY0C` is not text"), ("EY0C = \"10\"", "has no unit"), ("EY0C = ", "errors.toml: ")]
+    {
         fs::write(&errors, bad).unwrap();
         let stderr = refused(&plan, &folder.path().join("bad"), &["--errors", text(&errors)]);
-        assert!(
-            stderr.contains(message) && stderr.contains("errors.toml"),
-            "{stderr}"
-        );
+        assert!(stderr.contains(message) && stderr.contains("errors.toml"), "{stderr}");
     }
 }
 
@@ -207,27 +156,15 @@ fn invalid_simulations_are_refused_and_nothing_is_written() {
     let plan = small_plan(folder.path());
     let out = folder.path().join("out");
     for (more, message) in [
-        (
-            &["--error", "EY0Q=1um"][..],
-            "has no axis `Q`; its axes are C, A, Y, X, Z",
-        ),
+        (&["--error", "EY0Q=1um"][..], "has no axis `Q`; its axes are C, A, Y, X, Z"),
         (&["--error", "EY0A=1"], "`EY0A=1` has no unit"),
         (&["--error", "EY0A=onemm"], "is not a number with a unit"),
         (&["--error", "EY0A"], "has no value"),
-        (
-            &["--error", "EY0A=1arcsec"],
-            "`EY0A` has the unit `arcsec`; a unit such as `um` is expected",
-        ),
+        (&["--error", "EY0A=1arcsec"], "`EY0A` has the unit `arcsec`; a unit such as `um` is expected"),
         (&["--error", "e_y0a=1um", "--error", "EY0A=2um"], "is given twice"),
         (&["--error", "bra=1um"], "the session has no `bra`"),
-        (
-            &["--effect", "EZC~C:h3.amplitude=1um"],
-            "coefficients of its effects are EZC~C:h2.cos, EZC~C:h2.sin",
-        ),
-        (
-            &["--effect", "EZC~C:h2.phase=1deg"],
-            "`EZC~C:h2.phase` has a value, but `EZC~C:h2.amplitude` has none",
-        ),
+        (&["--effect", "EZC~C:h3.amplitude=1um"], "coefficients of its effects are EZC~C:h2.cos, EZC~C:h2.sin"),
+        (&["--effect", "EZC~C:h2.phase=1deg"], "`EZC~C:h2.phase` has a value, but `EZC~C:h2.amplitude` has none"),
         (&["--noise-um", "-1"], "a standard deviation in µm is expected"),
     ] {
         let stderr = refused(&plan, &out, more);
@@ -237,18 +174,12 @@ fn invalid_simulations_are_refused_and_nothing_is_written() {
     fs::create_dir(&out).unwrap();
     fs::write(out.join("notes.txt"), "mine").unwrap();
     let stderr = refused(&plan, &out, &[]);
-    assert!(
-        stderr.contains("exists and is not empty") && stderr.contains("--force"),
-        "{stderr}"
-    );
+    assert!(stderr.contains("exists and is not empty") && stderr.contains("--force"), "{stderr}");
     assert_eq!(fs::read_dir(&out).unwrap().count(), 1);
     fs::remove_dir_all(&out).unwrap();
     let before = fs::read(&plan).unwrap();
     let stderr = refused(&plan, folder.path(), &["--force"]);
-    assert!(
-        stderr.contains("this folder contains the plan itself"),
-        "{stderr}"
-    );
+    assert!(stderr.contains("this folder contains the plan itself"), "{stderr}");
     assert_eq!(fs::read(&plan).unwrap(), before);
     let stderr = refused(&ready("kuka-iiwa14/session.toml"), &out, &["--data", "nowhere"]);
     assert!(stderr.contains("nowhere"), "{stderr}");

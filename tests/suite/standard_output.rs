@@ -25,14 +25,8 @@ const COMMANDS: &[&str] = &[
 fn test_folder() -> TestFolder {
     let place = TestFolder::new();
     place.put("machine.toml", "chain = \"w X b Y Z t\"\n[axis.X]\ntravel_mm = [0, 9]\n[axis.Y]\ntravel_mm = [0, 9]\n[axis.Z]\ntravel_mm = [0, 9]\n");
-    place.put(
-        "functions.toml",
-        "[[function]]\nerror = \"EXX\"\ntable = { at_mm = [0, 9], um = [0, 1] }\n",
-    );
-    for (folder, ready) in [
-        ("hermle", "hermle-c600u/measured"),
-        ("probe", "self-calibration/measured"),
-    ] {
+    place.put("functions.toml", "[[function]]\nerror = \"EXX\"\ntable = { at_mm = [0, 9], um = [0, 1] }\n");
+    for (folder, ready) in [("hermle", "hermle-c600u/measured"), ("probe", "self-calibration/measured")] {
         fs::create_dir(place.at(folder)).unwrap();
         for entry in fs::read_dir(super::ready(ready)).unwrap() {
             let path = entry.unwrap().path();
@@ -73,24 +67,13 @@ fn json_goes_to_standard_output_and_nothing_else_does() {
 
         // With a file the JSON is the same, and the terminal shows the tables and the same warnings.
         let (tables, stderr) = run(&place, &format!("{command} --json out.json"));
-        assert_eq!(
-            fs::read_to_string(place.at("out.json")).unwrap(),
-            piped,
-            "{command}"
-        );
-        assert!(
-            tables.lines().count() > 1 || command.starts_with("simulate"),
-            "{command}: {tables}"
-        );
+        assert_eq!(fs::read_to_string(place.at("out.json")).unwrap(), piped, "{command}");
+        assert!(tables.lines().count() > 1 || command.starts_with("simulate"), "{command}: {tables}");
         assert_eq!(warnings(&stderr), warnings(&piped_stderr), "{command}");
         fs::remove_file(place.at("out.json")).unwrap();
     }
     let made = ["map.csv", "patterns.csv", "run"];
-    let after: Vec<String> = place
-        .names()
-        .into_iter()
-        .filter(|name| !made.contains(&name.as_str()))
-        .collect();
+    let after: Vec<String> = place.names().into_iter().filter(|name| !made.contains(&name.as_str())).collect();
     assert_eq!(after, before);
 }
 
@@ -98,14 +81,9 @@ fn json_goes_to_standard_output_and_nothing_else_does() {
 fn quiet_suppresses_tables_and_not_warnings() {
     let place = test_folder();
     // The true noise is ten times the stated one.
-    let wrong = fs::read_to_string(place.at("session.toml"))
-        .unwrap()
-        .replace("noise_um = 0.3", "noise_um = 0.03");
+    let wrong = fs::read_to_string(place.at("session.toml")).unwrap().replace("noise_um = 0.3", "noise_um = 0.03");
     place.put("wrong.toml", &wrong);
-    for command in COMMANDS
-        .iter()
-        .chain(&["fit wrong.toml", "fit wrong.toml --csv fit.csv"])
-    {
+    for command in COMMANDS.iter().chain(&["fit wrong.toml", "fit wrong.toml --csv fit.csv"]) {
         let (_, loud) = run(&place, command);
         for quiet in [format!("{command} -q"), format!("--quiet {command}")] {
             let (printed, stderr) = run(&place, &quiet);
@@ -120,12 +98,7 @@ fn quiet_suppresses_tables_and_not_warnings() {
         assert_eq!(run(&place, &format!("{command} -q")).0, "", "{command}");
     }
     // An equation, a schema and a list are the requested output, not tables.
-    for command in [
-        "equation session.toml --test XY",
-        "schema fit",
-        "new",
-        "completions bash",
-    ] {
+    for command in ["equation session.toml --test XY", "schema fit", "new", "completions bash"] {
         let (loud, quiet) = (run(&place, command).0, run(&place, &format!("{command} -q")).0);
         assert!(!loud.is_empty() && loud == quiet, "{command}");
     }
@@ -137,20 +110,11 @@ fn other_outputs_go_to_standard_output_too() {
     for (command, first) in [
         ("fit session.toml --csv -", "# Errors by their names"),
         ("fit session.toml --report -", "<!DOCTYPE html>"),
-        (
-            "trace session.toml --only backlash --csv -",
-            "# Errors by their names",
-        ),
+        ("trace session.toml --only backlash --csv -", "# Errors by their names"),
         ("trace session.toml --only backlash --write -", "[machine]"),
         ("plan session.toml --patterns -", "test,error,size,unit,run"),
-        (
-            "equation session.toml --test XY --out -",
-            "Length read by a ball bar",
-        ),
-        (
-            "volumetric machine.toml --map - --functions functions.toml",
-            "x_mm,y_mm,z_mm",
-        ),
+        ("equation session.toml --test XY --out -", "Length read by a ball bar"),
+        ("volumetric machine.toml --map - --functions functions.toml", "x_mm,y_mm,z_mm"),
     ] {
         let (printed, _) = run(&place, command);
         assert!(printed.starts_with(first), "{command}: {printed}");
@@ -166,19 +130,13 @@ fn standard_output_takes_one_output_and_no_folder() {
     for (arguments, words) in [
         (&["--json", "-", "--csv", "-"][..], "`-` is given for two outputs"),
         (&["--json", "-", "--report", "-"], "`-` is given for two outputs"),
-        (
-            &["--plots", "-"],
-            "standard output, which cannot contain a folder",
-        ),
+        (&["--plots", "-"], "standard output, which cannot contain a folder"),
         (&compensation, "standard output, which cannot contain a folder"),
     ] {
         let output = abbe(&[&["fit", text(&session)], arguments].concat());
         let stderr = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {stderr}");
-        assert!(
-            stderr.contains(words) && output.stdout.is_empty(),
-            "{arguments:?}: {stderr}"
-        );
+        assert!(stderr.contains(words) && output.stdout.is_empty(), "{arguments:?}: {stderr}");
     }
 }
 
@@ -186,12 +144,7 @@ fn standard_output_takes_one_output_and_no_folder() {
 fn the_help_and_the_readme_state_the_exit_statuses() {
     let help = String::from_utf8(abbe(&["--help"]).stdout).unwrap();
     let readme = fs::read_to_string(super::workspace().join("README.md")).unwrap();
-    for (status, words) in [
-        ("0", "done"),
-        ("1", "cannot be used"),
-        ("2", "command line"),
-        ("130", "interrupted"),
-    ] {
+    for (status, words) in [("0", "done"), ("1", "cannot be used"), ("2", "command line"), ("130", "interrupted")] {
         let stated = |line: &str| line.contains(status) && line.to_lowercase().contains(words);
         assert!(help.lines().any(stated), "{status}: {help}");
         assert!(readme.lines().any(stated), "{status} is not in the README");

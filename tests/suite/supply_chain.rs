@@ -1,7 +1,8 @@
-//! Dependencies: licences, sources and duplicates conform to `deny.toml`, and docs/development/dependencies.md names each direct
-//! dependency.
+//! Dependencies: licences, sources and duplicates conform to `deny.toml`, and docs/development/dependencies.md names
+//! each direct dependency.
 //!
-//! `cargo deny` reads the same file if it is installed. These tests use cargo only and need neither a database nor a network.
+//! `cargo deny` reads the same file if it is installed. These tests use cargo only and need neither a database nor a
+//! network.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -19,26 +20,13 @@ struct Built {
 /// The crates that `cargo tree` lists.
 fn built(more: &[&str]) -> Vec<Built> {
     let output = Command::new(env!("CARGO"))
-        .args([
-            "tree",
-            "--workspace",
-            "--all-features",
-            "--locked",
-            "--edges",
-            "normal,build,dev",
-            "--target",
-            "all",
-        ])
+        .args(["tree", "--workspace", "--all-features", "--locked", "--edges", "normal,build,dev", "--target", "all"])
         .args(["--prefix", "none", "--format", "{p}\t{l}"])
         .args(more)
         .current_dir(workspace())
         .output()
         .expect("cargo starts");
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let listed = String::from_utf8(output.stdout).unwrap();
     let crates = listed.lines().filter_map(|line| {
         let (package, licence) = line.split_once('\t')?;
@@ -54,18 +42,13 @@ fn built(more: &[&str]) -> Vec<Built> {
 }
 
 fn policy() -> toml::Table {
-    fs::read_to_string(workspace().join("deny.toml"))
-        .unwrap()
-        .parse()
-        .unwrap()
+    fs::read_to_string(workspace().join("deny.toml")).unwrap().parse().unwrap()
 }
 
-/// Whether the allowed licences satisfy an SPDX expression. `OR` binds less than `AND`, `/` is an old `OR`, an exception only adds rights.
+/// Whether the allowed licences satisfy an SPDX expression. `OR` binds less than `AND`, `/` is an old `OR`, an
+/// exception only adds rights.
 fn is_met(expression: &str, allowed: &BTreeSet<&str>) -> bool {
-    let spaced = expression
-        .replace('(', " ( ")
-        .replace(')', " ) ")
-        .replace('/', " OR ");
+    let spaced = expression.replace('(', " ( ").replace(')', " ) ").replace('/', " OR ");
     let mut words = spaced.split_whitespace().peekable();
     any(&mut words, allowed)
 }
@@ -114,13 +97,7 @@ fn licence_expressions() {
     ] {
         assert!(is_met(met, &allowed), "{met}");
     }
-    for unmet in [
-        "",
-        "GPL-3.0",
-        "MIT AND GPL-3.0",
-        "(MIT AND GPL-3.0) OR MPL-2.0",
-        "GPL-3.0 AND (MIT OR Zlib)",
-    ] {
+    for unmet in ["", "GPL-3.0", "MIT AND GPL-3.0", "(MIT AND GPL-3.0) OR MPL-2.0", "GPL-3.0 AND (MIT OR Zlib)"] {
         assert!(!is_met(unmet, &allowed), "{unmet}");
     }
 }
@@ -128,40 +105,24 @@ fn licence_expressions() {
 #[test]
 fn every_licence_is_allowed() {
     let policy = policy();
-    let allowed: BTreeSet<&str> = policy["licenses"]["allow"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .filter_map(toml::Value::as_str)
-        .collect();
+    let allowed: BTreeSet<&str> =
+        policy["licenses"]["allow"].as_array().unwrap().iter().filter_map(toml::Value::as_str).collect();
     let built = built(&[]);
     assert!(built.len() > 100, "{}", built.len());
     for Built { name, licence, .. } in built {
-        assert!(
-            is_met(&licence, &allowed),
-            "{name} is under \"{licence}\", which deny.toml does not allow"
-        );
+        assert!(is_met(&licence, &allowed), "{name} is under \"{licence}\", which deny.toml does not allow");
     }
 }
 
 #[test]
 fn everything_comes_from_the_registry_with_a_checksum() {
-    let lock: toml::Table = fs::read_to_string(workspace().join("Cargo.lock"))
-        .unwrap()
-        .parse()
-        .unwrap();
+    let lock: toml::Table = fs::read_to_string(workspace().join("Cargo.lock")).unwrap().parse().unwrap();
     for package in lock["package"].as_array().unwrap() {
         let name = package["name"].as_str().unwrap();
         match package.get("source").and_then(toml::Value::as_str) {
-            None => assert!(
-                name == "abbe" || name.starts_with("abbe-"),
-                "{name} comes from a folder"
-            ),
+            None => assert!(name == "abbe" || name.starts_with("abbe-"), "{name} comes from a folder"),
             Some(source) => {
-                assert_eq!(
-                    source, "registry+https://github.com/rust-lang/crates.io-index",
-                    "{name}"
-                );
+                assert_eq!(source, "registry+https://github.com/rust-lang/crates.io-index", "{name}");
                 assert!(package.get("checksum").is_some(), "{name} has no checksum");
             }
         }
@@ -171,41 +132,27 @@ fn everything_comes_from_the_registry_with_a_checksum() {
 #[test]
 fn no_crate_is_built_twice_unless_deny_toml_permits_it() {
     let policy = policy();
-    let skipped: BTreeSet<&str> = policy["bans"]["skip"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .filter_map(|entry| entry["crate"].as_str())
-        .collect();
+    let skipped: BTreeSet<&str> =
+        policy["bans"]["skip"].as_array().unwrap().iter().filter_map(|entry| entry["crate"].as_str()).collect();
     let mut versions: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     for package in built(&[]) {
         versions.entry(package.name).or_default().insert(package.version);
     }
-    let twice: BTreeSet<&str> = versions
-        .iter()
-        .filter(|(_, versions)| versions.len() > 1)
-        .map(|(name, _)| name.as_str())
-        .collect();
-    assert_eq!(
-        twice, skipped,
-        "crates of which several versions are built, and those that deny.toml names"
-    );
+    let twice: BTreeSet<&str> =
+        versions.iter().filter(|(_, versions)| versions.len() > 1).map(|(name, _)| name.as_str()).collect();
+    assert_eq!(twice, skipped, "crates of which several versions are built, and those that deny.toml names");
 }
 
 /// The first cell of each table row of the page, without backticks.
 fn explained() -> BTreeSet<String> {
     let page = fs::read_to_string(workspace().join("docs/development/dependencies.md")).unwrap();
-    let cells = page
-        .lines()
-        .filter_map(|line| line.strip_prefix("| `")?.split_once('`'));
+    let cells = page.lines().filter_map(|line| line.strip_prefix("| `")?.split_once('`'));
     cells.map(|(name, _)| name.to_string()).collect()
 }
 
 #[test]
 fn the_page_names_every_direct_dependency_and_no_other() {
-    let listed = built(&["--depth", "1", "--no-dedupe"])
-        .into_iter()
-        .map(|package| package.name);
+    let listed = built(&["--depth", "1", "--no-dedupe"]).into_iter().map(|package| package.name);
     let direct: BTreeSet<String> = listed.filter(|name| !name.starts_with("abbe")).collect();
     assert_eq!(explained(), direct);
 }
@@ -219,10 +166,7 @@ fn licences_citation_and_changelog_are_in_the_project() {
     assert!(changelog.contains("## [Unreleased]"), "{changelog}");
     let citation = read("CITATION.cff");
     let version = format!("\nversion: {}\n", env!("CARGO_PKG_VERSION"));
-    assert!(
-        citation.starts_with("cff-version: 1.2.0") && citation.contains(&version),
-        "{citation}"
-    );
+    assert!(citation.starts_with("cff-version: 1.2.0") && citation.contains(&version), "{citation}");
 }
 
 /// A page that uses the thesis cites it in full once.
@@ -249,10 +193,6 @@ fn the_thesis_is_cited_in_full_once_a_page() {
         let times = text.matches(full).count();
         let rest = text.replace(full, "");
         let relies = rest.to_lowercase().contains("thesis") || rest.contains("Jiang");
-        assert!(
-            times == 1 || times == 0 && !relies,
-            "{}: {times} times",
-            page.display()
-        );
+        assert!(times == 1 || times == 0 && !relies, "{}: {times} times", page.display());
     }
 }

@@ -1,7 +1,7 @@
 //! The commands of docs/guide/tour.md print the output that the page shows.
 //!
-//! In each `console` block a line after `$ ` is a command, lines after `> ` continue it, and the following lines are its output. A line `…`
-//! stands for any lines.
+//! In each `console` block a line after `$ ` is a command, lines after `> ` continue it, and the following lines are
+//! its output. A line `…` stands for any lines.
 #![cfg(unix)]
 
 use std::path::Path;
@@ -31,11 +31,7 @@ fn steps(document: &str) -> Vec<TourCommand> {
             continue;
         }
         if let Some(command) = line.strip_prefix("$ ") {
-            steps.push(TourCommand {
-                line: index + 1,
-                command: command.to_string(),
-                shown: Vec::new(),
-            });
+            steps.push(TourCommand { line: index + 1, command: command.to_string(), shown: Vec::new() });
             continue;
         }
         let step = steps.last_mut().expect("a block begins with a command");
@@ -85,10 +81,7 @@ fn the_tour_shows_the_output_of_its_commands() {
     let steps = steps(&document);
     let commands = ["new", "plan", "simulate", "fit", "trace"];
     for command in commands.map(|command| format!("abbe {command} ")) {
-        assert!(
-            steps.iter().any(|step| step.command.starts_with(&command)),
-            "{command}"
-        );
+        assert!(steps.iter().any(|step| step.command.starts_with(&command)), "{command}");
     }
     let folder = tempfile::tempdir().unwrap();
     for TourCommand { line, command, shown } in steps {

@@ -1,5 +1,5 @@
-//! Trace on sessions of an independent simulator and on real robots. The program reads the readings only; the true effects are in other
-//! files or in the literature.
+//! Trace on sessions of an independent simulator and on real robots. The program reads the readings only; the true
+//! effects are in other files or in the literature.
 
 use abbe::identify::results::{EffectName, TraceResult};
 use abbe::identify::trace::{TraceOptions, trace};
@@ -26,10 +26,7 @@ fn is(effect: &EffectName, component: &str, shape: &str, order: Option<usize>) -
 
 /// Whether an effect is named or is among the aliases of a named effect.
 fn named_or_alias(result: &TraceResult, wanted: &dyn Fn(&EffectName) -> bool) -> bool {
-    result
-        .effects
-        .iter()
-        .any(|effect| wanted(&effect.name) || effect.aliases.iter().any(wanted))
+    result.effects.iter().any(|effect| wanted(&effect.name) || effect.aliases.iter().any(wanted))
 }
 
 #[test]
@@ -43,28 +40,19 @@ fn a_clean_session_has_the_verdict_clean() {
     assert_eq!(result.before.parameters, result.after.parameters);
 }
 
-/// Without an effect, additions lower the residual of the fitted readings but not that of the held-out readings: nothing is claimed.
+/// Without an effect, additions lower the residual of the fitted readings but not that of the held-out readings:
+/// nothing is claimed.
 #[test]
 fn without_an_effect_no_addition_lowers_the_held_out_error() {
-    let Some(session) = sample(
-        "without_an_effect_no_addition_lowers_the_held_out_error",
-        "rotary-clean",
-    ) else {
+    let Some(session) = sample("without_an_effect_no_addition_lowers_the_held_out_error", "rotary-clean") else {
         return;
     };
-    let options = TraceOptions {
-        significance: 0.99,
-        max_effects: Some(6),
-        ..TraceOptions::default()
-    };
+    let options = TraceOptions { significance: 0.99, max_effects: Some(6), ..TraceOptions::default() };
     let result = traced(&session, &options);
     assert!(result.effects.is_empty(), "{:?}", result.effects[0].name);
     assert!(!result.rejected_candidates.is_empty());
     for rejected in &result.rejected_candidates {
-        assert!(
-            rejected.heldout_decrease_um <= rejected.u_heldout_decrease_um,
-            "{rejected:?}"
-        );
+        assert!(rejected.heldout_decrease_um <= rejected.u_heldout_decrease_um, "{rejected:?}");
     }
     assert_eq!(result.verdict, "clean");
     let (before, after) = (result.before.heldout_rms_um, result.after.heldout_rms_um);
@@ -80,19 +68,9 @@ fn an_axial_motion_is_found_or_is_among_the_aliases() {
     let result = traced(&session, &TraceOptions::default());
     assert_eq!(result.verdict, "explained");
     assert_eq!(result.effects.len(), 1);
-    assert!(named_or_alias(&result, &|effect| is(
-        effect,
-        "EZC",
-        "harmonic",
-        Some(3)
-    )));
+    assert!(named_or_alias(&result, &|effect| is(effect, "EZC", "harmonic", Some(3))));
     // At one ball radius it is confounded with a tilt of one order less (docs/reference/effects.md).
-    assert!(named_or_alias(&result, &|effect| is(
-        effect,
-        "EAC",
-        "harmonic",
-        Some(2)
-    )));
+    assert!(named_or_alias(&result, &|effect| is(effect, "EAC", "harmonic", Some(2))));
     assert!(result.after.heldout_rms_um < 0.32 && result.before.heldout_rms_um > 0.6);
 }
 
@@ -110,8 +88,8 @@ fn lost_motion_is_found_with_its_amplitude() {
     assert!((lost.value - 4.0).abs() < 4.0 * lost.u, "{lost:?}");
 }
 
-/// At one radius EZC of order n is confounded with a tilt of order n − 1. A second radius separates them: to first order the response to
-/// EZC does not depend on the radius, and that to the tilt is proportional to it.
+/// At one radius EZC of order n is confounded with a tilt of order n − 1. A second radius separates them: to first
+/// order the response to EZC does not depend on the radius, and that to the tilt is proportional to it.
 #[test]
 fn another_radius_is_proposed_to_separate_an_axial_motion_from_a_tilt() {
     let name = "another_radius_is_proposed_to_separate_an_axial_motion_from_a_tilt";
@@ -132,19 +110,16 @@ fn another_radius_is_proposed_to_separate_an_axial_motion_from_a_tilt() {
     assert_eq!(separation["from"]["order"], 2);
     // The ball of the session is at 100 mm.
     let test = effect["separated_by"].as_str().unwrap();
-    let radius = test
-        .split("radius ")
-        .nth(1)
-        .and_then(|rest| rest.split(' ').next())
-        .unwrap();
+    let radius = test.split("radius ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap();
     let radius_mm: f64 = radius.parse().unwrap();
     assert!((radius_mm - 100.0).abs() > 10.0, "{test}");
     assert!(separation["before_sigma"].as_f64().unwrap() < 1.0, "{separation}");
     assert!(separation["after_sigma"].as_f64().unwrap() > 10.0, "{separation}");
 }
 
-/// A tilt of A under the moment of a ball at y = R cos C on the table raises the ball by a · y² = a R² (1 + cos 2C) / 2, as EZC of second
-/// order does at that phase. Gravity needs one coefficient, the harmonic two, and the two are confounded.
+/// A tilt of A under the moment of a ball at y = R cos C on the table raises the ball by a · y² = a R² (1 + cos 2C) /
+/// 2, as EZC of second order does at that phase. Gravity needs one coefficient, the harmonic two, and the two are
+/// confounded.
 #[test]
 fn a_harmonic_is_listed_as_alias_of_a_compliance() {
     let folder = tempfile::tempdir().unwrap();
@@ -157,22 +132,13 @@ fn a_harmonic_is_listed_as_alias_of_a_compliance() {
     let run = folder.path().join("run");
     let simulated = ["--effect", "EZC~C:h2.cos=1.5um", "--hide-effects", "--seed", "7"];
     let outcome = abbe(&[&["simulate", text(&plan), "--out", text(&run)], &simulated[..]].concat());
-    assert!(
-        outcome.status.success(),
-        "{}",
-        String::from_utf8_lossy(&outcome.stderr)
-    );
+    assert!(outcome.status.success(), "{}", String::from_utf8_lossy(&outcome.stderr));
     let session = files::session(&run.join("session.toml"), &ReadOptions::default()).unwrap();
     let result = traced(&session, &TraceOptions::default());
     assert_eq!(result.effects.len(), 1);
     let gravity = |effect: &EffectName| effect.driver == "gravity";
     assert!(gravity(&result.effects[0].name), "{:?}", result.effects[0].name);
-    assert!(named_or_alias(&result, &|effect| is(
-        effect,
-        "EZC",
-        "harmonic",
-        Some(2)
-    )));
+    assert!(named_or_alias(&result, &|effect| is(effect, "EZC", "harmonic", Some(2))));
 }
 
 #[test]
@@ -180,57 +146,24 @@ fn the_bundled_session_is_explained_at_the_command_line() {
     let folder = tempfile::tempdir().unwrap();
     let (json, next) = (folder.path().join("trace.json"), folder.path().join("next.toml"));
     let session = ready("hermle-c600u/measured/session.toml");
-    let outcome = abbe(&[
-        "trace",
-        text(&session),
-        "--json",
-        text(&json),
-        "--write",
-        text(&next),
-    ]);
-    assert!(
-        outcome.status.success(),
-        "{}",
-        String::from_utf8_lossy(&outcome.stderr)
-    );
+    let outcome = abbe(&["trace", text(&session), "--json", text(&json), "--write", text(&next)]);
+    assert!(outcome.status.success(), "{}", String::from_utf8_lossy(&outcome.stderr));
     assert!(String::from_utf8_lossy(&outcome.stdout).starts_with("Verdict: explained"));
     let result: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
     for field in ["verdict", "noise_um", "before", "after", "effects", "remainder"] {
         assert!(!result[field].is_null(), "no field {field}");
     }
-    for field in [
-        "component",
-        "driver",
-        "shape",
-        "order",
-        "parameters",
-        "p_value",
-        "rms_gain_um",
-        "aliases",
-    ] {
-        assert!(
-            !result["effects"][0][field].is_null(),
-            "no field {field} in an effect"
-        );
+    for field in ["component", "driver", "shape", "order", "parameters", "p_value", "rms_gain_um", "aliases"] {
+        assert!(!result["effects"][0][field].is_null(), "no field {field} in an effect");
     }
     let written = std::fs::read_to_string(&next).unwrap();
-    assert!(
-        written.contains("[[effect]]") && written.contains("EZC"),
-        "{written}"
-    );
+    assert!(written.contains("[[effect]]") && written.contains("EZC"), "{written}");
     // The written session is in another folder than machine and data; `--allow-outside` permits it to read them.
     let again = folder.path().join("fit.json");
     let refused = abbe(&["fit", text(&next), "-q"]);
     assert!(!refused.status.success());
     assert!(String::from_utf8_lossy(&refused.stderr).contains("--allow-outside"));
-    let outcome = abbe(&[
-        "fit",
-        text(&next),
-        "-q",
-        "--allow-outside",
-        "--json",
-        text(&again),
-    ]);
+    let outcome = abbe(&["fit", text(&next), "-q", "--allow-outside", "--json", text(&again)]);
     let stderr = String::from_utf8_lossy(&outcome.stderr);
     assert!(outcome.status.success(), "{stderr}");
     let fit: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&again).unwrap()).unwrap();
@@ -244,24 +177,13 @@ fn ur10_has_the_seventeenth_harmonic_of_its_second_joint_first() {
     let Some(session) = session_on_public_data(name, "ur10/session.toml", "landgraf_ur10") else {
         return;
     };
-    let options = TraceOptions {
-        max_effects: Some(8),
-        draws: 99,
-        ..TraceOptions::default()
-    };
+    let options = TraceOptions { max_effects: Some(8), draws: 99, ..TraceOptions::default() };
     let result = traced(&session, &options);
     let first = &result.effects[0].name;
-    assert_eq!(
-        (first.component.as_str(), first.shape.as_str()),
-        ("EBJ2", "harmonic"),
-        "{first:?}"
-    );
+    assert_eq!((first.component.as_str(), first.shape.as_str()), ("EBJ2", "harmonic"), "{first:?}");
     assert!(first.order.unwrap().abs_diff(17) <= 1, "{first:?}");
     let held_out = result.after.heldout_rms_3d_um.unwrap() * 1e-3;
-    println!(
-        "UR10 with {} effects: {held_out:.4} mm held out",
-        result.effects.len()
-    );
+    println!("UR10 with {} effects: {held_out:.4} mm held out", result.effects.len());
     assert!(held_out <= 0.25, "{held_out}");
 }
 
@@ -272,22 +194,9 @@ fn kuka_has_a_compliance_under_gravity_and_no_harmonics() {
         return;
     };
     let result = traced(&session, &TraceOptions::default());
-    assert!(
-        result
-            .effects
-            .iter()
-            .any(|effect| effect.name.driver == "gravity")
-    );
-    assert!(
-        result
-            .effects
-            .iter()
-            .all(|effect| effect.name.shape != "harmonic")
-    );
+    assert!(result.effects.iter().any(|effect| effect.name.driver == "gravity"));
+    assert!(result.effects.iter().all(|effect| effect.name.shape != "harmonic"));
     let held_out = result.after.heldout_rms_3d_um.unwrap() * 1e-3;
-    println!(
-        "KUKA with {} effects: {held_out:.4} mm held out",
-        result.effects.len()
-    );
+    println!("KUKA with {} effects: {held_out:.4} mm held out", result.effects.len());
     assert!(held_out <= 0.185, "{held_out}");
 }

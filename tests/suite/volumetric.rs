@@ -33,10 +33,7 @@ fn by_matrices(machine: &Machine, slots: &[f64], positions: &[f64], tool: [f64; 
         let turn = Rotation3::from_axis_angle(&Vector3::x_axis(), six[3])
             * Rotation3::from_axis_angle(&Vector3::y_axis(), six[4])
             * Rotation3::from_axis_angle(&Vector3::z_axis(), six[5]);
-        Isometry3::from_parts(
-            Translation3::new(six[0], six[1], six[2]),
-            UnitQuaternion::from_rotation_matrix(&turn),
-        )
+        Isometry3::from_parts(Translation3::new(six[0], six[1], six[2]), UnitQuaternion::from_rotation_matrix(&turn))
     };
     let body = |name: &str| -> Isometry3<f64> {
         let axis = machine.axis_index(name).unwrap();
@@ -62,45 +59,24 @@ fn the_33_errors_of_the_bundled_machine_agree_with_matrices() {
     kinds.dedup();
     assert_eq!(kinds.len(), 33);
     let tool = [10.0, -20.0, -120.0];
-    let erring = MachineWithErrors {
-        machine: &machine,
-        functions: &functions,
-        tool_mm: tool,
-    };
+    let erring = MachineWithErrors { machine: &machine, functions: &functions, tool_mm: tool };
     let mut random = Pcg64::seed_from_u64(3);
     for _ in 0..200 {
         let positions: Vec<f64> = machine
             .axes
             .iter()
-            .map(|axis| {
-                uniform(
-                    &mut random,
-                    if axis.kind == AxisKind::Linear { 250.0 } else { 2.0 },
-                )
-            })
+            .map(|axis| uniform(&mut random, if axis.kind == AxisKind::Linear { 250.0 } else { 2.0 }))
             .collect();
         let nominal = by_matrices(&machine, &vec![0.0; machine.error_slots()], &positions, tool);
-        let actual = by_matrices(
-            &machine,
-            &slots(&machine, &functions, &positions),
-            &positions,
-            tool,
-        );
+        let actual = by_matrices(&machine, &slots(&machine, &functions, &positions), &positions, tool);
         let place = erring.error_at(&positions);
         let expected = actual - nominal;
-        assert!(
-            (Vector3::from(place.error_mm) - expected).norm() < 1e-10,
-            "{place:?} {expected}"
-        );
+        assert!((Vector3::from(place.error_mm) - expected).norm() < 1e-10, "{place:?} {expected}");
         assert!(expected.norm() > 1e-3);
         // The corrected commands move the independent machine to the nominal point.
         let commands = erring.compensate(&positions).unwrap().positions;
         let corrected = by_matrices(&machine, &slots(&machine, &functions, &commands), &commands, tool);
-        assert!(
-            (corrected - nominal).norm() < 1e-3 * expected.norm(),
-            "{}",
-            (corrected - nominal).norm()
-        );
+        assert!((corrected - nominal).norm() < 1e-3 * expected.norm(), "{}", (corrected - nominal).norm());
     }
 }
 
@@ -118,24 +94,12 @@ fn every_topology_is_compensated() {
             }
             let most = if within % 6 < 3 { 0.01 } else { 5e-5 };
             let form = Form::Polynomial {
-                scale: if machine.axes[axis].kind == AxisKind::Linear {
-                    250.0
-                } else {
-                    2.0
-                },
+                scale: if machine.axes[axis].kind == AxisKind::Linear { 250.0 } else { 2.0 },
                 coefficients: vec![uniform(&mut random, most), uniform(&mut random, most)],
             };
-            functions.push(ErrorFunction {
-                slot,
-                over: axis,
-                form,
-            });
+            functions.push(ErrorFunction { slot, over: axis, form });
         }
-        let erring = MachineWithErrors {
-            machine: &machine,
-            functions: &functions,
-            tool_mm: [0.0, 0.0, -100.0],
-        };
+        let erring = MachineWithErrors { machine: &machine, functions: &functions, tool_mm: [0.0, 0.0, -100.0] };
         let grid: Vec<Vec<f64>> = machine
             .axes
             .iter()
@@ -144,11 +108,7 @@ fn every_topology_is_compensated() {
                 AxisKind::Rotary => vec![-1.0, 0.3, 1.5],
             })
             .collect();
-        let linear = machine
-            .axes
-            .iter()
-            .filter(|axis| axis.kind == AxisKind::Linear)
-            .count();
+        let linear = machine.axes.iter().filter(|axis| axis.kind == AxisKind::Linear).count();
         if linear < 3 {
             let refused = volumetric::map(&erring, &grid, true).unwrap_err().to_string();
             assert!(refused.contains("do not span the space"), "{refused}");
@@ -169,31 +129,13 @@ fn every_topology_is_compensated() {
 
 #[test]
 fn functions_have_the_values_of_their_closed_forms() {
-    let table = Form::Table {
-        at: vec![-1.0, 0.0, 2.0],
-        values: vec![3.0, 1.0, 2.0],
-    };
-    for (q, expected) in [
-        (-5.0, 3.0),
-        (-1.0, 3.0),
-        (-0.5, 2.0),
-        (0.0, 1.0),
-        (1.0, 1.5),
-        (2.0, 2.0),
-        (9.0, 2.0),
-    ] {
+    let table = Form::Table { at: vec![-1.0, 0.0, 2.0], values: vec![3.0, 1.0, 2.0] };
+    for (q, expected) in [(-5.0, 3.0), (-1.0, 3.0), (-0.5, 2.0), (0.0, 1.0), (1.0, 1.5), (2.0, 2.0), (9.0, 2.0)] {
         assert_eq!(table.at(q), expected, "{q}");
     }
-    let polynomial = Form::Polynomial {
-        scale: 10.0,
-        coefficients: vec![1.0, -2.0, 4.0],
-    };
+    let polynomial = Form::Polynomial { scale: 10.0, coefficients: vec![1.0, -2.0, 4.0] };
     assert_eq!(polynomial.at(5.0), 1.0 - 1.0 + 1.0);
-    let harmonic = Form::Harmonic {
-        period: 8.0,
-        amplitude: 2.0,
-        phase: 0.5,
-    };
+    let harmonic = Form::Harmonic { period: 8.0, amplitude: 2.0, phase: 0.5 };
     assert!((harmonic.at(3.0) - 2.0 * (0.75 * std::f64::consts::PI + 0.5).cos()).abs() < 1e-15);
 }
 
@@ -205,69 +147,35 @@ fn the_command_writes_map_and_summary_and_names_what_is_wrong() {
     let base = ["volumetric", text(&machine), "--map", text(&map), "--functions"];
     let run = |functions: &str, more: &[&str]| {
         let output = abbe(&[&base[..], &[functions], more].concat());
-        (
-            output.status.code(),
-            String::from_utf8_lossy(&output.stderr).into_owned(),
-        )
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
     };
-    let more = [
-        "--compensate",
-        "--places",
-        "3",
-        "--axis",
-        "C:4",
-        "--axis",
-        "A=-30",
-        "--json",
-        text(&json),
-    ];
+    let more = ["--compensate", "--places", "3", "--axis", "C:4", "--axis", "A=-30", "--json", text(&json)];
     let (status, printed) = run(text(&errors), &more);
     assert_eq!(status, Some(0), "{printed}");
     let table = std::fs::read_to_string(&map).unwrap();
     assert_eq!(table.lines().count(), 1 + 27 * 4);
-    assert!(
-        table
-            .starts_with("c_deg,a_deg,y_mm,x_mm,z_mm,px_mm,py_mm,pz_mm,ex_um,ey_um,ez_um,e_um,c_command_deg")
-    );
+    assert!(table.starts_with("c_deg,a_deg,y_mm,x_mm,z_mm,px_mm,py_mm,pz_mm,ex_um,ey_um,ez_um,e_um,c_command_deg"));
     assert!(std::fs::read_to_string(&json).unwrap().contains("\"rms_um\""));
 
     let file = folder.path().join("errors.toml");
     for (written, expected) in [
         ("[constant]\nEX0W = \"1 um\"\n", "no axis `W`"),
-        (
-            "[constant]\nEX0X = \"1 um\"\n",
-            "a linear axis has squareness errors",
-        ),
+        ("[constant]\nEX0X = \"1 um\"\n", "a linear axis has squareness errors"),
         ("[constant]\nEX0C = \"1 arcsec\"\n", "arcsec"),
-        (
-            "[[function]]\nerror = \"EXX\"\n",
-            "[[function]] 1 (`EXX`): give exactly one of",
-        ),
+        ("[[function]]\nerror = \"EXX\"\n", "[[function]] 1 (`EXX`): give exactly one of"),
         (
             "[[function]]\nerror = \"EXX\"\ntable = { at_deg = [0, 1], um = [0, 1] }\n",
             "`at_mm` is expected for this axis",
         ),
-        (
-            "[[function]]\nerror = \"EXX\"\ntable = { at_mm = [1, 0], um = [0, 1] }\n",
-            "ascend",
-        ),
-        (
-            "[[function]]\nerror = \"EAX\"\npolynomial = { um = [0, 1] }\n",
-            "in `arcsec`",
-        ),
-        (
-            "[[function]]\nerror = \"EXX\"\nharmonic = { order = 2, amplitude_um = 1 }\n",
-            "`period_",
-        ),
+        ("[[function]]\nerror = \"EXX\"\ntable = { at_mm = [1, 0], um = [0, 1] }\n", "ascend"),
+        ("[[function]]\nerror = \"EAX\"\npolynomial = { um = [0, 1] }\n", "in `arcsec`"),
+        ("[[function]]\nerror = \"EXX\"\nharmonic = { order = 2, amplitude_um = 1 }\n", "`period_"),
         ("[[function]]\nerror = \"EXX\"\nspline = 1\n", "line 3"),
     ] {
         std::fs::write(&file, written).unwrap();
         let (status, printed) = run(text(&file), &[]);
         assert_eq!(status, Some(1));
-        assert!(
-            printed.contains(expected) && printed.contains("errors.toml"),
-            "{written}: {printed}"
-        );
+        assert!(printed.contains(expected) && printed.contains("errors.toml"), "{written}: {printed}");
     }
     let (status, printed) = run(text(&errors), &["--axis", "Q=3"]);
     assert!(status == Some(1) && printed.contains("no axis `Q`"), "{printed}");

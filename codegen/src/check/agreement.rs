@@ -58,26 +58,14 @@ pub(crate) fn agreement(
         tries += 1;
         let nominal = draw_anywhere(equation, source, &mut draws);
         let size = |variable: &Variable| SIZES[usize::from(variable.is_angle())];
-        let small = equation
-            .parameters
-            .iter()
-            .map(|p| draws.between(-size(p), size(p)));
-        let point = CheckPoint {
-            small: small.collect(),
-            nominal,
-        };
+        let small = equation.parameters.iter().map(|p| draws.between(-size(p), size(p)));
+        let point = CheckPoint { small: small.collect(), nominal };
         let (values, gradient) = expected(equation, source, &point)?;
         // Skip an impossible set-up, such as the root of a negative length.
-        if !values
-            .iter()
-            .chain(gradient.iter().flatten())
-            .all(|x| x.is_finite())
-        {
+        if !values.iter().chain(gradient.iter().flatten()).all(|x| x.is_finite()) {
             continue;
         }
-        let largest = values
-            .iter()
-            .fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        let largest = values.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
         value_scale = value_scale.max(largest);
         for row in &gradient {
             for k in 0..count {

@@ -67,16 +67,8 @@ pub(crate) fn deviations(
             for pattern in 0..(1u64 << count.min(8)) {
                 let pattern = if count <= 8 { pattern } else { draws.bits() };
                 for (index, parameter) in equation.parameters.iter().enumerate() {
-                    let sign = if pattern >> (index % 64) & 1 == 0 {
-                        1.0
-                    } else {
-                        -1.0
-                    };
-                    let size = if parameter.is_angle() {
-                        tilt_deg.to_radians()
-                    } else {
-                        shift_um * 1e-3
-                    };
+                    let sign = if pattern >> (index % 64) & 1 == 0 { 1.0 } else { -1.0 };
+                    let size = if parameter.is_angle() { tilt_deg.to_radians() } else { shift_um * 1e-3 };
                     inputs[first + index] = sign * size / reach[index];
                 }
                 run.seed(&|index| inputs[first + index]);
@@ -88,11 +80,7 @@ pub(crate) fn deviations(
                 }
             }
         }
-        deviations.push(Deviation {
-            shift_um,
-            tilt_deg,
-            largest_um: largest,
-        });
+        deviations.push(Deviation { shift_um, tilt_deg, largest_um: largest });
     }
     Ok(deviations)
 }
@@ -103,8 +91,5 @@ fn drawn_between(range: &[(Variable, [f64; 2])], count: usize, draws: &mut Pseud
         let along = draws.between(-1.0 / 6.0, 7.0 / 6.0).clamp(0.0, 1.0);
         (variable.clone(), low + (high - low) * along)
     });
-    CheckPoint {
-        nominal: nominal.collect(),
-        small: vec![0.0; count],
-    }
+    CheckPoint { nominal: nominal.collect(), small: vec![0.0; count] }
 }

@@ -41,11 +41,5 @@ pub fn check<'e>(equation: &'e Equation, source: &impl Source) -> Result<Checked
     let absent = absent::absent_parameters(equation, &agreement)?;
     let range = points::range(equation, source);
     let deviations = deviation::deviations(equation, source, &range, &value)?;
-    Ok(Checked {
-        equation,
-        agreement,
-        absent,
-        range,
-        deviations,
-    })
+    Ok(Checked { equation, agreement, absent, range, deviations })
 }

@@ -1,9 +1,8 @@
 //! Deterministic pseudo-random points at which programs are compared.
 
-use abbe_model::axis::AxisKind;
-use abbe_model::effect::{Driver, Effect, Shape};
+use abbe_model::driver::{Driver, DriverPart};
+use abbe_model::effect::Effect;
 
-use crate::driver_quantity::DriverQuantity;
 use crate::equation::Equation;
 use crate::program::{Input, Program};
 use crate::subject::Source;
@@ -62,34 +61,14 @@ impl CheckPoint {
 
 /// Intervals of a driver in which effects with a local shape are not zero.
 fn intervals_of_effects(equation: &Equation, driver: &Variable) -> Vec<[f64; 2]> {
-    let follows = |effect: &Effect| match (driver, &effect.driver) {
-        (Variable::Position { axis, .. }, Driver::Axis(name)) => axis == name,
-        (Variable::Driver(DriverQuantity::SinceReversal(axis, _)), Driver::Axis(name)) => axis == name,
-        (Variable::Driver(DriverQuantity::Time), Driver::Time) => true,
-        (Variable::Driver(DriverQuantity::Temperature), Driver::Temperature) => true,
-        (Variable::Driver(DriverQuantity::Gravity(_)), Driver::Gravity) => true,
-        _ => false,
+    let (driver, part) = match driver {
+        Variable::Driver(quantity) => (quantity.driver.clone(), quantity.part),
+        Variable::Position { axis, .. } => (Driver::Axis(axis.clone()), DriverPart::Value),
+        _ => return Vec::new(),
     };
-    let turn_back = matches!(driver, Variable::Driver(DriverQuantity::SinceReversal(..)));
-    let around = |low: f64, high: f64, margin: f64| Some([low - margin, high + margin]);
-    let interval = |effect: &Effect| match &effect.shape {
-        Shape::ReversalSpike { width } if turn_back => Some([0.0, 3.0 * width]),
-        _ if turn_back => None,
-        Shape::Local { centre, width, .. } => around(*centre, *centre, 1.2 * width),
-        Shape::Curve { from, to, .. } => around(*from, *to, 0.1 * (to - from)),
-        Shape::Warmup { tau_s } => Some([0.0, 3.0 * tau_s]),
-        Shape::Steps { at } => {
-            let low = at.iter().copied().fold(f64::INFINITY, f64::min);
-            let high = at.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            around(low, high, (0.2 * (high - low)).max(1e-3))
-        }
-        _ => None,
-    };
+    let follows = |effect: &Effect| effect.driver == driver && effect.shape.uses() == part;
     let effects = equation.options.effects.iter();
-    effects
-        .filter(|effect| follows(effect))
-        .filter_map(interval)
-        .collect()
+    effects.filter(|effect| follows(effect)).filter_map(|effect| effect.shape.varies_within()).collect()
 }
 
 /// Draws the nominal variables over their whole range: lengths near their stated values, positions over all possible
@@ -105,7 +84,7 @@ pub(crate) fn draw_anywhere(
                 Some(value) => value * (1.0 + draws.between(-0.01, 0.01)),
                 None => UNSTATED_MM * (1.0 + draws.between(-0.5, 0.5)),
             },
-            Variable::Driver(DriverQuantity::Direction(_)) => {
+            Variable::Driver(quantity) if quantity.part == DriverPart::Direction => {
                 if draws.bits() & 1 == 0 {
                     -1.0
                 } else {
@@ -116,11 +95,8 @@ pub(crate) fn draw_anywhere(
                 let places = intervals_of_effects(equation, moving);
                 // Half of the points lie where local effects are not zero.
                 let anywhere = places.is_empty() || draws.bits() & 1 == 0;
-                let [low, high] = if anywhere {
-                    whole_range(moving)
-                } else {
-                    places[(draws.bits() % places.len() as u64) as usize]
-                };
+                let [low, high] =
+                    if anywhere { whole_range(moving) } else { places[(draws.bits() % places.len() as u64) as usize] };
                 draws.between(low, high)
             }
         };
@@ -153,16 +129,8 @@ pub(crate) fn range(equation: &Equation, source: &impl Source) -> Vec<(Variable,
 
 /// Range of a position or another driver whose range is not stated, in its unit.
 fn whole_range(moving: &Variable) -> [f64; 2] {
-    if let Variable::Driver(followed) = moving {
-        match followed {
-            DriverQuantity::Direction(_) | DriverQuantity::Gravity(_) => [-1.0, 1.0],
-            DriverQuantity::Rate(_, AxisKind::Linear) => [-50.0, 50.0],
-            DriverQuantity::Rate(_, AxisKind::Rotary) => [-1.0, 1.0],
-            DriverQuantity::SinceReversal(_, AxisKind::Linear) => [0.0, 100.0],
-            DriverQuantity::SinceReversal(_, AxisKind::Rotary) => [0.0, std::f64::consts::PI],
-            DriverQuantity::Time => [0.0, 3600.0],
-            DriverQuantity::Temperature => [-5.0, 5.0],
-        }
+    if let Variable::Driver(quantity) = moving {
+        quantity.range
     } else if moving.is_angle() {
         [-std::f64::consts::PI, std::f64::consts::PI]
     } else {
@@ -173,9 +141,5 @@ fn whole_range(moving: &Variable) -> [f64; 2] {
 /// The absolute difference; infinite if either value is not a number.
 pub(crate) fn worst(found: f64, expected: f64) -> f64 {
     let difference = (found - expected).abs();
-    if difference.is_nan() {
-        f64::INFINITY
-    } else {
-        difference
-    }
+    if difference.is_nan() { f64::INFINITY } else { difference }
 }

@@ -38,9 +38,7 @@ where
         }
         Subject::Station(Station::Probe(_)) => {
             let geometry = run.probe_geometry().into_iter();
-            geometry
-                .flat_map(|geometry| [geometry.stylus.0, geometry.step.0].concat())
-                .collect()
+            geometry.flat_map(|geometry| [geometry.stylus.0, geometry.step.0].concat()).collect()
         }
         _ => run.read(),
     };
@@ -87,9 +85,7 @@ fn by_duals(
         };
         let read = run(equation, source, point, seeded)?.0;
         for (row, value) in gradient.iter_mut().zip(read) {
-            let slopes = value
-                .eps
-                .unwrap_generic(nalgebra::Const::<PACK>, nalgebra::Const::<1>);
+            let slopes = value.eps.unwrap_generic(nalgebra::Const::<PACK>, nalgebra::Const::<1>);
             let end = at.len().min(start + PACK);
             for k in start..end {
                 row[k] = slopes[k - start];

@@ -29,20 +29,10 @@ impl Language for C {
         let whole = &functions[functions.len() - 1];
         let header = whole.header(0, ['[', ']']).into_iter();
         let header = lines(header.map(|line| format!(" * {line}").trim_end().to_string()));
-        let advice = if whole.program.operations().roots == 0 {
-            ""
-        } else {
-            ADVICE
-        };
-        let slopes = if whole.gradient {
-            format!(", gradient[(j * {} + k) * n + i]", whole.errors())
-        } else {
-            String::new()
-        };
-        let kernels: Vec<String> = functions
-            .iter()
-            .map(|code| single(code) + "\n" + &columns(code))
-            .collect();
+        let advice = if whole.program.operations().roots == 0 { "" } else { ADVICE };
+        let slopes =
+            if whole.gradient { format!(", gradient[(j * {} + k) * n + i]", whole.errors()) } else { String::new() };
+        let kernels: Vec<String> = functions.iter().map(|code| single(code) + "\n" + &columns(code)).collect();
         format!(
             "/*\n{header} * Columns: n readings; axes[a * n + i] and the results value[j * n + i]{slopes} of \
              reading i.\n\
@@ -54,11 +44,7 @@ impl Language for C {
 
 /// What a function computes, and its signature as declaration and as head of the definition.
 fn head(code: &Code<'_>, of: &str, signature: &str) -> String {
-    let what = if code.gradient {
-        "Value and gradient"
-    } else {
-        "Value"
-    };
+    let what = if code.gradient { "Value and gradient" } else { "Value" };
     format!("/* {what} of {of}. */\n{signature};\n\n{signature}\n{{\n")
 }
 
@@ -72,9 +58,7 @@ fn single(code: &Code<'_>) -> String {
     let mut text = head(code, "one reading", &signature);
     text += &arguments(code, &[0, 1, 2]);
     text += &lines(code.assignments("    const double ", ";"));
-    text += &results(code, |name, index, value| {
-        format!("    {name}[{index}] = {value};\n")
-    });
+    text += &results(code, |name, index, value| format!("    {name}[{index}] = {value};\n"));
     text + "}\n"
 }
 
@@ -85,20 +69,14 @@ fn columns(code: &Code<'_>) -> String {
         "void {}_columns(size_t n, const double *restrict lengths, const double *restrict axes, \
          const double *restrict errors, double *restrict value{})",
         code.function(),
-        if code.gradient {
-            ", double *restrict gradient"
-        } else {
-            ""
-        }
+        if code.gradient { ", double *restrict gradient" } else { "" }
     );
     let mut text = head(code, "n readings", &signature);
     let axes = code.used(1);
     for (number, input) in &axes {
         text += &format!("    const double *restrict column_{input} = axes + {number} * n;\n");
     }
-    text += &results(code, |name, index, _| {
-        format!("    double *restrict {name}_{index} = {name} + {index} * n;\n")
-    });
+    text += &results(code, |name, index, _| format!("    double *restrict {name}_{index} = {name} + {index} * n;\n"));
     if axes.is_empty() {
         text += "    (void)axes;\n";
     }
@@ -110,9 +88,7 @@ fn columns(code: &Code<'_>) -> String {
         text += &format!("        const double {input} = column_{input}[i];\n");
     }
     text += &lines(code.assignments("        const double ", ";"));
-    text += &results(code, |name, index, value| {
-        format!("        {name}_{index}[i] = {value};\n")
-    });
+    text += &results(code, |name, index, value| format!("        {name}_{index}[i] = {value};\n"));
     text + "    }\n}\n"
 }
 
@@ -120,10 +96,7 @@ fn columns(code: &Code<'_>) -> String {
 fn results(code: &Code<'_>, line: impl Fn(&str, usize, &str) -> String) -> String {
     let (values, slopes) = code.results();
     let of = |name: &str, results: &[String]| {
-        let lines = results
-            .iter()
-            .enumerate()
-            .map(|(index, result)| line(name, index, result));
+        let lines = results.iter().enumerate().map(|(index, result)| line(name, index, result));
         lines.collect::<String>()
     };
     of("value", &values) + &of("gradient", &slopes)

@@ -69,9 +69,7 @@ pub(crate) const GROUPS: [&str; 3] = ["lengths", "axes", "errors"];
 pub(crate) fn functions<'e>(checked: &'e Checked<'e>, syntax: &'static Syntax) -> Vec<Code<'e>> {
     let gradient = checked.equation.options.gradient.then_some(true);
     let requested = [false].into_iter().chain(gradient);
-    requested
-        .map(|gradient| Code::new(checked, gradient, syntax))
-        .collect()
+    requested.map(|gradient| Code::new(checked, gradient, syntax)).collect()
 }
 
 /// Lines, each with a line break at its end.
@@ -113,13 +111,8 @@ impl<'e> Code<'e> {
                 })
             })
             .collect();
-        let steps = program
-            .steps
-            .iter()
-            .map(|step| name(step_name(&step.label, symbols)))
-            .collect();
-        let count =
-            |requested: &dyn Fn(&Input) -> bool| program.inputs.iter().filter(|i| requested(i)).count();
+        let steps = program.steps.iter().map(|step| name(step_name(&step.label, symbols))).collect();
+        let count = |requested: &dyn Fn(&Input) -> bool| program.inputs.iter().filter(|i| requested(i)).count();
         let lengths = count(&|input| matches!(input, Input::Plain(Variable::Length(_))));
         let small = count(&|input| matches!(input, Input::Plain(variable) if variable.is_small()));
         let all = program.inputs.len();
@@ -154,8 +147,7 @@ impl<'e> Code<'e> {
     pub(crate) fn used(&self, group: usize) -> Vec<(usize, &str)> {
         let places = self.groups[group].clone().enumerate();
         let used = places.filter(|(_, index)| self.uses(*index));
-        used.map(|(number, index)| (number, self.inputs[index].as_str()))
-            .collect()
+        used.map(|(number, index)| (number, self.inputs[index].as_str())).collect()
     }
 
     /// Whether the program uses an input.
@@ -167,9 +159,7 @@ impl<'e> Code<'e> {
     /// The assignments of the steps, each with `before` in front of the name and `end` at its end.
     pub(crate) fn assignments(&self, before: &str, end: &str) -> Vec<String> {
         let steps = self.steps.iter().zip(&self.program.steps);
-        steps
-            .map(|(name, step)| format!("{before}{name} = {}{end}", dialect::write(&step.value, self)))
-            .collect()
+        steps.map(|(name, step)| format!("{before}{name} = {}{end}", dialect::write(&step.value, self))).collect()
     }
 
     /// The outputs: values, and derivatives output by output.
@@ -183,8 +173,7 @@ impl<'e> Code<'e> {
     /// The lines of the header, without comment signs. Indices of arguments start at `first` and are enclosed in
     /// `brackets`.
     pub(crate) fn header(&self, first: usize, brackets: [char; 2]) -> Vec<String> {
-        let at =
-            |group: &str, number: usize| format!("{group}{}{}{}", brackets[0], number + first, brackets[1]);
+        let at = |group: &str, number: usize| format!("{group}{}{}{}", brackets[0], number + first, brackets[1]);
         let equation = self.checked.equation;
         let mut lines = notes::title(equation);
         lines.push(String::new());
@@ -198,10 +187,7 @@ impl<'e> Code<'e> {
                     Input::Cosine(variable) => ("1", format!("cosine of the {}", variable.meaning())),
                 };
                 let argument = at(group, number);
-                lines.push(format!(
-                    "  {argument:<12} {:<12} {unit:<4} {meaning}",
-                    self.inputs[index]
-                ));
+                lines.push(format!("  {argument:<12} {:<12} {unit:<4} {meaning}", self.inputs[index]));
             }
         }
         let what = match equation.kind {
@@ -223,11 +209,7 @@ impl<'e> Code<'e> {
             }
             some => format!(", and {some} functions of errors and drivers"),
         };
-        let with = if self.program.outputs.len() > self.outputs() {
-            "Value and gradient"
-        } else {
-            "Value"
-        };
+        let with = if self.program.outputs.len() > self.outputs() { "Value and gradient" } else { "Value" };
         lines.push(format!(
             "{with}: {} operations per reading ({} + and −, {} ·, {} /, {} √{functions}).",
             operations.arithmetic(),
@@ -274,18 +256,9 @@ pub(crate) fn function_name(kind: Kind) -> &'static str {
 
 fn step_name(label: &Label, symbols: Symbols) -> String {
     match label {
-        Label::Vector {
-            letter,
-            frame,
-            prime,
-            coordinate,
-        } => {
+        Label::Vector { letter, frame, prime, coordinate } => {
             let turned = if *prime { "t" } else { "" };
-            let frame = if frame.is_empty() {
-                String::new()
-            } else {
-                format!("_{}", identifier(frame))
-            };
+            let frame = if frame.is_empty() { String::new() } else { format!("_{}", identifier(frame)) };
             format!("{letter}{turned}{frame}_{}", ["x", "y", "z"][*coordinate])
         }
         Label::Scalar(name) => (*name).to_string(),

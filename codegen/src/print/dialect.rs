@@ -55,11 +55,7 @@ pub(crate) fn write(tree: &Tree, dialect: &impl Dialect) -> String {
 /// The expression as a factor or as a term after a minus: in parentheses if it is a sum.
 pub(crate) fn write_term(tree: &Tree, dialect: &impl Dialect) -> String {
     let (text, binding) = bound(tree, dialect);
-    if binding < Binding::Product {
-        dialect.group(&text)
-    } else {
-        text
-    }
+    if binding < Binding::Product { dialect.group(&text) } else { text }
 }
 
 /// Breaks a sum into lines of at most `width` visible characters if possible. Breaks lie before a plus or minus outside
@@ -80,11 +76,7 @@ pub(crate) fn lines(
             (_, true) => format!(" {} ", dialect.minus()),
         };
         // A nested sum needs parentheses only after a minus.
-        let text = if *minus {
-            write_term(tree, dialect)
-        } else {
-            write(tree, dialect)
-        };
+        let text = if *minus { write_term(tree, dialect) } else { write(tree, dialect) };
         whole.push_str(&sign);
         whole.push_str(&text);
     }
@@ -92,11 +84,7 @@ pub(crate) fn lines(
     for parentheses in 1..5 {
         let fits = |piece: &String| visible(piece) <= width;
         let finer = |piece: String| {
-            if fits(&piece) {
-                vec![piece]
-            } else {
-                split(&piece, dialect, parentheses)
-            }
+            if fits(&piece) { vec![piece] } else { split(&piece, dialect, parentheses) }
         };
         pieces = pieces.into_iter().flat_map(finer).collect();
     }
@@ -137,24 +125,14 @@ fn split(text: &str, dialect: &impl Dialect, parentheses: i32) -> Vec<String> {
 fn bound(tree: &Tree, dialect: &impl Dialect) -> (String, Binding) {
     let at_least = |tree: &Tree, least: Binding| {
         let (text, binding) = bound(tree, dialect);
-        if binding < least {
-            dialect.group(&text)
-        } else {
-            text
-        }
+        if binding < least { dialect.group(&text) } else { text }
     };
     match tree {
-        Tree::Number(value) if *value < 0.0 => (
-            format!("{}{}", dialect.minus(), dialect.number(-value)),
-            Binding::Sum,
-        ),
+        Tree::Number(value) if *value < 0.0 => (format!("{}{}", dialect.minus(), dialect.number(-value)), Binding::Sum),
         Tree::Number(value) => (dialect.number(*value), Binding::Atom),
         Tree::Input(index) => (dialect.input(*index), Binding::Atom),
         Tree::Step(index) => (dialect.step(*index), Binding::Atom),
-        Tree::Unary(Unary::Neg, a) => (
-            format!("{}{}", dialect.minus(), at_least(a, Binding::Product)),
-            Binding::Sum,
-        ),
+        Tree::Unary(Unary::Neg, a) => (format!("{}{}", dialect.minus(), at_least(a, Binding::Product)), Binding::Sum),
         Tree::Unary(function, a) => (dialect.call(*function, &write(a, dialect)), Binding::Atom),
         Tree::Binary(op, a, b) => match op {
             Binary::Add | Binary::Sub => {
@@ -162,11 +140,8 @@ fn bound(tree: &Tree, dialect: &impl Dialect) -> (String, Binding) {
                 // A leading minus in the second operand needs its parentheses in every language.
                 let (right, binding) = bound(b, dialect);
                 let starts_with_minus = right.starts_with(dialect.minus());
-                let right = if binding == Binding::Sum && (keep || starts_with_minus) {
-                    dialect.group(&right)
-                } else {
-                    right
-                };
+                let right =
+                    if binding == Binding::Sum && (keep || starts_with_minus) { dialect.group(&right) } else { right };
                 let left = at_least(a, Binding::Sum);
                 let sign = if *op == Binary::Add { "+" } else { dialect.minus() };
                 (format!("{left} {sign} {right}"), Binding::Sum)
@@ -174,10 +149,7 @@ fn bound(tree: &Tree, dialect: &impl Dialect) -> (String, Binding) {
             Binary::Mul => {
                 // For readers the number comes first.
                 if let (false, Tree::Binary(Binary::Mul, number, rest)) = (dialect.keeps_order(), &**b)
-                    && matches!(
-                        (&**number, &**a),
-                        (Tree::Number(_), Tree::Input(_) | Tree::Step(_))
-                    )
+                    && matches!((&**number, &**a), (Tree::Number(_), Tree::Input(_) | Tree::Step(_)))
                 {
                     let first = Tree::Binary(Binary::Mul, number.clone(), a.clone());
                     return bound(&Tree::Binary(Binary::Mul, Box::new(first), rest.clone()), dialect);
@@ -188,21 +160,16 @@ fn bound(tree: &Tree, dialect: &impl Dialect) -> (String, Binding) {
                     return (square, Binding::Product);
                 }
                 let left = at_least(a, Binding::Product);
-                let right = if dialect.keeps_order() {
-                    at_least(b, Binding::Atom)
-                } else {
-                    at_least(b, Binding::Product)
-                };
+                let right =
+                    if dialect.keeps_order() { at_least(b, Binding::Atom) } else { at_least(b, Binding::Product) };
                 (dialect.product(&left, &right), Binding::Product)
             }
-            Binary::Div if dialect.fractions() => (
-                dialect.quotient(&write(a, dialect), &write(b, dialect)),
-                Binding::Atom,
-            ),
-            Binary::Div => (
-                dialect.quotient(&at_least(a, Binding::Product), &at_least(b, Binding::Atom)),
-                Binding::Product,
-            ),
+            Binary::Div if dialect.fractions() => {
+                (dialect.quotient(&write(a, dialect), &write(b, dialect)), Binding::Atom)
+            }
+            Binary::Div => {
+                (dialect.quotient(&at_least(a, Binding::Product), &at_least(b, Binding::Atom)), Binding::Product)
+            }
         },
     }
 }

@@ -26,10 +26,7 @@ impl Language for Julia {
         let functions = functions(checked, &SYNTAX);
         let header = functions[functions.len() - 1].header(1, ['[', ']']).into_iter();
         let header = lines(header.map(|line| format!("# {line}").trim_end().to_string()));
-        let methods: String = functions
-            .iter()
-            .map(|code| single(code) + &columns(code))
-            .collect();
+        let methods: String = functions.iter().map(|code| single(code) + &columns(code)).collect();
         format!(
             "{header}# axes: a vector for one reading, or a matrix with a row for each input and a column for each \
              reading.\n\
@@ -46,11 +43,7 @@ fn sizes(code: &Code<'_>, reading: bool) -> String {
         (_, false) => ("[coordinate]", "[parameter, coordinate]"),
         (_, true) => ("[coordinate, reading]", "[parameter, coordinate, reading]"),
     };
-    let gradient = if code.gradient {
-        format!(", gradient{gradient}")
-    } else {
-        String::new()
-    };
+    let gradient = if code.gradient { format!(", gradient{gradient}") } else { String::new() };
     format!("value{value}{gradient}")
 }
 
@@ -93,10 +86,7 @@ fn single(code: &Code<'_>) -> String {
 
 /// The method for the columns of a matrix.
 fn columns(code: &Code<'_>) -> String {
-    let readings = format!(
-        "[{}(lengths, column, errors) for column in eachcol(axes)]",
-        code.function()
-    );
+    let readings = format!("[{}(lengths, column, errors) for column in eachcol(axes)]", code.function());
     let returned = match (code.gradient, code.outputs()) {
         (false, 1) => "readings",
         (false, _) => "stack(readings)",

@@ -23,19 +23,13 @@ const MARKUP: Markup = Markup {
     visible,
     escape,
     comment: "% ",
-    around_sections: [
-        "% Needs \\usepackage{amsmath}.\n\\begingroup\\allowdisplaybreaks\n",
-        "\\endgroup\n",
-    ],
+    around_sections: ["% Needs \\usepackage{amsmath}.\n\\begingroup\\allowdisplaybreaks\n", "\\endgroup\n"],
     section: ["", ":\n\\begin{align}\n", " \\\\\n", "\n\\end{align}\n"],
     approximately: "\\approx",
     line_break: " \\notag\\\\\n  &\\qquad {} ",
     remark: [" \\quad\\text{", "}"],
     rows: 40,
-    table: [
-        "\\noindent\n\\begin{tabular}{lll}\n  Symbol & Unit & Meaning \\\\ \\hline\n",
-        "\\end{tabular}\n",
-    ],
+    table: ["\\noindent\n\\begin{tabular}{lll}\n  Symbol & Unit & Meaning \\\\ \\hline\n", "\\end{tabular}\n"],
     cells: ["  ", " & ", " \\\\\n"],
     names: ",\\ ",
 };
@@ -73,10 +67,7 @@ impl Notation for Latex {
         if subscript.chars().all(plain) {
             format!("{letter}_{{{subscript}}}")
         } else {
-            format!(
-                "{letter}_{{\\mathrm{{{}}}}}",
-                escape(subscript).replace(' ', "\\ ")
-            )
+            format!("{letter}_{{\\mathrm{{{}}}}}", escape(subscript).replace(' ', "\\ "))
         }
     }
     fn coordinate(&self, vector: &str, prime: bool, frame: &str, coordinate: &str) -> String {

@@ -23,11 +23,7 @@ impl Language for Matlab {
     fn print(&self, checked: &Checked<'_>) -> String {
         let code = Code::new(checked, checked.equation.options.gradient, &SYNTAX);
         let (values, slopes) = code.results();
-        let returned = if slopes.is_empty() {
-            "value"
-        } else {
-            "[value, gradient]"
-        };
+        let returned = if slopes.is_empty() { "value" } else { "[value, gradient]" };
         let name = function_name(checked.equation.kind);
         let mut file = format!("function {returned} = {name}(lengths, axes, errors)\n");
         let header = code.header(1, ['(', ')']).into_iter();
@@ -53,10 +49,7 @@ impl Language for Matlab {
         };
         file += &format!("  value = [\n{}  ];\n", rows(&values));
         if !slopes.is_empty() {
-            file += &format!(
-                "  if nargout > 1\n    gradient = [\n{}    ];\n  end\n",
-                rows(&slopes)
-            );
+            file += &format!("  if nargout > 1\n    gradient = [\n{}    ];\n  end\n", rows(&slopes));
         }
         file + "end\n"
     }

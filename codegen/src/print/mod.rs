@@ -66,12 +66,7 @@ const fn entry(
     audience: Audience,
     language: &'static dyn Language,
 ) -> OutputLanguage {
-    OutputLanguage {
-        word,
-        extension,
-        audience,
-        language,
-    }
+    OutputLanguage { word, extension, audience, language }
 }
 
 /// The language with this word.
@@ -80,10 +75,7 @@ const fn entry(
 /// If there is none.
 pub fn language(word: &str) -> Result<&'static OutputLanguage, CodegenError> {
     let found = LANGUAGES.iter().find(|language| language.word == word);
-    found.ok_or_else(|| CodegenError::NoSuchLanguage {
-        word: word.to_string(),
-        known: words(|_| true, "and"),
-    })
+    found.ok_or_else(|| CodegenError::NoSuchLanguage { word: word.to_string(), known: words(|_| true, "and") })
 }
 
 impl OutputLanguage {
@@ -107,11 +99,7 @@ impl std::fmt::Debug for OutputLanguage {
 
 /// The words of some languages: `rust, c, python or matlab`.
 fn words(some: impl Fn(&OutputLanguage) -> bool, last: &str) -> String {
-    let words: Vec<&str> = LANGUAGES
-        .iter()
-        .filter(|entry| some(entry))
-        .map(|entry| entry.word)
-        .collect();
+    let words: Vec<&str> = LANGUAGES.iter().filter(|entry| some(entry)).map(|entry| entry.word).collect();
     match words.split_last() {
         Some((end, rest)) if !rest.is_empty() => format!("{} {last} {end}", rest.join(", ")),
         _ => words.concat(),
@@ -123,10 +111,7 @@ fn refuse_unreadable(equation: &Equation) -> Result<(), CodegenError> {
     let languages = || words(|entry| entry.audience == Compilers, "or");
     let curve = |effect: &&Effect| matches!(effect.shape, Shape::Curve { .. });
     if let Some(effect) = equation.options.effects.iter().find(curve) {
-        return Err(CodegenError::CurveForReaders {
-            effect: effect.id(),
-            languages: languages(),
-        });
+        return Err(CodegenError::CurveForReaders { effect: effect.id(), languages: languages() });
     }
     let what = match (equation.kind, equation.options.order) {
         _ if !equation.options.gradient => return Ok(()),
@@ -136,8 +121,5 @@ fn refuse_unreadable(equation: &Equation) -> Result<(), CodegenError> {
         (Kind::Coordinates, _) => "three coordinates",
         (Kind::Volumetric, _) => "the error vector",
     };
-    Err(CodegenError::GradientForReaders {
-        what,
-        languages: languages(),
-    })
+    Err(CodegenError::GradientForReaders { what, languages: languages() })
 }

@@ -109,14 +109,9 @@ impl<N: Notation> Spelling<'_, N> {
     /// A step, such as `p_A.x` for a coordinate of the point p in the frame of A.
     fn label(&self, label: &Label) -> String {
         match label {
-            Label::Vector {
-                letter,
-                frame,
-                prime,
-                coordinate,
-            } => self
-                .notation
-                .coordinate(letter, *prime, frame, ["x", "y", "z"][*coordinate]),
+            Label::Vector { letter, frame, prime, coordinate } => {
+                self.notation.coordinate(letter, *prime, frame, ["x", "y", "z"][*coordinate])
+            }
             Label::Scalar(name) => (*name).to_string(),
             Label::Quantity(variable) => self.variable(variable),
             Label::Temporary(number) => self.notation.subscripted("t", &number.to_string()),
@@ -126,8 +121,7 @@ impl<N: Notation> Spelling<'_, N> {
     fn output(&self, index: usize) -> String {
         let coordinate = |letter: &str| {
             let letter = self.notation.letter(letter);
-            self.notation
-                .coordinate(&letter, false, "", ["x", "y", "z"][index])
+            self.notation.coordinate(&letter, false, "", ["x", "y", "z"][index])
         };
         match self.kind {
             Kind::Length => "L".to_string(),

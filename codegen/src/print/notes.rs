@@ -1,9 +1,9 @@
 //! Sentences about an equation, common to all printers.
 
+use abbe_model::driver::DriverPart;
 use abbe_model::frames::Rotation;
 
 use crate::check::Checked;
-use crate::driver_quantity::DriverQuantity;
 use crate::equation::Equation;
 use crate::first_order::Column;
 use crate::form::{Form, Kind, Order};
@@ -36,10 +36,7 @@ pub(crate) fn title(equation: &Equation) -> Vec<String> {
         name if *name == code || name.is_empty() => String::new(),
         name => format!("{name}, "),
     };
-    vec![
-        format!("{what}: {name}{code}; {order}{rotation}."),
-        format!("Written by Abbe {}.", env!("CARGO_PKG_VERSION")),
-    ]
+    vec![format!("{what}: {name}{code}; {order}{rotation}."), format!("Written by Abbe {}.", env!("CARGO_PKG_VERSION"))]
 }
 
 /// The notes in plain text: the check, the truncation error, and the parameters that the equation does not contain.
@@ -76,9 +73,7 @@ pub(crate) fn notes_spelt(
         });
         let found = found.collect::<Vec<_>>().join(", ");
         let over = range(checked);
-        notes.push(escape(&format!(
-            "Largest deviation from the exact chain{over}: {found}."
-        )));
+        notes.push(escape(&format!("Largest deviation from the exact chain{over}: {found}.")));
     }
     if !checked.absent.is_empty() {
         let names: Vec<String> = checked.absent.iter().map(name).collect();
@@ -103,37 +98,26 @@ pub(crate) fn notes_spelt(
 /// The range over which the truncation error was evaluated: moving axes, and lengths that the session does not state.
 fn range(checked: &Checked<'_>) -> String {
     let degrees = |angle: f64| two_places(angle.to_degrees());
-    let axes = checked
-        .range
-        .iter()
-        .filter_map(|(variable, [low, high])| match variable {
-            Variable::Position { axis, .. } if variable.is_angle() => {
-                Some(format!("{axis} {}° to {}°", degrees(*low), degrees(*high)))
-            }
-            Variable::Position { axis, .. } => Some(format!(
-                "{axis} {} mm to {} mm",
-                two_places(*low),
-                two_places(*high)
-            )),
-            Variable::Driver(DriverQuantity::Direction(_)) => None,
-            Variable::Driver(followed) => Some(format!(
-                "{} {low} {unit} to {high} {unit}",
-                followed.text(),
-                low = two_places(*low),
-                high = two_places(*high),
-                unit = followed.unit()
-            )),
-            Variable::Length(name) if checked.equation.kind == Kind::Volumetric => {
-                Some(format!("{name} {} mm", two_places(*low)))
-            }
-            _ => None,
-        });
+    let axes = checked.range.iter().filter_map(|(variable, [low, high])| match variable {
+        Variable::Position { axis, .. } if variable.is_angle() => {
+            Some(format!("{axis} {}° to {}°", degrees(*low), degrees(*high)))
+        }
+        Variable::Position { axis, .. } => Some(format!("{axis} {} mm to {} mm", two_places(*low), two_places(*high))),
+        Variable::Driver(quantity) if quantity.part == DriverPart::Direction => None,
+        Variable::Driver(followed) => Some(format!(
+            "{} {low} {unit} to {high} {unit}",
+            followed.text,
+            low = two_places(*low),
+            high = two_places(*high),
+            unit = followed.unit
+        )),
+        Variable::Length(name) if checked.equation.kind == Kind::Volumetric => {
+            Some(format!("{name} {} mm", two_places(*low)))
+        }
+        _ => None,
+    });
     let axes: Vec<String> = axes.collect();
-    if axes.is_empty() {
-        String::new()
-    } else {
-        format!(" over {}", axes.join(", "))
-    }
+    if axes.is_empty() { String::new() } else { format!(" over {}", axes.join(", ")) }
 }
 
 /// A number rounded to two decimals, without trailing zeros.

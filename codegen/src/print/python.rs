@@ -41,10 +41,7 @@ fn function(code: &Code<'_>) -> String {
             format!("Value (3, ...), and gradient (3, {errors}, ...): coordinate, parameter, reading.")
         }
     };
-    let mut text = format!(
-        "\n\ndef {}(lengths, axes, errors):\n    \"\"\"{what}\"\"\"\n",
-        code.function()
-    );
+    let mut text = format!("\n\ndef {}(lengths, axes, errors):\n    \"\"\"{what}\"\"\"\n", code.function());
     for (group, word) in GROUPS.iter().enumerate() {
         for (number, input) in code.used(group) {
             text += &format!("    {input} = {word}[{number}]\n");
@@ -56,9 +53,7 @@ fn function(code: &Code<'_>) -> String {
              group))\n";
     let (values, slopes) = code.results();
     let stack = |items: &[String]| {
-        let rows = items
-            .iter()
-            .map(|item| format!("        np.broadcast_to({item}, shape),\n"));
+        let rows = items.iter().map(|item| format!("        np.broadcast_to({item}, shape),\n"));
         format!("np.stack([\n{}    ])", rows.collect::<String>())
     };
     let value = match values.as_slice() {

@@ -7,12 +7,8 @@ use crate::print::language::Language;
 /// Rust without dependencies.
 pub(crate) struct Rust;
 
-const SYNTAX: Syntax = Syntax {
-    times: "*",
-    over: "/",
-    call: |function, x| format!("elementary::{}({x})", name(function)),
-    reserved: "",
-};
+const SYNTAX: Syntax =
+    Syntax { times: "*", over: "/", call: |function, x| format!("elementary::{}({x})", name(function)), reserved: "" };
 
 impl Language for Rust {
     fn print(&self, checked: &Checked<'_>) -> String {
@@ -25,11 +21,7 @@ impl Language for Rust {
         } else {
             "Positions of moving axes (sine and cosine of a rotary one), and other drivers of effects."
         };
-        let groups = [
-            "Lengths of the set-up.",
-            axes,
-            "Errors and instrument parameters.",
-        ];
+        let groups = ["Lengths of the set-up.", axes, "Errors and instrument parameters."];
         for ((name, what), places) in GROUPS.iter().zip(groups).zip(&whole.groups) {
             let name = name.to_uppercase();
             file += &format!("/// {what}\npub const {name}: usize = {};\n", places.len());
@@ -73,11 +65,7 @@ fn single(code: &Code<'_>) -> String {
     );
     for (group, places) in GROUPS.iter().zip(&code.groups) {
         let input = |index: usize| {
-            if code.uses(index) {
-                code.inputs[index].as_str()
-            } else {
-                "_"
-            }
+            if code.uses(index) { code.inputs[index].as_str() } else { "_" }
         };
         let names: Vec<&str> = places.clone().map(input).collect();
         text += &format!("    let [{}] = *{group};\n", names.join(", "));
@@ -118,42 +106,24 @@ fn columns(code: &Code<'_>) -> String {
     let slopes = only_with_gradient(format!(", gradient: &mut [&mut [f64]; {all}]"));
     let and = only_with_gradient(" and gradients".to_string());
     let each = only_with_gradient(", for each derivative (output by output)".to_string());
-    let pattern = if code.gradient {
-        "(values, slopes)"
-    } else {
-        "values"
-    };
+    let pattern = if code.gradient { "(values, slopes)" } else { "values" };
     let call = |input: &dyn Fn(usize) -> String| {
         let inputs: Vec<String> = (0..code.groups[1].len()).map(input).collect();
-        format!(
-            "let {pattern} = {name}(lengths, &[{}], errors);",
-            inputs.join(", ")
-        )
+        format!("let {pattern} = {name}(lengths, &[{}], errors);", inputs.join(", "))
     };
     let block = call(&|axis| format!("x[{axis}][lane]"));
     let rest = call(&|axis| format!("axes[{axis}][i]"));
     let blocks_of_slopes = only_with_gradient(format!("        let mut g = [[0.0; LANES]; {all}];\n"));
     let (mut into_block, mut into_rest) = (String::new(), String::new());
     for output in 0..outputs {
-        let of = if outputs == 1 {
-            String::new()
-        } else {
-            format!("[{output}]")
-        };
+        let of = if outputs == 1 { String::new() } else { format!("[{output}]") };
         into_block += &format!("            v[{output}][lane] = values{of};\n");
         into_rest += &format!("        value[{output}][i] = values{of};\n");
         if code.gradient {
             for k in 0..errors {
-                into_block += &format!(
-                    "            g[{}][lane] = slopes{of}[{k}];\n",
-                    output * errors + k
-                );
+                into_block += &format!("            g[{}][lane] = slopes{of}[{k}];\n", output * errors + k);
             }
-            let first = if output == 0 {
-                String::new()
-            } else {
-                format!("{} + ", output * errors)
-            };
+            let first = if output == 0 { String::new() } else { format!("{} + ", output * errors) };
             into_rest += &format!(
                 "        for (k, slope) in slopes{of}.iter().enumerate() {{\n            \
                  gradient[{first}k][i] = *slope;\n        }}\n"
@@ -213,10 +183,8 @@ fn elementary(code: &Code<'_>) -> String {
         ("floor", "x.floor()"),
         ("round", "x.round()"),
     ];
-    let used = functions
-        .iter()
-        .filter(|(name, _)| text.contains(&format!("elementary::{name}(")))
-        .map(|(name, body)| {
+    let used =
+        functions.iter().filter(|(name, _)| text.contains(&format!("elementary::{name}("))).map(|(name, body)| {
             format!("    #[inline(always)]\n    pub fn {name}(x: f64) -> f64 {{\n        {body}\n    }}\n")
         });
     let used: Vec<String> = used.collect();

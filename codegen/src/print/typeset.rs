@@ -42,23 +42,15 @@ pub(crate) struct Markup {
 pub(crate) fn page(checked: &Checked<'_>, notation: &impl Notation, markup: &Markup) -> String {
     let equation = checked.equation;
     let article = Article::new(equation);
-    let spelling = Spelling {
-        notation,
-        program: &article.program,
-        symbols: equation.options.symbols,
-        kind: equation.kind,
-    };
+    let spelling =
+        Spelling { notation, program: &article.program, symbols: equation.options.symbols, kind: equation.kind };
     let escape = markup.escape;
     let title = notes::title(equation).into_iter();
     let mut page: String = title.map(|line| format!("{}{line}\n", markup.comment)).collect();
     page.push_str(markup.around_sections[0]);
     for section in &article.sections {
         let [before, opening, between, end] = markup.section;
-        let rows: Vec<String> = section
-            .rows
-            .iter()
-            .map(|row| line(row, &spelling, markup))
-            .collect();
+        let rows: Vec<String> = section.rows.iter().map(|row| line(row, &spelling, markup)).collect();
         let heading = escape(&capital(&section.heading));
         page.extend([before, &heading, opening, &rows.join(between), end]);
     }
@@ -66,19 +58,10 @@ pub(crate) fn page(checked: &Checked<'_>, notation: &impl Notation, markup: &Mar
     let tables = article.symbols.chunks(markup.rows).map(|symbols| {
         let [before, between, after] = markup.cells;
         let rows = symbols.iter().map(|(symbol, meaning, unit)| {
-            let (names, unit, meaning) = (
-                spelling.names(symbol, markup.names),
-                escape(unit),
-                escape(meaning),
-            );
+            let (names, unit, meaning) = (spelling.names(symbol, markup.names), escape(unit), escape(meaning));
             format!("{before}${names}${between}{unit}{between}{meaning}{after}")
         });
-        format!(
-            "{}{}{}",
-            markup.table[0],
-            rows.collect::<String>(),
-            markup.table[1]
-        )
+        format!("{}{}{}", markup.table[0], rows.collect::<String>(), markup.table[1])
     });
     page.push_str(&tables.collect::<Vec<_>>().join("\n"));
     page.push('\n');
@@ -91,11 +74,7 @@ pub(crate) fn page(checked: &Checked<'_>, notation: &impl Notation, markup: &Mar
 /// One equation, aligned at its relation.
 fn line<N: Notation>(row: &EquationLine, spelling: &Spelling<'_, N>, markup: &Markup) -> String {
     let left = spelling.left(&row.left);
-    let relation = if row.approximate {
-        markup.approximately
-    } else {
-        "="
-    };
+    let relation = if row.approximate { markup.approximately } else { "=" };
     let lines = dialect::lines(&terms_of(&row.right), spelling, markup.width, markup.visible);
     let remark = match &row.remark {
         None => String::new(),

@@ -15,33 +15,16 @@ fn the_symbolic_chain_evaluates_to_the_chain_over_numbers() {
     for rotation in [Rotation::Exact, Rotation::SmallAngle] {
         let machine = hermle(rotation);
         let errors = eight();
-        let equation = Equation::of(
-            &machine,
-            &Chapter5 { extended: true },
-            &errors,
-            &Options::default(),
-        )
-        .expect("an equation");
+        let equation =
+            Equation::of(&machine, &Chapter5 { extended: true }, &errors, &Options::default()).expect("an equation");
         let mut random = rand_pcg::Pcg64::seed_from_u64(4);
         for _ in 0..200 {
             let mut draw = |size: f64| random.random_range(-size..size);
             let (r, h, z_ca, d) = (draw(200.0), draw(100.0), draw(100.0), draw(200.0));
             let (a, c) = (draw(7.0), draw(7.0));
-            let values: Vec<f64> = errors
-                .iter()
-                .map(|e| {
-                    if e.freedom.is_angle() {
-                        draw(0.1)
-                    } else {
-                        draw(10.0)
-                    }
-                })
-                .collect();
-            let bar = BallBar {
-                workpiece_ball: [0.0, r, h - z_ca],
-                spindle_ball: [-d, 0.0, 0.0],
-                bar: r,
-            };
+            let values: Vec<f64> =
+                errors.iter().map(|e| if e.freedom.is_angle() { draw(0.1) } else { draw(10.0) }).collect();
+            let bar = BallBar { workpiece_ball: [0.0, r, h - z_ca], spindle_ball: [-d, 0.0, 0.0], bar: r };
             let state: Vec<_> = machine
                 .axes
                 .iter()
@@ -72,10 +55,7 @@ fn the_symbolic_chain_evaluates_to_the_chain_over_numbers() {
                         c
                     }
                 }
-                Variable::Error(name) => errors
-                    .iter()
-                    .position(|e| e == name)
-                    .map_or(f64::NAN, |i| values[i]),
+                Variable::Error(name) => errors.iter().position(|e| e == name).map_or(f64::NAN, |i| values[i]),
                 Variable::Instrument(_) | Variable::Driver(_) | Variable::Coefficient(_) => f64::NAN,
             });
             let found = found.expect("plain numbers")[0];
@@ -87,12 +67,7 @@ fn the_symbolic_chain_evaluates_to_the_chain_over_numbers() {
 #[test]
 fn value_and_gradient_of_the_chapter_5_test_take_at_most_70_operations() {
     let machine = hermle(Rotation::SmallAngle);
-    let equation = Equation::of(
-        &machine,
-        &Chapter5 { extended: true },
-        &eight(),
-        &Options::default(),
-    );
+    let equation = Equation::of(&machine, &Chapter5 { extended: true }, &eight(), &Options::default());
     let program = equation.expect("an equation").program(true);
     let operations = program.operations();
     assert!(operations.arithmetic() <= 70, "{operations:?}");

@@ -20,7 +20,9 @@ fn rust() {
         tools::write(&folder.join(format!("{}.rs", printed.name)), &printed.text);
         let _ = writeln!(main, "#[allow(dead_code)] mod {};", printed.name);
     }
-    main.push_str("fn numbers(text: &str) -> Vec<f64> { text.split_whitespace().map(|w| w.parse().unwrap()).collect() }\n");
+    main.push_str(
+        "fn numbers(text: &str) -> Vec<f64> { text.split_whitespace().map(|w| w.parse().unwrap()).collect() }\n",
+    );
     main.push_str("fn show(x: &[f64]) { println!(\"{}\", x.iter().map(|x| format!(\"{x:?}\")).collect::<Vec<_>>().join(\" \")); }\n");
     main.push_str("fn main() {\n");
     for printed in &all {
@@ -63,12 +65,7 @@ fn rust() {
     main.push_str("}\n");
     tools::write(&folder.join("main.rs"), &main);
     let binary = folder.join("run");
-    tools::run(
-        Command::new(rustc)
-            .current_dir(&folder)
-            .args(["--edition", "2024", "main.rs", "-o"])
-            .arg(&binary),
-    );
+    tools::run(Command::new(rustc).current_dir(&folder).args(["--edition", "2024", "main.rs", "-o"]).arg(&binary));
     check_all(&all, &tools::run(&mut Command::new(&binary)));
     let _ = std::fs::remove_dir_all(&folder);
 }
@@ -111,18 +108,7 @@ int main(void) {{
             printed.text
         );
         tools::write(&folder.join("run.c"), &text);
-        let strict = [
-            "-std=c99",
-            "-Wall",
-            "-Wextra",
-            "-Werror",
-            "-pedantic",
-            "-O1",
-            "run.c",
-            "-o",
-            "run",
-            "-lm",
-        ];
+        let strict = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-O1", "run.c", "-o", "run", "-lm"];
         tools::run(Command::new(&cc).current_dir(&folder).args(strict));
         output.push_str(&run_with_input(&folder.join("run"), &[], &points(printed)));
         output.push_str("next\n");
@@ -152,9 +138,8 @@ fn python() {
     };
     let folder = tools::folder("python");
     let all = all("python");
-    let mut main = String::from(
-        "import numpy as np\n\ndef show(x):\n    print(' '.join(repr(float(v)) for v in x))\n\n",
-    );
+    let mut main =
+        String::from("import numpy as np\n\ndef show(x):\n    print(' '.join(repr(float(v)) for v in x))\n\n");
     for printed in &all {
         let (name, function) = (&printed.name, printed.function);
         let [lengths, axes, ..] = sizes(printed);
@@ -179,10 +164,7 @@ print('next')\n\n"
     }
     tools::write(&folder.join("main.py"), &main);
     let strict = ["-W", "error", "main.py"];
-    check_all(
-        &all,
-        &tools::run(Command::new(python).current_dir(&folder).args(strict)),
-    );
+    check_all(&all, &tools::run(Command::new(python).current_dir(&folder).args(strict)));
     let _ = std::fs::remove_dir_all(&folder);
 }
 
@@ -226,9 +208,6 @@ printf('next\\n');\n",
     }
     tools::write(&folder.join("main.m"), &main);
     let strict = ["--no-gui", "--norc", "--quiet", "main.m"];
-    check_all(
-        &all,
-        &tools::run(Command::new(octave).current_dir(&folder).args(strict)),
-    );
+    check_all(&all, &tools::run(Command::new(octave).current_dir(&folder).args(strict)));
     let _ = std::fs::remove_dir_all(&folder);
 }

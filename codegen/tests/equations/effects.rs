@@ -4,12 +4,12 @@ use std::f64::consts::{PI, TAU};
 
 use abbe_codegen::evaluate::evaluate_f64;
 use abbe_codegen::print::{Audience, LANGUAGES};
-use abbe_codegen::{
-    CodegenError, DriverQuantity, Equation, Options, Order, Source, Subject, Variable, check,
-};
+use abbe_codegen::{CodegenError, Equation, Options, Order, Source, Subject, Variable, check};
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
-use abbe_model::effect::{Component, Driver, Effect, Shape};
+use abbe_model::driver::{Driver, DriverPart};
+use abbe_model::effect::shape::{Curve, Harmonic, Local, Periodic, Polynomial, Power, ReversalSpike, Steps, Warmup};
+use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::instrument::{Station, ballbar::BallBar, socket::Socket};
 use abbe_model::scalar::Nominal;
 
@@ -21,10 +21,7 @@ struct Ball;
 
 impl Source for Ball {
     fn subject<N: Nominal>(&self, _length: &impl Fn(&str) -> N) -> Subject<N> {
-        Subject::Station(Station::Socket(Socket {
-            ball: [N::constant(0.0); 3],
-            socket: [N::constant(0.0); 3],
-        }))
+        Subject::Station(Station::Socket(Socket { ball: [N::constant(0.0); 3], socket: [N::constant(0.0); 3] }))
     }
 }
 
@@ -38,11 +35,7 @@ pub fn effect(component: &str, driver: &str, shape: Shape) -> Effect {
 }
 
 fn with(effects: Vec<Effect>) -> Options {
-    Options {
-        effects,
-        gradient: true,
-        ..Options::default()
-    }
+    Options { effects, gradient: true, ..Options::default() }
 }
 
 /// State of a driver at a point: position, direction, rate, distance since the reversal.
@@ -61,12 +54,13 @@ fn bases(driver: &str, shape: Shape, at: At) -> Vec<f64> {
     let options = with(vec![effect("EYX", driver, shape)]);
     let equation = Equation::of(&machine, &Ball, &[], &options).expect("an equation");
     let variable = |variable: &Variable| match variable {
-        Variable::Position { .. } | Variable::Driver(DriverQuantity::Time | DriverQuantity::Temperature) => {
-            at.q
-        }
-        Variable::Driver(DriverQuantity::Direction(_)) => at.direction,
-        Variable::Driver(DriverQuantity::Rate(..)) => at.rate,
-        Variable::Driver(DriverQuantity::SinceReversal(..)) => at.way,
+        Variable::Position { .. } => at.q,
+        Variable::Driver(quantity) => match quantity.part {
+            DriverPart::Value => at.q,
+            DriverPart::Direction => at.direction,
+            DriverPart::Rate => at.rate,
+            DriverPart::SinceReversal => at.way,
+        },
         Variable::Coefficient(coefficient) => coefficient.number as f64,
         other => panic!("{other:?} has no place here"),
     };
@@ -86,12 +80,7 @@ fn near(found: &[f64], expected: &[f64]) {
     }
 }
 
-const HERE: At = At {
-    q: 37.0,
-    direction: -1.0,
-    rate: 4.0,
-    way: 6.0,
-};
+const HERE: At = At { q: 37.0, direction: -1.0, rate: 4.0, way: 6.0 };
 
 fn here(q: f64) -> At {
     At { q, ..HERE }
@@ -99,28 +88,16 @@ fn here(q: f64) -> At {
 
 #[test]
 fn smooth_shapes_by_hand() {
-    let polynomial = Shape::Polynomial {
-        degree: 3,
-        scale: 100.0,
-    };
+    let polynomial = Shape::Polynomial(Polynomial { degree: 3, scale: 100.0 });
     near(&bases("X", polynomial, HERE), &[0.37, 0.1369, 0.050653]);
-    let power = Shape::Power {
-        degree: 5,
-        scale: 10.0,
-    };
+    let power = Shape::Power(Power { degree: 5, scale: 10.0 });
     near(&bases("temperature", power, here(12.0)), &[2.48832]);
-    let harmonic = Shape::Harmonic { order: 3.0 };
-    near(
-        &bases("X", harmonic, here(PI / 12.0)),
-        &[0.5_f64.sqrt(), 0.5_f64.sqrt()],
-    );
-    let periodic = Shape::Periodic { period: 12.0 };
-    near(
-        &bases("X", periodic, here(38.0)),
-        &[(TAU / 6.0).cos(), (TAU / 6.0).sin()],
-    );
+    let harmonic = Shape::Harmonic(Harmonic { order: 3.0 });
+    near(&bases("X", harmonic, here(PI / 12.0)), &[0.5_f64.sqrt(), 0.5_f64.sqrt()]);
+    let periodic = Shape::Periodic(Periodic { period: 12.0 });
+    near(&bases("X", periodic, here(38.0)), &[(TAU / 6.0).cos(), (TAU / 6.0).sin()]);
     near(&bases("time", Shape::Drift, here(1800.0)), &[0.5]);
-    let warmup = Shape::Warmup { tau_s: 600.0 };
+    let warmup = Shape::Warmup(Warmup { tau_s: 600.0 });
     near(&bases("time", warmup, here(1200.0)), &[1.0 - (-2.0_f64).exp()]);
     near(&bases("X", Shape::Lag, HERE), &[-4.0]);
 }
@@ -128,22 +105,16 @@ fn smooth_shapes_by_hand() {
 #[test]
 fn shapes_of_reversal_by_hand() {
     near(&bases("X", Shape::Backlash, HERE), &[0.5]);
-    let spike = Shape::ReversalSpike { width: 3.0 };
+    let spike = Shape::ReversalSpike(ReversalSpike { width: 3.0 });
     near(&bases("X", spike, HERE), &[-(-2.0_f64).exp()]);
 }
 
 #[test]
 fn shapes_with_edges_by_hand_on_both_sides() {
-    let steps = || Shape::Steps {
-        at: vec![10.0, 37.0, 50.0],
-    };
+    let steps = || Shape::Steps(Steps { at: vec![10.0, 37.0, 50.0] });
     near(&bases("X", steps(), HERE), &[1.0, 1.0, 0.0]);
     near(&bases("X", steps(), here(36.999)), &[1.0, 0.0, 0.0]);
-    let bump = |recurs| Shape::Local {
-        centre: 30.0,
-        width: 10.0,
-        recurs,
-    };
+    let bump = |recurs| Shape::Local(Local { centre: 30.0, width: 10.0, recurs });
     let expected = 0.5 * (1.0 + (0.7 * PI).cos());
     near(&bases("X", bump(None), HERE), &[expected]);
     for outside in [19.9, 40.1, 137.0, -63.0] {
@@ -165,35 +136,20 @@ fn cardinal(s: f64) -> f64 {
 
 #[test]
 fn curves_by_truncated_powers() {
-    let open = || Shape::Curve {
-        from: 10.0,
-        to: 60.0,
-        intervals: 5,
-        closed: false,
-    };
+    let open = || Shape::Curve(Curve { from: 10.0, to: 60.0, intervals: 5, closed: false });
     // Beyond its ends a curve is constant.
     for (q, position) in [(10.0, 0.0), (22.5, 1.25), (37.0, 2.7), (59.9, 4.99), (-20.0, 0.0)] {
         let expected: Vec<f64> = (0..8).map(|j| cardinal(position - j as f64 + 3.0)).collect();
         near(&bases("X", open(), here(q)), &expected);
     }
     for at in [60.0, 80.0] {
-        near(
-            &bases("X", open(), here(at)),
-            &[0.0, 0.0, 0.0, 0.0, 0.0, 1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0],
-        );
+        near(&bases("X", open(), here(at)), &[0.0, 0.0, 0.0, 0.0, 0.0, 1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0]);
     }
-    let closed = || Shape::Curve {
-        from: 0.0,
-        to: 60.0,
-        intervals: 6,
-        closed: true,
-    };
+    let closed = || Shape::Curve(Curve { from: 0.0, to: 60.0, intervals: 6, closed: true });
     for q in [0.0_f64, 13.0, 59.0, 73.0, -47.0] {
         let position = (q / 10.0).rem_euclid(6.0);
         let turns = |j: i32| (-1..=1).map(move |turn| f64::from(j + 6 * turn));
-        let expected: Vec<f64> = (0..6)
-            .map(|j| turns(j).map(|j| cardinal(position - j + 3.0)).sum())
-            .collect();
+        let expected: Vec<f64> = (0..6).map(|j| turns(j).map(|j| cardinal(position - j + 3.0)).sum()).collect();
         near(&bases("X", closed(), here(q)), &expected);
     }
 }
@@ -201,33 +157,22 @@ fn curves_by_truncated_powers() {
 /// One effect of each shape on a machine with a rotary axis; the components include an instrument parameter and a
 /// delay.
 pub fn every_shape() -> Vec<Effect> {
-    let polynomial = |degree, scale| Shape::Polynomial { degree, scale };
-    let local = Shape::Local {
-        centre: 0.5,
-        width: 0.4,
-        recurs: Some(TAU),
-    };
+    let polynomial = |degree, scale| Shape::Polynomial(Polynomial { degree, scale });
+    let local = Shape::Local(Local { centre: 0.5, width: 0.4, recurs: Some(TAU) });
     vec![
-        effect("EZC", "C", Shape::Harmonic { order: 2.0 }),
-        effect("EXC", "C", Shape::Periodic { period: 0.3 }),
+        effect("EZC", "C", Shape::Harmonic(Harmonic { order: 2.0 })),
+        effect("EXC", "C", Shape::Periodic(Periodic { period: 0.3 })),
         effect("EYC", "C", polynomial(2, PI)),
         effect("EX0C", "temperature", polynomial(1, 1.0)),
         effect("EY0C", "time", Shape::Drift),
         effect("EBC", "C", Shape::Backlash),
         effect("ECC", "C", Shape::Lag),
-        effect("EAC", "C", Shape::ReversalSpike { width: 0.1 }),
-        effect("EZC", "C", Shape::Steps { at: vec![-1.0, 1.0] }),
+        effect("EAC", "C", Shape::ReversalSpike(ReversalSpike { width: 0.1 })),
+        effect("EZC", "C", Shape::Steps(Steps { at: vec![-1.0, 1.0] })),
         effect("EXC", "C", local),
         effect("EBC", "gravity", polynomial(1, 1.0)),
-        effect(
-            "EYX",
-            "X",
-            Shape::Power {
-                degree: 3,
-                scale: 100.0,
-            },
-        ),
-        effect("bar", "time", Shape::Warmup { tau_s: 900.0 }),
+        effect("EYX", "X", Shape::Power(Power { degree: 3, scale: 100.0 })),
+        effect("bar", "time", Shape::Warmup(Warmup { tau_s: 900.0 })),
         effect("workpiece_ball.x", "temperature", polynomial(1, 1.0)),
         effect("gain", "temperature", polynomial(1, 1.0)),
         effect("trigger", "none", Shape::Constant),
@@ -236,12 +181,7 @@ pub fn every_shape() -> Vec<Effect> {
 
 /// A curve, which is printed as code only.
 pub fn curve() -> Effect {
-    let shape = Shape::Curve {
-        from: 0.0,
-        to: TAU,
-        intervals: 4,
-        closed: true,
-    };
+    let shape = Shape::Curve(Curve { from: 0.0, to: TAU, intervals: 4, closed: true });
     effect("EYC", "C", shape)
 }
 
@@ -265,11 +205,7 @@ fn every_form_is_confirmed_with_every_shape() {
     let machine = Machine::from_code("w C b X t").expect("a code");
     let errors: Vec<ErrorName> = ErrorName::parse("EX0X").into_iter().collect();
     for order in [Order::Exact, Order::Bilinear, Order::First] {
-        let mut options = Options {
-            order,
-            gradient: order != Order::Bilinear,
-            ..with(every_shape())
-        };
+        let mut options = Options { order, gradient: order != Order::Bilinear, ..with(every_shape()) };
         for curved in [false, true] {
             options.effects.extend(curved.then(curve));
             let equation = Equation::of(&machine, &Bar, &errors, &options).expect("an equation");
@@ -282,10 +218,7 @@ fn every_form_is_confirmed_with_every_shape() {
                     Err(refused) => {
                         let message = refused.to_string();
                         assert!(curved && for_readers, "{message}");
-                        assert!(
-                            message.contains("`EYC~C:curve`") && message.contains("rust, c, python"),
-                            "{message}"
-                        );
+                        assert!(message.contains("`EYC~C:curve`") && message.contains("rust, c, python"), "{message}");
                     }
                 }
             }
@@ -297,8 +230,8 @@ fn every_form_is_confirmed_with_every_shape() {
 fn an_equation_names_driven_errors_and_their_drivers() {
     let machine = Machine::from_code("w C b X t").expect("a code");
     let effects = vec![
-        effect("EZC", "C", Shape::Harmonic { order: 2.0 }),
-        effect("bar", "time", Shape::Warmup { tau_s: 900.0 }),
+        effect("EZC", "C", Shape::Harmonic(Harmonic { order: 2.0 })),
+        effect("bar", "time", Shape::Warmup(Warmup { tau_s: 900.0 })),
     ];
     let equation = Equation::of(&machine, &Bar, &[], &with(effects)).expect("an equation");
     let text = printed(&equation, &Bar, "text");
@@ -313,20 +246,14 @@ fn an_equation_names_driven_errors_and_their_drivers() {
         assert!(text.contains(line), "`{line}` is not in\n{text}");
     }
     let latex = printed(&equation, &Bar, "latex");
-    assert!(
-        latex.contains("e_{zc} &= k_{1} \\cos (2 \\theta_{c}) + k_{2} \\sin (2 \\theta_{c})"),
-        "{latex}"
-    );
+    assert!(latex.contains("e_{zc} &= k_{1} \\cos (2 \\theta_{c}) + k_{2} \\sin (2 \\theta_{c})"), "{latex}");
 }
 
 /// A first-order harmonic in X and Y of C is confounded with the eccentricity of the ball: the same column twice.
 #[test]
 fn an_effect_confounded_with_a_location_error_is_marked() {
     let machine = Machine::from_code("w C b X t").expect("a code");
-    let options = Options {
-        order: Order::First,
-        ..with(vec![effect("EX0C", "none", Shape::Constant)])
-    };
+    let options = Options { order: Order::First, ..with(vec![effect("EX0C", "none", Shape::Constant)]) };
     let errors: Vec<ErrorName> = ErrorName::parse("EX0C").into_iter().collect();
     let equation = Equation::of(&machine, &Bar, &errors, &options).expect("an equation");
     let text = printed(&equation, &Bar, "text");
@@ -340,22 +267,14 @@ fn effects_without_a_closed_form_are_refused_by_name() {
         let equation = Equation::of(&machine, &Bar, &[], &with(vec![effect]));
         equation.expect_err("no equation").to_string()
     };
-    let long = Shape::Curve {
-        from: 0.0,
-        to: TAU,
-        intervals: 200,
-        closed: true,
-    };
+    let long = Shape::Curve(Curve { from: 0.0, to: TAU, intervals: 200, closed: true });
     let message = refused(effect("EZC", "C", long));
     assert!(
         message.contains("EZC~C:curve") && message.contains("200") && message.contains("fewer intervals"),
         "{message}"
     );
     let message = refused(effect("EZA", "A", Shape::Backlash));
-    assert!(
-        message.contains("EZA~A:backlash") && message.contains("`A`"),
-        "{message}"
-    );
+    assert!(message.contains("EZA~A:backlash") && message.contains("`A`"), "{message}");
     let message = refused(effect("tracker.x", "time", Shape::Drift));
     assert!(message.contains("tracker.x~time:drift"), "{message}");
     let twice = effect("EZC", "C", Shape::Backlash);

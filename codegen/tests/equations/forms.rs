@@ -43,10 +43,7 @@ fn without_rounding(text: &str) -> String {
 
 #[test]
 fn code_of_the_chapter_5_test() {
-    let options = Options {
-        gradient: true,
-        ..Options::default()
-    };
+    let options = Options { gradient: true, ..Options::default() };
     let equation = chapter5(&options);
     for word in ["rust", "c", "python", "matlab", "julia"] {
         snapshot(&format!("chapter5_{word}"), &printed(&equation, word));
@@ -56,21 +53,9 @@ fn code_of_the_chapter_5_test() {
 #[test]
 fn readable_forms_of_the_chapter_5_test() {
     for language in ["text", "latex", "typst"] {
-        for (order, word) in [
-            (Order::Exact, "exact"),
-            (Order::Bilinear, "bilinear"),
-            (Order::First, "first"),
-        ] {
-            let symbols = if order == Order::First {
-                Symbols::Iso
-            } else {
-                Symbols::Literature
-            };
-            let options = Options {
-                order,
-                symbols,
-                ..Options::default()
-            };
+        for (order, word) in [(Order::Exact, "exact"), (Order::Bilinear, "bilinear"), (Order::First, "first")] {
+            let symbols = if order == Order::First { Symbols::Iso } else { Symbols::Literature };
+            let options = Options { order, symbols, ..Options::default() };
             let text = printed(&chapter5(&options), language);
             snapshot(&format!("chapter5_{language}_{word}"), &text);
         }
@@ -79,10 +64,7 @@ fn readable_forms_of_the_chapter_5_test() {
 
 #[test]
 fn derivatives_of_the_chapter_5_test() {
-    let options = Options {
-        gradient: true,
-        ..Options::default()
-    };
+    let options = Options { gradient: true, ..Options::default() };
     let text = printed(&chapter5(&options), "text");
     snapshot("chapter5_text_derivatives", &text);
 }
@@ -95,26 +77,15 @@ fn operations_counted_by_running_the_printed_code() {
     let Some(rustc) = tools::find("forms::operations", &[&rustc], &["--version"]) else {
         return;
     };
-    let options = Options {
-        gradient: true,
-        ..Options::default()
-    };
+    let options = Options { gradient: true, ..Options::default() };
     let equation = chapter5(&options);
     let counted = equation.program(true).operations();
     let printed = printed(&equation, "rust");
     // Only the kernel of one reading, over the counting scalar instead of `f64`.
-    let from = printed
-        .find("/// Value and gradient of one reading.")
-        .expect("the kernel");
-    let to = printed
-        .find("/// Values and gradients of columns")
-        .expect("the columns");
+    let from = printed.find("/// Value and gradient of one reading.").expect("the kernel");
+    let to = printed.find("/// Values and gradients of columns").expect("the columns");
     let kernel = printed[from..to].replace("f64", "Counted");
-    let constants: String = printed
-        .lines()
-        .filter(|line| line.starts_with("pub const"))
-        .collect::<Vec<_>>()
-        .join("\n");
+    let constants: String = printed.lines().filter(|line| line.starts_with("pub const")).collect::<Vec<_>>().join("\n");
     let main = format!(
         "use std::cell::Cell; use std::ops::*;
 thread_local! {{ static COUNT: Cell<usize> = const {{ Cell::new(0) }}; }}
@@ -145,10 +116,7 @@ fn main() {{
             .args(["--edition", "2024", "-A", "dead_code", "main.rs", "-o"])
             .arg(&binary),
     );
-    let ran: usize = tools::run(&mut Command::new(&binary))
-        .trim()
-        .parse()
-        .expect("a number");
+    let ran: usize = tools::run(&mut Command::new(&binary)).trim().parse().expect("a number");
     let _ = std::fs::remove_dir_all(&folder);
     println!("{ran} operations");
     assert_eq!(ran, counted.arithmetic());
@@ -158,16 +126,11 @@ fn main() {{
 /// The benchmark code is the printer's output. `ABBE_WRITE_BENCHES=1` writes it again.
 #[test]
 fn the_benchmark_code_is_the_printed_code() {
-    let options = Options {
-        gradient: true,
-        ..Options::default()
-    };
+    let options = Options { gradient: true, ..Options::default() };
     let equation = chapter5(&options);
     for (language, name) in [("rust", "emitted.rs"), ("c", "emitted.c")] {
         let printed = printed(&equation, language);
-        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
-            .join("benches")
-            .join(name);
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("benches").join(name);
         if std::env::var("ABBE_WRITE_BENCHES").is_ok() {
             tools::write(&path, &printed);
         }
@@ -183,32 +146,15 @@ fn the_printed_rust_builds_without_std() {
     let Some(rustc) = tools::find("forms::without_std", &[&rustc], &["--version"]) else {
         return;
     };
-    let options = Options {
-        gradient: true,
-        rotation: Some(Rotation::Exact),
-        ..Options::default()
-    };
+    let options = Options { gradient: true, rotation: Some(Rotation::Exact), ..Options::default() };
     let printed = printed(&chapter5(&options), "rust");
-    let end = printed
-        .find("/// Functions that `core` lacks")
-        .expect("the last module");
+    let end = printed.find("/// Functions that `core` lacks").expect("the last module");
     let stub = |name: &str| format!("pub fn {name}(x: f64) -> f64 {{ x }} ");
     let stubs: String = ["sqrt", "sin", "cos"].map(stub).concat();
-    let text = format!(
-        "#![no_std]\n#![deny(warnings)]\n{}mod elementary {{ {stubs} }}\n",
-        &printed[..end]
-    );
+    let text = format!("#![no_std]\n#![deny(warnings)]\n{}mod elementary {{ {stubs} }}\n", &printed[..end]);
     let folder = tools::folder("no-std");
     tools::write(&folder.join("lib.rs"), &text);
-    let arguments = [
-        "--edition",
-        "2024",
-        "--crate-type",
-        "lib",
-        "--emit",
-        "metadata",
-        "lib.rs",
-    ];
+    let arguments = ["--edition", "2024", "--crate-type", "lib", "--emit", "metadata", "lib.rs"];
     tools::run(Command::new(rustc).current_dir(&folder).args(arguments));
     let _ = std::fs::remove_dir_all(&folder);
 }

@@ -53,10 +53,7 @@ end\n"
     }
     tools::write(&folder.join("main.jl"), &main);
     let arguments = ["--startup-file=no", "main.jl"];
-    check_all(
-        &all,
-        &tools::run(Command::new(julia).current_dir(&folder).args(arguments)),
-    );
+    check_all(&all, &tools::run(Command::new(julia).current_dir(&folder).args(arguments)));
     let _ = std::fs::remove_dir_all(&folder);
 }
 
@@ -64,11 +61,7 @@ end\n"
 #[test]
 fn read_by_the_rules_of_julia() {
     for printed in all("julia") {
-        let found: Vec<Vec<f64>> = printed
-            .cases
-            .iter()
-            .map(|case| evaluate(&printed, &case.arguments))
-            .collect();
+        let found: Vec<Vec<f64>> = printed.cases.iter().map(|case| evaluate(&printed, &case.arguments)).collect();
         let worst = disagreement(&printed.cases, &found, true);
         assert!(worst <= 1e-12, "{}: {worst:e}", printed.name);
     }
@@ -91,30 +84,14 @@ fn evaluate(printed: &Printed, arguments: &[Vec<f64>; 3]) -> Vec<f64> {
         .collect();
     for line in steps.lines() {
         let (name, value) = line.trim().split_once(" = ").expect("an assignment");
-        let value = Reader {
-            rest: value,
-            names: &names,
-        }
-        .whole();
-        assert!(
-            names.insert(name.to_string(), vec![value]).is_none(),
-            "{name} is assigned twice"
-        );
+        let value = Reader { rest: value, names: &names }.whole();
+        assert!(names.insert(name.to_string(), vec![value]).is_none(), "{name} is assigned twice");
     }
-    let mut read = |text: &str| {
-        Reader {
-            rest: text,
-            names: &names,
-        }
-        .whole()
-    };
+    let mut read = |text: &str| Reader { rest: text, names: &names }.whole();
     let values = returned.strip_suffix(", gradient").expect("value and gradient");
     let values = values.trim_start_matches('[').trim_end_matches(']').split(", ");
     let mut found: Vec<f64> = values.map(&mut read).collect();
-    let elements = gradient
-        .lines()
-        .skip(1)
-        .filter_map(|line| line.trim().strip_suffix(','));
+    let elements = gradient.lines().skip(1).filter_map(|line| line.trim().strip_suffix(','));
     found.extend(elements.map(&mut read));
     found
 }
@@ -187,9 +164,7 @@ impl Reader<'_> {
         if text.starts_with(|c: char| c.is_ascii_digit()) {
             // The sign of an exponent belongs to the number.
             if text.ends_with('e') && rest.starts_with('-') {
-                let digits = rest[1..]
-                    .find(|c: char| !c.is_ascii_digit())
-                    .map_or(rest.len(), |end| end + 1);
+                let digits = rest[1..].find(|c: char| !c.is_ascii_digit()).map_or(rest.len(), |end| end + 1);
                 (text, rest) = self.rest.split_at(end + digits);
             }
             self.rest = rest;
@@ -219,10 +194,7 @@ impl Reader<'_> {
             "sign" if x == 0.0 => 0.0,
             "sign" => x.signum(),
             "round" => {
-                assert!(
-                    self.take(", RoundNearestTiesAway"),
-                    "Julia rounds ties to even by default"
-                );
+                assert!(self.take(", RoundNearestTiesAway"), "Julia rounds ties to even by default");
                 x.round()
             }
             "ifelse" => {

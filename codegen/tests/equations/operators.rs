@@ -63,9 +63,7 @@ impl Batch {
             let first = (self.0 * 3 + coordinate) * TERMS;
             let numbers = first..(first + TERMS).min(EXPRESSIONS);
             // Each term has its own factor, so that no two errors cancel.
-            let term = |number: usize| {
-                expression(number, lengths) * (lengths[number % 4] + N::constant(number as f64))
-            };
+            let term = |number: usize| expression(number, lengths) * (lengths[number % 4] + N::constant(number as f64));
             numbers.map(term).fold(N::constant(0.25), |sum, term| sum + term)
         })
     }

@@ -20,16 +20,8 @@ pub struct Touch {
     pub stated: bool,
 }
 
-const LENGTHS: [(&str, f64); 8] = [
-    ("A_x", 3.0),
-    ("A_y", -2.0),
-    ("A_z", 30.0),
-    ("R", 45.0),
-    ("S_x", 1.5),
-    ("S_y", -4.0),
-    ("S_z", 25.0),
-    ("D", 70.0),
-];
+const LENGTHS: [(&str, f64); 8] =
+    [("A_x", 3.0), ("A_y", -2.0), ("A_z", 30.0), ("R", 45.0), ("S_x", 1.5), ("S_y", -4.0), ("S_z", 25.0), ("D", 70.0)];
 /// Position of the probe that moves in a stated direction.
 const HELD: [(&str, f64); 2] = [("Y", -8.0), ("Z", -7.0)];
 const STATED: [f64; 3] = [-0.96, 0.28, 0.0];
@@ -41,20 +33,12 @@ impl Touch {
     }
 
     pub fn machine(self) -> Machine {
-        let code = if self.stated {
-            "w C b X Y Z t"
-        } else {
-            "w C A b X Y Z t"
-        };
+        let code = if self.stated { "w C b X Y Z t" } else { "w C A b X Y Z t" };
         let mut machine = Machine::from_code(code).expect("a code");
         for axis in &mut machine.axes {
             if axis.kind == AxisKind::Rotary {
                 // In a stated direction the probe hits the cylinder only if the table does not carry it away.
-                axis.origin_mm = if self.stated {
-                    [1.0, -3.5, 41.25]
-                } else {
-                    [12.5, -30.0, 41.25]
-                };
+                axis.origin_mm = if self.stated { [1.0, -3.5, 41.25] } else { [12.5, -30.0, 41.25] };
             }
         }
         machine
@@ -82,30 +66,18 @@ impl Source for Touch {
     }
 
     fn length_mm(&self, name: &str) -> Option<f64> {
-        LENGTHS
-            .iter()
-            .find(|(known, _)| *known == name)
-            .map(|(_, value)| *value)
+        LENGTHS.iter().find(|(known, _)| *known == name).map(|(_, value)| *value)
     }
 }
 
 fn errors(machine: &Machine) -> Vec<ErrorName> {
-    let names = [
-        "EX0C", "EY0C", "EA0C", "EB0C", "EXC", "ECC", "EY0A", "EB0A", "EC0A", "EXX", "EBX", "EC0Y", "EAZ",
-    ];
+    let names = ["EX0C", "EY0C", "EA0C", "EB0C", "EXC", "ECC", "EY0A", "EB0A", "EC0A", "EXX", "EBX", "EC0Y", "EAZ"];
     let names = names.iter().filter_map(|name| ErrorName::parse(name));
-    names
-        .filter(|name| machine.axis_index(&name.axis).is_some())
-        .collect()
+    names.filter(|name| machine.axis_index(&name.axis).is_some()).collect()
 }
 
 fn options(order: Order) -> Options {
-    Options {
-        order,
-        gradient: true,
-        unknowns: (0..11).collect(),
-        ..Options::default()
-    }
+    Options { order, gradient: true, unknowns: (0..11).collect(), ..Options::default() }
 }
 
 /// Positions of the axes in the machine's order, and errors in the equation's order.
@@ -117,11 +89,7 @@ struct State {
 
 impl State {
     fn length(&self, name: &str) -> f64 {
-        self.lengths
-            .iter()
-            .find(|(known, _)| known == name)
-            .expect("a length")
-            .1
+        self.lengths.iter().find(|(known, _)| known == name).expect("a length").1
     }
 
     /// The arguments of a program, in its order and its three groups.
@@ -224,9 +192,7 @@ fn geometry(touch: Touch, parameters: &[Variable], point: &State) -> f64 {
     let off = Vector3::from(["x", "y", "z"].map(|k| unknown("stylus", k)));
     let start = transformed(tool(true), stylus + off);
     let pose = six(["x", "y", "z", "a", "b", "c"].map(|k| unknown("artefact", k)));
-    let to_artefact = (table(true) * shift(artefact) * pose)
-        .try_inverse()
-        .expect("a motion");
+    let to_artefact = (table(true) * shift(artefact) * pose).try_inverse().expect("a motion");
     let radius = point.length("R") + unknown("radius", "") + unknown("form", "");
     let beyond = |t: f64| {
         let p = transformed(to_artefact, start + direction * t);
@@ -259,10 +225,8 @@ fn geometry(touch: Touch, parameters: &[Variable], point: &State) -> f64 {
 }
 
 fn point(touch: Touch, parameters: &[Variable], size: [f64; 2], random: &mut impl rand::Rng) -> State {
-    let lengths: Vec<(String, f64)> = LENGTHS
-        .iter()
-        .map(|(name, value)| (name.to_string(), value * random.random_range(0.9..1.1)))
-        .collect();
+    let lengths: Vec<(String, f64)> =
+        LENGTHS.iter().map(|(name, value)| (name.to_string(), value * random.random_range(0.9..1.1))).collect();
     let position = |axis: &abbe_model::axis::Axis, random: &mut dyn FnMut(f64, f64) -> f64| match axis.kind {
         AxisKind::Rotary => random(-3.0, 3.0),
         AxisKind::Linear if !touch.stated => random(60.0, 150.0),
@@ -273,21 +237,13 @@ fn point(touch: Touch, parameters: &[Variable], size: [f64; 2], random: &mut imp
     };
     let mut draw = |low: f64, high: f64| random.random_range(low..high);
     let machine = touch.machine();
-    let positions: Vec<f64> = machine
-        .axes
-        .iter()
-        .map(|axis| position(axis, &mut draw))
-        .collect();
+    let positions: Vec<f64> = machine.axes.iter().map(|axis| position(axis, &mut draw)).collect();
     let small = parameters.iter().map(|parameter| {
         let size = size[usize::from(parameter.is_angle())];
         draw(-size, size)
     });
     let small: Vec<f64> = small.collect();
-    State {
-        lengths,
-        positions,
-        small,
-    }
+    State { lengths, positions, small }
 }
 
 fn equation(touch: Touch, order: Order) -> Equation {
@@ -372,10 +328,7 @@ fn the_bilinear_form_deviates_by_third_order() {
             off.abs()
         };
         let (whole, tenth) = (off(1.0), off(0.1));
-        assert!(
-            whole < 0.05 && tenth < whole.mul_add(3e-3, 1e-8),
-            "{whole:e} {tenth:e}"
-        );
+        assert!(whole < 0.05 && tenth < whole.mul_add(3e-3, 1e-8), "{whole:e} {tenth:e}");
     }
 }
 
@@ -392,18 +345,11 @@ fn a_direction_that_the_table_tilts_away_from_has_no_first_order() {
     }
     let machine = Machine::from_code("w C A b X Y Z t").expect("a code");
     let refused = Equation::of(&machine, &Oblique, &errors(&machine)[..2], &options(Order::First));
-    assert!(
-        matches!(refused, Err(CodegenError::ObliqueProbing)),
-        "{refused:?}"
-    );
+    assert!(matches!(refused, Err(CodegenError::ObliqueProbing)), "{refused:?}");
 }
 
 /// Printed code to compile and run: every language, with the values that dual numbers confirmed to 1e-12.
-pub fn printed(
-    language: &str,
-    count: usize,
-    random: &mut impl rand::Rng,
-) -> Vec<(String, String, Vec<Case>)> {
+pub fn printed(language: &str, count: usize, random: &mut impl rand::Rng) -> Vec<(String, String, Vec<Case>)> {
     let mut printed = Vec::new();
     for stated in [false, true] {
         let touch = Touch { stated };
@@ -416,11 +362,7 @@ pub fn printed(
             let found = program.run(&arguments.concat());
             // Near the edge of the artefact rounding errors grow without bound.
             if found.iter().all(|value| value.is_finite() && value.abs() < 300.0) {
-                cases.push(Case {
-                    arguments,
-                    values: found[..1].to_vec(),
-                    gradient: found[1..].to_vec(),
-                });
+                cases.push(Case { arguments, values: found[..1].to_vec(), gradient: found[1..].to_vec() });
             }
         }
         let text = support::printed(&equation, &touch, language);
@@ -436,10 +378,7 @@ pub fn fragments(language: &str) -> Vec<String> {
         for order in [Order::Exact, Order::Bilinear, Order::First] {
             let touch = Touch { stated };
             let machine = touch.machine();
-            let options = Options {
-                gradient: order == Order::First,
-                ..options(order)
-            };
+            let options = Options { gradient: order == Order::First, ..options(order) };
             let equation = Equation::of(&machine, &touch, &errors(&machine), &options).expect("an equation");
             fragments.push(support::printed(&equation, &touch, language));
         }

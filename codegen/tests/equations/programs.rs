@@ -2,9 +2,10 @@
 //! errors of 0.1 rad and 10 mm, value and gradient.
 
 use abbe_codegen::program::Input;
-use abbe_codegen::{DriverQuantity, Equation, Options, ToolPoint, Variable};
+use abbe_codegen::{Equation, Options, ToolPoint, Variable};
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
+use abbe_model::driver::{Driver, DriverPart};
 use abbe_model::frames::Rotation;
 use rand::{RngExt, SeedableRng};
 
@@ -33,27 +34,15 @@ pub fn all(language: &str) -> Vec<Printed> {
         let machine = machine(code);
         let errors = all_errors(&machine);
         for what in [What::Bar, What::Volumetric] {
-            let options = Options {
-                gradient: true,
-                rotation: Some(Rotation::Exact),
-                ..Options::default()
-            };
+            let options = Options { gradient: true, rotation: Some(Rotation::Exact), ..Options::default() };
             let equation = match what {
                 What::Bar => Equation::of(&machine, &AnyBar, &errors, &options),
                 What::Volumetric => Equation::volumetric(&machine, &errors, &options),
             };
             let equation = equation.expect("an equation");
             let (kind, function, text) = match what {
-                What::Bar => (
-                    "bar",
-                    "bar_length",
-                    support::printed(&equation, &AnyBar, language),
-                ),
-                What::Volumetric => (
-                    "vol",
-                    "volumetric_error",
-                    support::printed(&equation, &ToolPoint, language),
-                ),
+                What::Bar => ("bar", "bar_length", support::printed(&equation, &AnyBar, language)),
+                What::Volumetric => ("vol", "volumetric_error", support::printed(&equation, &ToolPoint, language)),
             };
             printed.push(Printed {
                 name: format!("{kind}_{}", short(code)),
@@ -78,14 +67,8 @@ pub fn all(language: &str) -> Vec<Printed> {
 /// Compound operands under every operator: three coordinates, each shifted by one of three errors.
 fn operators(language: &str, random: &mut impl rand::Rng) -> Vec<Printed> {
     let machine = Machine::from_code("w b X t").expect("a code");
-    let errors: Vec<ErrorName> = ["EXX", "EYX", "EZX"]
-        .iter()
-        .filter_map(|name| ErrorName::parse(name))
-        .collect();
-    let options = Options {
-        gradient: true,
-        ..Options::default()
-    };
+    let errors: Vec<ErrorName> = ["EXX", "EYX", "EZX"].iter().filter_map(|name| ErrorName::parse(name)).collect();
+    let options = Options { gradient: true, ..Options::default() };
     let mut printed = Vec::new();
     for batch in Batch::all() {
         let equation = Equation::of(&machine, &batch, &errors, &options).expect("an equation");
@@ -112,11 +95,8 @@ fn operators(language: &str, random: &mut impl rand::Rng) -> Vec<Printed> {
 /// A bar with an effect of every shape, against the program that dual numbers confirmed.
 fn effects(language: &str, random: &mut impl rand::Rng) -> Printed {
     let machine = Machine::from_code("w C b X t").expect("a code");
-    let options = Options {
-        gradient: true,
-        effects: every_shape().into_iter().chain([curve()]).collect(),
-        ..Options::default()
-    };
+    let options =
+        Options { gradient: true, effects: every_shape().into_iter().chain([curve()]).collect(), ..Options::default() };
     let errors: Vec<ErrorName> = ErrorName::parse("EX0C").into_iter().collect();
     let equation = Equation::of(&machine, &Bar, &errors, &options).expect("an equation");
     let program = equation.program(true);
@@ -131,11 +111,15 @@ fn effects(language: &str, random: &mut impl rand::Rng) -> Printed {
                     Variable::Length(_) => (0, random.random_range(90.0..110.0)),
                     Variable::Position { axis, .. } if axis == "C" => (1, angle),
                     Variable::Position { .. } => (1, random.random_range(-150.0..-50.0)),
-                    Variable::Driver(DriverQuantity::Direction(_)) => {
+                    Variable::Driver(quantity) if quantity.part == DriverPart::Direction => {
                         (1, if random.random() { 1.0 } else { -1.0 })
                     }
-                    Variable::Driver(DriverQuantity::Time) => (1, random.random_range(0.0..4000.0)),
-                    Variable::Driver(DriverQuantity::SinceReversal(..)) => (1, random.random_range(0.0..0.5)),
+                    Variable::Driver(quantity) if quantity.driver == Driver::Time => {
+                        (1, random.random_range(0.0..4000.0))
+                    }
+                    Variable::Driver(quantity) if quantity.part == DriverPart::SinceReversal => {
+                        (1, random.random_range(0.0..0.5))
+                    }
                     Variable::Driver(_) => (1, random.random_range(-2.0..2.0)),
                     _ => (2, random.random_range(-0.1..0.1)),
                 },
@@ -143,11 +127,7 @@ fn effects(language: &str, random: &mut impl rand::Rng) -> Printed {
             arguments[group].push(value);
         }
         let found = program.run(&arguments.concat());
-        Case {
-            arguments,
-            values: found[..1].to_vec(),
-            gradient: found[1..].to_vec(),
-        }
+        Case { arguments, values: found[..1].to_vec(), gradient: found[1..].to_vec() }
     });
     Printed {
         name: "effects".to_string(),
@@ -169,13 +149,7 @@ fn compare(printed: &Printed, single: &str, columns: &str) {
 pub fn sizes(printed: &Printed) -> [usize; 5] {
     let case = &printed.cases[0];
     let [lengths, axes, errors] = &case.arguments;
-    [
-        lengths.len(),
-        axes.len(),
-        errors.len(),
-        case.values.len(),
-        case.gradient.len(),
-    ]
+    [lengths.len(), axes.len(), errors.len(), case.values.len(), case.gradient.len()]
 }
 
 /// The arguments of the cases, a line each.

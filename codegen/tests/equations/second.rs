@@ -48,26 +48,17 @@ struct State {
 }
 
 fn draw(equation: &Equation, random: &mut impl rand::Rng) -> State {
-    let mut point = State {
-        lengths: Vec::new(),
-        positions: Vec::new(),
-        small: Vec::new(),
-    };
+    let mut point = State { lengths: Vec::new(), positions: Vec::new(), small: Vec::new() };
     for variable in equation.arena.variables() {
         match &variable {
             Variable::Length(name) => {
-                point
-                    .lengths
-                    .push((name.clone(), random.random_range(-200.0..200.0)));
+                point.lengths.push((name.clone(), random.random_range(-200.0..200.0)));
             }
             Variable::Position { axis, .. } => {
                 let size = if variable.is_angle() { 3.0 } else { 300.0 };
-                point
-                    .positions
-                    .push((axis.clone(), random.random_range(-size..size)));
+                point.positions.push((axis.clone(), random.random_range(-size..size)));
             }
-            Variable::Error(_) | Variable::Instrument(_) | Variable::Driver(_) | Variable::Coefficient(_) => {
-            }
+            Variable::Error(_) | Variable::Instrument(_) | Variable::Driver(_) | Variable::Coefficient(_) => {}
         }
     }
     point.small = equation
@@ -95,17 +86,10 @@ fn gradient(source: &impl Source, machine: &Machine, errors: &[ErrorName], at: &
         .iter()
         .map(|axis| {
             let held = source.held(&axis.name, &length);
-            AxisPosition::new(
-                axis.kind,
-                held.unwrap_or_else(|| named(&at.positions, &axis.name)),
-            )
+            AxisPosition::new(axis.kind, held.unwrap_or_else(|| named(&at.positions, &axis.name)))
         })
         .collect();
-    let index = |slot: usize| {
-        errors
-            .iter()
-            .position(|name| machine.error_slot(name) == Some(slot))
-    };
+    let index = |slot: usize| errors.iter().position(|name| machine.error_slot(name) == Some(slot));
     let mut gradient: Vec<Vec<f64>> = Vec::new();
     for start in (0..errors.len()).step_by(8) {
         let seeded = |i: usize| {
@@ -115,16 +99,12 @@ fn gradient(source: &impl Source, machine: &Machine, errors: &[ErrorName], at: &
             }
             Pack::new(at.small[i], Derivative::some(seed))
         };
-        let bodies = machine.body_errors(
-            |slot| index(slot).is_some(),
-            |slot| index(slot).map_or_else(|| Pack::from(0.0), seeded),
-        );
+        let bodies = machine
+            .body_errors(|slot| index(slot).is_some(), |slot| index(slot).map_or_else(|| Pack::from(0.0), seeded));
         let read = subject.read(machine, &state, &bodies, |_| None);
         gradient.resize(read.len(), Vec::new());
         for (row, value) in gradient.iter_mut().zip(read) {
-            let slopes = value
-                .eps
-                .unwrap_generic(nalgebra::Const::<8>, nalgebra::Const::<1>);
+            let slopes = value.eps.unwrap_generic(nalgebra::Const::<8>, nalgebra::Const::<1>);
             row.extend((start..errors.len().min(start + 8)).map(|k| slopes[k - start]));
         }
     }
@@ -149,11 +129,7 @@ fn agrees(what: &str, source: &impl Source, machine: &Machine, errors: &[ErrorNa
         };
         let found: Vec<Vec<Vec<f64>>> = second
             .iter()
-            .map(|rows| {
-                rows.iter()
-                    .map(|row| evaluate(&equation.arena, row, value).expect("numbers"))
-                    .collect()
-            })
+            .map(|rows| rows.iter().map(|row| evaluate(&equation.arena, row, value).expect("numbers")).collect())
             .collect();
         for (k, parameter) in equation.parameters.iter().enumerate() {
             // The error of a central difference is h²/6 of the third derivative plus rounding over h.
@@ -165,10 +141,7 @@ fn agrees(what: &str, source: &impl Source, machine: &Machine, errors: &[ErrorNa
             let below = gradient(source, machine, errors, &point);
             point.small[k] = here;
             for output in 0..found.len() {
-                let scale = found[output]
-                    .iter()
-                    .flatten()
-                    .fold(1.0_f64, |most, x| most.max(x.abs()));
+                let scale = found[output].iter().flatten().fold(1.0_f64, |most, x| most.max(x.abs()));
                 for l in 0..errors.len() {
                     let difference = (above[output][l] - below[output][l]) / (2.0 * step);
                     let own = found[output][l][k];
@@ -187,10 +160,7 @@ fn agrees(what: &str, source: &impl Source, machine: &Machine, errors: &[ErrorNa
 }
 
 fn errors(names: &[&str]) -> Vec<ErrorName> {
-    names
-        .iter()
-        .map(|name| ErrorName::parse(name).expect("a name"))
-        .collect()
+    names.iter().map(|name| ErrorName::parse(name).expect("a name")).collect()
 }
 
 #[test]

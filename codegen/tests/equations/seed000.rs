@@ -35,10 +35,7 @@ pub fn error<'a>(arena: &'a Arena, name: &str) -> Symbol<'a> {
 }
 
 pub fn turn<'a>(arena: &'a Arena, axis: &str) -> (Symbol<'a>, Symbol<'a>) {
-    let position = arena.variable(Variable::Position {
-        axis: axis.to_string(),
-        kind: AxisKind::Rotary,
-    });
+    let position = arena.variable(Variable::Position { axis: axis.to_string(), kind: AxisKind::Rotary });
     position.sin_cos()
 }
 
@@ -67,23 +64,7 @@ impl<'a> Printed<'a> {
     /// The three groups under the root of Eq. 3.20, in its order; `shift` is the additional term of Eq. 3.21 in its
     /// first group.
     fn groups(&self, shift: Symbol<'a>) -> [Symbol<'a>; 3] {
-        let Printed {
-            e_y0a,
-            e_z0a,
-            ty0a,
-            tz0a,
-            e_x0c,
-            e_y0c,
-            tx0c,
-            ty0c,
-            r,
-            h,
-            z_ca,
-            sa,
-            ca,
-            sc,
-            cc,
-        } = *self;
+        let Printed { e_y0a, e_z0a, ty0a, tz0a, e_x0c, e_y0c, tx0c, ty0c, r, h, z_ca, sa, ca, sc, cc } = *self;
         let y = e_y0a + ca * (e_y0c + z_ca * tx0c) + z_ca * sa + tz0a * (e_x0c - z_ca * ty0c)
             - h * (sa - ty0c * tz0a + tx0c * ca)
             - r * (sa * (tx0c * cc + ty0c * sc) - ca * cc + tz0a * sc);
@@ -130,10 +111,7 @@ fn eq_3_20_is_the_chain() {
     let [x, y, z] = bar.map(|component| equation.arena.symbol(component));
     let chain = sum_of_squares([x, y, z]);
     let printed = sum_of_squares(printed);
-    assert!(
-        ring.equal(printed.operand(), chain.operand())
-            .expect("a polynomial")
-    );
+    assert!(ring.equal(printed.operand(), chain.operand()).expect("a polynomial"));
     // The length is the root of that same sum.
     assert_eq!(chain.sqrt().operand(), equation.exact[0]);
 }
@@ -142,26 +120,14 @@ fn eq_3_20_is_the_chain() {
 fn eq_3_21_is_the_chain_for_any_d() {
     let equation = chapter5(true);
     let arena = &equation.arena;
-    let bar = equation
-        .vectors
-        .last()
-        .expect("vectors")
-        .components
-        .map(|c| arena.symbol(c));
+    let bar = equation.vectors.last().expect("vectors").components.map(|c| arena.symbol(c));
     let chain = sum_of_squares(bar);
     assert_eq!(chain.sqrt().operand(), equation.exact[0]);
     let printed = sum_of_squares(Printed::new(arena).groups(length(arena, "D")));
     let wrong = sum_of_squares(Printed::new(arena).groups(-length(arena, "D")));
     let mut ring = Ring::exact(arena);
-    assert!(
-        ring.equal(printed.operand(), chain.operand())
-            .expect("a polynomial")
-    );
-    assert!(
-        !ring
-            .equal(wrong.operand(), chain.operand())
-            .expect("a polynomial")
-    );
+    assert!(ring.equal(printed.operand(), chain.operand()).expect("a polynomial"));
+    assert!(!ring.equal(wrong.operand(), chain.operand()).expect("a polynomial"));
 }
 
 /// Chapter 5 with D as printed, or derived from the length of the bar.
@@ -171,16 +137,9 @@ struct Bar {
 }
 
 impl abbe_codegen::Source for Bar {
-    fn subject<N: abbe_model::scalar::Nominal>(
-        &self,
-        length: &impl Fn(&str) -> N,
-    ) -> abbe_codegen::Subject<N> {
+    fn subject<N: abbe_model::scalar::Nominal>(&self, length: &impl Fn(&str) -> N) -> abbe_codegen::Subject<N> {
         let (r, l) = (length("R"), length("L"));
-        let d = if self.printed {
-            N::constant(50.0) * N::constant(2.0).sqrt()
-        } else {
-            (l * l - r * r).sqrt()
-        };
+        let d = if self.printed { N::constant(50.0) * N::constant(2.0).sqrt() } else { (l * l - r * r).sqrt() };
         let zero = N::constant(0.0);
         abbe_codegen::Subject::Station(abbe_model::instrument::Station::BallBar(
             abbe_model::instrument::ballbar::BallBar {
@@ -203,24 +162,12 @@ fn eq_3_21_with_the_printed_d_and_with_the_right_one() {
         let equation = equation.expect("an equation");
         let arena = &equation.arena;
         let (r, l) = (length(arena, "R"), length(arena, "L"));
-        let d = if printed {
-            arena.symbol(Operand::constant(50.0 * 2.0_f64.sqrt()))
-        } else {
-            (l * l - r * r).sqrt()
-        };
+        let d = if printed { arena.symbol(Operand::constant(50.0 * 2.0_f64.sqrt())) } else { (l * l - r * r).sqrt() };
         let by_hand = sum_of_squares(Printed::new(arena).groups(d));
         let mut ring = Ring::exact(arena);
-        let bar = equation
-            .vectors
-            .last()
-            .expect("vectors")
-            .components
-            .map(|c| arena.symbol(c));
+        let bar = equation.vectors.last().expect("vectors").components.map(|c| arena.symbol(c));
         let chain = sum_of_squares(bar);
-        assert!(
-            ring.equal(by_hand.operand(), chain.operand())
-                .expect("a polynomial")
-        );
+        assert!(ring.equal(by_hand.operand(), chain.operand()).expect("a polynomial"));
 
         // Without errors, at C = 0 and H = Z_CA, the distance must equal the length of the bar; only the correct D
         // satisfies this.
@@ -249,10 +196,7 @@ fn the_length_contains_only_the_eight_errors() {
     // L·L equals L², the sum of squares, only if the root can be squared; its radicand contains errors.
     assert!(form.is_err());
     let bar = equation.vectors.last().expect("vectors").components;
-    let forms: Vec<_> = bar
-        .iter()
-        .map(|c| ring.normal_form(*c).expect("a polynomial"))
-        .collect();
+    let forms: Vec<_> = bar.iter().map(|c| ring.normal_form(*c).expect("a polynomial")).collect();
     assert!(ring.absent(&forms, &equation.parameters).is_empty());
 }
 
@@ -273,10 +217,7 @@ fn the_matrices_of_eqs_3_2_and_3_3() {
         .axes
         .iter()
         .map(|axis| {
-            let position = arena.variable(Variable::Position {
-                axis: axis.name.clone(),
-                kind: axis.kind,
-            });
+            let position = arena.variable(Variable::Position { axis: axis.name.clone(), kind: axis.kind });
             AxisPosition::new(axis.kind, position)
         })
         .collect();
@@ -289,25 +230,14 @@ fn the_matrices_of_eqs_3_2_and_3_3() {
     };
     // Eq. 3.2, two matrices multiplied and applied to (x, y, z, 1).
     let (y1, z1) = (p.ca * y - p.sa * z, p.sa * y + p.ca * z);
-    let eq_3_2 = [
-        x - p.tz0a * y1 + p.ty0a * z1,
-        p.tz0a * x + y1 + p.e_y0a,
-        z1 - p.ty0a * x + p.e_z0a,
-    ];
+    let eq_3_2 = [x - p.tz0a * y1 + p.ty0a * z1, p.tz0a * x + y1 + p.e_y0a, z1 - p.ty0a * x + p.e_z0a];
     let a = machine.axis_index("A").expect("A");
     decide(eq_3_2, machine.push(a, &state, &bodies, Point([x, y, z])));
     // Eq. 3.3; the table frame's origin lies Z_CA below the axes.
     let (x1, y1, z1) = (p.cc * x - p.sc * y, p.sc * x + p.cc * y, z - p.z_ca);
-    let eq_3_3 = [
-        x1 + p.ty0c * z1 + p.e_x0c,
-        y1 - p.tx0c * z1 + p.e_y0c,
-        z1 + p.tx0c * y1 - p.ty0c * x1,
-    ];
+    let eq_3_3 = [x1 + p.ty0c * z1 + p.e_x0c, y1 - p.tx0c * z1 + p.e_y0c, z1 + p.tx0c * y1 - p.ty0c * x1];
     let c = machine.axis_index("C").expect("C");
-    decide(
-        eq_3_3,
-        machine.push(c, &state, &bodies, Point([x, y, z - p.z_ca])),
-    );
+    decide(eq_3_3, machine.push(c, &state, &bodies, Point([x, y, z - p.z_ca])));
 }
 
 /// The paper's δx(X), ∂X_C … are defined against R in T_X, T_C and T_A; β₁ is −EB0Z, β₂ is EA0Z, α is EC0X.
@@ -320,26 +250,14 @@ fn the_matrices_of_eqs_3_2_and_3_3() {
 fn the_first_order_term_for_term() {
     use abbe_codegen::{Form, Order};
     let machine = hermle(Rotation::Exact);
-    let options = Options {
-        order: Order::First,
-        ..Options::default()
-    };
+    let options = Options { order: Order::First, ..Options::default() };
     let equation = Equation::of(&machine, &Chapter5 { extended: true }, &eight(), &options);
     let equation = equation.expect("an equation");
     let arena = &equation.arena;
     let Form::First(first, _) = &equation.form else {
         panic!("not of first order");
     };
-    let Printed {
-        r,
-        h,
-        z_ca,
-        sa,
-        ca,
-        sc,
-        cc,
-        ..
-    } = Printed::new(arena);
+    let Printed { r, h, z_ca, sa, ca, sc, cc, .. } = Printed::new(arena);
     let (h, d) = (h - z_ca, length(arena, "D"));
     let two = arena.symbol(Operand::constant(2.0));
     let zero = arena.symbol(Operand::constant(0.0));
@@ -349,24 +267,13 @@ fn the_first_order_term_for_term() {
     let mut ring = Ring::exact(arena);
     for (sensitivity, expected) in first.sensitivities.iter().zip(expected) {
         let expected = ring.normal_form(expected.operand()).expect("a polynomial");
-        assert_eq!(
-            sensitivity.coefficients[0], expected,
-            "{:?}",
-            sensitivity.parameter
-        );
+        assert_eq!(sensitivity.coefficients[0], expected, "{:?}", sensitivity.parameter);
         assert!(sensitivity.over_length);
     }
     let square = r * r + d * d + h * h - two * r * d * sc;
-    assert_eq!(
-        first.nominal[0],
-        ring.normal_form(square.operand()).expect("a polynomial")
-    );
+    assert_eq!(first.nominal[0], ring.normal_form(square.operand()).expect("a polynomial"));
     let checked = abbe_codegen::check(&equation, &Chapter5 { extended: true }).expect("agreement");
-    let unseen: Vec<String> = checked
-        .absent
-        .iter()
-        .map(|v| v.text(abbe_codegen::Symbols::Iso))
-        .collect();
+    let unseen: Vec<String> = checked.absent.iter().map(|v| v.text(abbe_codegen::Symbols::Iso)).collect();
     assert_eq!(unseen, ["EA0C"]);
     // θ_z0a and e_y0a are confounded in this test, and so are θ_y0a and e_z0a.
     let multiples: Vec<bool> = first
@@ -382,20 +289,12 @@ fn the_first_order_term_for_term() {
 fn truncation_errors_match_independent_figures() {
     use abbe_codegen::Order;
     let worst = |order, rotation, extended| {
-        let options = Options {
-            order,
-            rotation: Some(rotation),
-            ..Options::default()
-        };
+        let options = Options { order, rotation: Some(rotation), ..Options::default() };
         let machine = hermle(Rotation::Exact);
         let equation = Equation::of(&machine, &Chapter5 { extended }, &eight(), &options);
         let equation = equation.expect("an equation");
         let checked = abbe_codegen::check(&equation, &Chapter5 { extended }).expect("agreement");
-        checked
-            .deviations
-            .iter()
-            .map(|d| d.largest_um)
-            .collect::<Vec<f64>>()
+        checked.deviations.iter().map(|d| d.largest_um).collect::<Vec<f64>>()
     };
     let within = |found: Vec<f64>, low: f64, high: f64| {
         assert!((low..high).contains(&found[0]), "{found:?}");

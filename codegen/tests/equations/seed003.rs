@@ -25,11 +25,7 @@ impl Source for Untilted {
 /// All error motions of the five axes.
 fn motions(machine: &Machine) -> Vec<ErrorName> {
     let of_axis = |axis: &abbe_model::axis::Axis| {
-        Freedom::ALL.map(|freedom| ErrorName {
-            kind: ErrorKind::Motion,
-            freedom,
-            axis: axis.name.clone(),
-        })
+        Freedom::ALL.map(|freedom| ErrorName { kind: ErrorKind::Motion, freedom, axis: axis.name.clone() })
     };
     machine.axes.iter().flat_map(of_axis).collect()
 }
@@ -40,10 +36,7 @@ fn squareness() -> Vec<ErrorName> {
 }
 
 fn position<'a>(arena: &'a Arena, axis: &str) -> Symbol<'a> {
-    arena.variable(Variable::Position {
-        axis: axis.to_string(),
-        kind: AxisKind::Linear,
-    })
+    arena.variable(Variable::Position { axis: axis.to_string(), kind: AxisKind::Linear })
 }
 
 #[test]
@@ -127,11 +120,7 @@ fn minus<'a>(a: Vector<'a>, b: Vector<'a>) -> Vector<'a> {
 }
 
 fn times<'a>(a: Vector<'a>, b: Vector<'a>) -> Vector<'a> {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// The inverse rotation about A (X) or C (Z).
@@ -191,10 +180,7 @@ fn every_arrangement_with_its_nominal_rotations() {
         let expected = by_rigid_bodies(&equation.arena, &machine);
         let mut ring = Ring::truncated(&equation.arena, 1).expect("first order");
         for (expected, chain) in expected.into_iter().zip(&equation.exact) {
-            assert!(
-                ring.equal(expected.operand(), *chain).expect("a polynomial"),
-                "{code}"
-            );
+            assert!(ring.equal(expected.operand(), *chain).expect("a polynomial"), "{code}");
         }
     }
 }

@@ -9,9 +9,7 @@ use abbe_model::files;
 use crate::support::printed;
 
 fn file(name: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-        .join("../sessions")
-        .join(name)
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../sessions").join(name)
 }
 
 #[test]
@@ -22,10 +20,7 @@ fn every_test_of_the_bundled_plans() {
         for test in &session.tests {
             let source = SessionTest::new(&session, test).expect("a plan");
             for order in [Order::Exact, Order::Bilinear, Order::First] {
-                let options = Options {
-                    order,
-                    ..Options::default()
-                };
+                let options = Options { order, ..Options::default() };
                 let equation = Equation::of(&session.machine, &source, &session.unknowns, &options);
                 let equation = equation.expect("an equation");
                 assert_eq!(equation.kind, Kind::Length);
@@ -45,11 +40,7 @@ fn every_test_of_the_self_calibration() {
     for test in &session.tests {
         let source = SessionTest::new(&session, test).expect("a plan");
         for order in [Order::Exact, Order::Bilinear, Order::First] {
-            let options = Options {
-                order,
-                unknowns: (0..11).collect(),
-                ..Options::default()
-            };
+            let options = Options { order, unknowns: (0..11).collect(), ..Options::default() };
             let equation = Equation::of(&session.machine, &source, &session.unknowns, &options);
             let equation = equation.expect("an equation");
             assert_eq!(equation.kind, Kind::Distance);
@@ -66,11 +57,7 @@ fn every_test_of_the_self_calibration() {
 fn lengths_derived_from_the_bar_stay_expressions() {
     let path = file("hermle-c600u/chapter5.toml");
     let session = files::session(&path, &files::ReadOptions::default()).expect("a session");
-    let test = session
-        .tests
-        .iter()
-        .find(|test| test.name == "A150")
-        .expect("the test");
+    let test = session.tests.iter().find(|test| test.name == "A150").expect("the test");
     let source = SessionTest::new(&session, test).expect("a plan");
     let equation = Equation::of(&session.machine, &source, &session.unknowns, &Options::default());
     let text = printed(&equation.expect("an equation"), &source, "text");

@@ -66,8 +66,5 @@ pub fn eight() -> Vec<ErrorName> {
 /// A checked equation in a language.
 pub fn printed(equation: &Equation, source: &impl Source, word: &str) -> String {
     let checked = check(equation, source).expect("agreement with dual numbers");
-    language(word)
-        .expect("a language")
-        .print(&checked)
-        .expect("a page")
+    language(word).expect("a language").print(&checked).expect("a page")
 }

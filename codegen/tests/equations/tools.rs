@@ -47,10 +47,7 @@ pub fn run(command: &mut Command) -> String {
     let output = command.output().expect("a command that starts");
     let error = String::from_utf8_lossy(&output.stderr);
     // Octave without a terminal prints this message at exit, whatever the script.
-    let error: String = error
-        .lines()
-        .filter(|line| !line.contains("while preparing to exit"))
-        .collect();
+    let error: String = error.lines().filter(|line| !line.contains("while preparing to exit")).collect();
     assert!(output.status.success(), "{command:?}: {error}");
     assert!(error.trim().is_empty(), "{command:?}: {error}");
     String::from_utf8(output.stdout).expect("text")

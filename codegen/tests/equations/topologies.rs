@@ -46,11 +46,7 @@ pub fn all_errors(machine: &Machine) -> Vec<ErrorName> {
                 let without_effect =
                     axis.kind == AxisKind::Linear && kind == ErrorKind::Location && !freedom.is_angle();
                 if !without_effect {
-                    names.push(ErrorName {
-                        kind,
-                        freedom,
-                        axis: axis.name.clone(),
-                    });
+                    names.push(ErrorName { kind, freedom, axis: axis.name.clone() });
                 }
             }
         }
@@ -129,11 +125,7 @@ fn case(what: What, machine: &Machine, errors: &[ErrorName], random: &mut impl r
             random.random_range(-size..size)
         })
         .collect();
-    let index = |slot: usize| {
-        errors
-            .iter()
-            .position(|name| machine.error_slot(name) == Some(slot))
-    };
+    let index = |slot: usize| errors.iter().position(|name| machine.error_slot(name) == Some(slot));
     let mut values = Vec::new();
     let mut gradient: Vec<Vec<f64>> = Vec::new();
     for start in (0..errors.len()).step_by(8) {
@@ -144,44 +136,30 @@ fn case(what: What, machine: &Machine, errors: &[ErrorName], random: &mut impl r
             }
             Pack::new(small[i], Derivative::some(seed))
         };
-        let bodies = machine.body_errors(
-            |slot| index(slot).is_some(),
-            |slot| index(slot).map_or_else(|| Pack::from_re(0.0), seeded),
-        );
+        let bodies = machine
+            .body_errors(|slot| index(slot).is_some(), |slot| index(slot).map_or_else(|| Pack::from_re(0.0), seeded));
         let read: Vec<Pack> = match what {
             What::Bar => {
                 let l = |i: usize| lengths[i];
-                let bar = BallBar {
-                    workpiece_ball: [l(0), l(1), l(2)],
-                    spindle_ball: [l(3), l(4), l(5)],
-                    bar: 100.0,
-                };
+                let bar = BallBar { workpiece_ball: [l(0), l(1), l(2)], spindle_ball: [l(3), l(4), l(5)], bar: 100.0 };
                 vec![bar.read(machine, &state, &bodies, |_| None)]
             }
             What::Volumetric => {
                 let none = machine.body_errors::<Pack>(|_| false, |_| Pack::from_re(0.0));
                 let tool = Point::<Pack>::nominal([lengths[0], lengths[1], lengths[2]]);
-                let seen = |bodies: &[_]| {
-                    machine.table_point(&state, bodies, machine.tool_point(&state, bodies, tool))
-                };
+                let seen = |bodies: &[_]| machine.table_point(&state, bodies, machine.tool_point(&state, bodies, tool));
                 seen(&bodies).minus(seen(&none)).0.to_vec()
             }
         };
         values = read.iter().map(|value| value.re).collect();
         gradient.resize(read.len(), Vec::new());
         for (row, value) in gradient.iter_mut().zip(&read) {
-            let slopes = value
-                .eps
-                .unwrap_generic(nalgebra::Const::<8>, nalgebra::Const::<1>);
+            let slopes = value.eps.unwrap_generic(nalgebra::Const::<8>, nalgebra::Const::<1>);
             let end = errors.len().min(start + 8);
             row.extend((start..end).map(|k| slopes[k - start]));
         }
     }
-    Case {
-        arguments: [lengths, axes, small],
-        values,
-        gradient: gradient.concat(),
-    }
+    Case { arguments: [lengths, axes, small], values, gradient: gradient.concat() }
 }
 
 /// The largest difference, relative to the largest value of the same quantity over the cases.
@@ -197,10 +175,7 @@ pub fn disagreement(cases: &[Case], found: &[Vec<f64>], gradient: bool) -> f64 {
     assert_eq!(found.len(), cases.len());
     let mut worst = 0.0_f64;
     for column in 0..columns {
-        let scale = cases
-            .iter()
-            .map(|case| expected(case)[column].abs())
-            .fold(1e-3, f64::max);
+        let scale = cases.iter().map(|case| expected(case)[column].abs()).fold(1e-3, f64::max);
         for (case, found) in cases.iter().zip(found) {
             assert_eq!(found.len(), columns);
             let difference = (found[column] - expected(case)[column]).abs() / scale;

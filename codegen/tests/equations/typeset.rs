@@ -13,13 +13,7 @@ use crate::support::{Chapter5, eight, hermle, printed};
 use crate::tools;
 use crate::topologies::{AnyBar, CODES, all_errors, machine};
 
-fn of(
-    machine: &Machine,
-    source: &impl Source,
-    errors: &[ErrorName],
-    options: &Options,
-    language: &str,
-) -> String {
+fn of(machine: &Machine, source: &impl Source, errors: &[ErrorName], options: &Options, language: &str) -> String {
     let equation = Equation::of(machine, source, errors, options).expect("an equation");
     printed(&equation, source, language)
 }
@@ -47,28 +41,17 @@ fn fragments(language: &str) -> Vec<String> {
     for code in CODES {
         let machine = machine(code);
         let errors = all_errors(&machine);
-        let motions: Vec<ErrorName> = errors
-            .iter()
-            .filter(|name| name.kind == ErrorKind::Motion)
-            .cloned()
-            .collect();
+        let motions: Vec<ErrorName> = errors.iter().filter(|name| name.kind == ErrorKind::Motion).cloned().collect();
         fragments.push(of(&machine, &AnyBar, &errors, &Options::default(), language));
-        let first = Options {
-            order: Order::First,
-            ..Options::default()
-        };
+        let first = Options { order: Order::First, ..Options::default() };
         fragments.push(of(&machine, &AnyBar, &errors, &first, language));
         fragments.push(of(&machine, &ToolPoint, &motions, &first, language));
     }
     // Every declared shape.
     let machine = Machine::from_code("w C b X t").expect("a code");
     for order in [Order::Exact, Order::Bilinear, Order::First] {
-        let options = Options {
-            order,
-            gradient: order != Order::Bilinear,
-            effects: every_shape(),
-            ..Options::default()
-        };
+        let options =
+            Options { order, gradient: order != Order::Bilinear, effects: every_shape(), ..Options::default() };
         fragments.push(of(&machine, &Bar, &eight()[4..], &options, language));
     }
     fragments.extend(crate::probe::fragments(language));
@@ -105,27 +88,12 @@ fn latex() {
     document.push_str("\\end{document}\n");
     tools::write(&folder.join("all.tex"), &document);
     let arguments = ["-interaction=nonstopmode", "-halt-on-error", "all.tex"];
-    let output = Command::new(engine)
-        .current_dir(&folder)
-        .args(arguments)
-        .output()
-        .expect("the engine starts");
+    let output = Command::new(engine).current_dir(&folder).args(arguments).output().expect("the engine starts");
     let log = String::from_utf8_lossy(&std::fs::read(folder.join("all.log")).expect("a log")).into_owned();
-    assert!(
-        output.status.success(),
-        "{}",
-        &log[log.len().saturating_sub(3000)..]
-    );
-    let complaints: Vec<&str> = log
-        .lines()
-        .filter(|line| line.contains("Warning") || line.contains("Overfull"))
-        .collect();
-    assert!(
-        complaints.is_empty(),
-        "{} complaints, {:?}",
-        complaints.len(),
-        &complaints[..complaints.len().min(20)]
-    );
+    assert!(output.status.success(), "{}", &log[log.len().saturating_sub(3000)..]);
+    let complaints: Vec<&str> =
+        log.lines().filter(|line| line.contains("Warning") || line.contains("Overfull")).collect();
+    assert!(complaints.is_empty(), "{} complaints, {:?}", complaints.len(), &complaints[..complaints.len().min(20)]);
     let _ = std::fs::remove_dir_all(&folder);
 }
 

@@ -21,10 +21,7 @@ fn sessions() -> std::path::PathBuf {
 /// A session with readings simulated at given values.
 fn drawn(plan: Session, given: &[&str]) -> Session {
     let simulation = Simulation {
-        given: given
-            .iter()
-            .map(|text| Given::parse(text).expect("NAME=VALUEUNIT"))
-            .collect(),
+        given: given.iter().map(|text| Given::parse(text).expect("NAME=VALUEUNIT")).collect(),
         draw_setups: true,
         seed: 1,
         ..Simulation::default()
@@ -37,35 +34,20 @@ fn drawn(plan: Session, given: &[&str]) -> Session {
     session
 }
 
-/// The tests of chapter 5, each with its own set-up, with about this many readings in total: eight errors, and seven set-up
-/// parameters per test.
+/// The tests of chapter 5, each with its own set-up, with about this many readings in total: eight errors, and seven
+/// set-up parameters per test.
 pub fn ball_bar(count: usize, readings: usize) -> Session {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let machine = sessions().join("machine.toml");
     let machine = machine.canonicalize().expect("the ready machine");
     std::fs::copy(machine, folder.path().join("machine.toml")).expect("a copy");
-    let mut text =
-        "[machine]\nfile = \"machine.toml\"\n[instrument]\nkind = \"ballbar\"\nnoise_um = 0.3\n".to_string();
+    let mut text = "[machine]\nfile = \"machine.toml\"\n[instrument]\nkind = \"ballbar\"\nnoise_um = 0.3\n".to_string();
     let square = "sqrt(149.9946^2 - 100^2)";
     let tests = [
         ("A100", "A", -20.0, 70.0, 99.9881, String::new()),
-        (
-            "A150",
-            "A",
-            -20.0,
-            70.0,
-            149.9946,
-            format!("at = {{ x_mm = \"-{square}\" }}\n"),
-        ),
+        ("A150", "A", -20.0, 70.0, 149.9946, format!("at = {{ x_mm = \"-{square}\" }}\n")),
         ("C100", "C", 0.0, 360.0, 99.9881, String::new()),
-        (
-            "C150",
-            "C",
-            0.0,
-            360.0,
-            149.9946,
-            format!("at = {{ z_mm = \"{square}\" }}\n"),
-        ),
+        ("C150", "C", 0.0, 360.0, 149.9946, format!("at = {{ z_mm = \"{square}\" }}\n")),
     ];
     for (number, (kind, axis, from, to, bar, at)) in tests.iter().cycle().take(count).enumerate() {
         let name = format!("{kind}-{number}");
@@ -80,15 +62,5 @@ pub fn ball_bar(count: usize, readings: usize) -> Session {
     let file = folder.path().join("session.toml");
     std::fs::write(&file, text).expect("a file in a temporary folder");
     let plan = read(&file, &ReadOptions::default()).expect("a valid session");
-    drawn(
-        plan,
-        &[
-            "EY0A=35.3um",
-            "EZ0A=-10um",
-            "EX0C=12um",
-            "EY0C=-20um",
-            "EB0A=-5arcsec",
-            "EC0A=8arcsec",
-        ],
-    )
+    drawn(plan, &["EY0A=35.3um", "EZ0A=-10um", "EX0C=12um", "EY0C=-20um", "EB0A=-5arcsec", "EC0A=8arcsec"])
 }

@@ -1,15 +1,17 @@
 //! Diagnosis of a circular test of two linear axes: the contribution of each classical fault to the radial deviation.
 //!
-//! Values have the signs of the error motions `E` of ISO 230-1, along R. For example, the backlash of X has the sign of the effect
-//! `EXX~X:backlash`, whatever the counting direction of X. Faults that follow from a difference or a sum over both axes (scale mismatch,
-//! servo mismatch, third-order positioning) refer to the axes' positive directions. They are positive if an axis travels too far or lags.
+//! Values have the signs of the error motions `E` of ISO 230-1, along R. For example, the backlash of X has the sign of
+//! the effect `EXX~X:backlash`, whatever the counting direction of X. Faults that follow from a difference or a sum
+//! over both axes (scale mismatch, servo mismatch, third-order positioning) refer to the axes' positive directions.
+//! They are positive if an axis travels too far or lags.
 //!
-//! One least-squares fit estimates all terms of [`super::terms`], the radius and the centre. Radius and centre absorb the set-up. The
-//! width of reversal spikes and the pitch of cyclic errors are searched. These faults are added only if chance gives as large a gain in
-//! fewer than one of a thousand circles. The share of a fault is the range of its own `δL` over the sum of all ranges.
+//! One least-squares fit estimates all terms of [`super::terms`], the radius and the centre. Radius and centre absorb
+//! the set-up. The width of reversal spikes and the pitch of cyclic errors are searched. These faults are added only if
+//! chance gives as large a gain in fewer than one of a thousand circles. The share of a fault is the range of its own
+//! `δL` over the sum of all ranges.
 //!
-//! The uncertainties follow from the noise, or from the residual if that is larger. If neighbouring residuals have the correlation r, the
-//! uncertainties are enlarged by √((1 + r)/(1 − r)).
+//! The uncertainties follow from the noise, or from the residual if that is larger. If neighbouring residuals have the
+//! correlation r, the uncertainties are enlarged by √((1 + r)/(1 − r)).
 
 use abbe_model::chain::Machine;
 
@@ -39,35 +41,24 @@ struct Decomposition {
 impl Decomposition {
     /// Decomposes a path. The error holds the reason in words if the path is a circle of linear axes.
     fn of(machine: &Machine, path: &Path) -> Result<Decomposition, Option<String>> {
-        let MovingAxes::Linear {
-            axes,
-            radius_mm,
-            radial,
-        } = path.moves
-        else {
+        let MovingAxes::Linear { axes, radius_mm, radial } = path.moves else {
             return Err(None);
         };
         let arc_deg = path.arc().to_degrees();
         if !radial {
-            return Err(Some(
-                "no diagnosis: the bar does not lie in the plane of the circle".into(),
-            ));
+            return Err(Some("no diagnosis: the bar does not lie in the plane of the circle".into()));
         }
         if arc_deg < MIN_ARC_DEG * 0.99 {
-            return Err(Some(format!(
-                "no diagnosis: an arc of {arc_deg:.0}° is too short for it"
-            )));
+            return Err(Some(format!("no diagnosis: an arc of {arc_deg:.0}° is too short for it")));
         }
         let names = axes.map(|axis| machine.axes[axis].name.clone());
         let rows = PathRows::of(path);
         let mut faults = standard(path, &rows, &names, radius_mm);
         let Some(mut regression) = solve(&rows, &faults) else {
-            return Err(Some(
-                "no diagnosis: the faults are not separable with these readings".into(),
-            ));
+            return Err(Some("no diagnosis: the faults are not separable with these readings".into()));
         };
-        // Third-order errors are in the model during the search for spikes and cyclic errors, and remain if they are significant. On a
-        // partial circle they are nearly collinear with scale mismatch and straightness.
+        // Third-order errors are in the model during the search for spikes and cyclic errors, and remain if they are
+        // significant. On a partial circle they are nearly collinear with scale mismatch and straightness.
         if arc_deg > FULL_CIRCLE_DEG * 0.99 {
             let found = third_order(&rows, &names);
             add_faults(&rows, &mut faults, &mut regression, found);
@@ -76,8 +67,7 @@ impl Decomposition {
         add_faults(&rows, &mut faults, &mut regression, found);
         let found = cyclic(&rows, &names, &faults, &regression);
         add_faults(&rows, &mut faults, &mut regression, found);
-        let stays =
-            |fault: &Fault| !is_third_order(fault) || is_separable(&rows, &faults, fault, &regression);
+        let stays = |fault: &Fault| !is_third_order(fault) || is_separable(&rows, &faults, fault, &regression);
         let kept: Vec<bool> = faults.iter().map(stays).collect();
         if kept.contains(&false) {
             let mut kept = kept.into_iter();
@@ -86,12 +76,7 @@ impl Decomposition {
                 regression = without;
             }
         }
-        Ok(Decomposition {
-            names,
-            rows,
-            faults,
-            regression,
-        })
+        Ok(Decomposition { names, rows, faults, regression })
     }
 }
 
@@ -106,10 +91,8 @@ pub(super) fn reject_outliers(machine: &Machine, path: &Path) -> Option<Vec<bool
     let mut outliers = path.left_out.clone();
     for (i, value) in residual.iter().enumerate() {
         let neighbours = [i.checked_sub(1), Some(i + 1)];
-        let alone = neighbours
-            .into_iter()
-            .filter_map(|j| residual.get(j?))
-            .all(|other| other.abs() < 0.5 * value.abs());
+        let alone =
+            neighbours.into_iter().filter_map(|j| residual.get(j?)).all(|other| other.abs() < 0.5 * value.abs());
         if value.abs() > limit && alone {
             outliers[model.rows.row[i]] = true;
         }
@@ -175,12 +158,7 @@ fn standard(path: &Path, rows: &PathRows, names: &[String; 2], radius_mm: f64) -
             "ms",
         ));
     } else if path.both_directions() {
-        faults.push(Fault::new("servo mismatch", plane, vec![rows.servo()]).figure(
-            "lag",
-            &[(0, 1.0)],
-            1e3,
-            "um",
-        ));
+        faults.push(Fault::new("servo mismatch", plane, vec![rows.servo()]).figure("lag", &[(0, 1.0)], 1e3, "um"));
     }
     for axis in 0..2 {
         let name = &names[axis];
@@ -190,23 +168,19 @@ fn standard(path: &Path, rows: &PathRows, names: &[String; 2], radius_mm: f64) -
                 .figure(format!("{name}+"), &[(0, own), (1, own)], 1e3, "um")
                 .figure(format!("{name}-"), &[(0, own), (1, -own)], 1e3, "um"),
         );
-        faults.push(
-            Fault::new("straightness", name.clone(), vec![rows.straightness(axis)]).figure(
-                "sagitta",
+        faults.push(Fault::new("straightness", name.clone(), vec![rows.straightness(axis)]).figure(
+            "sagitta",
+            &[(0, across)],
+            1e3,
+            "um",
+        ));
+        if path.both_directions() {
+            faults.push(Fault::new("lateral play", name.clone(), vec![rows.lateral(axis)]).figure(
+                "play",
                 &[(0, across)],
                 1e3,
                 "um",
-            ),
-        );
-        if path.both_directions() {
-            faults.push(
-                Fault::new("lateral play", name.clone(), vec![rows.lateral(axis)]).figure(
-                    "play",
-                    &[(0, across)],
-                    1e3,
-                    "um",
-                ),
-            );
+            ));
         }
     }
     faults
@@ -225,11 +199,8 @@ fn report(rows: &PathRows, faults: &[Fault], regression: &Regression, sigma: f64
             .figures
             .iter()
             .map(|figure| {
-                let weights: Vec<(usize, f64)> = figure
-                    .weights
-                    .iter()
-                    .map(|(j, w)| (first + j, w * figure.per_mm))
-                    .collect();
+                let weights: Vec<(usize, f64)> =
+                    figure.weights.iter().map(|(j, w)| (first + j, w * figure.per_mm)).collect();
                 let value = weights.iter().map(|(j, w)| regression.beta[*j] * w).sum();
                 ParameterResult::new(&figure.name, value, regression.u(&weights, sigma), figure.unit)
             })
@@ -245,13 +216,9 @@ fn report(rows: &PathRows, faults: &[Fault], regression: &Regression, sigma: f64
         values.extend(fault.searched.iter().cloned());
         let own = (0..rows.count()).map(|i| {
             let terms = fault.columns.iter().enumerate();
-            terms
-                .map(|(j, column)| column[i] * regression.beta[first + j])
-                .sum::<f64>()
+            terms.map(|(j, column)| column[i] * regression.beta[first + j]).sum::<f64>()
         });
-        let (least, most) = own.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
-            (a.min(x), b.max(x))
-        });
+        let (least, most) = own.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
         for value in &mut values {
             value.meaning = format!("{} of {}: {}", fault.fault, fault.axes, value.id);
         }
@@ -266,15 +233,9 @@ fn report(rows: &PathRows, faults: &[Fault], regression: &Regression, sigma: f64
     }
     let total: f64 = result.diagnosis.iter().map(|fault| fault.circularity_um).sum();
     for fault in &mut result.diagnosis {
-        fault.share_percent = if total > 0.0 {
-            100.0 * fault.circularity_um / total
-        } else {
-            0.0
-        };
+        fault.share_percent = if total > 0.0 { 100.0 * fault.circularity_um / total } else { 0.0 };
     }
-    result
-        .diagnosis
-        .sort_by(|a, b| b.circularity_um.total_cmp(&a.circularity_um));
+    result.diagnosis.sort_by(|a, b| b.circularity_um.total_cmp(&a.circularity_um));
     result.diagnosis_rms_um = Some((regression.sum_of_squares() / rows.count() as f64).sqrt() * 1e3);
 }
 
@@ -287,14 +248,14 @@ fn limits(path: &Path, regression: &Regression, sigma: f64, names: &[String; 2],
         names[0], names[1]
     ));
     if !path.both_directions() {
-        let why = "one direction only: servo mismatch is confounded with squareness, and lateral play with radius and scale";
+        let why =
+            "one direction only: servo mismatch is confounded with squareness, and lateral play with radius and scale";
         result.not_identifiable.push(why.into());
     } else if path.feed_mm_s.is_none() {
         let why = "no time in the data: servo mismatch is given as a lag in µm at this feed, not in ms";
         result.not_identifiable.push(why.into());
     }
     result.not_identifiable.push(
-        "straightness is confounded with a positioning error of the other axis that grows with the square"
-            .into(),
+        "straightness is confounded with a positioning error of the other axis that grows with the square".into(),
     );
 }

@@ -26,14 +26,7 @@ pub(super) struct Fault {
 
 impl Fault {
     pub fn new(fault: &'static str, axes: String, columns: Vec<Vec<f64>>) -> Fault {
-        Fault {
-            fault,
-            axes,
-            columns,
-            figures: Vec::new(),
-            amplitudes: Vec::new(),
-            searched: Vec::new(),
-        }
+        Fault { fault, axes, columns, figures: Vec::new(), amplitudes: Vec::new(), searched: Vec::new() }
     }
 
     pub fn figure(
@@ -43,12 +36,7 @@ impl Fault {
         per_mm: f64,
         unit: &'static str,
     ) -> Fault {
-        self.figures.push(Figure {
-            name: name.into(),
-            weights: weights.to_vec(),
-            per_mm,
-            unit,
-        });
+        self.figures.push(Figure { name: name.into(), weights: weights.to_vec(), per_mm, unit });
         self
     }
 }
@@ -64,15 +52,8 @@ pub(super) fn columns(rows: &PathRows, faults: &[Fault]) -> Vec<Vec<f64>> {
 pub(super) fn variance_and_correlation(rows: &PathRows, regression: &Regression) -> (f64, f64) {
     let residual = &regression.residual;
     let sum = regression.sum_of_squares();
-    let neighbours: f64 = (1..residual.len())
-        .filter(|i| rows.follows[*i])
-        .map(|i| residual[i] * residual[i - 1])
-        .sum();
+    let neighbours: f64 = (1..residual.len()).filter(|i| rows.follows[*i]).map(|i| residual[i] * residual[i - 1]).sum();
     let freedom = residual.len().saturating_sub(regression.beta.len()).max(1);
-    let correlation = if sum > 0.0 {
-        (neighbours / sum).clamp(0.0, 0.99)
-    } else {
-        0.0
-    };
+    let correlation = if sum > 0.0 { (neighbours / sum).clamp(0.0, 0.99) } else { 0.0 };
     (sum / freedom as f64, correlation)
 }

@@ -1,12 +1,12 @@
-//! Characteristics of ISO 230-4: circular deviation G, bidirectional circular deviation G(b), radial deviation F, mean bidirectional
-//! radial deviation D, and circular hysteresis H (edition of 1996).
+//! Characteristics of ISO 230-4: circular deviation G, bidirectional circular deviation G(b), radial deviation F, mean
+//! bidirectional radial deviation D, and circular hysteresis H (edition of 1996).
 //!
 //! ```text
 //! p(θ) = L(θ)·(cos θ, sin θ)     c, ρ: least-squares circle through p     G = max ‖p − c‖ − min ‖p − c‖     F(θ) = ‖p − c‖ − L_nominal
 //! ```
 //!
-//! The standard permits the least-squares circle in place of the minimum-zone circles (clause 3). This module uses the least-squares
-//! circle, so G is never smaller than with minimum-zone circles.
+//! The standard permits the least-squares circle in place of the minimum-zone circles (clause 3). This module uses the
+//! least-squares circle, so G is never smaller than with minimum-zone circles.
 
 use std::f64::consts::{PI, TAU};
 
@@ -76,9 +76,7 @@ pub(super) fn figures(machine: &Machine, test: &Test, path: &Path) -> CircularTe
             let differences = there.0.iter().filter_map(|p| Some((p[1] - back.at(p[0])?).abs()));
             result.hysteresis_um = differences.reduce(f64::max).map(|most| most * 1e3);
         }
-        _ => result
-            .not_identifiable
-            .push("one direction only: G(b), D and hysteresis require both directions".into()),
+        _ => result.not_identifiable.push("one direction only: G(b), D and hysteresis require both directions".into()),
     }
     result
 }
@@ -90,13 +88,9 @@ fn mean(path: &Path, direction: f64) -> Option<(PolarPath, usize)> {
         .iter()
         .filter(|run| run.direction == direction)
         .map(|run| {
-            let kept = run
-                .rows
-                .clone()
-                .filter(|row| !path.left_out.get(*row).copied().unwrap_or(false));
-            let mut points: Vec<[f64; 3]> = kept
-                .map(|row| [path.angle[row], path.deviation_mm[row], path.nominal_mm[row]])
-                .collect();
+            let kept = run.rows.clone().filter(|row| !path.left_out.get(*row).copied().unwrap_or(false));
+            let mut points: Vec<[f64; 3]> =
+                kept.map(|row| [path.angle[row], path.deviation_mm[row], path.nominal_mm[row]]).collect();
             points.sort_by(|a, b| a[0].total_cmp(&b[0]));
             PolarPath(points)
         })
@@ -139,7 +133,8 @@ struct RadialDeviations {
     radius_mm: f64,
 }
 
-/// Removes the centre. If a rotary axis turns, the reading need not be a radius; the centre is then the first harmonic of the reading.
+/// Removes the centre. If a rotary axis turns, the reading need not be a radius; the centre is then the first harmonic
+/// of the reading.
 fn about(path: &Path, trace: &PolarPath) -> RadialDeviations {
     let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / trace.0.len() as f64;
     let nominal = mean(&mut trace.0.iter().map(|p| p[2]));
@@ -153,9 +148,7 @@ fn about(path: &Path, trace: &PolarPath) -> RadialDeviations {
         })
         .collect();
     // On a short arc the centre is confounded with the radius.
-    let found = (path.arc() >= PI * 0.99)
-        .then(|| circle::through(&points))
-        .flatten();
+    let found = (path.arc() >= PI * 0.99).then(|| circle::through(&points)).flatten();
     let Some(circle) = found else {
         return RadialDeviations {
             deviations_mm: trace.0.iter().map(|p| p[1]).collect(),
@@ -174,9 +167,5 @@ fn about(path: &Path, trace: &PolarPath) -> RadialDeviations {
 }
 
 fn range(values: &[f64]) -> (f64, f64) {
-    values
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), x| {
-            (least.min(*x), most.max(*x))
-        })
+    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), x| (least.min(*x), most.max(*x)))
 }

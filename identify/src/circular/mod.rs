@@ -1,8 +1,9 @@
 //! Characteristics of ISO 230-4 and the diagnosis of circular ball-bar tests.
 //!
-//! A ball bar between spindle ball and workpiece ball measures the radius of the path, `L(θ) = R + δL(θ)`. The characteristics describe
-//! the measured path. The diagnosis decomposes `δL` by least squares into the contributions of the classical faults of two linear axes
-//! (module `diagnosis`). Both use the readings only: fitted errors are not subtracted.
+//! A ball bar between spindle ball and workpiece ball measures the radius of the path, `L(θ) = R + δL(θ)`. The
+//! characteristics describe the measured path. The diagnosis decomposes `δL` by least squares into the contributions of
+//! the classical faults of two linear axes (module `diagnosis`). Both use the readings only: fitted errors are not
+//! subtracted.
 
 mod diagnosis;
 mod fault;
@@ -19,16 +20,15 @@ use abbe_model::session::Session;
 
 /// The characteristics of every ball-bar test with a circular path, and of every one in which a rotary axis turns.
 ///
-/// `noise_mm` is the standard deviation of a reading; `left_out[test][row]` marks outliers. The outliers of a circle of linear axes come
-/// from its own diagnosis instead: what a fit without these faults rejects may be a reversal spike.
+/// `noise_mm` is the standard deviation of a reading; `left_out[test][row]` marks outliers. The outliers of a circle of
+/// linear axes come from its own diagnosis instead: what a fit without these faults rejects may be a reversal spike.
 pub fn of_session(session: &Session, noise_mm: f64, left_out: &[Vec<bool>]) -> Vec<CircularTest> {
     let measured = session.tests.iter().filter(|test| test.readings.is_some());
     let mut results: Vec<CircularTest> = measured
         .zip(left_out)
         .filter_map(|(test, left_out)| {
             let mut path = path::Path::of(&session.machine, test)?;
-            path.left_out =
-                diagnosis::reject_outliers(&session.machine, &path).unwrap_or_else(|| left_out.clone());
+            path.left_out = diagnosis::reject_outliers(&session.machine, &path).unwrap_or_else(|| left_out.clone());
             let mut result = figures::figures(&session.machine, test, &path);
             diagnosis::add(&session.machine, &path, noise_mm, &mut result);
             Some(result)

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
-use abbe_model::effect::DriverSample;
+use abbe_model::driver::DriverSample;
 use abbe_model::instrument::{InstrumentKind, Station};
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::Test;
@@ -33,8 +33,8 @@ pub(super) enum MovingAxes {
     Rotary(usize),
 }
 
-/// Sign factors of two linear axes between the measured path (tool relative to workpiece, in the axes' positive directions) and the error
-/// motions `E` of the axes' bodies along R.
+/// Sign factors of two linear axes between the measured path (tool relative to workpiece, in the axes' positive
+/// directions) and the error motions `E` of the axes' bodies along R.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Signs {
     /// +1 if the body of the axis moves along R for an increasing command, −1 if it moves against R.
@@ -50,23 +50,19 @@ impl Signs {
                 direction: axes.map(|axis| machine.axes[axis].principal().map_or(1.0, |(_, sign)| sign)),
                 side: axes.map(|axis| if axis < machine.workpiece_side { -1.0 } else { 1.0 }),
             },
-            MovingAxes::Rotary(_) => Signs {
-                direction: [1.0; 2],
-                side: [1.0; 2],
-            },
+            MovingAxes::Rotary(_) => Signs { direction: [1.0; 2], side: [1.0; 2] },
         }
     }
 
-    /// The factor of an error of axis `of` along axis `along`: a deviation `δ` of the path along `along` is an error motion of `factor·δ`.
+    /// The factor of an error of axis `of` along axis `along`: a deviation `δ` of the path along `along` is an error
+    /// motion of `factor·δ`.
     pub fn error(&self, of: usize, along: usize) -> f64 {
         self.side[of] * self.side[along] * self.direction[along]
     }
 
     /// The factor of the squareness error of the two axes.
     pub fn squareness(&self) -> f64 {
-        (0..2)
-            .map(|axis| self.side[axis] * self.direction[axis])
-            .product()
+        (0..2).map(|axis| self.side[axis] * self.direction[axis]).product()
     }
 }
 
@@ -163,11 +159,8 @@ impl Path {
     pub fn arc(&self) -> f64 {
         let of = |run: &DirectionRun| {
             let angles = &self.angle[run.rows.clone()];
-            let (least, most) = angles
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
-                    (a.min(*x), b.max(*x))
-                });
+            let (least, most) =
+                angles.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
             most - least
         };
         self.runs.iter().map(of).fold(0.0, f64::max).min(TAU)
@@ -198,9 +191,7 @@ fn moves(machine: &Machine, positions: &[Vec<f64>], nominal_mm: &[f64]) -> Optio
             (off < OFF_CIRCLE * circle.radius).then(|| MovingAxes::Linear {
                 axes: ordered(machine, [first, second]),
                 radius_mm: circle.radius,
-                radial: nominal_mm
-                    .iter()
-                    .all(|length| (length - circle.radius).abs() < OFF_PLANE * circle.radius),
+                radial: nominal_mm.iter().all(|length| (length - circle.radius).abs() < OFF_PLANE * circle.radius),
             })
         }
         _ => None,
@@ -209,19 +200,11 @@ fn moves(machine: &Machine, positions: &[Vec<f64>], nominal_mm: &[f64]) -> Optio
 
 /// The two axes in the order of their names: XY, XZ, YZ.
 fn ordered(machine: &Machine, axes: [usize; 2]) -> [usize; 2] {
-    if machine.axes[axes[0]].name <= machine.axes[axes[1]].name {
-        axes
-    } else {
-        [axes[1], axes[0]]
-    }
+    if machine.axes[axes[0]].name <= machine.axes[axes[1]].name { axes } else { [axes[1], axes[0]] }
 }
 
 fn points(positions: &[Vec<f64>], axes: [usize; 2]) -> Vec<[f64; 2]> {
-    positions[axes[0]]
-        .iter()
-        .zip(&positions[axes[1]])
-        .map(|(a, b)| [*a, *b])
-        .collect()
+    positions[axes[0]].iter().zip(&positions[axes[1]]).map(|(a, b)| [*a, *b]).collect()
 }
 
 /// Angles of positions about the centre of their circle, in (−π, π].
@@ -240,11 +223,7 @@ fn feed(samples: &[Vec<DriverSample<f64>>; 2], timed: bool) -> Option<f64> {
     if !timed || samples[0].is_empty() {
         return None;
     }
-    let mut speeds: Vec<f64> = samples[0]
-        .iter()
-        .zip(&samples[1])
-        .map(|(a, b)| a.rate.hypot(b.rate))
-        .collect();
+    let mut speeds: Vec<f64> = samples[0].iter().zip(&samples[1]).map(|(a, b)| a.rate.hypot(b.rate)).collect();
     speeds.sort_by(f64::total_cmp);
     speeds.get(speeds.len() / 2).copied().filter(|speed| *speed > 0.0)
 }

@@ -25,12 +25,9 @@ impl Regression {
             return None;
         }
         let mut triangle = Triangle::new(n);
-        triangle
-            .absorb(Mat::from_fn(y.len(), n + 1, |i, j| if j < n { columns[j][i] } else { y[i] }).as_ref());
+        triangle.absorb(Mat::from_fn(y.len(), n + 1, |i, j| if j < n { columns[j][i] } else { y[i] }).as_ref());
         let (r, c, _) = triangle.parts();
-        let norms: Vec<f64> = (0..n)
-            .map(|j| (0..n).map(|i| r[(i, j)].powi(2)).sum::<f64>().sqrt())
-            .collect();
+        let norms: Vec<f64> = (0..n).map(|j| (0..n).map(|i| r[(i, j)].powi(2)).sum::<f64>().sqrt()).collect();
         if norms.iter().any(|norm| *norm <= 0.0) {
             return None;
         }
@@ -41,20 +38,10 @@ impl Regression {
             return None;
         }
         let spread = Mat::from_fn(n, n, |j, k| svd.V()[(j, k)] / singular[k] / norms[j]);
-        let projected: Vec<f64> = (0..n)
-            .map(|k| (0..n).map(|i| svd.U()[(i, k)] * c[i]).sum())
-            .collect();
-        let beta: Vec<f64> = (0..n)
-            .map(|j| (0..n).map(|k| spread[(j, k)] * projected[k]).sum())
-            .collect();
-        let residual = (0..y.len())
-            .map(|i| y[i] - (0..n).map(|j| columns[j][i] * beta[j]).sum::<f64>())
-            .collect();
-        Some(Regression {
-            beta,
-            inverse: &spread * spread.transpose(),
-            residual,
-        })
+        let projected: Vec<f64> = (0..n).map(|k| (0..n).map(|i| svd.U()[(i, k)] * c[i]).sum()).collect();
+        let beta: Vec<f64> = (0..n).map(|j| (0..n).map(|k| spread[(j, k)] * projected[k]).sum()).collect();
+        let residual = (0..y.len()).map(|i| y[i] - (0..n).map(|j| columns[j][i] * beta[j]).sum::<f64>()).collect();
+        Some(Regression { beta, inverse: &spread * spread.transpose(), residual })
     }
 
     /// Sum of squares of the residual.
@@ -64,10 +51,8 @@ impl Regression {
 
     /// Standard uncertainty of `Σ wⱼ·βⱼ` for readings with the standard deviation `sigma`.
     pub fn u(&self, weights: &[(usize, f64)], sigma: f64) -> f64 {
-        let variance: f64 = weights
-            .iter()
-            .flat_map(|(j, a)| weights.iter().map(move |(k, b)| a * b * self.inverse[(*j, *k)]))
-            .sum();
+        let variance: f64 =
+            weights.iter().flat_map(|(j, a)| weights.iter().map(move |(k, b)| a * b * self.inverse[(*j, *k)])).sum();
         variance.max(0.0).sqrt() * sigma
     }
 }

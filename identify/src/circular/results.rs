@@ -45,7 +45,8 @@ pub struct CircularTest {
 /// Figures of the mean path of the runs in one direction.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct DirectionFigures {
-    /// `+`: from the first axis of the plane towards the second, or the positive rotation of the rotary axis; `-`: the opposite direction.
+    /// `+`: from the first axis of the plane towards the second, or the positive rotation of the rotary axis; `-`: the
+    /// opposite direction.
     pub direction: String,
     /// Number of runs.
     pub runs: usize,
@@ -60,13 +61,14 @@ pub struct DirectionFigures {
 /// Contribution of one classical fault.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Diagnosis {
-    /// `backlash`, `squareness`, `scale mismatch`, `servo mismatch`, `straightness`, `cyclic error`, `reversal spike`, `lateral play`,
-    /// `third-order positioning`, `third-order straightness`.
+    /// `backlash`, `squareness`, `scale mismatch`, `servo mismatch`, `straightness`, `cyclic error`, `reversal spike`,
+    /// `lateral play`, `third-order positioning`, `third-order straightness`.
     pub fault: String,
     /// The axis, or the two axes.
     pub axes: String,
-    /// Its estimates. Those of one axis have the sign of the error motion of that axis along R, as the effect of the same name: `backlash` of X that of
-    /// `EXX~X:backlash`, `lateral play` that of `EYX~X:backlash`, `straightness` that of `EYX~X:power2`, `squareness` of X and Y that of `EC0Y`.
+    /// Its estimates. Those of one axis have the sign of the error motion of that axis along R, as the effect of the
+    /// same name: `backlash` of X that of `EXX~X:backlash`, `lateral play` that of `EYX~X:backlash`, `straightness`
+    /// that of `EYX~X:power2`, `squareness` of X and Y that of `EC0Y`.
     pub values: Vec<ParameterResult>,
     /// Contribution to the path, largest less smallest radius, µm.
     pub circularity_um: f64,

@@ -1,7 +1,8 @@
 //! The contribution of each classical fault of two linear axes to the radius of a circle.
 //!
-//! Notation: `u₁ = cos θ`, `u₂ = sin θ`, `dᵢ` the direction of travel of axis i, `s` that of the path, `v` the feed. The radius changes by
-//! `δL = u₁·δ₁ + u₂·δ₂`. `δᵢ` is the deviation of the tool along the positive direction of axis i.
+//! Notation: `u₁ = cos θ`, `u₂ = sin θ`, `dᵢ` the direction of travel of axis i, `s` that of the path, `v` the feed.
+//! The radius changes by `δL = u₁·δ₁ + u₂·δ₂`. `δᵢ` is the deviation of the tool along the positive direction of axis
+//! i.
 //!
 //! ```text
 //! scale mismatch   δᵢ = mᵢ·qᵢ                 ½(m₁ − m₂)·R·cos 2θ
@@ -30,8 +31,8 @@ pub(super) struct PathRows {
     pub d: [Vec<f64>; 2],
     /// Position of each axis, mm.
     pub q: [Vec<f64>; 2],
-    /// Angle of the path since the last reversal of each axis in this run, and the end of that reversal; infinite before the first
-    /// reversal.
+    /// Angle of the path since the last reversal of each axis in this run, and the end of that reversal; infinite
+    /// before the first reversal.
     pub since: [Vec<(f64, f64)>; 2],
     /// Deviation of the length, mm.
     pub y: Vec<f64>,
@@ -188,9 +189,6 @@ impl PathRows {
     /// u·cos(2πq/p) and u·sin(2πq/p).
     pub fn cyclic(&self, axis: usize, pitch_mm: f64) -> [Vec<f64>; 2] {
         let phase = |i: usize| TAU * self.q[axis][i] / pitch_mm;
-        [
-            self.column(|i| self.u[axis][i] * phase(i).cos()),
-            self.column(|i| self.u[axis][i] * phase(i).sin()),
-        ]
+        [self.column(|i| self.u[axis][i] * phase(i).cos()), self.column(|i| self.u[axis][i] * phase(i).sin())]
     }
 }

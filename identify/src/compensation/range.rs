@@ -61,9 +61,7 @@ pub(super) fn observed_range(problem: &Problem<'_>, error: &ErrorName, axis: usi
         let Some(readings) = &test.readings else { continue };
         let positions = &readings.positions[axis];
         for run in readings.runs() {
-            let observing: Vec<usize> = run
-                .filter(|row| sensitivity[*row] >= MOVED_SHARE * best)
-                .collect();
+            let observing: Vec<usize> = run.filter(|row| sensitivity[*row] >= MOVED_SHARE * best).collect();
             let mut moved: Option<MotionRange> = None;
             for pair in observing.windows(2) {
                 let (a, b) = (positions[pair[0]], positions[pair[1]]);
@@ -71,10 +69,7 @@ pub(super) fn observed_range(problem: &Problem<'_>, error: &ErrorName, axis: usi
                 if (b - a).abs() <= still {
                     continue;
                 }
-                let motion = moved.get_or_insert(MotionRange {
-                    range: a.min(b)..a.max(b),
-                    step: 0.0,
-                });
+                let motion = moved.get_or_insert(MotionRange { range: a.min(b)..a.max(b), step: 0.0 });
                 motion.range = motion.range.start.min(a.min(b))..motion.range.end.max(a.max(b));
                 motion.step = motion.step.max((b - a).abs());
             }
@@ -87,10 +82,7 @@ pub(super) fn observed_range(problem: &Problem<'_>, error: &ErrorName, axis: usi
         length(b).total_cmp(&length(a))
     });
     let mut ranges = merged.into_iter().map(|motion| motion.range);
-    Some(ObservedRange {
-        range: ranges.next()?,
-        unconnected: ranges.collect(),
-    })
+    Some(ObservedRange { range: ranges.next()?, unconnected: ranges.collect() })
 }
 
 /// Merges ranges that touch.
@@ -115,16 +107,8 @@ mod tests {
 
     #[test]
     fn touching_ranges_are_merged() {
-        let motion = |start: f64, end: f64| MotionRange {
-            range: start..end,
-            step: 5.0,
-        };
-        let found = merged(vec![
-            motion(5.0, 100.0),
-            motion(300.0, 350.0),
-            motion(-100.0, 0.0),
-            motion(-50.0, 20.0),
-        ]);
+        let motion = |start: f64, end: f64| MotionRange { range: start..end, step: 5.0 };
+        let found = merged(vec![motion(5.0, 100.0), motion(300.0, 350.0), motion(-100.0, 0.0), motion(-50.0, 20.0)]);
         assert_eq!(found, [motion(-100.0, 100.0), motion(300.0, 350.0)]);
     }
 }

@@ -8,8 +8,8 @@ use crate::problem::Problem;
 use crate::rank::Rank;
 use crate::results::{Covariance, NullSpace, ParameterResult};
 
-/// Covariance of the reported parameters by the law of propagation of uncertainty, in their order and units. It has the same factor as the
-/// standard uncertainties, so its diagonal holds their squares.
+/// Covariance of the reported parameters by the law of propagation of uncertainty, in their order and units. It has the
+/// same factor as the standard uncertainties, so its diagonal holds their squares.
 pub(crate) fn of_parameters(problem: &Problem<'_>, fit: &Fit, parameters: &[ParameterResult]) -> Covariance {
     let list = &problem.parameters.list;
     // Rows of the Jacobian of the reported quantities: their parameters, and the derivative by each.
@@ -21,41 +21,29 @@ pub(crate) fn of_parameters(problem: &Problem<'_>, fit: &Fit, parameters: &[Para
                 let (a, b) = (fit.beta[j], fit.beta[j + 1]);
                 let amplitude = a.hypot(b).max(f64::MIN_POSITIVE);
                 let display = list[j].unit.display_per_internal;
-                rows.push(vec![
-                    (j, a / amplitude * display),
-                    (j + 1, b / amplitude * display),
-                ]);
+                rows.push(vec![(j, a / amplitude * display), (j + 1, b / amplitude * display)]);
                 let per_radian = 1.0_f64.to_degrees() / amplitude;
-                rows.push(vec![
-                    (j, b / amplitude * per_radian),
-                    (j + 1, -a / amplitude * per_radian),
-                ]);
+                rows.push(vec![(j, b / amplitude * per_radian), (j + 1, -a / amplitude * per_radian)]);
             }
         }
     }
     let enlargement = fit.u_enlargement * fit.u_enlargement;
     let entry = |p: &[(usize, f64)], q: &[(usize, f64)]| -> f64 {
-        let products = p
-            .iter()
-            .flat_map(|(j, a)| q.iter().map(move |(k, b)| a * b * fit.covariance[(*j, *k)]));
+        let products = p.iter().flat_map(|(j, a)| q.iter().map(move |(k, b)| a * b * fit.covariance[(*j, *k)]));
         products.sum::<f64>() * enlargement
     };
     let mut matrix = Mat::from_fn(rows.len(), rows.len(), |i, j| entry(&rows[i], &rows[j]));
     adapt_diagonal(&mut matrix, parameters);
     Covariance {
         ids: parameters.iter().map(|parameter| parameter.id.clone()).collect(),
-        units: parameters
-            .iter()
-            .map(|parameter| parameter.unit.clone())
-            .collect(),
-        matrix: (0..rows.len())
-            .map(|i| (0..rows.len()).map(|j| matrix[(i, j)]).collect())
-            .collect(),
+        units: parameters.iter().map(|parameter| parameter.unit.clone()).collect(),
+        matrix: (0..rows.len()).map(|i| (0..rows.len()).map(|j| matrix[(i, j)]).collect()).collect(),
     }
 }
 
-/// Sets the diagonal of a covariance to the squares of the standard uncertainties, and keeps the matrix positive semidefinite. An additional
-/// contribution (competing explanations) is added as uncorrelated. A phase, whose uncertainty has an upper limit, is scaled.
+/// Sets the diagonal of a covariance to the squares of the standard uncertainties, and keeps the matrix positive
+/// semidefinite. An additional contribution (competing explanations) is added as uncorrelated. A phase, whose
+/// uncertainty has an upper limit, is scaled.
 fn adapt_diagonal(matrix: &mut Mat<f64>, parameters: &[ParameterResult]) {
     for (i, parameter) in parameters.iter().enumerate().take(matrix.nrows()) {
         let variance = parameter.u * parameter.u;
@@ -71,12 +59,12 @@ fn adapt_diagonal(matrix: &mut Mat<f64>, parameters: &[ParameterResult]) {
     }
 }
 
-/// The null space in reduced row echelon form, in display units, over the parameters that take part in it, in their order.
+/// The null space in reduced row echelon form, in display units, over the parameters that take part in it, in their
+/// order.
 pub(crate) fn null_space(problem: &Problem<'_>, rank: &Rank) -> NullSpace {
     let list = &problem.parameters.list;
-    let involved: Vec<usize> = (0..list.len())
-        .filter(|j| rank.null_combinations.iter().any(|row| row[*j] != 0.0))
-        .collect();
+    let involved: Vec<usize> =
+        (0..list.len()).filter(|j| rank.null_combinations.iter().any(|row| row[*j] != 0.0)).collect();
     let displayed = |row: &[f64], j: usize| row[j] * list[j].size * list[j].unit.display_per_internal;
     let vectors = rank
         .null_combinations
@@ -100,10 +88,7 @@ mod tests {
 
     #[test]
     fn a_covariance_has_the_squares_of_the_uncertainties_on_its_diagonal() {
-        let parameters = [
-            ParameterResult::new("a", 1.0, 2.0, "um"),
-            ParameterResult::new("b", 1.0, 3.0, "um"),
-        ];
+        let parameters = [ParameterResult::new("a", 1.0, 2.0, "um"), ParameterResult::new("b", 1.0, 3.0, "um")];
         let mut matrix = Mat::from_fn(2, 2, |i, j| [[16.0, 4.0], [4.0, 4.0]][i][j]);
         adapt_diagonal(&mut matrix, &parameters);
         assert_eq!((matrix[(0, 0)], matrix[(1, 1)]), (4.0, 9.0));

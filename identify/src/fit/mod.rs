@@ -1,8 +1,9 @@
 //! Estimation of the parameters of a session from its readings.
 //!
-//! The rank is decided on the linearisation at the nominal machine. Gauss–Newton then iterates in the identifiable directions only. A
-//! non-identifiable combination keeps its nominal value and is reported as a combination, never as a number. The law of propagation gives
-//! the uncertainties, `Cov = N (Nᵀ JᵀV⁻¹J N)⁻¹ Nᵀ`. The columns of `N` span the identifiable directions (JCGM 100, 5.2; JCGM 102, 6.2).
+//! The rank is decided on the linearisation at the nominal machine. Gauss–Newton then iterates in the identifiable
+//! directions only. A non-identifiable combination keeps its nominal value and is reported as a combination, never as a
+//! number. The law of propagation gives the uncertainties, `Cov = N (Nᵀ JᵀV⁻¹J N)⁻¹ Nᵀ`. The columns of `N` span the
+//! identifiable directions (JCGM 100, 5.2; JCGM 102, 6.2).
 
 mod covariance;
 mod prepare;
@@ -66,9 +67,7 @@ struct IdentifiableDirections<'p, 'a> {
 
 impl IdentifiableDirections<'_, '_> {
     fn beta(&self, z: &[f64]) -> Vec<f64> {
-        (0..self.basis.nrows())
-            .map(|j| (0..z.len()).map(|k| self.basis[(j, k)] * z[k]).sum())
-            .collect()
+        (0..self.basis.nrows()).map(|j| (0..z.len()).map(|k| self.basis[(j, k)] * z[k]).sum()).collect()
     }
 }
 
@@ -139,32 +138,18 @@ pub(crate) struct Minimum {
 /// If the model cannot be evaluated, or the iterations do not converge.
 pub(crate) fn minimum(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Minimum, IdentifyError> {
     let parameter_count = problem.parameters.list.len();
-    let size: Vec<f64> = problem
-        .parameters
-        .list
-        .iter()
-        .map(|parameter| parameter.size)
-        .collect();
+    let size: Vec<f64> = problem.parameters.list.iter().map(|parameter| parameter.size).collect();
     let nominal = vec![0.0; parameter_count];
     let triangles = problem.triangles(&nominal)?;
     let preference = pivot_preference(&problem.parameters.list);
-    let rank = Rank::decide(
-        whole(problem, &nominal, &triangles).parts().0.as_ref(),
-        &size,
-        &preference,
-    )?;
-    let restricted = IdentifiableDirections {
-        problem,
-        basis: &rank.identifiable_basis,
-        last: RefCell::new((nominal, triangles)),
-    };
+    let rank = Rank::decide(whole(problem, &nominal, &triangles).parts().0.as_ref(), &size, &preference)?;
+    let restricted =
+        IdentifiableDirections { problem, basis: &rank.identifiable_basis, last: RefCell::new((nominal, triangles)) };
     let mut end = None;
     if rank.identifiable_basis.ncols() > 0 {
         let scale = Scaling::Physical(vec![1.0; rank.identifiable_basis.ncols()]);
-        let from = start.map_or_else(
-            || vec![0.0; rank.identifiable_basis.ncols()],
-            |beta| rank.coordinates(beta, &size),
-        );
+        let from =
+            start.map_or_else(|| vec![0.0; rank.identifiable_basis.ncols()], |beta| rank.coordinates(beta, &size));
         end = Some(restricted.beta(&minimise(&restricted, &from, &scale)?.x));
     }
     let (last, triangles) = restricted.last.into_inner();
@@ -172,20 +157,12 @@ pub(crate) fn minimum(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Mi
     // After the last linearisation the parameters move by a step at which nonlinearity is negligible.
     let step: Vec<f64> = beta.iter().zip(&last).map(|(end, last)| end - last).collect();
     let triangles = triangles.iter().map(|triangle| triangle.after(&step)).collect();
-    Ok(Minimum {
-        beta,
-        triangles,
-        rank,
-    })
+    Ok(Minimum { beta, triangles, rank })
 }
 
 /// Computes covariance, residuals, cross-validation and χ² at the solution.
 fn finish(problem: &Problem<'_>, minimum: Minimum) -> Result<Fit, IdentifyError> {
-    let Minimum {
-        beta,
-        triangles,
-        rank,
-    } = minimum;
+    let Minimum { beta, triangles, rank } = minimum;
     let whole = whole(problem, &beta, &triangles);
     let covariance = parameter_covariance(&whole, &rank.identifiable_basis)?;
     let residuals = problem.residuals(&beta);
@@ -214,11 +191,7 @@ fn finish(problem: &Problem<'_>, minimum: Minimum) -> Result<Fit, IdentifyError>
 /// Factor on the standard uncertainties: the Birge ratio `√(χ²/ν)` if it is significantly above 1, else 1.
 pub(crate) fn u_enlargement(chi_square: f64, free: f64) -> f64 {
     let significance = ChiSquared::new(free).map(|law| law.sf(chi_square)).unwrap_or(1.0);
-    if significance < BIRGE_SIGNIFICANCE {
-        (chi_square / free).sqrt().max(1.0)
-    } else {
-        1.0
-    }
+    if significance < BIRGE_SIGNIFICANCE { (chi_square / free).sqrt().max(1.0) } else { 1.0 }
 }
 
 /// The warning about enlarged uncertainties, if they are enlarged.
@@ -244,12 +217,13 @@ pub(crate) fn parameter_covariance(triangle: &Triangle, basis: &Mat<f64>) -> Res
     let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
     let negligible = singular[0] * 1e-14;
     let spread = basis * svd.V();
-    let scaled = Mat::from_fn(n, singular.len(), |i, k| {
-        if singular[k] > negligible {
-            spread[(i, k)] / singular[k]
-        } else {
-            0.0
-        }
-    });
+    let scaled =
+        Mat::from_fn(
+            n,
+            singular.len(),
+            |i, k| {
+                if singular[k] > negligible { spread[(i, k)] / singular[k] } else { 0.0 }
+            },
+        );
     Ok(&scaled * scaled.transpose())
 }

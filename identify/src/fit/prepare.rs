@@ -23,7 +23,8 @@ const MIN_NOISE_MM: f64 = MIN_UM * 1e-3;
 const MAX_ROUNDS: usize = 6;
 /// Relative change of the noise standard deviation at which the rounds stop.
 const NOISE_TOLERANCE: f64 = 1e-4;
-/// Prepares and fits a session. The noise is the stated one, that of repeats, or that of the residual. Outliers are excluded.
+/// Prepares and fits a session. The noise is the stated one, that of repeats, or that of the residual. Outliers are
+/// excluded.
 ///
 /// # Errors
 /// See [`Problem::new`]; also if the iterations do not converge.
@@ -31,8 +32,8 @@ pub fn prepare(session: &Session, seed: u64) -> Result<(Problem<'_>, Fit), Ident
     prepare_with(session, &[], seed)
 }
 
-/// As [`prepare`], for the session with further declared effects. Noise, outliers and rank are exactly those of a session that declares
-/// them.
+/// As [`prepare`], for the session with further declared effects. Noise, outliers and rank are exactly those of a
+/// session that declares them.
 ///
 /// # Errors
 /// See [`prepare`].
@@ -52,13 +53,12 @@ pub fn prepare_with<'a>(
         problem.add_effect(effect)?;
     }
     if stated.is_none() {
-        problem.noise = Noise::white(
-            nominal_residual_mm(&problem)?.max(floor).max(MIN_NOISE_MM),
-            NoiseSource::Residual,
-        );
+        problem.noise =
+            Noise::white(nominal_residual_mm(&problem)?.max(floor).max(MIN_NOISE_MM), NoiseSource::Residual);
     }
     let mut fit = plausibility::checked(&problem, super::fit(&problem, None))?;
-    // Noise and outliers depend on the residuals, and the residuals on the fit. The returned fit always uses the returned noise.
+    // Noise and outliers depend on the residuals, and the residuals on the fit. The returned fit always uses the
+    // returned noise.
     for _ in 0..MAX_ROUNDS {
         let rejected = outliers::reject(&problem, &fit);
         let unchanged = rejected == problem.rejected;
@@ -77,9 +77,9 @@ pub fn prepare_with<'a>(
     Ok((problem, fit))
 }
 
-/// Root mean square of the residual of the nominal machine, mm, after a linearised fit of the set-up quantities. It serves as the noise in
-/// the first decision on the rank. Machine errors are excluded: in a socket session, shrinking the machine to a point would explain every
-/// reading.
+/// Root mean square of the residual of the nominal machine, mm, after a linearised fit of the set-up quantities. It
+/// serves as the noise in the first decision on the rank. Machine errors are excluded: in a socket session, shrinking
+/// the machine to a point would explain every reading.
 fn nominal_residual_mm(problem: &Problem<'_>) -> Result<f64, IdentifyError> {
     let list = &problem.parameters.list;
     let nominal = vec![0.0; list.len()];
@@ -101,9 +101,7 @@ fn nominal_residual_mm(problem: &Problem<'_>) -> Result<f64, IdentifyError> {
 }
 
 fn estimated_noise(problem: &Problem<'_>, fit: &Fit, floor: f64) -> Noise {
-    let pure = PureError::of(&problem.tests, &fit.residuals, |test, row| {
-        !problem.rejected[test][row]
-    });
+    let pure = PureError::of(&problem.tests, &fit.residuals, |test, row| !problem.rejected[test][row]);
     if let Some(sigma) = pure.sigma_mm() {
         return Noise::white(sigma.max(floor).max(MIN_NOISE_MM), NoiseSource::Repeats);
     }

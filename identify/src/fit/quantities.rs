@@ -1,7 +1,5 @@
 //! The quantities that a fit reports: identifiable parameters, and amplitude and phase of harmonics.
 
-use abbe_model::effect::Shape;
-
 use super::Fit;
 use crate::parameters::Role;
 use crate::problem::Problem;
@@ -22,13 +20,9 @@ pub(crate) fn quantities(problem: &Problem<'_>, rank: &Rank) -> Vec<Quantity> {
     let mut quantities = Vec::new();
     let mut j = 0;
     while j < list.len() {
-        if let Role::Coefficient {
-            effect,
-            coefficient: 0,
-        } = list[j].role
-        {
+        if let Role::Coefficient { effect, coefficient: 0 } = list[j].role {
             let effect = &problem.parameters.effects[effect];
-            let pair = matches!(effect.shape, Shape::Harmonic { .. } | Shape::Periodic { .. });
+            let pair = effect.shape.is_wave();
             if pair && rank.is_identifiable(j) && rank.is_identifiable(j + 1) {
                 quantities.push(Quantity::Harmonic(j));
                 j += 2;
@@ -43,8 +37,8 @@ pub(crate) fn quantities(problem: &Problem<'_>, rank: &Rank) -> Vec<Quantity> {
     quantities
 }
 
-/// Passes the reported quantities at the parameters `beta` to a function, in display units, amplitude before phase. Each phase lies within
-/// half a turn of the fit's phase.
+/// Passes the reported quantities at the parameters `beta` to a function, in display units, amplitude before phase.
+/// Each phase lies within half a turn of the fit's phase.
 pub(crate) fn values_at(
     problem: &Problem<'_>,
     fit: &Fit,
@@ -70,7 +64,9 @@ pub(crate) fn values_at(
 mod tests {
     use std::path::Path;
 
-    use abbe_model::effect::{Component, Driver, Effect};
+    use abbe_model::driver::Driver;
+    use abbe_model::effect::shape::Harmonic;
+    use abbe_model::effect::{Component, Effect, Shape};
     use abbe_model::files::{self, ReadOptions};
 
     use super::*;
@@ -79,15 +75,14 @@ mod tests {
     /// `A cos(nC + φ)` has the coefficients `A cos φ` and `−A sin φ`.
     #[test]
     fn amplitude_and_phase_of_a_harmonic_follow_from_its_coefficients() {
-        let file =
-            Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
         let session = files::session(&file, &ReadOptions::default()).unwrap();
         let (mut problem, _) = prepare(&session, 1).unwrap();
         problem
             .add_effect(&Effect {
                 component: Component::parse("EZC").unwrap(),
                 driver: Driver::parse("C"),
-                shape: Shape::Harmonic { order: 3.0 },
+                shape: Shape::Harmonic(Harmonic { order: 3.0 }),
                 tests: Vec::new(),
             })
             .unwrap();
@@ -113,11 +108,7 @@ mod tests {
             values_at(&problem, &fit, &quantities, &other, |value| values.push(value));
             // No harmonic with two reported values precedes this one.
             assert!((values[place] - 3.0).abs() < 1e-12, "{}", values[place]);
-            assert!(
-                (values[place + 1] - other_deg).abs() < 1e-9,
-                "{} and {other_deg}",
-                values[place + 1]
-            );
+            assert!((values[place + 1] - other_deg).abs() < 1e-9, "{} and {other_deg}", values[place + 1]);
         }
     }
 }

@@ -56,7 +56,8 @@ pub fn report(problem: &Problem<'_>, fit: &Fit) -> FitResult {
     }
 }
 
-/// The identifiable parameters, in display units. A harmonic has amplitude and phase of `amplitude · cos(order · angle + phase)`.
+/// The identifiable parameters, in display units. A harmonic has amplitude and phase of
+/// `amplitude · cos(order · angle + phase)`.
 pub fn parameters(problem: &Problem<'_>, fit: &Fit) -> Vec<ParameterResult> {
     let list = &problem.parameters.list;
     let u_internal = |j: usize| fit.covariance[(j, j)].max(0.0).sqrt() * fit.u_enlargement;
@@ -83,18 +84,12 @@ fn amplitude_and_phase(problem: &Problem<'_>, fit: &Fit, j: usize) -> [Parameter
     let (a, b) = (fit.beta[j], fit.beta[j + 1]);
     let cov = |p: usize, q: usize| fit.covariance[(p, q)] * fit.u_enlargement.powi(2);
     let amplitude = a.hypot(b);
-    let (ca, sa) = if amplitude > 0.0 {
-        (a / amplitude, b / amplitude)
-    } else {
-        (1.0, 0.0)
-    };
+    let (ca, sa) = if amplitude > 0.0 { (a / amplitude, b / amplitude) } else { (1.0, 0.0) };
     let along = ca * ca * cov(j, j) + 2.0 * ca * sa * cov(j, j + 1) + sa * sa * cov(j + 1, j + 1);
     let across = sa * sa * cov(j, j) - 2.0 * ca * sa * cov(j, j + 1) + ca * ca * cov(j + 1, j + 1);
     let unit = &problem.parameters.list[j].unit;
     let u_phase = if amplitude > 0.0 {
-        (across.max(0.0).sqrt() / amplitude)
-            .to_degrees()
-            .min(u_of_undetermined_phase_deg())
+        (across.max(0.0).sqrt() / amplitude).to_degrees().min(u_of_undetermined_phase_deg())
     } else {
         u_of_undetermined_phase_deg()
     };

@@ -1,15 +1,16 @@
 //! The centre of the circle that one ball describes about a turning axis while the other ball is fixed.
 //!
-//! Let `m` be the vector from the fixed ball to the moving one, `h` its component along the axis, and φ the angle of its transverse
-//! component, all nominal. A reading `L` gives the point
+//! Let `m` be the vector from the fixed ball to the moving one, `h` its component along the axis, and φ the angle of
+//! its transverse component, all nominal. A reading `L` gives the point
 //!
 //! ```text
 //! (u, v) = √(L² − h²) · (cos φ, sin φ)
 //! ```
 //!
-//! The axis passes the fixed ball at the centre of the least-squares circle through these points. Without an extension bar `h = 0` (Jiang
-//! 2014, Section 4.2). With an extension bar the lengths are projected onto the base plane of the cone (Sections 4.2.1 and 5.2).
-//! `workpiece_ball_mm` states the measured ball position; φ then includes the deviation of the start angle (Eq. 4.1).
+//! The axis passes the fixed ball at the centre of the least-squares circle through these points. Without an extension
+//! bar `h = 0` (Jiang 2014, Section 4.2). With an extension bar the lengths are projected onto the base plane of the
+//! cone (Sections 4.2.1 and 5.2). `workpiece_ball_mm` states the measured ball position; φ then includes the deviation
+//! of the start angle (Eq. 4.1).
 //!
 //! Jiang (2014): full reference in [`super`].
 
@@ -67,10 +68,7 @@ impl CircleGeometry {
         let balls = |row| balls(machine, model, bar, row, on_table);
         let (origin, along) = line(machine, model, axis);
         let Some(principal) = (0..3).find(|k| (along[*k].abs() - 1.0).abs() < MOTION_TOLERANCE) else {
-            return Err(format!(
-                "axis `{}` does not lie along X, Y or Z while it turns",
-                machine.axes[axis].name
-            ));
+            return Err(format!("axis `{}` does not lie along X, Y or Z while it turns", machine.axes[axis].name));
         };
         let across = [(principal + 1) % 3, (principal + 2) % 3];
         let (_, standing) = balls(0);
@@ -86,7 +84,10 @@ impl CircleGeometry {
             let [u, v] = across.map(|k| from[k]);
             let radius = u.hypot(v);
             if radius < 1.0 {
-                return Err("the moving ball lies on the line through the other ball along the axis, so its angle is undefined".into());
+                return Err(
+                    "the moving ball lies on the line through the other ball along the axis, so its angle is undefined"
+                        .into(),
+                );
             }
             angle.push([v / radius, u / radius]);
         }
@@ -136,9 +137,7 @@ impl CircleGeometry {
             centre.radius_mm = circle.radius.re;
             for (which, coordinate) in circle.centre.iter().enumerate() {
                 centre.offset_mm[which] = coordinate.re - self.nominal_mm[which];
-                let gradient = coordinate
-                    .eps
-                    .unwrap_generic(nalgebra::Const::<PACK>, nalgebra::Const::<1>);
+                let gradient = coordinate.eps.unwrap_generic(nalgebra::Const::<PACK>, nalgebra::Const::<1>);
                 for (place, row) in pack.iter().enumerate() {
                     centre.by_reading[which][*row] = gradient[place];
                 }
@@ -158,17 +157,10 @@ fn turning(machine: &Machine, model: &TestModel<'_>) -> Result<usize, String> {
     match moving[..] {
         [axis] if machine.axes[axis].kind == AxisKind::Rotary => Ok(axis),
         _ => {
-            let names: Vec<&str> = moving
-                .iter()
-                .map(|axis| machine.axes[*axis].name.as_str())
-                .collect();
+            let names: Vec<&str> = moving.iter().map(|axis| machine.axes[*axis].name.as_str()).collect();
             Err(format!(
                 "exactly one rotary axis has to turn, but {} {}",
-                if names.is_empty() {
-                    "none".into()
-                } else {
-                    names.join(", ")
-                },
+                if names.is_empty() { "none".into() } else { names.join(", ") },
                 if names.len() == 1 { "moves" } else { "move" }
             ))
         }
@@ -185,11 +177,7 @@ fn balls(
 ) -> ([f64; 3], [f64; 3]) {
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let (workpiece, spindle) = bar.balls::<f64>(machine, &model.state(row), &none, &|_| None);
-    if on_table {
-        (workpiece.0, spindle.0)
-    } else {
-        (spindle.0, workpiece.0)
-    }
+    if on_table { (workpiece.0, spindle.0) } else { (spindle.0, workpiece.0) }
 }
 
 /// A point of an axis and its direction in R, at the positions of the first reading.

@@ -62,7 +62,8 @@ pub struct ComparisonRow {
     pub value: Option<f64>,
     /// Its standard uncertainty from noise and set-ups, with the factor of the full fit.
     pub u: Option<f64>,
-    /// Bias of the method: its estimate from noise-free readings simulated with the full fit's errors, minus those errors.
+    /// Bias of the method: its estimate from noise-free readings simulated with the full fit's errors, minus those
+    /// errors.
     pub bias: Option<f64>,
     /// Estimate of the full fit; `None` if the error is not identifiable.
     pub full_value: Option<f64>,
@@ -135,8 +136,7 @@ pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Compariso
             u: index.map(|k| estimate.covariance[(k, k)].max(0.0).sqrt() * full.u_enlargement * display),
             bias: index.map(|k| (again.values[k] - known[p]) * display),
             full_value: identifiable.map(|()| full.beta[p] * display),
-            full_u: identifiable
-                .map(|()| full.covariance[(p, p)].max(0.0).sqrt() * full.u_enlargement * display),
+            full_u: identifiable.map(|()| full.covariance[(p, p)].max(0.0).sqrt() * full.u_enlargement * display),
             full_bias: identifiable.map(|()| (full_again[p] - known[p]) * display),
         });
     }
@@ -181,9 +181,7 @@ pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Compariso
 
 fn observed<'p>(problem: &'p Problem<'_>) -> Vec<&'p [f64]> {
     let of = |test: &&'p abbe_model::session::Test| {
-        test.readings
-            .as_ref()
-            .map_or(&[][..], |readings| readings.observed.as_slice())
+        test.readings.as_ref().map_or(&[][..], |readings| readings.observed.as_slice())
     };
     problem.tests.iter().map(of).collect()
 }
@@ -200,10 +198,9 @@ fn refitted(problem: &Problem<'_>, readings: &[Vec<f64>], full: &Fit) -> Result<
     let mut session = problem.session.clone();
     let mut remaining = readings.iter();
     for test in &mut session.tests {
-        if let (Some(known), Some(drawn)) = (
-            &mut test.readings,
-            test_has(problem, &test.name).then(|| remaining.next()).flatten(),
-        ) {
+        if let (Some(known), Some(drawn)) =
+            (&mut test.readings, test_has(problem, &test.name).then(|| remaining.next()).flatten())
+        {
             known.observed.clone_from(drawn);
         }
     }
@@ -216,20 +213,11 @@ fn test_has(problem: &Problem<'_>, name: &str) -> bool {
     problem.tests.iter().any(|test| test.name == name)
 }
 
-fn centres(
-    problem: &Problem<'_>,
-    estimator: &Estimator,
-    estimate: &Estimate,
-    u_enlargement: f64,
-) -> Vec<CentreResult> {
+fn centres(problem: &Problem<'_>, estimator: &Estimator, estimate: &Estimate, u_enlargement: f64) -> Vec<CentreResult> {
     let list = &problem.parameters.list;
     let declared: Vec<usize> = (0..list.len()).filter(|p| list[*p].role == Role::Error).collect();
     let letter = |k: usize| ["X", "Y", "Z"][k].to_string();
-    let tests = estimator
-        .tests
-        .iter()
-        .zip(&estimator.geometries)
-        .zip(&estimate.centres);
+    let tests = estimator.tests.iter().zip(&estimator.geometries).zip(&estimate.centres);
     tests
         .enumerate()
         .map(|(test_index, ((test, geometry), centre))| {
@@ -239,8 +227,7 @@ fn centres(
             };
             let sensitivity = |which: usize, p: usize| OffsetSensitivity {
                 id: list[p].id.clone(),
-                value: estimator.sensitivities[(2 * test_index + which, p)] * 1e3
-                    / list[p].unit.display_per_internal,
+                value: estimator.sensitivities[(2 * test_index + which, p)] * 1e3 / list[p].unit.display_per_internal,
                 unit: format!("um/{}", list[p].unit.name),
             };
             let offset = |which: usize| CentreOffset {

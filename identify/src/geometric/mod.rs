@@ -1,16 +1,17 @@
 //! Geometric methods beside the full fit: errors of rotary axes from the centres of circles.
 //!
-//! The methods are those of Jiang (2014), Chapters 4 to 6: X. Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine
-//! Tools*, PhD thesis, University of Birmingham. Each test gives the position of an axis relative to the fixed ball. To first order this
-//! position is a linear combination of position and orientation errors,
+//! The methods are those of Jiang (2014), Chapters 4 to 6: X. Jiang, *Characterising Geometric Errors in Rotary Axes of
+//! 5-axis Machine Tools*, PhD thesis, University of Birmingham. Each test gives the position of an axis relative to the
+//! fixed ball. To first order this position is a linear combination of position and orientation errors,
 //!
 //! ```text
 //! centre = Σ S·error,    S = ∂centre/∂L · ∂L/∂error
 //! ```
 //!
-//! The chain gives the derivative of the length, and the equations of the circle give that of the centre. `S` thus contains what the
-//! reference derives by hand: the levers of the cone and of the two planes, the contributions of axis A's errors to the centres of axis C,
-//! and the conversion from local to reference position errors. All signs follow from the chain.
+//! The chain gives the derivative of the length, and the equations of the circle give that of the centre. `S` thus
+//! contains what the reference derives by hand: the levers of the cone and of the two planes, the contributions of axis
+//! A's errors to the centres of axis C, and the conversion from local to reference position errors. All signs follow
+//! from the chain.
 
 mod centre;
 mod compare;
@@ -98,23 +99,14 @@ impl Estimator {
                 Err(why) => refused.push(format!("test \"{}\": {why}", problem.tests[test].name)),
             }
         }
-        let (tests, geometries): (Vec<usize>, Vec<CircleGeometry>) =
-            chosen(method, circles).into_iter().unzip();
+        let (tests, geometries): (Vec<usize>, Vec<CircleGeometry>) = chosen(method, circles).into_iter().unzip();
         if tests.is_empty() {
             let wanted = match method {
-                Method::Circle => {
-                    "a test in which one rotary axis turns and the balls lie in one plane across it"
-                }
-                Method::Cone => {
-                    "for each axis a test with the balls in one plane and one with the bar on a cone"
-                }
+                Method::Circle => "a test in which one rotary axis turns and the balls lie in one plane across it",
+                Method::Cone => "for each axis a test with the balls in one plane and one with the bar on a cone",
                 Method::TwoPlane => "for each axis two tests in planes apart from each other along the axis",
             };
-            let refused = if refused.is_empty() {
-                String::new()
-            } else {
-                format!("; {}", refused.join("; "))
-            };
+            let refused = if refused.is_empty() { String::new() } else { format!("; {}", refused.join("; ")) };
             return Err(refuse(format!("the session lacks {wanted}{refused}")));
         }
         let errors = errors(problem, method, &geometries);
@@ -138,19 +130,10 @@ impl Estimator {
             )));
         }
         let inverse = Mat::from_fn(errors.len(), sensitivities.nrows(), |k, i| {
-            let sum: f64 = (0..errors.len())
-                .map(|j| svd.V()[(k, j)] * svd.U()[(i, j)] / singular[j])
-                .sum();
+            let sum: f64 = (0..errors.len()).map(|j| svd.V()[(k, j)] * svd.U()[(i, j)] / singular[j]).sum();
             sum * problem.parameters.list[errors[k]].size
         });
-        Ok(Estimator {
-            method,
-            tests,
-            geometries,
-            errors,
-            sensitivities,
-            inverse,
-        })
+        Ok(Estimator { method, tests, geometries, errors, sensitivities, inverse })
     }
 
     /// Estimates the errors from readings, test by test in the order of the problem, mm.
@@ -162,25 +145,19 @@ impl Estimator {
         for (test, geometry) in self.tests.iter().zip(&self.geometries) {
             let centre = geometry
                 .centre(observed[*test], &problem.rejected[*test])
-                .map_err(|why| {
-                    IdentifyError::Request(format!("test \"{}\": {why}", problem.tests[*test].name))
-                })?;
+                .map_err(|why| IdentifyError::Request(format!("test \"{}\": {why}", problem.tests[*test].name)))?;
             centres.push(centre);
         }
         let offsets: Vec<f64> = centres.iter().flat_map(|centre| centre.offset_mm).collect();
         let rows = offsets.len();
-        let values = (0..self.errors.len())
-            .map(|k| (0..rows).map(|i| self.inverse[(k, i)] * offsets[i]).sum())
-            .collect();
+        let values =
+            (0..self.errors.len()).map(|k| (0..rows).map(|i| self.inverse[(k, i)] * offsets[i]).sum()).collect();
         let variance = problem.noise.sigma_mm.powi(2);
         let mut centre_covariance = Mat::from_fn(rows, rows, |i, j| {
             if i / 2 != j / 2 {
                 return 0.0;
             }
-            let (a, b) = (
-                &centres[i / 2].by_reading[i % 2],
-                &centres[j / 2].by_reading[j % 2],
-            );
+            let (a, b) = (&centres[i / 2].by_reading[i % 2], &centres[j / 2].by_reading[j % 2]);
             variance * a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>()
         });
         for (p, parameter) in problem.parameters.list.iter().enumerate() {
@@ -189,18 +166,12 @@ impl Estimator {
             };
             for i in 0..rows {
                 for j in 0..rows {
-                    centre_covariance[(i, j)] +=
-                        self.sensitivities[(i, p)] * u * u * self.sensitivities[(j, p)];
+                    centre_covariance[(i, j)] += self.sensitivities[(i, p)] * u * u * self.sensitivities[(j, p)];
                 }
             }
         }
         let covariance = &self.inverse * &centre_covariance * self.inverse.transpose();
-        Ok(Estimate {
-            centres,
-            values,
-            centre_covariance,
-            covariance,
-        })
+        Ok(Estimate { centres, values, centre_covariance, covariance })
     }
 }
 
@@ -209,22 +180,15 @@ fn chosen(method: Method, circles: Vec<(usize, CircleGeometry)>) -> Vec<(usize, 
     let plane = |geometry: &CircleGeometry| geometry.height_mm.abs() < MIN_LEVER_MM;
     let of = |axis: usize| circles.iter().filter(move |(_, geometry)| geometry.axis == axis);
     let selected = |(_, geometry): &&(usize, CircleGeometry)| {
-        let planes = || {
-            of(geometry.axis)
-                .map(|(_, other)| other)
-                .filter(|other| plane(other))
-        };
+        let planes = || of(geometry.axis).map(|(_, other)| other).filter(|other| plane(other));
         match method {
             Method::Circle => {
-                let nearest = planes()
-                    .map(|other| other.plane_mm.abs())
-                    .fold(f64::INFINITY, f64::min);
+                let nearest = planes().map(|other| other.plane_mm.abs()).fold(f64::INFINITY, f64::min);
                 plane(geometry) && geometry.plane_mm.abs() <= nearest + MIN_LEVER_MM
             }
             Method::Cone => planes().next().is_some() && of(geometry.axis).any(|(_, other)| !plane(other)),
             Method::TwoPlane => {
-                plane(geometry)
-                    && planes().any(|other| (other.plane_mm - geometry.plane_mm).abs() > MIN_LEVER_MM)
+                plane(geometry) && planes().any(|other| (other.plane_mm - geometry.plane_mm).abs() > MIN_LEVER_MM)
             }
         }
     };
@@ -238,15 +202,11 @@ fn errors(problem: &Problem<'_>, method: Method, geometries: &[CircleGeometry]) 
         let Some(name) = ErrorName::parse(id) else {
             return false;
         };
-        let turns = geometries
-            .iter()
-            .any(|geometry| machine.axes[geometry.axis].name == name.axis);
+        let turns = geometries.iter().any(|geometry| machine.axes[geometry.axis].name == name.axis);
         turns && (method != Method::Circle || !name.freedom.is_angle())
     };
     let list = &problem.parameters.list;
-    (0..list.len())
-        .filter(|p| list[*p].role == Role::Error && of_method(&list[*p].id))
-        .collect()
+    (0..list.len()).filter(|p| list[*p].role == Role::Error && of_method(&list[*p].id)).collect()
 }
 
 /// `S` at the nominal machine.
@@ -260,26 +220,15 @@ fn sensitivities(
     let mut sensitivities = Mat::zeros(2 * tests.len(), parameters);
     for (k, (test, geometry)) in tests.iter().zip(geometries).enumerate() {
         let lengths = problem.models[*test].readings_mm(&nominal[*test]);
-        let centre = geometry
-            .centre(&lengths, &problem.rejected[*test])
-            .map_err(|why| {
-                IdentifyError::Request(format!(
-                    "test \"{}\", nominally: {why}",
-                    problem.tests[*test].name
-                ))
-            })?;
-        let block = RowBlock {
-            test: *test,
-            rows: 0..problem.models[*test].rows(),
-        };
+        let centre = geometry.centre(&lengths, &problem.rejected[*test]).map_err(|why| {
+            IdentifyError::Request(format!("test \"{}\", nominally: {why}", problem.tests[*test].name))
+        })?;
+        let block = RowBlock { test: *test, rows: 0..problem.models[*test].rows() };
         let rows = problem.rows(&nominal, &block)?;
         for (which, by_reading) in centre.by_reading.iter().enumerate() {
             for p in 0..parameters {
-                sensitivities[(2 * k + which, p)] = by_reading
-                    .iter()
-                    .enumerate()
-                    .map(|(row, by)| by * rows[(row, p)])
-                    .sum::<f64>();
+                sensitivities[(2 * k + which, p)] =
+                    by_reading.iter().enumerate().map(|(row, by)| by * rows[(row, p)]).sum::<f64>();
             }
         }
     }

@@ -45,8 +45,8 @@ pub struct Folds {
 
 const BLOCKS_PER_TEST: usize = 5;
 const FOLDS_OF_POSES: usize = 10;
-/// Maximum number of folds of single runs. More folds cost time without better estimates. If the run column changes at every reading, each
-/// reading would be a fold.
+/// Maximum number of folds of single runs. More folds cost time without better estimates. If the run column changes at
+/// every reading, each reading would be a fold.
 const MAX_FOLDS_OF_RUNS: usize = 64;
 /// Number of folds for sessions with more runs.
 const FOLDS_OF_MANY_RUNS: usize = 32;
@@ -55,10 +55,8 @@ impl Folds {
     /// The folds of a session.
     pub fn of(session: &Session, tests: &[&Test], seed: u64) -> Folds {
         let readings: Vec<_> = tests.iter().filter_map(|test| test.readings.as_ref()).collect();
-        let poses = matches!(
-            session.instrument,
-            InstrumentKind::Tracker | InstrumentKind::Socket
-        ) && readings.iter().all(|r| r.run.is_empty());
+        let poses = matches!(session.instrument, InstrumentKind::Tracker | InstrumentKind::Socket)
+            && readings.iter().all(|r| r.run.is_empty());
         if poses {
             let total: usize = readings.iter().map(|r| r.rows()).sum();
             let folds = FOLDS_OF_POSES.min(total.max(1));
@@ -77,11 +75,7 @@ impl Folds {
                     rows
                 })
                 .collect();
-            return Folds {
-                kind: FoldKind::Poses,
-                count: folds,
-                of_row,
-            };
+            return Folds { kind: FoldKind::Poses, count: folds, of_row };
         }
         let runs: Vec<_> = readings.iter().map(|r| r.runs()).collect();
         let kind = if runs.iter().any(|runs| runs.len() < 2) {
@@ -102,17 +96,12 @@ impl Folds {
                     FoldKind::Runs => runs,
                     FoldKind::RunGroups => {
                         let groups = groups.min(runs.len());
-                        let first = |k: usize| {
-                            runs.get(k * runs.len() / groups)
-                                .map_or(r.rows(), |run| run.start)
-                        };
+                        let first = |k: usize| runs.get(k * runs.len() / groups).map_or(r.rows(), |run| run.start);
                         (0..groups).map(|k| first(k)..first(k + 1)).collect()
                     }
                     _ => {
                         let blocks = BLOCKS_PER_TEST.min(r.rows().max(1));
-                        (0..blocks)
-                            .map(|k| k * r.rows() / blocks..(k + 1) * r.rows() / blocks)
-                            .collect()
+                        (0..blocks).map(|k| k * r.rows() / blocks..(k + 1) * r.rows() / blocks).collect()
                     }
                 };
                 for part in parts {
@@ -136,10 +125,7 @@ pub fn mislabelled_runs(tests: &[&Test]) -> Vec<String> {
     let warning = |test: &&Test| {
         let readings = test.readings.as_ref()?;
         let runs = readings.runs();
-        let numbers: BTreeSet<i64> = runs
-            .iter()
-            .map(|run| readings.run.get(run.start).copied().unwrap_or(0))
-            .collect();
+        let numbers: BTreeSet<i64> = runs.iter().map(|run| readings.run.get(run.start).copied().unwrap_or(0)).collect();
         let length = readings.rows() as f64 / runs.len().max(1) as f64;
         let come_back = numbers.len() < runs.len();
         let one_each = length < 1.5;
@@ -167,8 +153,7 @@ mod tests {
 
     /// The bundled session (four tests of four runs) with another run column.
     fn numbered(number: impl Fn(usize, i64) -> i64) -> Session {
-        let file =
-            Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
         let mut session = files::session(&file, &ReadOptions::default()).unwrap();
         for readings in session.tests.iter_mut().filter_map(|test| test.readings.as_mut()) {
             for (row, run) in readings.run.iter_mut().enumerate() {
@@ -188,16 +173,11 @@ mod tests {
         let as_measured = folds(&numbered(|_, run| run));
         assert_eq!((as_measured.kind, as_measured.count), (FoldKind::Runs, 16));
         assert_eq!(folds(&numbered(|_, _| 1)).kind, FoldKind::Blocks);
-        for session in [
-            numbered(|row, _| row as i64),
-            numbered(|row, _| row as i64 % 2),
-            numbered(|row, _| row as i64 / 10),
-        ] {
+        for session in
+            [numbered(|row, _| row as i64), numbered(|row, _| row as i64 % 2), numbered(|row, _| row as i64 / 10)]
+        {
             let folds = folds(&session);
-            assert_eq!(
-                (folds.kind, folds.count),
-                (FoldKind::RunGroups, FOLDS_OF_MANY_RUNS)
-            );
+            assert_eq!((folds.kind, folds.count), (FoldKind::RunGroups, FOLDS_OF_MANY_RUNS));
             // Each fold is a sequence of rows of one test. No run is divided and no fold is empty.
             let mut next = 0;
             for (test, fold_of) in session.tests.iter().zip(&folds.of_row) {

@@ -8,18 +8,14 @@ use super::PureError;
 use super::trends::{TERMS, trend_terms};
 
 impl PureError {
-    /// Autocorrelation along runs: autoregressive coefficients by Yule–Walker. The order is the least one, up to three, whose successor is
-    /// insignificant. `None` without enough repeats.
+    /// Autocorrelation along runs: autoregressive coefficients by Yule–Walker. The order is the least one, up to three,
+    /// whose successor is insignificant. `None` without enough repeats.
     ///
-    /// Removing a trend from every run removes slow noise too: with a coefficient of 0.8 and a hundred readings per run, more than half of
-    /// its slow part. The autocovariances are therefore corrected. The correction ends when noise with the estimated coefficients, after
-    /// the same treatment, has the observed autocovariances (indirect inference: Gouriéroux, Monfort & Renault, J. Appl. Econometrics 8
-    /// (1993) S85).
-    pub fn autocorrelation(
-        &self,
-        tests: &[&Test],
-        kept: impl Fn(usize, usize) -> bool,
-    ) -> Option<Autocorrelation> {
+    /// Removing a trend from every run removes slow noise too: with a coefficient of 0.8 and a hundred readings per
+    /// run, more than half of its slow part. The autocovariances are therefore corrected. The correction ends when
+    /// noise with the estimated coefficients, after the same treatment, has the observed autocovariances (indirect
+    /// inference: Gouriéroux, Monfort & Renault, J. Appl. Econometrics 8 (1993) S85).
+    pub fn autocorrelation(&self, tests: &[&Test], kept: impl Fn(usize, usize) -> bool) -> Option<Autocorrelation> {
         self.autocorrelation_up_to(MAX_ORDER, tests, kept)
     }
 
@@ -30,7 +26,8 @@ impl PureError {
         tests: &[&Test],
         kept: impl Fn(usize, usize) -> bool,
     ) -> Option<Autocorrelation> {
-        // Deviations before their rescaling for the trends: the variance that trends remove depends on the autocorrelation.
+        // Deviations before their rescaling for the trends: the variance that trends remove depends on the
+        // autocorrelation.
         let mut covariance = [0.0; MAX_ORDER + 1];
         let mut enlarged = 0.0;
         let mut pairs = [0_usize; MAX_ORDER + 1];
@@ -68,12 +65,9 @@ impl PureError {
         let (coefficients, variance) = correct_for_detrending(&observed, order, insignificant, &lengths);
         // Bartlett's standard error of the lag-1 correlation, propagated through the correction.
         let neighbours = observed[1] / observed[0];
-        let u =
-            SCATTER_RATIO * ((1.0 - neighbours * neighbours).max(0.0) / self.freedom.max(1) as f64).sqrt();
+        let u = SCATTER_RATIO * ((1.0 - neighbours * neighbours).max(0.0) / self.freedom.max(1) as f64).sqrt();
         let mut shifted = observed;
-        shifted[1..]
-            .iter_mut()
-            .for_each(|value| *value += u * observed[0]);
+        shifted[1..].iter_mut().for_each(|value| *value += u * observed[0]);
         let (of_shifted, _) = correct_for_detrending(&shifted, order, insignificant, &lengths);
         let total = |coefficients: &[f64]| coefficients.iter().sum::<f64>();
         let sum_u = (total(&of_shifted) - total(&coefficients)).abs();
@@ -110,8 +104,8 @@ fn correct_for_detrending(
 /// Maximum autoregressive order.
 const MAX_ORDER: usize = 3;
 const CORRECTIONS: usize = 8;
-/// Ratio of the actual scatter of the lag-1 correlation to Bartlett's formula. The excess is due to removed trends and selected orders.
-/// Over 64 simulated sessions with a coefficient of 0.8 the scatter was 0.034.
+/// Ratio of the actual scatter of the lag-1 correlation to Bartlett's formula. The excess is due to removed trends and
+/// selected orders. Over 64 simulated sessions with a coefficient of 0.8 the scatter was 0.034.
 const SCATTER_RATIO: f64 = 1.6;
 /// Run length beyond which detrending removes a negligible part of the noise.
 const LONG_RUN: usize = 600;
@@ -127,18 +121,15 @@ pub struct Autocorrelation {
     pub inflation: f64,
 }
 
-/// Coefficients from autocovariances (Durbin–Levinson). The last coefficient of each order is its partial autocorrelation.
+/// Coefficients from autocovariances (Durbin–Levinson). The last coefficient of each order is its partial
+/// autocorrelation.
 fn autoregression(covariance: &[f64; MAX_ORDER + 1], most: usize, insignificant: f64) -> Vec<f64> {
     let correlation = covariance.map(|value| value / covariance[0]);
     let mut coefficients: Vec<f64> = Vec::new();
     let mut accepted = Vec::new();
     let mut unexplained = 1.0;
     for order in 1..=most {
-        let predicted: f64 = coefficients
-            .iter()
-            .enumerate()
-            .map(|(k, a)| a * correlation[order - 1 - k])
-            .sum();
+        let predicted: f64 = coefficients.iter().enumerate().map(|(k, a)| a * correlation[order - 1 - k]).sum();
         let partial = ((correlation[order] - predicted) / unexplained).clamp(-0.99, 0.99);
         let previous = coefficients.clone();
         for k in 0..previous.len() {
@@ -153,40 +144,20 @@ fn autoregression(covariance: &[f64; MAX_ORDER + 1], most: usize, insignificant:
     accepted
 }
 
-/// Autocorrelations of a process, and their expectation after detrending of runs with these lengths. `lengths` gives the number of
-/// readings in runs of each length.
-fn detrended(
-    coefficients: &[f64],
-    lengths: &BTreeMap<usize, usize>,
-) -> ([f64; MAX_ORDER + 1], [f64; MAX_ORDER + 1]) {
-    let longest = lengths
-        .keys()
-        .copied()
-        .filter(|n| *n <= LONG_RUN)
-        .max()
-        .unwrap_or(0)
-        .max(MAX_ORDER + 1);
+/// Autocorrelations of a process, and their expectation after detrending of runs with these lengths. `lengths` gives
+/// the number of readings in runs of each length.
+fn detrended(coefficients: &[f64], lengths: &BTreeMap<usize, usize>) -> ([f64; MAX_ORDER + 1], [f64; MAX_ORDER + 1]) {
+    let longest = lengths.keys().copied().filter(|n| *n <= LONG_RUN).max().unwrap_or(0).max(MAX_ORDER + 1);
     // Impulse response, long enough for every autocorrelation short of a drift.
     let mut response = vec![0.0; longest + 2000];
     response[0] = 1.0;
     for t in 1..response.len() {
-        response[t] = coefficients
-            .iter()
-            .enumerate()
-            .filter(|(k, _)| *k < t)
-            .map(|(k, a)| a * response[t - 1 - k])
-            .sum();
+        response[t] =
+            coefficients.iter().enumerate().filter(|(k, _)| *k < t).map(|(k, a)| a * response[t - 1 - k]).sum();
     }
     let power: f64 = response.iter().map(|r| r * r).sum();
     let correlation: Vec<f64> = (0..longest)
-        .map(|lag| {
-            response[lag..]
-                .iter()
-                .zip(&response)
-                .map(|(a, b)| a * b)
-                .sum::<f64>()
-                / power
-        })
+        .map(|lag| response[lag..].iter().zip(&response).map(|(a, b)| a * b).sum::<f64>() / power)
         .collect();
     let process = std::array::from_fn(|lag| correlation[lag]);
     let mut shown = [0.0; MAX_ORDER + 1];
@@ -250,17 +221,14 @@ mod tests {
             let found = autoregression(&covariance, MAX_ORDER, 1e-6);
             let wanted = if a[1] == 0.0 { &a[..1] } else { &a[..] };
             assert_eq!(found.len(), wanted.len());
-            assert!(
-                found.iter().zip(wanted).all(|(f, w)| (f - w).abs() < 1e-12),
-                "{found:?}"
-            );
+            assert!(found.iter().zip(wanted).all(|(f, w)| (f - w).abs() < 1e-12), "{found:?}");
             assert_eq!(autoregression(&covariance, 1, 1e-6).len(), 1);
             assert!(autoregression(&covariance, MAX_ORDER, 1.0).is_empty());
         }
     }
 
-    /// Compares with `Cov d = P Γ P`, `P = 1 − Q Qᵀ`, as explicit products. A run of negligible trend shows the autocorrelations of the
-    /// process itself.
+    /// Compares with `Cov d = P Γ P`, `P = 1 − Q Qᵀ`, as explicit products. A run of negligible trend shows the
+    /// autocorrelations of the process itself.
     #[test]
     fn detrended_autocovariances_equal_the_projected_covariance() {
         let a = [1.1, -0.4];
@@ -282,11 +250,7 @@ mod tests {
         for lag in 0..=MAX_ORDER {
             assert!((process[lag] - correlation[lag]).abs() < 1e-12);
             let wanted = (wanted[lag] + 601.0 * correlation[lag]) / 738.0;
-            assert!(
-                (shown[lag] - wanted).abs() < 1e-12,
-                "{lag}: {} {wanted}",
-                shown[lag]
-            );
+            assert!((shown[lag] - wanted).abs() < 1e-12, "{lag}: {} {wanted}", shown[lag]);
         }
     }
 

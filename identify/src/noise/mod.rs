@@ -1,13 +1,14 @@
 //! Noise of the readings: standard deviation and autocorrelation.
 //!
-//! Readings at the same test, direction and position in repeated runs differ by noise alone (pure error: Box, Hunter & Hunter, Statistics
-//! for Experimenters, ch. 10). Their deviations from their mean do not depend on a model. Every run is first detrended. Drift and warm-up
-//! are structure that would count as slow noise, and a ball that moves between two runs adds one cycle per turn. A long run loses a
-//! parabola and one cycle, a short run fewer terms.
+//! Readings at the same test, direction and position in repeated runs differ by noise alone (pure error: Box, Hunter &
+//! Hunter, Statistics for Experimenters, ch. 10). Their deviations from their mean do not depend on a model. Every run
+//! is first detrended. Drift and warm-up are structure that would count as slow noise, and a ball that moves between
+//! two runs adds one cycle per turn. A long run loses a parabola and one cycle, a short run fewer terms.
 //!
-//! Means and trends use degrees of freedom. Let `P` be the projector that removes the trends of the runs, and `M` the projector that
-//! removes the means of the groups of repeats. The deviations of noise of variance σ² have the expected sum of squares `σ²·tr(M·P)`. Their
-//! sum of squares is therefore divided by that trace, not by the number of deviations.
+//! Means and trends use degrees of freedom. Let `P` be the projector that removes the trends of the runs, and `M` the
+//! projector that removes the means of the groups of repeats. The deviations of noise of variance σ² have the expected
+//! sum of squares `σ²·tr(M·P)`. Their sum of squares is therefore divided by that trace, not by the number of
+//! deviations.
 
 mod autocorrelation;
 mod stated;
@@ -28,8 +29,8 @@ pub struct Noise {
     pub sigma_mm: f64,
     /// Autoregressive coefficients along a run; empty for white noise.
     pub ar_coefficients: Vec<f64>,
-    /// Standard uncertainty of the sum of these coefficients. The sum determines how slow the noise is, and thus the uncertainty of its
-    /// slow part.
+    /// Standard uncertainty of the sum of these coefficients. The sum determines how slow the noise is, and thus the
+    /// uncertainty of its slow part.
     pub ar_sum_u: f64,
     /// Source of the standard deviation.
     pub source: NoiseSource,
@@ -60,35 +61,31 @@ impl NoiseSource {
 impl Noise {
     /// White noise.
     pub fn white(sigma_mm: f64, source: NoiseSource) -> Noise {
-        Noise {
-            sigma_mm,
-            ar_coefficients: Vec::new(),
-            ar_sum_u: 0.0,
-            source,
-        }
+        Noise { sigma_mm, ar_coefficients: Vec::new(), ar_sum_u: 0.0, source }
     }
 
     /// Standard deviation of the innovation, mm: the part of a reading that earlier readings of its run do not predict.
     pub fn innovation_mm(&self) -> f64 {
-        // The innovation variance is γ0 Π(1 − κ²) with the reflection coefficients κ, from the Durbin–Levinson recursion run backwards.
+        // The innovation variance is γ0 Π(1 − κ²) with the reflection coefficients κ, from the Durbin–Levinson
+        // recursion run backwards.
         let mut variance_ratio = 1.0;
         let mut coefficients = self.ar_coefficients.clone();
         while let Some(reflection) = coefficients.last().copied() {
             let bound = 1.0 - reflection * reflection;
             variance_ratio *= bound;
             let n = coefficients.len();
-            coefficients = (0..n - 1)
-                .map(|k| (coefficients[k] + reflection * coefficients[n - 2 - k]) / bound)
-                .collect();
+            coefficients =
+                (0..n - 1).map(|k| (coefficients[k] + reflection * coefficients[n - 2 - k]) / bound).collect();
         }
         self.sigma_mm * variance_ratio.max(0.0).sqrt()
     }
 }
 
-/// Pure error: residuals (rows × coordinates, mm) without the trend of their run and their mean over repeats, rescaled for the variance
-/// that these remove. `None` for readings without repeats.
+/// Pure error: residuals (rows × coordinates, mm) without the trend of their run and their mean over repeats, rescaled
+/// for the variance that these remove. `None` for readings without repeats.
 pub struct PureError {
-    /// For each test, one value per scalar reading. The expected mean square within a test is the variance of white noise.
+    /// For each test, one value per scalar reading. The expected mean square within a test is the variance of white
+    /// noise.
     pub deviations: Vec<Vec<Option<f64>>>,
     /// Degrees of freedom after means and trends, rounded down.
     pub freedom: usize,
@@ -99,7 +96,8 @@ pub struct PureError {
 }
 
 impl PureError {
-    /// From the residuals of any model. A model error that is equal in all repeats cancels. `kept(test, row)` is false for outliers.
+    /// From the residuals of any model. A model error that is equal in all repeats cancels. `kept(test, row)` is false
+    /// for outliers.
     pub fn of(tests: &[&Test], residuals: &[Vec<f64>], kept: impl Fn(usize, usize) -> bool) -> PureError {
         let readings: Vec<Option<&Readings>> = tests.iter().map(|test| test.readings.as_ref()).collect();
         PureError::of_readings(&readings, residuals, kept)
@@ -139,9 +137,7 @@ impl PureError {
         let (mut sum, mut freedom) = (0.0, 0.0);
         for (deviations, of_test) in self.deviations.iter().zip(&self.freedom_of_tests) {
             let values = deviations.iter().flatten();
-            let (squares, count) = values.fold((0.0, 0_usize), |(sum, count), value| {
-                (sum + value * value, count + 1)
-            });
+            let (squares, count) = values.fold((0.0, 0_usize), |(sum, count), value| (sum + value * value, count + 1));
             if count > 0 {
                 sum += of_test * squares / count as f64;
                 freedom += of_test;
@@ -151,8 +147,8 @@ impl PureError {
     }
 }
 
-/// Writes the deviations of a test's repeats. Returns their degrees of freedom, and their rescaling factor for the trends. There are no
-/// deviations if the trends remove nearly all variance.
+/// Writes the deviations of a test's repeats. Returns their degrees of freedom, and their rescaling factor for the
+/// trends. There are no deviations if the trends remove nearly all variance.
 fn deviations(
     readings: &Readings,
     residual: &[f64],
@@ -165,12 +161,10 @@ fn deviations(
     let keys = RepeatKeys::of(readings);
     let mut order: Vec<usize> = (0..readings.rows()).filter(|row| kept(*row)).collect();
     order.sort_by(|a, b| keys.of_row(*a).cmp(keys.of_row(*b)));
-    // Over one coordinate: the trace, the expected sum of squares of deviations rescaled for the means alone, and their number.
+    // Over one coordinate: the trace, the expected sum of squares of deviations rescaled for the means alone, and their
+    // number.
     let (mut freedom, mut expected, mut count) = (0.0, 0.0, 0_usize);
-    for rows in order
-        .chunk_by(|a, b| keys.of_row(*a) == keys.of_row(*b))
-        .filter(|rows| rows.len() > 1)
-    {
+    for rows in order.chunk_by(|a, b| keys.of_row(*a) == keys.of_row(*b)).filter(|rows| rows.len() > 1) {
         let repeats = rows.len() as f64;
         let square = repeats / (repeats - 1.0);
         let of_group = trends.freedom_of(rows);
@@ -190,10 +184,7 @@ fn deviations(
         return (0.0, 1.0);
     }
     let enlarged = (count as f64 / expected).sqrt();
-    deviation
-        .iter_mut()
-        .flatten()
-        .for_each(|value| *value *= enlarged);
+    deviation.iter_mut().flatten().for_each(|value| *value *= enlarged);
     (freedom * coordinates as f64, enlarged)
 }
 
@@ -254,15 +245,9 @@ mod tests {
                 response.push(terms.map(|(k, a)| a * response[t - 1 - k]).sum::<f64>());
             }
             let power: f64 = response.iter().map(|r| r * r).sum();
-            let noise = Noise {
-                ar_coefficients: ar_coefficients,
-                ..Noise::white(2.0, NoiseSource::Stated)
-            };
+            let noise = Noise { ar_coefficients: ar_coefficients, ..Noise::white(2.0, NoiseSource::Stated) };
             let innovation = noise.innovation_mm();
-            assert!(
-                (innovation - 2.0 / power.sqrt()).abs() < 1e-9,
-                "{noise:?}: {innovation}"
-            );
+            assert!((innovation - 2.0 / power.sqrt()).abs() < 1e-9, "{noise:?}: {innovation}");
         }
     }
 
@@ -279,15 +264,13 @@ mod tests {
 
     /// Number of simulated sessions, from `ABBE_STUDY`.
     fn sessions() -> usize {
-        let stated = std::env::var("ABBE_STUDY")
-            .ok()
-            .and_then(|text| text.parse().ok());
+        let stated = std::env::var("ABBE_STUDY").ok().and_then(|text| text.parse().ok());
         stated.filter(|count| *count > 1).unwrap_or(200)
     }
 
-    /// White noise of 0.5 µm over structure, and over runs with different ball positions. The mean of σ² over many sessions is the true
-    /// one. The scatter of σ² is that of χ² with the remaining degrees of freedom, `(R − 1)(n − K)` for a test of R runs of n readings
-    /// which lose K terms each.
+    /// White noise of 0.5 µm over structure, and over runs with different ball positions. The mean of σ² over many
+    /// sessions is the true one. The scatter of σ² is that of χ² with the remaining degrees of freedom,
+    /// `(R − 1)(n − K)` for a test of R runs of n readings which lose K terms each.
     #[test]
     fn pure_error_is_unbiased_for_short_and_long_runs() {
         const SIGMA: f64 = 0.5e-3;
@@ -303,8 +286,7 @@ mod tests {
                 for _ in 0..sessions {
                     let residuals: Vec<Vec<f64>> = (0..TESTS)
                         .map(|_| {
-                            let offsets: Vec<f64> =
-                                (0..runs).map(|_| generator.sample(StandardNormal)).collect();
+                            let offsets: Vec<f64> = (0..runs).map(|_| generator.sample(StandardNormal)).collect();
                             (0..runs * places)
                                 .map(|row| {
                                     let noise: f64 = generator.sample(StandardNormal);
@@ -328,10 +310,7 @@ mod tests {
                     "{places} readings, {runs} runs: σ² {mean:.4} ± {:.4} of the true one",
                     (scatter / count).sqrt()
                 );
-                assert!(
-                    (mean - 1.0).abs() < 4.0 * (expected / count).sqrt(),
-                    "{places} readings, {runs} runs: {mean}"
-                );
+                assert!((mean - 1.0).abs() < 4.0 * (expected / count).sqrt(), "{places} readings, {runs} runs: {mean}");
                 assert!(
                     (scatter / expected - 1.0).abs() < 5.0 * (2.0 / count + 12.0 / (freedom * count)).sqrt(),
                     "{places} readings, {runs} runs: {scatter} instead of {expected}"
@@ -340,8 +319,8 @@ mod tests {
         }
     }
 
-    /// The degrees of freedom against the trace of the explicit product of both projectors, in a case where they do not commute: one run
-    /// visits its positions three times, another once, and some readings are excluded.
+    /// The degrees of freedom against the trace of the explicit product of both projectors, in a case where they do not
+    /// commute: one run visits its positions three times, another once, and some readings are excluded.
     #[test]
     fn degrees_of_freedom_are_the_trace_of_both_projectors() {
         let places: Vec<usize> = (0..36).map(|row| row % 12).chain(0..12).collect();
@@ -355,10 +334,7 @@ mod tests {
         let directions = directions(&readings);
         let rows: Vec<usize> = (0..48).filter(|row| kept(*row)).collect();
         let group = |row: usize| (places[row], directions[row]);
-        let (mut means, mut trends) = (
-            faer::Mat::<f64>::identity(48, 48),
-            faer::Mat::<f64>::identity(48, 48),
-        );
+        let (mut means, mut trends) = (faer::Mat::<f64>::identity(48, 48), faer::Mat::<f64>::identity(48, 48));
         for run in [0..36_usize, 36..48] {
             let of_run: Vec<usize> = run.filter(|row| kept(*row)).collect();
             let times: Vec<f64> = of_run.iter().map(|row| *row as f64).collect();
@@ -372,9 +348,7 @@ mod tests {
         for t in 0..48 {
             let repeats: Vec<usize> = rows.iter().copied().filter(|s| group(*s) == group(t)).collect();
             if kept(t) && repeats.len() > 1 {
-                repeats
-                    .iter()
-                    .for_each(|s| means[(t, *s)] -= 1.0 / repeats.len() as f64);
+                repeats.iter().for_each(|s| means[(t, *s)] -= 1.0 / repeats.len() as f64);
             } else {
                 means[(t, t)] = 0.0;
             }

@@ -26,10 +26,7 @@ pub(super) fn trend_terms(times: &[f64]) -> Vec<[f64; TERMS]> {
     let n = times.len() as f64;
     let powers = powers(times.len());
     let middle = times.iter().sum::<f64>() / n;
-    let half = times
-        .iter()
-        .map(|t| (t - middle).abs())
-        .fold(f64::MIN_POSITIVE, f64::max);
+    let half = times.iter().map(|t| (t - middle).abs()).fold(f64::MIN_POSITIVE, f64::max);
     let term = |t: &f64, i: usize| -> f64 {
         let time = (t - middle) / half;
         let (sin, cos) = (std::f64::consts::PI * time).sin_cos();
@@ -41,10 +38,7 @@ pub(super) fn trend_terms(times: &[f64]) -> Vec<[f64; TERMS]> {
             _ => sin,
         }
     };
-    let mut q: Vec<[f64; TERMS]> = times
-        .iter()
-        .map(|t| std::array::from_fn(|i| term(t, i)))
-        .collect();
+    let mut q: Vec<[f64; TERMS]> = times.iter().map(|t| std::array::from_fn(|i| term(t, i))).collect();
     for i in 0..TERMS {
         for j in (0..i).chain(0..i) {
             let along: f64 = q.iter().map(|row| row[i] * row[j]).sum();
@@ -70,11 +64,8 @@ pub(super) struct Trends {
 impl Trends {
     /// The trends over the rows that are not excluded. Readings without runs have no trend.
     pub fn of(readings: &Readings, kept: impl Fn(usize) -> bool) -> Trends {
-        let mut trends = Trends {
-            run: vec![0; readings.rows()],
-            terms: vec![[0.0; TERMS]; readings.rows()],
-            rows: Vec::new(),
-        };
+        let mut trends =
+            Trends { run: vec![0; readings.rows()], terms: vec![[0.0; TERMS]; readings.rows()], rows: Vec::new() };
         if readings.run.is_empty() {
             return trends;
         }
@@ -98,11 +89,8 @@ impl Trends {
         for rows in &self.rows {
             for coordinate in 0..coordinates {
                 let at = |row: usize| row * coordinates + coordinate;
-                let along: [f64; TERMS] = std::array::from_fn(|i| {
-                    rows.iter()
-                        .map(|row| residual[at(*row)] * self.terms[*row][i])
-                        .sum()
-                });
+                let along: [f64; TERMS] =
+                    std::array::from_fn(|i| rows.iter().map(|row| residual[at(*row)] * self.terms[*row][i]).sum());
                 for row in rows {
                     let terms = along.iter().zip(&self.terms[*row]);
                     level[at(*row)] -= terms.map(|(a, q)| a * q).sum::<f64>();
@@ -112,8 +100,8 @@ impl Trends {
         level
     }
 
-    /// Contribution of a group of repeats to the trace of `M·P`: `Σ_t P_tt − (1/R)·Σ_ts P_ts` over its R rows. `P_ts` is
-    /// `δ_ts − Σ_i q_ti q_si` for rows of one run, and `δ_ts` for others.
+    /// Contribution of a group of repeats to the trace of `M·P`: `Σ_t P_tt − (1/R)·Σ_ts P_ts` over its R rows. `P_ts`
+    /// is `δ_ts − Σ_i q_ti q_si` for rows of one run, and `δ_ts` for others.
     pub fn freedom_of(&self, group: &[usize]) -> f64 {
         let repeats = group.len() as f64;
         let mut own = 0.0;
@@ -144,14 +132,9 @@ mod tests {
             let values: Vec<f64> = times.iter().map(|t| of(*t)).collect();
             let along: [f64; TERMS] =
                 std::array::from_fn(|i| values.iter().zip(&q).map(|(value, q)| value * q[i]).sum());
-            let rest = values
-                .iter()
-                .zip(&q)
-                .map(|(value, q)| value - along.iter().zip(q).map(|(a, q)| a * q).sum::<f64>());
-            let (remaining, total) = (
-                rest.map(|r| r * r).sum::<f64>(),
-                values.iter().map(|v| v * v).sum::<f64>(),
-            );
+            let rest =
+                values.iter().zip(&q).map(|(value, q)| value - along.iter().zip(q).map(|(a, q)| a * q).sum::<f64>());
+            let (remaining, total) = (rest.map(|r| r * r).sum::<f64>(), values.iter().map(|v| v * v).sum::<f64>());
             (remaining / total).sqrt()
         };
         // One cycle from the first reading to the last.

@@ -1,8 +1,8 @@
 //! Waves along runs that vary from run to run and that no autocorrelation explains.
 //!
-//! A wave of varying amplitude has no line in the spectrum but a hump of some cycles' width. An autoregression of order two or three can
-//! imitate such a hump. The deviations are therefore whitened with order one, whose spectrum is monotonic, and the search for humps is by
-//! bands.
+//! A wave of varying amplitude has no line in the spectrum but a hump of some cycles' width. An autoregression of order
+//! two or three can imitate such a hump. The deviations are therefore whitened with order one, whose spectrum is
+//! monotonic, and the search for humps is by bands.
 
 use std::ops::Range;
 
@@ -31,9 +31,9 @@ struct RunRows {
 }
 
 impl PureError {
-    /// Removes waves along runs that no autocorrelation explains: they vary from run to run, so they are structure that would count as
-    /// noise. A band is removed from all tests or from one. The criterion is the periodogram of the whitened deviations, summed over runs,
-    /// against the median of all ordinates.
+    /// Removes waves along runs that no autocorrelation explains: they vary from run to run, so they are structure that
+    /// would count as noise. A band is removed from all tests or from one. The criterion is the periodogram of the
+    /// whitened deviations, summed over runs, against the median of all ordinates.
     pub fn without_waves(mut self, tests: &[&Test], kept: impl Fn(usize, usize) -> bool) -> PureError {
         let Some(mut autocorrelation) = self.autocorrelation_up_to(1, tests, &kept) else {
             return self;
@@ -59,14 +59,13 @@ impl PureError {
                     // Half cycles overlap: every second one of a band represents the whole band.
                     for half_cycles in band.clone().step_by(2) {
                         if remove_wave(&mut self.deviations[run.test][run.rows.clone()], half_cycles) {
-                            // Repeats hold a deviation more than once, so a wave uses only its share of two degrees of freedom.
+                            // Repeats hold a deviation more than once, so a wave uses only its share of two degrees of
+                            // freedom.
                             self.freedom_of_tests[run.test] -= 2.0 * independent[run.test];
                         }
                     }
                 }
-                self.freedom_of_tests
-                    .iter_mut()
-                    .for_each(|freedom| *freedom = freedom.max(0.0));
+                self.freedom_of_tests.iter_mut().for_each(|freedom| *freedom = freedom.max(0.0));
                 self.count();
                 let Some(of_remaining) = self.autocorrelation_up_to(1, tests, &kept) else {
                     return self;
@@ -86,9 +85,7 @@ impl PureError {
                 let deviation = |row: usize| self.deviations[*test][row].unwrap_or(0.0);
                 let past = |row: usize| -> f64 {
                     let lags = autocorrelation.coefficients.iter().enumerate();
-                    lags.filter(|(lag, _)| row > rows.start + lag)
-                        .map(|(lag, a)| a * deviation(row - lag - 1))
-                        .sum()
+                    lags.filter(|(lag, _)| row > rows.start + lag).map(|(lag, a)| a * deviation(row - lag - 1)).sum()
                 };
                 rows.clone().map(|row| deviation(row) - past(row)).collect()
             })
@@ -131,8 +128,8 @@ impl PureError {
     }
 }
 
-/// Removes a wave of so many half cycles from the deviations of a run, by least squares. Rescales the rest for the variance that the wave
-/// removes. Returns whether the run has enough deviations.
+/// Removes a wave of so many half cycles from the deviations of a run, by least squares. Rescales the rest for the
+/// variance that the wave removes. Returns whether the run has enough deviations.
 fn remove_wave(run: &mut [Option<f64>], half_cycles: usize) -> bool {
     let step = std::f64::consts::PI * half_cycles as f64 / run.len() as f64;
     let (mut cc, mut cs, mut ss, mut cy, mut sy) = (0.0, 0.0, 0.0, 0.0, 0.0);
@@ -150,10 +147,7 @@ fn remove_wave(run: &mut [Option<f64>], half_cycles: usize) -> bool {
     if determinant <= 1e-6 * cc * ss {
         return false;
     }
-    let (a, b) = (
-        (ss * cy - cs * sy) / determinant,
-        (cc * sy - cs * cy) / determinant,
-    );
+    let (a, b) = ((ss * cy - cs * sy) / determinant, (cc * sy - cs * cy) / determinant);
     let count = run.iter().flatten().count() as f64;
     let rescale = (count / (count - 2.0).max(1.0)).sqrt();
     for (t, value) in run.iter_mut().enumerate() {
@@ -173,9 +167,7 @@ mod tests {
     #[test]
     fn only_the_wave_of_the_given_frequency_is_removed() {
         const N: usize = 48;
-        let wave = |half_cycles: f64, t: usize| {
-            (std::f64::consts::PI * half_cycles * t as f64 / N as f64 + 0.4).cos()
-        };
+        let wave = |half_cycles: f64, t: usize| (std::f64::consts::PI * half_cycles * t as f64 / N as f64 + 0.4).cos();
         let mut run: Vec<Option<f64>> = (0..N).map(|t| Some(3.0 * wave(4.0, t) + wave(10.0, t))).collect();
         remove_wave(&mut run, 4);
         let rescale = (N as f64 / (N as f64 - 2.0)).sqrt();

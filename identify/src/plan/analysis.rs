@@ -28,12 +28,7 @@ pub struct PlanOptions {
 impl Default for PlanOptions {
     /// The session's noise, its data if present, effects included, and the usual sensor travel.
     fn default() -> Self {
-        PlanOptions {
-            noise_mm: None,
-            planned_only: false,
-            effects: true,
-            reach_mm: BAR_TRAVEL_MM,
-        }
+        PlanOptions { noise_mm: None, planned_only: false, effects: true, reach_mm: BAR_TRAVEL_MM }
     }
 }
 
@@ -51,11 +46,8 @@ pub fn analyse(session: &Session, options: &PlanOptions) -> Result<PlanAnalysis,
     let problem = states::problem_by_test(&complete, noise)?;
     let mut analysis = analyse_problem(&problem, options.reach_mm)?;
     if options.noise_mm.is_none() && session.noise_mm.is_none() {
-        let found = if problem.noise.source == NoiseSource::Stated {
-            "is assumed"
-        } else {
-            "is estimated from its data"
-        };
+        let found =
+            if problem.noise.source == NoiseSource::Stated { "is assumed" } else { "is estimated from its data" };
         let sigma_um = problem.noise.sigma_mm * 1e3;
         let warning = format!("the session states no `noise_um`: {sigma_um:.2} µm {found}");
         analysis.warnings.push(warning);
@@ -78,8 +70,8 @@ pub fn prepared(session: &Session, options: &PlanOptions) -> Result<(Session, No
     Ok((states::complete(session, options.planned_only)?, noise))
 }
 
-/// Analyses a problem whose folds are its tests (see [`states::problem_by_test`]), without effects. A test causes a warning if
-/// the distance of its balls differs from the bar length by more than `travel_mm`.
+/// Analyses a problem whose folds are its tests (see [`states::problem_by_test`]), without effects. A test causes a
+/// warning if the distance of its balls differs from the bar length by more than `travel_mm`.
 ///
 /// # Errors
 /// If the model cannot be evaluated.
@@ -112,9 +104,7 @@ pub fn analyse_problem(problem: &Problem<'_>, travel_mm: f64) -> Result<PlanAnal
     let mut setups: Vec<&str> = problem.tests.iter().map(|test| mounted(test)).collect();
     setups.sort_unstable();
     setups.dedup();
-    let tests: Vec<TestSummary> = (0..problem.tests.len())
-        .map(|test| summary(problem, test))
-        .collect();
+    let tests: Vec<TestSummary> = (0..problem.tests.len()).map(|test| summary(problem, test)).collect();
     let mut warnings = problem.session.warnings.clone();
     for test in &tests {
         if let Some(reach_mm) = test.reach_mm.filter(|reach_mm| *reach_mm > travel_mm) {
@@ -161,18 +151,11 @@ fn summary(problem: &Problem<'_>, number: usize) -> TestSummary {
     TestSummary {
         name: test.name.clone(),
         readings: readings.map_or(0, |readings| readings.rows()),
-        moving_min: time
-            .first()
-            .zip(time.last())
-            .map(|(first, last)| (last - first) / 60.0),
+        moving_min: time.first().zip(time.last()).map(|(first, last)| (last - first) / 60.0),
         reach_mm: match model.station() {
             Station::BallBar(bar) => {
                 let nominal = model.readings_mm(&SlotValues::zero(model.slots()));
-                Some(
-                    nominal
-                        .iter()
-                        .fold(0.0, |most: f64, reading| most.max((reading - bar.bar).abs())),
-                )
+                Some(nominal.iter().fold(0.0, |most: f64, reading| most.max((reading - bar.bar).abs())))
             }
             _ => None,
         },
@@ -181,18 +164,13 @@ fn summary(problem: &Problem<'_>, number: usize) -> TestSummary {
 }
 
 fn correlation(problem: &Problem<'_>, linear: &Linearisation, of_interest: &[usize]) -> Correlation {
-    let both_identifiable =
-        |i: usize, j: usize| linear.rank.is_identifiable(i) && linear.rank.is_identifiable(j);
+    let both_identifiable = |i: usize, j: usize| linear.rank.is_identifiable(i) && linear.rank.is_identifiable(j);
     Correlation {
-        ids: of_interest
-            .iter()
-            .map(|j| problem.parameters.list[*j].id.clone())
-            .collect(),
+        ids: of_interest.iter().map(|j| problem.parameters.list[*j].id.clone()).collect(),
         matrix: of_interest
             .iter()
             .map(|&i| {
-                let entry =
-                    |j: usize| both_identifiable(i, j).then(|| budget::correlation(&linear.covariance, i, j));
+                let entry = |j: usize| both_identifiable(i, j).then(|| budget::correlation(&linear.covariance, i, j));
                 of_interest.iter().map(|&j| entry(j)).collect()
             })
             .collect(),
@@ -217,10 +195,7 @@ fn leave_one_out(
                 .filter(|j| linear.rank.is_identifiable(**j))
                 .map(|&j| {
                     let grown = covariance[(j, j)] / linear.covariance[(j, j)];
-                    VarianceInflation {
-                        id: list[j].id.clone(),
-                        factor: rank.is_identifiable(j).then_some(grown),
-                    }
+                    VarianceInflation { id: list[j].id.clone(), factor: rank.is_identifiable(j).then_some(grown) }
                 })
                 .collect();
             let all: Vec<&str> = variance_inflation
@@ -242,19 +217,12 @@ fn leave_one_out(
                 words.push(format!("only {name} makes {} identifiable", all.join(", ")));
             }
             if !much.is_empty() {
-                words.push(format!(
-                    "without {name} the variance increases: {}",
-                    much.join(", ")
-                ));
+                words.push(format!("without {name} the variance increases: {}", much.join(", ")));
             }
             if words.is_empty() {
                 words.push(format!("without {name} no variance increases by 50 %"));
             }
-            Ok(LeaveOneOut {
-                test: name.clone(),
-                variance_inflation,
-                why: words.join("; "),
-            })
+            Ok(LeaveOneOut { test: name.clone(), variance_inflation, why: words.join("; ") })
         })
         .collect()
 }

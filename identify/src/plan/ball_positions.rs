@@ -37,41 +37,24 @@ pub(super) fn ball_positions(
             (bar.spindle_ball, test.spindle_setup.clone())
         };
         if on_table && !positions.iter().any(|position| position.setup == setup) {
-            positions.push(BallPosition {
-                ball,
-                setup,
-                new: false,
-            });
+            positions.push(BallPosition { ball, setup, new: false });
         }
     }
-    for &about in rotary
-        .iter()
-        .filter(|axis| (**axis < machine.workpiece_side) == on_table)
-    {
+    for &about in rotary.iter().filter(|axis| (**axis < machine.workpiece_side) == on_table) {
         let axis = &machine.axes[about];
         let across = across(axis.direction);
         let carries_table = on_table && about == 0;
         for &radius in &variations.radii_mm {
             for &height in &variations.heights_mm {
-                let both = if carries_table || height == 0.0 {
-                    &[1.0][..]
-                } else {
-                    &[1.0, -1.0][..]
-                };
+                let both = if carries_table || height == 0.0 { &[1.0][..] } else { &[1.0, -1.0][..] };
                 for sign in both {
                     let up = if axis.direction[2] < 0.0 { -1.0 } else { 1.0 };
                     let ball: [f64; 3] = std::array::from_fn(|i| {
                         axis.origin_mm[i] + up * sign * height * axis.direction[i] + radius * across[i]
                     });
-                    let present = positions
-                        .iter()
-                        .any(|position| distance(position.ball, ball) < SAME_POSITION_MM);
+                    let present = positions.iter().any(|position| distance(position.ball, ball) < SAME_POSITION_MM);
                     if !present {
-                        positions.push(BallPosition {
-                            ball,
-                            setup: String::new(),
-                            new: true,
-                        });
+                        positions.push(BallPosition { ball, setup: String::new(), new: true });
                     }
                 }
             }
@@ -82,11 +65,7 @@ pub(super) fn ball_positions(
 
 /// A unit vector perpendicular to an axis: the projection of R's Y, or of Z if the axis is close to Y.
 fn across(direction: [f64; 3]) -> [f64; 3] {
-    let start = if direction[1].abs() < 0.5 {
-        [0.0, 1.0, 0.0]
-    } else {
-        [0.0, 0.0, 1.0]
-    };
+    let start = if direction[1].abs() < 0.5 { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] };
     let along: f64 = (0..3).map(|i| start[i] * direction[i]).sum();
     let rest: [f64; 3] = std::array::from_fn(|i| start[i] - along * direction[i]);
     let length = norm(rest);
@@ -107,9 +86,7 @@ pub(super) fn axis_positions(
         for at in &all {
             for degrees in &variations.standing_deg {
                 let position = degrees.to_radians();
-                let [low, high] = machine.axes[other]
-                    .travel
-                    .unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+                let [low, high] = machine.axes[other].travel.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
                 if position >= low - 1e-9 && position <= high + 1e-9 {
                     let mut at = at.clone();
                     at[other] = position;

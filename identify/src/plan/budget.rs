@@ -1,16 +1,16 @@
 //! The uncertainty budget of each error.
 //!
-//! The least-squares estimator is `β̂ = Cov·(JᵀV⁻¹y + Σ e_s m_s/u_s²)`, with `y` the readings and `m_s` the prior value of set-up
-//! quantity `s`. The law of propagation (JCGM 100, 5.1.2) divides the covariance without remainder:
+//! The least-squares estimator is `β̂ = Cov·(JᵀV⁻¹y + Σ e_s m_s/u_s²)`, with `y` the readings and `m_s` the prior value
+//! of set-up quantity `s`. The law of propagation (JCGM 100, 5.1.2) divides the covariance without remainder:
 //!
 //! ```text
 //! Cov = Cov·JᵀV⁻¹J·Cov  +  Σ_s (Cov e_s)(Cov e_s)ᵀ/u_s²
 //!       noise               set-up quantity s
 //! ```
 //!
-//! Other errors contribute no variance of their own. They contribute through correlation. If error `j` were known, the variance
-//! of error `i` would decrease by the share `ρ_ij²`. If all other errors were known, it would be the reciprocal of `i`'s diagonal
-//! entry in the information on the errors.
+//! Other errors contribute no variance of their own. They contribute through correlation. If error `j` were known, the
+//! variance of error `i` would decrease by the share `ρ_ij²`. If all other errors were known, it would be the
+//! reciprocal of `i`'s diagonal entry in the information on the errors.
 
 use faer::Mat;
 
@@ -35,18 +35,10 @@ pub fn budget(problem: &Problem<'_>, linear: &Linearisation, error: usize) -> Ve
     for (s, parameter) in list.iter().enumerate() {
         let Some(u) = prior_u(parameter) else { continue };
         let part = (covariance[(error, s)] / u).powi(2);
-        parts.push(Contribution {
-            source: parameter.id.clone(),
-            u: part.sqrt() * scale,
-            share: part / variance,
-        });
+        parts.push(Contribution { source: parameter.id.clone(), u: part.sqrt() * scale, share: part / variance });
     }
     let noise = noise_variance(linear, error);
-    parts.push(Contribution {
-        source: "noise".to_string(),
-        u: noise.sqrt() * scale,
-        share: noise / variance,
-    });
+    parts.push(Contribution { source: "noise".to_string(), u: noise.sqrt() * scale, share: noise / variance });
     parts.retain(|part| part.share >= MIN_SHARE || part.source == "noise");
     parts.sort_by(|a, b| largest_first((a.share, &a.source), (b.share, &b.source)));
     parts
@@ -56,14 +48,7 @@ pub fn budget(problem: &Problem<'_>, linear: &Linearisation, error: usize) -> Ve
 fn noise_variance(linear: &Linearisation, error: usize) -> f64 {
     let (r, _, _) = linear.readings.parts();
     let n = r.ncols();
-    (0..n)
-        .map(|i| {
-            (i..n)
-                .map(|j| r[(i, j)] * linear.covariance[(j, error)])
-                .sum::<f64>()
-                .powi(2)
-        })
-        .sum()
+    (0..n).map(|i| (i..n).map(|j| r[(i, j)] * linear.covariance[(j, error)]).sum::<f64>().powi(2)).sum()
 }
 
 /// The errors that are correlated with an error, the most correlated first.
@@ -89,11 +74,7 @@ pub fn correlated_with(problem: &Problem<'_>, linear: &Linearisation, error: usi
 /// Correlation of two parameters.
 pub fn correlation(covariance: &Mat<f64>, i: usize, j: usize) -> f64 {
     let product = covariance[(i, i)] * covariance[(j, j)];
-    if product > 0.0 {
-        covariance[(i, j)] / product.sqrt()
-    } else {
-        0.0
-    }
+    if product > 0.0 { covariance[(i, j)] / product.sqrt() } else { 0.0 }
 }
 
 /// The conditional standard uncertainty of each error: all other errors of the list known, internal units.
@@ -102,7 +83,5 @@ pub fn correlation(covariance: &Mat<f64>, i: usize, j: usize) -> f64 {
 /// If the decomposition fails.
 pub fn conditional_u(linear: &Linearisation, of_interest: &[usize]) -> Result<Vec<f64>, IdentifyError> {
     let r = marginal(linear.whole.parts().0.as_ref(), of_interest, &linear.size)?;
-    Ok((0..of_interest.len())
-        .map(|j| 1.0 / (0..=j).map(|i| r[(i, j)].powi(2)).sum::<f64>().sqrt())
-        .collect())
+    Ok((0..of_interest.len()).map(|j| 1.0 / (0..=j).map(|i| r[(i, j)].powi(2)).sum::<f64>().sqrt()).collect())
 }

@@ -31,8 +31,8 @@ pub struct CandidateInformation {
 }
 
 impl PreparedCandidates {
-    /// Evaluates the candidate tests for a problem whose folds are its tests, at the parameter values `beta`. `targets` are the
-    /// parameters of the goal.
+    /// Evaluates the candidate tests for a problem whose folds are its tests, at the parameter values `beta`. `targets`
+    /// are the parameters of the goal.
     ///
     /// # Errors
     /// If the model cannot be evaluated.
@@ -44,9 +44,8 @@ impl PreparedCandidates {
         targets: &[usize],
     ) -> Result<PreparedCandidates, IdentifyError> {
         let list = &problem.parameters.list;
-        let kept: Vec<usize> = (0..list.len())
-            .filter(|j| !targets.contains(j) && may_be_shared(problem, &list[*j]))
-            .collect();
+        let kept: Vec<usize> =
+            (0..list.len()).filter(|j| !targets.contains(j) && may_be_shared(problem, &list[*j])).collect();
         let shared = SharedParameters::of(problem, &kept, targets);
         let linear = Linearisation::of(problem, beta)?;
         let base = shared.root_of(problem, &linear)?;
@@ -54,18 +53,14 @@ impl PreparedCandidates {
             .into_par_iter()
             .map(|candidate| ready(problem, &shared, candidate, variations))
             .collect::<Result<_, IdentifyError>>()?;
-        Ok(PreparedCandidates {
-            shared,
-            base,
-            candidates: ready.into_iter().flatten().collect(),
-        })
+        Ok(PreparedCandidates { shared, base, candidates: ready.into_iter().flatten().collect() })
     }
 
     /// The plan with some candidate tests added.
     pub fn with(&self, candidates: &[usize]) -> Root {
-        candidates.iter().fold(self.base.clone(), |root, candidate| {
-            sum(root.as_ref(), self.candidates[*candidate].root.as_ref())
-        })
+        candidates
+            .iter()
+            .fold(self.base.clone(), |root, candidate| sum(root.as_ref(), self.candidates[*candidate].root.as_ref()))
     }
 
     /// The information `root` with a candidate test added.
@@ -75,14 +70,11 @@ impl PreparedCandidates {
 
     /// A figure of the information with each candidate test added.
     pub fn figures<T: Send>(&self, root: &Root, figure: &(impl Fn(&Root) -> T + Sync)) -> Vec<T> {
-        (0..self.candidates.len())
-            .into_par_iter()
-            .map(|candidate| figure(&self.added(root, candidate)))
-            .collect()
+        (0..self.candidates.len()).into_par_iter().map(|candidate| figure(&self.added(root, candidate))).collect()
     }
 
-    /// The candidate test with the smallest figure, and the figures of all. Of equal tests the first counts. Mounted balls come
-    /// before newly mounted ones.
+    /// The candidate test with the smallest figure, and the figures of all. Of equal tests the first counts. Mounted
+    /// balls come before newly mounted ones.
     pub fn best(&self, root: &Root, figure: &(impl Fn(&Root) -> f64 + Sync)) -> Option<(usize, Vec<f64>)> {
         let figures = self.figures(root, figure);
         let best = (0..figures.len()).min_by(|a, b| smallest_first(figures[*a], figures[*b]))?;
@@ -90,23 +82,20 @@ impl PreparedCandidates {
     }
 }
 
-/// Whether a new test can share a parameter: errors and effects, a mounted workpiece ball, the spindle ball of the last test, the
-/// sensor.
+/// Whether a new test can share a parameter: errors and effects, a mounted workpiece ball, the spindle ball of the last
+/// test, the sensor.
 fn may_be_shared(problem: &Problem<'_>, parameter: &Parameter) -> bool {
     if parameter.role != Role::Setup {
         return true;
     }
-    let last = problem
-        .tests
-        .last()
-        .map_or("", |test| test.spindle_setup.as_str());
+    let last = problem.tests.last().map_or("", |test| test.spindle_setup.as_str());
     parameter.id.starts_with("workpiece_ball.")
         || (parameter.id.starts_with("spindle_ball.") && parameter.id.ends_with(&format!("[{last}]")))
         || !parameter.id.contains('[')
 }
 
-/// The information of a candidate test with a newly mounted spindle ball and, if permitted, with the spindle ball that stays
-/// mounted. The readings are the same.
+/// The information of a candidate test with a newly mounted spindle ball and, if permitted, with the spindle ball that
+/// stays mounted. The readings are the same.
 fn ready(
     problem: &Problem<'_>,
     shared: &SharedParameters,
@@ -140,21 +129,10 @@ fn ready(
         });
         let mut candidate = candidate.clone();
         candidate.test.spindle_setup = last.spindle_setup.clone();
-        candidate
-            .name
-            .push_str(&format!(", spindle ball left mounted as in {}", last.name));
-        ready.push(CandidateInformation {
-            test: candidate,
-            root,
-        });
+        candidate.name.push_str(&format!(", spindle ball left mounted as in {}", last.name));
+        ready.push(CandidateInformation { test: candidate, root });
     }
     let root = shared.root_of_test(&alone, r.as_ref(), str::to_string);
-    ready.insert(
-        0,
-        CandidateInformation {
-            test: candidate,
-            root,
-        },
-    );
+    ready.insert(0, CandidateInformation { test: candidate, root });
     Ok(ready)
 }

@@ -13,8 +13,8 @@ use super::test_variations::TestVariations;
 
 /// Least radius about the swept axis, mm. At smaller radii the bar hardly moves.
 const MIN_RADIUS_MM: f64 = 10.0;
-/// Shortest bar with which linear axes follow, mm: the shortest nominal length less its calibration deviation. With a shorter bar
-/// the cups touch.
+/// Shortest bar with which linear axes follow, mm: the shortest nominal length less its calibration deviation. With a
+/// shorter bar the cups touch.
 const MIN_FOLLOWING_MM: f64 = 49.0;
 
 /// A candidate test without its states.
@@ -30,51 +30,28 @@ pub(super) struct Draft {
 /// All combinations of the permitted choices, before travel and reach are checked.
 pub(super) fn drafts(session: &Session, variations: &TestVariations, last: &Test) -> Vec<Draft> {
     let machine = &session.machine;
-    let rotary: Vec<usize> = (0..machine.axes.len())
-        .filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary)
-        .collect();
+    let rotary: Vec<usize> =
+        (0..machine.axes.len()).filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary).collect();
     let mut drafts = Vec::new();
     for &axis in &rotary {
         let whole = sweep_of(session, axis);
         let sweeps: Vec<Sweep> = variations
             .ranges
             .iter()
-            .flat_map(|share| {
-                variations
-                    .both_directions
-                    .iter()
-                    .map(|both| whole.part(*share, *both))
-            })
+            .flat_map(|share| variations.both_directions.iter().map(|both| whole.part(*share, *both)))
             .collect();
         let on_table = axis < machine.workpiece_side;
         for ball in ball_positions(session, variations, &rotary, on_table) {
             for at in axis_positions(session, variations, &rotary, axis) {
-                for (sweep, &feed) in sweeps
-                    .iter()
-                    .flat_map(|sweep| variations.feeds.iter().map(|feed| (*sweep, feed)))
+                for (sweep, &feed) in sweeps.iter().flat_map(|sweep| variations.feeds.iter().map(|feed| (*sweep, feed)))
                 {
                     let ball = &ball;
                     let mut at = at.clone();
                     at[axis] = sweep.from;
-                    let choice = Choice {
-                        session,
-                        last,
-                        axis,
-                        sweep,
-                        feed,
-                        on_table,
-                        ball,
-                        at: &at,
-                    };
-                    drafts.extend(
-                        variations
-                            .bars_mm
-                            .iter()
-                            .flat_map(|nominal| choice.on_axis(variations, *nominal)),
-                    );
+                    let choice = Choice { session, last, axis, sweep, feed, on_table, ball, at: &at };
+                    drafts.extend(variations.bars_mm.iter().flat_map(|nominal| choice.on_axis(variations, *nominal)));
                     let upright = at.iter().enumerate().all(|(k, q)| k == axis || *q == 0.0);
-                    if let Some(nominal) = following_bar(variations).filter(|_| variations.follow && upright)
-                    {
+                    if let Some(nominal) = following_bar(variations).filter(|_| variations.follow && upright) {
                         drafts.extend(choice.following(variations, nominal));
                     }
                 }
@@ -84,20 +61,11 @@ pub(super) fn drafts(session: &Session, variations: &TestVariations, last: &Test
     drafts
 }
 
-/// The bar for tests in which linear axes follow. Its length only sets the distance of the balls. It is the shortest bar of at
-/// least 99 mm, otherwise the longest bar that keeps the cups apart.
+/// The bar for tests in which linear axes follow. Its length only sets the distance of the balls. It is the shortest
+/// bar of at least 99 mm, otherwise the longest bar that keeps the cups apart.
 fn following_bar(variations: &TestVariations) -> Option<f64> {
-    let bars = || {
-        variations
-            .bars_mm
-            .iter()
-            .copied()
-            .filter(|bar| *bar >= MIN_FOLLOWING_MM)
-    };
-    bars()
-        .filter(|bar| *bar >= 99.0)
-        .min_by(f64::total_cmp)
-        .or_else(|| bars().max_by(f64::total_cmp))
+    let bars = || variations.bars_mm.iter().copied().filter(|bar| *bar >= MIN_FOLLOWING_MM);
+    bars().filter(|bar| *bar >= 99.0).min_by(f64::total_cmp).or_else(|| bars().max_by(f64::total_cmp))
 }
 
 struct Choice<'b> {
@@ -119,19 +87,13 @@ impl Choice<'_> {
             Station::BallBar(bar) => Some(bar.bar),
             _ => None,
         });
-        bars.into_iter()
-            .find(|bar| (bar - nominal).abs() <= 1.0)
-            .unwrap_or(nominal)
+        bars.into_iter().find(|bar| (bar - nominal).abs() <= 1.0).unwrap_or(nominal)
     }
 
     fn station(&self, nominal: f64) -> BallBar<f64> {
         let mut bar = match &self.last.station {
             Station::BallBar(bar) => bar.clone(),
-            _ => BallBar {
-                workpiece_ball: [0.0; 3],
-                spindle_ball: [0.0; 3],
-                bar: 0.0,
-            },
+            _ => BallBar { workpiece_ball: [0.0; 3], spindle_ball: [0.0; 3], bar: 0.0 },
         };
         bar.bar = self.length(nominal);
         if self.on_table {
@@ -151,15 +113,8 @@ impl Choice<'_> {
         let from: [f64; 3] = std::array::from_fn(|i| carried[i] - origin[i]);
         let height = dot(from, along);
         let radius = (dot(from, from) - height * height).max(0.0).sqrt();
-        let ball = if self.on_table {
-            "workpiece ball"
-        } else {
-            "spindle ball"
-        };
-        let mut name = format!(
-            "{}{nominal:.0} with the {ball} at radius {radius:.0} mm",
-            axis.name
-        );
+        let ball = if self.on_table { "workpiece ball" } else { "spindle ball" };
+        let mut name = format!("{}{nominal:.0} with the {ball} at radius {radius:.0} mm", axis.name);
         if height.abs() >= 0.5 {
             name.push_str(&format!(", height {height:.0} mm").replace('-', "−"));
         }
@@ -171,11 +126,7 @@ impl Choice<'_> {
         name.push_str(words);
         if self.sweep.is_part || !self.sweep.both_directions {
             let [from, to] = [self.sweep.from, self.sweep.to].map(f64::to_degrees);
-            let ways = if self.sweep.both_directions {
-                "in both directions"
-            } else {
-                "in one direction"
-            };
+            let ways = if self.sweep.both_directions { "in both directions" } else { "in one direction" };
             name.push_str(&format!(", swept {from:.0} … {to:.0}° {ways}").replace('-', "−"));
         }
         if self.feed != 1.0 {
@@ -210,11 +161,7 @@ impl Choice<'_> {
             at,
             readings: None,
         };
-        Draft {
-            test,
-            name,
-            new_setup: self.ball.new,
-        }
+        Draft { test, name, new_setup: self.ball.new }
     }
 
     /// The set-up priors: those of the session's last test, and for the bar those of the same bar.
@@ -230,8 +177,8 @@ impl Choice<'_> {
         priors
     }
 
-    /// Places the other ball on the swept axis: in the plane of the circle if the bar is as long as the radius, otherwise beside
-    /// that plane.
+    /// Places the other ball on the swept axis: in the plane of the circle if the bar is as long as the radius,
+    /// otherwise beside that plane.
     fn on_axis(&self, variations: &TestVariations, nominal: f64) -> Vec<Draft> {
         let machine = &self.session.machine;
         let station = self.station(nominal);
@@ -275,24 +222,18 @@ impl Choice<'_> {
                     String::new()
                 } else {
                     let side = if beside > 0.0 { "+" } else { "−" };
-                    format!(
-                        ", other ball {side}{:.0} mm along {}",
-                        beside.abs(),
-                        machine.axes[self.axis].name
-                    )
+                    format!(", other ball {side}{:.0} mm along {}", beside.abs(), machine.axes[self.axis].name)
                 };
                 Some(self.draft(nominal, station.clone(), at, motion, &words))
             })
             .collect()
     }
 
-    /// The outward direction of a vertical table axis that carries the ball itself. No other ball can be below the table.
+    /// The outward direction of a vertical table axis that carries the ball itself. No other ball can be below the
+    /// table.
     fn outward(&self) -> Option<[f64; 3]> {
         let machine = &self.session.machine;
-        let table = machine
-            .axes
-            .first()
-            .filter(|axis| self.on_table && axis.kind == AxisKind::Rotary)?;
+        let table = machine.axes.first().filter(|axis| self.on_table && axis.kind == AxisKind::Rotary)?;
         let up = table.direction[2];
         (self.axis == 0 && up.abs() > 0.9).then(|| {
             let (_, along) = placing::axis_line(machine, self.at, 0);

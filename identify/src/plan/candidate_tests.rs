@@ -1,9 +1,10 @@
-//! The candidate ball-bar tests for the next measurement: the permitted variations, and those that the machine can perform.
+//! The candidate ball-bar tests for the next measurement: the permitted variations, and those that the machine can
+//! perform.
 //!
-//! A candidate test sweeps one rotary axis. The other ball is on that axis, in the plane of the circle or beside it, as the bar
-//! length requires. Alternatively the linear axes keep the bar radial, tangential or axial. A part of the range, or one
-//! direction, never gives more information than the whole. Such tests are candidates only if the gain per minute decides. Tests
-//! beyond the travel of an axis or the reach of the bar are not candidates.
+//! A candidate test sweeps one rotary axis. The other ball is on that axis, in the plane of the circle or beside it, as
+//! the bar length requires. Alternatively the linear axes keep the bar radial, tangential or axial. A part of the
+//! range, or one direction, never gives more information than the whole. Such tests are candidates only if the gain per
+//! minute decides. Tests beyond the travel of an axis or the reach of the bar are not candidates.
 
 use abbe_model::axis::AxisKind;
 use abbe_model::instrument::Station;
@@ -30,52 +31,33 @@ pub struct CandidateTest {
     pub minutes: f64,
 }
 
-/// Whether candidate tests exist for a problem: it has errors to identify, the instrument is a ball bar, and a rotary axis can be
-/// swept.
+/// Whether candidate tests exist for a problem: it has errors to identify, the instrument is a ball bar, and a rotary
+/// axis can be swept.
 pub fn has_candidates(problem: &Problem<'_>) -> bool {
     let session = problem.session;
-    let has_errors = problem
-        .parameters
-        .list
-        .iter()
-        .any(|parameter| parameter.role == Role::Error);
+    let has_errors = problem.parameters.list.iter().any(|parameter| parameter.role == Role::Error);
     let last = session.tests.last().map(|test| &test.station);
     has_errors
         && matches!(last, Some(Station::BallBar(_)))
-        && session
-            .machine
-            .axes
-            .iter()
-            .any(|axis| axis.kind == AxisKind::Rotary)
+        && session.machine.axes.iter().any(|axis| axis.kind == AxisKind::Rotary)
 }
 
 /// The candidate tests that a session's machine can perform. The session is complete (see [`states::complete`]).
 ///
 /// # Errors
 /// If the instrument is no ball bar, or no rotary axis can be swept.
-pub fn candidate_tests(
-    session: &Session,
-    variations: &TestVariations,
-) -> Result<Vec<CandidateTest>, IdentifyError> {
-    let Some(last) = session
-        .tests
-        .last()
-        .filter(|test| matches!(test.station, Station::BallBar(_)))
-    else {
+pub fn candidate_tests(session: &Session, variations: &TestVariations) -> Result<Vec<CandidateTest>, IdentifyError> {
+    let Some(last) = session.tests.last().filter(|test| matches!(test.station, Station::BallBar(_))) else {
         return Err(IdentifyError::Request(
-            "candidate tests are available for ball bars only; this session uses another instrument"
-                .to_string(),
+            "candidate tests are available for ball bars only; this session uses another instrument".to_string(),
         ));
     };
     let drafts = drafts(session, variations, last);
-    let tests: Vec<CandidateTest> = drafts
-        .into_par_iter()
-        .filter_map(|draft| finished(session, variations, draft))
-        .collect();
+    let tests: Vec<CandidateTest> =
+        drafts.into_par_iter().filter_map(|draft| finished(session, variations, draft)).collect();
     if tests.is_empty() {
         return Err(IdentifyError::Request(
-            "no candidate test is feasible on this machine: no bar reaches, or the travel is too short"
-                .to_string(),
+            "no candidate test is feasible on this machine: no bar reaches, or the travel is too short".to_string(),
         ));
     }
     Ok(tests)
@@ -83,47 +65,24 @@ pub fn candidate_tests(
 
 /// Plans the states of a candidate test. `None` if the travel forbids them or the bar does not reach.
 fn finished(session: &Session, variations: &TestVariations, draft: Draft) -> Option<CandidateTest> {
-    let Draft {
-        mut test,
-        name,
-        new_setup,
-    } = draft;
+    let Draft { mut test, name, new_setup } = draft;
     let Station::BallBar(bar) = &test.station else {
         return None;
     };
     let length = bar.bar;
     let mut readings = states::planned(session, &test).ok()?;
-    if readings
-        .observed
-        .iter()
-        .any(|reading| (reading - length).abs() > variations.reach_mm)
-    {
+    if readings.observed.iter().any(|reading| (reading - length).abs() > variations.reach_mm) {
         return None;
     }
-    let start = session
-        .tests
-        .iter()
-        .filter_map(|test| test.readings.as_ref()?.time_s.last().copied());
+    let start = session.tests.iter().filter_map(|test| test.readings.as_ref()?.time_s.last().copied());
     let start = start.fold(0.0, f64::max);
     let moving_s = readings.time_s.last().copied().unwrap_or(0.0);
-    readings
-        .time_s
-        .iter_mut()
-        .for_each(|time| *time += start + variations.test_min * 60.0);
-    if session.tests.iter().any(|test| {
-        test.readings
-            .as_ref()
-            .is_some_and(|r| !r.temperature_c.is_empty())
-    }) {
-        let mean = crate::drivers::Origin::of(session).temperature_c;
+    readings.time_s.iter_mut().for_each(|time| *time += start + variations.test_min * 60.0);
+    if session.tests.iter().any(|test| test.readings.as_ref().is_some_and(|r| !r.temperature_c.is_empty())) {
+        let mean = session.origin().temperature_c;
         readings.temperature_c = vec![mean; readings.rows()];
     }
     test.readings = Some(readings);
     let minutes = variations.test_min + moving_s / 60.0 + if new_setup { variations.setup_min } else { 0.0 };
-    Some(CandidateTest {
-        name,
-        test,
-        new_setup,
-        minutes,
-    })
+    Some(CandidateTest { name, test, new_setup, minutes })
 }

@@ -1,8 +1,8 @@
-//! The clearance between spindle and table of a tilting table turned by 90°: Yamaji, Hamabata & Ihara, Evaluation of linear axis
-//! motion error of machine tools using an R-test device (HPC 2014), Section 6, Figs. 7 to 10.
+//! The clearance between spindle and table of a tilting table turned by 90°: Yamaji, Hamabata & Ihara, Evaluation of
+//! linear axis motion error of machine tools using an R-test device (HPC 2014), Section 6, Figs. 7 to 10.
 //!
-//! `H` and `W` are the height and width of the device, `L` the shaft from jig to ball, `T` the jig, `Ds` and `Dt` the diameters
-//! of spindle and table:
+//! `H` and `W` are the height and width of the device, `L` the shaft from jig to ball, `T` the jig, `Ds` and `Dt` the
+//! diameters of spindle and table:
 //!
 //! | device on | condition | requirement |
 //! |---|---|---|
@@ -31,17 +31,10 @@ pub struct Clearance {
 }
 
 impl Clearance {
-    /// Each dimension that is too short, as a sentence. Empty if the clearance is sufficient with the table turned by 90°.
+    /// Each dimension that is too short, as a sentence. Empty if the clearance is sufficient with the table turned by
+    /// 90°.
     pub fn faults(&self) -> Vec<String> {
-        let Clearance {
-            spindle_mm,
-            table_mm,
-            device_height_mm,
-            device_width_mm,
-            shaft_mm,
-            jig_mm,
-            ..
-        } = *self;
+        let Clearance { spindle_mm, table_mm, device_height_mm, device_width_mm, shaft_mm, jig_mm, .. } = *self;
         let mut faults = Vec::new();
         let mut need = |holds: bool, words: String| {
             if !holds {
@@ -95,53 +88,16 @@ mod tests {
     #[test]
     fn a_flat_device_on_the_table_requires_a_long_shaft() {
         assert_eq!(machine_a(true).faults().len(), 1);
-        assert!(
-            Clearance {
-                shaft_mm: 160.0,
-                ..machine_a(true)
-            }
-            .faults()
-            .is_empty()
-        );
+        assert!(Clearance { shaft_mm: 160.0, ..machine_a(true) }.faults().is_empty());
         // A device higher than the spindle's radius only has to clear the tool holder.
-        assert!(
-            Clearance {
-                device_height_mm: 150.0,
-                ..machine_a(true)
-            }
-            .faults()
-            .is_empty()
-        );
-        assert_eq!(
-            Clearance {
-                device_height_mm: 150.0,
-                shaft_mm: 50.0,
-                ..machine_a(true)
-            }
-            .faults()
-            .len(),
-            1
-        );
+        assert!(Clearance { device_height_mm: 150.0, ..machine_a(true) }.faults().is_empty());
+        assert_eq!(Clearance { device_height_mm: 150.0, shaft_mm: 50.0, ..machine_a(true) }.faults().len(), 1);
     }
 
     #[test]
     fn a_device_in_the_spindle_has_to_be_high_or_the_shaft_long() {
         assert_eq!(machine_a(false).faults().len(), 1);
-        assert!(
-            Clearance {
-                device_height_mm: 250.0,
-                ..machine_a(false)
-            }
-            .faults()
-            .is_empty()
-        );
-        assert!(
-            Clearance {
-                shaft_mm: 150.0,
-                ..machine_a(false)
-            }
-            .faults()
-            .is_empty()
-        );
+        assert!(Clearance { device_height_mm: 250.0, ..machine_a(false) }.faults().is_empty());
+        assert!(Clearance { shaft_mm: 150.0, ..machine_a(false) }.faults().is_empty());
     }
 }

@@ -12,9 +12,9 @@ use crate::problem::Problem;
 pub enum Goal {
     /// The smallest maximum standard uncertainty of the errors. 1 µm has the same weight as 1″.
     WorstUncertainty,
-    /// The largest separation, in standard deviations, of an effect from the best approximation by all other parameters, the
-    /// other effect included. `coefficients` are in internal units. If they are empty, the effect has one display unit at the
-    /// worst phase.
+    /// The largest separation, in standard deviations, of an effect from the best approximation by all other
+    /// parameters, the other effect included. `coefficients` are in internal units. If they are empty, the effect has
+    /// one display unit at the worst phase.
     Separation {
         /// The effect that is present.
         effect: String,
@@ -44,31 +44,21 @@ pub fn figure(shared: &SharedParameters, root: &Root, goal: &Goal) -> f64 {
     }
 }
 
-/// The distance, in standard deviations, of the target parameters at these coefficients from the best approximation by all others.
-/// Without coefficients it is that of one display unit at the worst phase.
+/// The distance, in standard deviations, of the target parameters at these coefficients from the best approximation by
+/// all others. Without coefficients it is that of one display unit at the worst phase.
 pub fn separation(shared: &SharedParameters, root: &Root, coefficients: &[f64]) -> f64 {
     let block = shared.criterion_block(root);
     let first = shared.ids.len() - shared.targets;
     if coefficients.len() == shared.targets {
         return (0..shared.targets)
-            .map(|i| {
-                (i..shared.targets)
-                    .map(|j| block[(i, j)] * coefficients[j])
-                    .sum::<f64>()
-                    .powi(2)
-            })
+            .map(|i| (i..shared.targets).map(|j| block[(i, j)] * coefficients[j]).sum::<f64>().powi(2))
             .sum::<f64>()
             .sqrt();
     }
     let one = 1.0 / shared.display_per_internal[first];
     let square = Mat::from_fn(shared.targets, shared.targets, |i, j| block[(i, j)] * one);
     match square.svd() {
-        Ok(svd) => svd
-            .S()
-            .column_vector()
-            .iter()
-            .copied()
-            .fold(f64::INFINITY, f64::min),
+        Ok(svd) => svd.S().column_vector().iter().copied().fold(f64::INFINITY, f64::min),
         Err(_) => 0.0,
     }
 }

@@ -11,6 +11,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use abbe_model::effect::shape::Harmonic;
 use abbe_model::effect::{Effect, Shape};
 use faer::{Mat, MatRef};
 use nalgebra::DMatrix;
@@ -20,7 +21,6 @@ use super::detectability::{POWER, SIGNIFICANCE, corrected, noncentrality};
 use super::linear::{Linearisation, is_of_interest};
 use super::ranking::{largest_first, smallest_first};
 use super::results::{Bias, EffectDetectability, EffectsAnalysis};
-use crate::drivers;
 use crate::error::IdentifyError;
 use crate::parameters::physical_size;
 use crate::problem::Problem;
@@ -34,8 +34,8 @@ const CONFOUNDED_BELOW: f64 = 0.01;
 const LOW_ORDERS: f64 = 12.0;
 /// Higher orders that represent those between them.
 const HIGH_ORDERS: [f64; 8] = [16.0, 20.0, 30.0, 40.0, 60.0, 80.0, 100.0, 120.0];
-/// Number of longest periods of a component and driver that are all screened. Longer periods are harder to separate from the
-/// parameters.
+/// Number of longest periods of a component and driver that are all screened. Longer periods are harder to separate
+/// from the parameters.
 const LONG_PERIODS: usize = 24;
 /// Of the shorter periods, one in this number is screened.
 const EVERY_SHORT_PERIOD: usize = 8;
@@ -63,20 +63,11 @@ pub fn effects(problem: &Problem<'_>) -> Result<EffectsAnalysis, IdentifyError> 
     let (candidates, column_sets): (Vec<Candidate>, Vec<EffectColumns>) = all
         .into_iter()
         .filter(|candidate| is_screened(&candidate.effect, &mut periods))
-        .filter_map(|candidate| {
-            columns
-                .effect_columns(&candidate.effect)
-                .map(|column_set| (candidate, column_set))
-        })
+        .filter_map(|candidate| columns.effect_columns(&candidate.effect).map(|column_set| (candidate, column_set)))
         .unzip();
     let significance_corrected = corrected(searched);
     let thresholds: Vec<[f64; 2]> = (0..=MAX_COEFFICIENTS)
-        .map(|k| {
-            [
-                noncentrality(k.max(1), SIGNIFICANCE),
-                noncentrality(k.max(1), significance_corrected),
-            ]
-        })
+        .map(|k| [noncentrality(k.max(1), SIGNIFICANCE), noncentrality(k.max(1), significance_corrected)])
         .collect();
     let chunks = chunked(&column_sets);
     let judged: Vec<Vec<EffectDetectability>> = chunks
@@ -101,14 +92,7 @@ pub fn effects(problem: &Problem<'_>) -> Result<EffectsAnalysis, IdentifyError> 
                         moved: moved.subcols(range.start, count),
                     };
                     let greatest = column_sets[index].greatest();
-                    judge(
-                        problem,
-                        &candidates[index],
-                        name,
-                        &products,
-                        greatest,
-                        &thresholds[count],
-                    )
+                    judge(problem, &candidates[index], name, &products, greatest, &thresholds[count])
                 })
                 .collect()
         })
@@ -128,11 +112,9 @@ fn is_screened(effect: &Effect, periods: &mut HashMap<String, usize>) -> bool {
         return false;
     }
     match &effect.shape {
-        Shape::Harmonic { order } => *order <= LOW_ORDERS || HIGH_ORDERS.contains(order),
+        Shape::Harmonic(Harmonic { order }) => *order <= LOW_ORDERS || HIGH_ORDERS.contains(order),
         Shape::Periodic { .. } => {
-            let count = periods
-                .entry(format!("{}~{}", effect.component, effect.driver))
-                .or_default();
+            let count = periods.entry(format!("{}~{}", effect.component, effect.driver)).or_default();
             *count += 1;
             *count <= LONG_PERIODS || count.is_multiple_of(EVERY_SHORT_PERIOD)
         }
@@ -159,10 +141,10 @@ fn judge(
 ) -> EffectDetectability {
     let session = problem.session;
     let effect = &candidate.effect;
-    let unit = drivers::coefficient_unit(session, effect, 0);
+    let unit = Unit::of_effect(session, effect, 0);
     // The coefficient that moves the component by its physical size somewhere in the tests, whatever the scale of the
     // coefficient.
-    let size = match drivers::component_unit(session, &effect.component) {
+    let size = match effect.component.unit(session.instrument.unknowns()) {
         Some(inside) if greatest > 0.0 => physical_size(inside) / greatest,
         Some(inside) => physical_size(inside),
         None => 0.1,
@@ -175,19 +157,11 @@ fn judge(
     let weakest = eigen.eigenvalues[worst].max(0.0);
     let strongest = eigen.eigenvalues.max().max(0.0);
     // Of several equally weak phases, the one with the least surviving share counts, so that rounding does not decide.
-    let equally_weak: Vec<usize> = (0..eigen.eigenvalues.len())
-        .filter(|k| eigen.eigenvalues[*k] <= weakest + EQUAL_WITHIN * strongest)
-        .collect();
+    let equally_weak: Vec<usize> =
+        (0..eigen.eigenvalues.len()).filter(|k| eigen.eigenvalues[*k] <= weakest + EQUAL_WITHIN * strongest).collect();
     let phases = eigen.eigenvectors.select_columns(&equally_weak);
-    let whole = (phases.transpose() * &own * &phases)
-        .symmetric_eigen()
-        .eigenvalues
-        .max();
-    let surviving_share = if whole > 0.0 {
-        (weakest / whole).clamp(0.0, 1.0)
-    } else {
-        0.0
-    };
+    let whole = (phases.transpose() * &own * &phases).symmetric_eigen().eigenvalues.max();
+    let surviving_share = if whole > 0.0 { (weakest / whole).clamp(0.0, 1.0) } else { 0.0 };
     let amplitude = |threshold: f64| {
         let amplitude = (threshold / weakest).sqrt();
         (amplitude <= size).then_some(amplitude * unit.display_per_internal)
@@ -247,29 +221,24 @@ fn biases(problem: &Problem<'_>, moved: MatRef<'_, f64>, unit: &Unit) -> Vec<Bia
     biases
 }
 
-/// One result for each effect, or for all members of a grid (periods, centres, time constants, high orders): the member that is
-/// hardest to detect.
-fn grouped(
-    judged: impl Iterator<Item = EffectDetectability>,
-    candidates: &[Candidate],
-) -> Vec<EffectDetectability> {
+/// One result for each effect, or for all members of a grid (periods, centres, time constants, high orders): the member
+/// that is hardest to detect.
+fn grouped(judged: impl Iterator<Item = EffectDetectability>, candidates: &[Candidate]) -> Vec<EffectDetectability> {
     let mut order: Vec<String> = Vec::new();
     let mut groups: HashMap<String, EffectDetectability> = HashMap::new();
     for (entry, candidate) in judged.zip(candidates) {
         let effect = &candidate.effect;
         let key = match &effect.shape {
-            Shape::Harmonic { order } if *order > LOW_ORDERS => {
+            Shape::Harmonic(Harmonic { order }) if *order > LOW_ORDERS => {
                 format!("{}~{}:h>{LOW_ORDERS}", effect.component, effect.driver)
             }
             _ => effect.id(),
         };
         match groups.get_mut(&key) {
             Some(present) => {
-                // Of members with equal amplitudes, or without detectable amplitude, the one with the least surviving share
-                // counts, so that neither rounding nor order decides.
-                let needed = |entry: &EffectDetectability| {
-                    entry.detectable_amplitude_screened.unwrap_or(f64::INFINITY)
-                };
+                // Of members with equal amplitudes, or without detectable amplitude, the one with the least surviving
+                // share counts, so that neither rounding nor order decides.
+                let needed = |entry: &EffectDetectability| entry.detectable_amplitude_screened.unwrap_or(f64::INFINITY);
                 let harder = smallest_first(needed(present), needed(&entry))
                     .then_with(|| smallest_first(entry.residual_share, present.residual_share));
                 if harder.is_lt() {
@@ -288,27 +257,17 @@ fn grouped(
 /// The confounded effects that bias each error most, by error. A small residual does not exclude these.
 pub fn confounded_by_error(analysis: &EffectsAnalysis) -> BTreeMap<String, Vec<(String, f64, String)>> {
     let mut by_error: BTreeMap<String, Vec<(String, f64, String)>> = BTreeMap::new();
-    for effect in analysis
-        .effects
-        .iter()
-        .filter(|effect| effect.verdict.starts_with("confounded"))
-    {
+    for effect in analysis.effects.iter().filter(|effect| effect.verdict.starts_with("confounded")) {
         for bias in &effect.biases {
             let entry = (effect.id.clone(), bias.per_unit, bias.unit.clone());
             by_error.entry(bias.id.clone()).or_default().push(entry);
         }
     }
-    by_error
-        .values_mut()
-        .for_each(|list| list.sort_by(|a, b| largest_first((a.1, &a.0), (b.1, &b.0))));
+    by_error.values_mut().for_each(|list| list.sort_by(|a, b| largest_first((a.1, &a.0), (b.1, &b.0))));
     by_error
 }
 
 /// `um/arcsec`, `um/(um/h)`.
 fn per(above: &str, below: &str) -> String {
-    if below.contains('/') {
-        format!("{above}/({below})")
-    } else {
-        format!("{above}/{below}")
-    }
+    if below.contains('/') { format!("{above}/({below})") } else { format!("{above}/{below}") }
 }

@@ -1,5 +1,5 @@
-//! Identifiability: null-space combinations, errors determined by set-up priors only, and near collinearity, each described in
-//! words.
+//! Identifiability: null-space combinations, errors determined by set-up priors only, and near collinearity, each
+//! described in words.
 
 use faer::Mat;
 
@@ -14,10 +14,11 @@ use crate::results::Unobservable;
 
 /// Coefficients below this value, relative to the largest, are rounding errors.
 const NEGLIGIBLE: f64 = 1e-5;
-/// Condition index from which a near dependency is reported: moderate from 10, strong from 30 (Belsley, Kuh & Welsch, Regression
-/// Diagnostics, 1980, ch. 3).
+/// Condition index from which a near dependency is reported: moderate from 10, strong from 30 (Belsley, Kuh & Welsch,
+/// Regression Diagnostics, 1980, ch. 3).
 const MIN_CONDITION_INDEX: f64 = 10.0;
-/// Least share of the largest entry of the null space for an error to be the pivot of a combination with set-up quantities.
+/// Least share of the largest entry of the null space for an error to be the pivot of a combination with set-up
+/// quantities.
 const MIN_ERROR: f64 = 1.37e-3;
 /// Maximum number of quantities that a description names.
 const MAX_NAMED: usize = 5;
@@ -28,47 +29,29 @@ const MIN_PART: f64 = 0.1;
 
 /// The name of a quantity and its group: `spindle_ball.z[A150]` is `z of the spindle ball` in `A150`.
 fn name_of<'i>(list: &[Parameter], id: &'i str) -> (String, Option<&'i str>) {
-    let setup = list
-        .iter()
-        .any(|parameter| parameter.id == id && parameter.role == Role::Setup);
+    let setup = list.iter().any(|parameter| parameter.id == id && parameter.role == Role::Setup);
     if !setup {
         return (id.to_string(), None);
     }
     let (quantity, group) = id.split_once('[').unwrap_or((id, ""));
     let (quantity, coordinate) = quantity.split_once('.').unwrap_or((quantity, ""));
-    let of = if coordinate.is_empty() {
-        String::new()
-    } else {
-        format!("{coordinate} of ")
-    };
-    (
-        format!("{of}the {}", quantity.replace('_', " ")),
-        group.strip_suffix(']'),
-    )
+    let of = if coordinate.is_empty() { String::new() } else { format!("{coordinate} of ") };
+    (format!("{of}the {}", quantity.replace('_', " ")), group.strip_suffix(']'))
 }
 
-/// Describes a combination: the confounded quantities and their proportion, with units if they differ. A quantity that occurs in
-/// several tests is named once. A long combination is shortened.
+/// Describes a combination: the confounded quantities and their proportion, with units if they differ. A quantity that
+/// occurs in several tests is named once. A long combination is shortened.
 fn describe(list: &[Parameter], combination: &[(String, f64)], verb: &str) -> String {
     let unit_of = |id: &str| {
-        list.iter()
-            .find(|parameter| parameter.id == id)
-            .map_or("", |parameter| parameter.unit.name.as_str())
+        list.iter().find(|parameter| parameter.id == id).map_or("", |parameter| parameter.unit.name.as_str())
     };
     let first_unit = combination.first().map_or("", |(id, _)| unit_of(id));
     let mixed = combination.iter().any(|(id, _)| unit_of(id) != first_unit);
     let mut quantities: Vec<(String, Vec<&str>, String)> = Vec::new();
     for (id, value) in combination {
         let (quantity, group) = name_of(list, id);
-        let value = if mixed {
-            format!("{} {}", format_short(*value), unit_of(id))
-        } else {
-            format_short(*value)
-        };
-        match quantities
-            .iter_mut()
-            .find(|(other, groups, v)| *other == quantity && *v == value && !groups.is_empty())
-        {
+        let value = if mixed { format!("{} {}", format_short(*value), unit_of(id)) } else { format_short(*value) };
+        match quantities.iter_mut().find(|(other, groups, v)| *other == quantity && *v == value && !groups.is_empty()) {
             Some((_, groups, _)) => groups.extend(group),
             None => quantities.push((quantity, group.into_iter().collect(), value)),
         }
@@ -79,13 +62,11 @@ fn describe(list: &[Parameter], combination: &[(String, f64)], verb: &str) -> St
         _ => 0,
     };
     quantities.truncate(quantities.len() - unnamed);
-    let mut words = quantities
-        .iter()
-        .map(|(quantity, groups, _)| match groups.as_slice() {
-            [] => quantity.clone(),
-            [one] => format!("{quantity} in {one}"),
-            [first @ .., last] => format!("{quantity} in {} and {last}", first.join(", ")),
-        });
+    let mut words = quantities.iter().map(|(quantity, groups, _)| match groups.as_slice() {
+        [] => quantity.clone(),
+        [one] => format!("{quantity} in {one}"),
+        [first @ .., last] => format!("{quantity} in {} and {last}", first.join(", ")),
+    });
     let proportion: Vec<&str> = quantities.iter().map(|(_, _, value)| value.as_str()).collect();
     let first = words.next().unwrap_or_default();
     let others: Vec<String> = words.collect();
@@ -119,15 +100,13 @@ pub fn unidentifiable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
                 }
                 _ => describe(list, &combination, CONFOUNDED),
             };
-            Unobservable {
-                combination: combination.into_iter().collect(),
-                why,
-            }
+            Unobservable { combination: combination.into_iter().collect(), why }
         })
         .collect()
 }
 
-/// A row over scaled parameters in display units: the pivot first, with 1, then the others in the order of the parameters.
+/// A row over scaled parameters in display units: the pivot first, with 1, then the others in the order of the
+/// parameters.
 fn in_display_units(problem: &Problem<'_>, row: &[f64], pivot: usize) -> Vec<(String, f64)> {
     let list = &problem.parameters.list;
     let largest = row.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
@@ -136,22 +115,16 @@ fn in_display_units(problem: &Problem<'_>, row: &[f64], pivot: usize) -> Vec<(St
         .chain(others)
         .map(|j| {
             let parameter = &list[j];
-            (
-                parameter.id.clone(),
-                row[j] * parameter.size * parameter.unit.display_per_internal,
-            )
+            (parameter.id.clone(), row[j] * parameter.size * parameter.unit.display_per_internal)
         })
         .collect();
     let leading = entries.first().map_or(1.0, |(_, value)| *value);
-    entries
-        .into_iter()
-        .map(|(id, value)| (id, value / leading))
-        .collect()
+    entries.into_iter().map(|(id, value)| (id, value / leading)).collect()
 }
 
-/// The errors that the readings alone confound with set-up quantities, one sparse combination each. They follow from the null
-/// space of the readings without priors. It is reduced with errors as pivots, so that each combination contains one error and
-/// set-up quantities.
+/// The errors that the readings alone confound with set-up quantities, one sparse combination each. They follow from
+/// the null space of the readings without priors. It is reduced with errors as pivots, so that each combination
+/// contains one error and set-up quantities.
 ///
 /// # Errors
 /// If the decomposition fails.
@@ -187,20 +160,14 @@ pub fn determined_by_prior(
             continue;
         }
         let why = describe(list, &combination, CONFOUNDED);
-        held.push(DeterminedByPrior {
-            error: list[error].id.clone(),
-            combination,
-            why,
-        });
+        held.push(DeterminedByPrior { error: list[error].id.clone(), combination, why });
     }
     Ok(held)
 }
 
 fn subtract(row: &mut [f64], factor: f64, other: &[f64]) {
     if factor != 0.0 {
-        row.iter_mut()
-            .zip(other)
-            .for_each(|(value, o)| *value -= factor * o);
+        row.iter_mut().zip(other).for_each(|(value, o)| *value -= factor * o);
     }
 }
 
@@ -227,7 +194,8 @@ fn sparser(mut row: Vec<f64>, others: &[Vec<f64>]) -> Vec<f64> {
     }
 }
 
-/// Near dependencies of identifiable errors: small singular values of the information on the errors, with columns of unit length.
+/// Near dependencies of identifiable errors: small singular values of the information on the errors, with columns of
+/// unit length.
 ///
 /// # Errors
 /// If the decomposition fails.
@@ -237,36 +205,22 @@ pub fn nearly_collinear(
     of_interest: &[usize],
 ) -> Result<Vec<NearDependency>, IdentifyError> {
     let list = &problem.parameters.list;
-    let identifiable: Vec<usize> = of_interest
-        .iter()
-        .copied()
-        .filter(|j| linear.rank.is_identifiable(*j))
-        .collect();
+    let identifiable: Vec<usize> = of_interest.iter().copied().filter(|j| linear.rank.is_identifiable(*j)).collect();
     let r = marginal(linear.whole.parts().0.as_ref(), &identifiable, &linear.size)?;
     let n = identifiable.len();
-    let norm: Vec<f64> = (0..n)
-        .map(|j| {
-            (0..n)
-                .map(|i| r[(i, j)].powi(2))
-                .sum::<f64>()
-                .sqrt()
-                .max(f64::MIN_POSITIVE)
-        })
-        .collect();
+    let norm: Vec<f64> =
+        (0..n).map(|j| (0..n).map(|i| r[(i, j)].powi(2)).sum::<f64>().sqrt().max(f64::MIN_POSITIVE)).collect();
     let unit = Mat::from_fn(n, n, |i, j| r[(i, j)] / norm[j]);
     let svd = unit.svd().map_err(|_| IdentifyError::Decomposition)?;
     let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
-    // Equal singular values share a subspace, and the decomposition returns an arbitrary basis of it. The reduced basis is
-    // unique.
+    // Equal singular values share a subspace, and the decomposition returns an arbitrary basis of it. The reduced basis
+    // is unique.
     let mut directions: Vec<(f64, Vec<f64>)> = Vec::new();
     let mut first = 0;
     while first < n {
         let equal = (first..n).take_while(|k| smallest_first(singular[first], singular[*k]).is_eq());
         let equal: Vec<usize> = equal.collect();
-        let rows = equal
-            .iter()
-            .map(|k| (0..n).map(|j| svd.V()[(j, *k)]).collect())
-            .collect();
+        let rows = equal.iter().map(|k| (0..n).map(|j| svd.V()[(j, *k)]).collect()).collect();
         let condition_index = singular[0] / singular[first];
         directions.extend(reduced(rows).into_iter().map(|row| (condition_index, row)));
         first += equal.len().max(1);
@@ -279,33 +233,20 @@ pub fn nearly_collinear(
         // The direction in display units.
         let parts: Vec<(usize, f64)> = direction.into_iter().enumerate().collect();
         let largest = parts.iter().fold(0.0_f64, |most, (_, v)| most.max(v.abs()));
-        let chosen: Vec<(usize, f64)> = parts
-            .into_iter()
-            .filter(|(_, v)| v.abs() >= MIN_PART * largest)
-            .collect();
+        let chosen: Vec<(usize, f64)> = parts.into_iter().filter(|(_, v)| v.abs() >= MIN_PART * largest).collect();
         if chosen.len() < 2 {
             continue;
         }
         let raw = chosen.iter().map(|(j, v)| {
             let parameter = &list[identifiable[*j]];
-            (
-                parameter.id.clone(),
-                v / norm[*j] * parameter.unit.display_per_internal,
-            )
+            (parameter.id.clone(), v / norm[*j] * parameter.unit.display_per_internal)
         });
         let raw: Vec<(String, f64)> = raw.collect();
         let leading = raw[0].1;
         let combination: Vec<(String, f64)> = raw.into_iter().map(|(id, v)| (id, v / leading)).collect();
-        let why = describe(
-            list,
-            &combination,
-            &format!("is nearly collinear (condition index {condition_index:.0}) with"),
-        );
-        found.push(NearDependency {
-            condition_index,
-            combination,
-            why,
-        });
+        let why =
+            describe(list, &combination, &format!("is nearly collinear (condition index {condition_index:.0}) with"));
+        found.push(NearDependency { condition_index, combination, why });
     }
     Ok(found)
 }

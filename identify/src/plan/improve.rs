@@ -1,8 +1,8 @@
 //! Selects the next tests from the candidate tests by their information, greedily and by exchange. Nothing is refitted.
 //!
-//! Greedy: the candidate test with the best figure is added, repeatedly. Exchange: each proposed test is removed in turn and
-//! replaced by the best candidate test, until no test changes (Fedorov's algorithm: Atkinson, Donev & Tobias, Optimum
-//! Experimental Designs, 2007, ch. 12).
+//! Greedy: the candidate test with the best figure is added, repeatedly. Exchange: each proposed test is removed in
+//! turn and replaced by the best candidate test, until no test changes (Fedorov's algorithm: Atkinson, Donev & Tobias,
+//! Optimum Experimental Designs, 2007, ch. 12).
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -29,7 +29,8 @@ pub struct ImproveOptions {
 /// The proposed tests.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Improvement {
-    /// The criterion and the unit of its values: `worst standard uncertainty, um or arcsec`, or `separation, standard deviations`.
+    /// The criterion and the unit of its values: `worst standard uncertainty, um or arcsec`, or
+    /// `separation, standard deviations`.
     pub criterion: String,
     /// Number of candidate tests that were evaluated.
     pub candidate_tests: usize,
@@ -42,8 +43,8 @@ pub struct Improvement {
     pub steps: Vec<ProposedTest>,
     /// The exchanges of proposed tests, one sentence each.
     pub exchanged: Vec<String>,
-    /// The best single candidate tests, in the order of the criterion or of its gain per minute. Of tests with equal readings,
-    /// one is listed.
+    /// The best single candidate tests, in the order of the criterion or of its gain per minute. Of tests with equal
+    /// readings, one is listed.
     pub alternatives: Vec<AlternativeTest>,
 }
 
@@ -52,7 +53,8 @@ pub struct Improvement {
 pub struct ProposedTest {
     /// Description of the test.
     pub test: String,
-    /// Value of the criterion with this test and those before it; infinite (`null` in JSON) where an error is not identifiable.
+    /// Value of the criterion with this test and those before it; infinite (`null` in JSON) where an error is not
+    /// identifiable.
     #[schemars(with = "Option<f64>")]
     pub after: f64,
     /// Duration of the test, min.
@@ -131,11 +133,7 @@ pub fn improve(
         let Some((best, figures)) = prepared.best(&root, &figure) else {
             break;
         };
-        let best = if options.by_minute {
-            best_per_minute(&prepared, now, &figures).unwrap_or(best)
-        } else {
-            best
-        };
+        let best = if options.by_minute { best_per_minute(&prepared, now, &figures).unwrap_or(best) } else { best };
         if place == 0 {
             let score = |candidate: usize| match options.by_minute {
                 true => -gain_per_minute(&prepared, now, &figures, candidate),
@@ -148,16 +146,12 @@ pub fn improve(
         }
         chosen.push(best);
     }
-    let exchanged = if options.by_minute {
-        Vec::new()
-    } else {
-        exchange(&prepared, &mut chosen, &figure)
-    };
+    let exchanged = if options.by_minute { Vec::new() } else { exchange(&prepared, &mut chosen, &figure) };
     // An uncertainty near the physical size counts as infinite.
     let outside = |root: &Root| match options.goal {
-        Goal::WorstUncertainty => named_uncertainties(shared, root)
-            .into_iter()
-            .fold(0.0, |worst: f64, (_, u)| worst.max(u)),
+        Goal::WorstUncertainty => {
+            named_uncertainties(shared, root).into_iter().fold(0.0, |worst: f64, (_, u)| worst.max(u))
+        }
         Goal::Separation { .. } => reported(figure(root), &options.goal),
     };
     let with_units = |named: Vec<(String, f64)>| -> Vec<NamedUncertainty> {
@@ -170,9 +164,7 @@ pub fn improve(
             })
             .collect()
     };
-    let steps = (0..chosen.len())
-        .map(|k| step(&prepared, &chosen[..=k], &outside, &with_units))
-        .collect();
+    let steps = (0..chosen.len()).map(|k| step(&prepared, &chosen[..=k], &outside, &with_units)).collect();
     Ok(Improvement {
         criterion: match options.goal {
             Goal::WorstUncertainty => "worst standard uncertainty, um or arcsec".to_string(),
@@ -194,11 +186,7 @@ fn is_no_gain(before: f64, after: f64) -> bool {
 /// The decrease of the logarithm of the figure per minute.
 fn gain_per_minute(prepared: &PreparedCandidates, now: f64, figures: &[f64], candidate: usize) -> f64 {
     // A separation is negative here, so the ratio is inverted.
-    let ratio = if now > 0.0 {
-        now / figures[candidate]
-    } else {
-        figures[candidate].abs() / now.abs().max(1e-12)
-    };
+    let ratio = if now > 0.0 { now / figures[candidate] } else { figures[candidate].abs() / now.abs().max(1e-12) };
     ratio.max(1e-12).ln() / prepared.candidates[candidate].test.minutes.max(1e-3)
 }
 
@@ -245,12 +233,8 @@ fn exchange(
     for _ in 0..MAX_ROUNDS {
         let mut changed = false;
         for place in 0..chosen.len() {
-            let others: Vec<usize> = chosen
-                .iter()
-                .enumerate()
-                .filter(|(k, _)| *k != place)
-                .map(|(_, candidate)| *candidate)
-                .collect();
+            let others: Vec<usize> =
+                chosen.iter().enumerate().filter(|(k, _)| *k != place).map(|(_, candidate)| *candidate).collect();
             let now = figure(&prepared.with(chosen));
             let Some((best, figures)) = prepared.best(&prepared.with(&others), figure) else {
                 continue;
@@ -306,25 +290,21 @@ fn step(
     }
 }
 
-/// Whether the `j`-th target parameter is not identifiable. Its uncertainty is then that of the regularisation at its physical
-/// size.
+/// Whether the `j`-th target parameter is not identifiable. Its uncertainty is then that of the regularisation at its
+/// physical size.
 fn is_unidentifiable(shared: &SharedParameters, u: &[f64], j: usize) -> bool {
     let place = shared.ids.len() - shared.targets + j;
     u[j] > UNIDENTIFIABLE_SHARE * shared.size[place] * shared.display_per_internal[place]
 }
 
-/// The target parameters with their uncertainties. They are infinite for parameters that [`SharedParameters`] regularises because
-/// they are not identifiable.
+/// The target parameters with their uncertainties. They are infinite for parameters that [`SharedParameters`]
+/// regularises because they are not identifiable.
 fn named_uncertainties(shared: &SharedParameters, root: &Root) -> Vec<(String, f64)> {
     let first = shared.ids.len() - shared.targets;
     let u = shared.uncertainties(root);
     (0..shared.targets)
         .map(|j| {
-            let u_reported = if is_unidentifiable(shared, &u, j) {
-                f64::INFINITY
-            } else {
-                u[j]
-            };
+            let u_reported = if is_unidentifiable(shared, &u, j) { f64::INFINITY } else { u[j] };
             (shared.ids[first + j].clone(), u_reported)
         })
         .collect()

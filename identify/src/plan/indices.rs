@@ -1,11 +1,12 @@
 //! Scalar figures of merit: observability indices O1 to O5, condition number, D-, A-, E- and G-efficiency.
 //!
-//! They refer to the information `RᵀR` on the errors with the set-up quantities eliminated within their priors. The unit is
-//! standard deviations per physical size (1 mm, 0.01 rad). `σ1 ≥ … ≥ σm` are the singular values of `R`.
+//! They refer to the information `RᵀR` on the errors with the set-up quantities eliminated within their priors. The
+//! unit is standard deviations per physical size (1 mm, 0.01 rad). `σ1 ≥ … ≥ σm` are the singular values of `R`.
 //!
-//! An efficiency compares with uncorrelated errors. With `C = D⁻¹ᐟ²RᵀRD⁻¹ᐟ²` and `D` the diagonal of `RᵀR` (so that the scale of
-//! an error does not matter), `D = det(C)^(1/m)`, `A = m/tr(C⁻¹)`, `E = λ_min(C)`. All are 1 for uncorrelated errors (Atkinson,
-//! Donev & Tobias, Optimum Experimental Designs, 2007, ch. 10). `G` is the mean leverage of a reading over the greatest.
+//! An efficiency compares with uncorrelated errors. With `C = D⁻¹ᐟ²RᵀRD⁻¹ᐟ²` and `D` the diagonal of `RᵀR` (so that the
+//! scale of an error does not matter), `D = det(C)^(1/m)`, `A = m/tr(C⁻¹)`, `E = λ_min(C)`. All are 1 for uncorrelated
+//! errors (Atkinson, Donev & Tobias, Optimum Experimental Designs, 2007, ch. 10). `G` is the mean leverage of a reading
+//! over the greatest.
 
 use faer::{Mat, MatRef};
 
@@ -24,39 +25,25 @@ pub fn indices(
     g_efficiency: f64,
 ) -> Result<Indices, IdentifyError> {
     let errors = of_interest.len();
-    let identifiable: Vec<usize> = of_interest
-        .iter()
-        .copied()
-        .filter(|j| linear.rank.is_identifiable(*j))
-        .collect();
+    let identifiable: Vec<usize> = of_interest.iter().copied().filter(|j| linear.rank.is_identifiable(*j)).collect();
     let m = identifiable.len();
     if m == 0 {
-        return Ok(Indices {
-            error_count: errors,
-            condition_number: f64::INFINITY,
-            ..Indices::default()
-        });
+        return Ok(Indices { error_count: errors, condition_number: f64::INFINITY, ..Indices::default() });
     }
     let r = marginal(linear.whole.parts().0.as_ref(), &identifiable, &linear.size)?;
     let size: Vec<f64> = identifiable.iter().map(|j| linear.size[*j]).collect();
-    Ok(Indices {
-        error_count: errors,
-        g_efficiency,
-        ..of_triangle(r.as_ref(), &size, readings)?
-    })
+    Ok(Indices { error_count: errors, g_efficiency, ..of_triangle(r.as_ref(), &size, readings)? })
 }
 
-/// The indices from the triangular factor of the identifiable errors, in internal units. `size` is the physical size of each
-/// error.
+/// The indices from the triangular factor of the identifiable errors, in internal units. `size` is the physical size of
+/// each error.
 fn of_triangle(r: MatRef<'_, f64>, size: &[f64], readings: usize) -> Result<Indices, IdentifyError> {
     let m = size.len();
     let scaled = Mat::from_fn(m, m, |i, j| r[(i, j)] * size[j]);
     let sigma = singular_values(scaled.as_ref())?;
     let (first, last) = (sigma[0], sigma[m - 1]);
     let mean_log = sigma.iter().map(|s| s.ln()).sum::<f64>() / m as f64;
-    let norm: Vec<f64> = (0..m)
-        .map(|j| (0..m).map(|i| r[(i, j)].powi(2)).sum::<f64>().sqrt())
-        .collect();
+    let norm: Vec<f64> = (0..m).map(|j| (0..m).map(|i| r[(i, j)].powi(2)).sum::<f64>().sqrt()).collect();
     let unit = Mat::from_fn(m, m, |i, j| r[(i, j)] / norm[j]);
     let lambda: Vec<f64> = singular_values(unit.as_ref())?.iter().map(|s| s * s).collect();
     let count = m as f64;
@@ -108,9 +95,7 @@ mod tests {
     #[test]
     fn efficiencies_of_two_errors_at_an_angle() {
         let c = 0.6_f64;
-        let r = Mat::from_fn(2, 2, |i, j| {
-            [[3.0, 7.0 * c], [0.0, 7.0 * (1.0 - c * c).sqrt()]][i][j]
-        });
+        let r = Mat::from_fn(2, 2, |i, j| [[3.0, 7.0 * c], [0.0, 7.0 * (1.0 - c * c).sqrt()]][i][j]);
         let found = of_triangle(r.as_ref(), &[1.0, 1.0], 1).unwrap();
         near(found.d_efficiency, (1.0 - c * c).sqrt());
         near(found.a_efficiency, 1.0 - c * c);

@@ -1,7 +1,8 @@
 //! Square roots of the information on named shared parameters, so that tests can be added or removed without a fit.
 //!
-//! Of each test only a square root of its information on the shared parameters remains. Its own parameters (a ball mounted for it
-//! alone, its bar) are eliminated first, within their priors. Two such roots are added by one orthogonal reduction.
+//! Of each test only a square root of its information on the shared parameters remains. Its own parameters (a ball
+//! mounted for it alone, its bar) are eliminated first, within their priors. Two such roots are added by one orthogonal
+//! reduction.
 
 use std::collections::HashMap;
 
@@ -52,18 +53,15 @@ impl SharedParameters {
         }
     }
 
-    /// The root of a whole plan, priors included. Parameters are regularised at their physical size, so that a parameter that is
-    /// not identifiable has a very large uncertainty and needs no special case.
+    /// The root of a whole plan, priors included. Parameters are regularised at their physical size, so that a
+    /// parameter that is not identifiable has a very large uncertainty and needs no special case.
     ///
     /// # Errors
     /// If a parameter does not belong to the problem.
     pub fn root_of(&self, problem: &Problem<'_>, linear: &Linearisation) -> Result<Root, IdentifyError> {
         let list = &problem.parameters.list;
-        let index: HashMap<&str, usize> = list
-            .iter()
-            .enumerate()
-            .map(|(j, parameter)| (parameter.id.as_str(), j))
-            .collect();
+        let index: HashMap<&str, usize> =
+            list.iter().enumerate().map(|(j, parameter)| (parameter.id.as_str(), j)).collect();
         let columns = self
             .ids
             .iter()
@@ -81,14 +79,10 @@ impl SharedParameters {
         sum(root.as_ref(), priors.as_ref())
     }
 
-    /// The root of the readings of a problem with one test, from their triangular factor `r`. Parameters that are not shared are
-    /// eliminated within their priors. `as_shared` maps a parameter's identifier to that of the shared parameter.
-    pub fn root_of_test(
-        &self,
-        problem: &Problem<'_>,
-        r: MatRef<'_, f64>,
-        as_shared: impl Fn(&str) -> String,
-    ) -> Root {
+    /// The root of the readings of a problem with one test, from their triangular factor `r`. Parameters that are not
+    /// shared are eliminated within their priors. `as_shared` maps a parameter's identifier to that of the shared
+    /// parameter.
+    pub fn root_of_test(&self, problem: &Problem<'_>, r: MatRef<'_, f64>, as_shared: impl Fn(&str) -> String) -> Root {
         let list = &problem.parameters.list;
         let column_of = |id: &str| {
             let name = as_shared(id);
@@ -131,10 +125,7 @@ impl SharedParameters {
         let first = self.ids.len() - self.targets;
         (0..self.targets)
             .map(|i| {
-                let row = (i..self.targets)
-                    .map(|j| inverse[(i, j)].powi(2))
-                    .sum::<f64>()
-                    .sqrt();
+                let row = (i..self.targets).map(|j| inverse[(i, j)].powi(2)).sum::<f64>().sqrt();
                 row * self.display_per_internal[first + i]
             })
             .collect()
@@ -144,13 +135,8 @@ impl SharedParameters {
 /// The root of the sum of two information matrices.
 pub fn sum(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Root {
     let k = a.ncols();
-    let stacked = Mat::from_fn(a.nrows() + b.nrows(), k, |i, j| {
-        if i < a.nrows() {
-            a[(i, j)]
-        } else {
-            b[(i - a.nrows(), j)]
-        }
-    });
+    let stacked =
+        Mat::from_fn(a.nrows() + b.nrows(), k, |i, j| if i < a.nrows() { a[(i, j)] } else { b[(i - a.nrows(), j)] });
     upper(stacked)
 }
 

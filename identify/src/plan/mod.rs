@@ -1,12 +1,12 @@
 //! Plan: which errors a set of tests identifies, before the measurement, and which test to add next.
 //!
-//! A plan has no data. It receives nominal readings at its planned states, and becomes the same least-squares problem as a
-//! measured session. Fit and plan therefore share one Jacobian.
+//! A plan has no data. It receives nominal readings at its planned states, and becomes the same least-squares problem
+//! as a measured session. Fit and plan therefore share one Jacobian.
 //!
 //! - [`analyse`]: uncertainties, budgets, identifiability, indices, and the contribution of each test;
 //! - [`effects`]: detectability and bias of undeclared effects;
-//! - [`test_variations`], [`candidate_tests`], [`candidate_information`], [`information`], [`criterion`], [`mod@improve`], [`separate`]: the next
-//!   test; [`mod@range`]: how far a sweep can shrink;
+//! - [`test_variations`], [`candidate_tests`], [`candidate_information`], [`information`], [`criterion`],
+//!   [`mod@improve`], [`separate`]: the next test; [`mod@range`]: how far a sweep can shrink;
 //! - [`states`], [`linear`], [`sensitivity`], [`budget`], [`identifiability`], [`indices`]: the parts of the analysis;
 //! - [`results`]: the results, as they are written to JSON.
 

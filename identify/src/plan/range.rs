@@ -51,12 +51,7 @@ pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError
         };
         let rest = merged(
             linear.prior.clone(),
-            linear
-                .tests
-                .iter()
-                .enumerate()
-                .filter(|(other, _)| *other != test)
-                .map(|(_, triangle)| triangle),
+            linear.tests.iter().enumerate().filter(|(other, _)| *other != test).map(|(_, triangle)| triangle),
         );
         let rows = whitened(problem, test, axis)?;
         // The largest ratio of uncertainties at a share of the range, and its parameter.
@@ -64,23 +59,15 @@ pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError
             let (middle, half) = (0.5 * (low + high), 0.5 * share * (high - low) + 1e-9);
             let mut whole = rest.clone();
             for (positions, white) in rows.iter().filter(|_| share > 0.0) {
-                let kept: Vec<usize> = (0..positions.len())
-                    .filter(|i| (positions[*i] - middle).abs() <= half)
-                    .collect();
+                let kept: Vec<usize> =
+                    (0..positions.len()).filter(|i| (positions[*i] - middle).abs() <= half).collect();
                 whole.absorb(Mat::from_fn(kept.len(), white.ncols(), |i, j| white[(kept[i], j)]).as_ref());
             }
             let rank = Rank::decide(whole.parts().0.as_ref(), &linear.size, &linear.preference)?;
             let covariance = fit::parameter_covariance(&whole, &rank.identifiable_basis)?;
             let ratios = of_interest.iter().map(|&j| {
                 let ratio = (covariance[(j, j)] / linear.covariance[(j, j)]).sqrt();
-                (
-                    if rank.is_identifiable(j) {
-                        ratio
-                    } else {
-                        f64::INFINITY
-                    },
-                    j,
-                )
+                (if rank.is_identifiable(j) { ratio } else { f64::INFINITY }, j)
             });
             Ok(ratios.fold((0.0, 0), |most, next| if next.0 > most.0 { next } else { most }))
         };
@@ -110,13 +97,8 @@ pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError
                 }
             }
             let (middle, half) = (0.5 * (low + high), 0.5 * enough * (high - low));
-            shrinkage.minimum_range = Some(
-                [
-                    (middle - half) * display_per_internal,
-                    (middle + half) * display_per_internal,
-                ]
-                .into(),
-            );
+            shrinkage.minimum_range =
+                Some([(middle - half) * display_per_internal, (middle + half) * display_per_internal].into());
             shrinkage.first_to_double = Some(problem.parameters.list[parameter].id.clone());
         }
         found.push(shrinkage);
@@ -127,15 +109,11 @@ pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError
 /// The axis that moves alone in a test, and its limits.
 fn swept(problem: &Problem<'_>, test: usize) -> Option<(usize, f64, f64)> {
     let readings = problem.tests[test].readings.as_ref()?;
-    let mut moving = readings
-        .positions
-        .iter()
-        .enumerate()
-        .filter_map(|(axis, positions)| {
-            let low = positions.iter().copied().fold(f64::INFINITY, f64::min);
-            let high = positions.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            (high - low > 1e-6).then_some((axis, low, high))
-        });
+    let mut moving = readings.positions.iter().enumerate().filter_map(|(axis, positions)| {
+        let low = positions.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = positions.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        (high - low > 1e-6).then_some((axis, low, high))
+    });
     let only = moving.next()?;
     moving.next().is_none().then_some(only)
 }
@@ -153,11 +131,7 @@ fn whitened(problem: &Problem<'_>, test: usize, axis: usize) -> Result<Vec<Place
         .map(|block| {
             let (white, _) = problem.whiten(&problem.rows(&values, block)?, block);
             let row = |i: &usize| block.rows.start + i / problem.coordinates();
-            let positions = problem
-                .kept_rows(block)
-                .iter()
-                .map(|i| readings.positions[axis][row(i)])
-                .collect();
+            let positions = problem.kept_rows(block).iter().map(|i| readings.positions[axis][row(i)]).collect();
             Ok((positions, white))
         })
         .collect()

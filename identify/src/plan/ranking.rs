@@ -1,7 +1,7 @@
 //! Sorts figures by their first significant digits, then by name or index, so that rounding decides no order.
 //!
-//! Figures that are equal in theory differ by rounding errors, which differ between processors. A comparison "equal within a
-//! tolerance" is not transitive and cannot sort. Rounded figures can be sorted.
+//! Figures that are equal in theory differ by rounding errors, which differ between processors. A comparison "equal
+//! within a tolerance" is not transitive and cannot sort. Rounded figures can be sorted.
 
 use std::cmp::Ordering;
 

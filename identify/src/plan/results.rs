@@ -72,7 +72,8 @@ pub struct ErrorAnalysis {
     pub u: Option<f64>,
     /// Sensitivity of the readings to the error, all other parameters constant.
     pub sensitivity: Sensitivity,
-    /// Uncertainty budget, the largest contribution first. The squares of the contributions add up to the square of `u`.
+    /// Uncertainty budget, the largest contribution first. The squares of the contributions add up to the square of
+    /// `u`.
     pub budget: Vec<Contribution>,
     /// Conditional standard uncertainty, in `unit`: `u` if all other errors were known.
     pub conditional_u: Option<f64>,
@@ -111,7 +112,8 @@ pub struct Contribution {
 pub struct CorrelatedWith {
     /// The other error.
     pub id: String,
-    /// Correlation coefficient, −1 to 1. Its square is the share of the variance that vanishes if the other error is known.
+    /// Correlation coefficient, −1 to 1. Its square is the share of the variance that vanishes if the other error is
+    /// known.
     pub correlation: f64,
 }
 
@@ -120,7 +122,8 @@ pub struct CorrelatedWith {
 pub struct Curve {
     /// The test.
     pub test: String,
-    /// Change of the reading (for three coordinates: length of the vector) per unit of the error, in the unit of the sensitivity, evenly thinned.
+    /// Change of the reading (for three coordinates: length of the vector) per unit of the error, in the unit of the
+    /// sensitivity, evenly thinned.
     pub values: Vec<f64>,
 }
 
@@ -129,7 +132,8 @@ pub struct Curve {
 pub struct DeterminedByPrior {
     /// The error.
     pub error: String,
-    /// A change of the error and the set-up parameters in this proportion changes no reading. Display units; the error first.
+    /// A change of the error and the set-up parameters in this proportion changes no reading. Display units; the error
+    /// first.
     #[serde(serialize_with = "Combination::serialize_pairs")]
     #[schemars(with = "Combination")]
     pub combination: Vec<(String, f64)>,
@@ -159,7 +163,8 @@ pub struct Correlation {
     pub matrix: Vec<Vec<Option<f64>>>,
 }
 
-/// Observability indices and efficiencies of the information on the errors, with the set-up parameters estimated within their priors.
+/// Observability indices and efficiencies of the information on the errors, with the set-up parameters estimated within
+/// their priors.
 #[derive(Clone, Debug, Default, Serialize, JsonSchema)]
 pub struct Indices {
     /// Number of identifiable errors. The figures are of these.
@@ -168,15 +173,19 @@ pub struct Indices {
     pub error_count: usize,
     /// Largest over smallest singular value of the scaled Jacobian.
     pub condition_number: f64,
-    /// Observability index O1, the volume of the information: `(σ1 ⋯ σm)^(1/m) / √n` (Borm & Menq, Int. J. Robotics Res. 10 (1991) 51).
+    /// Observability index O1, the volume of the information: `(σ1 ⋯ σm)^(1/m) / √n` (Borm & Menq, Int. J. Robotics
+    /// Res. 10 (1991) 51).
     pub o1: f64,
-    /// Observability index O2, the inverse condition number: `σm / σ1` (Driels & Pathre, J. Robotic Syst. 7 (1990) 197).
+    /// Observability index O2, the inverse condition number: `σm / σ1` (Driels & Pathre, J. Robotic Syst. 7 (1990)
+    /// 197).
     pub o2: f64,
-    /// Observability index O3, the least sensitive direction: `σm` (Nahvi, Hollerbach & Hayward, Proc. IEEE ICRA (1994) 407).
+    /// Observability index O3, the least sensitive direction: `σm` (Nahvi, Hollerbach & Hayward, Proc. IEEE ICRA (1994)
+    /// 407).
     pub o3: f64,
     /// Observability index O4, the noise amplification: `σm² / σ1` (Nahvi & Hollerbach, Proc. IEEE ICRA (1996) 647).
     pub o4: f64,
-    /// Observability index O5, the harmonic mean of sensitivities: `1 / (1/σ1 + ⋯ + 1/σm)` (Sun & Hollerbach, Proc. IEEE ICRA (2008) 831).
+    /// Observability index O5, the harmonic mean of sensitivities: `1 / (1/σ1 + ⋯ + 1/σm)` (Sun & Hollerbach, Proc.
+    /// IEEE ICRA (2008) 831).
     pub o5: f64,
     /// D-efficiency: 1 for uncorrelated errors.
     pub d_efficiency: f64,
@@ -217,8 +226,8 @@ pub struct EffectsAnalysis {
     pub power: f64,
     /// Number of effects that are screened.
     pub effects_screened: usize,
-    /// Significance level of a test of a single effect when all effects are screened and the probability of any false alarm is `significance_level`
-    /// (Šidák).
+    /// Significance level of a test of a single effect when all effects are screened and the probability of any false
+    /// alarm is `significance_level` (Šidák).
     pub significance_level_corrected: f64,
     /// The effects.
     pub effects: Vec<EffectDetectability>,
@@ -233,15 +242,15 @@ pub struct EffectDetectability {
     pub family: String,
     /// Unit of its amplitude.
     pub unit: String,
-    /// Smallest amplitude that a test of this effect alone detects, in `unit`; of a power at 100 mm or 180°. `null` where no amplitude of physical size
-    /// is detectable.
+    /// Smallest amplitude that a test of this effect alone detects, in `unit`; of a power at 100 mm or 180°. `null`
+    /// where no amplitude of physical size is detectable.
     pub detectable_amplitude: Option<f64>,
     /// Smallest amplitude that is detected when all effects are screened, in `unit`.
     pub detectable_amplitude_screened: Option<f64>,
     /// Share of its signal (sum of squares) that remains in the residual after the fit of the parameters, 0 to 1.
     pub residual_share: f64,
-    /// `detectable`; `confounded` with the parameters (less than a hundredth remains); `confounded at one phase`; `no signal` (these tests do not change
-    /// with it).
+    /// `detectable`; `confounded` with the parameters (less than a hundredth remains); `confounded at one phase`;
+    /// `no signal` (these tests do not change with it).
     pub verdict: String,
     /// The errors that it biases, the most biased first.
     pub biases: Vec<Bias>,

@@ -1,5 +1,5 @@
-//! The sensitivity of the readings to each parameter (largest, root mean square, along each test), and the leverage of the
-//! readings.
+//! The sensitivity of the readings to each parameter (largest, root mean square, along each test), and the leverage of
+//! the readings.
 
 use faer::Mat;
 use rayon::prelude::*;
@@ -17,8 +17,8 @@ pub struct Sensitivities {
     pub summary: Vec<(f64, usize, f64)>,
     /// By parameter and test: along the first run.
     pub curves: Vec<Vec<Vec<f64>>>,
-    /// Mean over greatest leverage. The leverage `xᵀ Cov x` of a whitened row `x` is the response of the fitted value to that
-    /// reading.
+    /// Mean over greatest leverage. The leverage `xᵀ Cov x` of a whitened row `x` is the response of the fitted value
+    /// to that reading.
     pub g_efficiency: f64,
 }
 
@@ -70,16 +70,8 @@ pub fn sensitivities(
     for (_, _, rms) in &mut summary {
         *rms = (*rms / rows.max(1) as f64).sqrt();
     }
-    let g_efficiency = if most > 0.0 {
-        sum / rows.max(1) as f64 / most
-    } else {
-        0.0
-    };
-    Ok(Sensitivities {
-        summary,
-        curves,
-        g_efficiency,
-    })
+    let g_efficiency = if most > 0.0 { sum / rows.max(1) as f64 / most } else { 0.0 };
+    Ok(Sensitivities { summary, curves, g_efficiency })
 }
 
 fn of_block(
@@ -118,21 +110,14 @@ fn of_block(
             curve[j].push(if coordinates == 1 {
                 rows[(*i, j)]
             } else {
-                (0..coordinates)
-                    .map(|c| rows[(i * coordinates + c, j)].powi(2))
-                    .sum::<f64>()
-                    .sqrt()
+                (0..coordinates).map(|c| rows[(i * coordinates + c, j)].powi(2)).sum::<f64>().sqrt()
             });
         }
     }
     let (white, _) = problem.whiten(rows, block);
     let spread = white.as_ref().subcols(0, parameters) * covariance;
     let leverages = (0..white.nrows())
-        .map(|i| {
-            (0..parameters)
-                .map(|j| spread[(i, j)] * white[(i, j)])
-                .sum::<f64>()
-        })
+        .map(|i| (0..parameters).map(|j| spread[(i, j)] * white[(i, j)]).sum::<f64>())
         .collect::<Vec<f64>>();
     BlockSensitivity {
         test: block.test,

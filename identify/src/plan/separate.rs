@@ -1,9 +1,9 @@
 //! Further tests that separate a found effect from its alternatives.
 //!
-//! The alternatives are compared one at a time. The separation of an effect from one of them is its distance, in standard
-//! deviations, from the best approximation by that alternative and the rest of the model. The information of every candidate test
-//! contains the coefficients of all alternatives. To remove one from the model, its columns are removed from the root. One
-//! evaluation of the candidate tests therefore serves all alternatives.
+//! The alternatives are compared one at a time. The separation of an effect from one of them is its distance, in
+//! standard deviations, from the best approximation by that alternative and the rest of the model. The information of
+//! every candidate test contains the coefficients of all alternatives. To remove one from the model, its columns are
+//! removed from the root. One evaluation of the candidate tests therefore serves all alternatives.
 
 use abbe_model::effect::Effect;
 use faer::Mat;
@@ -79,11 +79,12 @@ impl AlternativeSeparation {
     }
 }
 
-/// The candidate test that best separates a found effect from an alias. `None` if no candidate test adds to the separation.
-/// `coefficients` are those of the found effect, internal units.
+/// The candidate test that best separates a found effect from an alias. `None` if no candidate test adds to the
+/// separation. `coefficients` are those of the found effect, internal units.
 ///
 /// # Errors
-/// If the columns of an effect cannot be computed for the session, or if there are no candidate tests for its instrument.
+/// If the columns of an effect cannot be computed for the session, or if there are no candidate tests for its
+/// instrument.
 pub fn separation(
     problem: &Problem<'_>,
     beta: &[f64],
@@ -92,14 +93,8 @@ pub fn separation(
     alias: &Effect,
     variations: &TestVariations,
 ) -> Result<Option<SeparationAnalysis>, IdentifyError> {
-    let comparison = SeparationComparison::new(
-        problem,
-        beta,
-        found,
-        coefficients,
-        std::slice::from_ref(alias),
-        variations,
-    )?;
+    let comparison =
+        SeparationComparison::new(problem, beta, found, coefficients, std::slice::from_ref(alias), variations)?;
     let base = &comparison.prepared.base;
     let before = comparison.sigma(base, 0);
     let sigmas = comparison.with_each(base, &[0]);
@@ -116,12 +111,13 @@ pub fn separation(
     }))
 }
 
-/// The tests that separate a found effect from its alternatives. The first test separates the largest number, each further test
-/// the largest number of the remaining ones. Empty if no test separates any. `coefficients` are those of the found effect,
-/// internal units.
+/// The tests that separate a found effect from its alternatives. The first test separates the largest number, each
+/// further test the largest number of the remaining ones. Empty if no test separates any. `coefficients` are those of
+/// the found effect, internal units.
 ///
 /// # Errors
-/// If the columns of an effect cannot be computed for the session, or if there are no candidate tests for its instrument.
+/// If the columns of an effect cannot be computed for the session, or if there are no candidate tests for its
+/// instrument.
 pub fn separating_tests(
     problem: &Problem<'_>,
     beta: &[f64],
@@ -138,10 +134,7 @@ pub fn separating_tests(
     let mut root = comparison.prepared.base.clone();
     let mut tests: Vec<SeparatingTest> = Vec::new();
     while !remaining.is_empty() && tests.len() < MAX_TESTS {
-        let before: Vec<f64> = remaining
-            .iter()
-            .map(|one| comparison.sigma(&root, *one))
-            .collect();
+        let before: Vec<f64> = remaining.iter().map(|one| comparison.sigma(&root, *one)).collect();
         let sigmas = comparison.with_each(&root, &remaining);
         let Some(best) = comparison.best(&sigmas, SEPARATED_SIGMA) else {
             break;
@@ -162,10 +155,7 @@ pub fn separating_tests(
         if !test.alternatives.iter().any(gained) {
             break;
         }
-        remaining = (test.alternatives.iter())
-            .filter(|one| !one.is_separated())
-            .map(|one| one.number)
-            .collect();
+        remaining = (test.alternatives.iter()).filter(|one| !one.is_separated()).map(|one| one.number).collect();
         root = comparison.prepared.added(&root, best);
         tests.push(test);
     }
@@ -205,23 +195,16 @@ impl SeparationComparison {
             _ => None,
         };
         let found_at = place(found);
-        let targets: Vec<usize> = (0..all.parameters.list.len())
-            .filter(|j| effect_of(*j).is_some() && effect_of(*j) == found_at)
-            .collect();
-        let variations = &variations
-            .clone()
-            .for_effects(std::iter::once(found).chain(alternatives));
+        let targets: Vec<usize> =
+            (0..all.parameters.list.len()).filter(|j| effect_of(*j).is_some() && effect_of(*j) == found_at).collect();
+        let variations = &variations.clone().for_effects(std::iter::once(found).chain(alternatives));
         let tests = super::candidate_tests::candidate_tests(all.session, variations)?;
         let prepared = PreparedCandidates::new(&all, &values, tests, variations, &targets)?;
         // An alternative that is part of the model always remains in it.
         let is_added = |effect: usize| effect >= known && Some(effect) != found_at;
         let added: Vec<Option<usize>> = (prepared.shared.ids.iter())
             .map(|id| {
-                let j = all
-                    .parameters
-                    .list
-                    .iter()
-                    .position(|parameter| parameter.id == *id)?;
+                let j = all.parameters.list.iter().position(|parameter| parameter.id == *id)?;
                 effect_of(j).filter(|effect| is_added(*effect))
             })
             .collect();
@@ -235,11 +218,7 @@ impl SeparationComparison {
                 (columns, shared)
             })
             .collect();
-        Ok(SeparationComparison {
-            prepared,
-            coefficients: coefficients.to_vec(),
-            pairs,
-        })
+        Ok(SeparationComparison { prepared, coefficients: coefficients.to_vec(), pairs })
     }
 
     /// The separation of the effect from an alternative under some information, standard deviations.
@@ -251,13 +230,11 @@ impl SeparationComparison {
 
     /// The separations with each candidate test added, by test and alternative.
     fn with_each(&self, root: &Root, alternatives: &[usize]) -> Vec<Vec<f64>> {
-        self.prepared.figures(root, &|root: &Root| {
-            alternatives.iter().map(|one| self.sigma(root, *one)).collect()
-        })
+        self.prepared.figures(root, &|root: &Root| alternatives.iter().map(|one| self.sigma(root, *one)).collect())
     }
 
-    /// The candidate test that separates the largest number of alternatives by at least `least` standard deviations. Of several,
-    /// the shortest test whose least separation is close to the largest. Names decide ties.
+    /// The candidate test that separates the largest number of alternatives by at least `least` standard deviations. Of
+    /// several, the shortest test whose least separation is close to the largest. Names decide ties.
     fn best(&self, sigmas: &[Vec<f64>], least: f64) -> Option<usize> {
         let count = |candidate: usize| sigmas[candidate].iter().filter(|sigma| **sigma >= least).count();
         let worst = |candidate: usize| {
@@ -268,12 +245,10 @@ impl SeparationComparison {
         let with_most = || (0..sigmas.len()).filter(|candidate| count(*candidate) == most);
         let best = with_most().map(worst).fold(0.0, f64::max);
         let candidate = |candidate: usize| &self.prepared.candidates[candidate].test;
-        with_most()
-            .filter(|one| worst(*one) >= EQUIVALENT_SHARE * best)
-            .min_by(|a, b| {
-                smallest_first(candidate(*a).minutes, candidate(*b).minutes)
-                    .then(worst(*b).total_cmp(&worst(*a)))
-                    .then_with(|| candidate(*a).name.cmp(&candidate(*b).name))
-            })
+        with_most().filter(|one| worst(*one) >= EQUIVALENT_SHARE * best).min_by(|a, b| {
+            smallest_first(candidate(*a).minutes, candidate(*b).minutes)
+                .then(worst(*b).total_cmp(&worst(*a)))
+                .then_with(|| candidate(*a).name.cmp(&candidate(*b).name))
+        })
     }
 }

@@ -12,8 +12,8 @@ use crate::problem::Problem;
 /// Assumed pause between two tests, s.
 const BETWEEN_TESTS_S: f64 = 120.0;
 
-/// A session in which every test has readings: its data, or its planned states with nominal readings. With `planned_only`, a test
-/// with a movement uses its planned states even if it has data.
+/// A session in which every test has readings: its data, or its planned states with nominal readings. With
+/// `planned_only`, a test with a movement uses its planned states even if it has data.
 ///
 /// # Errors
 /// If a test has neither data nor a movement, or a movement leaves the travel.
@@ -27,10 +27,7 @@ pub fn complete(session: &Session, planned_only: bool) -> Result<Session, Identi
             readings.time_s.iter_mut().for_each(|time| *time += clock_s);
             test.readings = Some(readings);
         }
-        let end = test
-            .readings
-            .as_ref()
-            .and_then(|readings| readings.time_s.last().copied());
+        let end = test.readings.as_ref().and_then(|readings| readings.time_s.last().copied());
         clock_s = end.map_or(clock_s, |end| end + BETWEEN_TESTS_S);
     }
     Ok(complete)
@@ -48,7 +45,8 @@ pub fn planned(session: &Session, test: &Test) -> Result<Readings, IdentifyError
     Ok(readings)
 }
 
-/// The least-squares problem of a complete session. Its folds are the tests, so that every test has its own triangular factor.
+/// The least-squares problem of a complete session. Its folds are the tests, so that every test has its own triangular
+/// factor.
 ///
 /// # Errors
 /// See [`Problem::new`].
@@ -63,17 +61,12 @@ pub fn fold_by_test(problem: &mut Problem<'_>) {
     problem.folds = Folds {
         kind: FoldKind::Runs,
         count: problem.models.len(),
-        of_row: problem
-            .models
-            .iter()
-            .enumerate()
-            .map(|(test, model)| vec![test; model.rows()])
-            .collect(),
+        of_row: problem.models.iter().enumerate().map(|(test, model)| vec![test; model.rows()]).collect(),
     };
 }
 
-/// Assumed noise of a reading if neither the session nor its data determine it: 1 µm, the accuracy that makers of ball bars
-/// state.
+/// Assumed noise of a reading if neither the session nor its data determine it: 1 µm, the accuracy that makers of ball
+/// bars state.
 pub const ASSUMED_NOISE_MM: f64 = 1e-3;
 
 /// The noise model of a plan: that of the session, that of its data, or [`ASSUMED_NOISE_MM`].

@@ -1,6 +1,7 @@
 //! The permitted variations of candidate tests: bars, radii, heights, positions, feeds, ranges.
 
-use abbe_model::effect::{Component, Driver, Effect, Shape};
+use abbe_model::driver::DriverPart;
+use abbe_model::effect::{Component, Effect};
 
 /// The permitted variations. Lengths in mm, times in min.
 #[derive(Clone, Debug)]
@@ -59,8 +60,8 @@ impl TestVariations {
     /// The same variations with a second feed, if one of the effects depends on speed or time.
     pub fn for_effects<'e>(mut self, effects: impl IntoIterator<Item = &'e Effect>) -> TestVariations {
         let depends = |effect: &Effect| {
-            effect.shape == Shape::Lag
-                || effect.driver == Driver::Time
+            effect.shape.uses() == DriverPart::Rate
+                || effect.driver.kind().changes_with_feed()
                 || effect.component == Component::TriggerDelay
         };
         if self.feeds.len() == 1 && effects.into_iter().any(depends) {

@@ -1,7 +1,7 @@
 //! Whether readings and session belong together.
 //!
-//! A session states directions and order of axes, places of balls, lengths of bars, units of columns. This module names the statements that the
-//! readings contradict, and the mistakes that explain the contradiction. Conflicts are:
+//! A session states directions and order of axes, places of balls, lengths of bars, units of columns. This module names
+//! the statements that the readings contradict, and the mistakes that explain the contradiction. Conflicts are:
 //!
 //! - set-up parameters far from their stated values, each (`pulls`) and all together;
 //! - a residual of a hundred times the noise in every test;
@@ -69,14 +69,11 @@ pub fn examine(problem: &Problem<'_>, fit: &Fit) -> Plausibility {
             ),
         });
     }
-    Plausibility {
-        conflicts,
-        suggestions,
-        explained_variance: None,
-    }
+    Plausibility { conflicts, suggestions, explained_variance: None }
 }
 
-/// The fit unchanged, or an error where the readings cannot belong to the session. The error names the mistakes that may explain it.
+/// The fit unchanged, or an error where the readings cannot belong to the session. The error names the mistakes that
+/// may explain it.
 ///
 /// # Errors
 /// If the fit failed, or nothing is identifiable.
@@ -106,8 +103,7 @@ pub(crate) fn checked(problem: &Problem<'_>, fit: Result<Fit, IdentifyError>) ->
     let diagnosis = match in_words(&suggestions) {
         Some(words) => words,
         None => {
-            "check the units, signs and order of the columns, and whether the data belong to this machine"
-                .to_string()
+            "check the units, signs and order of the columns, and whether the data belong to this machine".to_string()
         }
     };
     Err(IdentifyError::Contradicted { found, diagnosis })
@@ -117,22 +113,17 @@ pub(crate) fn checked(problem: &Problem<'_>, fit: Result<Fit, IdentifyError>) ->
 pub fn warnings(plausibility: &Plausibility) -> Vec<String> {
     let is_parameter = |conflict: &&Conflict| conflict.kind == ConflictKind::SetupParameter;
     let conflicts = &plausibility.conflicts;
-    let mut told: Vec<String> = (conflicts.iter())
-        .filter(|conflict| !is_parameter(conflict))
-        .map(|conflict| conflict.words.clone())
-        .collect();
-    let parameters: Vec<&str> = (conflicts.iter().filter(is_parameter))
-        .map(|conflict| conflict.words.as_str())
-        .collect();
+    let mut told: Vec<String> =
+        (conflicts.iter()).filter(|conflict| !is_parameter(conflict)).map(|conflict| conflict.words.clone()).collect();
+    let parameters: Vec<&str> =
+        (conflicts.iter().filter(is_parameter)).map(|conflict| conflict.words.as_str()).collect();
     if !parameters.is_empty() {
         let named = parameters[..parameters.len().min(MAX_NAMED)].join("; ");
         let others = match parameters.len().saturating_sub(MAX_NAMED) {
             0 => String::new(),
             n => format!("; and {n} more"),
         };
-        told.push(format!(
-            "the readings contradict the stated set-up: {named}{others}"
-        ));
+        told.push(format!("the readings contradict the stated set-up: {named}{others}"));
     }
     if let (Some(last), Some(words)) = (told.last_mut(), in_words(&plausibility.suggestions)) {
         *last = format!("{last}; {words}");
@@ -151,11 +142,7 @@ pub fn in_words(suggestions: &[Suggestion]) -> Option<String> {
     let clauses: Vec<String> = (kinds.iter())
         .map(|kind| {
             let of_kind = suggestions.iter().filter(|suggestion| suggestion.kind == *kind);
-            one_clause(
-                &of_kind
-                    .map(|suggestion| suggestion.words.as_str())
-                    .collect::<Vec<&str>>(),
-            )
+            one_clause(&of_kind.map(|suggestion| suggestion.words.as_str()).collect::<Vec<&str>>())
         })
         .collect();
     (!clauses.is_empty()).then(|| format!("this would be explained if {}", clauses.join(", or if ")))
@@ -163,34 +150,20 @@ pub fn in_words(suggestions: &[Suggestion]) -> Option<String> {
 
 /// Clauses as one that states their common beginning and end once: "the direction of axis A or Z is reversed".
 fn one_clause(clauses: &[&str]) -> String {
-    let words: Vec<Vec<&str>> = (clauses.iter())
-        .map(|clause| clause.split(' ').collect())
-        .collect();
+    let words: Vec<Vec<&str>> = (clauses.iter()).map(|clause| clause.split(' ').collect()).collect();
     let shortest = words.iter().map(Vec::len).min().unwrap_or(0);
     let first = &words[0];
-    let begin = (0..shortest)
-        .take_while(|i| words.iter().all(|other| other[*i] == first[*i]))
-        .count();
+    let begin = (0..shortest).take_while(|i| words.iter().all(|other| other[*i] == first[*i])).count();
     let end = (1..=shortest.saturating_sub(begin + 1))
-        .take_while(|i| {
-            words
-                .iter()
-                .all(|other| other[other.len() - i] == first[first.len() - i])
-        })
+        .take_while(|i| words.iter().all(|other| other[other.len() - i] == first[first.len() - i]))
         .count();
     if words.len() == 1 || begin + end == 0 {
         return clauses.join(" or ");
     }
-    let middles: Vec<String> = (words.iter())
-        .map(|words| words[begin..words.len() - end].join(" "))
-        .collect();
+    let middles: Vec<String> = (words.iter()).map(|words| words[begin..words.len() - end].join(" ")).collect();
     let (last, others) = middles.split_last().expect("there is more than one clause");
     let middle = format!("{} or {last}", others.join(", "));
-    let parts = [
-        first[..begin].join(" "),
-        middle,
-        first[first.len() - end..].join(" "),
-    ];
+    let parts = [first[..begin].join(" "), middle, first[first.len() - end..].join(" ")];
     let parts: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).collect();
     parts.join(" ")
 }
@@ -204,18 +177,11 @@ fn residual(problem: &Problem<'_>, fit: &Fit) -> Option<Conflict> {
     let coordinates = problem.coordinates();
     let of_test = |number: usize| {
         let rejected = &problem.rejected[number];
-        let kept = fit.residuals[number]
-            .iter()
-            .enumerate()
-            .filter(|(i, _)| !rejected[i / coordinates]);
-        let (sum, count) = kept.fold((0.0, 0_usize), |(sum, count), (_, value)| {
-            (sum + value * value, count + 1)
-        });
+        let kept = fit.residuals[number].iter().enumerate().filter(|(i, _)| !rejected[i / coordinates]);
+        let (sum, count) = kept.fold((0.0, 0_usize), |(sum, count), (_, value)| (sum + value * value, count + 1));
         (count > 0).then(|| (sum / count as f64).sqrt())
     };
-    let least = (0..problem.tests.len())
-        .filter_map(of_test)
-        .fold(f64::INFINITY, f64::min);
+    let least = (0..problem.tests.len()).filter_map(of_test).fold(f64::INFINITY, f64::min);
     (least.is_finite() && least >= ANOTHER_SESSION * noise).then(|| Conflict {
         kind: ConflictKind::Residual,
         subject: "session".to_string(),
@@ -290,11 +256,7 @@ fn of_poses(problem: &Problem<'_>, fit: &Fit) -> Plausibility {
     };
     let left = three * rms_mm(problem, &fit.residuals).powi(2);
     let explained = 1.0 - left / spread;
-    let suggestions = if explained < WELL_EXPLAINED {
-        poses::suggestions(problem)
-    } else {
-        Vec::new()
-    };
+    let suggestions = if explained < WELL_EXPLAINED { poses::suggestions(problem) } else { Vec::new() };
     let little = explained < MIN_EXPLAINED;
     let conflicts = if little || !suggestions.is_empty() {
         vec![Conflict {
@@ -314,18 +276,13 @@ fn of_poses(problem: &Problem<'_>, fit: &Fit) -> Plausibility {
     } else {
         Vec::new()
     };
-    Plausibility {
-        conflicts,
-        suggestions,
-        explained_variance: Some(explained),
-    }
+    Plausibility { conflicts, suggestions, explained_variance: Some(explained) }
 }
 
 /// Whether any set-up parameter has a stated uncertainty.
 fn has_priors(problem: &Problem<'_>) -> bool {
     let list = &problem.parameters.list;
-    list.iter()
-        .any(|parameter| matches!(parameter.prior, Prior::Gaussian(_)))
+    list.iter().any(|parameter| matches!(parameter.prior, Prior::Gaussian(_)))
 }
 
 #[cfg(test)]

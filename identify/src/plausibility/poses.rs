@@ -1,4 +1,5 @@
-//! Poses of a robot: how much of the variance of the measured positions the model explains, and which column may be misread.
+//! Poses of a robot: how much of the variance of the measured positions the model explains, and which column may be
+//! misread.
 
 use abbe_model::axis::AxisKind;
 use abbe_model::instrument::Station;
@@ -24,8 +25,9 @@ const MAX_LISTED: usize = 5;
 /// Any noise will do where residuals are compared, mm.
 const NOISE_MM: f64 = 1.0;
 
-/// Mean square of the distances of the positions from their mean, mm²: of those measured, or, where a ball sits in sockets, of those that the ball would
-/// take if the positions of the axes were combined at random. `None` if they do not scatter.
+/// Mean square of the distances of the positions from their mean, mm²: of those measured, or, where a ball sits in
+/// sockets, of those that the ball would take if the positions of the axes were combined at random. `None` if they do
+/// not scatter.
 pub(super) fn spread_mm2(problem: &Problem<'_>) -> Option<f64> {
     let (mut sum, mut count) = (0.0, 0_usize);
     let mut groups: Vec<&str> = problem.tests.iter().map(|test| test.setup.as_str()).collect();
@@ -52,10 +54,7 @@ pub(super) fn spread_mm2(problem: &Problem<'_>) -> Option<f64> {
             }
         }
         let mean = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
-        sum += points
-            .iter()
-            .map(|point| (point - mean).norm_squared())
-            .sum::<f64>();
+        sum += points.iter().map(|point| (point - mean).norm_squared()).sum::<f64>();
         count += points.len();
     }
     let spread = sum / count.max(1) as f64;
@@ -78,15 +77,11 @@ pub(super) fn suggestions(problem: &Problem<'_>) -> Vec<Suggestion> {
         .collect();
     // Readings that are scaled leave a residual that is scaled with them: compare shares of the spread.
     let share = |rms_mm: f64, session: &Session| {
-        let spread = Problem::new(session, noise.clone(), 1)
-            .ok()
-            .and_then(|problem| spread_mm2(&problem));
+        let spread = Problem::new(session, noise.clone(), 1).ok().and_then(|problem| spread_mm2(&problem));
         rms_mm / spread.unwrap_or(1.0).sqrt()
     };
     let base = share(base_mm, &nominal);
-    tried
-        .iter_mut()
-        .for_each(|(rms_mm, hypothesis)| *rms_mm = share(*rms_mm, &hypothesis.session));
+    tried.iter_mut().for_each(|(rms_mm, hypothesis)| *rms_mm = share(*rms_mm, &hypothesis.session));
     tried.retain(|(left, _)| *left * LOWERED < base);
     tried.sort_by(|a, b| a.0.total_cmp(&b.0));
     let best = tried.first().map_or(0.0, |(left, _)| *left);
@@ -106,10 +101,7 @@ pub(super) fn suggestions(problem: &Problem<'_>) -> Vec<Suggestion> {
 fn of_poses(session: &Session) -> Vec<Hypothesis> {
     let machine = &session.machine;
     let mut list = Vec::new();
-    let tracked = session
-        .tests
-        .iter()
-        .any(|test| matches!(test.station, Station::Tracker(_)));
+    let tracked = session.tests.iter().any(|test| matches!(test.station, Station::Tracker(_)));
     if tracked {
         for (factor, unit) in lengths() {
             let changed = with_readings(session, |_, _, observed| {
@@ -125,13 +117,9 @@ fn of_poses(session: &Session) -> Vec<Hypothesis> {
         let mirrored = with_readings(session, |_, _, observed| {
             observed.iter_mut().step_by(3).for_each(|value| *value = -*value);
         });
-        let words = "the measured positions are left-handed: one of px, py, pz has the opposite sign, or two are exchanged";
-        list.push(Hypothesis::new(
-            SuggestionKind::ColumnSign,
-            "px, py, pz",
-            words.to_string(),
-            mirrored,
-        ));
+        let words =
+            "the measured positions are left-handed: one of px, py, pz has the opposite sign, or two are exchanged";
+        list.push(Hypothesis::new(SuggestionKind::ColumnSign, "px, py, pz", words.to_string(), mirrored));
     }
     let scaled = |axes: &[usize], factor: f64| {
         with_readings(session, |_, positions, _| {
@@ -141,9 +129,7 @@ fn of_poses(session: &Session) -> Vec<Hypothesis> {
         })
     };
     for kind in [AxisKind::Rotary, AxisKind::Linear] {
-        let axes: Vec<usize> = (0..machine.axes.len())
-            .filter(|k| machine.axes[*k].kind == kind)
-            .collect();
+        let axes: Vec<usize> = (0..machine.axes.len()).filter(|k| machine.axes[*k].kind == kind).collect();
         let mut sets: Vec<Vec<usize>> = vec![axes.clone()];
         if axes.len() > 1 {
             sets.extend(axes.iter().map(|axis| vec![*axis]));
@@ -153,20 +139,10 @@ fn of_poses(session: &Session) -> Vec<Hypothesis> {
             let names = names.join(", ");
             for (factor, unit) in units(kind) {
                 let words = format!("the positions of {names} are {unit}");
-                list.push(Hypothesis::new(
-                    SuggestionKind::ColumnUnit,
-                    &names,
-                    words,
-                    scaled(set, factor),
-                ));
+                list.push(Hypothesis::new(SuggestionKind::ColumnUnit, &names, words, scaled(set, factor)));
             }
             let words = format!("the positions of {names} have the opposite sign");
-            list.push(Hypothesis::new(
-                SuggestionKind::ColumnSign,
-                &names,
-                words,
-                scaled(set, -1.0),
-            ));
+            list.push(Hypothesis::new(SuggestionKind::ColumnSign, &names, words, scaled(set, -1.0)));
         }
         for (place, &first) in axes.iter().enumerate() {
             for &second in &axes[place + 1..] {

@@ -1,14 +1,16 @@
 //! Pulls of set-up parameters: the deviation of the estimate from the stated value, over its standard deviation.
 //!
-//! With `P` the stated variances, `V` the covariance after the fit, and `A = V⁻¹ − P⁻¹` the information of the readings, the estimate is
-//! `m = V A θ + V Jᵀ W ε`. If the session is right, θ scatters by `P` and ε by `κ` times the variance that the fit assumes, so that
+//! With `P` the stated variances, `V` the covariance after the fit, and `A = V⁻¹ − P⁻¹` the information of the
+//! readings, the estimate is `m = V A θ + V Jᵀ W ε`. If the session is right, θ scatters by `P` and ε by `κ` times the
+//! variance that the fit assumes, so that
 //!
 //! ```text
 //! Cov m = (P − 2 V + V P⁻¹ V) + κ (V − V P⁻¹ V),    for κ = 1:  P − V
 //! ```
 //!
-//! Errors of the machine have no prior and do not enter: the estimate is unbiased in them. A pull is `m / √(Cov m)`, standard normal whatever the
-//! number of readings. Readings whose noise is serially correlated count less: `κ` is the excess of their χ² times `(1 + ρ)/(1 − ρ)`.
+//! Errors of the machine have no prior and do not enter: the estimate is unbiased in them. A pull is `m / √(Cov m)`,
+//! standard normal whatever the number of readings. Readings whose noise is serially correlated count less: `κ` is the
+//! excess of their χ² times `(1 + ρ)/(1 − ρ)`.
 
 use abbe_model::session::Prior;
 use faer::{Mat, Side};
@@ -18,7 +20,8 @@ use crate::fit::Fit;
 use crate::parameters::Role;
 use crate::problem::Problem;
 
-/// Probability that a correct session is reported as contradicted, once for the largest pull and once for all set-up parameters together.
+/// Probability that a correct session is reported as contradicted, once for the largest pull and once for all set-up
+/// parameters together.
 const SIGNIFICANCE: f64 = 1e-4;
 /// A parameter whose estimate scatters by less than this share of its stated uncertainty is not tested.
 const MIN_SHARE: f64 = 0.1;
@@ -68,9 +71,7 @@ impl Pulls {
         }
         let kappa = excess(problem, fit);
         // Everything in units of the stated uncertainties: P is the unit matrix.
-        let v = Mat::from_fn(count, count, |i, k| {
-            fit.covariance[(places[i], places[k])] / (prior[i] * prior[k])
-        });
+        let v = Mat::from_fn(count, count, |i, k| fit.covariance[(places[i], places[k])] / (prior[i] * prior[k]));
         let squared = &v * &v;
         let covariance = Mat::from_fn(count, count, |i, k| {
             let of_prior = f64::from(u8::from(i == k)) - 2.0 * v[(i, k)] + squared[(i, k)];
@@ -88,24 +89,13 @@ impl Pulls {
                 })
             })
             .collect();
-        let (together, freedom) = if count <= MAX_TESTED_JOINTLY {
-            together(&covariance, &moved)
-        } else {
-            (0.0, 0)
-        };
-        Pulls {
-            limit: limit(each.len()),
-            each,
-            together,
-            freedom,
-        }
+        let (together, freedom) = if count <= MAX_TESTED_JOINTLY { together(&covariance, &moved) } else { (0.0, 0) };
+        Pulls { limit: limit(each.len()), each, together, freedom }
     }
 
     /// The parameters that contradict their statements, the largest pull first.
     pub fn contradicted(&self) -> Vec<&Pull> {
-        let mut list: Vec<&Pull> = (self.each.iter())
-            .filter(|pull| pull.pull.abs() > self.limit)
-            .collect();
+        let mut list: Vec<&Pull> = (self.each.iter()).filter(|pull| pull.pull.abs() > self.limit).collect();
         list.sort_by(|a, b| b.pull.abs().total_cmp(&a.pull.abs()));
         list
     }
@@ -116,7 +106,8 @@ impl Pulls {
         self.freedom > 0 && law.is_ok_and(|law| law.sf(self.together) < SIGNIFICANCE)
     }
 
-    /// By how much χ² of the set-up parameters exceeds its least value with the probability [`SIGNIFICANCE`] if their statements are right.
+    /// By how much χ² of the set-up parameters exceeds its least value with the probability [`SIGNIFICANCE`] if their
+    /// statements are right.
     pub fn allowed(&self) -> f64 {
         let law = ChiSquared::new(self.freedom as f64);
         let together = law.map_or(0.0, |law| law.inverse_cdf(1.0 - SIGNIFICANCE));
@@ -135,7 +126,8 @@ fn limit(count: usize) -> f64 {
     -Normal::standard().inverse_cdf(tail)
 }
 
-/// χ² of estimates (in stated uncertainties) in those directions along which the readings, not the priors, decide where they lie; and how many these are.
+/// χ² of estimates (in stated uncertainties) in those directions along which the readings, not the priors, decide where
+/// they lie; and how many these are.
 fn together(covariance: &Mat<f64>, moved: &[f64]) -> (f64, usize) {
     let Ok(decomposed) = covariance.self_adjoint_eigen(Side::Lower) else {
         return (0.0, 0);
@@ -144,11 +136,7 @@ fn together(covariance: &Mat<f64>, moved: &[f64]) -> (f64, usize) {
     let (mut sum, mut freedom) = (0.0, 0);
     for k in 0..moved.len() {
         if values[k] > 0.5 {
-            let along: f64 = moved
-                .iter()
-                .enumerate()
-                .map(|(i, value)| vectors[(i, k)] * value)
-                .sum();
+            let along: f64 = moved.iter().enumerate().map(|(i, value)| vectors[(i, k)] * value).sum();
             sum += along * along / values[k];
             freedom += 1;
         }
@@ -156,8 +144,8 @@ fn together(covariance: &Mat<f64>, moved: &[f64]) -> (f64, usize) {
     (sum, freedom)
 }
 
-/// By how much the noise of an average exceeds what the fit assumes: the readings' own χ² over their degrees of freedom, where that is above 1, times
-/// what the autocorrelation of the residual along a run adds.
+/// By how much the noise of an average exceeds what the fit assumes: the readings' own χ² over their degrees of
+/// freedom, where that is above 1, times what the autocorrelation of the residual along a run adds.
 fn excess(problem: &Problem<'_>, fit: &Fit) -> f64 {
     let coordinates = problem.coordinates();
     let (mut squares, mut count, mut products, mut pairs) = (0.0, 0_usize, 0.0, 0.0);
@@ -177,8 +165,7 @@ fn excess(problem: &Problem<'_>, fit: &Fit) -> f64 {
             }
         }
     }
-    let free =
-        (0..problem.parameters.list.len()).filter(|j| problem.parameters.list[*j].prior == Prior::Free);
+    let free = (0..problem.parameters.list.len()).filter(|j| problem.parameters.list[*j].prior == Prior::Free);
     let freedom = count.saturating_sub(free.count()).max(1) as f64;
     let ratio = (squares / freedom / problem.noise.sigma_mm.powi(2)).max(1.0);
     let poses = problem.folds.kind == crate::heldout::FoldKind::Poses;

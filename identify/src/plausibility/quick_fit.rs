@@ -1,7 +1,7 @@
 //! How well a session with one statement changed fits its readings: a fit to some of them.
 //!
-//! The fit is iterated to its minimum. A freed parameter may be poorly determined; full Gauss–Newton steps then move it by as much as its prior
-//! allows, and the square of such a step exceeds the noise.
+//! The fit is iterated to its minimum. A freed parameter may be poorly determined; full Gauss–Newton steps then move it
+//! by as much as its prior allows, and the square of such a step exceeds the noise.
 
 use abbe_model::session::{Prior, Session};
 
@@ -17,7 +17,8 @@ use crate::rank::Rank;
 pub(super) struct Trial {
     /// χ² of readings and priors.
     pub chi_square: f64,
-    /// χ² of the readings over their degrees of freedom, at least 1: the variance of the noise over the variance that is assumed.
+    /// χ² of the readings over their degrees of freedom, at least 1: the variance of the noise over the variance that
+    /// is assumed.
     pub excess: f64,
     /// Residual over scalar readings, mm.
     pub rms_mm: f64,
@@ -51,13 +52,8 @@ pub(super) fn trial(session: &Session, noise: &Noise) -> Option<Trial> {
         })
         .sum();
     let readings = problem.readings() * problem.coordinates();
-    let free = list
-        .iter()
-        .filter(|parameter| parameter.prior == Prior::Free)
-        .count();
-    let freedom = readings
-        .saturating_sub(free.min(found.rank.identifiable_basis.ncols()))
-        .max(1) as f64;
+    let free = list.iter().filter(|parameter| parameter.prior == Prior::Free).count();
+    let freedom = readings.saturating_sub(free.min(found.rank.identifiable_basis.ncols())).max(1) as f64;
     chi_square.is_finite().then(|| Trial {
         chi_square,
         excess: ((chi_square - of_priors) / freedom).max(1.0),
@@ -76,10 +72,7 @@ pub(super) fn thinned(problem: &Problem<'_>, most: usize) -> Session {
             continue;
         };
         let kept = &problem.rejected[number];
-        let rows: Vec<usize> = (0..readings.rows())
-            .filter(|row| !kept[*row])
-            .step_by(each)
-            .collect();
+        let rows: Vec<usize> = (0..readings.rows()).filter(|row| !kept[*row]).step_by(each).collect();
         *readings = readings.of_rows(&rows);
         number += 1;
     }

@@ -40,9 +40,11 @@ pub struct Conflict {
     pub kind: ConflictKind,
     /// The set-up parameter, or `session`.
     pub subject: String,
-    /// What was found: the estimate of the set-up parameter, χ² of all of them, the residual, or the share of the variance; in `unit`.
+    /// What was found: the estimate of the set-up parameter, χ² of all of them, the residual, or the share of the
+    /// variance; in `unit`.
     pub value: f64,
-    /// What it is compared with, in `unit`: the stated standard uncertainty, the degrees of freedom, the noise, or the least share.
+    /// What it is compared with, in `unit`: the stated standard uncertainty, the degrees of freedom, the noise, or the
+    /// least share.
     pub stated: f64,
     /// Unit of `value` and `stated`; `1` for none.
     pub unit: String,

@@ -1,4 +1,5 @@
-//! Which single mistake would remove the conflicts: a refit with each. The likelihood decides which are listed, the evidence in what order.
+//! Which single mistake would remove the conflicts: a refit with each. The likelihood decides which are listed, the
+//! evidence in what order.
 
 use abbe_model::session::Session;
 use rayon::prelude::*;
@@ -17,18 +18,20 @@ const MIN_FALL: f64 = 10.0;
 const MAX_LISTED: usize = 10;
 /// Up to this number all mistakes that free parameters are tried, beyond it those whose parameters are contradicted.
 const MAX_HYPOTHESES: usize = 40;
-/// If the noise of every fit exceeds the assumed variance by more than this factor, the fits are repeated with the larger variance.
+/// If the noise of every fit exceeds the assumed variance by more than this factor, the fits are repeated with the
+/// larger variance.
 const MAX_EXCESS: f64 = 1.2;
 /// Scores that differ by less than the reciprocal of this are equal.
 const TIED: f64 = 100.0;
 /// By what factor a mistake has to lower χ² for it to be suggested on the residual alone.
 const LOWERED: f64 = 4.0;
 
-/// The mistakes that remove the conflicts of a session whose instrument reads between table and tool, the most probable first. Without conflicts
-/// only those that need no further parameter and explain most of the residual.
+/// The mistakes that remove the conflicts of a session whose instrument reads between table and tool, the most probable
+/// first. Without conflicts only those that need no further parameter and explain most of the residual.
 ///
-/// A mistake is listed if the readings do not reject it: its χ² exceeds the least χ² of all mistakes by no more than `allowed`. What the readings
-/// do not reject is ordered by evidence, which depends on the prior volume of the parameters that a mistake frees; that volume decides nothing else.
+/// A mistake is listed if the readings do not reject it: its χ² exceeds the least χ² of all mistakes by no more than
+/// `allowed`. What the readings do not reject is ordered by evidence, which depends on the prior volume of the
+/// parameters that a mistake frees; that volume decides nothing else.
 pub(super) fn suggestions(problem: &Problem<'_>, conflicts: &[Conflict], allowed: f64) -> Vec<Suggestion> {
     let by_residual = conflicts.is_empty();
     let sigma_mm = problem.noise.sigma_mm;
@@ -43,20 +46,14 @@ pub(super) fn suggestions(problem: &Problem<'_>, conflicts: &[Conflict], allowed
         tried.retain(|(_, found)| found.chi_square * LOWERED < base.chi_square);
     }
     // What remains with the best of them is noise: no mistake of the session explains it. Priors keep their weight.
-    let excess = (tried.iter())
-        .map(|(_, found)| found.excess)
-        .fold(base.excess, f64::min);
+    let excess = (tried.iter()).map(|(_, found)| found.excess).fold(base.excess, f64::min);
     if excess > MAX_EXCESS {
         let list = tried.into_iter().map(|(hypothesis, _)| hypothesis).collect();
         (base, tried) = trials(&stated, list, sigma_mm * excess.sqrt());
     }
-    let least = (tried.iter())
-        .map(|(_, found)| found.chi_square)
-        .fold(base.chi_square, f64::min);
+    let least = (tried.iter()).map(|(_, found)| found.chi_square).fold(base.chi_square, f64::min);
     let mut listed: Vec<(i64, Suggestion)> = (tried.into_iter())
-        .filter(|(_, found)| {
-            found.chi_square - least <= allowed && base.chi_square - found.chi_square >= MIN_FALL
-        })
+        .filter(|(_, found)| found.chi_square - least <= allowed && base.chi_square - found.chi_square >= MIN_FALL)
         .map(|(hypothesis, found)| {
             let suggestion = Suggestion {
                 kind: hypothesis.kind,
@@ -91,10 +88,7 @@ fn trials(stated: &Session, list: Vec<Hypothesis>, sigma_mm: f64) -> (Trial, Vec
 
 /// Whether a mistake is about something whose parameters the readings contradict.
 fn is_contradicted(hypothesis: &Hypothesis, problem: &Problem<'_>, conflicts: &[Conflict]) -> bool {
-    let group = |id: &str| {
-        id.split_once('[')
-            .map(|(_, group)| group.trim_end_matches(']').to_string())
-    };
+    let group = |id: &str| id.split_once('[').map(|(_, group)| group.trim_end_matches(']').to_string());
     let test = problem.tests.iter().find(|test| test.name == hypothesis.subject);
     conflicts.iter().any(|conflict| match (hypothesis.kind, test) {
         (SuggestionKind::OtherSession, Some(test)) => group(&conflict.subject)

@@ -25,8 +25,9 @@ pub(crate) fn is_another_session(plausibility: &Plausibility) -> bool {
     })
 }
 
-/// Replaces the priors of the set-up parameters whose statements the readings contradict by wide ones, so that no effect is claimed in the place of a
-/// wrong statement. Returns the identifiers of these parameters and the fit; `None` where nothing is contradicted.
+/// Replaces the priors of the set-up parameters whose statements the readings contradict by wide ones, so that no
+/// effect is claimed in the place of a wrong statement. Returns the identifiers of these parameters and the fit; `None`
+/// where nothing is contradicted.
 ///
 /// # Errors
 /// If the freed problem cannot be fitted.

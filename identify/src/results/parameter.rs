@@ -21,7 +21,8 @@ pub struct ParameterResult {
     pub expanded_u: f64,
     /// Unit of `value`, `u` and `expanded_u`: `um`, `arcsec`, `deg`, …
     pub unit: String,
-    /// Whether `|value|` exceeds `expanded_u`. For a phase: whether its amplitude does. `false` where `u` is not quantified.
+    /// Whether `|value|` exceeds `expanded_u`. For a phase: whether its amplitude does. `false` where `u` is not
+    /// quantified.
     pub significant: bool,
     /// What the parameter is, in words: `C table: inclination of the axis about Y (squareness to X)`.
     pub meaning: String,
@@ -45,10 +46,7 @@ impl ParameterResult {
 
     /// The same with its meaning in words.
     pub fn with_meaning(self, meaning: impl Into<String>) -> ParameterResult {
-        ParameterResult {
-            meaning: meaning.into(),
-            ..self
-        }
+        ParameterResult { meaning: meaning.into(), ..self }
     }
 
     /// Replaces the standard uncertainty, and what follows from it.
@@ -71,7 +69,8 @@ pub(crate) fn phases_follow_amplitudes(parameters: &mut [ParameterResult]) {
 /// A combination of parameters that leaves every reading unchanged.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Unobservable {
-    /// Coefficient of each parameter, in the parameter's display unit. A change of all parameters in this proportion changes no reading.
+    /// Coefficient of each parameter, in the parameter's display unit. A change of all parameters in this proportion
+    /// changes no reading.
     pub combination: BTreeMap<String, f64>,
     /// Explanation in words.
     pub why: String,
@@ -100,7 +99,8 @@ pub struct NullSpace {
     pub ids: Vec<String>,
     /// Display unit of each of them.
     pub units: Vec<String>,
-    /// One row per null-space direction, one column per parameter of `ids`, in the units of `units`. The coefficient of the leading parameter is 1.
+    /// One row per null-space direction, one column per parameter of `ids`, in the units of `units`. The coefficient of
+    /// the leading parameter is 1.
     pub vectors: Vec<Vec<f64>>,
 }
 
@@ -127,10 +127,7 @@ pub struct Interval {
 impl Interval {
     /// Both ends after a function.
     pub fn map(self, function: impl Fn(f64) -> f64) -> Interval {
-        Interval {
-            low: function(self.low),
-            high: function(self.high),
-        }
+        Interval { low: function(self.low), high: function(self.high) }
     }
 }
 

@@ -22,7 +22,8 @@ pub struct ModelResult {
     /// Rms length of the residual vector over held-out readings, µm, for instruments with three coordinates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub heldout_rms_3d_um: Option<f64>,
-    /// Standard deviation of one scalar reading from which the uncertainties follow, µm. Where the source is `residual`, that of this model.
+    /// Standard deviation of one scalar reading from which the uncertainties follow, µm. Where the source is
+    /// `residual`, that of this model.
     pub noise_um: f64,
     /// Numerical rank: number of independent combinations of the parameters that are identifiable.
     pub rank: usize,
@@ -113,7 +114,8 @@ pub struct EffectResult {
     pub unique: bool,
     /// Number of explanations that the readings do not separate, this effect included; 1 where it is unique.
     pub explanation_count: usize,
-    /// All of these explanations in words, by part of the machine: `C table: axial motion twice per turn, or tilt about X once per turn`.
+    /// All of these explanations in words, by part of the machine:
+    /// `C table: axial motion twice per turn, or tilt about X once per turn`.
     pub explanations: String,
     /// The competing explanations, nearest first.
     pub aliases: Vec<EffectName>,
@@ -122,7 +124,8 @@ pub struct EffectResult {
     /// Separation of the effect from the nearest alias that this test separates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub separation: Option<SeparationResult>,
-    /// Further tests that separate the effect from its aliases. The first separates most aliases, each further test most of the remaining ones.
+    /// Further tests that separate the effect from its aliases. The first separates most aliases, each further test
+    /// most of the remaining ones.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub separating_tests: Vec<SeparatingTestResult>,
 }
@@ -219,8 +222,8 @@ pub struct TraceResult {
     pub unique: bool,
     /// Standard deviation of one scalar reading with the found effects, µm: that of `after`.
     pub noise_um: f64,
-    /// Source of `noise_um`: `stated` by the session, `repeats` (repeated readings), or `residual` where there is neither. The residual of the
-    /// model with its effects also holds what that model lacks.
+    /// Source of `noise_um`: `stated` by the session, `repeats` (repeated readings), or `residual` where there is
+    /// neither. The residual of the model with its effects also holds what that model lacks.
     pub noise_source: String,
     /// Autoregressive coefficients of the noise along a run; empty for white noise.
     pub noise_ar_coefficients: Vec<f64>,
@@ -238,8 +241,8 @@ pub struct TraceResult {
     pub remainder: Remainder,
     /// Structure of the residual of the declared model, in words.
     pub residual_before: String,
-    /// Candidates that score better than the null distribution of the search and that are rejected, because the held-out error does not decrease by more
-    /// than the standard error of the decrease.
+    /// Candidates that score better than the null distribution of the search and that are rejected, because the
+    /// held-out error does not decrease by more than the standard error of the decrease.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub rejected_candidates: Vec<RejectedCandidate>,
     /// Parameters that changed by more than their standard uncertainty.

@@ -20,7 +20,8 @@ const DIRECTION_TOLERANCE: f64 = 1e-6;
 /// The four unknown functions, in the order of their columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Function {
-    /// Displacement of the table along the first direction across its axis, as a function of the axis' position: `E_XC,total`.
+    /// Displacement of the table along the first direction across its axis, as a function of the axis' position:
+    /// `E_XC,total`.
     First,
     /// The same along the second direction: `E_YC,total`.
     Second,
@@ -32,12 +33,7 @@ pub enum Function {
 
 impl Function {
     /// All four.
-    pub const ALL: [Function; 4] = [
-        Function::First,
-        Function::Second,
-        Function::Linear,
-        Function::Artefact,
-    ];
+    pub const ALL: [Function; 4] = [Function::First, Function::Second, Function::Linear, Function::Artefact];
 }
 
 /// Equations `Σ a·f(angle) = Δr`, one per reading.
@@ -45,7 +41,8 @@ impl Function {
 pub struct Equations {
     /// Index of the rotary axis in the machine.
     pub axis: usize,
-    /// The two directions of R across the axis: 0, 1, 2 for X, Y, Z. A positive rotation turns the first towards the second.
+    /// The two directions of R across the axis: 0, 1, 2 for X, Y, Z. A positive rotation turns the first towards the
+    /// second.
     pub across: [usize; 2],
     /// 1 if the axis turns from the first direction towards the second for an increasing command, else −1.
     pub sense: f64,
@@ -64,8 +61,8 @@ pub struct Equations {
 pub enum Reference {
     /// A parameter, estimated from all readings.
     Estimated,
-    /// The first reading at which every angle is 0, as in Zimmermann & Ibaraki (2020). It is subtracted from all readings, and its own
-    /// noise is not propagated.
+    /// The first reading at which every angle is 0, as in Zimmermann & Ibaraki (2020). It is subtracted from all
+    /// readings, and its own noise is not propagated.
     FirstReading,
 }
 
@@ -115,8 +112,9 @@ impl Equations {
     /// The equations of a session. The coefficients are the derivatives of the chain.
     ///
     /// # Errors
-    /// If the session does not fit the method: another instrument, no or several rotary axes that turn under the artefact, another
-    /// rotary axis that is not at zero, several artefacts or set-ups, a probing direction that is not radial, no readings.
+    /// If the session does not fit the method: another instrument, no or several rotary axes that turn under the
+    /// artefact, another rotary axis that is not at zero, several artefacts or set-ups, a probing direction that is not
+    /// radial, no readings.
     pub fn of(session: &Session) -> Result<Equations, IdentifyError> {
         let refuse = |message: String| IdentifyError::Request(format!("self-calibration: {message}"));
         if session.instrument != InstrumentKind::Probe {
@@ -125,11 +123,7 @@ impl Equations {
                 session.instrument.word()
             )));
         }
-        let tests: Vec<&Test> = session
-            .tests
-            .iter()
-            .filter(|test| test.readings.is_some())
-            .collect();
+        let tests: Vec<&Test> = session.tests.iter().filter(|test| test.readings.is_some()).collect();
         let Some(first) = tests.first() else {
             return Err(IdentifyError::NoReadings);
         };
@@ -141,10 +135,7 @@ impl Equations {
         }
         let axis = turning_axis(session, &tests).map_err(refuse)?;
         let Some((coordinate, sense)) = session.machine.axes[axis].principal() else {
-            return Err(refuse(format!(
-                "axis `{}` does not lie along X, Y or Z",
-                session.machine.axes[axis].name
-            )));
+            return Err(refuse(format!("axis `{}` does not lie along X, Y or Z", session.machine.axes[axis].name)));
         };
         let along = coordinate.index();
         let mut equations = Equations {
@@ -165,10 +156,7 @@ impl Equations {
         }
         for touch in &touches {
             for (known, angle) in equations.angles.iter_mut().zip(touch.angles) {
-                if known
-                    .iter()
-                    .all(|known| angular_distance(*known, angle) >= ANGLE_TOLERANCE)
-                {
+                if known.iter().all(|known| angular_distance(*known, angle) >= ANGLE_TOLERANCE) {
                     known.push(angle);
                 }
             }
@@ -178,10 +166,7 @@ impl Equations {
         }
         if equations.reference == Reference::FirstReading {
             let at_zero = |touch: &&TouchEquation| {
-                touch
-                    .angles
-                    .iter()
-                    .all(|angle| angular_distance(*angle, 0.0) < ANGLE_TOLERANCE)
+                touch.angles.iter().all(|angle| angular_distance(*angle, 0.0) < ANGLE_TOLERANCE)
             };
             let Some(first) = touches.iter().find(at_zero).map(|touch| touch.outward_mm) else {
                 return Err(refuse(
@@ -215,26 +200,16 @@ impl Equations {
         let machine = &session.machine;
         let model = TestModel::new(machine, test.station.clone(), readings);
         let motions = self.axis * ERRORS_PER_AXIS + 6;
-        let slots = [
-            motions + self.across[0],
-            motions + self.across[1],
-            machine.error_slots() + FORM,
-        ];
-        let touched: Vec<TouchAngles> = (0..model.rows())
-            .map(|row| self.touch_angles(machine, probe, &model, row))
-            .collect();
-        // Eq. (2): a table that stays at 0 has no displacement beyond the reference. Eq. (3): nor has a spot at 0 of the artefact, probed
-        // throughout, a form deviation.
+        let slots = [motions + self.across[0], motions + self.across[1], machine.error_slots() + FORM];
+        let touched: Vec<TouchAngles> =
+            (0..model.rows()).map(|row| self.touch_angles(machine, probe, &model, row)).collect();
+        // Eq. (2): a table that stays at 0 has no displacement beyond the reference. Eq. (3): nor has a spot at 0 of
+        // the artefact, probed throughout, a form deviation.
         let varies = |angle: fn(&TouchAngles) -> f64| {
-            let stays = touched
-                .iter()
-                .all(|angles| angular_distance(angle(angles), 0.0) < ANGLE_TOLERANCE);
+            let stays = touched.iter().all(|angles| angular_distance(angle(angles), 0.0) < ANGLE_TOLERANCE);
             f64::from(u8::from(!stays))
         };
-        let (axis_varies, spot_varies) = (
-            varies(|angles| angles.position),
-            varies(|angles| angles.on_artefact),
-        );
+        let (axis_varies, spot_varies) = (varies(|angles| angles.position), varies(|angles| angles.on_artefact));
         let nominal = SlotValues::zero(model.slots());
         let sensitivities = model.sensitivities(&nominal, &slots, 0..model.rows());
         (0..model.rows())
@@ -308,26 +283,15 @@ struct TouchAngles {
 fn turning_axis(session: &Session, tests: &[&Test]) -> Result<usize, String> {
     let machine = &session.machine;
     let moves = |axis: usize| {
-        tests
-            .iter()
-            .filter_map(|test| test.readings.as_ref())
-            .any(|readings| {
-                let positions = &readings.positions[axis];
-                positions
-                    .iter()
-                    .any(|q| (q - positions[0]).abs() > ANGLE_TOLERANCE)
-            })
+        tests.iter().filter_map(|test| test.readings.as_ref()).any(|readings| {
+            let positions = &readings.positions[axis];
+            positions.iter().any(|q| (q - positions[0]).abs() > ANGLE_TOLERANCE)
+        })
     };
     let rotary = |axis: &usize| machine.axes[*axis].kind == AxisKind::Rotary;
-    let turning: Vec<usize> = (0..machine.axes.len())
-        .filter(rotary)
-        .filter(|axis| moves(*axis))
-        .collect();
+    let turning: Vec<usize> = (0..machine.axes.len()).filter(rotary).filter(|axis| moves(*axis)).collect();
     let [axis] = turning[..] else {
-        let names: Vec<&str> = turning
-            .iter()
-            .map(|axis| machine.axes[*axis].name.as_str())
-            .collect();
+        let names: Vec<&str> = turning.iter().map(|axis| machine.axes[*axis].name.as_str()).collect();
         return Err(match names.len() {
             0 => "no rotary axis turns in these tests".into(),
             _ => format!("axes {} turn; the method is for one", names.join(" and ")),
@@ -339,15 +303,9 @@ fn turning_axis(session: &Session, tests: &[&Test]) -> Result<usize, String> {
             machine.axes[axis].name
         ));
     }
-    for other in (0..machine.axes.len())
-        .filter(rotary)
-        .filter(|other| *other != axis)
-    {
+    for other in (0..machine.axes.len()).filter(rotary).filter(|other| *other != axis) {
         let readings = tests.iter().filter_map(|test| test.readings.as_ref());
-        if readings
-            .flat_map(|readings| &readings.positions[other])
-            .any(|q| q.abs() > ANGLE_TOLERANCE)
-        {
+        if readings.flat_map(|readings| &readings.positions[other]).any(|q| q.abs() > ANGLE_TOLERANCE) {
             return Err(format!(
                 "axis `{}` does not stand at zero; the directions across axis `{}` are then not those of R",
                 machine.axes[other].name, machine.axes[axis].name
@@ -360,11 +318,7 @@ fn turning_axis(session: &Session, tests: &[&Test]) -> Result<usize, String> {
 /// An angle in (−π, π].
 fn wrapped(angle: f64) -> f64 {
     let turned = angle.rem_euclid(TAU);
-    if turned > PI + ANGLE_TOLERANCE / 2.0 {
-        turned - TAU
-    } else {
-        turned
-    }
+    if turned > PI + ANGLE_TOLERANCE / 2.0 { turned - TAU } else { turned }
 }
 
 /// The distance of two angles, modulo whole turns.

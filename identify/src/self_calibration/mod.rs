@@ -1,13 +1,14 @@
-//! Self-calibration of a rotary axis and two linear axes by probing an uncalibrated cylinder (Zimmermann & Ibaraki, Int. J. Adv. Manuf.
-//! Technol. 107 (2020) 2107). The tests combine four functions of an angle differently, which makes the functions separable.
+//! Self-calibration of a rotary axis and two linear axes by probing an uncalibrated cylinder (Zimmermann & Ibaraki,
+//! Int. J. Adv. Manuf. Technol. 107 (2020) 2107). The tests combine four functions of an angle differently, which makes
+//! the functions separable.
 //!
 //! ```text
 //! Δr = e(φ)·E_total(C) + W_radial(angle on the artefact) − E_radial(φ)
 //! ```
 //!
-//! φ is the angle of the probed point in the machine while the table is at C. The coefficients are the derivatives of the chain, so all
-//! signs follow from the machine file. In test 3 the probed point turns with the table. For a table that turns clockwise
-//! `e(φ) = (cos C, −sin C)`; Eq. (3) of the reference prints `+sin C`.
+//! φ is the angle of the probed point in the machine while the table is at C. The coefficients are the derivatives of
+//! the chain, so all signs follow from the machine file. In test 3 the probed point turns with the table. For a table
+//! that turns clockwise `e(φ) = (cos C, −sin C)`; Eq. (3) of the reference prints `+sin C`.
 
 mod boundary;
 mod equations;
@@ -20,9 +21,7 @@ use faer::Mat;
 
 pub use boundary::{Condition, Reduction, conditions, reduce};
 pub use equations::{Equations, Function, Reference};
-pub use results::{
-    DistributionResult, FunctionPoint, FunctionResult, Histogram, MonteCarloResult, SelfCalibration,
-};
+pub use results::{DistributionResult, FunctionPoint, FunctionResult, Histogram, MonteCarloResult, SelfCalibration};
 pub use solve::{CalibrationSolution, rank_before, solve};
 
 use crate::error::IdentifyError;
@@ -42,7 +41,8 @@ pub struct Calibration {
     pub solution: CalibrationSolution,
     /// Standard uncertainty of a reading, mm.
     pub sigma_mm: f64,
-    /// Factor on the uncertainties of the solution: `√(χ²/ν)` if the readings scatter significantly more than stated, else 1.
+    /// Factor on the uncertainties of the solution: `√(χ²/ν)` if the readings scatter significantly more than stated,
+    /// else 1.
     pub u_enlargement: f64,
     /// The free columns of the equations under the boundary conditions.
     pub free: Vec<usize>,
@@ -56,17 +56,16 @@ const START_NOISE_MM: f64 = 1e-3;
 /// Solves the equations of a session. The noise is the session's `noise_um`, or the residual of the solution.
 ///
 /// # Errors
-/// See [`Equations::of`] and [`conditions`]; also if the session states no noise and the residual has no degrees of freedom.
+/// See [`Equations::of`] and [`conditions`]; also if the session states no noise and the residual has no degrees of
+/// freedom.
 pub fn calibrate(session: &Session) -> Result<Calibration, IdentifyError> {
     let equations = Equations::of(session)?;
     let conditions = conditions(&equations, &session.machine.axes[equations.axis].name)?;
     let reduction = reduce(equations.columns(), &conditions);
     let stated = session.noise_mm.filter(|sigma| *sigma > 0.0);
-    // The residual estimates the noise only if the radius is a parameter: relative to one reading, all rows share that reading's noise.
-    let free_radius = Equations {
-        reference: Reference::Estimated,
-        ..equations.clone()
-    };
+    // The residual estimates the noise only if the radius is a parameter: relative to one reading, all rows share that
+    // reading's noise.
+    let free_radius = Equations { reference: Reference::Estimated, ..equations.clone() };
     let unreferenced = solve(&free_radius, &reduction, stated.unwrap_or(START_NOISE_MM))?;
     let square = unreferenced.rms_mm.powi(2) * equations.rows.len() as f64;
     let freedom = unreferenced.freedom as f64;
@@ -104,8 +103,8 @@ impl Calibration {
         &self.solution.values_mm[offset..offset + self.equations.angles[function as usize].len()]
     }
 
-    /// Whether readings determine the displacements of the table at every position of the axis, so that the axis position can be
-    /// estimated.
+    /// Whether readings determine the displacements of the table at every position of the axis, so that the axis
+    /// position can be estimated.
     pub fn has_position(&self) -> bool {
         let count = 2 * self.equations.angles[0].len();
         self.solution.identifiable[..count].iter().all(|seen| *seen)
@@ -142,9 +141,7 @@ impl Calibration {
 }
 
 fn columns_of(matrix: &Mat<f64>) -> Vec<Vec<f64>> {
-    (0..matrix.ncols())
-        .map(|j| (0..matrix.nrows()).map(|i| matrix[(i, j)]).collect())
-        .collect()
+    (0..matrix.ncols()).map(|j| (0..matrix.nrows()).map(|i| matrix[(i, j)]).collect()).collect()
 }
 
 /// The function from deviations of the readings to values and axis position.

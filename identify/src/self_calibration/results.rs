@@ -14,7 +14,8 @@ use crate::results::{Interval, ParameterResult, Unobservable};
 
 /// Bins of a histogram in a report.
 const REPORTED_BINS: usize = 100;
-/// Radius of a circle, in standard uncertainties of its points, below which linear propagation does not describe the uncertainty of its centre.
+/// Radius of a circle, in standard uncertainties of its points, below which linear propagation does not describe the
+/// uncertainty of its centre.
 const NARROW: f64 = 3.0;
 
 /// Value of a function at one angle.
@@ -24,7 +25,8 @@ pub struct FunctionPoint {
     pub at_deg: f64,
     /// Value, µm; `null` where it is not identifiable.
     pub value_um: Option<f64>,
-    /// Standard uncertainty of the value by the law of propagation (JCGM 100, 5.2), µm; 0 where a boundary condition fixes the value.
+    /// Standard uncertainty of the value by the law of propagation (JCGM 100, 5.2), µm; 0 where a boundary condition
+    /// fixes the value.
     pub u_um: Option<f64>,
 }
 
@@ -136,9 +138,7 @@ impl Calibration {
         let mut warnings = session.warnings.clone();
         warnings.extend(crate::fit::enlargement_warning(self.u_enlargement));
         if !session.effects.is_empty() {
-            warnings.push(
-                "self-calibration does not model the declared effects: its functions include them".into(),
-            );
+            warnings.push("self-calibration does not model the declared effects: its functions include them".into());
         }
         if self.equations.reference == Reference::FirstReading {
             warnings.push(
@@ -177,39 +177,23 @@ impl Calibration {
             method: "self-calibration".into(),
             readings: self.equations.rows.len(),
             noise_um: self.sigma_mm * 1e3,
-            noise_source: if self.sigma_stated {
-                NoiseSource::Stated
-            } else {
-                NoiseSource::Residual
-            }
-            .word()
-            .into(),
+            noise_source: if self.sigma_stated { NoiseSource::Stated } else { NoiseSource::Residual }.word().into(),
             rms_um: self.solution.rms_mm * 1e3,
             value_count: columns,
             rank_without_conditions: self.rank_before,
-            conditions: self
-                .conditions
-                .iter()
-                .map(|condition| condition.words.clone())
-                .collect(),
+            conditions: self.conditions.iter().map(|condition| condition.words.clone()).collect(),
             parameter_count: self.solution.parameters,
             rank: self.solution.rank.identifiable_basis.ncols(),
-            functions: Function::ALL
-                .map(|function| self.function(function, &axis))
-                .to_vec(),
-            radius: (self.solution.values_mm.len() > columns && self.solution.identifiable[columns]).then(
-                || {
-                    let value = self.solution.values_mm[columns] * 1e3;
-                    ParameterResult::new("radius", value, self.u_mm(columns) * 1e3, "um")
-                        .with_meaning("artefact: deviation of the radius from the stated one")
-                },
-            ),
+            functions: Function::ALL.map(|function| self.function(function, &axis)).to_vec(),
+            radius: (self.solution.values_mm.len() > columns && self.solution.identifiable[columns]).then(|| {
+                let value = self.solution.values_mm[columns] * 1e3;
+                ParameterResult::new("radius", value, self.u_mm(columns) * 1e3, "um")
+                    .with_meaning("artefact: deviation of the radius from the stated one")
+            }),
             parameters: parameters(0),
             parameters_by_turn: parameters(1),
             circle_radius_um: position.as_ref().map(|position| position.radius_mm * 1e3),
-            error_motions: position
-                .as_ref()
-                .map_or(Vec::new(), |position| self.error_motions(position, &axis)),
+            error_motions: position.as_ref().map_or(Vec::new(), |position| self.error_motions(position, &axis)),
             unobservable: self.unobservable(&axis),
             monte_carlo: draws.map(|draws| self.drawn(draws, &axis, position.is_some())),
             warnings,
@@ -223,12 +207,8 @@ impl Calibration {
 
     /// `EX0C` for the first direction across axis C where that is X.
     fn location(&self, which: usize, axis: &str) -> String {
-        ErrorName {
-            kind: ErrorKind::Location,
-            freedom: Freedom::ALL[self.equations.across[which]],
-            axis: axis.into(),
-        }
-        .to_string()
+        ErrorName { kind: ErrorKind::Location, freedom: Freedom::ALL[self.equations.across[which]], axis: axis.into() }
+            .to_string()
     }
 
     fn function(&self, function: Function, axis: &str) -> FunctionResult {
@@ -242,26 +222,21 @@ impl Calibration {
                 u_um: identifiable.then(|| self.u_mm(offset + k) * 1e3),
             }
         });
-        FunctionResult {
-            id: self.equations.name(function, axis),
-            points: points.collect(),
-        }
+        FunctionResult { id: self.equations.name(function, axis), points: points.collect() }
     }
 
     fn position(&self) -> AxisPositionEstimate {
         let turns = self.turns();
         let (first, second) = (self.values_mm(Function::First), self.values_mm(Function::Second));
         let sense = self.equations.sense;
-        let found: Position<f64> =
-            position::position(&turns, sense, &mut Vec::new(), |k| [first[k], second[k]]);
+        let found: Position<f64> = position::position(&turns, sense, &mut Vec::new(), |k| [first[k], second[k]]);
         let jacobian = position::jacobian(&turns, sense, first, second);
         let covariance = &self.solution.covariance;
         let u = jacobian.map(|row| {
-            let terms = row.iter().enumerate().flat_map(|(i, a)| {
-                row.iter()
-                    .enumerate()
-                    .map(move |(j, b)| a * b * covariance[(i, j)])
-            });
+            let terms = row
+                .iter()
+                .enumerate()
+                .flat_map(|(i, a)| row.iter().enumerate().map(move |(j, b)| a * b * covariance[(i, j)]));
             terms.sum::<f64>().max(0.0).sqrt()
         });
         let count = 2 * turns.len();
@@ -350,12 +325,7 @@ impl Calibration {
             };
             quantities.push(reported(id, distribution));
         }
-        MonteCarloResult {
-            runs: draws.runs,
-            seed: draws.seed,
-            coverage_probability: draws.coverage,
-            quantities,
-        }
+        MonteCarloResult { runs: draws.runs, seed: draws.seed, coverage_probability: draws.coverage, quantities }
     }
 }
 
@@ -379,11 +349,7 @@ fn reported(id: String, distribution: &Distribution) -> DistributionResult {
         histogram: Histogram {
             from_um: distribution.from * 1e3,
             to_um: distribution.to * 1e3,
-            counts: distribution
-                .counts
-                .chunks(merged.max(1))
-                .map(|bins| bins.iter().sum())
-                .collect(),
+            counts: distribution.counts.chunks(merged.max(1)).map(|bins| bins.iter().sum()).collect(),
             below: distribution.outside[0],
             above: distribution.outside[1],
         },

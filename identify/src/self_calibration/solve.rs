@@ -82,12 +82,10 @@ pub fn solve(
     let weighted = Mat::from_fn(parameters, rows.len(), |k, i| rows[i][k] / u_inputs_mm[i].powi(2));
     let estimator = &spread * (&of_free * weighted);
     let covariance = &spread * of_free * spread.transpose();
-    let values_mm: Vec<f64> = (0..outputs)
-        .map(|i| (0..inputs.len()).map(|j| estimator[(i, j)] * inputs[j]).sum())
-        .collect();
-    let identifiable = (0..outputs)
-        .map(|i| (0..parameters).all(|k| spread[(i, k)] == 0.0 || rank.is_identifiable(k)))
-        .collect();
+    let values_mm: Vec<f64> =
+        (0..outputs).map(|i| (0..inputs.len()).map(|j| estimator[(i, j)] * inputs[j]).sum()).collect();
+    let identifiable =
+        (0..outputs).map(|i| (0..parameters).all(|k| spread[(i, k)] == 0.0 || rank.is_identifiable(k))).collect();
 
     let residual = |(row, observed): (&Vec<f64>, &f64)| {
         let model: f64 = row.iter().zip(&values_mm).map(|(a, x)| a * x).sum();
@@ -95,13 +93,7 @@ pub fn solve(
         observed - model - radius
     };
     let count = equations.rows.len();
-    let sum: f64 = equations
-        .rows
-        .iter()
-        .zip(&equations.outward_mm)
-        .map(residual)
-        .map(|r| r * r)
-        .sum();
+    let sum: f64 = equations.rows.iter().zip(&equations.outward_mm).map(residual).map(|r| r * r).sum();
     let informative = rows.iter().filter(|row| row.iter().any(|a| *a != 0.0)).count();
     let freedom = informative.saturating_sub(rank.identifiable_basis.ncols());
     Ok(CalibrationSolution {
@@ -127,6 +119,7 @@ pub fn rank_before(equations: &Equations) -> Result<usize, IdentifyError> {
     let svd = matrix.svd().map_err(|_| IdentifyError::Decomposition)?;
     let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
     let largest = singular.first().copied().unwrap_or(0.0);
-    // Coefficients are sines and cosines: singular values of dependent columns are at rounding level, others at a hundredth or more.
+    // Coefficients are sines and cosines: singular values of dependent columns are at rounding level, others at a
+    // hundredth or more.
     Ok(singular.iter().filter(|s| **s > 1e-9 * largest).count())
 }

@@ -46,12 +46,11 @@ fn range(values: &[f64]) -> f64 {
 }
 
 impl Abscissa {
-    /// The abscissa of a test's readings: the rotary axis with the largest travel; else the angle about the circle of two linear axes;
-    /// else the linear axis with the largest travel; else the number of the reading.
+    /// The abscissa of a test's readings: the rotary axis with the largest travel; else the angle about the circle of
+    /// two linear axes; else the linear axis with the largest travel; else the number of the reading.
     pub fn of(machine: &Machine, readings: &Readings) -> Abscissa {
-        let moving: Vec<usize> = (0..machine.axes.len())
-            .filter(|axis| range(&readings.positions[*axis]) > POSITION_TOLERANCE)
-            .collect();
+        let moving: Vec<usize> =
+            (0..machine.axes.len()).filter(|axis| range(&readings.positions[*axis]) > POSITION_TOLERANCE).collect();
         let most = |kind: AxisKind| {
             moving
                 .iter()
@@ -100,16 +99,13 @@ impl Abscissa {
         }
     }
 
-    /// The segments of one direction of each run. For `poses`, and if the direction changes at every other reading, whole runs without a
-    /// direction.
+    /// The segments of one direction of each run. For `poses`, and if the direction changes at every other reading,
+    /// whole runs without a direction.
     pub fn stretches(&self, readings: &Readings, poses: bool) -> Vec<PathSegment> {
         let runs = readings.runs();
         let number = |row: usize| readings.run.get(row).copied().unwrap_or(1);
-        let whole_run = |rows: &Range<usize>| PathSegment {
-            run: number(rows.start),
-            rows: rows.clone(),
-            forward: None,
-        };
+        let whole_run =
+            |rows: &Range<usize>| PathSegment { run: number(rows.start), rows: rows.clone(), forward: None };
         if poses {
             return runs.iter().map(whole_run).collect();
         }
@@ -125,18 +121,10 @@ impl Abscissa {
                 match parts.last_mut() {
                     Some(last) if last.forward != forward => {
                         last.rows.end = row;
-                        parts.push(PathSegment {
-                            run: number(run.start),
-                            rows: row..run.end,
-                            forward,
-                        });
+                        parts.push(PathSegment { run: number(run.start), rows: row..run.end, forward });
                     }
                     Some(_) => {}
-                    None => parts.push(PathSegment {
-                        run: number(run.start),
-                        rows: run.clone(),
-                        forward,
-                    }),
+                    None => parts.push(PathSegment { run: number(run.start), rows: run.clone(), forward }),
                 }
             }
             if parts.is_empty() || parts.len() > 1 + run.len() / MIN_READINGS_PER_SEGMENT {
@@ -163,9 +151,7 @@ fn about_a_circle(first: &[f64], second: &[f64]) -> Option<Vec<f64>> {
     let mut turns = 0.0;
     let mut last: Option<f64> = None;
     let angles = points.iter().map(|p| {
-        let angle = (p[1] - circle.centre[1])
-            .atan2(p[0] - circle.centre[0])
-            .to_degrees();
+        let angle = (p[1] - circle.centre[1]).atan2(p[0] - circle.centre[0]).to_degrees();
         if let Some(before) = last {
             turns -= ((angle - before) / 360.0).round() * 360.0;
         }
@@ -197,10 +183,7 @@ mod tests {
         let machine = Machine::from_code("wCbt").unwrap();
         let there = (0..=20).chain((0..20).rev()).map(f64::from);
         let positions: Vec<f64> = there.map(f64::to_radians).collect();
-        let readings = Readings {
-            positions: vec![positions],
-            ..Readings::default()
-        };
+        let readings = Readings { positions: vec![positions], ..Readings::default() };
         let stretches = Abscissa::of(&machine, &readings).stretches(&readings, false);
         let found: Vec<_> = stretches.iter().map(|s| (s.rows.clone(), s.forward)).collect();
         assert_eq!(found, [(0..21, Some(true)), (21..41, Some(false))]);

@@ -1,13 +1,14 @@
 //! A session reading by reading: the columns for plots.
 //!
-//! Let `L` be the reading and `β` the fitted parameters. The deviation of a reading from the nominal machine is, to first order, a sum of
-//! *shares*:
+//! Let `L` be the reading and `β` the fitted parameters. The deviation of a reading from the nominal machine is, to
+//! first order, a sum of *shares*:
 //!
 //! ```text
 //! d = observed − L(0) = Σ_k J_k β_k + residual + O(β²)
 //! ```
 //!
-//! The deviation without one error is thus `d` minus the share of that error. [`SessionSeries::second_order_um`] bounds the last term.
+//! The deviation without one error is thus `d` minus the share of that error. [`SessionSeries::second_order_um`] bounds
+//! the last term.
 
 pub mod abscissa;
 pub mod sensitivities;
@@ -55,7 +56,8 @@ pub struct TestSeries {
     pub way: Abscissa,
     /// Segments of one run in one direction.
     pub stretches: Vec<PathSegment>,
-    /// Observed minus nominal. For instruments with three coordinates without the set-up's share, which includes the frame of reference.
+    /// Observed minus nominal. For instruments with three coordinates without the set-up's share, which includes the
+    /// frame of reference.
     pub deviation_um: Vec<f64>,
     /// Residual of the model before.
     pub before_um: Vec<f64>,
@@ -95,15 +97,10 @@ impl SessionSeries {
 /// The shares of a fit: each identified error, each effect, the set-up, and the confounded parameters.
 fn shares(problem: &Problem<'_>, fit: &Fit) -> Vec<Share> {
     let mut shares: Vec<Share> = Vec::new();
-    let mut add =
-        |id: &str, cause: Cause, unknown: usize| match shares.iter_mut().find(|share| share.id == id) {
-            Some(share) => share.unknowns.push(unknown),
-            None => shares.push(Share {
-                id: id.to_string(),
-                cause,
-                unknowns: vec![unknown],
-            }),
-        };
+    let mut add = |id: &str, cause: Cause, unknown: usize| match shares.iter_mut().find(|share| share.id == id) {
+        Some(share) => share.unknowns.push(unknown),
+        None => shares.push(Share { id: id.to_string(), cause, unknowns: vec![unknown] }),
+    };
     for (j, parameter) in problem.parameters.list.iter().enumerate() {
         match parameter.role {
             Role::Setup => add("set-up", Cause::Setup, j),
@@ -117,16 +114,12 @@ fn shares(problem: &Problem<'_>, fit: &Fit) -> Vec<Share> {
     shares
 }
 
-/// The series of a fit, with the residuals (mm) of another model of the same session as `before`. The default for `before` is the nominal
-/// machine.
+/// The series of a fit, with the residuals (mm) of another model of the same session as `before`. The default for
+/// `before` is the nominal machine.
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn views(
-    problem: &Problem<'_>,
-    fit: &Fit,
-    before_mm: Option<&[Vec<f64>]>,
-) -> Result<SessionSeries, IdentifyError> {
+pub fn views(problem: &Problem<'_>, fit: &Fit, before_mm: Option<&[Vec<f64>]>) -> Result<SessionSeries, IdentifyError> {
     let shares = shares(problem, fit);
     let three = problem.coordinates() == 3;
     let nominal_mm = problem.residuals(&vec![0.0; fit.beta.len()]);
@@ -162,27 +155,15 @@ pub fn views(
             shares_um,
         });
     }
-    Ok(SessionSeries {
-        shares,
-        tests,
-        coordinates: problem.coordinates(),
-        second_order_um,
-    })
+    Ok(SessionSeries { shares, tests, coordinates: problem.coordinates(), second_order_um })
 }
 
 /// `J_k β_k` of every share, µm, by test.
-fn shares_of_readings(
-    problem: &Problem<'_>,
-    fit: &Fit,
-    shares: &[Share],
-) -> Result<Vec<Vec<Vec<f64>>>, IdentifyError> {
+fn shares_of_readings(problem: &Problem<'_>, fit: &Fit, shares: &[Share]) -> Result<Vec<Vec<Vec<f64>>>, IdentifyError> {
     let coordinates = problem.coordinates();
     let values = problem.slot_values(&fit.beta);
-    let mut of_tests: Vec<Vec<Vec<f64>>> = problem
-        .models
-        .iter()
-        .map(|model| vec![vec![0.0; model.rows() * coordinates]; shares.len()])
-        .collect();
+    let mut of_tests: Vec<Vec<Vec<f64>>> =
+        problem.models.iter().map(|model| vec![vec![0.0; model.rows() * coordinates]; shares.len()]).collect();
     for block in problem.blocks() {
         let rows = problem.rows(&values, &block)?;
         for (k, share) in shares.iter().enumerate() {
@@ -205,22 +186,15 @@ pub fn lengths(values: &[f64], coordinates: usize) -> Vec<f64> {
     values.chunks(coordinates).map(length).collect()
 }
 
-/// Correlation matrix of the identified errors and effects' coefficients, with identifiers, row by row. Set-up parameters and confounded
-/// parameters are excluded.
+/// Correlation matrix of the identified errors and effects' coefficients, with identifiers, row by row. Set-up
+/// parameters and confounded parameters are excluded.
 pub fn correlation(problem: &Problem<'_>, fit: &Fit) -> (Vec<String>, Vec<Vec<f64>>) {
     let list = &problem.parameters.list;
     let chosen: Vec<usize> = (0..list.len())
-        .filter(|j| {
-            list[*j].role != Role::Setup && fit.rank.is_identifiable(*j) && fit.covariance[(*j, *j)] > 0.0
-        })
+        .filter(|j| list[*j].role != Role::Setup && fit.rank.is_identifiable(*j) && fit.covariance[(*j, *j)] > 0.0)
         .collect();
-    let of = |j: usize, k: usize| {
-        fit.covariance[(j, k)] / (fit.covariance[(j, j)] * fit.covariance[(k, k)]).sqrt()
-    };
-    let matrix = chosen
-        .iter()
-        .map(|j| chosen.iter().map(|k| of(*j, *k)).collect())
-        .collect();
+    let of = |j: usize, k: usize| fit.covariance[(j, k)] / (fit.covariance[(j, j)] * fit.covariance[(k, k)]).sqrt();
+    let matrix = chosen.iter().map(|j| chosen.iter().map(|k| of(*j, *k)).collect()).collect();
     let ids = chosen.iter().map(|j| list[*j].id.clone()).collect();
     (ids, matrix)
 }

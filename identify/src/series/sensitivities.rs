@@ -1,7 +1,8 @@
-//! Sensitivity of each test to each error: `∂L/∂error` along the first run (as in Jiang 2014, Figs. 3.7, 3.8). For poses, which have no
-//! path, its root mean square.
+//! Sensitivity of each test to each error: `∂L/∂error` along the first run (as in Jiang 2014, Figs. 3.7, 3.8). For
+//! poses, which have no path, its root mean square.
 //!
-//! Jiang (2014): X. Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine Tools*, PhD thesis, University of Birmingham.
+//! Jiang (2014): X. Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine Tools*, PhD thesis,
+//! University of Birmingham.
 
 use abbe_model::instrument::Station;
 use abbe_model::sensitivity::TestModel;
@@ -14,7 +15,8 @@ use crate::problem::{Problem, RowBlock};
 
 /// Maximum number of points along a run.
 const MAX_POINTS: usize = 181;
-/// Sensitivity below which an error does not affect a test, µm per unit. Smaller values are second-order contributions of other errors.
+/// Sensitivity below which an error does not affect a test, µm per unit. Smaller values are second-order contributions
+/// of other errors.
 const MIN_SENSITIVITY_UM: f64 = 1e-3;
 
 /// The sensitivities of one test.
@@ -41,8 +43,8 @@ pub struct Sensitivity {
     pub values: Vec<f64>,
 }
 
-/// The sensitivity of the tests' first runs to every error to be estimated, at the parameters `beta`; for vector readings coordinate by
-/// coordinate.
+/// The sensitivity of the tests' first runs to every error to be estimated, at the parameters `beta`; for vector
+/// readings coordinate by coordinate.
 ///
 /// # Errors
 /// If the model cannot be evaluated.
@@ -64,10 +66,7 @@ pub fn sensitivities(problem: &Problem<'_>, beta: &[f64]) -> Result<Vec<TestSens
         }
         let mut way = Abscissa::of(&problem.session.machine, readings);
         way.values = picked.iter().map(|i| way.values[run.start + i]).collect();
-        let block = RowBlock {
-            test: number,
-            rows: run,
-        };
+        let block = RowBlock { test: number, rows: run };
         let rows = problem.rows(&values, &block)?;
         let names = names(&test.station);
         for coordinate in 0..coordinates {
@@ -92,7 +91,8 @@ pub fn sensitivities(problem: &Problem<'_>, beta: &[f64]) -> Result<Vec<TestSens
     Ok(of_tests)
 }
 
-/// The sensitivity of the poses to every error to be estimated: the root mean square length over all poses, at the parameters `beta`.
+/// The sensitivity of the poses to every error to be estimated: the root mean square length over all poses, at the
+/// parameters `beta`.
 ///
 /// # Errors
 /// If the model cannot be evaluated.
@@ -107,10 +107,7 @@ pub fn over_poses(problem: &Problem<'_>, beta: &[f64]) -> Result<Vec<Sensitivity
         }
     }
     let readings = problem.models.iter().map(TestModel::rows).sum::<usize>().max(1) as f64;
-    let wanted = list
-        .iter()
-        .zip(squares)
-        .filter(|(parameter, _)| is_of_interest(parameter));
+    let wanted = list.iter().zip(squares).filter(|(parameter, _)| is_of_interest(parameter));
     Ok(wanted
         .map(|(parameter, square)| {
             let rms_um = (square / readings).sqrt() * 1e3 / parameter.unit.display_per_internal;
@@ -121,11 +118,7 @@ pub fn over_poses(problem: &Problem<'_>, beta: &[f64]) -> Result<Vec<Sensitivity
 }
 
 fn sensitivity(parameter: &Parameter, values: Vec<f64>) -> Sensitivity {
-    Sensitivity {
-        id: parameter.id.clone(),
-        unit: parameter.unit.name.clone(),
-        values,
-    }
+    Sensitivity { id: parameter.id.clone(), unit: parameter.unit.name.clone(), values }
 }
 
 /// The names of the coordinates of a vector reading.

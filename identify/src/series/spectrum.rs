@@ -1,8 +1,8 @@
 //! The spectrum of a residual by order over an angle.
 //!
-//! Each order `h` is fitted separately, `a + b·cos hφ + c·sin hφ`. `S` is its sum of squares beyond the constant, over `n` readings. The
-//! amplitude is `√(2·S/n)`. Over whole turns this is the amplitude of the Fourier series. Over a part of a turn it never exceeds the
-//! residual.
+//! Each order `h` is fitted separately, `a + b·cos hφ + c·sin hφ`. `S` is its sum of squares beyond the constant, over
+//! `n` readings. The amplitude is `√(2·S/n)`. Over whole turns this is the amplitude of the Fourier series. Over a part
+//! of a turn it never exceeds the residual.
 
 use abbe_model::axis::AxisKind;
 use faer::Mat;
@@ -53,11 +53,7 @@ fn explained(basis: &[[f64; 3]], values: &[f64], coordinates: usize) -> f64 {
         basis.iter().map(|row| row[i] * row[j]).sum::<f64>() + ridge
     });
     let sides = Mat::from_fn(3, coordinates, |i, c| {
-        basis
-            .iter()
-            .zip(values.chunks(coordinates))
-            .map(|(row, reading)| row[i] * reading[c])
-            .sum::<f64>()
+        basis.iter().zip(values.chunks(coordinates)).map(|(row, reading)| row[i] * reading[c]).sum::<f64>()
     });
     let solution = gram.partial_piv_lu().solve(&sides);
     let sum: f64 = (0..coordinates)
@@ -84,15 +80,7 @@ pub fn spectra(problem: &Problem<'_>, views: &SessionSeries) -> Vec<Spectrum> {
             .tests
             .iter()
             .filter(|test| test.way.is_angle)
-            .map(|test| {
-                of(
-                    &test.name,
-                    &test.way.name,
-                    &test.way.values,
-                    &test.before_um,
-                    &test.after_um,
-                )
-            })
+            .map(|test| of(&test.name, &test.way.name, &test.way.values, &test.before_um, &test.after_um))
             .collect();
     }
     let joined = |of: &dyn Fn(usize) -> Vec<f64>| (0..views.tests.len()).flat_map(of).collect::<Vec<f64>>();
@@ -103,9 +91,7 @@ pub fn spectra(problem: &Problem<'_>, views: &SessionSeries) -> Vec<Spectrum> {
         .map(|axis| {
             let angle = joined(&|test| {
                 let readings = problem.tests[test].readings.as_ref();
-                readings.map_or(Vec::new(), |r| {
-                    r.positions[axis].iter().map(|q| q.to_degrees()).collect()
-                })
+                readings.map_or(Vec::new(), |r| r.positions[axis].iter().map(|q| q.to_degrees()).collect())
             });
             of("all poses", &machine.axes[axis].name, &angle, &before, &after)
         })
@@ -119,10 +105,7 @@ mod tests {
     #[test]
     fn a_wave_over_whole_turns_has_one_nonzero_order() {
         let angle: Vec<f64> = (0..720).map(f64::from).collect();
-        let values: Vec<f64> = angle
-            .iter()
-            .map(|a| 3.0 + 1.5 * (2.0 * a.to_radians() + 1.0).cos())
-            .collect();
+        let values: Vec<f64> = angle.iter().map(|a| 3.0 + 1.5 * (2.0 * a.to_radians() + 1.0).cos()).collect();
         for (k, found) in amplitudes(&angle, &values, 1).into_iter().enumerate() {
             let wanted = if k + 1 == 2 { 1.5 } else { 0.0 };
             assert!((found - wanted).abs() < 1e-6, "order {}: {found}", k + 1);
@@ -134,10 +117,6 @@ mod tests {
         let angle: Vec<f64> = (0..50).map(|k| 0.5 * f64::from(k)).collect();
         let values: Vec<f64> = angle.iter().map(|a| (0.7 * a).sin()).collect();
         let most = 2.0_f64.sqrt() * (values.iter().map(|v| v * v).sum::<f64>() / 50.0).sqrt();
-        assert!(
-            amplitudes(&angle, &values, 1)
-                .iter()
-                .all(|found| *found <= most + 1e-9)
-        );
+        assert!(amplitudes(&angle, &values, 1).iter().all(|found| *found <= most + 1e-9));
     }
 }

@@ -1,9 +1,9 @@
 //! Aliases of a found effect: other effects that explain the residual equally well.
 //!
-//! Two candidates are aliases if the readings do not separate them. The alias replaces the found effect in the same model.
-//! Its log-likelihood is then at most 2 lower, with or without the penalty for selected shape numbers and positions. It also
-//! reproduces at least half of the found effect's signature in the readings. The search reports the candidate with the shortest
-//! description. The others are listed, nearest first.
+//! Two candidates are aliases if the readings do not separate them. The alias replaces the found effect in the same
+//! model. Its log-likelihood is then at most 2 lower, with or without the penalty for selected shape numbers and
+//! positions. It also reproduces at least half of the found effect's signature in the readings. The search reports the
+//! candidate with the shortest description. The others are listed, nearest first.
 
 use std::cmp::Ordering;
 use std::collections::HashSet;
@@ -13,8 +13,9 @@ use abbe_model::effect::Shape;
 use super::score::{Gain, INDISTINGUISHABLE, TrainedModel};
 use super::search::{ALL, Search};
 
-/// Least cosine between the signature of the found effect and the column space of an alias, which then reproduces at least half
-/// of the squared signature. The evidence alone does not suffice: a candidate may explain as much of a different structure.
+/// Least cosine between the signature of the found effect and the column space of an alias, which then reproduces at
+/// least half of the squared signature. The evidence alone does not suffice: a candidate may explain as much of a
+/// different structure.
 const MIN_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// An alias of a selected effect.
@@ -22,7 +23,8 @@ const MIN_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 pub(super) struct Alias {
     /// Index of the candidate.
     pub candidate: usize,
-    /// Cosine of the angle between the found effect's signature and the column space of the alias, after projection on the model.
+    /// Cosine of the angle between the found effect's signature and the column space of the alias, after projection on
+    /// the model.
     pub cosine: f64,
     /// Coefficients of the model's base columns if the alias replaces the effect.
     pub model_coefficients: Vec<f64>,
@@ -59,7 +61,8 @@ fn simplest_first(search: &Search<'_>, a: usize, b: usize) -> Ordering {
         .then(a.cmp(&b))
 }
 
-/// The competing explanations of the `k`-th selected effect, best first: that effect, its aliases, and rejected candidates.
+/// The competing explanations of the `k`-th selected effect, best first: that effect, its aliases, and rejected
+/// candidates.
 fn competing_effects(
     search: &Search<'_>,
     k: usize,
@@ -69,10 +72,8 @@ fn competing_effects(
 ) -> Vec<CompetingEffect> {
     let selected = search.selected()[k].candidate;
     let named = search.candidates[selected].effect.id();
-    let alias_ids: HashSet<String> = aliases
-        .iter()
-        .map(|alias| search.candidates[alias.candidate].effect.id())
-        .collect();
+    let alias_ids: HashSet<String> =
+        aliases.iter().map(|alias| search.candidates[alias.candidate].effect.id()).collect();
     let others: Vec<usize> = search.selected().iter().map(|t| t.candidate).collect();
     let mut ranked: Vec<(f64, usize)> = gains
         .iter()
@@ -98,18 +99,13 @@ fn competing_effects(
         if competing_effects.len() == MAX_COMPETING {
             break;
         }
-        competing_effects.push(CompetingEffect {
-            named: id == named,
-            alias: alias_ids.contains(&id),
-            id,
-            evidence,
-        });
+        competing_effects.push(CompetingEffect { named: id == named, alias: alias_ids.contains(&id), id, evidence });
     }
     competing_effects
 }
 
-/// The aliases of the `k`-th selected effect, nearest first, and its competing explanations. `model` is the model without that
-/// effect.
+/// The aliases of the `k`-th selected effect, nearest first, and its competing explanations. `model` is the model
+/// without that effect.
 pub(super) fn aliases(
     search: &Search<'_>,
     k: usize,
@@ -122,7 +118,8 @@ pub(super) fn aliases(
     let least_unpriced = search.evidence(&of_named, variance) - INDISTINGUISHABLE;
     let least_gain = of_named.gain / variance - 2.0 * INDISTINGUISHABLE;
     let columns = |candidate: usize| search.moments.count[candidate];
-    // A harmonic has two columns because its phase is estimated. It still counts as an alias of an effect with one column.
+    // A harmonic has two columns because its phase is estimated. It still counts as an alias of an effect with one
+    // column.
     let no_more_said = |candidate: usize| {
         columns(candidate) <= columns(selected.candidate)
             || matches!(search.candidates[candidate].effect.shape, Shape::Harmonic { .. })
@@ -130,10 +127,8 @@ pub(super) fn aliases(
     let (_, coefficients) = model.with_candidate(selected.candidate);
     // Base columns are the candidate's columns at unit length. The signature is their linear combination.
     let norms = search.norms(selected.candidate);
-    let signature: Vec<(usize, f64)> = search
-        .places(selected.candidate)
-        .zip(coefficients.iter().zip(&norms).map(|(c, norm)| c * norm))
-        .collect();
+    let signature: Vec<(usize, f64)> =
+        search.places(selected.candidate).zip(coefficients.iter().zip(&norms).map(|(c, norm)| c * norm)).collect();
     let others: Vec<usize> = search.selected().iter().map(|t| t.candidate).collect();
     let gains = model.gains();
     let mut aliases: Vec<Alias> = gains
@@ -162,8 +157,8 @@ pub(super) fn aliases(
             .total_cmp(&to_six_decimals(a.cosine))
             .then_with(|| simplest_first(search, a.candidate, b.candidate))
     });
-    // The nearest candidate represents all candidates with its identifier. Candidates with the found effect's own identifier are
-    // excluded.
+    // The nearest candidate represents all candidates with its identifier. Candidates with the found effect's own
+    // identifier are excluded.
     let named = search.candidates[selected.candidate].effect.id();
     let mut ids = HashSet::from([named]);
     aliases.retain(|alias| ids.insert(search.candidates[alias.candidate].effect.id()));

@@ -11,7 +11,8 @@ pub fn ln_chi_square_tail(x: f64, k: usize) -> f64 {
     if z < a + 1.0 {
         return gamma_ur(a, z).max(f64::MIN_POSITIVE).ln();
     }
-    // Γ(a, z) by its continued fraction (Lentz; Abramowitz & Stegun 6.5.31). The logarithm is taken before any underflow.
+    // Γ(a, z) by its continued fraction (Lentz; Abramowitz & Stegun 6.5.31). The logarithm is taken before any
+    // underflow.
     let tiny = 1e-300;
     let mut b = z + 1.0 - a;
     let mut c = 1.0 / tiny;
@@ -35,8 +36,8 @@ pub fn ln_chi_square_tail(x: f64, k: usize) -> f64 {
     -z + a * z.ln() - ln_gamma(a) + h.ln()
 }
 
-/// An upper bound of `−ln P(χ²ₖ > x)` that is fast to compute. For two degrees of freedom the tail is `e^(−x/2)`, for more it is
-/// larger, and for one it is at least `√(2/π) √x/(1 + x) e^(−x/2)`.
+/// An upper bound of `−ln P(χ²ₖ > x)` that is fast to compute. For two degrees of freedom the tail is `e^(−x/2)`, for
+/// more it is larger, and for one it is at least `√(2/π) √x/(1 + x) e^(−x/2)`.
 pub(super) fn most_evidence(x: f64, k: usize) -> f64 {
     if k == 1 && x > 0.0 {
         0.5 * x + ((1.0 + x) / x.sqrt()).ln() + 0.5 * std::f64::consts::FRAC_PI_2.ln()

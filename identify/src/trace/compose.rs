@@ -1,10 +1,11 @@
 //! Step tables: effects with several step positions, such as the steps of a compensation table.
 //!
-//! For each component the library holds a dictionary of all step positions. Positions are selected one at a time. An exchange
-//! sweep follows each selection (best-subset selection by splicing: Zhu et al., PNAS 117 (2020) 33117). The evidence of `n`
-//! selected out of `m` positions is reduced by `ln C(m, n)`, the logarithm of the number of possible selections. By the union
-//! bound this penalty keeps the significance level of the search.
+//! For each component the library holds a dictionary of all step positions. Positions are selected one at a time. An
+//! exchange sweep follows each selection (best-subset selection by splicing: Zhu et al., PNAS 117 (2020) 33117). The
+//! evidence of `n` selected out of `m` positions is reduced by `ln C(m, n)`, the logarithm of the number of possible
+//! selections. By the union bound this penalty keeps the significance level of the search.
 
+use abbe_model::effect::shape::Steps;
 use abbe_model::effect::{Effect, Shape};
 use faer::Mat;
 use faer::prelude::Solve;
@@ -36,23 +37,19 @@ impl StepTable {
     }
 }
 
-/// The best step table of a dictionary for addition to a model, with at least two positions. A single step is an effect of the
-/// library itself.
+/// The best step table of a dictionary for addition to a model, with at least two positions. A single step is an effect
+/// of the library itself.
 pub fn best_step_table(
     model: &TrainedModel<'_>,
     number: usize,
     dictionary: &Candidate,
     variance: f64,
 ) -> Option<StepTable> {
-    let Shape::Steps { at } = &dictionary.effect.shape else {
+    let Shape::Steps(Steps { at }) = &dictionary.effect.shape else {
         return None;
     };
     let (d, g, own) = model.projected(number);
-    let subset = Subset {
-        d: &d,
-        g: &g,
-        own: &own,
-    };
+    let subset = Subset { d: &d, g: &g, own: &own };
     let mut chosen: Vec<usize> = Vec::new();
     let mut best: Option<StepTable> = None;
     while chosen.len() < MAX_POSITIONS {
@@ -67,22 +64,11 @@ pub fn best_step_table(
         }
         let selection_penalty = ln_choices(at.len(), n);
         let evidence = -ln_chi_square_tail(gain / variance, n) - selection_penalty;
-        if best
-            .as_ref()
-            .is_none_or(|best| evidence - dictionary.cost > best.score())
-        {
+        if best.as_ref().is_none_or(|best| evidence - dictionary.cost > best.score()) {
             let mut positions: Vec<f64> = chosen.iter().map(|k| at[*k]).collect();
             positions.sort_by(f64::total_cmp);
-            let effect = Effect {
-                shape: Shape::Steps { at: positions },
-                ..dictionary.effect.clone()
-            };
-            let candidate = Candidate {
-                effect,
-                selection_penalty,
-                dictionary: false,
-                ..dictionary.clone()
-            };
+            let effect = Effect { shape: Shape::Steps(Steps { at: positions }), ..dictionary.effect.clone() };
+            let candidate = Candidate { effect, selection_penalty, dictionary: false, ..dictionary.clone() };
             best = Some(StepTable { candidate, evidence });
         }
     }
@@ -112,19 +98,12 @@ impl Subset<'_> {
             Mat::zeros(0, m + 1)
         } else {
             let block = Mat::from_fn(n, n, |i, j| self.d[(chosen[i], chosen[j])]);
-            let right = Mat::from_fn(n, m + 1, |i, j| {
-                if j < m {
-                    self.d[(chosen[i], j)]
-                } else {
-                    self.g[chosen[i]]
-                }
-            });
+            let right = Mat::from_fn(n, m + 1, |i, j| if j < m { self.d[(chosen[i], j)] } else { self.g[chosen[i]] });
             block.partial_piv_lu().solve(&right)
         };
         let mut best: Option<(usize, f64)> = None;
         for j in (0..m).filter(|j| !chosen.contains(j)) {
-            let with =
-                |column: usize| -> f64 { (0..n).map(|i| self.d[(chosen[i], j)] * solved[(i, column)]).sum() };
+            let with = |column: usize| -> f64 { (0..n).map(|i| self.d[(chosen[i], j)] * solved[(i, column)]).sum() };
             let projected = self.d[(j, j)] - with(j);
             // A position that is nearly a linear combination of the others adds rounding errors and no evidence.
             if projected <= MIN_OBSERVABLE.sqrt() * self.own[(j, j)] {
@@ -181,19 +160,14 @@ mod tests {
 
     #[test]
     fn the_subset_with_the_largest_gain_is_found() {
-        // Steps over forty readings. The second and fourth of five are real. The reference is the best pair by exhaustive search.
+        // Steps over forty readings. The second and fourth of five are real. The reference is the best pair by
+        // exhaustive search.
         let positions = [5, 12, 20, 28, 35];
         let column = |k: usize, i: usize| f64::from(u8::from(i >= positions[k]));
         let y = |i: usize| 1.5 * column(1, i) - column(3, i) + 0.1 * ((i * i) % 7) as f64;
         let d = Mat::from_fn(5, 5, |k, l| (0..40).map(|i| column(k, i) * column(l, i)).sum());
-        let g: Vec<f64> = (0..5)
-            .map(|k| (0..40).map(|i| column(k, i) * y(i)).sum())
-            .collect();
-        let subset = Subset {
-            d: &d,
-            g: &g,
-            own: &d,
-        };
+        let g: Vec<f64> = (0..5).map(|k| (0..40).map(|i| column(k, i) * y(i)).sum()).collect();
+        let subset = Subset { d: &d, g: &g, own: &d };
         let mut chosen = vec![0, 2];
         let gain = subset.splice(&mut chosen);
         let mut best = 0.0_f64;

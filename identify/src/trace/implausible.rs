@@ -1,5 +1,5 @@
-//! A trace of a session whose readings contradict it. The trace states the contradiction first. It does not search if the
-//! readings belong to another session. It accepts no effect that only represents a wrong set-up value.
+//! A trace of a session whose readings contradict it. The trace states the contradiction first. It does not search if
+//! the readings belong to another session. It accepts no effect that only represents a wrong set-up value.
 
 use abbe_model::effect::Effect;
 
@@ -26,11 +26,8 @@ impl<'a> Contradicted<'a> {
     /// # Errors
     /// If the problem cannot be fitted without the set-up priors.
     pub fn of(problem: &Problem<'a>, fit: &Fit) -> Result<Contradicted<'a>, IdentifyError> {
-        let mut contradicted = Contradicted {
-            plausibility: plausibility::examine(problem, fit),
-            parameters: Vec::new(),
-            freed: None,
-        };
+        let mut contradicted =
+            Contradicted { plausibility: plausibility::examine(problem, fit), parameters: Vec::new(), freed: None };
         let mut freed = problem.clone();
         if !contradicted.forbids_search()
             && let Some((parameters, found)) = with_set_ups_freed(&mut freed, fit)?
@@ -90,9 +87,7 @@ impl<'a> Contradicted<'a> {
             remainder: Remainder {
                 structured: true,
                 p_value: 0.0,
-                place: Some(
-                    "every test: the readings contradict the session; no effect was searched for".to_string(),
-                ),
+                place: Some("every test: the readings contradict the session; no effect was searched for".to_string()),
             },
             residual_before: "the readings contradict the session".to_string(),
             ..unsearched(&problem, &fit)

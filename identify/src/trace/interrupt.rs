@@ -20,11 +20,7 @@ impl Interrupt<'_> {
     /// # Errors
     /// [`IdentifyError::Interrupted`] if the caller stops the trace.
     pub fn check(&self) -> Result<(), IdentifyError> {
-        if (self.0)(Progress::Working) {
-            Ok(())
-        } else {
-            Err(IdentifyError::Interrupted)
-        }
+        if (self.0)(Progress::Working) { Ok(()) } else { Err(IdentifyError::Interrupted) }
     }
 }
 

@@ -23,7 +23,8 @@ pub(super) struct RefittedModel<'a> {
 }
 
 impl<'a> RefittedModel<'a> {
-    /// Refits with the selected effects of a search. `structure_before` is the structure in the residual of the declared model.
+    /// Refits with the selected effects of a search. `structure_before` is the structure in the residual of the
+    /// declared model.
     pub fn of(
         problem: &Problem<'a>,
         before_fit: &Fit,
@@ -40,26 +41,19 @@ impl<'a> RefittedModel<'a> {
                 structure: structure_before.cloned(),
             });
         }
-        // Noise, outliers and rank are determined anew, as in a fit of a session that declares these effects. The residual of the
-        // declared model contains the effects and overstates the noise.
+        // Noise, outliers and rank are determined anew, as in a fit of a session that declares these effects. The
+        // residual of the declared model contains the effects and overstates the noise.
         let (mut after, mut after_fit) = prepare_with(problem.session, &effects, options.seed)?;
         if noise_is_from_residual(problem, &after) {
             after.noise = problem.noise.clone();
             after_fit = fit(&after, Some(&after_fit.beta))?;
         }
-        let structure = structure_before
-            .map(|_| remaining_structure(&after, &after_fit, options))
-            .transpose()?;
-        Ok(RefittedModel {
-            after,
-            after_fit,
-            effects,
-            structure,
-        })
+        let structure = structure_before.map(|_| remaining_structure(&after, &after_fit, options)).transpose()?;
+        Ok(RefittedModel { after, after_fit, effects, structure })
     }
 
-    /// Whether this model has the effects that the search selects now, in the same order. Exchanges keep the number of effects,
-    /// so the number alone does not decide.
+    /// Whether this model has the effects that the search selects now, in the same order. Exchanges keep the number of
+    /// effects, so the number alone does not decide.
     pub fn is_of(&self, search: &Search<'_>) -> bool {
         self.effects.iter().eq(selected_effects(search))
     }
@@ -76,8 +70,8 @@ fn selected_effects<'s>(search: &'s Search<'_>) -> impl Iterator<Item = &'s Effe
     selected.map(|selected| &search.candidates[selected.candidate].effect)
 }
 
-/// Whether the search used a noise model from repeats along runs that differs from that of a fit: autocorrelated, or with another
-/// standard deviation.
+/// Whether the search used a noise model from repeats along runs that differs from that of a fit: autocorrelated, or
+/// with another standard deviation.
 fn noise_is_from_residual(search: &Problem<'_>, fit: &Problem<'_>) -> bool {
     let (of_search, of_fit) = (&search.noise, &fit.noise);
     let of_one_size = (of_search.sigma_mm / of_fit.sigma_mm - 1.0).abs() < SCATTER;
@@ -85,23 +79,11 @@ fn noise_is_from_residual(search: &Problem<'_>, fit: &Problem<'_>) -> bool {
 }
 
 /// The remaining structure in the residual of a fit.
-fn remaining_structure(
-    problem: &Problem<'_>,
-    fit: &Fit,
-    options: &TraceOptions,
-) -> Result<Structure, IdentifyError> {
+fn remaining_structure(problem: &Problem<'_>, fit: &Fit, options: &TraceOptions) -> Result<Structure, IdentifyError> {
     let columns = Columns::new(problem, &fit.beta);
     let start = Start::of(problem, &columns, fit)?;
     let (count, seed) = (null_draw_count(options), options.seed.wrapping_add(1));
-    let draws = null::draws(
-        problem,
-        &columns,
-        &fit.residuals,
-        &start.residual,
-        count,
-        null::SINGLE,
-        seed,
-    );
+    let draws = null::draws(problem, &columns, &fit.residuals, &start.residual, count, null::SINGLE, seed);
     let prior = start.prior();
     remainder::structure(problem, &columns, start.model, &start.residual, draws, &prior)
 }

@@ -1,15 +1,16 @@
 //! Find the unmodelled effect behind the residual of a fitted model.
 //!
-//! 1. The noise standard deviation and autocorrelation follow from repeats ([`crate::noise`]). Outliers are excluded by name
-//!    ([`crate::outliers`]).
-//! 2. The basis columns of the library's effects ([`library`]) are computed for the session (`columns`). Their products with the
-//!    model, the residual and the null draws are computed once (`moments`).
-//! 3. The search (`search`) adds, removes and exchanges effects. Its p-values come from the same search on readings without
-//!    structure (`null`). An effect is accepted if its p-value is below the significance level and the held-out error decreases by
-//!    more than the standard error of the decrease. That standard error follows from paired differences over runs, blocks or
-//!    poses (`paired`).
+//! 1. The noise standard deviation and autocorrelation follow from repeats ([`crate::noise`]). Outliers are excluded by
+//!    name ([`crate::outliers`]).
+//! 2. The basis columns of the library's effects ([`library`]) are computed for the session (`columns`). Their products
+//!    with the model, the residual and the null draws are computed once (`moments`).
+//! 3. The search (`search`) adds, removes and exchanges effects. Its p-values come from the same search on readings
+//!    without structure (`null`). An effect is accepted if its p-value is below the significance level and the held-out
+//!    error decreases by more than the standard error of the decrease. That standard error follows from paired
+//!    differences over runs, blocks or poses (`paired`).
 //! 4. All parameters are refitted together (`judge`). The result (`result`) states the held-out error before and after.
-//! 5. For each effect the trace lists its aliases ([`alias`]). It tests the residual for remaining structure (`remainder`).
+//! 5. For each effect the trace lists its aliases ([`alias`]). It tests the residual for remaining structure
+//!    (`remainder`).
 
 pub mod alias;
 mod chi_square_tail;
@@ -69,8 +70,9 @@ pub struct TraceOptions {
     pub exclude: Vec<String>,
     /// Number of null draws.
     pub draws: usize,
-    /// Probability that the trace accepts an effect on readings without structure, if the null distribution is exact. The noise
-    /// model is estimated, which increases this probability. The documentation of the method gives measured rates.
+    /// Probability that the trace accepts an effect on readings without structure, if the null distribution is exact.
+    /// The noise model is estimated, which increases this probability. The documentation of the method gives measured
+    /// rates.
     pub significance: f64,
 }
 
@@ -142,8 +144,9 @@ pub struct TraceOutcome<'a> {
 
 /// Finds the unmodelled effects behind the residual of a session.
 ///
-/// `progress` receives the progress and returns whether to continue. If it returns `false`, the trace ends within a fraction of a
-/// second after the fit of the declared model. It then returns the effects found so far and marks the result as interrupted.
+/// `progress` receives the progress and returns whether to continue. If it returns `false`, the trace ends within a
+/// fraction of a second after the fit of the declared model. It then returns the effects found so far and marks the
+/// result as interrupted.
 ///
 /// # Errors
 /// If the session cannot be fitted.
@@ -164,8 +167,8 @@ pub fn trace<'a>(
             contradicted.add_warnings(&mut found.result);
             return Ok(found);
         }
-        // The effects found without the set-up priors explain the apparent contradiction. The search therefore runs with these
-        // priors.
+        // The effects found without the set-up priors explain the apparent contradiction. The search therefore runs
+        // with these priors.
         return with_noise_of_repeats(problem, fitted, options, progress);
     }
     let mut found = with_noise_of_repeats(problem, fitted, options, progress)?;
@@ -173,7 +176,8 @@ pub fn trace<'a>(
     Ok(found)
 }
 
-/// Searches with the noise model estimated from repeats. Searches once more if the found effects change that noise model.
+/// Searches with the noise model estimated from repeats. Searches once more if the found effects change that noise
+/// model.
 fn with_noise_of_repeats<'a>(
     mut problem: Problem<'a>,
     mut before_fit: Fit,
@@ -218,7 +222,8 @@ fn trace_with<'a>(
     }
 }
 
-/// Traces with a given noise model, and returns [`IdentifyError::Interrupted`] if it was interrupted before the search began.
+/// Traces with a given noise model, and returns [`IdentifyError::Interrupted`] if it was interrupted before the search
+/// began.
 fn trace_or_interrupted<'a>(
     problem: &Problem<'a>,
     before_fit: &Fit,
@@ -249,9 +254,7 @@ fn trace_or_interrupted<'a>(
     let searched = screening::searched_candidates(problem, &columns, options)?;
     let candidate_count = searched.len();
     progress(Progress::Screening(candidate_count));
-    let (reserve, searched): (Vec<_>, Vec<_>) = searched
-        .into_iter()
-        .partition(|(candidate, _)| candidate.last_resort);
+    let (reserve, searched): (Vec<_>, Vec<_>) = searched.into_iter().partition(|(candidate, _)| candidate.last_resort);
     let (candidates, column_sets): (Vec<Candidate>, Vec<EffectColumns>) = searched.into_iter().unzip();
     let (model, prior) = (start.model.clone(), start.prior());
     let go_on = || interrupt.check().is_ok();
@@ -264,28 +267,15 @@ fn trace_or_interrupted<'a>(
         in_residual_variance: poses,
     };
     let unwhitened = start.unwhitened(&columns, &before_fit.beta, problem.noise.sigma_mm)?;
-    let mut search = Search::new(
-        &columns,
-        candidates,
-        column_sets,
-        moments,
-        prior,
-        unwhitened,
-        stop,
-    )?;
+    let mut search = Search::new(&columns, candidates, column_sets, moments, prior, unwhitened, stop)?;
     search.reserve = reserve;
     search.interrupt = Some(interrupt);
     let gains = search.model_without(None)?.gains();
     let observable = gains.iter().filter(|gain| gain.freedom > 0).count();
 
-    let mut record = SearchRecord {
-        steps: Vec::new(),
-        noise_um: problem.noise.sigma_mm * 1e3,
-        progress,
-    };
+    let mut record = SearchRecord { steps: Vec::new(), noise_um: problem.noise.sigma_mm * 1e3, progress };
     let structure_before = structure_before.as_ref();
-    let judge =
-        |search: &Search<'_>| RefittedModel::of(problem, before_fit, search, options, structure_before);
+    let judge = |search: &Search<'_>| RefittedModel::of(problem, before_fit, search, options, structure_before);
     let found = match search_and_refit(&mut search, &mut record, judge) {
         Err(IdentifyError::Interrupted) => {
             search.roll_back();
@@ -299,17 +289,9 @@ fn trace_or_interrupted<'a>(
     let (ended, judged) = match found {
         Some((p_value, judged)) => (Some(p_value), judged),
         // The effects found so far are fitted. Their residual is not tested for structure.
-        None => (
-            None,
-            RefittedModel::of(problem, before_fit, &search, options, None)?,
-        ),
+        None => (None, RefittedModel::of(problem, before_fit, &search, options, None)?),
     };
-    let RefittedModel {
-        after,
-        after_fit,
-        effects,
-        structure: structure_after,
-    } = judged;
+    let RefittedModel { after, after_fit, effects, structure: structure_after } = judged;
     let mut reported = result::report(&result::TraceFindings {
         before: problem,
         before_fit,
@@ -325,10 +307,7 @@ fn trace_or_interrupted<'a>(
         candidates: candidate_count,
         candidates_seen: observable,
     })?;
-    reported
-        .result
-        .warnings
-        .extend(screening::unused_exclusions(problem, options)?);
+    reported.result.warnings.extend(screening::unused_exclusions(problem, options)?);
     drop(search);
     drop(columns);
     Ok(TraceOutcome {
@@ -344,8 +323,8 @@ fn trace_or_interrupted<'a>(
     })
 }
 
-/// Searches and refits. If significant structure remains, the search continues with nonparametric curves. Effects that explain
-/// nothing are withdrawn. Returns the p-value at which the search ended ([`search_on`]) and the refitted model.
+/// Searches and refits. If significant structure remains, the search continues with nonparametric curves. Effects that
+/// explain nothing are withdrawn. Returns the p-value at which the search ended ([`search_on`]) and the refitted model.
 ///
 /// # Errors
 /// [`IdentifyError::Interrupted`] if the caller stopped the trace.

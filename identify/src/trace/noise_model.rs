@@ -7,8 +7,8 @@ use crate::problem::Problem;
 /// Sampling scatter of an estimated AR coefficient, and relative scatter of an estimated noise standard deviation.
 pub(super) const SCATTER: f64 = 0.02;
 
-/// Sets the noise standard deviation and autocorrelation from repeats, if there are enough. Returns whether this changed them by
-/// more than their sampling scatter.
+/// Sets the noise standard deviation and autocorrelation from repeats, if there are enough. Returns whether this
+/// changed them by more than their sampling scatter.
 pub(super) fn estimate_noise_model(problem: &mut Problem<'_>, residuals: &[Vec<f64>]) -> bool {
     if problem.folds.kind == FoldKind::Poses {
         return false;
@@ -27,11 +27,7 @@ pub(super) fn estimate_noise_model(problem: &mut Problem<'_>, residuals: &[Vec<f
     }
     let present = &problem.noise;
     let same_coefficients = noise.ar_coefficients.len() == present.ar_coefficients.len()
-        && noise
-            .ar_coefficients
-            .iter()
-            .zip(&present.ar_coefficients)
-            .all(|(a, b)| (a - b).abs() < SCATTER);
+        && noise.ar_coefficients.iter().zip(&present.ar_coefficients).all(|(a, b)| (a - b).abs() < SCATTER);
     if same_coefficients && (noise.sigma_mm / present.sigma_mm - 1.0).abs() < SCATTER {
         return false;
     }

@@ -1,9 +1,9 @@
 //! Readings without structure: the null distribution of the search.
 //!
-//! Along runs, the draws come from the pure error: whitened deviations of repeats from their mean, in blocks with random signs.
-//! The blocks keep the autocorrelation that whitening leaves. Independent poses have few repeats. For them the residual is drawn
-//! with a random sign for each pose (the wild bootstrap). This keeps the magnitude of each pose and removes every dependence on
-//! position.
+//! Along runs, the draws come from the pure error: whitened deviations of repeats from their mean, in blocks with
+//! random signs. The blocks keep the autocorrelation that whitening leaves. Independent poses have few repeats. For
+//! them the residual is drawn with a random sign for each pose (the wild bootstrap). This keeps the magnitude of each
+//! pose and removes every dependence on position.
 
 use std::collections::HashMap;
 
@@ -18,7 +18,8 @@ use crate::noise::{Noise, PureError};
 use crate::outliers::median;
 use crate::problem::Problem;
 
-/// Readings per block for the search. A block keeps intermittent structure, so that the search does not accept it as an effect.
+/// Readings per block for the search. A block keeps intermittent structure, so that the search does not accept it as an
+/// effect.
 pub const BLOCK: usize = 20;
 /// Readings per block for the test of the remaining structure. Single readings leave only noise with the estimated
 /// autocorrelation.
@@ -57,12 +58,7 @@ pub fn draws(
 }
 
 /// The residual with a random sign for each pose.
-fn sign_flipped(
-    columns: &Columns<'_, '_>,
-    whitened: &[f64],
-    count: usize,
-    generator: &mut Pcg64,
-) -> Mat<f64> {
+fn sign_flipped(columns: &Columns<'_, '_>, whitened: &[f64], count: usize, generator: &mut Pcg64) -> Mat<f64> {
     let origins = columns.origin_of_rows();
     let mut draws = Mat::zeros(columns.rows(), count);
     for draw in 0..count {
@@ -106,9 +102,9 @@ fn block_draws(pool: &[Vec<f64>], rows: usize, block: usize, generator: &mut Pcg
     values
 }
 
-/// Gives each draw the spectrum that an inaccurate whitening leaves. Whitening with an inaccurate autocorrelation under- or
-/// over-whitens. The AR coefficients of each draw differ from the estimate by its uncertainty. With `A` the estimated polynomial
-/// and `A*` that of the draw, `A* w = A ε`.
+/// Gives each draw the spectrum that an inaccurate whitening leaves. Whitening with an inaccurate autocorrelation
+/// under- or over-whitens. The AR coefficients of each draw differ from the estimate by its uncertainty. With `A` the
+/// estimated polynomial and `A*` that of the draw, `A* w = A ε`.
 fn with_noise_spectrum(values: &mut [f64], noise: &Noise, generator: &mut Pcg64) {
     if noise.ar_coefficients.is_empty() || noise.ar_sum_u <= 0.0 {
         return;
@@ -169,12 +165,8 @@ fn pool(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> Vec<Vec<f64>> {
             stretches.push(stretch);
         }
     }
-    let (sum, count) = stretches
-        .iter()
-        .flatten()
-        .fold((0.0, 0_usize), |(sum, count), value| {
-            (sum + value * value, count + 1)
-        });
+    let (sum, count) =
+        stretches.iter().flatten().fold((0.0, 0_usize), |(sum, count), value| (sum + value * value, count + 1));
     if count > 0 && sum > 0.0 {
         // The stated noise may differ from the true noise. The search uses whitened readings, so their own variance is
         // normalised.
@@ -191,9 +183,7 @@ fn without_smooth(residual: &[f64], coordinates: usize) -> Vec<Option<f64>> {
     for row in 0..rows {
         let (start, end) = (row.saturating_sub(SMOOTHING), (row + SMOOTHING + 1).min(rows));
         for coordinate in 0..coordinates {
-            let mut window: Vec<f64> = (start..end)
-                .map(|r| residual[r * coordinates + coordinate])
-                .collect();
+            let mut window: Vec<f64> = (start..end).map(|r| residual[r * coordinates + coordinate]).collect();
             let level = median(&mut window);
             rough[row * coordinates + coordinate] = Some(residual[row * coordinates + coordinate] - level);
         }
@@ -205,28 +195,21 @@ fn without_smooth(residual: &[f64], coordinates: usize) -> Vec<Option<f64>> {
 mod tests {
     use super::*;
 
-    /// Three coordinates rise at their own rates. Nothing of the rise remains away from the ends. The spike remains up to the
-    /// difference of its neighbours.
+    /// Three coordinates rise at their own rates. Nothing of the rise remains away from the ends. The spike remains up
+    /// to the difference of its neighbours.
     #[test]
     fn smooth_structure_is_removed_from_each_coordinate() {
         const ROWS: usize = 60;
         let (spiked, coordinate) = (30, 1);
         let residual: Vec<f64> = (0..3 * ROWS)
-            .map(|i| {
-                (i / 3) as f64 * [1.0, -2.0, 5.0][i % 3]
-                    + if i == 3 * spiked + coordinate { 1e3 } else { 0.0 }
-            })
+            .map(|i| (i / 3) as f64 * [1.0, -2.0, 5.0][i % 3] + if i == 3 * spiked + coordinate { 1e3 } else { 0.0 })
             .collect();
         let rough = without_smooth(&residual, 3);
         assert_eq!(rough.len(), residual.len());
         for row in SMOOTHING..ROWS - SMOOTHING {
             for k in 0..3 {
                 let left = rough[3 * row + k].unwrap();
-                let spike = if (row, k) == (spiked, coordinate) {
-                    1e3
-                } else {
-                    0.0
-                };
+                let spike = if (row, k) == (spiked, coordinate) { 1e3 } else { 0.0 };
                 // A spike among an odd number of neighbours moves their median by at most one order statistic.
                 assert!((left - spike).abs() <= 2.0 + 1e-9, "{row} {k}: {left}");
                 if k != coordinate {

@@ -1,5 +1,5 @@
-//! The observable subspace of a candidate: the directions that remain after projection on the model, and the inverse of the
-//! projected product on them.
+//! The observable subspace of a candidate: the directions that remain after projection on the model, and the inverse of
+//! the projected product on them.
 
 use faer::Mat;
 
@@ -26,15 +26,7 @@ pub(super) struct ObservableSubspace {
 impl ObservableSubspace {
     pub fn of(d: &Mat<f64>, own: &Mat<f64>) -> ObservableSubspace {
         let n = d.nrows();
-        let scale: Vec<f64> = (0..n)
-            .map(|k| {
-                if own[(k, k)] > 0.0 {
-                    1.0 / own[(k, k)].sqrt()
-                } else {
-                    0.0
-                }
-            })
-            .collect();
+        let scale: Vec<f64> = (0..n).map(|k| if own[(k, k)] > 0.0 { 1.0 / own[(k, k)].sqrt() } else { 0.0 }).collect();
         let scaled = Mat::from_fn(n, n, |i, j| d[(i, j)] * scale[i] * scale[j]);
         if n == 1 {
             let observable = scaled[(0, 0)] > MIN_OBSERVABLE;
@@ -50,12 +42,7 @@ impl ObservableSubspace {
             return ObservableSubspace::of_two(scaled, scale);
         }
         let Ok(eigen) = scaled.self_adjoint_eigen(faer::Side::Lower) else {
-            return ObservableSubspace {
-                vectors: Mat::identity(n, n),
-                values: vec![0.0; n],
-                scale,
-                freedom: 0,
-            };
+            return ObservableSubspace { vectors: Mat::identity(n, n), values: vec![0.0; n], scale, freedom: 0 };
         };
         let values: Vec<f64> = eigen
             .S()
@@ -64,12 +51,7 @@ impl ObservableSubspace {
             .map(|value| if *value > MIN_OBSERVABLE { 1.0 / value } else { 0.0 })
             .collect();
         let freedom = values.iter().filter(|value| **value > 0.0).count();
-        ObservableSubspace {
-            vectors: eigen.U().to_owned(),
-            values,
-            scale,
-            freedom,
-        }
+        ObservableSubspace { vectors: eigen.U().to_owned(), values, scale, freedom }
     }
 
     /// For two columns, as sine and cosine have: one Jacobi rotation (Golub & Van Loan, section 8.5).
@@ -84,9 +66,7 @@ impl ObservableSubspace {
         let cos = 1.0 / 1.0_f64.hypot(tangent);
         let sin = tangent * cos;
         let values = vec![a - tangent * b, c + tangent * b].into_iter();
-        let values: Vec<f64> = values
-            .map(|value| if value > MIN_OBSERVABLE { 1.0 / value } else { 0.0 })
-            .collect();
+        let values: Vec<f64> = values.map(|value| if value > MIN_OBSERVABLE { 1.0 / value } else { 0.0 }).collect();
         ObservableSubspace {
             vectors: Mat::from_fn(2, 2, |i, k| match (i, k) {
                 (0, 1) => sin,
@@ -129,19 +109,11 @@ impl ObservableSubspace {
 /// If the product has entries that are not finite.
 pub(super) fn pseudo_inverse(gram: &Mat<f64>) -> Result<Mat<f64>, IdentifyError> {
     let n = gram.nrows();
-    let eigen = gram
-        .self_adjoint_eigen(faer::Side::Lower)
-        .map_err(|_| IdentifyError::Decomposition)?;
+    let eigen = gram.self_adjoint_eigen(faer::Side::Lower).map_err(|_| IdentifyError::Decomposition)?;
     let values: Vec<f64> = eigen.S().column_vector().iter().copied().collect();
     let largest = values.iter().fold(0.0_f64, |a, b| a.max(*b));
     let u = eigen.U();
-    let scaled = Mat::from_fn(n, n, |i, k| {
-        if values[k] > largest * 1e-12 {
-            u[(i, k)] / values[k]
-        } else {
-            0.0
-        }
-    });
+    let scaled = Mat::from_fn(n, n, |i, k| if values[k] > largest * 1e-12 { u[(i, k)] / values[k] } else { 0.0 });
     Ok(&scaled * u.transpose())
 }
 

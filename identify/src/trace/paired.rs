@@ -1,9 +1,10 @@
-//! Compares two models on held-out readings by paired differences: the decrease of the held-out error and its standard error.
+//! Compares two models on held-out readings by paired differences: the decrease of the held-out error and its standard
+//! error.
 //!
-//! Neighbouring readings are not independent. Noise is autocorrelated along a run, and one fit predicts a whole fold. The
-//! differences between the squared held-out residuals of two models are therefore summed over independent units (runs, blocks or
-//! poses). Units of one test are replicates of each other. Tests are strata, because an effect need not act in all of them. The
-//! variance of the sum follows from the scatter of the units within their test.
+//! Neighbouring readings are not independent. Noise is autocorrelated along a run, and one fit predicts a whole fold.
+//! The differences between the squared held-out residuals of two models are therefore summed over independent units
+//! (runs, blocks or poses). Units of one test are replicates of each other. Tests are strata, because an effect need
+//! not act in all of them. The variance of the sum follows from the scatter of the units within their test.
 
 use std::collections::BTreeMap;
 
@@ -119,8 +120,8 @@ mod tests {
 
     use super::*;
 
-    /// Two tests of three runs. Only the first test shows an effect. The scatter within tests counts, not the difference between
-    /// them.
+    /// Two tests of three runs. Only the first test shows an effect. The scatter within tests counts, not the
+    /// difference between them.
     #[test]
     fn the_standard_error_comes_from_the_scatter_within_tests() {
         let rows = [(0, 0), (0, 1), (0, 2), (1, 3), (1, 4), (1, 5)];

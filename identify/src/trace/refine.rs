@@ -1,11 +1,12 @@
 //! Tunes shapes with numbers (a period, a time constant, a centre, a width) off the grid of the library.
 //!
-//! Candidates are tuned before they are compared. On the grid, a wrong component may have a larger gain than the true one, which
-//! gains more at its own optimum. Every component near the best is therefore tuned first.
+//! Candidates are tuned before they are compared. On the grid, a wrong component may have a larger gain than the true
+//! one, which gains more at its own optimum. Every component near the best is therefore tuned first.
 
 use std::collections::HashMap;
 use std::ops::Range;
 
+use abbe_model::effect::shape::Steps;
 use abbe_model::effect::{Effect, Shape};
 use rayon::prelude::*;
 
@@ -17,8 +18,8 @@ use super::search::Search;
 /// Iterations of a line search, each reducing the interval to 0.62: on all readings, and with one fold left out.
 const STEPS: usize = 12;
 const STEPS_WITHOUT_A_FOLD: usize = 6;
-/// Share of the best evidence that a candidate needs on the grid to be tuned. A local feature between two grid points loses a
-/// third of its evidence.
+/// Share of the best evidence that a candidate needs on the grid to be tuned. A local feature between two grid points
+/// loses a third of its evidence.
 const MIN_EVIDENCE_SHARE: f64 = 0.5;
 /// Maximum number of candidates that are tuned at a time: on all readings, and with one fold left out.
 const MAX_TUNED: usize = 10;
@@ -28,11 +29,11 @@ const MAX_EVIDENCE_DEFICIT: f64 = 4.0;
 
 /// Whether a candidate has shape numbers or positions that can be tuned off the library's grid.
 pub(super) fn can_be_tuned(candidate: &Candidate) -> bool {
-    candidate.dictionary || brackets(candidate).is_some()
+    candidate.dictionary || !brackets(candidate).is_empty()
 }
 
-/// The candidates near the best, each with its best shape numbers for addition to a model, and the step tables near the best.
-/// `gains` are those of all candidates added to the model.
+/// The candidates near the best, each with its best shape numbers for addition to a model, and the step tables near the
+/// best. `gains` are those of all candidates added to the model.
 pub fn refined(
     search: &Search<'_>,
     model: &TrainedModel<'_>,
@@ -40,11 +41,7 @@ pub fn refined(
     composed: &[StepTable],
 ) -> Vec<Candidate> {
     let variance = search.variance(model);
-    let most = if search.has_all_folds(&model.folds) {
-        MAX_TUNED
-    } else {
-        MAX_WITHOUT_A_FOLD
-    };
+    let most = if search.has_all_folds(&model.folds) { MAX_TUNED } else { MAX_WITHOUT_A_FOLD };
     let mut nearest: HashMap<String, (usize, f64)> = HashMap::new();
     let mut best = 0.0_f64;
     for (candidate, gain) in gains.iter().enumerate() {
@@ -54,7 +51,7 @@ pub fn refined(
         let evidence = search.evidence(gain, variance);
         best = best.max(evidence);
         let effect = &search.candidates[candidate].effect;
-        if brackets(&search.candidates[candidate]).is_none() {
+        if brackets(&search.candidates[candidate]).is_empty() {
             continue;
         }
         let best_of_id = nearest.entry(effect.id()).or_insert((candidate, evidence));
@@ -62,10 +59,8 @@ pub fn refined(
             *best_of_id = (candidate, evidence);
         }
     }
-    let mut near: Vec<(usize, f64)> = nearest
-        .into_values()
-        .filter(|(_, evidence)| *evidence >= MIN_EVIDENCE_SHARE * best)
-        .collect();
+    let mut near: Vec<(usize, f64)> =
+        nearest.into_values().filter(|(_, evidence)| *evidence >= MIN_EVIDENCE_SHARE * best).collect();
     near.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     near.truncate(most);
     let mut fresh: Vec<Candidate> = near
@@ -73,10 +68,7 @@ pub fn refined(
         .filter_map(|(candidate, _)| {
             let original = &search.candidates[candidate];
             let effect = refine(search, model, original, gains[candidate].gain)?;
-            Some(Candidate {
-                effect,
-                ..original.clone()
-            })
+            Some(Candidate { effect, ..original.clone() })
         })
         .collect();
     fresh.extend(moved(search, model, composed, best, most));
@@ -98,27 +90,18 @@ fn moved(
     most: usize,
 ) -> Vec<Candidate> {
     let variance = search.variance(model);
-    let mut nearest: Vec<&StepTable> = composed
-        .iter()
-        .filter(|c| c.evidence >= MIN_EVIDENCE_SHARE * best)
-        .collect();
+    let mut nearest: Vec<&StepTable> = composed.iter().filter(|c| c.evidence >= MIN_EVIDENCE_SHARE * best).collect();
     nearest.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
     nearest.truncate(most);
     nearest
         .into_par_iter()
         .filter_map(|composed| {
             let (effect, gain) = moved_steps(search, model, &composed.candidate);
-            let gain = Gain {
-                gain,
-                freedom: effect.shape.coefficients() + effect.shape.numbers(),
-            };
+            let gain = Gain { gain, freedom: effect.shape.coefficients() + effect.shape.numbers() };
             let evidence = search.evidence(&gain, variance);
             let near = evidence >= best - MAX_EVIDENCE_DEFICIT
                 || evidence - composed.candidate.cost >= MIN_EVIDENCE_SHARE * best;
-            near.then(|| Candidate {
-                effect,
-                ..composed.candidate.clone()
-            })
+            near.then(|| Candidate { effect, ..composed.candidate.clone() })
         })
         .collect()
 }
@@ -131,19 +114,15 @@ pub(super) fn refine(
     before: f64,
 ) -> Option<Effect> {
     let mut effect = original.effect.clone();
-    let brackets = brackets(original)?;
+    let brackets = brackets(original);
     let mut best = before;
-    let steps = if search.has_all_folds(&model.folds) {
-        STEPS
-    } else {
-        STEPS_WITHOUT_A_FOLD
-    };
+    let steps = if search.has_all_folds(&model.folds) { STEPS } else { STEPS_WITHOUT_A_FOLD };
     // The numbers of one shape are tuned in turn.
     for _ in 0..brackets.len() {
-        for (which, low, high) in &brackets {
+        for (which, [low, high]) in brackets.iter().enumerate() {
             let value_at = |share: f64| low + (high - low) * share;
             let gain_at = |share: f64| {
-                let tuned = with_number(&effect, *which, value_at(share));
+                let tuned = Effect { shape: effect.shape.with_number(which, value_at(share)), ..effect.clone() };
                 (search.gain_beside(model, &tuned).unwrap_or(0.0), tuned)
             };
             let (gain, tuned) = highest(gain_at, steps);
@@ -156,7 +135,8 @@ pub(super) fn refine(
     (best > before * (1.0 + 1e-6)).then_some(effect)
 }
 
-/// The maximum of a line search between 0 and 1, and its argument, by golden section (Kiefer, Proc. Am. Math. Soc. 4 (1953) 502).
+/// The maximum of a line search between 0 and 1, and its argument, by golden section (Kiefer, Proc. Am. Math. Soc. 4
+/// (1953) 502).
 fn highest<T>(value_at: impl Fn(f64) -> (f64, T), steps: usize) -> (f64, T) {
     let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
     let (mut a, mut b) = (0.0, 1.0);
@@ -181,21 +161,14 @@ fn highest<T>(value_at: impl Fn(f64) -> (f64, T), steps: usize) -> (f64, T) {
 /// Moves each step position by fractions of the grid for the largest joint gain. Returns the effect and its gain.
 fn moved_steps(search: &Search<'_>, model: &TrainedModel<'_>, candidate: &Candidate) -> (Effect, f64) {
     let original = &candidate.effect;
-    let (Shape::Steps { at }, Some(mut present)) = (&original.shape, search.tuned_effect(model, original))
+    let (Shape::Steps(Steps { at }), Some(mut present)) = (&original.shape, search.tuned_effect(model, original))
     else {
         return (original.clone(), 0.0);
     };
     let mut best = present.gain(model);
     let mut positions = at.clone();
-    let with = |positions: &[f64]| Effect {
-        shape: Shape::Steps {
-            at: positions.to_vec(),
-        },
-        ..original.clone()
-    };
-    let trained: Vec<Range<usize>> = (model.folds.iter())
-        .map(|fold| search.columns.fold_rows[*fold].clone())
-        .collect();
+    let with = |positions: &[f64]| Effect { shape: Shape::Steps(Steps { at: positions.to_vec() }), ..original.clone() };
+    let trained: Vec<Range<usize>> = (model.folds.iter()).map(|fold| search.columns.fold_rows[*fold].clone()).collect();
     for _ in 0..2 {
         for k in 0..positions.len() {
             let middle = positions[k];
@@ -217,32 +190,7 @@ fn moved_steps(search: &Search<'_>, model: &TrainedModel<'_>, candidate: &Candid
     (with(&positions), best)
 }
 
-/// The shape numbers that can be tuned, each with the interval between its neighbours on the grid.
-fn brackets(candidate: &Candidate) -> Option<Vec<(usize, f64, f64)>> {
-    match &candidate.effect.shape {
-        Shape::Periodic { period } => {
-            let near = candidate.grid / period;
-            Some(vec![(0, period / (1.0 + near), period / (1.0 - near.min(0.5)))])
-        }
-        Shape::Warmup { tau_s } => Some(vec![(0, tau_s * 0.5, tau_s * 2.0)]),
-        Shape::ReversalSpike { width } => Some(vec![(0, width * 0.4, width * 2.5)]),
-        Shape::Local { centre, width, .. } => Some(vec![
-            (0, centre - width, centre + width),
-            (1, width * 0.5, width * 2.0),
-        ]),
-        _ => None,
-    }
-}
-
-fn with_number(effect: &Effect, which: usize, value: f64) -> Effect {
-    let mut changed = effect.clone();
-    match (&mut changed.shape, which) {
-        (Shape::Periodic { period }, _) => *period = value,
-        (Shape::Warmup { tau_s }, _) => *tau_s = value,
-        (Shape::ReversalSpike { width }, _) => *width = value,
-        (Shape::Local { centre, .. }, 0) => *centre = value,
-        (Shape::Local { width, .. }, _) => *width = value,
-        _ => {}
-    }
-    changed
+/// The interval between its neighbours on the grid, for each shape number that can be tuned.
+fn brackets(candidate: &Candidate) -> Vec<[f64; 2]> {
+    candidate.effect.shape.brackets(candidate.grid)
 }

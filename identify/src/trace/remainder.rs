@@ -1,13 +1,15 @@
 //! Tests the residual after the search for remaining structure, and describes and locates it.
 //!
-//! The detectors act on readings, not on components: a wave over an axis position in one test or one run, a wave with opposite
-//! sign in the two directions, a curve, a local feature, a drift over time. Their null distribution comes from the same pure
-//! error as that of the search.
+//! The detectors act on readings, not on components: a wave over an axis position in one test or one run, a wave with
+//! opposite sign in the two directions, a curve, a local feature, a drift over time. Their null distribution comes from
+//! the same pure error as that of the search.
 
 use std::ops::Range;
 
 use abbe_model::axis::{Axis, AxisKind};
-use abbe_model::effect::{Component, Driver, Effect, Shape};
+use abbe_model::driver::Driver;
+use abbe_model::effect::shape::{Curve, Local, Periodic};
+use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::session::readings::Readings;
 
 use super::chi_square_tail::ln_chi_square_tail;
@@ -22,8 +24,8 @@ use crate::problem::Problem;
 pub struct Structure {
     /// Probability of at least as large a maximum in readings without structure.
     pub p_value: f64,
-    /// Decrease of the sum of squares by the best detector in excess of its expectation for noise: its `χ²` less its degrees of
-    /// freedom.
+    /// Decrease of the sum of squares by the best detector in excess of its expectation for noise: its `χ²` less its
+    /// degrees of freedom.
     pub excess: f64,
     /// Description: the test, the driver, and the amplitude.
     pub description: String,
@@ -50,13 +52,7 @@ fn detectors(problem: &Problem<'_>, columns: &Columns<'_, '_>) -> Vec<Detector> 
     let mut detectors = Vec::new();
     for (number, test) in problem.tests.iter().enumerate() {
         let Some(readings) = &test.readings else { continue };
-        let mut of_test = TestResidual {
-            columns,
-            number,
-            name: &test.name,
-            readings,
-            detectors: Vec::new(),
-        };
+        let mut of_test = TestResidual { columns, number, name: &test.name, readings, detectors: Vec::new() };
         for (axis, column) in readings.positions.iter().enumerate() {
             let low = column.iter().copied().fold(f64::INFINITY, f64::min);
             let high = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -101,18 +97,13 @@ impl TestResidual<'_, '_, '_> {
             tests: vec![self.name.to_string()],
         };
         for coordinate in 0..self.readings.coordinates {
-            let column_set =
-                self.columns
-                    .reading_columns(&effect, self.number, coordinate, by_direction, rows);
+            let column_set = self.columns.reading_columns(&effect, self.number, coordinate, by_direction, rows);
             let description = if self.readings.coordinates == 3 {
                 format!("{description} in {}", ["x", "y", "z"][coordinate])
             } else {
                 description.clone()
             };
-            self.detectors.extend(column_set.map(|column_set| Detector {
-                column_set,
-                description,
-            }));
+            self.detectors.extend(column_set.map(|column_set| Detector { column_set, description }));
         }
     }
 
@@ -121,11 +112,7 @@ impl TestResidual<'_, '_, '_> {
         let driver = Driver::Axis(name.clone());
         self.waves(axis, &driver, high - low);
         for intervals in [6, 12, 24] {
-            self.add(
-                &driver,
-                curve(low, high, intervals),
-                format!("a curve over {name} in {test}"),
-            );
+            self.add(&driver, curve(low, high, intervals), format!("a curve over {name} in {test}"));
         }
         for share in [0.02, 0.06] {
             let width = share * (high - low);
@@ -135,30 +122,16 @@ impl TestResidual<'_, '_, '_> {
                     AxisKind::Rotary => format!("{:.1}°", centre.to_degrees()),
                     AxisKind::Linear => format!("{centre:.1} mm"),
                 };
-                let shape = Shape::Local {
-                    centre,
-                    width,
-                    recurs: None,
-                };
-                self.add(
-                    &driver,
-                    shape,
-                    format!("a local feature at {name} = {place} in {test}"),
-                );
+                let shape = Shape::Local(Local { centre, width, recurs: None });
+                self.add(&driver, shape, format!("a local feature at {name} = {place} in {test}"));
             }
         }
-        self.add(
-            &driver,
-            Shape::Backlash,
-            format!("a difference between the directions of {name} in {test}"),
-        );
+        self.add(&driver, Shape::Backlash, format!("a difference between the directions of {name} in {test}"));
     }
 
     fn waves(&mut self, axis: &Axis, driver: &Driver, span: f64) {
         let (name, test) = (&axis.name, self.name);
-        let wave = |half_cycles: usize| Shape::Periodic {
-            period: 2.0 * span / half_cycles as f64,
-        };
+        let wave = |half_cycles: usize| Shape::Periodic(Periodic { period: 2.0 * span / half_cycles as f64 });
         for half_cycles in (2..=80).chain((84..=240).step_by(4)) {
             let period = 2.0 * span / half_cycles as f64;
             let length = match axis.kind {
@@ -174,11 +147,7 @@ impl TestResidual<'_, '_, '_> {
         }
         // A structure that changes with time cancels in the mean over runs.
         let runs = self.readings.runs();
-        let most = if runs.len() > 1 {
-            MAX_HALF_CYCLES_OF_A_RUN
-        } else {
-            0
-        };
+        let most = if runs.len() > 1 { MAX_HALF_CYCLES_OF_A_RUN } else { 0 };
         for half_cycles in 2..=most {
             let shows = |run: &&Range<usize>| half_cycles <= most_half_cycles(run.len());
             for (k, run) in runs.iter().enumerate().filter(|(_, run)| shows(run)) {
@@ -198,17 +167,9 @@ impl TestResidual<'_, '_, '_> {
         }
         let first = readings.time_s[0] - origin_s;
         let last = readings.time_s[readings.rows() - 1] - origin_s;
-        self.add(
-            &Driver::Time,
-            Shape::Drift,
-            format!("a drift over time in {test}"),
-        );
+        self.add(&Driver::Time, Shape::Drift, format!("a drift over time in {test}"));
         if last > first {
-            self.add(
-                &Driver::Time,
-                curve(first, last, 6),
-                format!("a slow change over time in {test}"),
-            );
+            self.add(&Driver::Time, curve(first, last, 6), format!("a slow change over time in {test}"));
         }
     }
 }
@@ -216,18 +177,14 @@ impl TestResidual<'_, '_, '_> {
 /// Maximum number of half cycles that is tested in one run.
 const MAX_HALF_CYCLES_OF_A_RUN: usize = 40;
 
-/// Maximum number of half cycles for a number of readings: 2.4 readings per cycle, as for the candidates of the library.
+/// Maximum number of half cycles for a number of readings: 2.4 readings per cycle, as for the candidates of the
+/// library.
 fn most_half_cycles(readings: usize) -> usize {
     readings * 10 / 12
 }
 
 fn curve(from: f64, to: f64, intervals: usize) -> Shape {
-    Shape::Curve {
-        from,
-        to,
-        intervals,
-        closed: false,
-    }
+    Shape::Curve(Curve { from, to, intervals, closed: false })
 }
 
 /// Tests a residual for structure that a model, given by its orthonormal columns, does not explain.
@@ -250,13 +207,10 @@ pub fn structure(
             description: "no detector applies to these readings".to_string(),
         });
     }
-    let column_sets: Vec<EffectColumns> = detectors
-        .iter()
-        .map(|detector| detector.column_set.clone())
-        .collect();
+    let column_sets: Vec<EffectColumns> = detectors.iter().map(|detector| detector.column_set.clone()).collect();
     let rank = model.ncols();
-    let moments = Moments::new(columns, &column_sets, model, residual, null, &|| true)
-        .ok_or(IdentifyError::Interrupted)?;
+    let moments =
+        Moments::new(columns, &column_sets, model, residual, null, &|| true).ok_or(IdentifyError::Interrupted)?;
     let folds = (0..columns.fold_rows.len()).collect();
     let trained = TrainedModel::new(&moments, prior, (0..rank).collect(), folds)?;
     let mut best = (0, f64::NEG_INFINITY, 0.0);
@@ -272,15 +226,7 @@ pub fn structure(
     let null_best = trained.null_best(&vec![0.0; column_sets.len()], 1.0);
     let above = null_best.iter().filter(|score| **score >= best.1).count();
     let p_value = (above + 1) as f64 / (null_best.len() + 1) as f64;
-    let size_um =
-        (2.0 * best.2.max(0.0) / columns.rows().max(1) as f64).sqrt() * problem.noise.sigma_mm * 1e3;
-    let description = format!(
-        "{} ({size_um:.2} µm over all readings)",
-        detectors[best.0].description
-    );
-    Ok(Structure {
-        p_value,
-        excess: best.2.max(0.0),
-        description,
-    })
+    let size_um = (2.0 * best.2.max(0.0) / columns.rows().max(1) as f64).sqrt() * problem.noise.sigma_mm * 1e3;
+    let description = format!("{} ({size_um:.2} µm over all readings)", detectors[best.0].description);
+    Ok(Structure { p_value, excess: best.2.max(0.0), description })
 }

@@ -26,29 +26,23 @@ impl SearchRecord<'_> {
         let effects = search.selected().len();
         for candidate in added {
             let id = search.candidates[candidate].effect.id();
-            self.steps.push(SearchStep {
-                id: id.clone(),
-                effects,
-                heldout_rms_um,
-            });
+            self.steps.push(SearchStep { id: id.clone(), effects, heldout_rms_um });
             (self.progress)(Progress::SelectedEffect(effects, id, heldout_rms_um));
         }
     }
 }
 
-/// Consecutive additions that may fail to lower the held-out error before they are withdrawn. Of two effects that partly cancel
-/// each other, the first alone explains little.
+/// Consecutive additions that may fail to lower the held-out error before they are withdrawn. Of two effects that
+/// partly cancel each other, the first alone explains little.
 const MAX_REJECTED_IN_A_ROW: usize = 2;
 
-/// Runs rounds until no candidate is significant, or until additions do not lower the held-out error. The accepted effects remain.
-/// Returns the p-value of the best candidate that was not added.
+/// Runs rounds until no candidate is significant, or until additions do not lower the held-out error. The accepted
+/// effects remain. Returns the p-value of the best candidate that was not added.
 ///
 /// # Errors
-/// [`IdentifyError::Interrupted`] if the caller stopped the trace. [`Search::roll_back`] then restores the accepted effects.
-pub(super) fn search_on(
-    search: &mut Search<'_>,
-    record: &mut SearchRecord<'_>,
-) -> Result<f64, IdentifyError> {
+/// [`IdentifyError::Interrupted`] if the caller stopped the trace. [`Search::roll_back`] then restores the accepted
+/// effects.
+pub(super) fn search_on(search: &mut Search<'_>, record: &mut SearchRecord<'_>) -> Result<f64, IdentifyError> {
     let p_value = rounds(search, record)?;
     search.withdraw_rejected();
     Ok(p_value)
@@ -64,8 +58,8 @@ fn rounds(search: &mut Search<'_>, record: &mut SearchRecord<'_>) -> Result<f64,
             Round::Done { .. } if search.retune_all()? || search.exchange_pairs()? => pending.push(None),
             Round::Done { p_value } => ended = Some(p_value),
             Round::Added { candidate } => {
-                // Each exchange trains one model per effect. With many effects the gain is small, and an occasional sweep is
-                // enough.
+                // Each exchange trains one model per effect. With many effects the gain is small, and an occasional
+                // sweep is enough.
                 let selected = search.selected().len();
                 if selected <= SWAP_EVERY_ROUND_UP_TO || selected.is_multiple_of(SWAP_EVERY) {
                     search.exchange()?;

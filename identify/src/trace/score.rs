@@ -1,8 +1,8 @@
 //! The gain of a candidate, and a score that compares candidates with different numbers of columns.
 //!
-//! If a candidate with `k` observable columns is absent, its gain follows a `χ²ₖ` distribution. The gain is the decrease of the
-//! sum of squares of whitened residuals. The score is `−ln P(χ²ₖ > gain)` less the candidate's cost in the library. The tail is
-//! computed in logarithms, because it underflows at real effect sizes.
+//! If a candidate with `k` observable columns is absent, its gain follows a `χ²ₖ` distribution. The gain is the
+//! decrease of the sum of squares of whitened residuals. The score is `−ln P(χ²ₖ > gain)` less the candidate's cost in
+//! the library. The tail is computed in logarithms, because it underflows at real effect sizes.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -94,10 +94,7 @@ impl<'m> TrainedModel<'m> {
         folds: Vec<usize>,
     ) -> Result<TrainedModel<'m>, IdentifyError> {
         let mut trained = TrainedModel::projection(moments, prior, base, folds)?;
-        let total = moments
-            .first
-            .last()
-            .map_or(0, |first| first + moments.count.last().copied().unwrap_or(0));
+        let total = moments.first.last().map_or(0, |first| first + moments.count.last().copied().unwrap_or(0));
         let cross = trained.cross(0, total);
         let solved = &trained.inverse * &cross;
         trained.all = Some((cross, solved));
@@ -115,9 +112,7 @@ impl<'m> TrainedModel<'m> {
         folds: Vec<usize>,
     ) -> Result<TrainedModel<'m>, IdentifyError> {
         let m = base.len();
-        let left_out: Vec<usize> = (0..moments.folds.len())
-            .filter(|fold| !folds.contains(fold))
-            .collect();
+        let left_out: Vec<usize> = (0..moments.folds.len()).filter(|fold| !folds.contains(fold)).collect();
         let parts: Vec<(&FoldMoments, f64)> = if left_out.len() < folds.len() {
             std::iter::once((&moments.whole, 1.0))
                 .chain(left_out.iter().map(|fold| (&moments.folds[*fold], -1.0)))
@@ -130,11 +125,7 @@ impl<'m> TrainedModel<'m> {
         let mut base_y = vec![0.0; m];
         for (i, bi) in base.iter().enumerate() {
             for (j, bj) in base.iter().enumerate() {
-                let mut sum = if *bi < of_prior && *bj < of_prior {
-                    prior.base[(*bi, *bj)]
-                } else {
-                    0.0
-                };
+                let mut sum = if *bi < of_prior && *bj < of_prior { prior.base[(*bi, *bj)] } else { 0.0 };
                 for (part, sign) in &parts {
                     sum += sign * part.base[(*bi, *bj)];
                 }
@@ -146,19 +137,8 @@ impl<'m> TrainedModel<'m> {
             }
         }
         let inverse = pseudo_inverse(&gram)?;
-        let coefficients = (0..m)
-            .map(|i| (0..m).map(|j| inverse[(i, j)] * base_y[j]).sum())
-            .collect();
-        Ok(TrainedModel {
-            moments,
-            base,
-            folds,
-            inverse,
-            all: None,
-            parts,
-            base_y,
-            coefficients,
-        })
+        let coefficients = (0..m).map(|i| (0..m).map(|j| inverse[(i, j)] * base_y[j]).sum()).collect();
+        Ok(TrainedModel { moments, base, folds, inverse, all: None, parts, base_y, coefficients })
     }
 
     /// `Xᵀ C` of consecutive candidate columns.
@@ -167,9 +147,7 @@ impl<'m> TrainedModel<'m> {
         for (part, sign) in &self.parts {
             for (j, to) in cross.col_iter_mut().enumerate() {
                 let of_part = part.cross.col_as_slice(first + j);
-                to.iter_mut()
-                    .zip(&self.base)
-                    .for_each(|(to, base)| *to += sign * of_part[*base]);
+                to.iter_mut().zip(&self.base).for_each(|(to, base)| *to += sign * of_part[*base]);
             }
         }
         cross
@@ -179,18 +157,12 @@ impl<'m> TrainedModel<'m> {
     fn beside(&self, candidate: usize) -> GivenModel<'_> {
         let (first, count) = (self.moments.first[candidate], self.moments.count[candidate]);
         match &self.all {
-            Some((cross, solved)) => GivenModel {
-                cross: Cow::Borrowed(cross),
-                solved: Cow::Borrowed(solved),
-                columns: first..first + count,
-            },
+            Some((cross, solved)) => {
+                GivenModel { cross: Cow::Borrowed(cross), solved: Cow::Borrowed(solved), columns: first..first + count }
+            }
             None => {
                 let cross = self.cross(first, count);
-                GivenModel {
-                    solved: Cow::Owned(&self.inverse * &cross),
-                    cross: Cow::Owned(cross),
-                    columns: 0..count,
-                }
+                GivenModel { solved: Cow::Owned(&self.inverse * &cross), cross: Cow::Owned(cross), columns: 0..count }
             }
         }
     }
@@ -202,15 +174,10 @@ impl<'m> TrainedModel<'m> {
 
     fn projected_with(&self, candidate: usize, beside: &GivenModel<'_>) -> (Mat<f64>, Vec<f64>, Mat<f64>) {
         let (first, count) = (self.moments.first[candidate], self.moments.count[candidate]);
-        let over_parts = |of: &dyn Fn(&FoldMoments) -> f64| -> f64 {
-            self.parts.iter().map(|(part, sign)| sign * of(part)).sum()
-        };
-        let mut own = Mat::from_fn(count, count, |k, l| {
-            over_parts(&|part| part.own[candidate][(k, l)])
-        });
-        let mut g: Vec<f64> = (0..count)
-            .map(|k| over_parts(&|part| part.cross_y[first + k]))
-            .collect();
+        let over_parts =
+            |of: &dyn Fn(&FoldMoments) -> f64| -> f64 { self.parts.iter().map(|(part, sign)| sign * of(part)).sum() };
+        let mut own = Mat::from_fn(count, count, |k, l| over_parts(&|part| part.own[candidate][(k, l)]));
+        let mut g: Vec<f64> = (0..count).map(|k| over_parts(&|part| part.cross_y[first + k])).collect();
         // A difference at the rounding level counts as zero.
         let whole = &self.moments.whole.own[candidate];
         for k in 0..count {
@@ -220,9 +187,7 @@ impl<'m> TrainedModel<'m> {
                 g[k] = 0.0;
             }
         }
-        let d = Mat::from_fn(count, count, |k, l| {
-            own[(k, l)] - dot(beside.cross(k), beside.solved(l))
-        });
+        let d = Mat::from_fn(count, count, |k, l| own[(k, l)] - dot(beside.cross(k), beside.solved(l)));
         for k in 0..count {
             g[k] -= dot(beside.solved(k), &self.base_y);
         }
@@ -231,31 +196,20 @@ impl<'m> TrainedModel<'m> {
 
     /// The decrease of the sum of squares by the model, priors included.
     pub fn explained(&self) -> f64 {
-        self.base_y
-            .iter()
-            .zip(&self.coefficients)
-            .map(|(y, c)| y * c)
-            .sum()
+        self.base_y.iter().zip(&self.coefficients).map(|(y, c)| y * c).sum()
     }
 
-    /// The degrees of freedom of a candidate's gain: its observable directions and its tuned shape numbers. Without the latter,
-    /// tunable candidates would be preferred.
+    /// The degrees of freedom of a candidate's gain: its observable directions and its tuned shape numbers. Without the
+    /// latter, tunable candidates would be preferred.
     fn freedom(&self, candidate: usize, observable: usize) -> usize {
-        if observable == 0 {
-            0
-        } else {
-            observable + self.moments.numbers[candidate]
-        }
+        if observable == 0 { 0 } else { observable + self.moments.numbers[candidate] }
     }
 
     /// The gain of a candidate.
     pub fn gain(&self, candidate: usize) -> Gain {
         let (d, g, own) = self.projected(candidate);
         let inverse = ObservableSubspace::of(&d, &own);
-        Gain {
-            gain: inverse.quadratic(&g),
-            freedom: self.freedom(candidate, inverse.freedom),
-        }
+        Gain { gain: inverse.quadratic(&g), freedom: self.freedom(candidate, inverse.freedom) }
     }
 
     /// The gains of all candidates.
@@ -265,20 +219,14 @@ impl<'m> TrainedModel<'m> {
 
     /// The gains of all candidates. `known` are those of the first candidates with the same model.
     pub fn remaining_gains(&self, mut known: Vec<Gain>) -> Vec<Gain> {
-        known.par_extend(
-            (known.len()..self.moments.count.len())
-                .into_par_iter()
-                .map(|candidate| self.gain(candidate)),
-        );
+        known.par_extend((known.len()..self.moments.count.len()).into_par_iter().map(|candidate| self.gain(candidate)));
         known
     }
 
     /// The best score of each null draw over all candidates. `costs` and `variance` are those of the real search.
     pub fn null_best(&self, costs: &[f64], variance: f64) -> Vec<f64> {
         let draws = self.moments.null_cross.nrows();
-        let h = Mat::from_fn(draws, self.base.len(), |d, i| {
-            self.moments.null_base[(self.base[i], d)]
-        });
+        let h = Mat::from_fn(draws, self.base.len(), |d, i| self.moments.null_base[(self.base[i], d)]);
         let per_chunk: Vec<Vec<f64>> = (0..costs.len())
             .collect::<Vec<_>>()
             .par_chunks(64)
@@ -297,8 +245,7 @@ impl<'m> TrainedModel<'m> {
                     let modelled = &h * beside.all_solved();
                     for draw in 0..draws {
                         g.clear();
-                        let left =
-                            |k: usize| self.moments.null_cross[(draw, first + k)] - modelled[(draw, k)];
+                        let left = |k: usize| self.moments.null_cross[(draw, first + k)] - modelled[(draw, k)];
                         g.extend((0..count).map(left));
                         let gain = inverse.quadratic(&g) / variance;
                         // The tail is computed only if it can exceed the best score.
@@ -319,8 +266,8 @@ impl<'m> TrainedModel<'m> {
         best
     }
 
-    /// The share of a signature that a candidate can reproduce in addition to the model: `cos²` of the angle between the two. The
-    /// signature is given by coefficients of base columns that are not in this model.
+    /// The share of a signature that a candidate can reproduce in addition to the model: `cos²` of the angle between
+    /// the two. The signature is given by coefficients of base columns that are not in this model.
     pub fn explained_by_signature(&self, candidate: usize, signature: &[(usize, f64)]) -> f64 {
         let (d, _, own) = self.projected(candidate);
         let (first, count) = (self.moments.first[candidate], self.moments.count[candidate]);
@@ -346,21 +293,14 @@ impl<'m> TrainedModel<'m> {
         }
         let inverse = ObservableSubspace::of(&d, &own);
         let projected = length - self.model_share(&gram_with);
-        if projected <= 0.0 {
-            0.0
-        } else {
-            (inverse.quadratic(&g) / projected).clamp(0.0, 1.0)
-        }
+        if projected <= 0.0 { 0.0 } else { (inverse.quadratic(&g) / projected).clamp(0.0, 1.0) }
     }
 
     /// `gᵀ (XᵀX)⁻¹ g`.
     fn model_share(&self, gram_with: &[f64]) -> f64 {
         let m = self.base.len();
         let quadratic = |i: usize, j: usize| gram_with[i] * self.inverse[(i, j)] * gram_with[j];
-        (0..m)
-            .flat_map(|i| (0..m).map(move |j| (i, j)))
-            .map(|(i, j)| quadratic(i, j))
-            .sum()
+        (0..m).flat_map(|i| (0..m).map(move |j| (i, j))).map(|(i, j)| quadratic(i, j)).sum()
     }
 
     /// Coefficients of the model's base columns and of a candidate's columns if the candidate is added.
@@ -370,11 +310,7 @@ impl<'m> TrainedModel<'m> {
         let beside = self.beside(candidate);
         let of_model = (0..self.base.len())
             .map(|i| {
-                let shift: f64 = of_candidate
-                    .iter()
-                    .enumerate()
-                    .map(|(k, c)| beside.solved(k)[i] * c)
-                    .sum();
+                let shift: f64 = of_candidate.iter().enumerate().map(|(k, c)| beside.solved(k)[i] * c).sum();
                 self.coefficients[i] - shift
             })
             .collect();

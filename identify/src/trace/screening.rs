@@ -1,5 +1,5 @@
-//! Screens the library for a session: which effects apply to its readings, and which are observable in addition to the declared
-//! parameters.
+//! Screens the library for a session: which effects apply to its readings, and which are observable in addition to the
+//! declared parameters.
 
 use abbe_model::session::Session;
 use faer::Mat;
@@ -30,10 +30,7 @@ pub struct ScreenedEffect {
 ///
 /// # Errors
 /// If the session cannot be fitted.
-pub fn screened_effects(
-    session: &Session,
-    options: &TraceOptions,
-) -> Result<Vec<ScreenedEffect>, IdentifyError> {
+pub fn screened_effects(session: &Session, options: &TraceOptions) -> Result<Vec<ScreenedEffect>, IdentifyError> {
     let (problem, fit) = prepare(session, options.seed)?;
     let columns = Columns::new(&problem, &fit.beta);
     let start = Start::of(&problem, &columns, &fit)?;
@@ -41,15 +38,8 @@ pub fn screened_effects(
     let searched = searched_candidates(&problem, &columns, options)?;
     let (candidates, column_sets): (Vec<Candidate>, Vec<EffectColumns>) = searched.into_iter().unzip();
     let none = Mat::zeros(columns.rows(), 0);
-    let moments = Moments::new(
-        &columns,
-        &column_sets,
-        start.model,
-        &start.residual,
-        none,
-        &|| true,
-    )
-    .ok_or(IdentifyError::Interrupted)?;
+    let moments = Moments::new(&columns, &column_sets, start.model, &start.residual, none, &|| true)
+        .ok_or(IdentifyError::Interrupted)?;
     let rank = moments.base();
     let folds = (0..columns.fold_rows.len()).collect();
     let trained = TrainedModel::new(&moments, &prior, (0..rank).collect(), folds)?;
@@ -64,7 +54,8 @@ pub fn screened_effects(
         .collect())
 }
 
-/// The requested candidates for which the data have driver values, in the order of the library, with their basis columns.
+/// The requested candidates for which the data have driver values, in the order of the library, with their basis
+/// columns.
 ///
 /// # Errors
 /// If a requested string occurs in no identifier: a misspelt string would otherwise look like an absent effect.
@@ -92,27 +83,17 @@ pub(super) fn searched_candidates(
 }
 
 /// A warning for each exclusion that matches no candidate.
-pub(super) fn unused_exclusions(
-    problem: &Problem<'_>,
-    options: &TraceOptions,
-) -> Result<Vec<String>, IdentifyError> {
+pub(super) fn unused_exclusions(problem: &Problem<'_>, options: &TraceOptions) -> Result<Vec<String>, IdentifyError> {
     let candidates = library::candidates(problem)?;
     Ok(matching_no_candidate(&candidates, &options.exclude)
-        .map(|text| {
-            format!("`{text}` excludes nothing: no candidate of this session has it in its identifier")
-        })
+        .map(|text| format!("`{text}` excludes nothing: no candidate of this session has it in its identifier"))
         .collect())
 }
 
 /// The texts that occur in no candidate's identifier.
-fn matching_no_candidate<'t>(
-    candidates: &[Candidate],
-    texts: &'t [String],
-) -> impl Iterator<Item = &'t String> {
+fn matching_no_candidate<'t>(candidates: &[Candidate], texts: &'t [String]) -> impl Iterator<Item = &'t String> {
     let ids: Vec<String> = candidates.iter().map(|candidate| candidate.effect.id()).collect();
-    texts
-        .iter()
-        .filter(move |text| !ids.iter().any(|id| id.contains(text.as_str())))
+    texts.iter().filter(move |text| !ids.iter().any(|id| id.contains(text.as_str())))
 }
 
 fn is_requested(options: &TraceOptions, id: &str) -> bool {

@@ -14,9 +14,9 @@ use crate::results::{AlternativeResult, EffectResult, SeparatingTestResult, Sepa
 /// Maximum number of aliases that are compared with an effect, the nearest first. Each alias adds columns.
 const MAX_COMPARED_TESTS: usize = 24;
 
-/// Adds to each found effect the candidate tests that separate it from its aliases. Adds nothing if there are no candidate tests
-/// for the session's instrument. If `progress` returns `false`, the trace is marked as interrupted and keeps the tests found so
-/// far.
+/// Adds to each found effect the candidate tests that separate it from its aliases. Adds nothing if there are no
+/// candidate tests for the session's instrument. If `progress` returns `false`, the trace is marked as interrupted and
+/// keeps the tests found so far.
 ///
 /// # Errors
 /// If the basis columns of an effect cannot be computed for the session.
@@ -31,12 +31,7 @@ pub fn separate_aliases(
     let interrupt = Interrupt(progress);
     for k in 0..trace.effects.len() {
         match interrupt.check().and_then(|()| tests_for(trace, k, variations)) {
-            Ok(tests) => fill_in(
-                &mut trace.result.effects[k],
-                &trace.alias_effects[k],
-                trace.after.session,
-                tests,
-            ),
+            Ok(tests) => fill_in(&mut trace.result.effects[k], &trace.alias_effects[k], trace.after.session, tests),
             Err(IdentifyError::Request(_)) => break,
             Err(IdentifyError::Interrupted) => break,
             Err(error) => return Err(error),
@@ -57,21 +52,12 @@ fn tests_for(
     let number = trace.before.parameters.effects.len() + k;
     let is_own = |role: &Role| matches!(role, Role::Coefficient { effect, .. } if *effect == number);
     let parameters = trace.after.parameters.list.iter().zip(&trace.after_fit.beta);
-    let coefficients: Vec<f64> = parameters
-        .filter(|(parameter, _)| is_own(&parameter.role))
-        .map(|(_, value)| *value)
-        .collect();
+    let coefficients: Vec<f64> =
+        parameters.filter(|(parameter, _)| is_own(&parameter.role)).map(|(_, value)| *value).collect();
     let aliases = &trace.alias_effects[k];
     let weighed = &aliases[..aliases.len().min(MAX_COMPARED_TESTS)];
     let beta = &trace.after_fit.beta;
-    separating_tests(
-        &trace.after,
-        beta,
-        &trace.effects[k],
-        &coefficients,
-        weighed,
-        variations,
-    )
+    separating_tests(&trace.after, beta, &trace.effects[k], &coefficients, weighed, variations)
 }
 
 /// Writes tests into an effect's result.

@@ -1,7 +1,7 @@
 //! The start of a search: the fitted model in orthonormal columns, priors included.
 //!
-//! `J` is the Jacobian, `V` the basis of the identifiable directions, and `R` the triangular factor of `J V` with its prior rows.
-//! The columns are `J V R⁻¹`. Normal equations over orthonormal columns lose no precision.
+//! `J` is the Jacobian, `V` the basis of the identifiable directions, and `R` the triangular factor of `J V` with its
+//! prior rows. The columns are `J V R⁻¹`. Normal equations over orthonormal columns lose no precision.
 
 use faer::Mat;
 
@@ -44,13 +44,7 @@ impl Start {
         let (of_prior, prior_residual, _) = prior.parts();
         let prior_rows = &of_prior * &to_parameters;
         debug_assert_eq!(model.ncols(), rank);
-        Ok(Start {
-            model,
-            residual,
-            to_parameters,
-            prior_rows,
-            prior_residual,
-        })
+        Ok(Start { model, residual, to_parameters, prior_rows, prior_residual })
     }
 
     /// The same model and residual without whitening.
@@ -65,9 +59,7 @@ impl Start {
         let base = rows.as_ref().subcols(0, parameters) * &self.to_parameters;
         Ok(UnwhitenedModel {
             base: Mat::from_fn(base.nrows(), base.ncols(), |i, j| base[(i, j)] / sigma_mm),
-            residual: (0..rows.nrows())
-                .map(|i| rows[(i, parameters)] / sigma_mm)
-                .collect(),
+            residual: (0..rows.nrows()).map(|i| rows[(i, parameters)] / sigma_mm).collect(),
             folds: columns.unwhitened_folds(),
             units: columns.unwhitened_units(),
             sigma_mm,
@@ -97,11 +89,7 @@ fn inverse_of_triangle(r: &Mat<f64>) -> Mat<f64> {
         for i in (0..=column).rev() {
             let unit = if i == column { 1.0 } else { 0.0 };
             let sum: f64 = (i + 1..=column).map(|k| r[(i, k)] * inverse[(k, column)]).sum();
-            inverse[(i, column)] = if r[(i, i)] != 0.0 {
-                (unit - sum) / r[(i, i)]
-            } else {
-                0.0
-            };
+            inverse[(i, column)] = if r[(i, i)] != 0.0 { (unit - sum) / r[(i, i)] } else { 0.0 };
         }
     }
     inverse

@@ -1,12 +1,13 @@
-//! Exchanges that a purely additive search misses: a wrong effect in place of the true one, and one effect in place of a pair.
+//! Exchanges that a purely additive search misses: a wrong effect in place of the true one, and one effect in place of
+//! a pair.
 //!
-//! Each effect is exchanged for a candidate that explains clearly more together with the others. When no addition is significant,
-//! effects with tunable shape numbers or positions are tuned again together with each of the next best candidates. A step table
-//! or a warm-up with a free time constant can absorb most of a second effect. The second effect becomes significant only when
-//! both are in the model.
+//! Each effect is exchanged for a candidate that explains clearly more together with the others. When no addition is
+//! significant, effects with tunable shape numbers or positions are tuned again together with each of the next best
+//! candidates. A step table or a warm-up with a free time constant can absorb most of a second effect. The second
+//! effect becomes significant only when both are in the model.
 //!
-//! Pairs of effects are also searched jointly as replacements of two effects or of one. If two effects partly cancel each other,
-//! neither is significant alone, and the search finds a single effect that approximates both.
+//! Pairs of effects are also searched jointly as replacements of two effects or of one. If two effects partly cancel
+//! each other, neither is significant alone, and the search finds a single effect that approximates both.
 
 use std::collections::HashSet;
 
@@ -41,7 +42,8 @@ struct SetComparison {
     chosen: Vec<usize>,
     /// The score that readings without structure exceed with the probability of the significance level.
     threshold: f64,
-    /// The value that a set has to exceed: the best value so far, at first that of the selected set plus the confounding margin.
+    /// The value that a set has to exceed: the best value so far, at first that of the selected set plus the
+    /// confounding margin.
     most: f64,
     /// The best set that exceeds it.
     best: Option<Vec<usize>>,
@@ -65,8 +67,8 @@ impl Search<'_> {
         self.note_held_out()
     }
 
-    /// Exchanges one effect for a candidate that explains clearly more together with the others. The improvement has to exceed the
-    /// confounding margin, so that exchanges end.
+    /// Exchanges one effect for a candidate that explains clearly more together with the others. The improvement has to
+    /// exceed the confounding margin, so that exchanges end.
     fn exchange_one(&mut self, branch: usize, k: usize) -> Result<(), IdentifyError> {
         let SearchBranch { folds, .. } = self.branches[branch].clone();
         let mut others = self.branches[branch].chosen();
@@ -90,16 +92,15 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Tunes effects with shape numbers or positions again together with each of the next best candidates, in addition to the
-    /// others or in place of one. Selects the best of these sets if it has clearly more evidence than the present one. Returns
-    /// whether the search on all readings changed.
+    /// Tunes effects with shape numbers or positions again together with each of the next best candidates, in addition
+    /// to the others or in place of one. Selects the best of these sets if it has clearly more evidence than the
+    /// present one. Returns whether the search on all readings changed.
     pub fn retune_all(&mut self) -> Result<bool, IdentifyError> {
         if self.stop.in_residual_variance {
             return Ok(false);
         }
-        let changed: Vec<bool> = (0..self.branches.len())
-            .map(|branch| self.retune_one(branch))
-            .collect::<Result<_, _>>()?;
+        let changed: Vec<bool> =
+            (0..self.branches.len()).map(|branch| self.retune_one(branch)).collect::<Result<_, _>>()?;
         self.note_held_out()?;
         Ok(changed[ALL])
     }
@@ -141,8 +142,8 @@ impl Search<'_> {
         Ok(self.replace(branch, comparison.best))
     }
 
-    /// Searches two effects jointly in place of one or two, and selects the best pair if it has clearly more evidence. Returns
-    /// whether the search on all readings changed.
+    /// Searches two effects jointly in place of one or two, and selects the best pair if it has clearly more evidence.
+    /// Returns whether the search on all readings changed.
     pub fn exchange_pairs(&mut self) -> Result<bool, IdentifyError> {
         if self.stop.in_residual_variance {
             return Ok(false);
@@ -164,24 +165,14 @@ impl Search<'_> {
         };
         let SetComparison { folds, chosen, .. } = comparison.clone();
         let places = 0..chosen.len();
-        let removed = places
-            .clone()
-            .flat_map(|i| places.clone().filter(move |j| i <= *j).map(move |j| (i, j)));
+        let removed = places.clone().flat_map(|i| places.clone().filter(move |j| i <= *j).map(move |j| (i, j)));
         for (i, j) in removed {
             if i == j && chosen.len() >= self.stop.max_effects {
                 continue;
             }
-            let base: Vec<usize> = places
-                .clone()
-                .filter(|k| *k != i && *k != j)
-                .map(|k| chosen[k])
-                .collect();
+            let base: Vec<usize> = places.clone().filter(|k| *k != i && *k != j).map(|k| chosen[k]).collect();
             let in_place_of_two = i != j && branch == ALL;
-            let count = if in_place_of_two {
-                MAX_FIRST_MEMBERS
-            } else {
-                FEW_FIRST_MEMBERS
-            };
+            let count = if in_place_of_two { MAX_FIRST_MEMBERS } else { FEW_FIRST_MEMBERS };
             let firsts = self.untunable_candidates(&base, &folds, count)?;
             self.add_to_base(&firsts);
             for first in firsts {
@@ -209,15 +200,12 @@ impl Search<'_> {
         Ok(self.replace(branch, comparison.best))
     }
 
-    /// Replaces the selected effects by a set, if there is one. The largest p-value of the replaced effects applies to all of the
-    /// set. Returns whether the effects were replaced.
+    /// Replaces the selected effects by a set, if there is one. The largest p-value of the replaced effects applies to
+    /// all of the set. Returns whether the effects were replaced.
     fn replace(&mut self, branch: usize, set: Option<Vec<usize>>) -> bool {
         let Some(set) = set else { return false };
         let selected = &mut self.branches[branch].selected;
-        let p_value = selected
-            .iter()
-            .map(|selected| selected.p_value)
-            .fold(0.0, f64::max);
+        let p_value = selected.iter().map(|selected| selected.p_value).fold(0.0, f64::max);
         let retuned = |candidate: usize| SelectedEffect { candidate, p_value };
         *selected = set.into_iter().map(retuned).collect();
         true
@@ -232,8 +220,7 @@ impl Search<'_> {
         }
         Ok(Some(SetComparison {
             threshold: self.thresholds.last().copied().unwrap_or(f64::INFINITY),
-            most: self.evidence_of(&chosen, &[], &folds)? - self.description_length(&chosen)
-                + INDISTINGUISHABLE,
+            most: self.evidence_of(&chosen, &[], &folds)? - self.description_length(&chosen) + INDISTINGUISHABLE,
             best: None,
             folds,
             chosen,
@@ -241,32 +228,22 @@ impl Search<'_> {
     }
 
     /// Whether one effect of a set scores at least the null threshold in addition to the others.
-    fn is_significant_in(
-        &self,
-        one: usize,
-        set: &[usize],
-        comparison: &SetComparison,
-    ) -> Result<bool, IdentifyError> {
+    fn is_significant_in(&self, one: usize, set: &[usize], comparison: &SetComparison) -> Result<bool, IdentifyError> {
         let others: Vec<usize> = set.iter().copied().filter(|c| *c != one).collect();
         let model = self.projection_of(&others, &comparison.folds)?;
         Ok(self.score(one, &model.gain(one), self.variance(&model)) >= comparison.threshold)
     }
 
-    /// Effects without tunable shape numbers or positions that have a positive score in addition to some others, best first. Of
-    /// equivalent effects one is kept.
-    fn untunable_candidates(
-        &self,
-        base: &[usize],
-        folds: &[usize],
-        most: usize,
-    ) -> Result<Vec<usize>, IdentifyError> {
+    /// Effects without tunable shape numbers or positions that have a positive score in addition to some others, best
+    /// first. Of equivalent effects one is kept.
+    fn untunable_candidates(&self, base: &[usize], folds: &[usize], most: usize) -> Result<Vec<usize>, IdentifyError> {
         let mut ranked = self.ranked(base, folds, |candidate| !self.is_tunable(candidate))?;
         ranked.truncate(most);
         Ok(ranked)
     }
 
-    /// The candidates with a positive score in addition to some effects, restricted to those that `accepts` accepts, best first.
-    /// Of equivalent candidates one is kept. `accepts` is called in order of decreasing score.
+    /// The candidates with a positive score in addition to some effects, restricted to those that `accepts` accepts,
+    /// best first. Of equivalent candidates one is kept. `accepts` is called in order of decreasing score.
     fn ranked(
         &self,
         base: &[usize],
@@ -283,9 +260,7 @@ impl Search<'_> {
             .collect();
         scored.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         scored.retain(|(c, _)| accepts(*c));
-        scored.dedup_by(|a, b| {
-            (a.1 - b.1).abs() < EQUIVALENT * b.1.abs() && gains[a.0].freedom == gains[b.0].freedom
-        });
+        scored.dedup_by(|a, b| (a.1 - b.1).abs() < EQUIVALENT * b.1.abs() && gains[a.0].freedom == gains[b.0].freedom);
         Ok(scored.into_iter().map(|(c, _)| c).collect())
     }
 
@@ -300,25 +275,14 @@ impl Search<'_> {
     /// The best candidates in addition to some effects: one for each identifier, and one of equivalent candidates.
     fn next_best(&self, base: &[usize], but: usize, folds: &[usize]) -> Result<Vec<usize>, IdentifyError> {
         let mut ids: HashSet<String> = HashSet::from([self.candidates[but].effect.id()]);
-        let mut ranked = self.ranked(base, folds, |candidate| {
-            ids.insert(self.candidates[candidate].effect.id())
-        })?;
-        let most = if self.has_all_folds(folds) {
-            MAX_TRIED
-        } else {
-            MAX_TRIED_WITHOUT_A_FOLD
-        };
+        let mut ranked = self.ranked(base, folds, |candidate| ids.insert(self.candidates[candidate].effect.id()))?;
+        let most = if self.has_all_folds(folds) { MAX_TRIED } else { MAX_TRIED_WITHOUT_A_FOLD };
         ranked.truncate(most);
         Ok(ranked)
     }
 
     /// An effect with the shape numbers or positions that are best together with others.
-    fn retuned(
-        &mut self,
-        tunable: usize,
-        beside: &[usize],
-        folds: &[usize],
-    ) -> Result<Option<usize>, IdentifyError> {
+    fn retuned(&mut self, tunable: usize, beside: &[usize], folds: &[usize]) -> Result<Option<usize>, IdentifyError> {
         let fresh = {
             let model = self.projection_of(beside, folds)?;
             let original = &self.candidates[tunable];
@@ -327,10 +291,7 @@ impl Search<'_> {
             } else {
                 let before = model.gain(tunable).gain;
                 match refine::refine(self, &model, original, before) {
-                    Some(effect) => Some(Candidate {
-                        effect,
-                        ..original.clone()
-                    }),
+                    Some(effect) => Some(Candidate { effect, ..original.clone() }),
                     None => return Ok(Some(tunable)),
                 }
             }
@@ -341,9 +302,7 @@ impl Search<'_> {
     /// The best step table of an effect's dictionary for addition to a model.
     fn best_step_table(&self, model: &TrainedModel<'_>, id: &str) -> Option<Candidate> {
         let dictionary = self.candidates.iter().position(|candidate| {
-            candidate.dictionary
-                && candidate.effect.id() == id
-                && matches!(candidate.effect.shape, Shape::Steps { .. })
+            candidate.dictionary && candidate.effect.id() == id && matches!(candidate.effect.shape, Shape::Steps { .. })
         })?;
         let variance = self.variance(model);
         let composed = compose::best_step_table(model, dictionary, &self.candidates[dictionary], variance)?;

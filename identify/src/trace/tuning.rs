@@ -43,8 +43,7 @@ impl TunedEffect {
             own: Mat::zeros(column_set.count, column_set.count),
             with_y: Mat::zeros(column_set.count, 1),
         };
-        for stretch in columns.moved_stretches(std::slice::from_ref(column_set), model.folds.iter().copied())
-        {
+        for stretch in columns.moved_stretches(std::slice::from_ref(column_set), model.folds.iter().copied()) {
             let (start, count) = (stretch.start, stretch.len());
             let fresh = rows.as_ref().subrows(start, count);
             let present = moments.base_columns().subrows(start, count);
@@ -65,7 +64,8 @@ impl TunedEffect {
         self.products.gain(model)
     }
 
-    /// The gain with column `column` replaced by the column of `other`. `stretches` are the rows that the model is trained on.
+    /// The gain with column `column` replaced by the column of `other`. `stretches` are the rows that the model is
+    /// trained on.
     pub fn gain_with(
         &self,
         column: usize,
@@ -84,21 +84,14 @@ impl TunedEffect {
 
     fn exchanged(&self, column: usize, other: &TunedEffect, stretches: &[Range<usize>]) -> EffectProducts {
         let mut products = self.products.clone();
-        products
-            .cross
-            .col_mut(column)
-            .copy_from(other.products.cross.col(0));
+        products.cross.col_mut(column).copy_from(other.products.cross.col(0));
         products.with_y[(column, 0)] = other.products.with_y[(0, 0)];
         for k in 0..self.rows.ncols() {
             let with_other = |rows: &Range<usize>| {
                 let (own, other) = (self.rows.col(k), other.rows.col(0));
                 own.subrows(rows.start, rows.len()).transpose() * other.subrows(rows.start, rows.len())
             };
-            let product = if k == column {
-                other.products.own[(0, 0)]
-            } else {
-                stretches.iter().map(with_other).sum()
-            };
+            let product = if k == column { other.products.own[(0, 0)] } else { stretches.iter().map(with_other).sum() };
             products.own[(k, column)] = product;
             products.own[(column, k)] = product;
         }
@@ -114,9 +107,7 @@ impl EffectProducts {
             let terms = (0..model.base.len()).map(|i| solved[(i, k)] * model.base_y[i]);
             terms.sum()
         };
-        let g: Vec<f64> = (0..d.nrows())
-            .map(|k| self.with_y[(k, 0)] - modelled(k))
-            .collect();
+        let g: Vec<f64> = (0..d.nrows()).map(|k| self.with_y[(k, 0)] - modelled(k)).collect();
         quadratic_gain(&d, &self.own, &g)
     }
 }

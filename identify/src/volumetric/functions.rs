@@ -64,11 +64,9 @@ impl Form {
                 let x = q / scale;
                 coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c)
             }
-            Form::Harmonic {
-                period,
-                amplitude,
-                phase,
-            } => amplitude * (std::f64::consts::TAU * q / period + phase).cos(),
+            Form::Harmonic { period, amplitude, phase } => {
+                amplitude * (std::f64::consts::TAU * q / period + phase).cos()
+            }
         }
     }
 }
@@ -156,8 +154,8 @@ struct HarmonicEntry {
 /// Several functions of one error are summed.
 ///
 /// # Errors
-/// If the file cannot be read, is not of this form, holds a number beyond [`limits::LARGEST`], or names something that the machine lacks.
-/// The message names the file and the entry.
+/// If the file cannot be read, is not of this form, holds a number beyond [`limits::LARGEST`], or names something that
+/// the machine lacks. The message names the file and the entry.
 pub fn read(path: &Path, machine: &Machine) -> Result<Vec<ErrorFunction>, IdentifyError> {
     let fault = |message: String| IdentifyError::Request(format!("{}: {message}", path.display()));
     let text = files::text(path, "the file of error functions")?;
@@ -215,13 +213,8 @@ fn function(machine: &Machine, entry: &FunctionEntry) -> Result<ErrorFunction, S
         }
         (None, Some(polynomial), None) => {
             let single = |value: Option<f64>| value.map(|value| vec![value]);
-            let scale = position(
-                kind,
-                single(polynomial.scale_mm),
-                single(polynomial.scale_deg),
-                "scale",
-            )?
-            .map_or(1.0, |scale| scale[0]);
+            let scale = position(kind, single(polynomial.scale_mm), single(polynomial.scale_deg), "scale")?
+                .map_or(1.0, |scale| scale[0]);
             if scale <= 0.0 {
                 return Err("the scale of a polynomial must be above 0".into());
             }
@@ -230,36 +223,24 @@ fn function(machine: &Machine, entry: &FunctionEntry) -> Result<ErrorFunction, S
         }
         (None, None, Some(harmonic)) => {
             let single = |value: Option<f64>| value.map(|value| vec![value]);
-            let period = position(
-                kind,
-                single(harmonic.period_mm),
-                single(harmonic.period_deg),
-                "period",
-            )?;
+            let period = position(kind, single(harmonic.period_mm), single(harmonic.period_deg), "period")?;
             check_finite(harmonic.order.as_slice())?;
             let period = match (period, harmonic.order, kind) {
                 (Some(period), None, _) => period[0],
                 (None, Some(order), AxisKind::Rotary) => std::f64::consts::TAU / order,
                 _ => {
                     return Err(
-                        "a harmonic needs either a `period_…` or, over a rotary axis, an `order` (cycles per turn)".into(),
+                        "a harmonic needs either a `period_…` or, over a rotary axis, an `order` (cycles per turn)"
+                            .into(),
                     );
                 }
             };
             if period.is_nan() || period <= 0.0 || period.is_infinite() {
                 return Err("the period of a harmonic must be a length or an angle above 0".into());
             }
-            let amplitude = values(
-                angle,
-                single(harmonic.amplitude_um),
-                single(harmonic.amplitude_arcsec),
-            )?;
+            let amplitude = values(angle, single(harmonic.amplitude_um), single(harmonic.amplitude_arcsec))?;
             check_finite(&[harmonic.phase_deg])?;
-            Form::Harmonic {
-                period,
-                amplitude: amplitude[0],
-                phase: harmonic.phase_deg.to_radians(),
-            }
+            Form::Harmonic { period, amplitude: amplitude[0], phase: harmonic.phase_deg.to_radians() }
         }
         _ => return Err("give exactly one of `table`, `polynomial` and `harmonic`".into()),
     };
@@ -269,9 +250,7 @@ fn function(machine: &Machine, entry: &FunctionEntry) -> Result<ErrorFunction, S
 /// Slot and axis of an error, and whether it is an angle.
 fn error_slot_of(machine: &Machine, id: &str) -> Result<(usize, usize, bool), String> {
     let Some(name) = ErrorName::parse(id) else {
-        return Err(format!(
-            "`{id}` is not the name of an error; use ISO 230-1 names such as EXX, EB0A"
-        ));
+        return Err(format!("`{id}` is not the name of an error; use ISO 230-1 names such as EXX, EB0A"));
     };
     let Some(slot) = machine.error_slot(&name) else {
         return Err(no_axis(machine, &name.axis));
@@ -279,19 +258,14 @@ fn error_slot_of(machine: &Machine, id: &str) -> Result<(usize, usize, bool), St
     let axis = slot / ERRORS_PER_AXIS;
     let angle = name.freedom.is_angle();
     if machine.axes[axis].kind == AxisKind::Linear && name.kind == ErrorKind::Location && !angle {
-        return Err(format!(
-            "`{id}`: a linear axis has squareness errors (angles) but no position errors"
-        ));
+        return Err(format!("`{id}`: a linear axis has squareness errors (angles) but no position errors"));
     }
     Ok((slot, axis, angle))
 }
 
 fn no_axis(machine: &Machine, name: &str) -> String {
     let axes: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
-    format!(
-        "the machine has no axis `{name}`; its axes are {}",
-        axes.join(", ")
-    )
+    format!("the machine has no axis `{name}`; its axes are {}", axes.join(", "))
 }
 
 fn unit_suffix(kind: AxisKind) -> &'static str {
@@ -309,36 +283,24 @@ fn position(
 ) -> Result<Option<Vec<f64>>, String> {
     let (right, wrong) = match kind {
         AxisKind::Linear => (mm, deg),
-        AxisKind::Rotary => (
-            deg.map(|list| list.into_iter().map(f64::to_radians).collect()),
-            mm,
-        ),
+        AxisKind::Rotary => (deg.map(|list| list.into_iter().map(f64::to_radians).collect()), mm),
     };
     if wrong.is_some() {
-        return Err(format!(
-            "`{id_stem}_{}` is expected for this axis",
-            unit_suffix(kind)
-        ));
+        return Err(format!("`{id_stem}_{}` is expected for this axis", unit_suffix(kind)));
     }
     check_finite(right.as_deref().unwrap_or_default())?;
     Ok(right)
 }
 
 fn values(angle: bool, um: Option<Vec<f64>>, arcsec: Option<Vec<f64>>) -> Result<Vec<f64>, String> {
-    let (right, wrong, display_per_internal, word) = if angle {
-        (arcsec, um, ARCSEC, "arcsec")
-    } else {
-        (um, arcsec, 1e3, "um")
-    };
+    let (right, wrong, display_per_internal, word) =
+        if angle { (arcsec, um, ARCSEC, "arcsec") } else { (um, arcsec, 1e3, "um") };
     let values = match (right, wrong) {
         (Some(values), None) if !values.is_empty() => values,
         _ => return Err(format!("the values of this error must be in `{word}`")),
     };
     check_finite(&values)?;
-    Ok(values
-        .into_iter()
-        .map(|value| value / display_per_internal)
-        .collect())
+    Ok(values.into_iter().map(|value| value / display_per_internal).collect())
 }
 
 /// Checks that numbers are finite and within the limits of all files.

@@ -1,12 +1,14 @@
-//! The volumetric error: the deviation of the tool point from its nominal position in the table frame, anywhere in the workspace.
+//! The volumetric error: the deviation of the tool point from its nominal position in the table frame, anywhere in the
+//! workspace.
 //!
 //! ```text
 //! e(q) = T_w(q, E(q))⁻¹ T_t(q, E(q)) p − T_w(q)⁻¹ T_t(q) p
 //! ```
 //!
-//! The errors `E` are functions of the axes. Compensation computes commands `q′` at which the machine with errors is where the error-free
-//! machine is at `q`. Newton's iteration on the chain is `q′ ← q′ − J⁻¹ r`. `J` holds the motions of the tool over the table per motion of
-//! the linear axes, without errors. The errors change by a few parts in 10⁵ of the travel, so each step gains about four digits.
+//! The errors `E` are functions of the axes. Compensation computes commands `q′` at which the machine with errors is
+//! where the error-free machine is at `q`. Newton's iteration on the chain is `q′ ← q′ − J⁻¹ r`. `J` holds the motions
+//! of the tool over the table per motion of the linear axes, without errors. The errors change by a few parts in 10⁵ of
+//! the travel, so each step gains about four digits.
 
 pub mod functions;
 mod results;
@@ -67,12 +69,8 @@ impl MachineWithErrors<'_> {
     /// The tool point in the table frame, with errors or without.
     fn point(&self, positions: &[f64], with_errors: bool, only: Option<usize>) -> Vector3<f64> {
         let machine = self.machine;
-        let state: Vec<AxisPosition<f64>> = machine
-            .axes
-            .iter()
-            .zip(positions)
-            .map(|(axis, q)| AxisPosition::new(axis.kind, *q))
-            .collect();
+        let state: Vec<AxisPosition<f64>> =
+            machine.axes.iter().zip(positions).map(|(axis, q)| AxisPosition::new(axis.kind, *q)).collect();
         let errors = if with_errors {
             let mut slots = vec![0.0; machine.error_slots()];
             for function in self.functions {
@@ -107,9 +105,8 @@ impl MachineWithErrors<'_> {
     /// Axis positions in display units, mm or degrees.
     fn position_text(&self, positions: &[f64]) -> String {
         let axes = self.machine.axes.iter().zip(positions);
-        let each: Vec<String> = axes
-            .map(|(axis, q)| format!("{} {:.3}", axis.name, axis.kind.to_display(*q)))
-            .collect();
+        let each: Vec<String> =
+            axes.map(|(axis, q)| format!("{} {:.3}", axis.name, axis.kind.to_display(*q))).collect();
         each.join(", ")
     }
 
@@ -118,9 +115,8 @@ impl MachineWithErrors<'_> {
     /// # Errors
     /// If the linear axes do not span the space, or the iteration does not converge.
     pub fn compensate(&self, positions: &[f64]) -> Result<Compensated, IdentifyError> {
-        let linear: Vec<usize> = (0..self.machine.axes.len())
-            .filter(|axis| self.machine.axes[*axis].kind == AxisKind::Linear)
-            .collect();
+        let linear: Vec<usize> =
+            (0..self.machine.axes.len()).filter(|axis| self.machine.axes[*axis].kind == AxisKind::Linear).collect();
         let wanted = self.point(positions, false, None);
         // The nominal point is affine in the linear axes, so a difference over one millimetre is the derivative.
         let columns: Vec<Vector3<f64>> = linear
@@ -147,10 +143,7 @@ impl MachineWithErrors<'_> {
         for _ in 0..MAX_STEPS {
             let residual = self.point(&commands, true, None) - wanted;
             if residual.norm() <= CONVERGENCE_MM {
-                return Ok(Compensated {
-                    positions: commands,
-                    error_mm: residual.into(),
-                });
+                return Ok(Compensated { positions: commands, error_mm: residual.into() });
             }
             let step = &inverse * DVector::from_column_slice(residual.as_slice());
             for (axis, change) in linear.iter().zip(step.iter()) {
@@ -172,13 +165,9 @@ pub fn map(
     grid: &[Vec<f64>],
     compensate: bool,
 ) -> Result<(Vec<VolumetricPoint>, Summary), IdentifyError> {
-    let total = grid
-        .iter()
-        .try_fold(1_usize, |total, axis| total.checked_mul(axis.len()));
+    let total = grid.iter().try_fold(1_usize, |total, axis| total.checked_mul(axis.len()));
     let Some(total) = total.filter(|total| *total > 0 && *total <= MAX_POINTS) else {
-        return Err(IdentifyError::Request(format!(
-            "a map needs 1 to {MAX_POINTS} points"
-        )));
+        return Err(IdentifyError::Request(format!("a map needs 1 to {MAX_POINTS} points")));
     };
     let points: Vec<(VolumetricPoint, Vec<f64>)> = (0..total)
         .into_par_iter()
@@ -200,9 +189,7 @@ pub fn map(
             if compensate {
                 point.compensated = Some(machine_with_errors.compensate(&positions)?);
             }
-            let by_axis = (0..grid.len())
-                .map(|axis| norm(machine_with_errors.of_axis(&positions, axis)))
-                .collect();
+            let by_axis = (0..grid.len()).map(|axis| norm(machine_with_errors.of_axis(&positions, axis))).collect();
             Ok((point, by_axis))
         })
         // With several failures, the first one in grid order is reported, independent of threads.
@@ -210,9 +197,7 @@ pub fn map(
         .into_iter()
         .collect::<Result<_, _>>()?;
     let machine = machine_with_errors.machine;
-    let largest = points
-        .iter()
-        .max_by(|(a, _), (b, _)| norm(a.error_mm).total_cmp(&norm(b.error_mm)));
+    let largest = points.iter().max_by(|(a, _), (b, _)| norm(a.error_mm).total_cmp(&norm(b.error_mm)));
     let outside = |axis: usize, q: f64| match machine.axes[axis].kind {
         AxisKind::Linear => q,
         AxisKind::Rotary => q.to_degrees(),
@@ -238,11 +223,7 @@ pub fn map(
                 })
                 .collect()
         }),
-        coordinates: Coordinates {
-            x: coordinate(0),
-            y: coordinate(1),
-            z: coordinate(2),
-        },
+        coordinates: Coordinates { x: coordinate(0), y: coordinate(1), z: coordinate(2) },
         by_axis: machine
             .axes
             .iter()

@@ -20,10 +20,7 @@ impl Size {
             sum += length * length;
             count += 1;
         }
-        Size {
-            largest_um: largest * 1e3,
-            rms_um: (sum / f64::from(count.max(1))).sqrt() * 1e3,
-        }
+        Size { largest_um: largest * 1e3, rms_um: (sum / f64::from(count.max(1))).sqrt() * 1e3 }
     }
 }
 

@@ -1,13 +1,13 @@
-//! Compares every cell of docs/reference/effects.md with the exact chain: the response of each kind of test to each effect, and
-//! the aliases of each effect.
+//! Compares every cell of docs/reference/effects.md with the exact chain: the response of each kind of test to each
+//! effect, and the aliases of each effect.
 //!
 //! A section of the page contains a session and a table. Its columns are:
 //!
 //! - `effect`;
 //! - `in TEST`: amplitude by order of a full turn (`±` if it changes sign with the direction);
 //! - `rms in TEST`;
-//! - `aliases in TESTS` (`, one way`: forward runs alone; `, spindle ball known`): the effects that explain at least 90 % of the
-//!   square of the effect that remains after projection on the mounts.
+//! - `aliases in TESTS` (`, one way`: forward runs alone; `, spindle ball known`): the effects that explain at least 90
+//!   % of the square of the effect that remains after projection on the mounts.
 
 mod changes;
 mod page;
@@ -15,7 +15,9 @@ mod poses;
 
 use std::path::{Path, PathBuf};
 
-use abbe_model::effect::{Driver, Effect, Shape};
+use abbe_model::driver::Driver;
+use abbe_model::effect::shape::Warmup;
+use abbe_model::effect::{Effect, Shape};
 use abbe_model::files::{self, ReadOptions};
 use abbe_model::session::Session;
 use abbe_model::session::planned::planned_session;
@@ -37,10 +39,7 @@ const NOTHING: f64 = 2e-3;
 const MAX_ALIASES: usize = 6;
 
 fn workspace() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .unwrap()
-        .to_path_buf()
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_path_buf()
 }
 
 /// The session of a section. Its planned states are its readings, and its temperature rises by 1 K per hour.
@@ -50,18 +49,11 @@ fn session(toml: &str) -> Session {
     let sessions = format!("\"{}/sessions/", workspace().display());
     std::fs::write(&path, toml.replace("\"sessions/", &sessions)).unwrap();
     poses::write(folder.path(), &path);
-    let options = ReadOptions {
-        allow_outside: true,
-        ..ReadOptions::default()
-    };
+    let options = ReadOptions { allow_outside: true, ..ReadOptions::default() };
     let mut session = files::session(&path, &options).unwrap();
     let planned = planned_session(&session).unwrap();
     for (test, mut readings) in session.tests.iter_mut().zip(planned) {
-        readings.temperature_c = readings
-            .time_s
-            .iter()
-            .map(|time_s| 20.0 + time_s / 3600.0)
-            .collect();
+        readings.temperature_c = readings.time_s.iter().map(|time_s| 20.0 + time_s / 3600.0).collect();
         test.readings = Some(readings);
     }
     session
@@ -81,18 +73,10 @@ fn test_named(session: &Session, name: &str) -> usize {
 
 /// Amplitudes by order, for example `1: 0.71, ±2: 0.30`.
 fn orders(changes: &Changes, effect: usize, test: usize) -> String {
-    let coordinates = changes
-        .at
-        .iter()
-        .filter(|at| at.test == test)
-        .map(|at| at.coordinate)
-        .max();
+    let coordinates = changes.at.iter().filter(|at| at.test == test).map(|at| at.coordinate).max();
     let mut waves = Vec::new();
     for coordinate in 0..=coordinates.unwrap_or(0) {
-        for (sign, amplitudes) in ["", "±"]
-            .iter()
-            .zip(changes.orders(effect, test, coordinate, ORDERS))
-        {
+        for (sign, amplitudes) in ["", "±"].iter().zip(changes.orders(effect, test, coordinate, ORDERS)) {
             for (order, amplitude) in amplitudes.into_iter().enumerate() {
                 waves.push((coordinate, *sign, order, amplitude));
             }
@@ -107,17 +91,12 @@ fn orders(changes: &Changes, effect: usize, test: usize) -> String {
     for coordinate in 0..=coordinates.unwrap_or(0) {
         let own: Vec<_> = waves.iter().filter(|wave| wave.0 == coordinate).collect();
         let shown = own.iter().take(MAX_SHOWN);
-        let mut text: Vec<String> = shown
-            .map(|(_, sign, order, amplitude)| format!("{sign}{order}: {}", number(*amplitude)))
-            .collect();
+        let mut text: Vec<String> =
+            shown.map(|(_, sign, order, amplitude)| format!("{sign}{order}: {}", number(*amplitude))).collect();
         if own.len() > MAX_SHOWN {
             text.push("…".into());
         }
-        let letter = if coordinates == Some(2) {
-            ["x ", "y ", "z "][coordinate]
-        } else {
-            ""
-        };
+        let letter = if coordinates == Some(2) { ["x ", "y ", "z "][coordinate] } else { "" };
         if !text.is_empty() {
             parts.push(format!("{letter}{}", text.join(", ")));
         }
@@ -125,68 +104,36 @@ fn orders(changes: &Changes, effect: usize, test: usize) -> String {
     parts.join("; ")
 }
 
-/// The cell of an effect that follows time or temperature. Each reading is checked against the constant effect of the component
-/// times the time function, which this test computes itself.
-fn over_time(
-    changes: &Changes,
-    effects: &[Effect],
-    effect: usize,
-    wanted: &dyn Fn(&At) -> bool,
-) -> Option<String> {
+/// The cell of an effect that follows time or temperature. Each reading is checked against the constant effect of the
+/// component times the time function, which this test computes itself.
+fn over_time(changes: &Changes, effects: &[Effect], effect: usize, wanted: &dyn Fn(&At) -> bool) -> Option<String> {
     let own = &effects[effect];
     let grows = |time_s: f64, mean_k: f64| match own.shape {
         Shape::Drift => time_s / 3600.0,
-        Shape::Warmup { tau_s } => 1.0 - (-time_s / tau_s).exp(),
+        Shape::Warmup(Warmup { tau_s }) => 1.0 - (-time_s / tau_s).exp(),
         _ => time_s / 3600.0 - mean_k,
     };
     if !matches!(own.driver, Driver::Time | Driver::Temperature) {
         return None;
     }
-    let constant = effects
-        .iter()
-        .position(|other| other.component == own.component && other.shape == Shape::Constant);
+    let constant = effects.iter().position(|other| other.component == own.component && other.shape == Shape::Constant);
     let constant = constant.unwrap_or_else(|| panic!("{} has no row without its driver", own.id()));
-    let readings = || {
-        changes
-            .session
-            .tests
-            .iter()
-            .filter_map(|test| test.readings.as_ref())
-    };
-    let times: Vec<f64> = readings()
-        .flat_map(|r| {
-            r.time_s
-                .iter()
-                .flat_map(|t| std::iter::repeat_n(*t, r.coordinates))
-        })
-        .collect();
+    let readings = || changes.session.tests.iter().filter_map(|test| test.readings.as_ref());
+    let times: Vec<f64> =
+        readings().flat_map(|r| r.time_s.iter().flat_map(|t| std::iter::repeat_n(*t, r.coordinates))).collect();
     let mean_k = times.iter().sum::<f64>() / times.len() as f64 / 3600.0;
-    let times = times
-        .iter()
-        .zip(&changes.at)
-        .filter(|(_, at)| wanted(at))
-        .map(|(time, _)| *time);
+    let times = times.iter().zip(&changes.at).filter(|(_, at)| wanted(at)).map(|(time, _)| *time);
     let still = changes.of(constant, wanted);
     let moved = changes.of(effect, wanted);
     for ((time_s, still), moved) in times.zip(still.iter()).zip(moved.iter()) {
         let expected = still * grows(time_s, mean_k);
-        assert!(
-            (moved - expected).abs() < 1e-5,
-            "{}: {moved} {expected}",
-            own.id()
-        );
+        assert!((moved - expected).abs() < 1e-5, "{}: {moved} {expected}", own.id());
     }
     Some(format!("`{}`, over time", own.component))
 }
 
 /// The aliases of an effect, nearest first.
-fn aliases(
-    own: usize,
-    ids: &[String],
-    observable: &[bool],
-    by_setup: &[Share],
-    between: &[Vec<Share>],
-) -> String {
+fn aliases(own: usize, ids: &[String], observable: &[bool], by_setup: &[Share], between: &[Vec<Share>]) -> String {
     if !observable[own] {
         return "not observable".into();
     }
@@ -210,19 +157,11 @@ fn aliases(
     }
     found.sort_by_key(|(inexact, _)| *inexact);
     let more = found.len() > MAX_ALIASES;
-    let mut found: Vec<String> = found
-        .into_iter()
-        .map(|(_, text)| text)
-        .take(MAX_ALIASES)
-        .collect();
+    let mut found: Vec<String> = found.into_iter().map(|(_, text)| text).take(MAX_ALIASES).collect();
     if more {
         found.push("…".into());
     }
-    if found.is_empty() {
-        "–".into()
-    } else {
-        found.join(", ")
-    }
+    if found.is_empty() { "–".into() } else { found.join(", ") }
 }
 
 /// The rows of a section's table, computed from the chain.
@@ -249,10 +188,7 @@ fn computed(section: &Section) -> Vec<Vec<String>> {
             }
         } else if let Some(names) = title.strip_prefix("aliases in ") {
             let (names, known) = match names.split_once(", ") {
-                Some((names, words)) => (
-                    names,
-                    words.strip_suffix(" known").map(|thing| thing.replace(' ', "_")),
-                ),
+                Some((names, words)) => (names, words.strip_suffix(" known").map(|thing| thing.replace(' ', "_"))),
                 None => (names, None),
             };
             let one_way = title.ends_with(", one way");
@@ -267,9 +203,7 @@ fn computed(section: &Section) -> Vec<Vec<String>> {
                 true => orders(&changes, own, test) != "–",
                 false => changes.rms(own, |at| at.test == test) >= NOTHING,
             };
-            let observable: Vec<bool> = (0..ids.len())
-                .map(|own| tests.iter().any(|test| shows(own, *test)))
-                .collect();
+            let observable: Vec<bool> = (0..ids.len()).map(|own| tests.iter().any(|test| shows(own, *test))).collect();
             for (own, row) in rows.iter_mut().enumerate() {
                 row.push(aliases(own, &ids, &observable, &by_setup, &between));
             }
@@ -296,21 +230,14 @@ fn the_page_agrees_with_the_chain() {
             }
         }
     }
-    assert!(
-        wrong.is_empty(),
-        "docs/reference/effects.md differs from the chain, which gives{wrong}"
-    );
+    assert!(wrong.is_empty(), "docs/reference/effects.md differs from the chain, which gives{wrong}");
 }
 
 #[test]
 fn every_family_of_the_library_is_on_the_page() {
     let text = std::fs::read_to_string(workspace().join("docs/reference/effects.md")).unwrap();
     let sections = sections(&text);
-    let listed = &sections
-        .iter()
-        .find(|section| section.title == "The library")
-        .unwrap()
-        .tables[0];
+    let listed = &sections.iter().find(|section| section.title == "The library").unwrap().tables[0];
     let families = abbe_identify::trace::library::families().unwrap();
     let names: Vec<&str> = families.iter().map(|family| family.name.as_str()).collect();
     let written: Vec<&str> = listed.rows.iter().map(|row| row[0].as_str()).collect();
@@ -322,10 +249,7 @@ fn every_family_of_the_library_is_on_the_page() {
         .collect();
     for row in &listed.rows {
         for example in row[1].split(", ") {
-            assert!(
-                rows.iter().any(|shown| *shown == example),
-                "{example} has no row in any table"
-            );
+            assert!(rows.iter().any(|shown| *shown == example), "{example} has no row in any table");
         }
     }
 }
@@ -349,10 +273,7 @@ fn circles_follow_their_closed_forms() {
     ];
     let text = std::fs::read_to_string(workspace().join("docs/reference/effects.md")).unwrap();
     let sections = sections(&text);
-    let circles = sections
-        .iter()
-        .find(|section| section.title.contains("circles of X and Y"))
-        .unwrap();
+    let circles = sections.iter().find(|section| section.title.contains("circles of X and Y")).unwrap();
     let session = session(circles.toml.as_ref().unwrap());
     let effects: Vec<Effect> = cases.iter().map(|(id, _)| effect(&session.machine, id)).collect();
     let changes = changes(session, &effects);
@@ -367,10 +288,7 @@ fn circles_follow_their_closed_forms() {
                 let along = if direction > 0.0 { k } else { turn - k };
                 let angle = std::f64::consts::TAU * along as f64 / turn as f64;
                 let (found, expected) = (change[(k, 0)], form(angle, direction));
-                assert!(
-                    (found - expected).abs() < 1e-3,
-                    "{id} at {angle}: {found} {expected}"
-                );
+                assert!((found - expected).abs() < 1e-3, "{id} at {angle}: {found} {expected}");
             }
         }
     }

@@ -4,7 +4,9 @@ use std::f64::consts::PI;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
-use abbe_model::effect::{Component, Driver, Effect, Shape};
+use abbe_model::driver::Driver;
+use abbe_model::effect::shape::{Curve, Harmonic, Local, Periodic, Power, ReversalSpike, Steps, Warmup};
+use abbe_model::effect::{Component, Effect, Shape};
 
 /// A Markdown table: header and rows, with trimmed cells.
 pub struct Table {
@@ -26,11 +28,7 @@ pub fn sections(text: &str) -> Vec<Section> {
     let mut in_table = false;
     for line in text.lines() {
         if let Some(title) = line.strip_prefix("## ") {
-            sections.push(Section {
-                title: title.to_string(),
-                toml: None,
-                tables: Vec::new(),
-            });
+            sections.push(Section { title: title.to_string(), toml: None, tables: Vec::new() });
         }
         let Some(section) = sections.last_mut() else {
             continue;
@@ -52,10 +50,7 @@ pub fn sections(text: &str) -> Vec<Section> {
             Some(cells) if fence.is_none() => {
                 let cells: Vec<String> = cells.split('|').map(|cell| cell.trim().to_string()).collect();
                 if !in_table {
-                    section.tables.push(Table {
-                        header: cells,
-                        rows: Vec::new(),
-                    });
+                    section.tables.push(Table { header: cells, rows: Vec::new() });
                 } else if !cells[0].starts_with("---") {
                     section.tables.last_mut().unwrap().rows.push(cells);
                 }
@@ -72,12 +67,7 @@ pub fn effect(machine: &Machine, cell: &str) -> Effect {
     let text = cell.trim_matches('`');
     let plain = |component: &str| Component::parse(component).unwrap_or_else(|| panic!("{text}"));
     let Some((component, rest)) = text.split_once('~') else {
-        return Effect {
-            component: plain(text),
-            driver: Driver::None,
-            shape: Shape::Constant,
-            tests: Vec::new(),
-        };
+        return Effect { component: plain(text), driver: Driver::None, shape: Shape::Constant, tests: Vec::new() };
     };
     let (driver, shape) = rest.split_once(':').unwrap_or_else(|| panic!("{text}"));
     let driver = Driver::parse(driver);
@@ -102,40 +92,22 @@ pub fn effect(machine: &Machine, cell: &str) -> Effect {
         ("backlash", []) => Shape::Backlash,
         ("lag", []) => Shape::Lag,
         ("drift", []) => Shape::Drift,
-        ("warmup", [tau_s]) => Shape::Warmup { tau_s: *tau_s },
-        ("reversal-spike", [width]) => Shape::ReversalSpike {
-            width: inside(*width),
-        },
-        ("periodic", [period]) => Shape::Periodic {
-            period: inside(*period),
-        },
-        ("steps", at) => Shape::Steps {
-            at: at.iter().map(|at| inside(*at)).collect(),
-        },
-        ("local", [centre, width]) => Shape::Local {
-            centre: inside(*centre),
-            width: inside(*width),
-            recurs: rotary.then_some(2.0 * PI),
-        },
-        ("curve", [intervals]) => Shape::Curve {
+        ("warmup", [tau_s]) => Shape::Warmup(Warmup { tau_s: *tau_s }),
+        ("reversal-spike", [width]) => Shape::ReversalSpike(ReversalSpike { width: inside(*width) }),
+        ("periodic", [period]) => Shape::Periodic(Periodic { period: inside(*period) }),
+        ("steps", at) => Shape::Steps(Steps { at: at.iter().map(|at| inside(*at)).collect() }),
+        ("local", [centre, width]) => {
+            Shape::Local(Local { centre: inside(*centre), width: inside(*width), recurs: rotary.then_some(2.0 * PI) })
+        }
+        ("curve", [intervals]) => Shape::Curve(Curve {
             from: if rotary { 0.0 } else { -100.0 },
             to: if rotary { 2.0 * PI } else { 100.0 },
             intervals: *intervals as usize,
             closed: rotary,
-        },
-        (word, []) if word.starts_with('h') => Shape::Harmonic {
-            order: word[1..].parse().unwrap(),
-        },
-        (word, []) if word.starts_with("power") => Shape::Power {
-            degree: word[5..].parse().unwrap(),
-            scale,
-        },
+        }),
+        (word, []) if word.starts_with('h') => Shape::Harmonic(Harmonic { order: word[1..].parse().unwrap() }),
+        (word, []) if word.starts_with("power") => Shape::Power(Power { degree: word[5..].parse().unwrap(), scale }),
         _ => panic!("{text}"),
     };
-    Effect {
-        component: plain(component),
-        driver,
-        shape,
-        tests: Vec::new(),
-    }
+    Effect { component: plain(component), driver, shape, tests: Vec::new() }
 }

@@ -1,5 +1,5 @@
-//! Generates poses for tests whose states come from a file: random joint positions of a robot. For a socket, the ball stays where
-//! the first pose places it.
+//! Generates poses for tests whose states come from a file: random joint positions of a robot. For a socket, the ball
+//! stays where the first pose places it.
 
 use std::path::Path;
 
@@ -21,10 +21,7 @@ pub fn write(folder: &Path, session: &Path) {
     let machine = files::machine(Path::new(toml["machine"]["file"].as_str().unwrap())).unwrap();
     for (stream, test) in toml["test"].as_array().unwrap().iter().enumerate() {
         let Some(file) = test.get("data") else { continue };
-        let point = ["target_mm", "ball_mm"]
-            .iter()
-            .find_map(|key| test.get(*key))
-            .unwrap();
+        let point = ["target_mm", "ball_mm"].iter().find_map(|key| test.get(*key)).unwrap();
         let point: Vec<f64> = point
             .as_array()
             .unwrap()
@@ -39,16 +36,8 @@ pub fn write(folder: &Path, session: &Path) {
         };
         let socketed = test.get("socket").is_some();
         let place = tool_point(&machine, &draw(), point);
-        let names: Vec<String> = machine
-            .axes
-            .iter()
-            .map(|axis| format!("{}_rad", axis.name))
-            .collect();
-        let mut text = format!(
-            "{}{}\n",
-            names.join(","),
-            if socketed { "" } else { ",px_mm,py_mm,pz_mm" }
-        );
+        let names: Vec<String> = machine.axes.iter().map(|axis| format!("{}_rad", axis.name)).collect();
+        let mut text = format!("{}{}\n", names.join(","), if socketed { "" } else { ",px_mm,py_mm,pz_mm" });
         let mut poses = 0;
         while poses < POSES {
             let mut joints = draw();
@@ -67,16 +56,13 @@ pub fn write(folder: &Path, session: &Path) {
 }
 
 fn tool_point(machine: &Machine, joints: &DVector<f64>, point: Vector3<f64>) -> Vector3<f64> {
-    let state: Vec<_> = joints
-        .iter()
-        .map(|q| AxisPosition::new(AxisKind::Rotary, *q))
-        .collect();
+    let state: Vec<_> = joints.iter().map(|q| AxisPosition::new(AxisKind::Rotary, *q)).collect();
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     Vector3::from(machine.tool_point(&state, &none, Point(point.into())).0)
 }
 
-/// Moves the joints by the smallest change that brings the point to its place, by Newton's method. Returns `false` if it does not
-/// converge.
+/// Moves the joints by the smallest change that brings the point to its place, by Newton's method. Returns `false` if
+/// it does not converge.
 fn reach(machine: &Machine, joints: &mut DVector<f64>, point: Vector3<f64>, place: Vector3<f64>) -> bool {
     for _ in 0..50 {
         let here = tool_point(machine, joints, point);

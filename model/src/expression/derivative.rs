@@ -7,8 +7,9 @@
 //! n = a − b: a += w, b −= w        n = a/b: a += w/b, b −= w·n/b      n = sin a: a += w·cos a
 //! ```
 //!
-//! For the length of the bar, the first adjoint is the unit vector of the bar. It is then transformed back through the chain, frame by
-//! frame, and gives the derivative by every error on the way. Nothing is expanded and nothing is computed twice.
+//! For the length of the bar, the first adjoint is the unit vector of the bar. It is then transformed back through the
+//! chain, frame by frame, and gives the derivative by every error on the way. Nothing is expanded and nothing is
+//! computed twice.
 
 use std::collections::HashMap;
 
@@ -27,12 +28,7 @@ impl Adjoints {
         }
     }
 
-    fn add<'a, V: Clone + PartialEq>(
-        &mut self,
-        arena: &'a Arena<V>,
-        operand: Operand,
-        contribution: Symbol<'a, V>,
-    ) {
+    fn add<'a, V: Clone + PartialEq>(&mut self, arena: &'a Arena<V>, operand: Operand, contribution: Symbol<'a, V>) {
         if let Operand::Node(id) = operand {
             let sum = match self.0.get(&id) {
                 Some(sum) => arena.symbol(*sum) + contribution,
@@ -58,8 +54,7 @@ impl<V: Clone + PartialEq> Arena<V> {
                 .any(|operand| matches!(operand, Operand::Node(a) if active.get(&a) == Some(&true)));
             active.insert(*id, itself || through);
         }
-        let is_active =
-            |operand: Operand| matches!(operand, Operand::Node(id) if active.get(&id) == Some(&true));
+        let is_active = |operand: Operand| matches!(operand, Operand::Node(id) if active.get(&id) == Some(&true));
         let one = Operand::constant(1.0);
         adjoints.0.insert(root, one);
         for id in nodes.into_iter().rev() {
@@ -126,12 +121,10 @@ impl<V: Clone + PartialEq> Arena<V> {
         variables.iter().map(|variable| adjoints.of(*variable)).collect()
     }
 
-    /// The second derivatives of `output` by each pair of `variables`: row `i` is the gradient of the derivative by variable `i`.
+    /// The second derivatives of `output` by each pair of `variables`: row `i` is the gradient of the derivative by
+    /// variable `i`.
     pub fn second_derivatives(&self, output: Operand, variables: &[Operand]) -> Vec<Vec<Operand>> {
-        self.gradient(output, variables)
-            .into_iter()
-            .map(|derivative| self.gradient(derivative, variables))
-            .collect()
+        self.gradient(output, variables).into_iter().map(|derivative| self.gradient(derivative, variables)).collect()
     }
 }
 

@@ -1,8 +1,8 @@
 //! Simplification of expressions while they are built, limited to changes that do not alter the floating-point result.
 //!
-//! Constants are computed; 0, 1 and −1 are eliminated; a minus sign moves outwards until it becomes part of a difference. Signs and
-//! powers of two move without rounding. A folded expression therefore evaluates to the same bits as the unfolded one, except for the sign
-//! of zero.
+//! Constants are computed; 0, 1 and −1 are eliminated; a minus sign moves outwards until it becomes part of a
+//! difference. Signs and powers of two move without rounding. A folded expression therefore evaluates to the same bits
+//! as the unfolded one, except for the sign of zero.
 
 use super::{Arena, Binary, Node, Operand, Unary};
 
@@ -17,9 +17,7 @@ pub(crate) fn unary<V: Clone + PartialEq>(arena: &Arena<V>, op: Unary, a: Operan
         (Unary::Neg, Some(Node::Binary(Binary::Mul, x, y))) if x.known().is_some() => {
             binary(arena, Binary::Mul, unary(arena, Unary::Neg, x), y)
         }
-        (Unary::Sin | Unary::Signum, Some(Node::Unary(Unary::Neg, x))) => {
-            unary(arena, Unary::Neg, unary(arena, op, x))
-        }
+        (Unary::Sin | Unary::Signum, Some(Node::Unary(Unary::Neg, x))) => unary(arena, Unary::Neg, unary(arena, op, x)),
         (Unary::Cos, Some(Node::Unary(Unary::Neg, x))) => unary(arena, Unary::Cos, x),
         _ => arena.intern(Node::Unary(op, a)),
     }

@@ -1,8 +1,9 @@
 //! The symbolic scalar: hash-consed and `Copy`; expressions are owned by an arena of the caller.
 //!
-//! A [`Symbol`] takes the place of a number in the chain. The calculation is recorded as a graph in an [`Arena`]. Equal expressions are
-//! one node, so a common subexpression is found when it is built. A symbol contains constants directly, and 0, 1 and −1 are eliminated.
-//! The caller defines the meaning of a variable: a printed name (`abbe-codegen`), or a column of numbers ([`crate::sensitivity`]).
+//! A [`Symbol`] takes the place of a number in the chain. The calculation is recorded as a graph in an [`Arena`]. Equal
+//! expressions are one node, so a common subexpression is found when it is built. A symbol contains constants directly,
+//! and 0, 1 and −1 are eliminated. The caller defines the meaning of a variable: a printed name (`abbe-codegen`), or a
+//! column of numbers ([`crate::sensitivity`]).
 
 mod derivative;
 mod fold;
@@ -22,11 +23,7 @@ pub struct Constant(u64);
 impl Constant {
     /// The constant `value`.
     pub fn new(value: f64) -> Self {
-        Constant(if value == 0.0 {
-            0.0_f64.to_bits()
-        } else {
-            value.to_bits()
-        })
+        Constant(if value == 0.0 { 0.0_f64.to_bits() } else { value.to_bits() })
     }
 
     /// Its value.
@@ -149,11 +146,7 @@ pub struct Arena<V> {
 
 impl<V> Default for Arena<V> {
     fn default() -> Self {
-        Arena {
-            nodes: RefCell::default(),
-            places: RefCell::default(),
-            variables: RefCell::default(),
-        }
+        Arena { nodes: RefCell::default(), places: RefCell::default(), variables: RefCell::default() }
     }
 }
 
@@ -165,11 +158,7 @@ impl<V: Clone + PartialEq> Arena<V> {
 
     /// The symbol of a variable; the same variable is always the same symbol.
     pub fn variable(&self, variable: V) -> Symbol<'_, V> {
-        let index = self
-            .variables
-            .borrow()
-            .iter()
-            .position(|known| *known == variable);
+        let index = self.variables.borrow().iter().position(|known| *known == variable);
         let index = index.unwrap_or_else(|| {
             self.variables.borrow_mut().push(variable);
             self.variables.borrow().len() - 1
@@ -239,9 +228,8 @@ impl<V: Clone + PartialEq> Arena<V> {
             matches!(operand, Operand::Node(id) if matches!(nodes[id.0 as usize], Node::Variable(index)
                 if variables[index.0 as usize] == *variable))
         };
-        let plain = |node: &Node| {
-            !matches!(node, Node::Unary(Unary::Sin | Unary::Cos, _)) && operands(*node).any(itself)
-        };
+        let plain =
+            |node: &Node| !matches!(node, Node::Unary(Unary::Sin | Unary::Cos, _)) && operands(*node).any(itself);
         nodes.iter().any(plain)
     }
 
@@ -272,10 +260,7 @@ impl<V: Clone + PartialEq> Arena<V> {
                 }
             }
         }
-        (0..used.len())
-            .filter(|&index| used[index])
-            .map(|index| NodeId(index as u32))
-            .collect()
+        (0..used.len()).filter(|&index| used[index]).map(|index| NodeId(index as u32)).collect()
     }
 }
 
@@ -358,7 +343,8 @@ impl<'arena, V: Clone + PartialEq> Symbol<'arena, V> {
 }
 
 impl<V> PartialEq for Symbol<'_, V> {
-    /// Equality of constants or of nodes of the same arena. Algebraic equality is decided by the normal form of `abbe-codegen`.
+    /// Equality of constants or of nodes of the same arena. Algebraic equality is decided by the normal form of
+    /// `abbe-codegen`.
     fn eq(&self, other: &Self) -> bool {
         match (self.0, other.0) {
             (Repr::Constant(a), Repr::Constant(b)) => a == b,

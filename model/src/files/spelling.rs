@@ -4,11 +4,8 @@ use strsim::osa_distance;
 
 /// The most similar known name if one is similar, and all of them.
 pub(crate) fn known_names(found: &str, known: &[&str]) -> String {
-    let all = if known.is_empty() {
-        "no key is allowed here".to_string()
-    } else {
-        format!("known: {}", known.join(", "))
-    };
+    let all =
+        if known.is_empty() { "no key is allowed here".to_string() } else { format!("known: {}", known.join(", ")) };
     match most_similar(found, known) {
         Some(near) => format!("did you mean `{near}`? ({all})"),
         None => all,
@@ -30,8 +27,7 @@ fn most_similar<'k>(found: &str, known: &'k [impl AsRef<str>]) -> Option<&'k str
             let name = name.as_ref();
             let other = name.to_lowercase();
             // `c_degree` for `c_deg`: a common prefix counts as one edit.
-            let begins =
-                lower.len().min(other.len()) >= 3 && (lower.starts_with(&other) || other.starts_with(&lower));
+            let begins = lower.len().min(other.len()) >= 3 && (lower.starts_with(&other) || other.starts_with(&lower));
             (if begins { 1 } else { osa_distance(&lower, &other) }, name)
         })
         .filter(|(distance, name)| *distance <= 1 + name.len().min(lower.len()) / 4)
@@ -72,10 +68,7 @@ mod tests {
 
     #[test]
     fn the_help_names_what_is_known() {
-        assert_eq!(
-            known_names("swep", &["sweep", "path"]),
-            "did you mean `sweep`? (known: sweep, path)"
-        );
+        assert_eq!(known_names("swep", &["sweep", "path"]), "did you mean `sweep`? (known: sweep, path)");
         assert_eq!(known_names("at", &["sweep", "path"]), "known: sweep, path");
         assert_eq!(known_names("at", &[]), "no key is allowed here");
         assert_eq!(suggestion("swep", &["sweep"]), "did you mean `sweep`? ");

@@ -10,10 +10,7 @@ use crate::error::ModelError;
 /// # Errors
 /// If it cannot be written; the previous file then remains.
 pub fn write(path: &Path, text: &str) -> Result<(), ModelError> {
-    let fault = |cause: std::io::Error| ModelError::Output {
-        file: path.to_path_buf(),
-        cause: cause.to_string(),
-    };
+    let fault = |cause: std::io::Error| ModelError::Output { file: path.to_path_buf(), cause: cause.to_string() };
     let mut name = path.file_name().unwrap_or_default().to_os_string();
     name.push(format!(".{}.part", std::process::id()));
     let part: PathBuf = path.with_file_name(name);

@@ -1,7 +1,7 @@
 //! The double ball bar: `L = ‖P_w − P_s‖`, the distance between a ball on the table and a ball in the spindle.
 //!
-//! The reading refers to the stated length of the bar: a bar that is `δ` longer than stated reads `L − δ`. A sensor with the gain error
-//! `k` adds `k·(L − L_bar)`.
+//! The reading refers to the stated length of the bar: a bar that is `δ` longer than stated reads `L − δ`. A sensor
+//! with the gain error `k` adds `k·(L − L_bar)`.
 
 use super::{InstrumentParameter, InternalUnit, SharedBy, displaced};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
@@ -61,10 +61,7 @@ impl<N: crate::scalar::Nominal> BallBar<N> {
     ) -> (Point<S>, Point<S>) {
         let workpiece = displaced(self.workpiece_ball, 0, unknown);
         let spindle = displaced(self.spindle_ball, 3, unknown);
-        (
-            machine.workpiece_point(state, errors, workpiece),
-            machine.tool_point(state, errors, spindle),
-        )
+        (machine.workpiece_point(state, errors, workpiece), machine.tool_point(state, errors, spindle))
     }
 
     /// The reading, mm.

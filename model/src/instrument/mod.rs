@@ -23,10 +23,7 @@ impl<S: Scalar> Reading<S> {
     /// A reading of one length.
     pub fn length(value: S) -> Self {
         let zero = S::constant(0.0);
-        Reading {
-            values: [value, zero, zero],
-            count: 1,
-        }
+        Reading { values: [value, zero, zero], count: 1 }
     }
 
     /// A reading of three coordinates.
@@ -113,8 +110,8 @@ pub enum SharedBy {
     SpindleSetup,
     /// Tests with the same `bar_setup`: the assembled bar.
     BarSetup,
-    /// Tests with the same mount of an R-test's sensors: the same `setup` if they are on the table, the same `spindle_setup` if they are
-    /// in the spindle.
+    /// Tests with the same mount of an R-test's sensors: the same `setup` if they are on the table, the same
+    /// `spindle_setup` if they are in the spindle.
     Sensors,
     /// Tests with the same `socket`.
     Socket,
@@ -125,8 +122,8 @@ pub enum SharedBy {
 /// One parameter of an instrument.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InstrumentParameter {
-    /// The object: `workpiece_ball`, `spindle_ball`, `bar`, `tracker`, `target`, `socket`, `ball`, `artefact`, `radius`, `form`,
-    /// `stylus`, `sensor`, `gain`.
+    /// The object: `workpiece_ball`, `spindle_ball`, `bar`, `tracker`, `target`, `socket`, `ball`, `artefact`,
+    /// `radius`, `form`, `stylus`, `sensor`, `gain`.
     pub thing: &'static str,
     /// Its coordinate, `x` … `c`, `omega`, `phi`, `theta`, or empty.
     pub coordinate: &'static str,
@@ -143,27 +140,14 @@ impl InstrumentParameter {
         unit: InternalUnit,
         shared_by: SharedBy,
     ) -> InstrumentParameter {
-        InstrumentParameter {
-            thing,
-            coordinate,
-            unit,
-            shared_by,
-        }
+        InstrumentParameter { thing, coordinate, unit, shared_by }
     }
 
-    const fn length(
-        thing: &'static str,
-        coordinate: &'static str,
-        shared_by: SharedBy,
-    ) -> InstrumentParameter {
+    const fn length(thing: &'static str, coordinate: &'static str, shared_by: SharedBy) -> InstrumentParameter {
         InstrumentParameter::new(thing, coordinate, InternalUnit::Millimetre, shared_by)
     }
 
-    const fn angle(
-        thing: &'static str,
-        coordinate: &'static str,
-        shared_by: SharedBy,
-    ) -> InstrumentParameter {
+    const fn angle(thing: &'static str, coordinate: &'static str, shared_by: SharedBy) -> InstrumentParameter {
         InstrumentParameter::new(thing, coordinate, InternalUnit::Radian, shared_by)
     }
 }
@@ -209,10 +193,9 @@ impl<N> Station<N> {
                 rotation: tracker.rotation.each_ref().map(point),
                 origin: point(&tracker.origin),
             }),
-            Station::Socket(socket) => Station::Socket(socket::Socket {
-                ball: point(&socket.ball),
-                socket: point(&socket.socket),
-            }),
+            Station::Socket(socket) => {
+                Station::Socket(socket::Socket { ball: point(&socket.ball), socket: point(&socket.socket) })
+            }
             Station::Probe(probe) => Station::Probe(probe::Probe {
                 artefact: point(&probe.artefact),
                 axis: point(&probe.axis),
@@ -240,8 +223,8 @@ impl<N> Station<N> {
         }
     }
 
-    /// Computes the reading from the state of the axes, the errors of the machine and the parameters of the instrument (mm, rad, in the
-    /// order of [`InstrumentKind::unknowns`]; `None` is an exact zero).
+    /// Computes the reading from the state of the axes, the errors of the machine and the parameters of the instrument
+    /// (mm, rad, in the order of [`InstrumentKind::unknowns`]; `None` is an exact zero).
     pub fn read<S: Scalar<Nominal = N>>(
         &self,
         machine: &Machine,
@@ -290,11 +273,7 @@ impl<N> Station<N> {
 }
 
 /// A nominal point, displaced by three parameters if they are included.
-pub fn displaced<S: Scalar>(
-    nominal: [S::Nominal; 3],
-    first: usize,
-    unknown: &impl Fn(usize) -> Option<S>,
-) -> Point<S> {
+pub fn displaced<S: Scalar>(nominal: [S::Nominal; 3], first: usize, unknown: &impl Fn(usize) -> Option<S>) -> Point<S> {
     Point(std::array::from_fn(|i| match unknown(first + i) {
         Some(displacement) => displacement + nominal[i],
         None => S::nominal(nominal[i]),

@@ -1,15 +1,16 @@
 //! The touch probe: the signed distance from the stylus to the artefact's surface along the probing direction.
 //!
-//! `P_s` is the stylus in R and `n` the probing direction. The artefact is a cylinder of radius ρ about the line through `c` along `e`.
-//! Both are transformed to the table frame through the inverse chain: `v = p − c`, `u` the probing direction there and `⊥` the component
-//! perpendicular to `e`,
+//! `P_s` is the stylus in R and `n` the probing direction. The artefact is a cylinder of radius ρ about the line
+//! through `c` along `e`. Both are transformed to the table frame through the inverse chain: `v = p − c`, `u` the
+//! probing direction there and `⊥` the component perpendicular to `e`,
 //!
 //! ```text
 //! d = −(B + √(B² − A·C)) / A,    A = u⊥·u⊥,   B = v⊥·u⊥,   C = v⊥·v⊥ − (ρ + δρ + w)²
 //! ```
 //!
-//! This is the nearer of the two intersections of the line with the surface. The distance is positive if the surface lies ahead. A form
-//! deviation of `w` outwards reduces the distance by `w`. The "measured radius less the target" of the literature is `−d`.
+//! This is the nearer of the two intersections of the line with the surface. The distance is positive if the surface
+//! lies ahead. A form deviation of `w` outwards reduces the distance by `w`. The "measured radius less the target" of
+//! the literature is `−d`.
 
 use super::{InstrumentParameter, SharedBy, displaced, pose_error};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
@@ -85,8 +86,8 @@ impl<S: Scalar> ProbeGeometry<S> {
 }
 
 impl<N: Nominal> Probe<N> {
-    /// A step in the probing direction in R at a state of the axes, and its length: the stated direction, or the whole distance to the
-    /// artefact's nominal axis.
+    /// A step in the probing direction in R at a state of the axes, and its length: the stated direction, or the whole
+    /// distance to the artefact's nominal axis.
     pub fn step_at<S: Scalar<Nominal = N>>(
         &self,
         machine: &Machine,
@@ -99,19 +100,13 @@ impl<N: Nominal> Probe<N> {
         let stylus = machine.tool_point(state, &none, Point::nominal(self.stylus));
         let foot = machine.workpiece_point(state, &none, Point::nominal(self.artefact));
         let tip: [N; 3] = std::array::from_fn(|i| self.artefact[i] + self.axis[i]);
-        let along = machine
-            .workpiece_point(state, &none, Point::nominal(tip))
-            .minus(foot);
+        let along = machine.workpiece_point(state, &none, Point::nominal(tip)).minus(foot);
         let inward = perpendicular(foot.minus(stylus), along);
         (inward, Some(inward.norm()))
     }
 
     /// The probing direction at a state of the axes, in R.
-    pub fn direction_at<S: Scalar<Nominal = N>>(
-        &self,
-        machine: &Machine,
-        state: &[AxisPosition<N>],
-    ) -> Point<S> {
+    pub fn direction_at<S: Scalar<Nominal = N>>(&self, machine: &Machine, state: &[AxisPosition<N>]) -> Point<S> {
         match self.step_at(machine, state) {
             (step, Some(length)) => Point(step.0.map(|x| x / length)),
             (direction, None) => direction,

@@ -1,16 +1,18 @@
-//! The R-test: three displacement sensors in a nest around a master ball measure its position, as the vector `P_s − P_w`.
+//! The R-test: three displacement sensors in a nest around a master ball measure its position, as the vector
+//! `P_s − P_w`.
 //!
-//! The vector is in the table frame if the nest is on the table (E-setting), and in the tool frame if the nest is in the spindle
-//! (Es-setting):
+//! The vector is in the table frame if the nest is on the table (E-setting), and in the tool frame if the nest is in
+//! the spindle (Es-setting):
 //!
 //! ```text
 //! E:   m = T_w⁻¹·P_s − w          Es:   m = s − T_s⁻¹·P_w          r = D · Rᵀ(ω₁, φ₁, θ₁) · m
 //! ```
 //!
-//! `w` and `s` are the points of table and tool that nominally coincide. ω₁, φ₁, θ₁ are the orientation errors of the nest. The rows of
-//! `D` are the measuring directions of the sensors; without `D` the reading is already in X, Y, Z. Yamaji, Hamabata & Ihara, Evaluation
-//! of linear axis motion error of machine tools using an R-test device (HPC 2014), Section 4: sensor outputs become machine coordinates
-//! by `R = R_φ·R_θ·R_ω` (Eqs. 1–3). The matrices above Eq. 1 are printed in a different order from the expanded equations and the text.
+//! `w` and `s` are the points of table and tool that nominally coincide. ω₁, φ₁, θ₁ are the orientation errors of the
+//! nest. The rows of `D` are the measuring directions of the sensors; without `D` the reading is already in X, Y, Z.
+//! Yamaji, Hamabata & Ihara, Evaluation of linear axis motion error of machine tools using an R-test device (HPC 2014),
+//! Section 4: sensor outputs become machine coordinates by `R = R_φ·R_θ·R_ω` (Eqs. 1–3). The matrices above Eq. 1 are
+//! printed in a different order from the expanded equations and the text.
 
 use super::{InstrumentParameter, SharedBy, displaced};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
@@ -80,28 +82,23 @@ pub struct Orientation<S> {
 }
 
 impl<S: Scalar> Orientation<S> {
-    /// From ω, φ, θ in radians. The small-angle form replaces the sine by the angle and the cosine by 1, as in Eqs. (7) to (9), which
-    /// keep products of two angles and omit their squares.
+    /// From ω, φ, θ in radians. The small-angle form replaces the sine by the angle and the cosine by 1, as in Eqs. (7)
+    /// to (9), which keep products of two angles and omit their squares.
     pub fn new(angles: [S; 3], rotation: Rotation) -> Self {
         let [omega, phi, theta] = angles.map(|angle| match rotation {
             Rotation::Exact => {
                 let (sin, cos) = angle.sin_cos();
                 SinCos { sin, cos }
             }
-            Rotation::SmallAngle => SinCos {
-                sin: angle,
-                cos: S::constant(1.0),
-            },
+            Rotation::SmallAngle => SinCos { sin: angle, cos: S::constant(1.0) },
         });
         Orientation { omega, phi, theta }
     }
 
     /// `R · v`: from sensor coordinates to the frame that carries the sensors.
     pub fn to_machine(&self, sensors: Point<S>) -> Point<S> {
-        let [omega, phi, theta] = [self.omega, self.phi, self.theta].map(|turn| SinCos {
-            sin: -turn.sin,
-            cos: turn.cos,
-        });
+        let [omega, phi, theta] =
+            [self.omega, self.phi, self.theta].map(|turn| SinCos { sin: -turn.sin, cos: turn.cos });
         let about_u = turn_about(Coordinate::X, omega, sensors);
         let about_w = turn_about(Coordinate::Z, theta, about_u);
         turn_about(Coordinate::Y, phi, about_w)
@@ -175,17 +172,10 @@ mod tests {
             gravity: [0.0, 0.0, -1.0],
         };
         let [x, y, z] = [0.03, -0.05, 0.07];
-        let vectors = RTest {
-            setting: Setting::Table,
-            workpiece_ball: [0.0; 3],
-            spindle_ball: [x, y, z],
-            sensors: None,
-        };
+        let vectors =
+            RTest { setting: Setting::Table, workpiece_ball: [0.0; 3], spindle_ball: [x, y, z], sensors: None };
         let directions = [[0.6, 0.8, 0.0], [0.0, 0.6, 0.8], [0.8, 0.0, 0.6]];
-        let counts = RTest {
-            sensors: Some(directions),
-            ..vectors.clone()
-        };
+        let counts = RTest { sensors: Some(directions), ..vectors.clone() };
         let (sin, cos) = 0.4_f64.sin_cos();
         for (index, turned) in [
             [x, cos * y - sin * z, sin * y + cos * z],

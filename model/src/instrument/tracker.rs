@@ -1,7 +1,7 @@
 //! The laser tracker: three coordinates of a target in the tracker's own frame.
 //!
-//! `m = B · E · P`: `P` is the target in R through the chain, `E` a small motion (the pose parameters) and `B` a fixed rigid motion. `B`
-//! keeps the estimated angles small for any orientation of the tracker.
+//! `m = B · E · P`: `P` is the target in R through the chain, `E` a small motion (the pose parameters) and `B` a fixed
+//! rigid motion. `B` keeps the estimated angles small for any orientation of the tracker.
 
 use super::{InstrumentParameter, SharedBy, displaced, pose_error};
 use crate::chain::{AxisPosition, BodyErrors, Machine};

@@ -174,15 +174,12 @@ impl NewTest {
             ));
         }
         check_station(&self.station).map_err(|(message, help)| (named(message), help))?;
-        let priors = self
-            .all_priors()
-            .map_err(|(message, help)| (named(message), help))?;
+        let priors = self.all_priors().map_err(|(message, help)| (named(message), help))?;
         let mut at = vec![0.0; machine.axes.len()];
         let mut listed = vec![false; machine.axes.len()];
         for (name, position) in &self.at {
             let axis = axis_index(machine, name).map_err(|(message, help)| (named(message), help))?;
-            number(&format!("the position of {name}"), *position)
-                .map_err(|(message, help)| (named(message), help))?;
+            number(&format!("the position of {name}"), *position).map_err(|(message, help)| (named(message), help))?;
             at[axis] = *position;
             listed[axis] = true;
         }
@@ -251,10 +248,7 @@ impl NewTest {
             if !found {
                 let mut things: Vec<&str> = kind.unknowns().iter().map(|parameter| parameter.thing).collect();
                 things.dedup();
-                return Err((
-                    format!("a {} has no `{thing}`", kind.word()),
-                    format!("it has {}", things.join(", ")),
-                ));
+                return Err((format!("a {} has no `{thing}`", kind.word()), format!("it has {}", things.join(", "))));
             }
         }
         Ok(priors)

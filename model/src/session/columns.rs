@@ -110,10 +110,7 @@ impl Columns {
 pub(super) fn axis_index(machine: &Machine, name: &str) -> Result<usize, Fault> {
     machine.axis_index(name).ok_or_else(|| {
         let names: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
-        (
-            format!("the machine \"{}\" has no axis `{name}`", machine.name),
-            format!("its axes are {}", names.join(", ")),
-        )
+        (format!("the machine \"{}\" has no axis `{name}`", machine.name), format!("its axes are {}", names.join(", ")))
     })
 }
 
@@ -129,19 +126,12 @@ fn column_of(what: &str, column: &[f64], rows: usize) -> Result<(), Fault> {
 }
 
 fn wrong_count(what: &str, found: usize, expected: usize) -> Fault {
-    (
-        format!("{what}: {found} where {expected} are expected"),
-        "all columns have one item for each reading".into(),
-    )
+    (format!("{what}: {found} where {expected} are expected"), "all columns have one item for each reading".into())
 }
 
 /// Checks that a number is finite and within [`limits::LARGEST`].
 pub(super) fn number(what: &str, value: f64) -> Result<(), Fault> {
-    let fault = if value.is_finite() {
-        limits::too_large(value)
-    } else {
-        Some(value.to_string())
-    };
+    let fault = if value.is_finite() { limits::too_large(value) } else { Some(value.to_string()) };
     match fault {
         None => Ok(()),
         Some(fault) => Err((format!("{what} is {fault}"), "a finite number is expected".into())),

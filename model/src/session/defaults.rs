@@ -44,10 +44,7 @@ pub fn spindle_setup(kind: InstrumentKind, test: &str) -> &str {
 fn all_location_errors(machine: &Machine) -> Vec<ErrorName> {
     let mut errors = pattern::errors(machine);
     errors.retain(|name| {
-        let of_linear = machine
-            .axes
-            .iter()
-            .find(|axis| axis.name == name.axis && axis.kind == AxisKind::Linear);
+        let of_linear = machine.axes.iter().find(|axis| axis.name == name.axis && axis.kind == AxisKind::Linear);
         let own = of_linear.is_some_and(|axis| name.freedom.index() == axis.own_freedom().index() + 3);
         name.kind == ErrorKind::Location && !own
     });
@@ -57,24 +54,17 @@ fn all_location_errors(machine: &Machine) -> Vec<ErrorName> {
 /// The position and orientation errors of every rotary axis, in alphabetical order of the axes. The two location errors
 /// in the axis' own degrees of freedom are excluded, because its own motion is confounded with them.
 fn position_and_orientation_errors(machine: &Machine) -> Vec<ErrorName> {
-    let mut rotary: Vec<_> = machine
-        .axes
-        .iter()
-        .filter(|axis| axis.kind == AxisKind::Rotary)
-        .collect();
+    let mut rotary: Vec<_> = machine.axes.iter().filter(|axis| axis.kind == AxisKind::Rotary).collect();
     rotary.sort_by(|a, b| a.name.cmp(&b.name));
     rotary
         .into_iter()
         .flat_map(|axis| {
             let own = axis.own_freedom().index() % 3;
-            Freedom::ALL
-                .into_iter()
-                .filter(move |freedom| freedom.index() % 3 != own)
-                .map(|freedom| ErrorName {
-                    kind: ErrorKind::Location,
-                    freedom,
-                    axis: axis.name.clone(),
-                })
+            Freedom::ALL.into_iter().filter(move |freedom| freedom.index() % 3 != own).map(|freedom| ErrorName {
+                kind: ErrorKind::Location,
+                freedom,
+                axis: axis.name.clone(),
+            })
         })
         .collect()
 }

@@ -71,17 +71,9 @@ impl Length {
     pub fn parse(text: &str, known: &[&str]) -> Result<Length, String> {
         let characters: Vec<char> = text.chars().collect();
         if characters.len() > MAX_CHARACTERS {
-            return Err(format!(
-                "an expression of {} characters; the limit is {MAX_CHARACTERS}",
-                characters.len()
-            ));
+            return Err(format!("an expression of {} characters; the limit is {MAX_CHARACTERS}", characters.len()));
         }
-        let mut reader = Reader {
-            characters,
-            position: 0,
-            depth: 0,
-            known,
-        };
+        let mut reader = Reader { characters, position: 0, depth: 0, known };
         let length = reader.sum()?;
         match reader.peek() {
             None => Ok(length),
@@ -100,11 +92,7 @@ struct Reader<'a> {
 impl Reader<'_> {
     /// The next character that is not a space.
     fn peek(&mut self) -> Option<char> {
-        while self
-            .characters
-            .get(self.position)
-            .is_some_and(|c| c.is_whitespace())
-        {
+        while self.characters.get(self.position).is_some_and(|c| c.is_whitespace()) {
             self.position += 1;
         }
         self.characters.get(self.position).copied()
@@ -161,12 +149,7 @@ impl Reader<'_> {
         if base.size() > MAX_CHARACTERS {
             return Err("too many nested squares".into());
         }
-        if self.accept('2')
-            && !self
-                .characters
-                .get(self.position)
-                .is_some_and(|c| c.is_alphanumeric())
-        {
+        if self.accept('2') && !self.characters.get(self.position).is_some_and(|c| c.is_alphanumeric()) {
             return Ok(Length::Product(Box::new(base.clone()), Box::new(base)));
         }
         Err("`^` with a power other than 2; only squares are allowed".into())
@@ -189,11 +172,7 @@ impl Reader<'_> {
         self.deeper()?;
         let inner = self.sum()?;
         self.depth -= 1;
-        if self.accept(')') {
-            Ok(inner)
-        } else {
-            Err("a `(` without its `)`".into())
-        }
+        if self.accept(')') { Ok(inner) } else { Err("a `(` without its `)`".into()) }
     }
 
     fn number(&mut self) -> Result<Length, String> {
@@ -215,11 +194,7 @@ impl Reader<'_> {
 
     fn named(&mut self) -> Result<Length, String> {
         let start = self.position;
-        while self
-            .characters
-            .get(self.position)
-            .is_some_and(|c| c.is_alphanumeric() || *c == '_')
-        {
+        while self.characters.get(self.position).is_some_and(|c| c.is_alphanumeric() || *c == '_') {
             self.position += 1;
         }
         let name: String = self.characters[start..self.position].iter().collect();
@@ -232,10 +207,7 @@ impl Reader<'_> {
         if self.known.is_empty() {
             return Err(format!("no constant `{name}`: the session has no [constants]"));
         }
-        Err(format!(
-            "no constant `{name}`; the session's constants are {}",
-            self.known.join(", ")
-        ))
+        Err(format!("no constant `{name}`; the session's constants are {}", self.known.join(", ")))
     }
 
     fn deeper(&mut self) -> Result<(), String> {

@@ -20,6 +20,7 @@ pub(crate) mod trajectory;
 
 use crate::chain::Machine;
 use crate::component::ErrorName;
+use crate::driver::Origin;
 use crate::effect::Effect;
 use crate::instrument::rtest::Setting;
 use crate::instrument::{InstrumentKind, SharedBy, Station};
@@ -51,6 +52,13 @@ pub struct Session {
     /// Notes of `[about]` on the measurement, by name in the order of the file: `serial_number`, `operator`, `date`,
     /// `comment` and others. No calculation uses them; reports and results repeat them.
     pub about: Vec<(String, String)>,
+}
+
+impl Session {
+    /// Reference time and temperature, from which the drivers of effects count.
+    pub fn origin(&self) -> Origin {
+        Origin::of(self.tests.iter().filter_map(|test| test.readings.as_ref()))
+    }
 }
 
 /// One test.

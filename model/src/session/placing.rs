@@ -17,14 +17,8 @@ pub fn balls(machine: &Machine, bar: &BallBar<f64>, at: &[f64]) -> ([f64; 3], [f
 
 /// The positions of all axes at which the linear axes place the spindle ball at `requested` from the workpiece ball
 /// (mm, in R), with the rotary axes `at` their positions. `None` if that is impossible.
-pub fn positions_for_bar(
-    machine: &Machine,
-    bar: &BallBar<f64>,
-    at: &[f64],
-    requested: [f64; 3],
-) -> Option<Vec<f64>> {
-    let (state, missed) =
-        trajectory::solve_linear_axes(machine, bar, at, &trajectory::linear_axes(machine), requested);
+pub fn positions_for_bar(machine: &Machine, bar: &BallBar<f64>, at: &[f64], requested: [f64; 3]) -> Option<Vec<f64>> {
+    let (state, missed) = trajectory::solve_linear_axes(machine, bar, at, &trajectory::linear_axes(machine), requested);
     (missed <= POSITION_TOLERANCE_MM).then_some(state)
 }
 

@@ -48,10 +48,7 @@ pub(crate) fn checked_plan(machine: &Machine, test: &Test) -> Result<Readings, (
         Some(Motion::List) | None => {
             let Some(data) = &test.readings else {
                 return Err((
-                    format!(
-                        "test \"{}\" has neither a motion nor data from which its states follow",
-                        test.name
-                    ),
+                    format!("test \"{}\" has neither a motion nor data from which its states follow", test.name),
                     "add `sweep = { … }` or `path = { … }`, or read its data".into(),
                 ));
             };
@@ -72,26 +69,20 @@ pub(crate) fn checked_plan(machine: &Machine, test: &Test) -> Result<Readings, (
 
 /// A description of the first axis that exceeds its travel.
 pub(crate) fn beyond_travel(machine: &Machine, readings: &Readings) -> Option<String> {
-    machine
-        .axes
-        .iter()
-        .zip(&readings.positions)
-        .find_map(|(axis, positions)| {
-            let [least, greatest] = axis.travel?;
-            let slack = 1e-9 * (1.0 + least.abs().max(greatest.abs()));
-            let beyond = positions
-                .iter()
-                .find(|&&q| q < least - slack || q > greatest + slack)?;
-            let displayed = |q: f64| axis.kind.to_display(q);
-            Some(format!(
-                "axis `{}` goes to {:.3} {unit}; its travel is {} to {} {unit}",
-                axis.name,
-                displayed(*beyond),
-                displayed(least),
-                displayed(greatest),
-                unit = axis.kind.unit(),
-            ))
-        })
+    machine.axes.iter().zip(&readings.positions).find_map(|(axis, positions)| {
+        let [least, greatest] = axis.travel?;
+        let slack = 1e-9 * (1.0 + least.abs().max(greatest.abs()));
+        let beyond = positions.iter().find(|&&q| q < least - slack || q > greatest + slack)?;
+        let displayed = |q: f64| axis.kind.to_display(q);
+        Some(format!(
+            "axis `{}` goes to {:.3} {unit}; its travel is {} to {} {unit}",
+            axis.name,
+            displayed(*beyond),
+            displayed(least),
+            displayed(greatest),
+            unit = axis.kind.unit(),
+        ))
+    })
 }
 
 /// Sets linear axes that a circle does not move, and that the test does not state, so that the centre of the circle
@@ -103,15 +94,8 @@ pub(crate) fn centre_circle(
     listed: &[bool],
     at: &mut [f64],
 ) {
-    if let (
-        Some(pair),
-        Some(Motion::Circle {
-            first,
-            second,
-            centre,
-            ..
-        }),
-    ) = (trajectory::bar_between_points(station), motion)
+    if let (Some(pair), Some(Motion::Circle { first, second, centre, .. })) =
+        (trajectory::bar_between_points(station), motion)
     {
         let open: Vec<usize> = trajectory::linear_axes(machine)
             .into_iter()

@@ -62,23 +62,17 @@ const MAX_TRIED: usize = 500;
 
 /// The mistakes, of one axis or of all axes of a kind, whose correction makes the instrument fit.
 fn mistakes(machine: &Machine, test: &Test, readings: &Readings) -> Vec<String> {
-    let rows: Vec<usize> = (0..readings.rows())
-        .step_by(readings.rows().div_ceil(MAX_TRIED).max(1))
-        .collect();
+    let rows: Vec<usize> = (0..readings.rows()).step_by(readings.rows().div_ceil(MAX_TRIED).max(1)).collect();
     let readings = readings.of_rows(&rows);
     let matters = |axis: usize| readings.positions[axis].iter().any(|q| *q != 0.0);
     let mut found: Vec<(f64, String)> = Vec::new();
     for (kind, mistakes) in [(AxisKind::Linear, &LINEAR[..]), (AxisKind::Rotary, &ROTARY[..])] {
-        let axes: Vec<usize> = (0..machine.axes.len())
-            .filter(|axis| machine.axes[*axis].kind == kind && matters(*axis))
-            .collect();
+        let axes: Vec<usize> =
+            (0..machine.axes.len()).filter(|axis| machine.axes[*axis].kind == kind && matters(*axis)).collect();
         let together = (axes.len() > 1).then(|| axes.clone());
         let groups = axes.iter().map(|axis| vec![*axis]).chain(together);
         for group in groups.collect::<Vec<_>>() {
-            let names: Vec<&str> = group
-                .iter()
-                .map(|axis| machine.axes[*axis].name.as_str())
-                .collect();
+            let names: Vec<&str> = group.iter().map(|axis| machine.axes[*axis].name.as_str()).collect();
             for (factor, words) in mistakes {
                 let mut corrected = readings.clone();
                 for axis in &group {
@@ -94,10 +88,7 @@ fn mistakes(machine: &Machine, test: &Test, readings: &Readings) -> Vec<String> 
         }
     }
     // A scale that nearly stops an axis makes many set-ups fit, so only corrections about as good as the best are kept.
-    let best = found
-        .iter()
-        .map(|(misfit, _)| *misfit)
-        .fold(f64::INFINITY, f64::min);
+    let best = found.iter().map(|(misfit, _)| *misfit).fold(f64::INFINITY, f64::min);
     found.retain(|(misfit, _)| *misfit <= EQUIVALENT_FACTOR * best + EQUIVALENT_MM);
     found.into_iter().map(|(_, description)| description).collect()
 }
@@ -115,11 +106,7 @@ fn misfit(machine: &Machine, test: &Test, readings: &Readings) -> f64 {
         readings.state(machine, row, &mut state);
         let reading = test.station.read::<f64>(machine, &state, &none, |_| None);
         let nominal = bar_mm(&test.station);
-        sum += reading
-            .coordinates()
-            .iter()
-            .map(|x| (x - nominal).powi(2))
-            .sum::<f64>();
+        sum += reading.coordinates().iter().map(|x| (x - nominal).powi(2)).sum::<f64>();
     }
     (sum / readings.rows().max(1) as f64).sqrt()
 }

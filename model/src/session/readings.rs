@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::axis::AxisKind;
 use crate::chain::{AxisPosition, Machine};
-use crate::effect::DriverSample;
+use crate::driver::DriverSample;
 
 /// The file of readings, for messages about single readings.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -54,10 +54,10 @@ impl Readings {
             rows.iter().map(|&row| column[row]).collect()
         }
         Readings {
-            origin: self.origin.as_ref().map(|origin| Origin {
-                file: origin.file.clone(),
-                line: of(&origin.line, rows),
-            }),
+            origin: self
+                .origin
+                .as_ref()
+                .map(|origin| Origin { file: origin.file.clone(), line: of(&origin.line, rows) }),
             run: of(&self.run, rows),
             time_s: of(&self.time_s, rows),
             temperature_c: of(&self.temperature_c, rows),
@@ -78,11 +78,7 @@ impl Readings {
     pub fn state(&self, machine: &Machine, row: usize, state: &mut Vec<AxisPosition<f64>>) {
         state.clear();
         state.extend(
-            machine
-                .axes
-                .iter()
-                .zip(&self.positions)
-                .map(|(axis, column)| AxisPosition::new(axis.kind, column[row])),
+            machine.axes.iter().zip(&self.positions).map(|(axis, column)| AxisPosition::new(axis.kind, column[row])),
         );
     }
 
@@ -116,13 +112,8 @@ impl Readings {
             AxisKind::Linear => 1e-6,
             AxisKind::Rotary => 1e-9,
         };
-        let mut samples: Vec<DriverSample<f64>> = positions
-            .iter()
-            .map(|&value| DriverSample {
-                value,
-                ..DriverSample::default()
-            })
-            .collect();
+        let mut samples: Vec<DriverSample<f64>> =
+            positions.iter().map(|&value| DriverSample { value, ..DriverSample::default() }).collect();
         for run in self.runs() {
             let (first, end) = (run.start, run.end);
             let step = |row: usize| positions[row] - positions[row - 1];

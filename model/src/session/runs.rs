@@ -12,21 +12,9 @@ const MIN_ADVANCE: f64 = 0.5;
 /// A description of the difference between the runs of the data and those of the stated motion, if any. Data without a
 /// `run` column are not compared.
 pub(crate) fn difference_from_stated(motion: Option<&Motion>, readings: &Readings) -> Option<String> {
-    let (Motion::Sweep {
-        runs,
-        both_directions,
-        ..
-    }
-    | Motion::Circle {
-        runs,
-        both_directions,
-        ..
-    }
-    | Motion::Follow {
-        runs,
-        both_directions,
-        ..
-    }) = motion?
+    let (Motion::Sweep { runs, both_directions, .. }
+    | Motion::Circle { runs, both_directions, .. }
+    | Motion::Follow { runs, both_directions, .. }) = motion?
     else {
         return None;
     };
@@ -58,12 +46,8 @@ pub(crate) fn difference_from_stated(motion: Option<&Motion>, readings: &Reading
     }
     let enough = forward >= *runs && (backward >= *runs || !both_directions);
     let only_forward = *both_directions || backward == 0;
-    (!(enough && only_forward)).then(|| {
-        format!(
-            "the data contain {} forward and {backward} backward, but {states}",
-            counted(forward, "run")
-        )
-    })
+    (!(enough && only_forward))
+        .then(|| format!("the data contain {} forward and {backward} backward, but {states}", counted(forward, "run")))
 }
 
 /// Net advance of a run in the direction of the motion, and its total path length: along an axis, or around a circle by
@@ -77,13 +61,7 @@ fn advance_and_length(motion: &Motion, readings: &Readings, run: &Range<usize>) 
             let positions = &readings.positions[*axis][run.clone()];
             sum(&mut positions.windows(2).map(|pair| (pair[1] - pair[0]) * (to - from)))
         }
-        Motion::Circle {
-            first,
-            second,
-            from,
-            to,
-            ..
-        } => {
+        Motion::Circle { first, second, from, to, .. } => {
             let [x, y] = [*first, *second].map(|axis| &readings.positions[axis][run.clone()]);
             let area = |k: usize| (x[k] - x[0]) * (y[k + 1] - y[0]) - (x[k + 1] - x[0]) * (y[k] - y[0]);
             sum(&mut (0..x.len() - 1).map(|k| area(k) * (to - from)))

@@ -8,19 +8,13 @@ pub(crate) fn differing(earlier: &[Test], test: &Test) -> Vec<String> {
     let unknowns = test.station.kind().unknowns();
     let mut warnings = Vec::new();
     for group in mounted_groups(unknowns) {
-        let Some(first) = earlier
-            .iter()
-            .find(|other| other.group(group) == test.group(group))
-        else {
+        let Some(first) = earlier.iter().find(|other| other.group(group) == test.group(group)) else {
             continue;
         };
         let own = |test: &Test| -> (Vec<Prior>, [f64; 3]) {
             let priors = unknowns.iter().zip(&test.priors);
             let priors = priors.filter(|(unknown, _)| unknown.shared_by == group);
-            (
-                priors.map(|(_, prior)| *prior).collect(),
-                nominal(&test.station, group),
-            )
+            (priors.map(|(_, prior)| *prior).collect(), nominal(&test.station, group))
         };
         if own(first) != own(test) {
             warnings.push(format!(

@@ -25,15 +25,7 @@ type Fault = (String, String);
 /// Positions, runs and times of a motion.
 pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<Readings, Fault> {
     match motion {
-        Motion::Sweep {
-            axis,
-            from,
-            to,
-            step,
-            speed,
-            runs,
-            both_directions,
-        } => {
+        Motion::Sweep { axis, from, to, step, speed, runs, both_directions } => {
             let along = steps(*from, *to, *step);
             traversals(machine, &along, *speed, *runs, *both_directions, |q| {
                 let mut at = test.at.clone();
@@ -41,18 +33,7 @@ pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<
                 Ok(at)
             })
         }
-        Motion::Circle {
-            first,
-            second,
-            radius,
-            centre,
-            from,
-            to,
-            step,
-            speed,
-            runs,
-            both_directions,
-        } => {
+        Motion::Circle { first, second, radius, centre, from, to, step, speed, runs, both_directions } => {
             let bar = bar_between_points(&test.station).unwrap_or(BallBar {
                 workpiece_ball: [0.0; 3],
                 spindle_ball: [0.0; 3],
@@ -61,20 +42,9 @@ pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<
             let circle = Circle::new(machine, &bar, &test.at, [*first, *second], *centre)?;
             let along = steps(*from, *to, *step);
             let turn = *speed / *radius;
-            traversals(machine, &along, turn, *runs, *both_directions, |angle| {
-                Ok(circle.state(*radius, angle))
-            })
+            traversals(machine, &along, turn, *runs, *both_directions, |angle| Ok(circle.state(*radius, angle)))
         }
-        Motion::Follow {
-            axis,
-            from,
-            to,
-            step,
-            speed,
-            runs,
-            both_directions,
-            offset,
-        } => {
+        Motion::Follow { axis, from, to, step, speed, runs, both_directions, offset } => {
             let Some(mut bar) = bar_between_points(&test.station) else {
                 return Err((
                     format!("test \"{}\" has no point of the table to follow", test.name),
@@ -135,15 +105,7 @@ fn steps(from: f64, to: f64, step: f64) -> Vec<f64> {
     let ratio = (to - from).abs() / step;
     let count = (ratio + 1e-6).floor() as usize;
     let whole = (ratio - count as f64).abs() < 1e-6;
-    (0..=count)
-        .map(|k| {
-            if whole && k == count {
-                to
-            } else {
-                from + (to - from).signum() * step * k as f64
-            }
-        })
-        .collect()
+    (0..=count).map(|k| if whole && k == count { to } else { from + (to - from).signum() * step * k as f64 }).collect()
 }
 
 /// Follows a path `runs` times, and back each time if both directions are requested.
@@ -156,10 +118,7 @@ fn traversals(
     state: impl Fn(f64) -> Result<Vec<f64>, Fault>,
 ) -> Result<Readings, Fault> {
     let states = along.iter().map(|&q| state(q)).collect::<Result<Vec<_>, _>>()?;
-    let mut readings = Readings {
-        positions: vec![Vec::new(); machine.axes.len()],
-        ..Readings::default()
-    };
+    let mut readings = Readings { positions: vec![Vec::new(); machine.axes.len()], ..Readings::default() };
     let last = along.len() - 1;
     let mut start_s = 0.0;
     for run in 0..runs * if both_directions { 2 } else { 1 } {
@@ -171,9 +130,7 @@ fn traversals(
                 column.push(*position);
             }
             readings.run.push(run as i64 + 1);
-            readings
-                .time_s
-                .push(start_s + (along[here] - along[origin]).abs() / speed);
+            readings.time_s.push(start_s + (along[here] - along[origin]).abs() / speed);
         }
         start_s = readings.time_s.last().copied().unwrap_or(0.0) + BETWEEN_RUNS_S;
     }
@@ -181,19 +138,8 @@ fn traversals(
 }
 
 /// Positions of the axes at these angles of a test's circle; `None` for another motion.
-pub(crate) fn on_circle(
-    machine: &Machine,
-    test: &Test,
-    angles: &[f64],
-) -> Option<Result<Vec<Vec<f64>>, Fault>> {
-    let Some(Motion::Circle {
-        first,
-        second,
-        radius,
-        centre,
-        ..
-    }) = &test.motion
-    else {
+pub(crate) fn on_circle(machine: &Machine, test: &Test, angles: &[f64]) -> Option<Result<Vec<Vec<f64>>, Fault>> {
+    let Some(Motion::Circle { first, second, radius, centre, .. }) = &test.motion else {
         return None;
     };
     let bar = bar_between_points(&test.station)?;
@@ -248,9 +194,7 @@ impl Circle {
 
 /// The linear axes of a machine, by index.
 pub(crate) fn linear_axes(machine: &Machine) -> Vec<usize> {
-    (0..machine.axes.len())
-        .filter(|&index| machine.axes[index].kind == AxisKind::Linear)
-        .collect()
+    (0..machine.axes.len()).filter(|&index| machine.axes[index].kind == AxisKind::Linear).collect()
 }
 
 /// Moves the `open` axes so that the spindle ball is nominally at `requested` from the workpiece ball, in the
@@ -265,10 +209,7 @@ pub(super) fn solve_linear_axes(
 ) -> (Vec<f64>, f64) {
     let apart = spindle_from_workpiece(machine, bar, at);
     let rest = DVector::from_iterator(3, (0..3).map(|i| requested[i] - apart[i]));
-    let moves: Vec<[f64; 3]> = open
-        .iter()
-        .map(|&axis| relative_move(machine, bar, at, axis))
-        .collect();
+    let moves: Vec<[f64; 3]> = open.iter().map(|&axis| relative_move(machine, bar, at, axis)).collect();
     let matrix = DMatrix::from_fn(3, open.len(), |i, j| moves[j][i]);
     let mut state = at.to_vec();
     if open.is_empty() {
@@ -303,21 +244,12 @@ fn relative_move(machine: &Machine, bar: &BallBar<f64>, at: &[f64], axis: usize)
     std::array::from_fn(|i| {
         let step = one[i] - zero[i];
         // Differences of positions contain rounding errors; a direction along R's axes is exact.
-        if (step - step.round()).abs() < 1e-12 {
-            step.round()
-        } else {
-            step
-        }
+        if (step - step.round()).abs() < 1e-12 { step.round() } else { step }
     })
 }
 
 pub(crate) fn positions(machine: &Machine, at: &[f64]) -> Vec<AxisPosition<f64>> {
-    machine
-        .axes
-        .iter()
-        .zip(at)
-        .map(|(axis, &position)| AxisPosition::new(axis.kind, position))
-        .collect()
+    machine.axes.iter().zip(at).map(|(axis, &position)| AxisPosition::new(axis.kind, position)).collect()
 }
 
 /// From workpiece ball to spindle ball while the linear axes follow a rotary axis. The vector has the length of the bar
@@ -334,11 +266,7 @@ fn offset_vector(
     let (workpiece, spindle) = bar.balls::<f64>(machine, &state, &none, &|_| None);
     let on_workpiece_side = axis < machine.workpiece_side;
     // A rotating head carries the spindle ball: the workpiece ball is then on the opposite side.
-    let (carried, sign) = if on_workpiece_side {
-        (workpiece.0, 1.0)
-    } else {
-        (spindle.0, -1.0)
-    };
+    let (carried, sign) = if on_workpiece_side { (workpiece.0, 1.0) } else { (spindle.0, -1.0) };
     let (origin, along) = axis_line(machine, &state, axis);
     let from: [f64; 3] = std::array::from_fn(|i| carried[i] - origin[i]);
     let height: f64 = (0..3).map(|i| from[i] * along[i]).sum();
@@ -349,10 +277,7 @@ fn offset_vector(
         FollowOffset::Axial => along,
         _ if radius < 1e-6 => {
             return Err((
-                format!(
-                    "the ball lies on axis `{}` and does not move on a circle",
-                    machine.axes[axis].name
-                ),
+                format!("the ball lies on axis `{}` and does not move on a circle", machine.axes[axis].name),
                 "a radial or tangential bar needs a ball away from the axis".into(),
             ));
         }
@@ -364,29 +289,18 @@ fn offset_vector(
 
 /// A point of an axis and its direction in R, carried by the axes between it and the bed.
 pub(super) fn axis_line(machine: &Machine, state: &[AxisPosition<f64>], axis: usize) -> ([f64; 3], [f64; 3]) {
-    let between = if axis < machine.workpiece_side {
-        axis + 1..machine.workpiece_side
-    } else {
-        machine.workpiece_side..axis
-    };
+    let between =
+        if axis < machine.workpiece_side { axis + 1..machine.workpiece_side } else { machine.workpiece_side..axis };
     let mut carrying = machine.clone();
     carrying.axes = machine.axes[between.clone()].to_vec();
-    carrying.workpiece_side = if axis < machine.workpiece_side {
-        between.len()
-    } else {
-        0
-    };
+    carrying.workpiece_side = if axis < machine.workpiece_side { between.len() } else { 0 };
     let none = vec![BodyErrors::<f64>::NONE; between.len()];
     let in_r = |point: [f64; 3]| {
         let point = Point(point);
         if axis < machine.workpiece_side {
-            carrying
-                .workpiece_point::<f64>(&state[between.clone()], &none, point)
-                .0
+            carrying.workpiece_point::<f64>(&state[between.clone()], &none, point).0
         } else {
-            carrying
-                .tool_point::<f64>(&state[between.clone()], &none, point)
-                .0
+            carrying.tool_point::<f64>(&state[between.clone()], &none, point).0
         }
     };
     let line = &machine.axes[axis];

@@ -5,19 +5,14 @@ use std::path::Path;
 
 use abbe_model::files::{self, ReadOptions};
 
-use super::{
-    DATA, MACHINE, SESSION, assert_contains, error_text, session, with_data, with_machine, with_session,
-};
+use super::{DATA, MACHINE, SESSION, assert_contains, error_text, session, with_data, with_machine, with_session};
 
 #[test]
 fn missing_and_invalid_files() {
     let folder = tempfile::tempdir().unwrap();
     let read = |path: &Path| error_text(files::session(path, &ReadOptions::default()));
     assert_contains(&read(folder.path()), &["this is a folder"]);
-    assert_contains(
-        &read(&folder.path().join("no.toml")),
-        &["the session file cannot be read"],
-    );
+    assert_contains(&read(&folder.path().join("no.toml")), &["the session file cannot be read"]);
     let latin = folder.path().join("latin.toml");
     fs::write(&latin, b"name = \"\xe4\"").unwrap();
     assert_contains(&read(&latin), &["byte 9 is not UTF-8"]);
@@ -25,73 +20,38 @@ fn missing_and_invalid_files() {
 
 #[test]
 fn invalid_toml() {
-    assert_contains(
-        &with_session("kind = ", "kind "),
-        &["session.toml:5", "not valid TOML"],
-    );
-    assert_contains(
-        &with_session("100.0", "\"a\" 1"),
-        &["session.toml:11", "not valid TOML"],
-    );
+    assert_contains(&with_session("kind = ", "kind "), &["session.toml:5", "not valid TOML"]);
+    assert_contains(&with_session("100.0", "\"a\" 1"), &["session.toml:11", "not valid TOML"]);
 }
 
 #[test]
 fn unknown_keys() {
     assert_contains(
         &with_session("bar_mm", "bar_length = 1\nbar_mm"),
-        &[
-            "session.toml:11",
-            "test \"C100\" has the unknown key `bar_length`",
-        ],
+        &["session.toml:11", "test \"C100\" has the unknown key `bar_length`"],
     );
     assert_contains(
         &with_session("noise_um", "nois_um"),
-        &[
-            "session.toml:6",
-            "[instrument] has the unknown key `nois_um`",
-            "did you mean `noise_um`?",
-        ],
+        &["session.toml:6", "[instrument] has the unknown key `nois_um`", "did you mean `noise_um`?"],
     );
-    assert_contains(
-        &with_session("[instrument]", "[instruments]"),
-        &["has no `instrument`"],
-    );
+    assert_contains(&with_session("[instrument]", "[instruments]"), &["has no `instrument`"]);
     assert_contains(
         &with_session("[machine]", "extra = 1\n[machine]"),
         &["session.toml:1", "the file has the unknown key `extra`"],
     );
     assert_contains(
         &with_machine("direction = [1, 0, 0]", "directon = [1, 0, 0]"),
-        &[
-            "machine.toml:8",
-            "has the unknown key `directon`",
-            "did you mean `direction`?",
-        ],
+        &["machine.toml:8", "has the unknown key `directon`", "did you mean `direction`?"],
     );
 }
 
 #[test]
 fn invalid_numbers() {
-    assert_contains(
-        &with_data(&DATA.replace("100.0010", "NaN")),
-        &["C100.csv:3", "column 4", "NaN"],
-    );
-    assert_contains(
-        &with_data(&DATA.replace("100.0010", "inf")),
-        &["C100.csv:3", "column 4", "infinite"],
-    );
-    assert_contains(
-        &with_session("100.0", "nan"),
-        &["session.toml:11", "`bar_mm` is NaN"],
-    );
-    assert_contains(
-        &with_machine("[1, 0, 0]", "[nan, 0, 0]"),
-        &["machine.toml:8", "`direction` is NaN"],
-    );
-    assert_contains(
-        &with_machine("[1, 0, 0]", "[0, 0, 0]"),
-        &["machine.toml:8", "is zero"],
-    );
+    assert_contains(&with_data(&DATA.replace("100.0010", "NaN")), &["C100.csv:3", "column 4", "NaN"]);
+    assert_contains(&with_data(&DATA.replace("100.0010", "inf")), &["C100.csv:3", "column 4", "infinite"]);
+    assert_contains(&with_session("100.0", "nan"), &["session.toml:11", "`bar_mm` is NaN"]);
+    assert_contains(&with_machine("[1, 0, 0]", "[nan, 0, 0]"), &["machine.toml:8", "`direction` is NaN"]);
+    assert_contains(&with_machine("[1, 0, 0]", "[0, 0, 0]"), &["machine.toml:8", "is zero"]);
 }
 
 #[test]
@@ -118,8 +78,5 @@ fn torn_and_garbled_files_are_refused_or_read_and_never_panic() {
         }
     }
     let nested = format!("x = {}", "[".repeat(100_000));
-    assert_contains(
-        &error_text(session(MACHINE, &nested, None)),
-        &["session.toml:1", "not valid TOML"],
-    );
+    assert_contains(&error_text(session(MACHINE, &nested, None)), &["session.toml:1", "not valid TOML"]);
 }

@@ -28,11 +28,7 @@ const COLUMNS: &str = "[columns]\nrun = \"Lauf\"\nlength_mm = \"Länge\"\nc_deg 
 fn latin_1_and_utf_16_are_read_as_utf_8_is() {
     let latin: Vec<u8> = FOREIGN.chars().map(|c| c as u8).collect();
     let wide = |mark: bool, of: fn(u16) -> [u8; 2]| -> Vec<u8> {
-        let text = if mark {
-            format!("\u{feff}{FOREIGN}")
-        } else {
-            FOREIGN.into()
-        };
+        let text = if mark { format!("\u{feff}{FOREIGN}") } else { FOREIGN.into() };
         text.encode_utf16().flat_map(of).collect()
     };
     for (bytes, more) in [
@@ -46,40 +42,16 @@ fn latin_1_and_utf_16_are_read_as_utf_8_is() {
         (wide(false, u16::to_le_bytes), "encoding = \"utf-16le\""),
     ] {
         let read = with_bytes(&format!("{COLUMNS}{more}"), &bytes).unwrap();
-        assert_eq!(
-            observed(&read),
-            [99.9990, 100.0010, 100.0],
-            "{more} {:?}",
-            &bytes[..8]
-        );
-        assert_eq!(
-            read.tests[0]
-                .readings
-                .as_ref()
-                .unwrap()
-                .origin
-                .as_ref()
-                .unwrap()
-                .line,
-            [2, 3, 4]
-        );
+        assert_eq!(observed(&read), [99.9990, 100.0010, 100.0], "{more} {:?}", &bytes[..8]);
+        assert_eq!(read.tests[0].readings.as_ref().unwrap().origin.as_ref().unwrap().line, [2, 3, 4]);
     }
     // A header in another encoding than the stated one.
     let fault = error_text(with_bytes(&format!("{COLUMNS}encoding = \"utf-8\""), &latin));
-    assert_contains(
-        &fault,
-        &["C100.csv:1", "not valid UTF-8", "encoding = \"latin1\""],
-    );
-    let fault = error_text(with_bytes(
-        &format!("{COLUMNS}encoding = \"latin1\""),
-        FOREIGN.as_bytes(),
-    ));
+    assert_contains(&fault, &["C100.csv:1", "not valid UTF-8", "encoding = \"latin1\""]);
+    let fault = error_text(with_bytes(&format!("{COLUMNS}encoding = \"latin1\""), FOREIGN.as_bytes()));
     assert_contains(&fault, &["no column `Länge`", "read as Latin-1", "encoding = "]);
     let fault = error_text(with_bytes(&format!("{COLUMNS}encoding = \"latin-one\""), &latin));
-    assert_contains(
-        &fault,
-        &["session.toml", "which is not a known encoding", "latin1"],
-    );
+    assert_contains(&fault, &["session.toml", "which is not a known encoding", "latin1"]);
 }
 
 #[test]
@@ -109,40 +81,21 @@ fn a_file_without_a_header_keeps_its_first_reading() {
     let rows = "0,1,0,99.9990\n1,1,90,100.0010\n2,1,180,100.0000\n";
     let columns = "[columns]\ntime_s = 1\nrun = 2\nc_deg = 3\nlength_mm = 4\n";
     let fault = error_text(with_bytes(columns, rows.as_bytes()));
-    assert_contains(
-        &fault,
-        &[
-            "C100.csv:1",
-            "numbers where a header is expected",
-            "header = false",
-        ],
-    );
+    assert_contains(&fault, &["C100.csv:1", "numbers where a header is expected", "header = false"]);
     let read = with_bytes(&format!("{columns}[format]\nheader = false\n"), rows.as_bytes()).unwrap();
     assert_eq!(observed(&read), [99.9990, 100.0010, 100.0]);
     // A remark in the row does not make it a header.
     let remarks = rows.replace('\n', ",good\n");
+    assert_contains(&error_text(with_bytes(columns, remarks.as_bytes())), &["numbers where a header is expected"]);
     assert_contains(
-        &error_text(with_bytes(columns, remarks.as_bytes())),
-        &["numbers where a header is expected"],
-    );
-    assert_contains(
-        &error_text(with_bytes(
-            &columns.replace("= 4", "= \"reading\""),
-            rows.as_bytes(),
-        )),
+        &error_text(with_bytes(&columns.replace("= 4", "= \"reading\""), rows.as_bytes())),
         &["no column `reading`", "header = false"],
     );
-    assert_contains(
-        &error_text(with_bytes("", rows.as_bytes())),
-        &["C100.csv:1", "header = false"],
-    );
+    assert_contains(&error_text(with_bytes("", rows.as_bytes())), &["C100.csv:1", "header = false"]);
     // Names that look like numbers are names if [columns] says so.
     let numbered = "1,2,3\n0,0,99.9990\n1,90,100.0010\n";
     let columns = "[columns]\ntime_s = \"1\"\nc_deg = \"2\"\nlength_mm = \"3\"\n";
-    assert_eq!(
-        observed(&with_bytes(columns, numbered.as_bytes()).unwrap()).len(),
-        2
-    );
+    assert_eq!(observed(&with_bytes(columns, numbered.as_bytes()).unwrap()).len(), 2);
 }
 
 #[test]
@@ -150,40 +103,23 @@ fn a_foreign_column_maps_to_one_column() {
     let twice = "angle,reading,reading\n0,99.9,100.0\n90,99.9,100.0\n";
     let columns = "[columns]\nc_deg = \"angle\"\nlength_mm = \"reading\"\n";
     let fault = error_text(with_bytes(columns, twice.as_bytes()));
-    assert_contains(
-        &fault,
-        &[
-            "session.toml",
-            "2 columns with the name `reading`: 2, 3",
-            "number of one of them",
-        ],
-    );
+    assert_contains(&fault, &["session.toml", "2 columns with the name `reading`: 2, 3", "number of one of them"]);
     let read = with_bytes(&columns.replace("\"reading\"", "3"), twice.as_bytes()).unwrap();
     assert_eq!(observed(&read), [100.0, 100.0]);
     // One foreign column cannot be two of ours, by name or by number.
     let one = "t,angle,reading\n0,0,100.0\n1,90,100.1\n";
-    for both in [
-        "run = \"t\"\ntime_s = \"t\"",
-        "run = 1\ntime_s = \"t\"",
-        "time_s = 1\nrun = 1",
-    ] {
+    for both in ["run = \"t\"\ntime_s = \"t\"", "run = 1\ntime_s = \"t\"", "time_s = 1\nrun = 1"] {
         let fault = error_text(with_bytes(
             &format!("[columns]\n{both}\nc_deg = \"angle\"\nlength_mm = \"reading\"\n"),
             one.as_bytes(),
         ));
-        assert_contains(
-            &fault,
-            &["session.toml", "column 1 of", "twice", "`run`", "`time_s`"],
-        );
+        assert_contains(&fault, &["session.toml", "column 1 of", "twice", "`run`", "`time_s`"]);
     }
 }
 
 #[test]
 fn an_empty_table_of_columns_is_ignored() {
-    assert_eq!(
-        observed(&with_bytes("[columns]\n", DATA.as_bytes()).unwrap()).len(),
-        4
-    );
+    assert_eq!(observed(&with_bytes("[columns]\n", DATA.as_bytes()).unwrap()).len(), 4);
     let tracker = SESSION
         .replace("ballbar", "tracker")
         .replace(
@@ -212,13 +148,7 @@ fn duplicate_rows_are_reported_and_are_not_repeats() {
     assert_eq!(warnings.len(), 1);
     assert_contains(
         &warnings[0],
-        &[
-            "test \"C100\"",
-            "C100.csv",
-            "2 rows are copies",
-            "line 3, 6",
-            "not treated as repeats",
-        ],
+        &["test \"C100\"", "C100.csv", "2 rows are copies", "line 3, 6", "not treated as repeats"],
     );
     // Without time: the whole file repeated after itself.
     let mut timeless = "run,c_deg,length_mm\n".to_string();
@@ -241,10 +171,8 @@ fn duplicate_rows_are_reported_and_are_not_repeats() {
     assert_eq!(copied(closed), (3, Vec::new()));
     // A column that is not read distinguishes rows as well.
     let counted = "t,angle,reading,n\n0,0,100.0,1\n0,0,100.0,2\n1,90,100.1,3\n";
-    let read = with_bytes(
-        "[columns]\ntime_s = \"t\"\nc_deg = \"angle\"\nlength_mm = \"reading\"\n",
-        counted.as_bytes(),
-    );
+    let read =
+        with_bytes("[columns]\ntime_s = \"t\"\nc_deg = \"angle\"\nlength_mm = \"reading\"\n", counted.as_bytes());
     assert_eq!(observed(&read.unwrap()).len(), 3);
 }
 
@@ -263,10 +191,7 @@ fn notes_of_the_measurement_are_kept_in_order() {
     assert_eq!(read.about, expected);
     let fault = error_text(with_bytes("[about]\noperator = [1]\n", DATA.as_bytes()));
     assert_contains(&fault, &["session.toml:9", "`operator` is a list of 1; a text"]);
-    assert_contains(
-        &error_text(with_bytes("about = 3\n[x]\n", DATA.as_bytes())),
-        &["session.toml"],
-    );
+    assert_contains(&error_text(with_bytes("about = 3\n[x]\n", DATA.as_bytes())), &["session.toml"]);
 }
 
 #[test]
@@ -285,22 +210,10 @@ fn sign_and_unit_mistakes_of_an_axis_are_suggested() {
     };
     session(MACHINE, SESSION, Some(&with("c_deg", &|angle| angle))).unwrap();
     let fault = error_text(session(MACHINE, SESSION, Some(&with("c_deg", &|angle| -angle))));
-    assert_contains(
-        &fault,
-        &["cannot reach", "positions of C were read with the opposite sign"],
-    );
+    assert_contains(&fault, &["cannot reach", "positions of C were read with the opposite sign"]);
     let fault = error_text(session(MACHINE, SESSION, Some(&with("c_deg", &f64::to_radians))));
-    assert_contains(
-        &fault,
-        &[
-            "cannot reach",
-            "positions of C were read in radians rather than degrees",
-        ],
-    );
+    assert_contains(&fault, &["cannot reach", "positions of C were read in radians rather than degrees"]);
     let inches = with("c_deg", &|angle| angle).replace("x_mm,y_mm", "x_in,y_in");
     let fault = error_text(session(MACHINE, SESSION, Some(&inches)));
-    assert_contains(
-        &fault,
-        &["positions of Y and X were read in mm rather than inches"],
-    );
+    assert_contains(&fault, &["positions of Y and X were read in mm rather than inches"]);
 }

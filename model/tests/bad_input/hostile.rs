@@ -7,9 +7,7 @@ use abbe_model::ModelError;
 use abbe_model::files::{self, ReadOptions, SourceMap};
 use abbe_model::session::Session;
 
-use super::{
-    DATA, MACHINE, SESSION, assert_contains, error_text, session, with_data, with_machine, with_session,
-};
+use super::{DATA, MACHINE, SESSION, assert_contains, error_text, session, with_data, with_machine, with_session};
 
 /// One test per input: its name, the resulting message, and the text that it must contain.
 macro_rules! refused {
@@ -32,12 +30,7 @@ impl Sandbox {
         for file in ["inner/machine.toml", "machine.toml"] {
             fs::write(sandbox.at(file), MACHINE).unwrap();
         }
-        for file in [
-            "inner/C100.csv",
-            "inner/sub/C100.csv",
-            "other/C100.csv",
-            "C100.csv",
-        ] {
+        for file in ["inner/C100.csv", "inner/sub/C100.csv", "other/C100.csv", "C100.csv"] {
             fs::write(sandbox.at(file), DATA).unwrap();
         }
         sandbox
@@ -65,11 +58,7 @@ impl Sandbox {
     }
 
     fn machine(&self, name: &str) -> Result<Session, ModelError> {
-        self.read(
-            "\"machine.toml\"",
-            &format!("\"{name}\""),
-            &ReadOptions::default(),
-        )
+        self.read("\"machine.toml\"", &format!("\"{name}\""), &ReadOptions::default())
     }
 
     fn absolute(&self, name: &str) -> String {
@@ -104,10 +93,7 @@ refused! {
 fn an_absolute_name_outside() {
     let sandbox = Sandbox::new();
     let outside = sandbox.absolute("C100.csv").replace('\\', "/");
-    assert_contains(
-        &error_text(sandbox.data(&outside)),
-        &["session.toml:10", OUTSIDE, "allow files outside"],
-    );
+    assert_contains(&error_text(sandbox.data(&outside)), &["session.toml:10", OUTSIDE, "allow files outside"]);
 }
 
 #[cfg(unix)]
@@ -115,10 +101,7 @@ fn an_absolute_name_outside() {
 fn a_symbolic_link_that_leads_out() {
     let sandbox = Sandbox::new();
     std::os::unix::fs::symlink(sandbox.at("C100.csv"), sandbox.at("inner/link.csv")).unwrap();
-    assert_contains(
-        &error_text(sandbox.data("link.csv")),
-        &["session.toml:10", "`data = \"link.csv\"`", OUTSIDE],
-    );
+    assert_contains(&error_text(sandbox.data("link.csv")), &["session.toml:10", "`data = \"link.csv\"`", OUTSIDE]);
 }
 
 #[cfg(unix)]
@@ -126,10 +109,7 @@ fn a_symbolic_link_that_leads_out() {
 fn a_folder_that_is_a_symbolic_link_out() {
     let sandbox = Sandbox::new();
     std::os::unix::fs::symlink(sandbox.at("other"), sandbox.at("inner/link")).unwrap();
-    assert_contains(
-        &error_text(sandbox.data("link/C100.csv")),
-        &["session.toml:10", OUTSIDE],
-    );
+    assert_contains(&error_text(sandbox.data("link/C100.csv")), &["session.toml:10", OUTSIDE]);
 }
 
 #[cfg(unix)]
@@ -137,10 +117,7 @@ fn a_folder_that_is_a_symbolic_link_out() {
 fn a_symbolic_link_that_leads_in_a_circle() {
     let sandbox = Sandbox::new();
     std::os::unix::fs::symlink(sandbox.at("inner/loop.csv"), sandbox.at("inner/loop.csv")).unwrap();
-    assert_contains(
-        &error_text(sandbox.data("loop.csv")),
-        &["session.toml:10", "`loop.csv` does not exist"],
-    );
+    assert_contains(&error_text(sandbox.data("loop.csv")), &["session.toml:10", "`loop.csv` does not exist"]);
 }
 
 #[cfg(unix)]
@@ -148,24 +125,15 @@ fn a_symbolic_link_that_leads_in_a_circle() {
 fn a_device() {
     assert_contains(&data_at("/dev/zero"), &["session.toml:10", OUTSIDE]);
     let sandbox = Sandbox::new();
-    let options = ReadOptions {
-        allow_outside: true,
-        ..ReadOptions::default()
-    };
+    let options = ReadOptions { allow_outside: true, ..ReadOptions::default() };
     let endless = sandbox.read("\"C100.csv\"", "\"/dev/zero\"", &options);
-    assert_contains(
-        &error_text(endless),
-        &["zero:1", "a line of more than 1048576 bytes"],
-    );
+    assert_contains(&error_text(endless), &["zero:1", "a line of more than 1048576 bytes"]);
 }
 
 #[test]
 fn above_the_data_directory_is_outside_too() {
     let sandbox = Sandbox::new();
-    let options = ReadOptions {
-        data_directory: Some(sandbox.at("other")),
-        ..ReadOptions::default()
-    };
+    let options = ReadOptions { data_directory: Some(sandbox.at("other")), ..ReadOptions::default() };
     assert_contains(
         &error_text(sandbox.read("\"C100.csv\"", "\"../C100.csv\"", &options)),
         &["session.toml:10", OUTSIDE],
@@ -176,14 +144,7 @@ fn above_the_data_directory_is_outside_too() {
 fn files_inside_are_read_under_any_name() {
     let sandbox = Sandbox::new();
     let inside = sandbox.absolute("inner/sub/C100.csv").replace('\\', "/");
-    for name in [
-        "C100.csv",
-        "./C100.csv",
-        "sub/C100.csv",
-        "sub/../C100.csv",
-        "../inner/C100.csv",
-        &inside,
-    ] {
+    for name in ["C100.csv", "./C100.csv", "sub/C100.csv", "sub/../C100.csv", "../inner/C100.csv", &inside] {
         assert!(sandbox.data(name).is_ok(), "{name}");
     }
     #[cfg(unix)]
@@ -191,16 +152,10 @@ fn files_inside_are_read_under_any_name() {
         std::os::unix::fs::symlink("sub/C100.csv", sandbox.at("inner/link.csv")).unwrap();
         assert!(sandbox.data("link.csv").is_ok());
     }
-    let elsewhere = ReadOptions {
-        data_directory: Some(sandbox.at("other")),
-        ..ReadOptions::default()
-    };
+    let elsewhere = ReadOptions { data_directory: Some(sandbox.at("other")), ..ReadOptions::default() };
     fs::remove_file(sandbox.at("inner/C100.csv")).unwrap();
     assert!(sandbox.read("kind", "kind", &elsewhere).is_ok());
-    let trusted = ReadOptions {
-        allow_outside: true,
-        ..ReadOptions::default()
-    };
+    let trusted = ReadOptions { allow_outside: true, ..ReadOptions::default() };
     assert!(sandbox.read("\"C100.csv\"", "\"../C100.csv\"", &trusted).is_ok());
 }
 
@@ -286,11 +241,7 @@ fn sparse(name: &str, bytes: u64) -> String {
     let file = fs::File::create(at(name)).unwrap();
     file.set_len(bytes).unwrap();
     let read = |file: &Path| files::session(file, &ReadOptions::default());
-    error_text(read(&at(if name.ends_with(".toml") {
-        name
-    } else {
-        "session.toml"
-    })))
+    error_text(read(&at(if name.ends_with(".toml") { name } else { "session.toml" })))
 }
 
 refused! {
@@ -309,9 +260,7 @@ fn a_spreadsheet_that_unpacks_without_end() {
     fs::write(at("machine.toml"), MACHINE).unwrap();
     fs::write(at("session.toml"), SESSION.replace("C100.csv", "C.xlsx")).unwrap();
     let mut writer = zip::ZipWriter::new(fs::File::create(at("C.xlsx")).unwrap());
-    writer
-        .start_file("xl/sharedStrings.xml", zip::write::SimpleFileOptions::default())
-        .unwrap();
+    writer.start_file("xl/sharedStrings.xml", zip::write::SimpleFileOptions::default()).unwrap();
     for _ in 0..257 {
         writer.write_all(&vec![b' '; 1 << 20]).unwrap();
     }
@@ -319,23 +268,13 @@ fn a_spreadsheet_that_unpacks_without_end() {
     assert!(fs::metadata(at("C.xlsx")).unwrap().len() < 1 << 20);
     assert_contains(
         &error_text(files::session(&at("session.toml"), &ReadOptions::default())),
-        &[
-            "C.xlsx:0",
-            "unpacks to more than 268435456 bytes",
-            "export it as CSV",
-        ],
+        &["C.xlsx:0", "unpacks to more than 268435456 bytes", "export it as CSV"],
     );
 }
 
 #[test]
 fn nesting_up_to_the_limit_is_read() {
-    let deep = |levels: usize| {
-        error_text(session(
-            MACHINE,
-            &format!("x = {}", nested("[", "]", levels)),
-            None,
-        ))
-    };
+    let deep = |levels: usize| error_text(session(MACHINE, &format!("x = {}", nested("[", "]", levels)), None));
     assert_contains(&deep(79), &["has no `machine`"]);
     assert_contains(&deep(81), &["nested 80 levels deep"]);
 }
@@ -380,25 +319,13 @@ fn a_pipe_is_read_as_a_stream() {
 fn changed_files_are_detected() {
     let sandbox = Sandbox::new();
     let (_, sources) = sandbox.with_sources("C100.csv").unwrap();
-    let names: Vec<_> = sources
-        .files
-        .iter()
-        .map(|stamp| stamp.file.file_name().unwrap().to_str().unwrap())
-        .collect();
+    let names: Vec<_> = sources.files.iter().map(|stamp| stamp.file.file_name().unwrap().to_str().unwrap()).collect();
     assert_eq!(names, ["session.toml", "machine.toml", "C100.csv"]);
     assert!(sources.files.iter().all(|stamp| stamp.changed().is_none()));
     fs::write(sandbox.at("inner/C100.csv"), format!("{DATA}4,1,300,100\n")).unwrap();
-    assert_eq!(
-        sources.files[2].changed().unwrap(),
-        "it has changed since it was read"
-    );
+    assert_eq!(sources.files[2].changed().unwrap(), "it has changed since it was read");
     fs::remove_file(sandbox.at("inner/C100.csv")).unwrap();
-    assert!(
-        sources.files[2]
-            .changed()
-            .unwrap()
-            .starts_with("it no longer exists")
-    );
+    assert!(sources.files[2].changed().unwrap().starts_with("it no longer exists"));
 }
 
 #[cfg(unix)]
@@ -406,22 +333,12 @@ fn changed_files_are_detected() {
 fn folders_and_files_of_any_name_are_read() {
     use std::os::unix::ffi::OsStrExt;
     let folder = tempfile::tempdir().unwrap();
-    for name in [
-        &b"with space"[..],
-        b"caf\xe9",
-        "größe µm".as_bytes(),
-        b"-rf",
-        b"a'b\"c",
-    ] {
+    for name in [&b"with space"[..], b"caf\xe9", "größe µm".as_bytes(), b"-rf", b"a'b\"c"] {
         let inner = folder.path().join(std::ffi::OsStr::from_bytes(name));
         fs::create_dir(&inner).unwrap();
         fs::write(inner.join("machine.toml"), MACHINE).unwrap();
         fs::write(inner.join("C 100.csv"), DATA).unwrap();
-        fs::write(
-            inner.join("my session.toml"),
-            SESSION.replace("C100.csv", "C 100.csv"),
-        )
-        .unwrap();
+        fs::write(inner.join("my session.toml"), SESSION.replace("C100.csv", "C 100.csv")).unwrap();
         assert!(files::session(&inner.join("my session.toml"), &ReadOptions::default()).is_ok());
     }
 }

@@ -1,22 +1,14 @@
 //! Tests of instrument set-ups.
 
-use super::{
-    DATA, MACHINE, SESSION, assert_contains, error_text, session, with_data, with_session, without_tests,
-};
+use super::{DATA, MACHINE, SESSION, assert_contains, error_text, session, with_data, with_session, without_tests};
 
 #[test]
 fn unknown_instruments() {
     assert_contains(
         &with_session("\"ballbar\"", "\"bar\""),
-        &[
-            "session.toml:5",
-            "\"ballbar\", \"r-test\", \"probe\", \"tracker\" or \"socket\" is expected",
-        ],
+        &["session.toml:5", "\"ballbar\", \"r-test\", \"probe\", \"tracker\" or \"socket\" is expected"],
     );
-    assert_contains(
-        &with_session("\"ballbar\"", "\"tracker\""),
-        &["`bar_mm` belongs to a ballbar"],
-    );
+    assert_contains(&with_session("\"ballbar\"", "\"tracker\""), &["`bar_mm` belongs to a ballbar"]);
 }
 
 #[test]
@@ -25,10 +17,7 @@ fn uncertainties_below_zero() {
         &with_session("bar_mm", "bar_u_um = -1\nbar_mm"),
         &["session.toml:11", "`bar_u_um` is -1", "cannot be negative"],
     );
-    assert_contains(
-        &with_session("noise_um = 0.3", "noise_um = -0.3"),
-        &["session.toml:6", "cannot be negative"],
-    );
+    assert_contains(&with_session("noise_um = 0.3", "noise_um = -0.3"), &["session.toml:6", "cannot be negative"]);
 }
 
 #[test]
@@ -37,30 +26,14 @@ fn a_bar_that_does_not_fit() {
     let offset = SESSION.replace("[0, 100, 0]", "[0, 100, 60]");
     assert_contains(
         &error_text(session(MACHINE, &offset, Some(DATA))),
-        &[
-            "session.toml:8",
-            "a bar of 100.0000 mm cannot reach",
-            "116.619 mm apart",
-            "degrees read as radians",
-        ],
+        &["session.toml:8", "a bar of 100.0000 mm cannot reach", "116.619 mm apart", "degrees read as radians"],
     );
     // A depends on both balls: degrees misread as radians separate the balls.
     let both = SESSION.replace("spindle_ball_mm = [0, 0, 0]", "spindle_ball_mm = [0, 100, 100]");
-    let data = radians
-        .replace("a_deg", "a_rad")
-        .replace(",90,", ",2,")
-        .replace(",270,", ",5,");
+    let data = radians.replace("a_deg", "a_rad").replace(",90,", ",2,").replace(",270,", ",5,");
+    assert_contains(&error_text(session(MACHINE, &both, Some(&data))), &["cannot reach"]);
     assert_contains(
-        &error_text(session(MACHINE, &both, Some(&data))),
-        &["cannot reach"],
-    );
-    assert_contains(
-        &with_data(
-            &DATA
-                .replace("length_mm", "deviation_um")
-                .replace("99.", "99999.")
-                .replace("100.", "99999."),
-        ),
+        &with_data(&DATA.replace("length_mm", "deviation_um").replace("99.", "99999.").replace("100.", "99999.")),
         &["read 200.000 mm", "deviation"],
     );
 }
@@ -81,28 +54,16 @@ at = { x_mm = 45, y_mm = 0, z_mm = 0, a_deg = 0 }
     let readings = read("", "").unwrap().tests.remove(0).readings.unwrap();
     assert_eq!(readings.observed, [-1.5e-3, 2.0e-3]);
     for (from, to, expected) in [
-        (
-            "radius_mm = 45",
-            "radius_mm = 30",
-            "is 15.000 mm from the artefact's nominal surface",
-        ),
+        ("radius_mm = 45", "radius_mm = 30", "is 15.000 mm from the artefact's nominal surface"),
         ("x_mm = 45", "x_mm = 0", "misses the artefact, or is on its axis"),
         (
             "stylus_mm = [0, 0, 0]",
             "stylus_mm = [0, 0, 0]\ndirection = [0, 1, 0]\nartefact_axis = [0, 1, 0]",
             "misses the artefact",
         ),
-        (
-            "stylus_mm = [0, 0, 0]",
-            "stylus_mm = [0, 0, 0]\ndirection = [0, 0, 0]",
-            "`direction` is zero",
-        ),
+        ("stylus_mm = [0, 0, 0]", "stylus_mm = [0, 0, 0]\ndirection = [0, 0, 0]", "`direction` is zero"),
         ("radius_mm = 45", "radius_mm = 0", "it must be greater than 0"),
-        (
-            "radius_mm = 45",
-            "radius_mm = 45\nbar_mm = 100",
-            "`bar_mm` belongs to a ballbar",
-        ),
+        ("radius_mm = 45", "radius_mm = 45\nbar_mm = 100", "`bar_mm` belongs to a ballbar"),
     ] {
         let error_text = error_text(read(from, to));
         assert!(error_text.contains(expected), "{to}: {error_text}");
@@ -127,139 +88,62 @@ at = { y_mm = 0, z_mm = 50, a_deg = 0 }
     let good = without_tests().replace("ballbar", "r-test") + &TEST.replace("y_mm = 0, ", "");
     let read = |from: &str, to: &str, data: (&str, &str)| {
         assert!(good.contains(from) && DATA.contains(data.0), "{from} {}", data.0);
-        session(
-            MACHINE,
-            &good.replacen(from, to, 1),
-            Some(&DATA.replace(data.0, data.1)),
-        )
+        session(MACHINE, &good.replacen(from, to, 1), Some(&DATA.replace(data.0, data.1)))
     };
     let readings = read("", "", ("", "")).unwrap().tests.remove(0).readings.unwrap();
     assert_eq!(readings.observed, [1.5e-3, 0.0, 2.0e-3, -2.0e-3, 1.0e-3, 3.0e-3]);
     let angles = "sensor_angles_deg = [135, -35.264, 0]";
     for (from, to, expected) in [
-        (
-            "setting = \"E\"\n",
-            "",
-            &["session.toml:8", "no `setting`", "\"Es\""][..],
-        ),
-        (
-            "\"E\"",
-            "\"F\"",
-            &["session.toml:11", "the text \"F\"", "sensors in the spindle"],
-        ),
-        (
-            "workpiece_ball_mm = [100, 0, 50]\n",
-            "",
-            &["session.toml:8", "no `workpiece_ball_mm`", "table frame"],
-        ),
-        (
-            "spindle_ball_mm",
-            "bar_mm = 100\nspindle_ball_mm",
-            &["session.toml:13", "`bar_mm` belongs to a ballbar"],
-        ),
-        (
-            angles,
-            "sensor_angles_deg = [135, 0]",
-            &["session.toml:14", "three angles"],
-        ),
-        (
-            angles,
-            "sensor_angles_deg = [135, nan, 0]",
-            &["session.toml:14", "`sensor_angles_deg` is NaN"],
-        ),
+        ("setting = \"E\"\n", "", &["session.toml:8", "no `setting`", "\"Es\""][..]),
+        ("\"E\"", "\"F\"", &["session.toml:11", "the text \"F\"", "sensors in the spindle"]),
+        ("workpiece_ball_mm = [100, 0, 50]\n", "", &["session.toml:8", "no `workpiece_ball_mm`", "table frame"]),
+        ("spindle_ball_mm", "bar_mm = 100\nspindle_ball_mm", &["session.toml:13", "`bar_mm` belongs to a ballbar"]),
+        (angles, "sensor_angles_deg = [135, 0]", &["session.toml:14", "three angles"]),
+        (angles, "sensor_angles_deg = [135, nan, 0]", &["session.toml:14", "`sensor_angles_deg` is NaN"]),
         (
             angles,
             "sensor_angles_deg = [135, -35.264, 0]\nsensor_directions = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]",
-            &[
-                "session.toml:15",
-                "both `sensor_angles_deg` and `sensor_directions`",
-                "keep one",
-            ],
+            &["session.toml:15", "both `sensor_angles_deg` and `sensor_directions`", "keep one"],
         ),
         (
             angles,
             "sensor_directions = [[1, 0, 0], [0, 1, 0], [1, 1, 0.01]]",
-            &[
-                "session.toml:14",
-                "almost in a plane",
-                "0.007",
-                "three independent measuring directions",
-            ],
+            &["session.toml:14", "almost in a plane", "0.007", "three independent measuring directions"],
         ),
         (
             angles,
             "sensor_directions = [[1, 0, 0], [0, 0, 0], [1, 1, 0.01]]",
             &["session.toml:14", "`sensor_directions` is zero"],
         ),
-        (
-            angles,
-            "sensor_u_arcsec = -1",
-            &["session.toml:14", "`sensor_u_arcsec` is -1", "cannot be negative"],
-        ),
-        (
-            angles,
-            "",
-            &[
-                "C100.csv:1",
-                "column 4 has the unknown name `du_um`",
-                "needs `dx_um`, `dy_um` and `dz_um`",
-            ],
-        ),
-        (
-            "[100, 0, 50]",
-            "[100, 6, 50]",
-            &[
-                "session.toml:8",
-                "reading 1",
-                "6.000 mm from the centre of the sensors",
-            ],
-        ),
+        (angles, "sensor_u_arcsec = -1", &["session.toml:14", "`sensor_u_arcsec` is -1", "cannot be negative"]),
+        (angles, "", &["C100.csv:1", "column 4 has the unknown name `du_um`", "needs `dx_um`, `dy_um` and `dz_um`"]),
+        ("[100, 0, 50]", "[100, 6, 50]", &["session.toml:8", "reading 1", "6.000 mm from the centre of the sensors"]),
         (
             angles,
             "path = { kind = \"follow\", axis = \"C\", offset = \"radial\", step_deg = 10 }",
-            &[
-                "session.toml:14",
-                "`offset` is the direction of a bar",
-                "remove it",
-            ],
+            &["session.toml:14", "`offset` is the direction of a bar", "remove it"],
         ),
         (
             angles,
             "path = { kind = \"follow\", axis = \"C\", step_deg = 10, feed_mm_min = 10, programmed_feed_mm_min = 10 }",
-            &[
-                "session.toml:14",
-                "both `programmed_feed_mm_min` and `feed_mm_min`",
-            ],
+            &["session.toml:14", "both `programmed_feed_mm_min` and `feed_mm_min`"],
         ),
     ] {
         assert_contains(&error_text(read(from, to, ("", ""))), expected);
     }
     for (from, to, expected) in [
-        (
-            "dw_um",
-            "dz_um",
-            &["C100.csv:1", "unknown name `dz_um`", "the sensor values"][..],
-        ),
+        ("dw_um", "dz_um", &["C100.csv:1", "unknown name `dz_um`", "the sensor values"][..]),
         (",dw_um", ",temperature_c", &["C100.csv:1", "no column `dw_um`"]),
         ("dv_um", "du_mm", &["C100.csv:1", "have the same meaning"]),
-        (
-            "_um",
-            "_m",
-            &["session.toml:8", "the sensors read", "another unit"],
-        ),
+        ("_um", "_m", &["session.toml:8", "the sensors read", "another unit"]),
     ] {
         assert_contains(&error_text(read("", "", (from, to))), expected);
     }
-    let on_axis = good.replace("[100, 0, 50]", "[0, 0, 50]").replace(
-        angles,
-        "path = { kind = \"follow\", axis = \"C\", step_deg = 10, programmed_feed_mm_min = 10 }",
-    );
+    let on_axis = good
+        .replace("[100, 0, 50]", "[0, 0, 50]")
+        .replace(angles, "path = { kind = \"follow\", axis = \"C\", step_deg = 10, programmed_feed_mm_min = 10 }");
     assert_contains(
         &error_text(session(MACHINE, &on_axis, Some(DATA))),
-        &[
-            "session.toml:14",
-            "`programmed_feed_mm_min` of a ball that lies on its axis of rotation",
-            "feed_deg_min",
-        ],
+        &["session.toml:14", "`programmed_feed_mm_min` of a ball that lies on its axis of rotation", "feed_deg_min"],
     );
 }

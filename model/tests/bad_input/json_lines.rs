@@ -25,11 +25,8 @@ fn objects(csv: &str) -> String {
     let keys: Vec<&str> = lines.next().unwrap().split(',').collect();
     let mut text = String::new();
     for (number, line) in lines.enumerate() {
-        let mut pairs: Vec<String> = keys
-            .iter()
-            .zip(line.split(','))
-            .map(|(key, cell)| format!("\"{key}\": {cell}"))
-            .collect();
+        let mut pairs: Vec<String> =
+            keys.iter().zip(line.split(',')).map(|(key, cell)| format!("\"{key}\": {cell}")).collect();
         if number % 2 == 1 {
             pairs.reverse();
         }
@@ -51,16 +48,10 @@ fn the_readings_are_those_of_the_same_table_as_csv() {
         // An empty line takes the place of the header.
         assert_eq!(own.line(0), other.line(0));
     }
-    let foreign = objects(DATA)
-        .replace("c_deg", "angle")
-        .replace("}", ", \"remark\": [\"x\", null]}");
-    let columns =
-        "[columns]\ntime_s = \"time_s\"\nrun = \"run\"\nc_deg = \"angle\"\nlength_mm = \"length_mm\"\n";
+    let foreign = objects(DATA).replace("c_deg", "angle").replace("}", ", \"remark\": [\"x\", null]}");
+    let columns = "[columns]\ntime_s = \"time_s\"\nrun = \"run\"\nc_deg = \"angle\"\nlength_mm = \"length_mm\"\n";
     let mapped = with_lines(columns, &foreign).unwrap();
-    assert_eq!(
-        mapped.tests[0].readings.as_ref().unwrap().observed,
-        csv.tests[0].readings.as_ref().unwrap().observed
-    );
+    assert_eq!(mapped.tests[0].readings.as_ref().unwrap().observed, csv.tests[0].readings.as_ref().unwrap().observed);
 }
 
 #[test]
@@ -77,46 +68,22 @@ fn every_fault_has_its_line_and_key() {
         changed(&format!("{before}\"length_mm\": {value}}}"))
     };
     for value in ["null", "true", "\"100.0\"", "\"100,0\""] {
-        assert_contains(
-            &key(value),
-            &[
-                "C100.jsonl:3",
-                &format!("key `length_mm`: `{value}` is not a number"),
-            ],
-        );
+        assert_contains(&key(value), &["C100.jsonl:3", &format!("key `length_mm`: `{value}` is not a number")]);
     }
     assert_contains(&key("[100.0]"), &["C100.jsonl:3", "`a list` is not a number"]);
     assert_contains(&key("{}"), &["C100.jsonl:3", "`an object` is not a number"]);
     assert_contains(&key("1e400"), &["C100.jsonl:3", "infinite or too large"]);
     assert_contains(&key("NaN"), &["C100.jsonl:3", "not a JSON object", "at byte"]);
-    assert_contains(
-        &key("1.0, \"length_mm\": 1.0"),
-        &["C100.jsonl:3", "key `length_mm` occurs twice"],
-    );
-    assert_contains(
-        &key("1.0, \"a\": 1"),
-        &["C100.jsonl:3", "key `a`, which the first object does not have"],
-    );
-    assert_contains(
-        &changed("[1, 2]"),
-        &["C100.jsonl:3", "not a JSON object", "expected an object"],
-    );
-    assert_contains(
-        &changed("{\"run\": 1}"),
-        &["C100.jsonl:3", "no key `time_s`", "write `null`"],
-    );
-    assert_contains(
-        &changed("{}{}"),
-        &["C100.jsonl:3", "not a JSON object: trailing characters"],
-    );
+    assert_contains(&key("1.0, \"length_mm\": 1.0"), &["C100.jsonl:3", "key `length_mm` occurs twice"]);
+    assert_contains(&key("1.0, \"a\": 1"), &["C100.jsonl:3", "key `a`, which the first object does not have"]);
+    assert_contains(&changed("[1, 2]"), &["C100.jsonl:3", "not a JSON object", "expected an object"]);
+    assert_contains(&changed("{\"run\": 1}"), &["C100.jsonl:3", "no key `time_s`", "write `null`"]);
+    assert_contains(&changed("{}{}"), &["C100.jsonl:3", "not a JSON object: trailing characters"]);
     assert_contains(
         &error_text(with_lines("", &good.replace("c_deg", "c_degree"))),
         &["C100.jsonl:1", "unknown key `c_degree`", "did you mean `c_deg`?"],
     );
-    assert_contains(
-        &error_text(with_lines("", "{}\n")),
-        &["C100.jsonl:1", "an object without keys"],
-    );
+    assert_contains(&error_text(with_lines("", "{}\n")), &["C100.jsonl:1", "an object without keys"]);
     assert_contains(&error_text(with_lines("", "\n\n")), &["an empty data file"]);
 }
 

@@ -44,8 +44,7 @@ workpiece_ball_mm = [0, 100, 0]
 spindle_ball_mm = [0, 0, 0]
 "#;
 
-const DATA: &str =
-    "time_s,run,c_deg,length_mm\n0,1,0,99.9990\n1,1,90,100.0010\n2,1,180,100.0000\n3,1,270,99.9995\n";
+const DATA: &str = "time_s,run,c_deg,length_mm\n0,1,0,99.9990\n1,1,90,100.0010\n2,1,180,100.0000\n3,1,270,99.9995\n";
 
 /// Reads a session from three files.
 fn session(machine: &str, session: &str, data: Option<&str>) -> Result<Session, ModelError> {
@@ -70,11 +69,7 @@ fn error_text(result: Result<Session, ModelError>) -> String {
     let location = fault.location().expect("a location in a file").clone();
     let name = location.file.file_name().unwrap().to_string_lossy().into_owned();
     let message = fault.to_string().replace(&location.to_string(), &name);
-    format!(
-        "{name}:{} {message} | {}",
-        location.line,
-        fault.help().unwrap_or("")
-    )
+    format!("{name}:{} {message} | {}", location.line, fault.help().unwrap_or(""))
 }
 
 #[track_caller]

@@ -14,12 +14,7 @@ fn missing_machine_file() {
 fn missing_data_file() {
     assert_contains(
         &error_text(session(MACHINE, SESSION, None)),
-        &[
-            "session.toml:10",
-            "the data file `C100.csv` does not exist",
-            "looked for",
-            "state the data folder",
-        ],
+        &["session.toml:10", "the data file `C100.csv` does not exist", "looked for", "state the data folder"],
     );
 }
 
@@ -30,47 +25,27 @@ fn duplicate_test_names_and_missing_tests() {
         &error_text(session(MACHINE, &twice, Some(DATA))),
         &["session.toml:15", "two tests have the name \"C100\""],
     );
-    assert_contains(
-        &error_text(session(MACHINE, without_tests(), None)),
-        &["a session without tests"],
-    );
+    assert_contains(&error_text(session(MACHINE, without_tests(), None)), &["a session without tests"]);
 }
 
 #[test]
 fn tests_without_a_motion() {
-    assert_contains(
-        &with_session("data = \"C100.csv\"\n", ""),
-        &["session.toml:8", "neither data nor a motion"],
-    );
+    assert_contains(&with_session("data = \"C100.csv\"\n", ""), &["session.toml:8", "neither data nor a motion"]);
     let both = SESSION.to_string()
         + "sweep = { axis = \"C\", from_deg = 0, to_deg = 10, step_deg = 1 }\npath = { kind = \"list\" }\n";
-    assert_contains(
-        &error_text(session(MACHINE, &both, Some(DATA))),
-        &["both `sweep` and `path`"],
-    );
+    assert_contains(&error_text(session(MACHINE, &both, Some(DATA))), &["both `sweep` and `path`"]);
 }
 
 #[test]
 fn errors_of_missing_axes() {
-    let unknown = |name: &str| {
-        with_session(
-            "[[test]]",
-            &format!("[unknowns]\nerrors = [\"{name}\"]\n\n[[test]]"),
-        )
-    };
+    let unknown = |name: &str| with_session("[[test]]", &format!("[unknowns]\nerrors = [\"{name}\"]\n\n[[test]]"));
     assert_contains(&unknown("EX0B"), &["session.toml:9", "has no axis `B`"]);
     assert_contains(&unknown("error"), &["\"error\" is not the name of an error"]);
 }
 
 #[test]
 fn effects_on_missing_components() {
-    let effect = |text: &str| {
-        error_text(session(
-            MACHINE,
-            &format!("{SESSION}\n[[effect]]\n{text}\n"),
-            Some(DATA),
-        ))
-    };
+    let effect = |text: &str| error_text(session(MACHINE, &format!("{SESSION}\n[[effect]]\n{text}\n"), Some(DATA)));
     assert_contains(
         &effect("component = \"EZB\"\ndriver = \"C\"\nshape = \"harmonic\"\norder = 2"),
         &["session.toml:16", "the machine \"Small\" has no axis `B`"],
@@ -83,10 +58,7 @@ fn effects_on_missing_components() {
         &effect("component = \"EZC\"\nshape = \"harmonics\"\norder = 2"),
         &["\"harmonics\" is not a shape", "did you mean `harmonic`?"],
     );
-    assert_contains(
-        &effect("component = \"EZC\"\nshape = \"harmonic\""),
-        &["needs `order`"],
-    );
+    assert_contains(&effect("component = \"EZC\"\nshape = \"harmonic\""), &["needs `order`"]);
     assert_contains(
         &effect("component = \"EXX\"\nshape = \"harmonic\"\norder = 1"),
         &["cannot have the driver \"X\"", "rotary"],
@@ -113,28 +85,16 @@ fn expressions_over_unknown_constants() {
     );
     let constants = SESSION.replace("[[test]]", "[constants]\nR = 100\nH = 75\n\n[[test]]");
     assert_contains(
-        &error_text(session(
-            MACHINE,
-            &constants.replace("[0, 100, 0]", "[0, \"r\", 0]"),
-            Some(DATA),
-        )),
+        &error_text(session(MACHINE, &constants.replace("[0, 100, 0]", "[0, \"r\", 0]"), Some(DATA))),
         &["no constant `r`", "R, H"],
     );
     assert_contains(
-        &error_text(session(
-            MACHINE,
-            &constants.replace("[0, 100, 0]", "[0, \"sqrt(H - R)\", 0]"),
-            Some(DATA),
-        )),
+        &error_text(session(MACHINE, &constants.replace("[0, 100, 0]", "[0, \"sqrt(H - R)\", 0]"), Some(DATA))),
         &["evaluates to NaN"],
     );
     let deep = format!("[0, \"{}R{}\", 0]", "(".repeat(60), ")".repeat(60));
     assert_contains(
-        &error_text(session(
-            MACHINE,
-            &constants.replace("[0, 100, 0]", &deep),
-            Some(DATA),
-        )),
+        &error_text(session(MACHINE, &constants.replace("[0, 100, 0]", &deep), Some(DATA))),
         &["nested deeper"],
     );
     let mut squares = "R".to_string();
@@ -143,11 +103,7 @@ fn expressions_over_unknown_constants() {
     }
     let wide = format!("[0, \"{squares}\", 0]");
     assert_contains(
-        &error_text(session(
-            MACHINE,
-            &constants.replace("[0, 100, 0]", &wide),
-            Some(DATA),
-        )),
+        &error_text(session(MACHINE, &constants.replace("[0, 100, 0]", &wide), Some(DATA))),
         &["too many nested squares"],
     );
 }

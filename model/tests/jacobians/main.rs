@@ -1,5 +1,5 @@
-//! Tests of the derivatives of the recorded chain against dual numbers, central differences and the closed form of first order, over
-//! every topology.
+//! Tests of the derivatives of the recorded chain against dual numbers, central differences and the closed form of
+//! first order, over every topology.
 
 mod topologies;
 
@@ -20,11 +20,7 @@ use rand_pcg::Pcg64;
 use topologies::uniform;
 
 fn ball_bar(workpiece_ball: [f64; 3], spindle_ball: [f64; 3]) -> Station<f64> {
-    Station::BallBar(BallBar {
-        workpiece_ball,
-        spindle_ball,
-        bar: 100.0,
-    })
+    Station::BallBar(BallBar { workpiece_ball, spindle_ball, bar: 100.0 })
 }
 
 fn tracker(target: [f64; 3]) -> Station<f64> {
@@ -37,13 +33,7 @@ fn tracker(target: [f64; 3]) -> Station<f64> {
 
 /// A stylus in a cylinder wide enough to be hit from any position.
 fn probe(artefact: [f64; 3], stylus: [f64; 3]) -> Station<f64> {
-    Station::Probe(Probe {
-        artefact,
-        axis: [0.6, 0.0, 0.8],
-        radius: 5000.0,
-        stylus,
-        direction: None,
-    })
+    Station::Probe(Probe { artefact, axis: [0.6, 0.0, 0.8], radius: 5000.0, stylus, direction: None })
 }
 
 /// Sensors in three directions, far from the other point.
@@ -76,10 +66,7 @@ fn states(machine: &Machine, rows: usize, random: &mut impl Rng) -> Readings {
         };
         (0..rows).map(|_| uniform(random, most)).collect()
     });
-    Readings {
-        positions: positions.collect(),
-        ..Readings::default()
-    }
+    Readings { positions: positions.collect(), ..Readings::default() }
 }
 
 /// A tenth of a millimetre and a tenth of a degree: large enough that second derivatives matter.
@@ -113,11 +100,7 @@ fn worst(machine: &Machine, station: Station<f64>, random: &mut impl Rng) -> f64
     }
     let mut worst = 0.0_f64;
     for slot in slots {
-        let (step, least) = if is_angle(machine, kind, slot) {
-            (1e-4, 1.0)
-        } else {
-            (1e-2, 1e-2)
-        };
+        let (step, least) = if is_angle(machine, kind, slot) { (1e-4, 1.0) } else { (1e-2, 1e-2) };
         let at = |value: f64| {
             let mut moved = values.clone();
             moved.constant[slot] += value;
@@ -143,7 +126,8 @@ fn derivatives_agree_with_central_differences_on_every_topology() {
             for station in every_station(table, tool) {
                 let kind = station.kind();
                 let worst = worst(&machine, station, &mut random);
-                // Differences over 1e-4 rad deviate by its square times the lever arm: 5 m of a cylinder instead of 300 mm.
+                // Differences over 1e-4 rad deviate by its square times the lever arm: 5 m of a cylinder instead of 300
+                // mm.
                 let most = if kind == InstrumentKind::Probe { 1e-5 } else { 1e-6 };
                 assert!(worst < most, "{} with a {}: {worst:e}", machine.name, kind.word());
                 all = all.max(worst);
@@ -153,8 +137,8 @@ fn derivatives_agree_with_central_differences_on_every_topology() {
     println!("worst relative difference {all:.1e}");
 }
 
-/// The largest difference between the recorded chain and the chain over dual numbers, relative to the largest value or derivative. Errors
-/// are 10 mm and 0.1 rad; some of them vary between rows. The test has more rows than one block.
+/// The largest difference between the recorded chain and the chain over dual numbers, relative to the largest value or
+/// derivative. Errors are 10 mm and 0.1 rad; some of them vary between rows. The test has more rows than one block.
 fn worst_against_duals(machine: &Machine, station: Station<f64>, random: &mut impl Rng) -> f64 {
     let rows = 131;
     let mut readings = states(machine, rows, random);
@@ -187,13 +171,10 @@ fn worst_against_duals(machine: &Machine, station: Station<f64>, random: &mut im
         for (place, seed) in requested.iter().enumerate() {
             let dual = |slot: usize| Dual64::new(value(slot), if slot == *seed { 1.0 } else { 0.0 });
             let bodies = machine.body_errors(|_| true, dual);
-            let reading = station.read(machine, &state, &bodies, |unknown| {
-                Some(dual(machine.error_slots() + unknown))
-            });
+            let reading = station.read(machine, &state, &bodies, |unknown| Some(dual(machine.error_slots() + unknown)));
             for (coordinate, expected) in reading.coordinates().iter().enumerate() {
                 let scalar = (row - range.start) * model.coordinates() + coordinate;
-                let off =
-                    (found.derivatives[place][scalar] - expected.eps).abs() / expected.eps.abs().max(1.0);
+                let off = (found.derivatives[place][scalar] - expected.eps).abs() / expected.eps.abs().max(1.0);
                 let value_off = (found.readings_mm[scalar] - expected.re).abs() / expected.re.abs().max(1.0);
                 worst = worst.max(off).max(value_off);
             }
@@ -213,12 +194,9 @@ fn the_recorded_chain_is_the_chain_over_dual_numbers_at_large_errors() {
             for station in every_station(table, tool) {
                 let kind = station.kind();
                 let worst = worst_against_duals(&machine, station, &mut random);
-                // Errors of 10 mm and 0.1 rad can turn the normal of a cylinder far. The larger tolerance allows for cancellation.
-                let most = if kind == InstrumentKind::Probe {
-                    1e-9
-                } else {
-                    1e-11
-                };
+                // Errors of 10 mm and 0.1 rad can turn the normal of a cylinder far. The larger tolerance allows for
+                // cancellation.
+                let most = if kind == InstrumentKind::Probe { 1e-9 } else { 1e-11 };
                 assert!(worst < most, "{} with a {}: {worst:e}", machine.name, kind.word());
             }
         }
@@ -230,9 +208,7 @@ fn the_first_order_of_the_bar_is_the_closed_form() {
     let machine = Machine::from_code("[wCAbYXZt]").unwrap();
     let mut random = Pcg64::seed_from_u64(2);
     let slot = |name: &str| machine.error_slot(&ErrorName::parse(name).unwrap()).unwrap();
-    let names = [
-        "e_y0a", "θ_z0a", "e_z0a", "θ_y0a", "e_x0c", "e_y0c", "θ_y0c", "θ_x0c",
-    ];
+    let names = ["e_y0a", "θ_z0a", "e_z0a", "θ_y0a", "e_x0c", "e_y0c", "θ_y0c", "θ_x0c"];
     let slots = names.map(slot);
     for _ in 0..50 {
         let [r, h, d] = [(); 3].map(|()| uniform(&mut random, 150.0));
@@ -252,11 +228,7 @@ fn the_first_order_of_the_bar_is_the_closed_form() {
             let closed = [y, -d * y, z, d * z, d - r * sc, r * cc, d * h, 0.0].map(|term| term / length);
             for ((name, closed), derivatives) in names.iter().zip(closed).zip(&found.derivatives) {
                 let difference = (derivatives[row] - closed).abs();
-                assert!(
-                    difference < 1e-10 * closed.abs().max(1.0),
-                    "{name}: {} {closed}",
-                    derivatives[row]
-                );
+                assert!(difference < 1e-10 * closed.abs().max(1.0), "{name}: {} {closed}", derivatives[row]);
             }
         }
     }

@@ -5,7 +5,8 @@ use abbe_model::chain::Machine;
 use abbe_model::frames::Rotation;
 use rand::{Rng, RngExt};
 
-/// Table 1.1 of the thesis, corrected: the print doubles the `A` of [wXYbZBAt] and of [wXYbZCAt], and the `B` of [wXYbZCBt].
+/// Table 1.1 of the thesis, corrected: the print doubles the `A` of [wXYbZBAt] and of [wXYbZCAt], and the `B` of
+/// [wXYbZCBt].
 pub const TABLE_1_1: [&str; 10] = [
     "[wXYbZABt]",
     "[wXYbZBAt]",
@@ -22,8 +23,8 @@ pub const TABLE_1_1: [&str; 10] = [
 /// The machines of Fig. 1.1.
 pub const FIGURE_1_1: [&str; 3] = ["[wXbYZCBt]", "[wCXbYZAt]", "[wCAYbXZt]"];
 
-/// One machine of each topology: the ten of the table, the three of the figure, the one of the thesis, and a robot. The axes are near
-/// their nominal lines.
+/// One machine of each topology: the ten of the table, the three of the figure, the one of the thesis, and a robot. The
+/// axes are near their nominal lines.
 pub fn all(random: &mut impl Rng) -> Vec<Machine> {
     let codes = TABLE_1_1.iter().chain(&FIGURE_1_1).chain(&["[wCAbYXZt]"]);
     let mut machines: Vec<Machine> = codes.map(|code| Machine::from_code(code).unwrap()).collect();
@@ -59,16 +60,13 @@ pub fn robot() -> Machine {
         ([0.0, 0.0, -1.0], [-1184.3, -163.941, 127.3]),
         ([0.0, -1.0, 0.0], [-1184.3, -163.941, 11.6]),
     ];
-    let axes = lines
-        .iter()
-        .enumerate()
-        .map(|(index, (direction, origin_mm))| Axis {
-            name: format!("J{}", index + 1),
-            kind: AxisKind::Rotary,
-            direction: *direction,
-            origin_mm: *origin_mm,
-            travel: None,
-        });
+    let axes = lines.iter().enumerate().map(|(index, (direction, origin_mm))| Axis {
+        name: format!("J{}", index + 1),
+        kind: AxisKind::Rotary,
+        direction: *direction,
+        origin_mm: *origin_mm,
+        travel: None,
+    });
     Machine {
         name: "six axes".into(),
         axes: axes.collect(),

@@ -21,24 +21,16 @@ fn apart(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Bounds of second-order gaps, mm. The first is for errors of `factor` times the random ones; the second is for the remainder after four
-/// times the gap of half the errors is subtracted. With Θ the sum of all error angles and L the longest distance from the bed to a point,
-/// they are Θ²·L and Θ³·L.
+/// Bounds of second-order gaps, mm. The first is for errors of `factor` times the random ones; the second is for the
+/// remainder after four times the gap of half the errors is subtracted. With Θ the sum of all error angles and L the
+/// longest distance from the bed to a point, they are Θ²·L and Θ³·L.
 fn second_and_third_order(drawn: &Drawn, factor: f64) -> (f64, f64) {
     let angles = drawn.errors.iter().enumerate();
-    let sum: f64 = angles
-        .filter(|(slot, _)| is_angle(*slot))
-        .map(|(_, angle)| factor * angle.abs())
-        .sum();
+    let sum: f64 = angles.filter(|(slot, _)| is_angle(*slot)).map(|(_, angle)| factor * angle.abs()).sum();
     let lines = drawn.machine.axes.iter().zip(&drawn.positions);
-    let way: f64 = lines
-        .map(|(axis, q)| 2.0 * apart(axis.origin_mm, [0.0; 3]) + q.abs())
-        .sum();
+    let way: f64 = lines.map(|(axis, q)| 2.0 * apart(axis.origin_mm, [0.0; 3]) + q.abs()).sum();
     let reach = 1000.0 + way;
-    (
-        sum.powi(2) * reach + ROUNDING_MM,
-        sum.powi(3) * reach + ROUNDING_MM,
-    )
+    (sum.powi(2) * reach + ROUNDING_MM, sum.powi(3) * reach + ROUNDING_MM)
 }
 
 const ROUNDING_MM: f64 = 1e-10;
@@ -196,7 +188,8 @@ proptest! {
         for (found, plain) in found.into_iter().zip(both(&drawn, 1.0, table, tool)) {
             prop_assert!(apart(found, mirror(plain)) < 1e-10, "{found:?} {plain:?}");
         }
-        // The moment about a rotary axis is unchanged in the mirror image, because the moment and the axis both change sign.
+        // The moment about a rotary axis is unchanged in the mirror image, because the moment and the axis both change
+        // sign.
         let tool_in_the_mirror = mirror(tool);
         for index in 0..drawn.machine.axes.len() {
             let moment = drawn.machine.gravity_moment_mm(index, &drawn.state(), tool);

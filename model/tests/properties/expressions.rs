@@ -1,5 +1,5 @@
-//! Properties of random calculations: recorded, folded, differentiated and evaluated over columns, they agree with plain and dual
-//! numbers.
+//! Properties of random calculations: recorded, folded, differentiated and evaluated over columns, they agree with
+//! plain and dual numbers.
 
 use abbe_model::expression::{Arena, Operand, Symbol};
 use abbe_model::replay::Replay;
@@ -23,11 +23,7 @@ fn calculated<S: Scalar>(operations: &[(u8, u16, u16)], variables: [S; VARIABLES
         // Recent values more often than old ones, so that expressions grow.
         let of = |place: &u16| {
             let near = usize::from(*place) % places.len().min(24);
-            places[if place.is_multiple_of(2) {
-                places.len() - 1 - near
-            } else {
-                near % places.len()
-            }]
+            places[if place.is_multiple_of(2) { places.len() - 1 - near } else { near % places.len() }]
         };
         let (x, y) = (of(a), of(b));
         // Values stay bounded, and roots and quotients stay away from their singularities.

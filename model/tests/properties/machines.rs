@@ -13,12 +13,7 @@ use proptest::test_runner::{Config, RngSeed};
 
 /// Number of cases of a property, drawn from a fixed seed: the same on every machine and every day.
 pub fn cases(cases: u32) -> Config {
-    Config {
-        cases,
-        rng_seed: RngSeed::Fixed(20_260_101),
-        failure_persistence: None,
-        ..Config::default()
-    }
+    Config { cases, rng_seed: RngSeed::Fixed(20_260_101), failure_persistence: None, ..Config::default() }
 }
 
 /// A machine, the positions of its axes, and its errors in mm and rad, slot by slot.
@@ -32,15 +27,13 @@ pub struct Drawn {
 impl Drawn {
     pub fn state(&self) -> Vec<AxisPosition<f64>> {
         let axes = self.machine.axes.iter().zip(&self.positions);
-        axes.map(|(axis, position)| AxisPosition::new(axis.kind, *position))
-            .collect()
+        axes.map(|(axis, position)| AxisPosition::new(axis.kind, *position)).collect()
     }
 
     /// The prepared errors, multiplied by a factor.
     pub fn bodies(&self, factor: f64) -> Vec<BodyErrors<f64>> {
         let errors = &self.errors;
-        self.machine
-            .body_errors(|_| factor != 0.0, |slot| factor * errors[slot])
+        self.machine.body_errors(|_| factor != 0.0, |slot| factor * errors[slot])
     }
 
     pub fn with(&self, rotation: Rotation) -> Drawn {
@@ -68,9 +61,9 @@ impl Drawn {
         other
     }
 
-    /// The mirror image in the plane perpendicular to `coordinate`. Translations along the normal change sign, and so do rotations about
-    /// the other two coordinates. The direction of a rotary axis is opposite to its mirror image, because a mirrored right hand is a left
-    /// one.
+    /// The mirror image in the plane perpendicular to `coordinate`. Translations along the normal change sign, and so
+    /// do rotations about the other two coordinates. The direction of a rotary axis is opposite to its mirror image,
+    /// because a mirrored right hand is a left one.
     pub fn mirrored(&self, coordinate: usize) -> Drawn {
         let mut other = self.clone();
         other.machine = mirrored(&self.machine, coordinate);
@@ -131,18 +124,16 @@ fn norm(v: [f64; 3]) -> f64 {
 /// An axis with its position in its travel and its errors, both from −1 to 1.
 fn axis() -> impl Strategy<Value = (Axis, f64, Vec<f64>)> {
     let line = (any::<bool>(), direction(), point());
-    (line, -1.0..1.0, vec(-1.0..1.0, ERRORS_PER_AXIS)).prop_map(
-        |((turns, direction, origin), place, errors)| {
-            let axis = Axis {
-                name: String::new(),
-                kind: if turns { AxisKind::Rotary } else { AxisKind::Linear },
-                direction,
-                origin_mm: if turns { origin } else { [0.0; 3] },
-                travel: None,
-            };
-            (axis, place, errors)
-        },
-    )
+    (line, -1.0..1.0, vec(-1.0..1.0, ERRORS_PER_AXIS)).prop_map(|((turns, direction, origin), place, errors)| {
+        let axis = Axis {
+            name: String::new(),
+            kind: if turns { AxisKind::Rotary } else { AxisKind::Linear },
+            direction,
+            origin_mm: if turns { origin } else { [0.0; 3] },
+            travel: None,
+        };
+        (axis, place, errors)
+    })
 }
 
 /// Machines of one to six axes with errors of up to 0.1 mm and 2 mrad, which is very large.
@@ -161,17 +152,8 @@ pub fn machines() -> impl Strategy<Value = Drawn> {
             errors.extend(slots.map(|(slot, size)| size * if is_angle(slot) { 2e-3 } else { 0.1 }));
             machine.push(axis);
         }
-        let machine = Machine {
-            name: "drawn".into(),
-            axes: machine,
-            workpiece_side,
-            rotation,
-            gravity: [0.0, 0.0, -1.0],
-        };
-        Drawn {
-            machine,
-            positions,
-            errors,
-        }
+        let machine =
+            Machine { name: "drawn".into(), axes: machine, workpiece_side, rotation, gravity: [0.0, 0.0, -1.0] };
+        Drawn { machine, positions, errors }
     })
 }

@@ -25,26 +25,11 @@ struct DrawnTest {
 fn station() -> impl Strategy<Value = Station<f64>> {
     let turned = [[0.0, 1.0, 0.0], [-0.6, 0.0, 0.8], [0.8, 0.0, 0.6]];
     (point(), point(), 0_usize..5).prop_map(move |(table, tool, kind)| match kind {
-        0 => Station::BallBar(BallBar {
-            workpiece_ball: table,
-            spindle_ball: tool,
-            bar: 100.0,
-        }),
-        1 => Station::Tracker(Tracker {
-            target: tool,
-            rotation: turned,
-            origin: table,
-        }),
-        2 => Station::Socket(Socket {
-            ball: tool,
-            socket: table,
-        }),
+        0 => Station::BallBar(BallBar { workpiece_ball: table, spindle_ball: tool, bar: 100.0 }),
+        1 => Station::Tracker(Tracker { target: tool, rotation: turned, origin: table }),
+        2 => Station::Socket(Socket { ball: tool, socket: table }),
         kind => Station::RTest(RTest {
-            setting: if kind == 3 {
-                Setting::Table
-            } else {
-                Setting::Spindle
-            },
+            setting: if kind == 3 { Setting::Table } else { Setting::Spindle },
             workpiece_ball: table,
             spindle_ball: tool,
             sensors: None,
@@ -68,18 +53,11 @@ fn tests() -> impl Strategy<Value = DrawnTest> {
         let mut values = SlotValues::zero(0);
         values.constant.clone_from(&drawn.errors);
         let unknowns = station.kind().unknowns().iter().zip(own);
-        values
-            .constant
-            .extend(unknowns.map(|(unknown, size)| match unknown.unit {
-                InternalUnit::Millimetre => 0.1 * size,
-                InternalUnit::Radian | InternalUnit::Ratio => 1e-3 * size,
-            }));
-        DrawnTest {
-            drawn,
-            station,
-            readings,
-            values,
-        }
+        values.constant.extend(unknowns.map(|(unknown, size)| match unknown.unit {
+            InternalUnit::Millimetre => 0.1 * size,
+            InternalUnit::Radian | InternalUnit::Ratio => 1e-3 * size,
+        }));
+        DrawnTest { drawn, station, readings, values }
     })
 }
 

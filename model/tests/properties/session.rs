@@ -8,7 +8,8 @@ use abbe_model::ModelError;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
-use abbe_model::effect::{Component, Driver, Effect, Shape};
+use abbe_model::driver::Driver;
+use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::files::{self, ReadOptions};
 use abbe_model::files::{table::csv, toml::write};
 use abbe_model::frames::Rotation;
@@ -34,11 +35,7 @@ fn text(machine: &Machine) -> String {
         }
     );
     for axis in &machine.axes {
-        let kind = if axis.kind == AxisKind::Rotary {
-            "rotary"
-        } else {
-            "linear"
-        };
+        let kind = if axis.kind == AxisKind::Rotary { "rotary" } else { "linear" };
         // Writing to a String does not fail.
         let _ = writeln!(
             text,
@@ -73,10 +70,7 @@ fn readings(machine: &Machine, rows: &[Vec<f64>]) -> Readings {
             })
             .collect(),
         coordinates: 3,
-        observed: rows
-            .iter()
-            .flat_map(|row| [6, 7, 8].map(|k| 1000.0 * row[k]))
-            .collect(),
+        observed: rows.iter().flat_map(|row| [6, 7, 8].map(|k| 1000.0 * row[k])).collect(),
         ..Readings::default()
     }
 }
@@ -85,10 +79,7 @@ fn readings(machine: &Machine, rows: &[Vec<f64>]) -> Readings {
 fn effects() -> impl Strategy<Value = Vec<(usize, usize, usize, Shape, Shape)>> {
     let places = (0_usize..6, 0_usize..6, 0_usize..6);
     let one = (places, shapes(AxisKind::Linear), shapes(AxisKind::Rotary));
-    vec(
-        one.prop_map(|((a, b, c), linear, rotary)| (a, b, c, linear, rotary)),
-        0..6,
-    )
+    vec(one.prop_map(|((a, b, c), linear, rotary)| (a, b, c, linear, rotary)), 0..6)
 }
 
 fn declared(machine: &Machine, drawn: Vec<(usize, usize, usize, Shape, Shape)>) -> Vec<Effect> {
@@ -102,11 +93,7 @@ fn declared(machine: &Machine, drawn: Vec<(usize, usize, usize, Shape, Shape)>) 
                 axis: machine.axes[of % axes].name.clone(),
             }),
             driver: Driver::Axis(driver.name.clone()),
-            shape: if driver.kind == AxisKind::Rotary {
-                rotary
-            } else {
-                linear
-            },
+            shape: if driver.kind == AxisKind::Rotary { rotary } else { linear },
             tests: Vec::new(),
         }
     });

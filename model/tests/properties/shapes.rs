@@ -1,7 +1,9 @@
 //! Properties of random shapes of effects over the position of an axis, in its internal unit.
 
 use abbe_model::axis::AxisKind;
-use abbe_model::effect::{Component, Driver, DriverSample, Effect, Shape};
+use abbe_model::driver::{Driver, DriverSample};
+use abbe_model::effect::shape::{Curve, Harmonic, Local, Periodic, Polynomial, Power, ReversalSpike, Steps};
+use abbe_model::effect::{Component, Effect, Shape};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -16,35 +18,28 @@ pub fn shapes(kind: AxisKind) -> impl Strategy<Value = Shape> {
     let place = move || -far..far;
     let width = move || 1e-3 * far..far;
     let recurs = (kind == AxisKind::Rotary).then_some(std::f64::consts::TAU);
-    let of_rotary = (1_u32..40).prop_map(|halves| Shape::Harmonic {
-        order: f64::from(halves) / 2.0,
-    });
+    let of_rotary = (1_u32..40).prop_map(|halves| Shape::Harmonic(Harmonic { order: f64::from(halves) / 2.0 }));
     let harmonic = match kind {
         AxisKind::Rotary => of_rotary.boxed(),
         AxisKind::Linear => Just(Shape::Lag).boxed(),
     };
     prop_oneof![
         harmonic,
-        (1_usize..6, width()).prop_map(|(degree, scale)| Shape::Polynomial { degree, scale }),
-        (1_usize..6, width()).prop_map(|(degree, scale)| Shape::Power { degree, scale }),
-        width().prop_map(|period| Shape::Periodic { period }),
+        (1_usize..6, width()).prop_map(|(degree, scale)| Shape::Polynomial(Polynomial { degree, scale })),
+        (1_usize..6, width()).prop_map(|(degree, scale)| Shape::Power(Power { degree, scale })),
+        width().prop_map(|period| Shape::Periodic(Periodic { period })),
         (place(), width(), 4_usize..30, any::<bool>()).prop_map(|(from, length, intervals, closed)| {
-            Shape::Curve {
-                from,
-                to: from + length,
-                intervals,
-                closed,
-            }
+            Shape::Curve(Curve { from, to: from + length, intervals, closed })
         }),
         Just(Shape::Backlash),
         Just(Shape::Lag),
-        width().prop_map(|width| Shape::ReversalSpike { width }),
-        vec(place(), 1..5).prop_map(|at| Shape::Steps { at }),
-        (place(), width(), any::<bool>()).prop_map(move |(centre, width, again)| Shape::Local {
+        width().prop_map(|width| Shape::ReversalSpike(ReversalSpike { width })),
+        vec(place(), 1..5).prop_map(|at| Shape::Steps(Steps { at })),
+        (place(), width(), any::<bool>()).prop_map(move |(centre, width, again)| Shape::Local(Local {
             centre,
             width,
             recurs: recurs.filter(|_| again),
-        }),
+        })),
     ]
 }
 
@@ -86,8 +81,8 @@ proptest! {
             Shape::Harmonic { .. } | Shape::Periodic { .. } => {
                 prop_assert!((found[0].hypot(found[1]) - 1.0).abs() < 1e-12);
             }
-            Shape::Power { degree, scale } => {
-                let all = basis(&Shape::Polynomial { degree, scale }, &sample);
+            Shape::Power(Power { degree, scale }) => {
+                let all = basis(&Shape::Polynomial(Polynomial { degree, scale }), &sample);
                 prop_assert!((found[0] - all[degree - 1]).abs() <= 1e-12 * found[0].abs());
             }
             _ => {}
@@ -98,10 +93,10 @@ proptest! {
     #[test]
     fn periodic_shapes_are_periodic(shape in shapes(AxisKind::Rotary), value in -3.0..3.0, turns in -3_i32..=3) {
         let period = match &shape {
-            Shape::Harmonic { order } => std::f64::consts::TAU / order,
-            Shape::Periodic { period } => *period,
-            Shape::Curve { from, to, closed: true, .. } => to - from,
-            Shape::Local { recurs: Some(period), .. } => *period,
+            Shape::Harmonic(Harmonic { order }) => std::f64::consts::TAU / order,
+            Shape::Periodic(Periodic { period }) => *period,
+            Shape::Curve(Curve { from, to, closed: true, .. }) => to - from,
+            Shape::Local(Local { recurs: Some(period), .. }) => *period,
             _ => return Ok(()),
         };
         let at = |value: f64| DriverSample { value, ..DriverSample::default() };
@@ -117,7 +112,7 @@ fn an_effect_acts_in_the_tests_that_it_is_confined_to() {
     let mut effect = Effect {
         component: Component::parse("EZC").expect("a component"),
         driver: Driver::parse("C"),
-        shape: Shape::Harmonic { order: 1.0 },
+        shape: Shape::Harmonic(Harmonic { order: 1.0 }),
         tests: Vec::new(),
     };
     assert!(effect.acts_in("one") && effect.acts_in("two"));

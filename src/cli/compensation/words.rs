@@ -15,10 +15,7 @@ pub fn words(name: &ErrorName) -> String {
         (ErrorKind::Location, false) => {
             format!("error of the position of {} in direction {direction}", name.axis)
         }
-        (ErrorKind::Location, true) => format!(
-            "error of the orientation of {} in direction {direction}",
-            name.axis
-        ),
+        (ErrorKind::Location, true) => format!("error of the orientation of {} in direction {direction}", name.axis),
         (ErrorKind::Motion, false) => format!("error motion of {} in direction {direction}", name.axis),
         (ErrorKind::Motion, true) => {
             format!("angular error motion of {} in direction {direction}", name.axis)

@@ -1,4 +1,5 @@
-//! The first screen of `abbe fit`: whether the result is good, what was found, what is missing or confounded, what to do next.
+//! The first screen of `abbe fit`: whether the result is good, what was found, what is missing or confounded, what to
+//! do next.
 
 use abbe::identify::fit::Fit;
 use abbe::identify::plan::candidate_tests;
@@ -31,8 +32,7 @@ fn quality(result: &FitResult) {
     let ratio = result.chi_square / result.degrees_of_freedom.max(1) as f64;
     let figures = format!("χ²/ν = {ratio:.2}, ν = {}", result.degrees_of_freedom);
     let verdict = if result.noise_source == "residual" {
-        "no statement: no noise is stated and no reading repeats, so the residual is taken for noise"
-            .to_string()
+        "no statement: no noise is stated and no reading repeats, so the residual is taken for noise".to_string()
     } else if result.u_enlargement > 1.0 {
         format!("the residual exceeds the noise ({figures}): the model lacks an effect")
     } else if ratio < MIN_RATIO {
@@ -56,18 +56,12 @@ fn quality(result: &FitResult) {
             table::micrometres(held)
         );
     }
-    say!(
-        "{}",
-        screen::rank(result.identifiable.len(), result.parameter_count, result.rank)
-    );
+    say!("{}", screen::rank(result.identifiable.len(), result.parameter_count, result.rank));
 }
 
 /// Both propagations side by side, with the quoted interval.
 fn print_drawn(drawn: &FitMonteCarlo, estimates: &Estimates<'_>, all: bool) {
-    let shown = drawn
-        .parameters
-        .iter()
-        .filter(|p| all || !estimates.is_setup(&p.id));
+    let shown = drawn.parameters.iter().filter(|p| all || !estimates.is_setup(&p.id));
     let rows: Vec<Vec<String>> = shown
         .map(|parameter| {
             let (value, gum_u) = table::value_and_u(parameter.value, parameter.gum_u);
@@ -75,10 +69,7 @@ fn print_drawn(drawn: &FitMonteCarlo, estimates: &Estimates<'_>, all: bool) {
             let (quoted, source) = match parameter.verdict {
                 Verdict::Agree => (&parameter.gum_interval, "GUM"),
                 Verdict::Differ => (&parameter.symmetric_interval, "Monte Carlo"),
-                Verdict::Undecided => (
-                    &parameter.symmetric_interval,
-                    "Monte Carlo (too few runs to compare)",
-                ),
+                Verdict::Undecided => (&parameter.symmetric_interval, "Monte Carlo (too few runs to compare)"),
             };
             let [low, high] = [quoted.low, quoted.high].map(|end| table::value_and_u(end, parameter.u).0);
             vec![
@@ -93,13 +84,8 @@ fn print_drawn(drawn: &FitMonteCarlo, estimates: &Estimates<'_>, all: bool) {
         })
         .collect();
     let interval = format!("{} %", drawn.coverage_probability * 100.0);
-    say!(
-        "\nEstimates with standard uncertainty u by GUM and by Monte Carlo, and the quoted coverage interval:"
-    );
-    table::print(
-        &["parameter", "value", "u GUM", "u MC", &interval, "unit", "quoted"],
-        &rows,
-    );
+    say!("\nEstimates with standard uncertainty u by GUM and by Monte Carlo, and the quoted coverage interval:");
+    table::print(&["parameter", "value", "u GUM", "u MC", &interval, "unit", "quoted"], &rows);
     if !all {
         estimates.print_folded_setup();
     }

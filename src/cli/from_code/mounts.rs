@@ -1,7 +1,7 @@
 //! Mounting points of the balls of a generated plan, and positions of the linear axes in each test.
 //!
-//! A ball is mounted once. Linear axes move the spindle ball to the position relative to the workpiece ball that a test needs. If no axis moves along
-//! a required direction, the ball that does not move in the test is mounted again.
+//! A ball is mounted once. Linear axes move the spindle ball to the position relative to the workpiece ball that a test
+//! needs. If no axis moves along a required direction, the ball that does not move in the test is mounted again.
 
 use abbe::model::axis::AxisKind;
 
@@ -38,18 +38,11 @@ impl Length {
             }
             text.push_str(name);
         }
-        if text.is_empty() {
-            "0".to_string()
-        } else {
-            format!("\"{text}\"")
-        }
+        if text.is_empty() { "0".to_string() } else { format!("\"{text}\"") }
     }
 
     fn less(self, other: Length) -> Length {
-        Length {
-            radius: self.radius - other.radius,
-            lift: self.lift - other.lift,
-        }
+        Length { radius: self.radius - other.radius, lift: self.lift - other.lift }
     }
 
     fn negative(self) -> Length {
@@ -87,16 +80,14 @@ pub struct Setting {
 }
 
 impl Mounts {
-    /// The mounting points that all tests share: a workpiece ball beside the rotary axes of the table, a spindle ball beside those of the head. Axes
-    /// along three directions need two mounting points.
+    /// The mounting points that all tests share: a workpiece ball beside the rotary axes of the table, a spindle ball
+    /// beside those of the head. Axes along three directions need two mounting points.
     pub fn of(bodies: &[Body]) -> Mounts {
-        Mounts {
-            workpiece: beside(bodies, Side::Workpiece),
-            spindle: beside(bodies, Side::Tool),
-        }
+        Mounts { workpiece: beside(bodies, Side::Workpiece), spindle: beside(bodies, Side::Tool) }
     }
 
-    /// A test in which rotary axis `turning` moves its ball about the other ball, which is on the axis (`lift` 0) or raised along it (`lift` 1).
+    /// A test in which rotary axis `turning` moves its ball about the other ball, which is on the axis (`lift` 0) or
+    /// raised along it (`lift` 1).
     pub fn sweep(&mut self, bodies: &[Body], turning: usize, lift: i32) -> Setting {
         let axis = &bodies[turning];
         let carried_on = axis.side();
@@ -105,9 +96,7 @@ impl Mounts {
             Side::Workpiece => (&mut workpiece, &self.workpiece),
             Side::Tool => (&mut spindle, &self.spindle),
         };
-        *own = (0..mounts.len())
-            .find(|mount| is_off_axis(&mounts[*mount], axis.along))
-            .unwrap_or(0);
+        *own = (0..mounts.len()).find(|mount| is_off_axis(&mounts[*mount], axis.along)).unwrap_or(0);
         let ball = mounts[*own];
         // The vector from workpiece ball to spindle ball: from the moved ball to the axis, and along the axis.
         let mut wanted = match carried_on {
@@ -120,9 +109,8 @@ impl Mounts {
             Side::Workpiece => index < turning,
             Side::Tool => index > turning,
         };
-        let usable: Vec<usize> = (0..bodies.len())
-            .filter(|index| bodies[*index].side() != carried_on || !carried(*index))
-            .collect();
+        let usable: Vec<usize> =
+            (0..bodies.len()).filter(|index| bodies[*index].side() != carried_on || !carried(*index)).collect();
         let standing = match carried_on {
             Side::Workpiece => Side::Tool,
             Side::Tool => Side::Workpiece,
@@ -130,7 +118,8 @@ impl Mounts {
         self.placed(bodies, [workpiece, spindle], wanted, &usable, standing)
     }
 
-    /// A test in which two linear axes move the spindle ball on a circle about the workpiece ball. The other axes move both into one plane.
+    /// A test in which two linear axes move the spindle ball on a circle about the workpiece ball. The other axes move
+    /// both into one plane.
     pub fn circle(&mut self, bodies: &[Body], pair: [usize; 2]) -> Setting {
         let usable: Vec<usize> = (0..bodies.len()).collect();
         let apart: Vector = std::array::from_fn(|d| self.spindle[0][d].less(self.workpiece[0][d]));
@@ -141,14 +130,12 @@ impl Mounts {
             wanted[along] = apart[along];
         }
         let mut setting = self.placed(bodies, [0, 0], wanted, &usable, Side::Tool);
-        setting
-            .at
-            .retain(|(name, _)| pair.iter().all(|axis| bodies[*axis].name != *name));
+        setting.at.retain(|(name, _)| pair.iter().all(|axis| bodies[*axis].name != *name));
         setting
     }
 
-    /// Moves the first usable linear axis along each direction until the spindle ball is at `wanted` from the workpiece ball, with all rotary axes at
-    /// zero. Without such an axis the ball of the `standing` side is mounted again.
+    /// Moves the first usable linear axis along each direction until the spindle ball is at `wanted` from the workpiece
+    /// ball, with all rotary axes at zero. Without such an axis the ball of the `standing` side is mounted again.
     fn placed(
         &mut self,
         bodies: &[Body],
@@ -159,10 +146,8 @@ impl Mounts {
     ) -> Setting {
         let (mut workpiece, mut spindle) = (self.workpiece[mounts[0]], self.spindle[mounts[1]]);
         let is_linear = |index: &usize| bodies[*index].kind == AxisKind::Linear;
-        let mut at: Vec<(usize, Length)> = (0..bodies.len())
-            .filter(is_linear)
-            .map(|axis| (axis, Length::ZERO))
-            .collect();
+        let mut at: Vec<(usize, Length)> =
+            (0..bodies.len()).filter(is_linear).map(|axis| (axis, Length::ZERO)).collect();
         let mut remounted_along = Vec::new();
         for along in 0..3 {
             let missing = wanted[along].less(spindle[along].less(workpiece[along]));
@@ -187,10 +172,7 @@ impl Mounts {
         Setting {
             workpiece: index_of(&mut self.workpiece, workpiece),
             spindle: index_of(&mut self.spindle, spindle),
-            at: at
-                .into_iter()
-                .map(|(axis, position)| (bodies[axis].name.clone(), position))
-                .collect(),
+            at: at.into_iter().map(|(axis, position)| (bodies[axis].name.clone(), position)).collect(),
             remounted_along,
         }
     }
@@ -206,15 +188,13 @@ fn index_of(list: &mut Vec<Vector>, point: Vector) -> usize {
 
 /// Whether an axis along this direction moves the ball on a circle of radius R.
 fn is_off_axis(ball: &Vector, along: usize) -> bool {
-    let beside: i32 = (0..3)
-        .filter(|direction| *direction != along)
-        .map(|direction| ball[direction].radius.abs())
-        .sum();
+    let beside: i32 =
+        (0..3).filter(|direction| *direction != along).map(|direction| ball[direction].radius.abs()).sum();
     beside == 1
 }
 
-/// Balls at the distance R from the rotary axes of a side, one ball per two directions of axes; a ball at the origin of R if the side has no rotary
-/// axis.
+/// Balls at the distance R from the rotary axes of a side, one ball per two directions of axes; a ball at the origin of
+/// R if the side has no rotary axis.
 fn beside(bodies: &[Body], side: Side) -> Vec<Vector> {
     let mut directions: Vec<usize> = Vec::new();
     for body in bodies {
@@ -231,10 +211,7 @@ fn beside(bodies: &[Body], side: Side) -> Vec<Vector> {
             Side::Tool => ([2, 0, 1], -1),
             Side::Workpiece => ([1, 0, 2], 1),
         };
-        let across = order
-            .into_iter()
-            .find(|direction| !directions.contains(direction))
-            .unwrap_or(2);
+        let across = order.into_iter().find(|direction| !directions.contains(direction)).unwrap_or(2);
         let mut ball = [Length::ZERO; 3];
         ball[across].radius = if across == 2 { sign } else { 1 };
         ball

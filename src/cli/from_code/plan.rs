@@ -1,7 +1,7 @@
 //! `plan.toml` of a structural code: two tests of each rotary axis, a circle of each pair of linear axes.
 //!
-//! The balls are mounted once. Each test states the positions of the axes that it does not move. These are the coordinates that the operator enters
-//! and that the data contain.
+//! The balls are mounted once. Each test states the positions of the axes that it does not move. These are the
+//! coordinates that the operator enters and that the data contain.
 
 use std::fmt::Write;
 
@@ -76,11 +76,7 @@ fn unknowns(text: &mut String, bodies: &[Body], pairs: &[[usize; 2]]) {
         let across = || (0..3).filter(|k| *k != body.along);
         let name = |letter: &str| format!("E{letter}0{}", body.name);
         let listed: Vec<String> = across()
-            .filter(|k| {
-                !given
-                    .iter()
-                    .any(|(axis, along, _)| (*axis, *along) == (index, *k))
-            })
+            .filter(|k| !given.iter().any(|(axis, along, _)| (*axis, *along) == (index, *k)))
             .map(|k| LETTERS[k])
             .chain(across().map(|k| ANGLES[k]))
             .map(|letter| format!("\"{}\"", name(letter)))
@@ -105,17 +101,14 @@ fn unknowns(text: &mut String, bodies: &[Body], pairs: &[[usize; 2]]) {
     }
     for [first, second] in pairs.iter().map(|pair| pair.map(|axis| &bodies[axis])) {
         let about = ANGLES[3 - first.along - second.along];
-        let _ = writeln!(
-            text,
-            "  \"E{about}0{}\",  # squareness of {} and {}",
-            second.name, first.name, second.name
-        );
+        let _ = writeln!(text, "  \"E{about}0{}\",  # squareness of {} and {}", second.name, first.name, second.name);
     }
     text.push_str("]\n");
 }
 
-/// Position errors of axes of the head that are not estimated, each with its direction and an axis of the table. If both sides have rotary axes
-/// across a direction, the readings depend only on the difference of their positions along it.
+/// Position errors of axes of the head that are not estimated, each with its direction and an axis of the table. If
+/// both sides have rotary axes across a direction, the readings depend only on the difference of their positions along
+/// it.
 fn given(bodies: &[Body]) -> Vec<(usize, usize, usize)> {
     let across = |side: Side, along: usize| {
         (0..bodies.len()).filter(move |index| {
@@ -152,14 +145,7 @@ fn pairs(bodies: &[Body]) -> Vec<[usize; 2]> {
     pairs
 }
 
-fn sweep(
-    text: &mut String,
-    bodies: &[Body],
-    turning: usize,
-    extended: bool,
-    mounts: &Mounts,
-    setting: &Setting,
-) {
+fn sweep(text: &mut String, bodies: &[Body], turning: usize, extended: bool, mounts: &Mounts, setting: &Setting) {
     let axis = &bodies[turning];
     let name = &axis.name;
     let (bar, length) = if extended { ("R_e", 150) } else { ("R_c", 100) };
@@ -172,18 +158,11 @@ fn sweep(
     } else {
         "on the axis in the plane of the circle, so that the position of the axis changes the readings"
     };
-    let _ = write!(
-        text,
-        "\n# {name} turns the {carried} ball about the {standing} ball, which is {place}.\n"
-    );
+    let _ = write!(text, "\n# {name} turns the {carried} ball about the {standing} ball, which is {place}.\n");
     remounted(text, setting, standing);
     let _ = write!(text, "[[test]]\nname = \"{name}{length}\"\n");
     common(text, bodies, bar, mounts, setting, &[turning]);
-    let (from, to, step) = if axis.along == 2 {
-        (0, 360, 2)
-    } else {
-        (-90, 90, 1)
-    };
+    let (from, to, step) = if axis.along == 2 { (0, 360, 2) } else { (-90, 90, 1) };
     let _ = write!(
         text,
         "# The axis moves there and back. Adapt the ends to its travel. `runs` repeats both directions.\n\
@@ -193,10 +172,7 @@ fn sweep(
 
 fn circle(text: &mut String, bodies: &[Body], pair: [usize; 2], mounts: &Mounts, setting: &Setting) {
     let [a, b] = pair.map(|axis| bodies[axis].name.as_str());
-    let _ = write!(
-        text,
-        "\n# {a} and {b} move the spindle ball on a circle about the workpiece ball.\n"
-    );
+    let _ = write!(text, "\n# {a} and {b} move the spindle ball on a circle about the workpiece ball.\n");
     remounted(text, setting, "spindle");
     let _ = write!(text, "[[test]]\nname = \"{a}{b}\"\n");
     common(text, bodies, "R_c", mounts, setting, &pair);
@@ -221,14 +197,7 @@ fn remounted(text: &mut String, setting: &Setting, ball: &str) {
 }
 
 /// The entries that all tests have: bar, balls, set-ups, priors, and positions of the axes that the test does not move.
-fn common(
-    text: &mut String,
-    bodies: &[Body],
-    bar: &str,
-    mounts: &Mounts,
-    setting: &Setting,
-    moving: &[usize],
-) {
+fn common(text: &mut String, bodies: &[Body], bar: &str, mounts: &Mounts, setting: &Setting, moving: &[usize]) {
     let _ = write!(
         text,
         "# Calibrated length.\n\
@@ -247,10 +216,7 @@ fn common(
         p = setting.workpiece + 1,
         s = setting.spindle + 1,
     );
-    let linear = setting
-        .at
-        .iter()
-        .map(|(name, position)| format!("{}_mm = {}", name.to_lowercase(), position.text()));
+    let linear = setting.at.iter().map(|(name, position)| format!("{}_mm = {}", name.to_lowercase(), position.text()));
     let rotary = bodies
         .iter()
         .enumerate()

@@ -32,9 +32,7 @@ pub fn print(analysis: &PlanAnalysis) {
 }
 
 fn sensitivity(errors: &[ErrorAnalysis]) {
-    say!(
-        "\nSensitivity of a reading, µm per unit of the error (largest, rms, the test in which it is largest):"
-    );
+    say!("\nSensitivity of a reading, µm per unit of the error (largest, rms, the test in which it is largest):");
     let rows: Vec<Vec<String>> = errors
         .iter()
         .map(|error| {
@@ -52,11 +50,7 @@ fn sensitivity(errors: &[ErrorAnalysis]) {
             ]
         })
         .collect();
-    table::print_aligned(
-        &["error", "unit", "largest", "rms", "largest in"],
-        &rows,
-        &[0, 1, 4],
-    );
+    table::print_aligned(&["error", "unit", "largest", "rms", "largest in"], &rows, &[0, 1, 4]);
 }
 
 fn optional(value: Option<f64>) -> String {
@@ -65,11 +59,7 @@ fn optional(value: Option<f64>) -> String {
 
 fn budget(errors: &[ErrorAnalysis]) {
     say!("\nLargest contributions to the variance of each error, and its largest correlations:");
-    let width = errors
-        .iter()
-        .map(|error| error.id.chars().count())
-        .max()
-        .unwrap_or(0);
+    let width = errors.iter().map(|error| error.id.chars().count()).max().unwrap_or(0);
     for error in errors.iter().filter(|error| error.u.is_some()) {
         let parts: Vec<String> = error
             .budget
@@ -83,11 +73,7 @@ fn budget(errors: &[ErrorAnalysis]) {
             .take(2)
             .map(|other| format!("{} {:+.2}", other.id, other.correlation))
             .collect();
-        let with = if shared.is_empty() {
-            String::new()
-        } else {
-            format!("; with {}", shared.join(", "))
-        };
+        let with = if shared.is_empty() { String::new() } else { format!("; with {}", shared.join(", ")) };
         say!("  {:width$}  {}{with}", error.id, parts.join(", "));
     }
 }
@@ -126,11 +112,7 @@ pub fn small_plot(values: &[f64], most: f64) -> String {
     (0..width)
         .map(|k| {
             let value = values[k * (values.len() - 1) / (width - 1).max(1)];
-            let level = if most > 0.0 {
-                (value / most + 1.0) / 2.0
-            } else {
-                0.5
-            };
+            let level = if most > 0.0 { (value / most + 1.0) / 2.0 } else { 0.5 };
             BARS[((level * 7.0).round() as usize).min(7)]
         })
         .collect()
@@ -151,11 +133,7 @@ fn correlation(analysis: &PlanAnalysis) {
         .enumerate()
         .map(|(i, (id, row))| {
             let mut cells = vec![id.clone()];
-            cells.extend(
-                row.iter()
-                    .take(i + 1)
-                    .map(|value| value.map_or("–".into(), |rho| format!("{rho:+.2}"))),
-            );
+            cells.extend(row.iter().take(i + 1).map(|value| value.map_or("–".into(), |rho| format!("{rho:+.2}"))));
             cells.resize(ids.len() + 1, String::new());
             cells
         })
@@ -170,36 +148,18 @@ fn indices(analysis: &PlanAnalysis) {
         indices.identifiable_count,
         counted(indices.error_count, "error")
     );
-    let row = |name: &str, value: f64, meaning: &str| {
-        vec![name.to_string(), three_digits(value), meaning.to_string()]
-    };
+    let row = |name: &str, value: f64, meaning: &str| vec![name.to_string(), three_digits(value), meaning.to_string()];
     let rows = [
-        row(
-            "condition number",
-            indices.condition_number,
-            "largest over smallest singular value",
-        ),
+        row("condition number", indices.condition_number, "largest over smallest singular value"),
         row(
             "O1",
             indices.o1,
             "geometric mean of the singular values, per root of the readings: volume of the confidence region",
         ),
         row("O2", indices.o2, "smallest over largest singular value: evenness"),
-        row(
-            "O3",
-            indices.o3,
-            "smallest singular value: worst determined direction",
-        ),
-        row(
-            "O4",
-            indices.o4,
-            "square of the smallest over the largest singular value: noise amplification",
-        ),
-        row(
-            "O5",
-            indices.o5,
-            "reciprocal of the sum of reciprocal singular values: mean uncertainty",
-        ),
+        row("O3", indices.o3, "smallest singular value: worst determined direction"),
+        row("O4", indices.o4, "square of the smallest over the largest singular value: noise amplification"),
+        row("O5", indices.o5, "reciprocal of the sum of reciprocal singular values: mean uncertainty"),
     ];
     table::print_aligned(&["index", "value", "meaning"], &rows, &[0, 2]);
     say!(
@@ -216,19 +176,12 @@ fn tests(analysis: &PlanAnalysis) {
         return;
     }
     say!("\nContribution of each test:");
-    analysis
-        .leave_one_out
-        .iter()
-        .for_each(|item| say!("  {}", item.why));
+    analysis.leave_one_out.iter().for_each(|item| say!("  {}", item.why));
 }
 
 fn effects(found: &EffectsAnalysis) {
     let by_verdict = |verdict: fn(&str) -> bool| -> Vec<&EffectDetectability> {
-        found
-            .effects
-            .iter()
-            .filter(|effect| verdict(&effect.verdict))
-            .collect()
+        found.effects.iter().filter(|effect| verdict(&effect.verdict)).collect()
     };
     let confounded = by_verdict(|verdict| verdict.starts_with("confounded"));
     let detectable = by_verdict(|verdict| verdict == "detectable");
@@ -274,21 +227,17 @@ fn component_and_driver(id: &str) -> &str {
     id.split_once(':').map_or(id, |(before, _)| before)
 }
 
-/// A table of effects. Of those with the same component and driver it lists the one with the largest bias and counts the others.
+/// A table of effects. Of those with the same component and driver it lists the one with the largest bias and counts
+/// the others.
 fn effect_table(effects: &[&EffectDetectability]) {
-    let strongest =
-        |effect: &EffectDetectability| effect.biases.first().map_or(0.0, |bias| bias.per_unit.abs());
+    let strongest = |effect: &EffectDetectability| effect.biases.first().map_or(0.0, |bias| bias.per_unit.abs());
     let mut sorted: Vec<&EffectDetectability> = effects.to_vec();
     // Equal rounded values are ordered by name: rounding differs between processors.
-    let size =
-        |effect: &EffectDetectability| three_digits(strongest(effect)).parse().unwrap_or(f64::INFINITY);
+    let size = |effect: &EffectDetectability| three_digits(strongest(effect)).parse().unwrap_or(f64::INFINITY);
     sorted.sort_by(|a, b| f64::total_cmp(&size(b), &size(a)).then_with(|| a.id.cmp(&b.id)));
     let mut chosen: Vec<(&EffectDetectability, usize)> = Vec::new();
     for effect in sorted {
-        match chosen
-            .iter_mut()
-            .find(|(first, _)| component_and_driver(&first.id) == component_and_driver(&effect.id))
-        {
+        match chosen.iter_mut().find(|(first, _)| component_and_driver(&first.id) == component_and_driver(&effect.id)) {
             Some((_, alike)) => *alike += 1,
             None => chosen.push((effect, 0)),
         }
@@ -301,14 +250,7 @@ fn effect_table(effects: &[&EffectDetectability]) {
                 .biases
                 .iter()
                 .take(2)
-                .map(|bias| {
-                    format!(
-                        "{} {} {}",
-                        bias.id,
-                        three_digits(bias.per_unit),
-                        table::unit(&bias.unit)
-                    )
-                })
+                .map(|bias| format!("{} {} {}", bias.id, three_digits(bias.per_unit), table::unit(&bias.unit)))
                 .collect();
             vec![
                 effect.id.clone(),
@@ -316,19 +258,12 @@ fn effect_table(effects: &[&EffectDetectability]) {
                 optional(effect.detectable_amplitude_screened),
                 table::unit(&effect.unit),
                 per_cent(effect.residual_share),
-                if biases.is_empty() {
-                    "none".into()
-                } else {
-                    biases.join(", ")
-                },
+                if biases.is_empty() { "none".into() } else { biases.join(", ") },
                 alike.to_string(),
             ]
         })
         .collect();
-    table::print(
-        &["effect", "single", "search", "unit", "remains", "bias", "further"],
-        &rows,
-    );
+    table::print(&["effect", "single", "search", "unit", "remains", "bias", "further"], &rows);
     if chosen.len() > MAX_EFFECTS {
         say!("  … {} more in the JSON", chosen.len() - MAX_EFFECTS);
     }
@@ -336,9 +271,5 @@ fn effect_table(effects: &[&EffectDetectability]) {
 
 /// A share of a signal in per cent.
 fn per_cent(share: f64) -> String {
-    if share < 1e-4 {
-        "< 0.01 %".to_string()
-    } else {
-        format!("{} %", three_digits(share * 100.0))
-    }
+    if share < 1e-4 { "< 0.01 %".to_string() } else { format!("{} %", three_digits(share * 100.0)) }
 }

@@ -34,7 +34,8 @@ enum Directions {
 #[derive(Args)]
 #[command(group = clap::ArgGroup::new("next_test").args(["improve", "separate"]))]
 pub struct ImproveArguments {
-    /// Propose tests that most lower the largest standard uncertainty (1 µm counts as 1″); 1 test if no number is given.
+    /// Propose tests that most lower the largest standard uncertainty (1 µm counts as 1″); 1 test if no number is
+    /// given.
     ///
     /// Example: --improve 2
     #[arg(long, value_name = "TESTS", num_args = 0..=1, default_missing_value = "1", conflicts_with = "separate")]
@@ -59,7 +60,8 @@ pub struct ImproveArguments {
     /// Example: --improve 1 --heights-mm 0,75,150
     #[arg(long, value_name = "MM,…", value_delimiter = ',', requires = "next_test")]
     heights_mm: Option<Vec<f64>>,
-    /// Feeds to try, as multiples of the session's feed [default: 1, and a second feed if an effect depends on speed or time].
+    /// Feeds to try, as multiples of the session's feed
+    /// [default: 1, and a second feed if an effect depends on speed or time].
     ///
     /// Example: --improve 1 --feeds 0.5,1,2
     #[arg(long, value_name = "TIMES,…", value_delimiter = ',', requires = "next_test")]
@@ -67,12 +69,7 @@ pub struct ImproveArguments {
     /// Shares of the range of a sweep to try, about its middle [default: 1; with --setup-min or --test-min 1,0.5].
     ///
     /// Example: --improve 1 --sweep-shares 1,0.5,0.25
-    #[arg(
-        long = "sweep-shares",
-        value_name = "SHARE,…",
-        value_delimiter = ',',
-        requires = "next_test"
-    )]
+    #[arg(long = "sweep-shares", value_name = "SHARE,…", value_delimiter = ',', requires = "next_test")]
     ranges: Option<Vec<f64>>,
     /// Directions to try [default: both; with --setup-min or --test-min both,one].
     ///
@@ -119,10 +116,7 @@ impl ImproveArguments {
     }
 
     fn candidate_tests(&self) -> Result<TestVariations, Failure> {
-        let mut candidates = TestVariations {
-            reach_mm: self.reach_mm()?,
-            ..TestVariations::default()
-        };
+        let mut candidates = TestVariations { reach_mm: self.reach_mm()?, ..TestVariations::default() };
         let checked = |flag: &str, list: &[f64], least: f64| match list
             .iter()
             .find(|value| !value.is_finite() || **value < least)
@@ -145,18 +139,16 @@ impl ImproveArguments {
             candidates.ranges.push(HALF);
             candidates.both_directions.push(false);
         }
-        let shares = |flag: &str, list: &[f64], most: f64| match list
-            .iter()
-            .find(|value| !(**value > 0.0 && **value <= most))
-        {
-            Some(value) if most == 1.0 => Err(Failure::Other(format!(
-                "`{flag}`: {value} is no share of a range; a number above 0 and at most 1 is expected"
-            ))),
-            Some(value) => Err(Failure::Other(format!(
-                "`{flag}`: {value} is no multiple of a feed; a positive number is expected"
-            ))),
-            None => Ok(list.to_vec()),
-        };
+        let shares =
+            |flag: &str, list: &[f64], most: f64| match list.iter().find(|value| !(**value > 0.0 && **value <= most)) {
+                Some(value) if most == 1.0 => Err(Failure::Other(format!(
+                    "`{flag}`: {value} is no share of a range; a number above 0 and at most 1 is expected"
+                ))),
+                Some(value) => Err(Failure::Other(format!(
+                    "`{flag}`: {value} is no multiple of a feed; a positive number is expected"
+                ))),
+                None => Ok(list.to_vec()),
+            };
         if let Some(feeds) = &self.feeds {
             candidates.feeds = shares("--feeds", feeds, f64::MAX)?;
         }
@@ -192,19 +184,8 @@ impl ImproveArguments {
                 add(&mut both, id.trim())?;
             }
             let candidates = candidates.for_effects(&both.parameters.effects);
-            let goal = Goal::Separation {
-                effect: a.trim().to_string(),
-                coefficients: Vec::new(),
-            };
-            return Ok(improve(
-                &both,
-                &candidates,
-                &ImproveOptions {
-                    goal,
-                    tests: 1,
-                    by_minute,
-                },
-            )?);
+            let goal = Goal::Separation { effect: a.trim().to_string(), coefficients: Vec::new() };
+            return Ok(improve(&both, &candidates, &ImproveOptions { goal, tests: 1, by_minute })?);
         }
         let tests = self.improve.unwrap_or(1);
         if !(1..=MAX_TESTS).contains(&tests) {
@@ -212,11 +193,7 @@ impl ImproveArguments {
                 "`--improve {tests}`: a number of tests from 1 to {MAX_TESTS} is expected"
             )));
         }
-        let options = ImproveOptions {
-            goal: Goal::WorstUncertainty,
-            tests,
-            by_minute,
-        };
+        let options = ImproveOptions { goal: Goal::WorstUncertainty, tests, by_minute };
         Ok(improve(problem, &candidates, &options)?)
     }
 }
@@ -226,9 +203,7 @@ fn not_negative(flag: &str, value: f64) -> Result<f64, Failure> {
     if value.is_finite() && value >= 0.0 {
         Ok(value)
     } else {
-        Err(Failure::Other(format!(
-            "`{flag} {value}`: a number of at least 0 is expected"
-        )))
+        Err(Failure::Other(format!("`{flag} {value}`: a number of at least 0 is expected")))
     }
 }
 
@@ -240,11 +215,8 @@ fn add(problem: &mut Problem<'_>, id: &str) -> Result<(), IdentifyError> {
     let candidates = library::candidates(problem)?;
     let Some(candidate) = candidates.iter().find(|candidate| candidate.effect.id() == id) else {
         let before_shape = id.split(':').next().unwrap_or(id);
-        let mut alike: Vec<String> = candidates
-            .iter()
-            .map(|c| c.effect.id())
-            .filter(|other| other.starts_with(before_shape))
-            .collect();
+        let mut alike: Vec<String> =
+            candidates.iter().map(|c| c.effect.id()).filter(|other| other.starts_with(before_shape)).collect();
         alike.dedup();
         alike.truncate(6);
         let hint = if alike.is_empty() {
@@ -252,9 +224,7 @@ fn add(problem: &mut Problem<'_>, id: &str) -> Result<(), IdentifyError> {
         } else {
             format!("similar ones: {}", alike.join(", "))
         };
-        return Err(IdentifyError::Request(format!(
-            "`{id}` is not in the library of effects for this plan; {hint}"
-        )));
+        return Err(IdentifyError::Request(format!("`{id}` is not in the library of effects for this plan; {hint}")));
     };
     problem.add_effect(&candidate.effect)
 }
@@ -277,11 +247,7 @@ pub fn print(found: &Improvement) {
             "   {criterion} {}, {:.1} min{}",
             three_digits(step.after),
             step.duration_min,
-            if step.new_setup {
-                " including the set-up"
-            } else {
-                ""
-            }
+            if step.new_setup { " including the set-up" } else { "" }
         );
         say!(
             "   workpiece ball {}, spindle ball {}, bar {} mm",
@@ -302,12 +268,7 @@ pub fn print(found: &Improvement) {
         .enumerate()
         .map(|(k, before)| {
             let mut row = vec![before.id.clone(), three_digits(before.u)];
-            row.extend(
-                found
-                    .steps
-                    .iter()
-                    .map(|step| three_digits(step.uncertainties[k].u)),
-            );
+            row.extend(found.steps.iter().map(|step| three_digits(step.uncertainties[k].u)));
             row
         })
         .collect();
@@ -317,12 +278,7 @@ pub fn print(found: &Improvement) {
     }
     say!("\nBest single tests:");
     for other in &found.alternatives {
-        say!(
-            "  {}  {} ({:.1} min)",
-            three_digits(other.after),
-            other.test,
-            other.duration_min
-        );
+        say!("  {}  {} ({:.1} min)", three_digits(other.after), other.test, other.duration_min);
     }
 }
 
@@ -337,9 +293,7 @@ pub const RANGES: [&str; 5] = ["test", "axis", "planned", "smallest", "doubles f
 /// The smallest range of each sweep, one row per sweep.
 pub fn range_rows(ranges: &[Shrinkage]) -> Vec<Vec<String>> {
     let row = |range: &Shrinkage| {
-        let span = |Interval { low, high }: Interval| {
-            table::quantity(&format!("{low:.0} to {high:.0}"), &range.unit)
-        };
+        let span = |Interval { low, high }: Interval| table::quantity(&format!("{low:.0} to {high:.0}"), &range.unit);
         vec![
             range.test.clone(),
             range.axis.clone(),

@@ -30,8 +30,8 @@ pub struct PlanArguments {
     common: CommonArguments,
     #[command(flatten)]
     report: ReportArguments,
-    /// List everything that the first screen folds: confounded parameters, sensitivities, budgets, correlations, observability indices, contribution
-    /// of each test, undeclared effects.
+    /// List everything that the first screen folds: confounded parameters, sensitivities, budgets, correlations,
+    /// observability indices, contribution of each test, undeclared effects.
     #[arg(long)]
     all: bool,
     /// Standard deviation of a reading, instead of the session's.
@@ -50,8 +50,8 @@ pub struct PlanArguments {
     /// Use the planned movements even if there are data.
     #[arg(long)]
     planned: bool,
-    /// Check the clearance of spindle and table with the table upright: diameters of spindle and table, height and width of the device, length of the
-    /// shaft from jig to ball, length of the jig.
+    /// Check the clearance of spindle and table with the table upright: diameters of spindle and table, height and
+    /// width of the device, length of the shaft from jig to ball, length of the jig.
     ///
     /// Example: --clearance-mm 80,320,60,80,150,50
     #[arg(long, value_name = "DS,DT,H,W,L,T", conflicts_with_all = ["improve", "separate", "range"])]
@@ -87,29 +87,19 @@ limits it. --all adds sensitivities, budgets, correlations, observability indice
 /// Runs `abbe plan`.
 pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
     arguments.report.check()?;
-    let outputs = arguments
-        .common
-        .outputs(&[arguments.patterns.file(), arguments.report.file()])?;
+    let outputs = arguments.common.outputs(&[arguments.patterns.file(), arguments.report.file()])?;
     let tables = outputs.tables(arguments.common.quiet);
     let (mut session, sources) = read_session(&arguments.session, &outputs)?;
     if arguments.patterns.asked() {
-        return arguments
-            .patterns
-            .run((&session, &sources), &arguments.common, tables);
+        return arguments.patterns.run((&session, &sources), &arguments.common, tables);
     }
     if let Some(u_um) = arguments.setup_um {
         set_priors(&mut session, positive("--setup-um", u_um)?);
     }
     if arguments.one_spindle_ball {
-        session
-            .tests
-            .iter_mut()
-            .for_each(|test| test.spindle_setup = "all tests".to_string());
+        session.tests.iter_mut().for_each(|test| test.spindle_setup = "all tests".to_string());
     }
-    let noise_mm = arguments
-        .noise_um
-        .map(|um| positive("--noise-um", um))
-        .transpose()?;
+    let noise_mm = arguments.noise_um.map(|um| positive("--noise-um", um)).transpose()?;
     let options = PlanOptions {
         noise_mm,
         planned_only: arguments.planned,
@@ -138,9 +128,7 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
         let problem = plan::states::problem_by_test(&complete, noise)?;
         let document = crate::report::plan::document(&problem, &analysis)?;
         let method = crate::report::plan::method(&analysis);
-        arguments
-            .report
-            .write(&document, &method, (&session, &sources), arguments.common.seed)?;
+        arguments.report.write(&document, &method, (&session, &sources), arguments.common.seed)?;
     }
     Ok(())
 }
@@ -173,11 +161,7 @@ fn next_test(
     } else {
         None
     };
-    let ranges = if arguments.range {
-        plan::range::shrinkages(&problem)?
-    } else {
-        Vec::new()
-    };
+    let ranges = if arguments.range { plan::range::shrinkages(&problem)? } else { Vec::new() };
     if arguments.range && tables {
         improve::print_ranges(&ranges);
     }
@@ -186,40 +170,24 @@ fn next_test(
         json::write_of_session(path, sources, arguments.common.seed, &found)?;
     }
     if arguments.report.asked() {
-        let document =
-            crate::report::next_test::document(&problem, found.improvement.as_ref(), &found.ranges);
+        let document = crate::report::next_test::document(&problem, found.improvement.as_ref(), &found.ranges);
         let method = crate::report::next_test::method();
-        arguments
-            .report
-            .write(&document, &method, (session, sources), arguments.common.seed)?;
+        arguments.report.write(&document, &method, (session, sources), arguments.common.seed)?;
     }
     Ok(())
 }
 
 /// Collisions, with the device where the R-tests of the session have it, else both on the table and in the spindle.
 fn clearance(session: &Session, sizes: &str) -> Result<Vec<String>, Failure> {
-    let numbers: Vec<f64> = sizes
-        .split(',')
-        .filter_map(|size| size.trim().parse().ok())
-        .collect();
+    let numbers: Vec<f64> = sizes.split(',').filter_map(|size| size.trim().parse().ok()).collect();
     let valid = |size: &f64| size.is_finite() && *size > 0.0;
-    let &[
-        spindle_mm,
-        table_mm,
-        device_height_mm,
-        device_width_mm,
-        shaft_mm,
-        jig_mm,
-    ] = numbers.as_slice()
-    else {
+    let &[spindle_mm, table_mm, device_height_mm, device_width_mm, shaft_mm, jig_mm] = numbers.as_slice() else {
         return Err(Failure::Other(format!(
             "`--clearance-mm {sizes}`: six lengths are expected: diameters of spindle and table, height and width of the device, shaft, jig"
         )));
     };
     if !numbers.iter().all(valid) {
-        return Err(Failure::Other(format!(
-            "`--clearance-mm {sizes}`: every length has to be positive"
-        )));
+        return Err(Failure::Other(format!("`--clearance-mm {sizes}`: every length has to be positive")));
     }
     let settings: Vec<Setting> = session
         .tests
@@ -229,28 +197,22 @@ fn clearance(session: &Session, sizes: &str) -> Result<Vec<String>, Failure> {
             _ => None,
         })
         .collect();
-    let faults = [
-        (Setting::Table, "device on the table"),
-        (Setting::Spindle, "device in the spindle"),
-    ]
-    .into_iter()
-    .filter(|(setting, _)| settings.is_empty() || settings.contains(setting))
-    .flat_map(|(setting, words)| {
-        let device_on_table = setting == Setting::Table;
-        let clearance = Clearance {
-            spindle_mm,
-            table_mm,
-            device_height_mm,
-            device_width_mm,
-            shaft_mm,
-            jig_mm,
-            device_on_table,
-        };
-        clearance
-            .faults()
-            .into_iter()
-            .map(move |fault| format!("{words}: {fault}"))
-    });
+    let faults = [(Setting::Table, "device on the table"), (Setting::Spindle, "device in the spindle")]
+        .into_iter()
+        .filter(|(setting, _)| settings.is_empty() || settings.contains(setting))
+        .flat_map(|(setting, words)| {
+            let device_on_table = setting == Setting::Table;
+            let clearance = Clearance {
+                spindle_mm,
+                table_mm,
+                device_height_mm,
+                device_width_mm,
+                shaft_mm,
+                jig_mm,
+                device_on_table,
+            };
+            clearance.faults().into_iter().map(move |fault| format!("{words}: {fault}"))
+        });
     Ok(faults.collect())
 }
 
@@ -259,9 +221,7 @@ fn positive(flag: &str, um: f64) -> Result<f64, Failure> {
     if (MIN_UM..=LARGEST).contains(&um) {
         Ok(um * 1e-3)
     } else {
-        Err(Failure::Other(format!(
-            "`{flag} {um}`: a number of µm from {MIN_UM:e} to {LARGEST:e} is expected"
-        )))
+        Err(Failure::Other(format!("`{flag} {um}`: a number of µm from {MIN_UM:e} to {LARGEST:e} is expected")))
     }
 }
 

@@ -23,15 +23,11 @@ pub struct PatternArguments {
         conflicts_with_all = ["improve", "separate", "range", "report", "plots", "clearance_mm", "noise_um", "setup_um"]
     )]
     patterns: Option<PathBuf>,
-    /// Size of an error for --patterns; may be repeated [default: all errors that the session estimates, 10 µm and 0.01°].
+    /// Size of an error for --patterns; may be repeated
+    /// [default: all errors that the session estimates, 10 µm and 0.01°].
     ///
     /// Example: --patterns patterns.csv --error EY0A=10um --error EB0A=0.01deg
-    #[arg(
-        long = "error",
-        value_name = "NAME=SIZE",
-        allow_hyphen_values = true,
-        requires = "patterns"
-    )]
+    #[arg(long = "error", value_name = "NAME=SIZE", allow_hyphen_values = true, requires = "patterns")]
     errors: Vec<String>,
 }
 
@@ -53,16 +49,8 @@ impl PatternArguments {
         common: &CommonArguments,
         tables: bool,
     ) -> Result<(), Failure> {
-        let given: Vec<Given> = self
-            .errors
-            .iter()
-            .map(|text| Given::parse(text))
-            .collect::<Result<_, _>>()?;
-        let given = if given.is_empty() {
-            usual_sizes(session)
-        } else {
-            given
-        };
+        let given: Vec<Given> = self.errors.iter().map(|text| Given::parse(text)).collect::<Result<_, _>>()?;
+        let given = if given.is_empty() { usual_sizes(session) } else { given };
         let found = patterns(session, &given)?;
         if let Some(path) = &self.patterns {
             output::write_whole(path, &csv(&found, session)?)?;
@@ -71,9 +59,7 @@ impl PatternArguments {
             print(&found);
         }
         if let Some(path) = &common.json {
-            let result = PatternSizes {
-                patterns: found.patterns,
-            };
+            let result = PatternSizes { patterns: found.patterns };
             json::write_of_session(path, sources, common.seed, &result)?;
         }
         Ok(())
@@ -91,11 +77,7 @@ pub struct PatternSizes {
 fn print(found: &Patterns) {
     let number = |value: f64| {
         let rounded = format!("{value:.3}");
-        if rounded == "-0.000" {
-            "0.000".to_string()
-        } else {
-            rounded
-        }
+        if rounded == "-0.000" { "0.000".to_string() } else { rounded }
     };
     let rows: Vec<Vec<String>> = found
         .patterns
@@ -111,25 +93,13 @@ fn print(found: &Patterns) {
             ]
         })
         .collect();
-    table::print(
-        &[
-            "test",
-            "error",
-            "size",
-            "largest, µm",
-            "mean, µm",
-            "standard deviation, µm",
-        ],
-        &rows,
-    );
+    table::print(&["test", "error", "size", "largest, µm", "mean, µm", "standard deviation, µm"], &rows);
 }
 
 /// One line per reading and error: test, error and its size, run, positions of the axes, deviation.
 fn csv(found: &Patterns, session: &Session) -> Result<Vec<u8>, Failure> {
     let axes = &session.machine.axes;
-    let mut header: Vec<String> = ["test", "error", "size", "unit", "run"]
-        .map(String::from)
-        .to_vec();
+    let mut header: Vec<String> = ["test", "error", "size", "unit", "run"].map(String::from).to_vec();
     header.extend(axes.iter().map(|axis| axis.column("")));
     match session.instrument.coordinates() {
         1 => header.push("deviation_um".into()),
@@ -140,19 +110,10 @@ fn csv(found: &Patterns, session: &Session) -> Result<Vec<u8>, Failure> {
         let Some((name, states)) = found.tests.iter().find(|(name, _)| *name == pattern.test) else {
             continue;
         };
-        for (row, deviations) in pattern
-            .deviations_um
-            .chunks(states.coordinates.max(1))
-            .enumerate()
-        {
+        for (row, deviations) in pattern.deviations_um.chunks(states.coordinates.max(1)).enumerate() {
             let run = states.run.get(row).map_or(String::new(), ToString::to_string);
-            let mut cells = vec![
-                name.clone(),
-                pattern.error.clone(),
-                pattern.size.to_string(),
-                pattern.unit.clone(),
-                run,
-            ];
+            let mut cells =
+                vec![name.clone(), pattern.error.clone(), pattern.size.to_string(), pattern.unit.clone(), run];
             // Rounded to 1e-9 to omit rounding errors of the last digits.
             let shown = |position: f64| (position * 1e9).round() / 1e9 + 0.0;
             let at = axes.iter().zip(&states.positions);

@@ -1,4 +1,5 @@
-//! The first screen of `abbe plan`: identifiability, predicted uncertainties, what is confounded, what to do next, the verdict.
+//! The first screen of `abbe plan`: identifiability, predicted uncertainties, what is confounded, what to do next, the
+//! verdict.
 
 use abbe::identify::plan::results::{EffectsAnalysis, ErrorAnalysis, PlanAnalysis};
 use abbe::model::words::counted;
@@ -31,9 +32,7 @@ fn header(analysis: &PlanAnalysis) {
         analysis.rank,
         analysis.parameter_count
     );
-    let moving = analysis
-        .moving_min
-        .map_or(String::new(), |min| format!(", {min:.1} min of movement"));
+    let moving = analysis.moving_min.map_or(String::new(), |min| format!(", {min:.1} min of movement"));
     say!(
         "{} in {}, {}{moving}, noise {}",
         counted(analysis.readings, "reading"),
@@ -53,10 +52,7 @@ fn errors(errors: &[ErrorAnalysis]) {
         .iter()
         .map(|error| {
             let part = |noise: bool| {
-                let parts = error
-                    .budget
-                    .iter()
-                    .filter(|part| (part.source == "noise") == noise);
+                let parts = error.budget.iter().filter(|part| (part.source == "noise") == noise);
                 let part = parts.map(|part| part.u.powi(2)).sum::<f64>().sqrt();
                 error.u.map(|_| part)
             };
@@ -69,22 +65,11 @@ fn errors(errors: &[ErrorAnalysis]) {
                 optional(part(true)),
                 optional(part(false)),
                 optional(error.conditional_u),
-                largest.map_or(String::new(), |part| {
-                    format!("{} {:.0} %", part.source, part.share * 100.0)
-                }),
+                largest.map_or(String::new(), |part| format!("{} {:.0} %", part.source, part.share * 100.0)),
             ]
         })
         .collect();
-    let header = [
-        "error",
-        "u",
-        "U",
-        "unit",
-        "noise",
-        "set-up",
-        "conditional",
-        "largest contribution",
-    ];
+    let header = ["error", "u", "U", "unit", "noise", "set-up", "conditional", "largest contribution"];
     table::print_aligned(&header, &rows, &[0, 3, 7]);
 }
 
@@ -106,21 +91,12 @@ fn unidentifiable(analysis: &PlanAnalysis, all: bool) {
         by_setup.map(|item| table::with_symbols(&item.why)).collect(),
     );
     let near = analysis.nearly_collinear.iter();
-    list(
-        "Nearly collinear:",
-        near.map(|item| table::with_symbols(&item.why)).collect(),
-    );
+    list("Nearly collinear:", near.map(|item| table::with_symbols(&item.why)).collect());
 }
 
 /// How many undeclared effects the tests detect.
 fn effects(found: &EffectsAnalysis) {
-    let count = |verdict: fn(&str) -> bool| {
-        found
-            .effects
-            .iter()
-            .filter(|effect| verdict(&effect.verdict))
-            .count()
-    };
+    let count = |verdict: fn(&str) -> bool| found.effects.iter().filter(|effect| verdict(&effect.verdict)).count();
     say!(
         "\nUndeclared effects: of {} screened, {} are detectable and {} are confounded with the errors; --all lists them",
         found.effects.len(),
@@ -144,9 +120,6 @@ fn next(analysis: &PlanAnalysis, session: &SessionArguments, improvable: bool, a
         let purpose = "list sensitivities, budgets, correlations, indices, tests, effects";
         steps.push((command("plan", session, "--all"), purpose.into()));
     }
-    steps.push((
-        command("simulate", session, "--out run1"),
-        "simulate readings of these tests".into(),
-    ));
+    steps.push((command("simulate", session, "--out run1"), "simulate readings of these tests".into()));
     steps
 }

@@ -1,4 +1,5 @@
-//! The first screen of `abbe trace`: verdict and uniqueness, the residual before and after, the effects with their aliases, the next measurement.
+//! The first screen of `abbe trace`: verdict and uniqueness, the residual before and after, the effects with their
+//! aliases, the next measurement.
 
 use abbe::identify::results::{EffectResult, ModelResult, TraceResult};
 use abbe::identify::trace::TraceOutcome;
@@ -22,13 +23,7 @@ pub fn print(trace: &TraceOutcome<'_>, session: &SessionArguments, all: bool) {
         let mut parameters = result.effects.iter().flat_map(|effect| &effect.parameters);
         parameters.any(|p| p.id == id)
     };
-    Estimates::new(
-        &trace.after,
-        &trace.after_fit,
-        &result.after.parameters,
-        with_its_effect,
-    )
-    .print(all);
+    Estimates::new(&trace.after, &trace.after_fit, &result.after.parameters, with_its_effect).print(all);
     if result.effects.iter().any(|effect| !effect.unique) {
         say!("  u covers the change of the parameter if an alias takes the place of an effect");
     }
@@ -40,11 +35,7 @@ pub fn print(trace: &TraceOutcome<'_>, session: &SessionArguments, all: bool) {
 
 /// The verdict and the number of effects, then the uniqueness of the effects, then readings, noise and candidates.
 fn verdict(result: &TraceResult) {
-    say!(
-        "Verdict: {}, {}",
-        result.verdict,
-        counted(result.effects.len(), "effect")
-    );
+    say!("Verdict: {}, {}", result.verdict, counted(result.effects.len(), "effect"));
     if let Some(headline) = uniqueness::headline(result) {
         say!("{headline}");
     }
@@ -75,11 +66,7 @@ fn before_and_after(result: &TraceResult) {
     // The residual itself is no measure of the noise.
     let judges = result.noise_source != "residual";
     let row = |name: &str, model: &ModelResult| {
-        let mut cells = vec![
-            name.to_string(),
-            format!("{:.3}", model.rms_um),
-            format!("{:.3}", model.heldout_rms_um),
-        ];
+        let mut cells = vec![name.to_string(), format!("{:.3}", model.rms_um), format!("{:.3}", model.heldout_rms_um)];
         if let (Some(rms), Some(held)) = (model.rms_3d_um, model.heldout_rms_3d_um) {
             cells.extend([format!("{rms:.1}"), format!("{held:.1}")]);
         }
@@ -87,11 +74,7 @@ fn before_and_after(result: &TraceResult) {
             let ratio = model.chi_square / model.degrees_of_freedom.max(1) as f64;
             cells.push(format!("{ratio:.2}"));
         }
-        cells.push(screen::rank(
-            model.identifiable.len(),
-            model.parameter_count,
-            model.rank,
-        ));
+        cells.push(screen::rank(model.identifiable.len(), model.parameter_count, model.rank));
         cells
     };
     let mut header = vec!["residual, µm", "rms", "held out"];
@@ -116,22 +99,12 @@ fn print_effect(number: usize, effect: &EffectResult, screened: usize, all: bool
     }
     for p in &effect.parameters {
         let (value, u) = table::value_and_u(p.value, p.u);
-        say!(
-            "   {}  {}",
-            p.id,
-            table::quantity(&format!("{value} ± {u}"), &p.unit)
-        );
+        say!("   {}  {}", p.id, table::quantity(&format!("{value} ± {u}"), &p.unit));
     }
-    say!(
-        "   explains {} rms; p ≤ {:.3}",
-        table::micrometres(effect.rms_gain_um),
-        effect.p_value
-    );
+    say!("   explains {} rms; p ≤ {:.3}", table::micrometres(effect.rms_gain_um), effect.p_value);
     say!("   {}", uniqueness::standing(effect, screened));
     let aliases = effect.aliases.iter();
-    let aliases: Vec<String> = aliases
-        .map(|alias| format!("or {}  ({})", alias.meaning, name(alias)))
-        .collect();
+    let aliases: Vec<String> = aliases.map(|alias| format!("or {}  ({})", alias.meaning, name(alias))).collect();
     screen::list(&aliases, "     ", all);
 }
 
@@ -167,18 +140,12 @@ fn changes(result: &TraceResult, all: bool) {
     if result.changed_parameters.is_empty() {
         return;
     }
-    say!(
-        "\nChanged by more than their standard uncertainty when the effects were added (bias of the declared model):"
-    );
+    say!("\nChanged by more than their standard uncertainty when the effects were added (bias of the declared model):");
     let changed = result.changed_parameters.iter();
     let lines: Vec<String> = changed
         .map(|changed| {
             let (change, u) = table::value_and_u(changed.change, changed.u);
-            format!(
-                "{}  {} (u {u})",
-                changed.id,
-                table::quantity(&change, &changed.unit)
-            )
+            format!("{}  {} (u {u})", changed.id, table::quantity(&change, &changed.unit))
         })
         .collect();
     screen::list(&lines, "  ", all);
@@ -189,11 +156,7 @@ fn measure_next(result: &TraceResult) {
     let effects = result.effects.iter().enumerate();
     let sentences: Vec<String> = effects
         .flat_map(|(k, effect)| {
-            let about = if result.effects.len() > 1 {
-                format!("Effect {}: ", k + 1)
-            } else {
-                String::new()
-            };
+            let about = if result.effects.len() > 1 { format!("Effect {}: ", k + 1) } else { String::new() };
             let tests = uniqueness::tests(effect, name).into_iter();
             tests.map(move |sentence| format!("{about}{sentence}"))
         })

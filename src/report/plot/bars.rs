@@ -45,14 +45,7 @@ fn horizontal_scale(x: &Scale, bottom: f64, label: &str) -> Markup {
 }
 
 /// Plots values of one unit with whiskers of ± 2 u. `labels` name the first and the second value of a row.
-pub fn values(
-    name: String,
-    title: String,
-    caption: String,
-    unit: &str,
-    labels: [&str; 2],
-    rows: &[Row],
-) -> Plot {
+pub fn values(name: String, title: String, caption: String, unit: &str, labels: [&str; 2], rows: &[Row]) -> Plot {
     let ends = rows
         .iter()
         .flat_map(|row| [row.before, row.after])
@@ -129,10 +122,7 @@ pub fn bars(
     let [low, high] = span(rows.iter().map(|row| row.1).chain([0.0]));
     let x = Scale::rounded(low, high, [NAMES, WIDTH - 18.0], 6);
     let bottom = 10.0 + ROW * rows.len() as f64;
-    let entries: Vec<(&str, String)> = labels
-        .iter()
-        .map(|(class, label)| (*class, label.to_string()))
-        .collect();
+    let entries: Vec<(&str, String)> = labels.iter().map(|(class, label)| (*class, label.to_string())).collect();
     let (keys, end) = legend(&entries, 20.0, bottom + 54.0, WIDTH - 30.0);
     let inner = html! {
         (horizontal_scale(&x, bottom, label))

@@ -34,25 +34,15 @@ pub fn plot(machine: &Machine, errors: &[String]) -> Plot {
         .collect();
     let errors_of = |axis: &Axis| -> Vec<String> {
         let own = |id: &&String| owner(id) == axis.name;
-        wrapped(
-            &errors.iter().filter(own).cloned().collect::<Vec<_>>().join(" "),
-            15,
-        )
+        wrapped(&errors.iter().filter(own).cloned().collect::<Vec<_>>().join(" "), 15)
     };
-    let max_lines = machine
-        .axes
-        .iter()
-        .map(|axis| errors_of(axis).len())
-        .max()
-        .unwrap_or(0);
+    let max_lines = machine.axes.iter().map(|axis| errors_of(axis).len()).max().unwrap_or(0);
     let row_height = HEIGHT + 26.0 + 14.0 * max_lines as f64;
     let rows = bodies.len().div_ceil(BODIES_PER_ROW);
-    let last_lines = bodies[(rows - 1) * BODIES_PER_ROW..]
-        .iter()
-        .map(|body| match body {
-            Body::Axis(axis) => errors_of(axis).len(),
-            _ => 0,
-        });
+    let last_lines = bodies[(rows - 1) * BODIES_PER_ROW..].iter().map(|body| match body {
+        Body::Axis(axis) => errors_of(axis).len(),
+        _ => 0,
+    });
     let last_height = HEIGHT + 8.0 + 14.0 * last_lines.max().unwrap_or(0) as f64;
     let inner = html! {
         @for (number, body) in bodies.iter().enumerate() {

@@ -13,18 +13,8 @@ const MAX_NAME: usize = 21;
 const MIN_NUMBERED: f64 = 31.0;
 
 /// Plots a correlation matrix. `None` stands for an error that is not identifiable.
-pub fn map(
-    name: String,
-    title: String,
-    caption: String,
-    ids: &[String],
-    matrix: &[Vec<Option<f64>>],
-) -> Plot {
-    let longest = ids
-        .iter()
-        .map(|id| id.chars().count().min(MAX_NAME))
-        .max()
-        .unwrap_or_default();
+pub fn map(name: String, title: String, caption: String, ids: &[String], matrix: &[Vec<Option<f64>>]) -> Plot {
+    let longest = ids.iter().map(|id| id.chars().count().min(MAX_NAME)).max().unwrap_or_default();
     let names = 12.0 + CHARACTER * longest as f64;
     let cell = ((WIDTH - names - 10.0) / ids.len().max(1) as f64).min(44.0);
     let side = cell * ids.len() as f64;

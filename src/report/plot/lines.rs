@@ -48,9 +48,7 @@ pub struct Series<'s> {
 impl Series<'_> {
     fn path(&self, x: &Scale, y: &Scale) -> String {
         let points = self.points.iter().map(|p| (x.at(p.0), y.at(p.1)));
-        let stroke = |x: f64, from: f64, to: f64| {
-            format!("M{} {}V{}", coordinate(x), coordinate(from), coordinate(to))
-        };
+        let stroke = |x: f64, from: f64, to: f64| format!("M{} {}V{}", coordinate(x), coordinate(from), coordinate(to));
         match self.mark {
             Mark::Line => polyline(points),
             Mark::Dots => dots(points),
@@ -99,9 +97,7 @@ pub fn span(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
     values
         .into_iter()
         .filter(|value| value.is_finite())
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
-            [low.min(value), high.max(value)]
-        })
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
 }
 
 /// Contents of a plot with straight axes.

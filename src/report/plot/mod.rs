@@ -1,7 +1,8 @@
 //! Plots as SVG, inside the report and as separate files. The feature `png` adds PNG files.
 //!
-//! The plots use the same templates as the page. Plotting crates lack three things that the reports need: a polar plot with a magnified deviation about
-//! a nominal circle, CSS classes that one style sheet colours for light screens, dark screens and print, and data attributes for the script of the page.
+//! The plots use the same templates as the page. Plotting crates lack three things that the reports need: a polar plot
+//! with a magnified deviation about a nominal circle, CSS classes that one style sheet colours for light screens, dark
+//! screens and print, and data attributes for the script of the page.
 
 pub mod bars;
 pub mod chain;
@@ -14,7 +15,8 @@ pub mod scale;
 
 use maud::{Markup, PreEscaped, html};
 
-/// Width of a plot with straight axes, in SVG units. Two such plots stand beside one another at 1,280 px, and one fills a narrow screen with legible text.
+/// Width of a plot with straight axes, in SVG units. Two such plots stand beside one another at 1,280 px, and one fills
+/// a narrow screen with legible text.
 pub const WIDTH: f64 = 500.0;
 
 /// Style sheet of all plots.
@@ -135,18 +137,9 @@ pub const DARK: [(&str, &str); 12] = [
 /// A file name that is valid on every file system.
 pub fn file_name(text: &str) -> String {
     let plain = |c: char| {
-        if c.is_ascii_alphanumeric() || "-_.+".contains(c) {
-            c
-        } else {
-            '-'
-        }
+        if c.is_ascii_alphanumeric() || "-_.+".contains(c) { c } else { '-' }
     };
-    text.chars()
-        .map(plain)
-        .take(80)
-        .collect::<String>()
-        .trim_matches('.')
-        .to_string()
+    text.chars().map(plain).take(80).collect::<String>().trim_matches('.').to_string()
 }
 
 /// Wraps text into lines of at most `max` characters. A longer word stays whole.
@@ -173,7 +166,8 @@ pub fn shortened(text: &str, max: usize) -> String {
     format!("{kept}…")
 }
 
-/// Draws a legend from the left, in as many lines as needed. Returns it with the ordinate of its last line. Text widths are estimated generously.
+/// Draws a legend from the left, in as many lines as needed. Returns it with the ordinate of its last line. Text widths
+/// are estimated generously.
 pub fn legend(entries: &[(&str, String)], x: f64, y: f64, width: f64) -> (Markup, f64) {
     let mut placed = Vec::new();
     let (mut left, mut baseline) = (x, y);

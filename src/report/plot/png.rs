@@ -18,10 +18,7 @@ impl Fonts {
         let mut fonts = usvg::fontdb::Database::new();
         fonts.load_font_data(epaint_default_fonts::UBUNTU_LIGHT.to_vec());
         fonts.load_font_data(epaint_default_fonts::HACK_REGULAR.to_vec());
-        let family = fonts
-            .faces()
-            .next()
-            .and_then(|face| face.families.first().map(|(name, _)| name.clone()));
+        let family = fonts.faces().next().and_then(|face| face.families.first().map(|(name, _)| name.clone()));
         fonts.set_sans_serif_family(family.unwrap_or_else(|| FAMILY.to_string()));
         Fonts(Arc::new(fonts))
     }
@@ -30,11 +27,8 @@ impl Fonts {
 /// Draws a plot as PNG with two pixels per SVG unit. `None` if the SVG cannot be drawn.
 pub fn png(plot: &Plot, fonts: &Fonts) -> Option<Vec<u8>> {
     const PIXELS_PER_UNIT: f32 = 2.0;
-    let options = usvg::Options {
-        fontdb: fonts.0.clone(),
-        font_family: FAMILY.to_string(),
-        ..usvg::Options::default()
-    };
+    let options =
+        usvg::Options { fontdb: fonts.0.clone(), font_family: FAMILY.to_string(), ..usvg::Options::default() };
     let tree = usvg::Tree::from_str(&plot.svg(), &options).ok()?;
     let size = tree.size().to_int_size().scale_by(PIXELS_PER_UNIT)?;
     let mut pixels = tiny_skia::Pixmap::new(size.width(), size.height())?;

@@ -29,15 +29,9 @@ pub struct PolarSize {
 
 impl PolarSize {
     /// A separate plot.
-    pub const LARGE: PolarSize = PolarSize {
-        side: 340.0,
-        detailed: true,
-    };
+    pub const LARGE: PolarSize = PolarSize { side: 340.0, detailed: true };
     /// One of several in a plot, three to a row.
-    pub const SMALL: PolarSize = PolarSize {
-        side: super::WIDTH / 3.0,
-        detailed: false,
-    };
+    pub const SMALL: PolarSize = PolarSize { side: super::WIDTH / 3.0, detailed: false };
 
     /// Distance of two neighbouring circles.
     pub fn division(self) -> f64 {
@@ -132,11 +126,7 @@ pub fn plot(
 ) -> Plot {
     let size = PolarSize::LARGE;
     let mut entries: Vec<(&str, String)> = Vec::new();
-    for (class, label) in [
-        ("forward", "forward"),
-        ("backward", "backward"),
-        ("plain", "readings"),
-    ] {
+    for (class, label) in [("forward", "forward"), ("backward", "backward"), ("plain", "readings")] {
         if traversals.iter().any(|traversal| traversal.class == class) {
             entries.push((class, label.to_string()));
         }

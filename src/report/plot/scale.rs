@@ -10,9 +10,7 @@ pub fn round_up(value: f64) -> f64 {
     let power = 10.0_f64.powf(value.log10().floor());
     let steps = [1.0, 2.0, 5.0, 10.0];
     // The tolerance covers rounding: 0.3 / 0.1 is 2.9999999999999996.
-    let step = steps
-        .into_iter()
-        .find(|step| step * power >= value * (1.0 - 1e-9));
+    let step = steps.into_iter().find(|step| step * power >= value * (1.0 - 1e-9));
     step.unwrap_or(10.0) * power
 }
 
@@ -48,11 +46,7 @@ impl Scale {
         } else {
             (0.0, 1.0)
         };
-        Scale {
-            values: [low, high],
-            coordinates,
-            step: round_up((high - low) / ticks.max(1) as f64),
-        }
+        Scale { values: [low, high], coordinates, step: round_up((high - low) / ticks.max(1) as f64) }
     }
 
     /// A scale over this range, extended to whole steps.
@@ -100,11 +94,7 @@ impl Scale {
 /// Formats a coordinate to a tenth of a pixel, without negative zero.
 pub fn coordinate(value: f64) -> String {
     let rounded = (value * 10.0).round() / 10.0;
-    if rounded == 0.0 {
-        "0".to_string()
-    } else {
-        format!("{rounded}")
-    }
+    if rounded == 0.0 { "0".to_string() } else { format!("{rounded}") }
 }
 
 /// SVG path through points.

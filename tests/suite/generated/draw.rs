@@ -21,19 +21,9 @@ pub struct DrawnSession {
 
 /// The errors of the plant in a test.
 fn out_of_place(plan: &Session, test: &Test, values: &[(String, f64)]) -> ChainErrors {
-    let value = |id: String| {
-        values
-            .iter()
-            .find(|(name, _)| *name == id)
-            .map_or(0.0, |(_, v)| *v)
-    };
-    let ball =
-        |ball: &str, mount: &str| ["x", "y", "z"].map(|axis| value(format!("{ball}.{axis}[{mount}]")) * 1e-3);
-    let letters = plan
-        .machine
-        .axes
-        .iter()
-        .map(|axis| axis.name.chars().next().unwrap());
+    let value = |id: String| values.iter().find(|(name, _)| *name == id).map_or(0.0, |(_, v)| *v);
+    let ball = |ball: &str, mount: &str| ["x", "y", "z"].map(|axis| value(format!("{ball}.{axis}[{mount}]")) * 1e-3);
+    let letters = plan.machine.axes.iter().map(|axis| axis.name.chars().next().unwrap());
     let location = letters.map(|letter| {
         let of = |freedom: char, size: f64| value(format!("E{freedom}0{letter}")) * size;
         let lengths = ['X', 'Y', 'Z'].map(|freedom| of(freedom, 1e-3));
@@ -50,7 +40,8 @@ fn out_of_place(plan: &Session, test: &Test, values: &[(String, f64)]) -> ChainE
     }
 }
 
-/// Draws errors and set-ups and simulates readings with white noise of `noise_um`, rounded to the resolution unless the noise is zero.
+/// Draws errors and set-ups and simulates readings with white noise of `noise_um`, rounded to the resolution unless the
+/// noise is zero.
 pub fn draw(code: &str, plan: &Session, seed: u64, noise_um: f64) -> DrawnSession {
     let mut random = Pcg64::seed_from_u64(seed);
     let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
@@ -63,10 +54,7 @@ pub fn draw(code: &str, plan: &Session, seed: u64, noise_um: f64) -> DrawnSessio
         for (unknown, prior) in test.station.kind().unknowns().iter().zip(&test.priors) {
             let group = test.group(unknown.shared_by);
             let dot = if unknown.coordinate.is_empty() { "" } else { "." };
-            ids.push((
-                format!("{}{dot}{}[{group}]", unknown.thing, unknown.coordinate),
-                *prior,
-            ));
+            ids.push((format!("{}{dot}{}[{group}]", unknown.thing, unknown.coordinate), *prior));
         }
         for (id, prior) in ids {
             let Prior::Gaussian(u_mm) = prior else { continue };

@@ -26,25 +26,14 @@ use super::topologies::{FIGURE_1_1, TABLE_1_1};
 use super::{abbe, text};
 use crate::plant::chain::{Chain, ChainErrors};
 
-/// Unusual codes: rotary axes on both sides in any order, linear axes on and behind rotary ones, parallel axes, one rotary axis.
-const MIXED: [&str; 5] = [
-    "w B X b Y Z A t",
-    "w C A X b Y Z B t",
-    "w X Y Z b C B t",
-    "w C b U V W t",
-    "w Y A b X Z W C t",
-];
+/// Unusual codes: rotary axes on both sides in any order, linear axes on and behind rotary ones, parallel axes, one
+/// rotary axis.
+const MIXED: [&str; 5] =
+    ["w B X b Y Z A t", "w C A X b Y Z B t", "w X Y Z b C B t", "w C b U V W t", "w Y A b X Z W C t"];
 
 /// Further codes, some without some of the linear axes.
-const OTHERS: [&str; 7] = [
-    "w b Z X Y C B t",
-    "[wCbt]",
-    "[wCbXYt]",
-    "w C b Z A t",
-    "w b Z B t",
-    "w C B A b X Y Z t",
-    "w b X Y C Z t",
-];
+const OTHERS: [&str; 7] =
+    ["w b Z X Y C B t", "[wCbt]", "[wCbXYt]", "w C b Z A t", "w b Z B t", "w C B A b X Y Z t", "w b X Y C Z t"];
 
 fn codes() -> impl Iterator<Item = &'static str> {
     TABLE_1_1.into_iter().chain(FIGURE_1_1).chain(MIXED)
@@ -54,13 +43,8 @@ fn codes() -> impl Iterator<Item = &'static str> {
 fn generated(code: &str, folder: &Path) -> Session {
     let made = folder.join(code.replace(' ', "-"));
     let run = abbe(&["new", text(&made), "--from-code", code]);
-    assert!(
-        run.status.success(),
-        "{code}: {}",
-        String::from_utf8_lossy(&run.stderr)
-    );
-    files::session(&plan_file(code, folder), &ReadOptions::default())
-        .unwrap_or_else(|fault| panic!("{code}: {fault}"))
+    assert!(run.status.success(), "{code}: {}", String::from_utf8_lossy(&run.stderr));
+    files::session(&plan_file(code, folder), &ReadOptions::default()).unwrap_or_else(|fault| panic!("{code}: {fault}"))
 }
 
 /// The file of the plan of a code.
@@ -75,8 +59,8 @@ fn bar(test: &Test) -> &BallBar<f64> {
     }
 }
 
-/// Asserts that tests with one set-up state one position and one uncertainty of its ball, and that the nominal length of the plant is the
-/// stated one.
+/// Asserts that tests with one set-up state one position and one uncertainty of its ball, and that the nominal length
+/// of the plant is the stated one.
 fn check_described_once(code: &str, plan: &Session, written: &str) {
     assert!(plan.warnings.is_empty(), "{code}: {:?}", plan.warnings);
     for (index, test) in plan.tests.iter().enumerate() {
@@ -108,11 +92,7 @@ fn check_described_once(code: &str, plan: &Session, written: &str) {
             }
             let none = ChainErrors::default();
             let length = chain.reading_mm(&position, stated.workpiece_ball, stated.spindle_ball, &none);
-            assert!(
-                (length - stated.bar).abs() < 1e-9,
-                "{code} {}: {length} at reading {row}",
-                test.name
-            );
+            assert!((length - stated.bar).abs() < 1e-9, "{code} {}: {length} at reading {row}", test.name);
         }
         // Every stationary axis is at the position that the file states.
         let start = written.find(&format!("name = \"{}\"", test.name)).unwrap();
@@ -121,9 +101,9 @@ fn check_described_once(code: &str, plan: &Session, written: &str) {
             let name = plan.machine.axes[axis].name.to_lowercase();
             let listed = [" ", "{ "].iter().any(|before| {
                 ["mm", "deg"].iter().any(|unit| {
-                    of_test.lines().any(|line| {
-                        line.starts_with("at = ") && line.contains(&format!("{before}{name}_{unit} = "))
-                    })
+                    of_test
+                        .lines()
+                        .any(|line| line.starts_with("at = ") && line.contains(&format!("{before}{name}_{unit} = ")))
                 })
             });
             assert_eq!(listed, still, "{code} {}: {name}\n{of_test}", test.name);
@@ -141,20 +121,13 @@ fn two_tests_of_one_set_up_place_a_ball_at_one_point() {
         let plan = generated(code, folder.path());
         let written = fs::read_to_string(plan_file(code, folder.path())).unwrap();
         check_described_once(code, &plan, &written);
-        let options = PlanOptions {
-            effects: false,
-            ..PlanOptions::default()
-        };
+        let options = PlanOptions { effects: false, ..PlanOptions::default() };
         let analysis = analyse(&plan, &options).unwrap();
         assert!(analysis.warnings.is_empty(), "{code}: {:?}", analysis.warnings);
         assert!(
             analysis.unidentifiable.is_empty(),
             "{code}: {:?}",
-            analysis
-                .unidentifiable
-                .iter()
-                .map(|item| &item.why)
-                .collect::<Vec<_>>()
+            analysis.unidentifiable.iter().map(|item| &item.why).collect::<Vec<_>>()
         );
     }
 }
@@ -188,10 +161,7 @@ fn a_ball_that_no_axis_moves_is_mounted_again_with_a_comment() {
         assert!(written[..start].contains(&comment), "{code}\n{written}");
         let first = &plan.tests[0];
         let again = plan.tests.iter().find(|other| other.name == test).unwrap();
-        assert!(
-            again.setup != first.setup || again.spindle_setup != first.spindle_setup,
-            "{code}"
-        );
+        assert!(again.setup != first.setup || again.spindle_setup != first.spindle_setup, "{code}");
     }
 }
 
@@ -211,21 +181,13 @@ fn simulate_and_the_plant_agree_on_a_generated_plan() {
                 "um".to_string()
             },
         });
-        let simulation = Simulation {
-            given: given.collect(),
-            noise_mm: Some(0.0),
-            ..Simulation::default()
-        };
+        let simulation = Simulation { given: given.collect(), noise_mm: Some(0.0), ..Simulation::default() };
         let simulated = simulate(&plan, &simulation).unwrap();
         for (test, readings) in drawn.measured.tests.iter().zip(&simulated.readings) {
             let plant = &test.readings.as_ref().unwrap().observed;
             assert_eq!(plant.len(), readings.observed.len());
             for (plant, abbe) in plant.iter().zip(&readings.observed) {
-                assert!(
-                    (plant - abbe).abs() < 1e-9,
-                    "{code} {}: {plant} {abbe}",
-                    test.name
-                );
+                assert!((plant - abbe).abs() < 1e-9, "{code} {}: {plant} {abbe}", test.name);
             }
         }
     }
@@ -274,10 +236,7 @@ fn plan_simulate_and_fit_run_on_a_generated_plan() {
             "EX0B" => -9.0,
             _ => 0.0,
         };
-        let (value, u) = (
-            parameter["value"].as_f64().unwrap(),
-            parameter["u"].as_f64().unwrap(),
-        );
+        let (value, u) = (parameter["value"].as_f64().unwrap(), parameter["u"].as_f64().unwrap());
         assert!((value - truth).abs() < 4.5 * u, "{id}: {value} ± {u}");
     }
     // The data contain the positions of the axes, and the ball has not moved.

@@ -34,16 +34,12 @@ fn pulls(code: &str, plan: &Session, seeds: std::ops::Range<u64>) -> Vec<(String
     };
     let sessions: Vec<Vec<f64>> = seeds.into_par_iter().map(of_session).collect();
     let of_error = |k: usize| sessions.iter().map(|pulls| pulls[k]).collect();
-    (plan.unknowns.iter().enumerate())
-        .map(|(k, name)| (name.to_string(), of_error(k)))
-        .collect()
+    (plan.unknowns.iter().enumerate()).map(|(k, name)| (name.to_string(), of_error(k))).collect()
 }
 
 #[test]
 fn errors_are_found_within_their_uncertainties_on_every_code() {
-    let study = std::env::var("ABBE_STUDY")
-        .ok()
-        .and_then(|text| text.parse().ok());
+    let study = std::env::var("ABBE_STUDY").ok().and_then(|text| text.parse().ok());
     let sessions: u64 = study.unwrap_or(FEW as u64);
     if sessions == 0 {
         println!("skipped: errors_are_found_within_their_uncertainties_on_every_code (ABBE_STUDY is 0)");
@@ -66,11 +62,7 @@ fn errors_are_found_within_their_uncertainties_on_every_code() {
             let p_mean = 2.0 * Normal::standard().sf(mean.abs() * n.sqrt());
             let p_squares = 2.0 * squares.sf(sum).min(squares.cdf(sum));
             assert!(p_mean > MIN_P, "{code} {id}: mean {mean:.3} over {sessions}");
-            assert!(
-                p_squares > MIN_P,
-                "{code} {id}: rms {:.3} over {sessions}",
-                (sum / n).sqrt()
-            );
+            assert!(p_squares > MIN_P, "{code} {id}: rms {:.3} over {sessions}", (sum / n).sqrt());
             means.push(mean);
             deviations.push(((sum - n * mean * mean) / (n - 1.0).max(1.0)).sqrt());
         }
@@ -79,17 +71,10 @@ fn errors_are_found_within_their_uncertainties_on_every_code() {
             let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             format!("{low:+.2} to {high:+.2}")
         };
-        let all: Vec<f64> = by_error
-            .iter()
-            .flat_map(|(_, pulls)| pulls.iter().copied())
-            .collect();
+        let all: Vec<f64> = by_error.iter().flat_map(|(_, pulls)| pulls.iter().copied()).collect();
         let (count, sum) = (all.len() as f64, all.iter().sum::<f64>());
         let rms = (all.iter().map(|pull| pull * pull).sum::<f64>() / count).sqrt();
-        let readings: usize = planned_session(&plan)
-            .unwrap()
-            .iter()
-            .map(|test| test.rows())
-            .sum();
+        let readings: usize = planned_session(&plan).unwrap().iter().map(|test| test.rows()).sum();
         println!(
             "| `{code}` | {readings} | {} | {} | {} | mean {:+.3}, rms {rms:.3} |",
             by_error.len(),

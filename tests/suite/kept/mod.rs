@@ -1,8 +1,9 @@
 //! Kept answers: everything that the commands print and write for small sessions, compared with `snapshots/kept__*`.
 //!
-//! Other tests show that an answer is right. These tests detect every change of an answer. Answers are the same on every processor; `ABBE_RUNNER`
-//! checks that by running the command under an emulator. Numbers may differ by rounding, or by one in the last printed digit.
-//! `cargo insta accept` accepts an intended change. `snapshots/compare_kept.py` compares the numbers of two versions after keys were renamed.
+//! Other tests show that an answer is right. These tests detect every change of an answer. Answers are the same on
+//! every processor; `ABBE_RUNNER` checks that by running the command under an emulator. Numbers may differ by rounding,
+//! or by one in the last printed digit. `cargo insta accept` accepts an intended change. `snapshots/compare_kept.py`
+//! compares the numbers of two versions after keys were renamed.
 
 use std::ffi::OsStr;
 use std::fmt::Write;
@@ -57,9 +58,7 @@ fn pieces(text: &str) -> Vec<&str> {
             let mut rest = word;
             std::iter::from_fn(move || {
                 let first = rest.chars().next()?;
-                let end = rest
-                    .find(|c| is_number(c) != is_number(first))
-                    .unwrap_or(rest.len());
+                let end = rest.find(|c| is_number(c) != is_number(first)).unwrap_or(rest.len());
                 let (piece, after) = rest.split_at(end);
                 rest = after;
                 Some(piece)
@@ -80,11 +79,7 @@ fn numbers_alike(a: &str, b: &str) -> bool {
         10f64.powi(exponent.parse::<i32>().unwrap_or(0) - places as i32)
     };
     // Whole numbers are counts.
-    let printed = if a.contains('.') && b.contains('.') {
-        last_place(a).max(last_place(b)) * 1.001
-    } else {
-        0.0
-    };
+    let printed = if a.contains('.') && b.contains('.') { last_place(a).max(last_place(b)) * 1.001 } else { 0.0 };
     let allowed = printed.max(ABSOLUTE).max(RELATIVE * x.abs().max(y.abs()));
     (x - y).abs() <= allowed && (a.contains('.') || b.contains('.') || x == y)
 }
@@ -92,15 +87,11 @@ fn numbers_alike(a: &str, b: &str) -> bool {
 /// A JSON document as lines `path: value`, of long lists only some entries.
 fn lines_of(path: &str, value: &Value, lines: &mut String) {
     match value {
-        Value::Object(fields) => fields
-            .iter()
-            .for_each(|(key, value)| lines_of(&format!("{path}.{key}"), value, lines)),
+        Value::Object(fields) => {
+            fields.iter().for_each(|(key, value)| lines_of(&format!("{path}.{key}"), value, lines))
+        }
         Value::Array(entries) => {
-            let kept = if path.ends_with(".covariance.matrix") {
-                KEPT_OF_A_MATRIX
-            } else {
-                KEPT_OF_A_LIST
-            };
+            let kept = if path.ends_with(".covariance.matrix") { KEPT_OF_A_MATRIX } else { KEPT_OF_A_LIST };
             let step = entries.len().div_ceil(kept).max(1);
             if step > 1 {
                 writeln!(lines, "{path}: {} entries", entries.len()).unwrap();
@@ -139,8 +130,9 @@ fn told(file: &Path) -> String {
     lines
 }
 
-/// The command `abbe`, run by the program that `ABBE_RUNNER` names: `ABBE_RUNNER="qemu-x86_64 -cpu Nehalem"` answers as a processor without AVX does, and
-/// `-cpu Haswell,-pcid,-x2apic,-tsc-deadline,-hle,-invpcid,-rtm` as one with AVX2 and without AVX-512 (of what it lacks the emulator warns in the answer).
+/// The command `abbe`, run by the program that `ABBE_RUNNER` names: `ABBE_RUNNER="qemu-x86_64 -cpu Nehalem"` answers as
+/// a processor without AVX does, and `-cpu Haswell,-pcid,-x2apic,-tsc-deadline,-hle,-invpcid,-rtm` as one with AVX2 and
+/// without AVX-512 (of what it lacks the emulator warns in the answer).
 fn command_of_abbe() -> Command {
     let runner = std::env::var("ABBE_RUNNER").unwrap_or_default();
     let mut words = runner.split_whitespace();
@@ -152,8 +144,8 @@ fn command_of_abbe() -> Command {
     command
 }
 
-/// Runs commands one after another in a folder with copies of a folder's files, and holds what they print and write to what is kept. `DATA` among
-/// their words stands for the folder of public data.
+/// Runs commands one after another in a folder with copies of a folder's files, and holds what they print and write to
+/// what is kept. `DATA` among their words stands for the folder of public data.
 #[track_caller]
 fn kept(name: &str, folder_of_input: &Path, changed: &[(&str, String)], commands: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
@@ -184,10 +176,7 @@ fn kept(name: &str, folder_of_input: &Path, changed: &[(&str, String)], commands
             .current_dir(folder.path())
             .output()
             .expect("the command starts");
-        let (printed, said) = (
-            String::from_utf8_lossy(&output.stdout),
-            String::from_utf8_lossy(&output.stderr),
-        );
+        let (printed, said) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
         assert!(output.status.success(), "{command}: {said}");
         writeln!(answer, "$ abbe {command}\n{printed}{said}").unwrap();
         let after = files();
@@ -256,10 +245,7 @@ fn a_fit_by_each_method() {
         "fit_chapter4",
         &ready("hermle-c600u"),
         // The noise follows from the repeated runs.
-        &[(
-            "plan.toml",
-            coarse("chapter4.toml").replace("noise_um = 0.3\n", ""),
-        )],
+        &[("plan.toml", coarse("chapter4.toml").replace("noise_um = 0.3\n", ""))],
         &[
             "simulate plan.toml --out run --seed 4 --noise-um 0.4 --error EY0A=35.3um --error EB0A=-1.29arcsec --error EX0C=-4um --json run.json",
             "fit run/session.toml --method circle --json circle.json",
@@ -366,12 +352,7 @@ fn a_plan() {
             "plan plan.toml --no-effects --patterns patterns.csv --error EY0A=10um --error EB0A=0.01deg",
         ],
     );
-    kept(
-        "plan_rtest",
-        &ready("r-test"),
-        &[],
-        &["plan plan.toml --no-effects --json plan.json"],
-    );
+    kept("plan_rtest", &ready("r-test"), &[], &["plan plan.toml --no-effects --json plan.json"]);
 }
 
 #[test]

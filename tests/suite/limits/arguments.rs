@@ -8,10 +8,7 @@ use super::super::{abbe, text};
 use super::{Case, folder, refused};
 
 fn plan() -> TempDir {
-    let case = Case {
-        more: "sweep = { axis = \"C\", from_deg = 0, to_deg = 360, step_deg = 10 }",
-        ..Case::default()
-    };
+    let case = Case { more: "sweep = { axis = \"C\", from_deg = 0, to_deg = 360, step_deg = 10 }", ..Case::default() };
     folder(&case.session().replace("data = \"C.csv\"\n", ""), "")
 }
 
@@ -21,31 +18,11 @@ fn arguments_at_their_limits() {
     let out = folder.path().join("out");
     for (command, more, message) in [
         ("plan", &["--noise-um", "1e-300"][..], "`--noise-um 0.000000"),
-        (
-            "plan",
-            &["--noise-um", "inf"],
-            "a number of µm from 1e-6 to 1e12 is expected",
-        ),
-        (
-            "plan",
-            &["--setup-um", "1e300"],
-            "a number of µm from 1e-6 to 1e12 is expected",
-        ),
-        (
-            "simulate",
-            &["--noise-um", "1e300"],
-            "a standard deviation in µm is expected: 0, or 1e-6 to 1e12",
-        ),
-        (
-            "simulate",
-            &["--noise-um", "1e-300"],
-            "a standard deviation in µm is expected: 0, or 1e-6 to 1e12",
-        ),
-        (
-            "simulate",
-            &["--error", "EX0C=1e300um"],
-            "1e300 is too large; the maximum is 1e12",
-        ),
+        ("plan", &["--noise-um", "inf"], "a number of µm from 1e-6 to 1e12 is expected"),
+        ("plan", &["--setup-um", "1e300"], "a number of µm from 1e-6 to 1e12 is expected"),
+        ("simulate", &["--noise-um", "1e300"], "a standard deviation in µm is expected: 0, or 1e-6 to 1e12"),
+        ("simulate", &["--noise-um", "1e-300"], "a standard deviation in µm is expected: 0, or 1e-6 to 1e12"),
+        ("simulate", &["--error", "EX0C=1e300um"], "1e300 is too large; the maximum is 1e12"),
     ] {
         let mut arguments = more.to_vec();
         if command == "simulate" {
@@ -62,19 +39,13 @@ fn steps_without_end() {
     for step in ["1e-300", "1e-6"] {
         let folder = plan();
         let path = folder.path().join("session.toml");
-        let session = fs::read_to_string(&path)
-            .unwrap()
-            .replace("step_deg = 10", &format!("step_deg = {step}"));
+        let session = fs::read_to_string(&path).unwrap().replace("step_deg = 10", &format!("step_deg = {step}"));
         fs::write(&path, session).unwrap();
         refused(
             folder.path(),
             "plan",
             &["--no-effects"],
-            &[
-                "session.toml:16",
-                "the limit is 1000000 readings",
-                "use a larger step",
-            ],
+            &["session.toml:16", "the limit is 1000000 readings", "use a larger step"],
         );
     }
 }
@@ -86,18 +57,8 @@ fn a_denormal_error() {
     let session = folder.path().join("session.toml");
     let simulated = |name: &str, more: &[&str]| {
         let out = folder.path().join(name);
-        let output = abbe(
-            &[
-                &["simulate", text(&session), "--out", text(&out), "--noise-um", "0"],
-                more,
-            ]
-            .concat(),
-        );
-        assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
+        let output = abbe(&[&["simulate", text(&session), "--out", text(&out), "--noise-um", "0"], more].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         fs::read_to_string(out.join("C.csv")).unwrap()
     };
     let plain = simulated("plain", &[]);

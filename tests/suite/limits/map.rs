@@ -12,14 +12,7 @@ use super::super::{abbe, ready, text};
 #[track_caller]
 fn message_of(folder: &TempDir, functions: &Path, more: &[&str]) -> String {
     let (machine, map) = (ready("volumetric/machine.toml"), folder.path().join("map.csv"));
-    let base = [
-        "volumetric",
-        text(&machine),
-        "--map",
-        text(&map),
-        "--functions",
-        text(functions),
-    ];
+    let base = ["volumetric", text(&machine), "--map", text(&map), "--functions", text(functions)];
     let output = abbe(&[&base[..], more].concat());
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(1), "{stderr}");
@@ -30,14 +23,7 @@ fn message_of(folder: &TempDir, functions: &Path, more: &[&str]) -> String {
 /// The output of `abbe simulate --errors` with a file, and its output folder.
 fn simulated(folder: &TempDir, errors: &Path) -> (Output, PathBuf) {
     let (plan, out) = (ready("hermle-c600u/chapter5.toml"), folder.path().join("out"));
-    let output = abbe(&[
-        "simulate",
-        text(&plan),
-        "--out",
-        text(&out),
-        "--errors",
-        text(errors),
-    ]);
+    let output = abbe(&["simulate", text(&plan), "--out", text(&out), "--errors", text(errors)]);
     (output, out)
 }
 
@@ -46,26 +32,10 @@ fn error_functions_beyond_the_largest_value() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("errors.toml");
     for (error, form, message) in [
-        (
-            "EXX",
-            "polynomial = { um = [1e300] }",
-            "1e300, which is too large; the limit is 1e12",
-        ),
-        (
-            "EXX",
-            "table = { at_mm = [-1e308, 1e308], um = [0, 1] }",
-            "-1e308, which is too large; the limit is 1e12",
-        ),
-        (
-            "EXC",
-            "harmonic = { order = 1e300, amplitude_um = 1 }",
-            "1e300, which is too large; the limit is 1e12",
-        ),
-        (
-            "EXX",
-            "polynomial = { um = [nan] }",
-            "`NaN` is not a finite number",
-        ),
+        ("EXX", "polynomial = { um = [1e300] }", "1e300, which is too large; the limit is 1e12"),
+        ("EXX", "table = { at_mm = [-1e308, 1e308], um = [0, 1] }", "-1e308, which is too large; the limit is 1e12"),
+        ("EXC", "harmonic = { order = 1e300, amplitude_um = 1 }", "1e300, which is too large; the limit is 1e12"),
+        ("EXX", "polynomial = { um = [nan] }", "`NaN` is not a finite number"),
         (
             "EXX",
             "polynomial = { scale_mm = 1e-300, um = [0, 1, 1] }",
@@ -83,10 +53,7 @@ fn arguments_of_a_map() {
     let folder = tempfile::tempdir().unwrap();
     let ready = ready("volumetric/errors.toml");
     for (more, message) in [
-        (
-            ["--places", "18446744073709551615"],
-            "a map has at most 1000000 places",
-        ),
+        (["--places", "18446744073709551615"], "a map has at most 1000000 places"),
         (["--places", "1000000000000"], "a map has at most 1000000 places"),
         (["--axis", "X:1e18"], "--axis X:1e18: 1e6 is the most"),
         (["--axis", "A=1e300"], "--axis A=1e300: 1e12 is the most"),
@@ -100,7 +67,8 @@ fn arguments_of_a_map() {
     }
 }
 
-/// Files that the command line names have the limits of a session: they are read completely or refused, and reading always ends.
+/// Files that the command line names have the limits of a session: they are read completely or refused, and reading
+/// always ends.
 #[test]
 fn invalid_files_of_errors() {
     let folder = tempfile::tempdir().unwrap();
@@ -123,17 +91,11 @@ fn invalid_files_of_errors() {
         (Path::new("/dev/zero"), "has more than 8388608 bytes"),
     ] {
         for stderr in [refused(file), message_of(&folder, file, &[])] {
-            assert!(
-                stderr.contains(message) && stderr.contains(text(file)),
-                "{stderr}"
-            );
+            assert!(stderr.contains(message) && stderr.contains(text(file)), "{stderr}");
         }
     }
     let stderr = refused(&long);
-    assert!(
-        stderr.contains("`EX0C`: the number with its unit has 300000 bytes; the maximum is 100"),
-        "{stderr}"
-    );
+    assert!(stderr.contains("`EX0C`: the number with its unit has 300000 bytes; the maximum is 100"), "{stderr}");
 }
 
 /// A byte order mark and CRLF line ends have no effect.
@@ -143,14 +105,7 @@ fn a_byte_order_mark_before_errors() {
     let file = folder.path().join("errors.toml");
     fs::write(&file, "\u{feff}EX0C = \"3 um\"\r\nEY0C = \"-2 um\"\r\n").unwrap();
     let (output, _) = simulated(&folder, &file);
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let stdout = String::from_utf8(output.stdout).unwrap();
-    assert!(
-        stdout.contains("EX0C") && stdout.contains("3.0000") && stdout.contains("-2.0000"),
-        "{stdout}"
-    );
+    assert!(stdout.contains("EX0C") && stdout.contains("3.0000") && stdout.contains("-2.0000"), "{stdout}");
 }

@@ -1,7 +1,7 @@
 //! Numbers at their limits: each agrees with a closed form or is refused with its location and the reason.
 //!
-//! The session is the simplest one: a bar between the rotating table and a stationary spindle ball. With the axis of C displaced by `(x,
-//! y)` a ball at radius R reads `L = √((x − R·sin C)² + (y + R·cos C)²)`.
+//! The session is the simplest one: a bar between the rotating table and a stationary spindle ball. With the axis of C
+//! displaced by `(x, y)` a ball at radius R reads `L = √((x − R·sin C)² + (y + R·cos C)²)`.
 
 mod arguments;
 mod map;
@@ -80,11 +80,7 @@ impl Case {
 
 fn folder(session: &str, data: &str) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
-    for (name, text) in [
-        ("machine.toml", MACHINE),
-        ("session.toml", session),
-        ("C.csv", data),
-    ] {
+    for (name, text) in [("machine.toml", MACHINE), ("session.toml", session), ("C.csv", data)] {
         fs::write(folder.path().join(name), text).unwrap();
     }
     folder
@@ -122,10 +118,7 @@ fn found(result: &Value, id: &str) -> (f64, f64) {
     let parameters = result["parameters"].as_array().unwrap();
     let parameter = parameters.iter().find(|parameter| parameter["id"] == id);
     let parameter = parameter.unwrap_or_else(|| panic!("no {id} in {result:#}"));
-    (
-        parameter["value"].as_f64().unwrap(),
-        parameter["u"].as_f64().unwrap(),
-    )
+    (parameter["value"].as_f64().unwrap(), parameter["u"].as_f64().unwrap())
 }
 
 /// Asserts that the fit finds the displacement of the axis, within µm.

@@ -5,10 +5,7 @@ use super::{Case, displaced, fitted, folder, found, refused, session_refused, wo
 #[test]
 fn bars_of_a_millimetre_and_of_ten_metres() {
     for bar_mm in [1.0, 10_000.0] {
-        let result = works(&Case {
-            bar_mm,
-            ..Case::default()
-        });
+        let result = works(&Case { bar_mm, ..Case::default() });
         // 72 readings of 0.3 µm: the least-squares centre of a full circle has u = σ·√(2/n).
         let (_, u) = found(&result, "EX0C");
         assert!((u - 0.3 * (2.0_f64 / 72.0).sqrt()).abs() < 1e-3, "{u}");
@@ -18,26 +15,15 @@ fn bars_of_a_millimetre_and_of_ten_metres() {
 #[test]
 fn a_bar_of_no_length() {
     session_refused(
-        &Case {
-            bar_mm: 5e-324,
-            ..Case::default()
-        },
-        &[
-            "session.toml:11",
-            "reading 1",
-            "the two balls nominally coincide",
-            "5e-324 mm",
-        ],
+        &Case { bar_mm: 5e-324, ..Case::default() },
+        &["session.toml:11", "reading 1", "the two balls nominally coincide", "5e-324 mm"],
     );
 }
 
 #[test]
 fn a_million_turns() {
     let angles = (0..36).map(|k| 360.0 * 1e6 + 10.0 * f64::from(k)).collect();
-    works(&Case {
-        angles,
-        ..Case::default()
-    });
+    works(&Case { angles, ..Case::default() });
 }
 
 /// At 10¹² degrees a double resolves 10⁻⁴ degrees; larger angles are meaningless.
@@ -49,11 +35,7 @@ fn more_turns_than_double_precision_resolves() {
         folder(&case.session(), &data).path(),
         "fit",
         &[],
-        &[
-            "C.csv:20",
-            "`c_deg`",
-            "`1e13` is infinite or too large; the limit is 1e12",
-        ],
+        &["C.csv:20", "`c_deg`", "`1e13` is infinite or too large; the limit is 1e12"],
     );
 }
 
@@ -69,11 +51,7 @@ fn infinite_and_huge_readings() {
     for cell in ["inf", "-inf", "1e400", "1e300"] {
         let case = Case::default();
         let data = case.data().replacen("180.0", cell, 1);
-        let parts = [
-            "C.csv:20",
-            "`c_deg`",
-            "is infinite or too large; the limit is 1e12",
-        ];
+        let parts = ["C.csv:20", "`c_deg`", "is infinite or too large; the limit is 1e12"];
         refused(folder(&case.session(), &data).path(), "fit", &[], &parts);
     }
 }
@@ -82,21 +60,9 @@ fn infinite_and_huge_readings() {
 fn huge_numbers_in_a_session() {
     let case = Case::default();
     for (from, to, place) in [
-        (
-            "bar_mm = 100.0",
-            "bar_mm = 1e300",
-            "`bar_mm` is 1e300, which is too large; the limit is 1e12",
-        ),
-        (
-            "[0, 100.0, 0]",
-            "[0, 1e300, 0]",
-            "is 1e300, which is too large; the limit is 1e12",
-        ),
-        (
-            "[0, 100.0, 0]",
-            "[0, \"1e200 * 1e10\", 0]",
-            "which is too large; the limit is 1e12",
-        ),
+        ("bar_mm = 100.0", "bar_mm = 1e300", "`bar_mm` is 1e300, which is too large; the limit is 1e12"),
+        ("[0, 100.0, 0]", "[0, 1e300, 0]", "is 1e300, which is too large; the limit is 1e12"),
+        ("[0, 100.0, 0]", "[0, \"1e200 * 1e10\", 0]", "which is too large; the limit is 1e12"),
         (
             "data = \"C.csv\"",
             "data = \"C.csv\"\nat = { x_mm = 1e300 }",
@@ -105,22 +71,12 @@ fn huge_numbers_in_a_session() {
     ] {
         assert!(case.session().contains(from));
         let session = case.session().replacen(from, to, 1);
-        refused(
-            folder(&session, &case.data()).path(),
-            "fit",
-            &[],
-            &["session.toml:", place],
-        );
+        refused(folder(&session, &case.data()).path(), "fit", &[], &["session.toml:", place]);
     }
 }
 
 #[test]
 fn denormal_readings() {
     let data = "run,c_deg,length_mm\n1,0,5e-324\n1,90,5e-324\n1,180,5e-324\n";
-    refused(
-        folder(&Case::default().session(), data).path(),
-        "fit",
-        &[],
-        &["a bar of 100.0000 mm read 0.000 mm"],
-    );
+    refused(folder(&Case::default().session(), data).path(), "fit", &[], &["a bar of 100.0000 mm read 0.000 mm"]);
 }

@@ -1,4 +1,5 @@
-//! Sessions that their readings contradict are reported with the mistake that explains it; correct sessions are not reported.
+//! Sessions that their readings contradict are reported with the mistake that explains it; correct sessions are not
+//! reported.
 
 mod poses;
 mod sessions;
@@ -12,17 +13,8 @@ use crate::plant::Noise;
 use sessions::{MISTAKES, Mistake, STEPS_DEG, session};
 
 const WHITE: Noise = Noise::White { sigma_um: 0.3 };
-const NOISES: [Noise; 3] = [
-    WHITE,
-    Noise::Serial {
-        sigma_um: 0.3,
-        coefficient: 0.8,
-    },
-    Noise::Outliers {
-        sigma_um: 0.3,
-        share: 0.01,
-    },
-];
+const NOISES: [Noise; 3] =
+    [WHITE, Noise::Serial { sigma_um: 0.3, coefficient: 0.8 }, Noise::Outliers { sigma_um: 0.3, share: 0.01 }];
 
 /// Number of sessions: `ABBE_STUDY`, or a few.
 fn sessions_of_study(few: usize) -> usize {
@@ -94,18 +86,15 @@ fn a_ball_that_is_off_is_named_from_few_readings() {
         let (told, _) = found(STEPS_DEG[0], Mistake::SpindleBall, WHITE, seed);
         let message = warnings(&told).join("\n");
         println!("{seed}: {message}");
-        let first: Vec<&str> = (told.suggestions.iter().take(2))
-            .map(|suggestion| suggestion.subject.as_str())
-            .collect();
+        let first: Vec<&str> =
+            (told.suggestions.iter().take(2)).map(|suggestion| suggestion.subject.as_str()).collect();
         assert!(first.contains(&"spindle_ball[A100]"), "{seed}: {message}");
-        assert!(
-            message.contains("spindle ball") && message.contains("A100"),
-            "{message}"
-        );
+        assert!(message.contains("spindle ball") && message.contains("A100"), "{message}");
     }
 }
 
-/// Readings that are outliers enlarge the noise, not what is stated of the set-up. Runs of 13 readings are too short to reject outliers.
+/// Readings that are outliers enlarge the noise, not what is stated of the set-up. Runs of 13 readings are too short to
+/// reject outliers.
 #[test]
 fn mistakes_are_named_beside_outliers() {
     for (mistake, seed) in [(Mistake::Exchanged, 1024), (Mistake::OtherSession, 1027)] {
@@ -128,10 +117,7 @@ fn correct_sessions_are_not_contradicted() {
             contradicted.push(format!("{number} {step_deg}°: {told:?}"));
         }
     }
-    println!(
-        "{count} correct sessions: {} contradicted, largest pull {largest_of_all:.2}",
-        contradicted.len()
-    );
+    println!("{count} correct sessions: {} contradicted, largest pull {largest_of_all:.2}", contradicted.len());
     assert!(contradicted.is_empty(), "{contradicted:#?}");
 }
 
@@ -161,11 +147,7 @@ fn pulls_are_standard_normal() {
     );
     // Standard deviation of χ²/ν: √(2/ν). Pulls of one session are correlated: no more than ν of them count.
     let scatter = 4.0 * (2.0 / freedom).sqrt();
-    assert!(
-        (together / freedom - 1.0).abs() < scatter,
-        "{}",
-        together / freedom
-    );
+    assert!((together / freedom - 1.0).abs() < scatter, "{}", together / freedom);
     assert!((squares / number - 1.0).abs() < scatter, "{}", squares / number);
     assert!((sum / number).abs() < 4.0 / freedom.sqrt(), "{}", sum / number);
 }
@@ -175,22 +157,12 @@ fn pulls_are_standard_normal() {
 fn trace_claims_no_effect_for_a_mistake_of_the_set_up() {
     for mistake in [Mistake::SpindleBall, Mistake::Reversed("Z")] {
         let session = session(10.0, mistake, WHITE, 40);
-        let found = trace(&session, &TraceOptions::default(), &|_| true)
-            .unwrap()
-            .result;
-        let effects: Vec<&str> = found
-            .effects
-            .iter()
-            .map(|effect| effect.name.component.as_str())
-            .collect();
+        let found = trace(&session, &TraceOptions::default(), &|_| true).unwrap().result;
+        let effects: Vec<&str> = found.effects.iter().map(|effect| effect.name.component.as_str()).collect();
         println!("{mistake:?}: {} {effects:?} {:?}", found.verdict, found.warnings);
         assert!(!found.plausibility.conflicts.is_empty(), "{mistake:?}");
         assert!(effects.is_empty(), "{mistake:?}: {effects:?}");
-        assert!(
-            found.warnings[0].contains("readings contradict"),
-            "{:?}",
-            found.warnings
-        );
+        assert!(found.warnings[0].contains("readings contradict"), "{:?}", found.warnings);
     }
 }
 
@@ -204,17 +176,12 @@ fn trace_stops_at_the_readings_of_another_session() {
         std::fs::write(&path, text.replace("a_deg,c_deg", "a_rad,c_rad")).unwrap();
     }
     let session = files::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
-    let found = trace(&session, &TraceOptions::default(), &|_| true)
-        .unwrap()
-        .result;
+    let found = trace(&session, &TraceOptions::default(), &|_| true).unwrap().result;
     println!("{} {:?}", found.verdict, found.plausibility);
     assert_eq!(found.verdict, "unexplained");
     assert!(found.effects.is_empty() && found.candidates == 0);
     let best = &found.plausibility.suggestions[0];
-    assert_eq!(
-        (best.kind, best.subject.as_str()),
-        (SuggestionKind::ColumnUnit, "C, A")
-    );
+    assert_eq!((best.kind, best.subject.as_str()), (SuggestionKind::ColumnUnit, "C, A"));
 }
 
 /// The conflict is stated on the terminal, among the warnings, in JSON and in the report.
@@ -224,25 +191,13 @@ fn a_conflict_is_told_everywhere() {
     sessions::write(folder.path(), 10.0, Mistake::SpindleBall, WHITE, 40);
     let at = |name: &str| folder.path().join(name);
     let (session, json, html) = (at("session.toml"), at("fit.json"), at("fit.html"));
-    let output = super::abbe(&[
-        "fit",
-        super::text(&session),
-        "--json",
-        super::text(&json),
-        "--report",
-        super::text(&html),
-    ]);
-    let (out, err) = (
-        String::from_utf8_lossy(&output.stdout),
-        String::from_utf8_lossy(&output.stderr),
-    );
+    let output =
+        super::abbe(&["fit", super::text(&session), "--json", super::text(&json), "--report", super::text(&html)]);
+    let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     assert!(output.status.success(), "{err}");
     println!("{out}\n{err}");
     assert!(out.starts_with("The readings contradict the session"), "{out}");
-    assert!(
-        err.contains("warning: the readings contradict the stated set-up: spindle_ball.y[A100]"),
-        "{err}"
-    );
+    assert!(err.contains("warning: the readings contradict the stated set-up: spindle_ball.y[A100]"), "{err}");
     let read: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap();
     assert_eq!(read["conflicts"][0]["kind"], "setup-parameter", "{read:#}");
     assert!(read["suggestions"][0]["description"].is_string(), "{read:#}");
@@ -256,8 +211,5 @@ fn a_correct_session_says_nothing_of_conflicts() {
     let session = session(10.0, Mistake::None, WHITE, 900);
     let (problem, fit) = prepare(&session, 1).unwrap();
     let json = serde_json::to_value(report(&problem, &fit)).unwrap();
-    assert!(
-        json.get("conflicts").is_none() && json.get("suggestions").is_none(),
-        "{json:#}"
-    );
+    assert!(json.get("conflicts").is_none() && json.get("suggestions").is_none(), "{json:#}");
 }

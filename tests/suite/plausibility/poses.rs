@@ -22,9 +22,7 @@ fn ur10(test: &str, change: impl Fn(String) -> String) -> Option<Session> {
     let at = |name: &str| folder.path().join(name);
     let mut lines = table.lines();
     let mut few = lines.next().unwrap().to_string() + "\n";
-    lines
-        .step_by(EACH)
-        .for_each(|line| few += &(line.to_string() + "\n"));
+    lines.step_by(EACH).for_each(|line| few += &(line.to_string() + "\n"));
     std::fs::write(at("poses.csv"), few).unwrap();
     let text = std::fs::read_to_string(ready("ur10/session.toml")).unwrap();
     let text = change(text.replace(path, "poses.csv"));
@@ -44,10 +42,7 @@ fn poses_that_belong_to_the_robot_are_not_contradicted() {
         return;
     };
     let told = fitted(&session).unwrap().plausibility;
-    assert!(
-        told.conflicts.is_empty() && told.suggestions.is_empty(),
-        "{told:?}"
-    );
+    assert!(told.conflicts.is_empty() && told.suggestions.is_empty(), "{told:?}");
     assert!(told.explained_variance.unwrap() > 0.9999, "{told:?}");
 }
 
@@ -55,24 +50,14 @@ fn poses_that_belong_to_the_robot_are_not_contradicted() {
 fn metres_for_millimetres_are_named() {
     let test = "metres_for_millimetres_are_named";
     for letter in ["px", "py", "pz"] {
-        assert!(
-            std::fs::read_to_string(ready("ur10/session.toml"))
-                .unwrap()
-                .contains(&format!("{letter}_mm = "))
-        );
+        assert!(std::fs::read_to_string(ready("ur10/session.toml")).unwrap().contains(&format!("{letter}_mm = ")));
     }
-    let change = |text: String| {
-        text.replace("px_mm =", "px_m =")
-            .replace("py_mm =", "py_m =")
-            .replace("pz_mm =", "pz_m =")
-    };
+    let change =
+        |text: String| text.replace("px_mm =", "px_m =").replace("py_mm =", "py_m =").replace("pz_mm =", "pz_m =");
     let Some(session) = ur10(test, change) else { return };
     let error = fitted(&session).unwrap_err().to_string();
     println!("{error}");
-    for part in [
-        "none of the 45 parameters is identifiable",
-        "measured positions are 1,000 times too large",
-    ] {
+    for part in ["none of the 45 parameters is identifiable", "measured positions are 1,000 times too large"] {
         assert!(error.contains(part), "`{part}` is not in {error}");
     }
 }
@@ -92,31 +77,14 @@ fn two_exchanged_joint_columns_are_named() {
             assert!(told.explained_variance.unwrap() < 0.99, "{told:?}");
             assert_eq!(told.conflicts[0].kind, ConflictKind::ExplainedVariance);
             let best = &told.suggestions[0];
-            assert_eq!(
-                (best.kind, best.subject.as_str()),
-                (SuggestionKind::ColumnsExchanged, "J2, J3")
-            );
-            assert!(
-                result
-                    .warnings
-                    .iter()
-                    .any(|warning| warning.contains("the columns of J2 and J3 are exchanged"))
-            );
+            assert_eq!((best.kind, best.subject.as_str()), (SuggestionKind::ColumnsExchanged, "J2, J3"));
+            assert!(result.warnings.iter().any(|warning| warning.contains("the columns of J2 and J3 are exchanged")));
         }
-        Err(error) => assert!(
-            error
-                .to_string()
-                .contains("the columns of J2 and J3 are exchanged"),
-            "{error}"
-        ),
+        Err(error) => assert!(error.to_string().contains("the columns of J2 and J3 are exchanged"), "{error}"),
     }
     let traced = trace(&session, &TraceOptions::default(), &|_| true).map(|found| found.result);
     match traced {
-        Ok(found) => assert!(
-            found.verdict == "unexplained" && found.effects.is_empty(),
-            "{}",
-            found.verdict
-        ),
+        Ok(found) => assert!(found.verdict == "unexplained" && found.effects.is_empty(), "{}", found.verdict),
         Err(error) => assert!(error.to_string().contains("are exchanged"), "{error}"),
     }
 }
@@ -132,10 +100,7 @@ fn radians_declared_as_degrees_are_named() {
         Err(error) => error.to_string(),
     };
     println!("{told}");
-    assert!(
-        told.contains("the positions of J1, J2, J3, J4, J5, J6 are in radians, not in degrees"),
-        "{told}"
-    );
+    assert!(told.contains("the positions of J1, J2, J3, J4, J5, J6 are in radians, not in degrees"), "{told}");
 }
 
 #[test]

@@ -54,7 +54,8 @@ pub const MISTAKES: [Mistake; 10] = [
     Mistake::BarSign,
 ];
 
-/// The machine of the mistaken sessions, in the order of the plan: EY0A, EZ0A, EB0A, EC0A, EX0C, EY0C, EA0C, EB0C; µm and ″.
+/// The machine of the mistaken sessions, in the order of the plan: EY0A, EZ0A, EB0A, EC0A, EX0C, EY0C, EA0C, EB0C; µm
+/// and ″.
 const MACHINE: [f64; 8] = [35.3, -21.8, -1.3, 12.4, 18.6, -27.1, 6.2, -8.9];
 /// Another machine, or the same on another day.
 const OTHER_MACHINE: [f64; 8] = [12.0, 9.5, 7.3, -4.8, -16.2, 21.7, -11.0, 5.1];
@@ -67,11 +68,8 @@ pub fn plan(step_deg: f64) -> Plan {
         test.step_deg = step_deg;
         let long = test.stated.bar_mm > 120.0;
         test.stated.bar_mm = BARS_MM[usize::from(long)];
-        let (axis, at_mm) = if test.name.starts_with('A') {
-            (AxisName::X, -offset_mm)
-        } else {
-            (AxisName::Z, offset_mm)
-        };
+        let (axis, at_mm) =
+            if test.name.starts_with('A') { (AxisName::X, -offset_mm) } else { (AxisName::Z, offset_mm) };
         if long {
             test.motions = with(test.motions, axis, Motion::Stands(at_mm));
         }
@@ -92,10 +90,7 @@ fn readings(plan: &Plan, machine: Option<&[f64; 8]>, noise: Noise, off_um: f64, 
     if let Some(machine) = machine {
         values[..8].copy_from_slice(machine);
     }
-    let moved = plan
-        .unknowns
-        .iter()
-        .position(|unknown| unknown.id == "spindle_ball[A100].y");
+    let moved = plan.unknowns.iter().position(|unknown| unknown.id == "spindle_ball[A100].y");
     values[moved.unwrap()] += off_um;
     let mut rows = Vec::new();
     for run in plan.instants.chunk_by(|a, b| (a.test, a.run) == (b.test, b.run)) {
@@ -111,11 +106,7 @@ fn readings(plan: &Plan, machine: Option<&[f64; 8]>, noise: Noise, off_um: f64, 
 pub fn write(folder: &Path, step_deg: f64, mistake: Mistake, noise: Noise, seed: u64) {
     let plan = plan(step_deg);
     let machine = (mistake != Mistake::None).then_some(&MACHINE);
-    let off_um = if mistake == Mistake::SpindleBall {
-        30.0
-    } else {
-        0.0
-    };
+    let off_um = if mistake == Mistake::SpindleBall { 30.0 } else { 0.0 };
     let mut rows = readings(&plan, machine, noise, off_um, seed);
     let others = readings(&plan, Some(&OTHER_MACHINE), noise, 0.0, seed + 1000);
     let wrong_bar_mm = 2.0 * RADIUS_MM - BARS_MM[0];

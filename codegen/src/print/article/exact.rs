@@ -9,7 +9,7 @@
 use crate::equation::Equation;
 use crate::form::Kind;
 use crate::print::article::groups::{norm_of_steps, with_bar_parameters};
-use crate::print::article::line::{EquationLine, LeftSide, Section, quantity_heading, row};
+use crate::print::article::line::{EquationLine, LeftSide, Section, quantity_heading, row, section};
 use crate::program::{Label, Naming, Program, Step};
 use crate::symbol::{Binary, Operand, Symbol};
 use crate::touch::{self, ProbeTerms};
@@ -27,11 +27,7 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
     if let (Kind::Length, true, Some(Operand::Node(distance))) =
         (equation.kind, equation.options.gradient, distance(equation))
     {
-        let name = if Operand::Node(distance) == equation.outputs[0] {
-            "L"
-        } else {
-            "d"
-        };
+        let name = if Operand::Node(distance) == equation.outputs[0] { "L" } else { "d" };
         labels.insert(distance, Label::Scalar(name));
         let parameters = equation.parameter_operands();
         let adjoints = equation.arena.adjoints(equation.outputs[0], &parameters);
@@ -42,8 +38,7 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
                     "derivatives by the bar vector: its unit vector times the gain of the sensor".to_string();
             }
             // A pure translation leaves the adjoint vector and its name unchanged.
-            let new =
-                |component: &Operand| matches!(component, Operand::Node(id) if !labels.contains_key(id));
+            let new = |component: &Operand| matches!(component, Operand::Node(id) if !labels.contains_key(id));
             if vector.components.iter().any(new) {
                 for (node, label) in vectors::labels(std::slice::from_ref(&vector)) {
                     labels.entry(node).or_insert(label);
@@ -51,27 +46,13 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
                 adjoint.push(vector);
             }
         }
-        slopes = parameters
-            .iter()
-            .map(|parameter| adjoints.of(*parameter))
-            .collect();
+        slopes = parameters.iter().map(|parameter| adjoints.of(*parameter)).collect();
     }
     let mut requested: Vec<Operand> = equation.outputs.clone();
-    requested.extend(
-        forward
-            .iter()
-            .chain(&adjoint)
-            .flat_map(|vector| vector.components),
-    );
+    requested.extend(forward.iter().chain(&adjoint).flat_map(|vector| vector.components));
     requested.extend(&slopes);
     requested.extend(equation.driven_errors.iter().map(|(_, value)| *value));
-    let mut program = Program::of(
-        &equation.arena,
-        equation.inputs(),
-        &requested,
-        &labels,
-        Naming::Labelled,
-    );
+    let mut program = Program::of(&equation.arena, equation.inputs(), &requested, &labels, Naming::Labelled);
     let (outputs, rest) = program.outputs.split_at(equation.outputs.len());
     let (rest, driven_errors) = rest.split_at(rest.len() - equation.driven_errors.len());
     let (vectors, slopes) = rest.split_at(rest.len() - slopes.len());
@@ -81,32 +62,17 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
         row(LeftSide::Named(label.clone()), value_of(&program, &label, tree))
     });
     let driven_errors: Vec<EquationLine> = driven_errors.collect();
-    let mut vectors = forward
-        .iter()
-        .chain(&adjoint)
-        .zip(vectors.chunks(3))
-        .map(|(vector, trees)| {
-            let rows = (0..3).map(|coordinate| component(&program, vector, trees, coordinate));
-            Section {
-                heading: vector.meaning.clone(),
-                rows: rows.collect(),
-            }
-        });
+    let mut vectors = forward.iter().chain(&adjoint).zip(vectors.chunks(3)).map(|(vector, trees)| {
+        let rows = (0..3).map(|coordinate| component(&program, vector, trees, coordinate));
+        section(&vector.meaning, rows)
+    });
     let mut sections: Vec<Section> = vectors.by_ref().take(forward.len()).collect();
     if !driven_errors.is_empty() {
-        let follow = Section {
-            heading: "errors as functions of drivers".to_string(),
-            rows: driven_errors,
-        };
-        sections.insert(0, follow);
+        sections.insert(0, section("errors as functions of drivers", driven_errors));
     }
     let outputs = outputs.iter().enumerate();
-    let mut read = Section {
-        heading: quantity_heading(equation).to_string(),
-        rows: outputs
-            .map(|(index, tree)| row(LeftSide::Output(index), tree.clone()))
-            .collect(),
-    };
+    let rows = outputs.map(|(index, tree)| row(LeftSide::Output(index), tree.clone()));
+    let mut read = section(quantity_heading(equation), rows);
     if equation.kind == Kind::Distance {
         let between = touch::QUADRATIC.into_iter().chain([touch::STEP_LENGTH]);
         let between = between.filter_map(|label| {
@@ -117,43 +83,27 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
     }
     let adjoint: Vec<Section> = vectors.collect();
     let slopes = equation.parameters.iter().zip(slopes);
-    let slopes: Vec<EquationLine> = slopes
-        .map(|(parameter, tree)| row(LeftSide::Slope(0, parameter.clone()), tree.clone()))
-        .collect();
+    let slopes: Vec<EquationLine> =
+        slopes.map(|(parameter, tree)| row(LeftSide::Slope(0, parameter.clone()), tree.clone())).collect();
     if let (Kind::Length, Some(bar)) = (equation.kind, forward.last()) {
         // The norm of the bar in terms of its own coordinates, even if some of them are aliases.
         let start = program.steps.len();
-        let aliases = (0..3).map(|coordinate| Step {
-            label: bar.label(coordinate),
-            value: Tree::Number(0.0),
-        });
+        let aliases = (0..3).map(|coordinate| Step { label: bar.label(coordinate), value: Tree::Number(0.0) });
         program.steps.extend(aliases);
         let norm = norm_of_steps(start);
-        let named = program
-            .steps
-            .iter()
-            .position(|step| step.label == Label::Scalar("d"));
+        let named = program.steps.iter().position(|step| step.label == Label::Scalar("d"));
         read.rows = match named {
             Some(index) => vec![
                 row(LeftSide::Named(Label::Scalar("d")), norm),
-                row(
-                    LeftSide::Output(0),
-                    with_bar_parameters(equation, &program, Tree::Step(index)),
-                ),
+                row(LeftSide::Output(0), with_bar_parameters(equation, &program, Tree::Step(index))),
             ],
-            None => vec![row(
-                LeftSide::Output(0),
-                with_bar_parameters(equation, &program, norm),
-            )],
+            None => vec![row(LeftSide::Output(0), with_bar_parameters(equation, &program, norm))],
         };
     }
     sections.push(read);
     sections.extend(adjoint);
     if !slopes.is_empty() {
-        sections.push(Section {
-            heading: "derivatives".to_string(),
-            rows: slopes,
-        });
+        sections.push(section("derivatives", slopes));
     }
     (program, sections)
 }

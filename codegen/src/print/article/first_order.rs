@@ -3,7 +3,9 @@
 use crate::equation::Equation;
 use crate::first_order::{Column, FirstOrder};
 use crate::form::{Kind, PrintedFirstOrder};
-use crate::print::article::line::{EquationLine, LeftSide, NoteKind, Section, naming, quantity_heading, row};
+use crate::print::article::line::{
+    EquationLine, LeftSide, NoteKind, Section, naming, quantity_heading, row, section, truncated,
+};
 use crate::program::{Input, Label, Program};
 use crate::symbol::{Binary, Unary};
 use crate::tree::{Term, Tree, binary, negative, product, sum, terms_of};
@@ -26,18 +28,12 @@ pub(crate) fn sections(
     let mut sum_rows = Vec::new();
     if is_length {
         sum_rows.push(row(LeftSide::Square(L_0), printed.nominal[0].clone()));
-        sum_rows.push(row(
-            LeftSide::Named(S),
-            sum(terms(equation, first, printed, 0, true)),
-        ));
+        sum_rows.push(row(LeftSide::Named(S), sum(terms(equation, first, printed, 0, true))));
         let slope = binary(Binary::Div, s, l_0.clone());
         let mut all = terms_of(&printed.without_errors(l_0.clone()));
         all.push((false, slope));
         all.extend(terms(equation, first, printed, 0, false));
-        sum_rows.push(EquationLine {
-            approximate: true,
-            ..row(LeftSide::Output(0), sum(all))
-        });
+        sum_rows.push(truncated(LeftSide::Output(0), sum(all), false));
     } else {
         for (index, nominal) in printed.nominal.iter().enumerate() {
             let mut all = Vec::new();
@@ -45,10 +41,7 @@ pub(crate) fn sections(
                 all.push((false, nominal.clone()));
             }
             all.extend(terms(equation, first, printed, index, false));
-            sum_rows.push(EquationLine {
-                approximate: true,
-                ..row(LeftSide::Output(index), sum(all))
-            });
+            sum_rows.push(truncated(LeftSide::Output(index), sum(all), false));
         }
     }
     let mut table = Vec::new();
@@ -76,26 +69,15 @@ pub(crate) fn sections(
             });
         }
     }
-    let sections = vec![
-        Section {
-            heading: format!("{}, first order", quantity_heading(equation)),
-            rows: sum_rows,
-        },
-        Section {
-            heading: "coefficients by parameter".to_string(),
-            rows: table,
-        },
-    ];
+    let heading = format!("{}, first order", quantity_heading(equation));
+    let sections = vec![section(&heading, sum_rows), section("coefficients by parameter", table)];
     (program, sections)
 }
 
 /// `a/b`, or `(1/b)·a` if the numerator is too long for one line.
 fn over(numerator: Tree, denominator: Tree) -> Tree {
     if terms_of(&numerator).len() > 4 || numerator.leaves() > 20 {
-        product(vec![
-            binary(Binary::Div, Tree::Number(1.0), denominator),
-            numerator,
-        ])
+        product(vec![binary(Binary::Div, Tree::Number(1.0), denominator), numerator])
     } else {
         match without_minus(&numerator) {
             (true, numerator) => negative(binary(Binary::Div, numerator, denominator)),
@@ -115,10 +97,7 @@ fn terms(
     let inputs = equation.inputs();
     let input = |parameter: &Variable| {
         let requested = Input::Plain(parameter.clone());
-        inputs
-            .iter()
-            .position(|input| *input == requested)
-            .map(Tree::Input)
+        inputs.iter().position(|input| *input == requested).map(Tree::Input)
     };
     let mut terms = Vec::new();
     for (index, sensitivity) in first.sensitivities.iter().enumerate() {
@@ -134,8 +113,7 @@ fn terms(
                     || bases.any(|base| base.parameter == *of && base.over_length != sensitivity.over_length)
             }
         };
-        let shown =
-            is_separate && sensitivity.over_length == over_length && *coefficient != Tree::Number(0.0);
+        let shown = is_separate && sensitivity.over_length == over_length && *coefficient != Tree::Number(0.0);
         let (true, Some(own)) = (shown, input(&sensitivity.parameter)) else {
             continue;
         };
@@ -151,11 +129,7 @@ fn terms(
                 continue;
             }
             let (minus, scale) = without_minus(numerator);
-            let term = if scale == Tree::Number(1.0) {
-                error
-            } else {
-                product(vec![scale, error])
-            };
+            let term = if scale == Tree::Number(1.0) { error } else { product(vec![scale, error]) };
             errors.push((minus, term));
         }
         let errors = sum(errors);

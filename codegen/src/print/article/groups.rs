@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use crate::equation::Equation;
 use crate::form::Kind;
-use crate::print::article::line::{EquationLine, LeftSide, Section, naming, quantity_heading, row};
+use crate::print::article::line::{LeftSide, Section, naming, quantity_heading, row, section, truncated};
 use crate::program::{Label, Naming, Program};
 use crate::symbol::{Binary, Operand, Unary};
 use crate::tree::{Tree, binary, product, sum};
@@ -12,47 +12,25 @@ use crate::tree::{Tree, binary, product, sum};
 /// `√(x² + y² + z²)` of three steps.
 pub(crate) fn norm_of_steps(start: usize) -> Tree {
     let square = |index| (false, binary(Binary::Mul, Tree::Step(index), Tree::Step(index)));
-    Tree::Unary(
-        Unary::Sqrt,
-        Box::new(sum((start..start + 3).map(square).collect())),
-    )
+    Tree::Unary(Unary::Sqrt, Box::new(sum((start..start + 3).map(square).collect())))
 }
 
 /// The coordinate groups, and the length as a function of them.
 pub(crate) fn sections(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<Section>) {
     if equation.kind != Kind::Length {
-        let rows = trees.iter().enumerate().map(|(index, tree)| EquationLine {
-            approximate: !complete,
-            ..row(LeftSide::Output(index), tree.clone())
-        });
-        let section = Section {
-            heading: quantity_heading(equation).to_string(),
-            rows: rows.collect(),
-        };
+        let trees = trees.iter().enumerate();
+        let rows = trees.map(|(index, tree)| truncated(LeftSide::Output(index), tree.clone(), complete));
+        let section = section(quantity_heading(equation), rows);
         return (naming(equation, Vec::new()), vec![section]);
     }
     let bar = &equation.vectors[0];
     let labels: Vec<Label> = (0..3).map(|coordinate| bar.label(coordinate)).collect();
     let program = naming(equation, labels.clone());
-    let rows = labels
-        .into_iter()
-        .zip(trees)
-        .map(|(label, tree)| row(LeftSide::Named(label), tree.clone()));
+    let rows = labels.into_iter().zip(trees).map(|(label, tree)| row(LeftSide::Named(label), tree.clone()));
     let length = with_bar_parameters(equation, &program, norm_of_steps(0));
-    let sections = vec![
-        Section {
-            heading: bar.meaning.clone(),
-            rows: rows.collect(),
-        },
-        Section {
-            heading: quantity_heading(equation).to_string(),
-            rows: vec![EquationLine {
-                approximate: !complete,
-                ..row(LeftSide::Output(0), length)
-            }],
-        },
-    ];
-    (program, sections)
+    let length = truncated(LeftSide::Output(0), length, complete);
+    let sections = [section(&bar.meaning, rows), section(quantity_heading(equation), [length])];
+    (program, sections.into())
 }
 
 /// `d − δ_bar + δ_gain·(d − bar)`, with the parameters that are included.

@@ -48,12 +48,17 @@ pub(crate) struct Section {
 
 /// A line without a remark.
 pub(crate) fn row(left: LeftSide, right: Tree) -> EquationLine {
-    EquationLine {
-        left,
-        approximate: false,
-        right,
-        remark: None,
-    }
+    EquationLine { left, approximate: false, right, remark: None }
+}
+
+/// A line that omits terms unless it is complete.
+pub(crate) fn truncated(left: LeftSide, right: Tree, complete: bool) -> EquationLine {
+    EquationLine { approximate: !complete, ..row(left, right) }
+}
+
+/// Equations under a heading.
+pub(crate) fn section(heading: &str, rows: impl IntoIterator<Item = EquationLine>) -> Section {
+    Section { heading: heading.to_string(), rows: rows.into_iter().collect() }
 }
 
 /// The heading of the section of the reading.
@@ -68,13 +73,6 @@ pub(crate) fn quantity_heading(equation: &Equation) -> &'static str {
 
 /// A program that only assigns names to steps.
 pub(crate) fn naming(equation: &Equation, labels: Vec<Label>) -> Program {
-    let step = |label| Step {
-        label,
-        value: Tree::Number(0.0),
-    };
-    Program {
-        inputs: equation.inputs(),
-        steps: labels.into_iter().map(step).collect(),
-        outputs: Vec::new(),
-    }
+    let step = |label| Step { label, value: Tree::Number(0.0) };
+    Program { inputs: equation.inputs(), steps: labels.into_iter().map(step).collect(), outputs: Vec::new() }
 }

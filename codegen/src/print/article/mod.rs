@@ -27,9 +27,7 @@ impl Article {
     pub(crate) fn new(equation: &Equation) -> Self {
         let (program, sections) = match &equation.form {
             Form::Exact => exact::sections(equation),
-            Form::Groups {
-                printed, complete, ..
-            } => match &equation.touch {
+            Form::Groups { printed, complete, .. } => match &equation.touch {
                 Some(touch) => probe::sections(equation, touch, printed, *complete),
                 None => groups::sections(equation, printed, *complete),
             },
@@ -46,21 +44,13 @@ impl Article {
         let symbols = inputs
             .filter(|(index, input)| is_listed(*index, input))
             .map(|(_, input)| match input {
-                Input::Plain(variable) => {
-                    (input.clone(), notes::meaning(equation, variable), variable.unit())
+                Input::Plain(variable) => (input.clone(), notes::meaning(equation, variable), variable.unit()),
+                Input::Sine(variable) | Input::Cosine(variable) => {
+                    (input.clone(), format!("sine and cosine of the {}", variable.meaning()), "1")
                 }
-                Input::Sine(variable) | Input::Cosine(variable) => (
-                    input.clone(),
-                    format!("sine and cosine of the {}", variable.meaning()),
-                    "1",
-                ),
             })
             .collect();
-        Article {
-            program,
-            sections,
-            symbols,
-        }
+        Article { program, sections, symbols }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::equation::Equation;
 use crate::print::article::groups::named_or_expanded;
-use crate::print::article::line::{EquationLine, LeftSide, Section, naming, quantity_heading, row};
+use crate::print::article::line::{EquationLine, LeftSide, Section, naming, quantity_heading, row, section, truncated};
 use crate::program::{Label, Program};
 use crate::symbol::{Binary, Unary};
 use crate::touch::{self, ProbeTerms};
@@ -29,38 +29,26 @@ pub(crate) fn sections(
         labels.extend(coordinates(step));
     }
     let program = naming(equation, labels);
-    let step_trees: Vec<Tree> = way.map_or_else(Vec::new, |step| {
-        step.components
-            .map(|part| named_or_expanded(equation, &program, part))
-            .to_vec()
-    });
+    let step_trees: Vec<Tree> = way
+        .map_or_else(Vec::new, |step| step.components.map(|part| named_or_expanded(equation, &program, part)).to_vec());
     let dot = |a: usize, b: usize| {
         let there = |i: &usize| trees[a + i] != Tree::Number(0.0) && trees[b + i] != Tree::Number(0.0);
         let parts = (0..3).filter(there);
-        sum(parts
-            .map(|i| (false, binary(Binary::Mul, Tree::Step(a + i), Tree::Step(b + i))))
-            .collect())
+        sum(parts.map(|i| (false, binary(Binary::Mul, Tree::Step(a + i), Tree::Step(b + i)))).collect())
     };
     let mut sections: Vec<Section> = Vec::new();
     for (vector, trees) in vectors.iter().zip(trees.chunks(3)) {
         let rows = coordinates(vector).into_iter().zip(trees);
-        sections.push(Section {
-            heading: vector.meaning.clone(),
-            rows: rows
-                .map(|(label, tree)| row(LeftSide::Named(label), tree.clone()))
-                .collect(),
-        });
+        let rows = rows.map(|(label, tree)| row(LeftSide::Named(label), tree.clone()));
+        sections.push(section(&vector.meaning, rows));
     }
     let radius = named_or_expanded(equation, &program, touch.radius);
     let radius = (true, binary(Binary::Mul, radius.clone(), radius));
     let mut beyond = terms_of(&dot(0, 0));
     beyond.push(radius);
     let quadratic = [dot(3, 3), dot(0, 3), sum(beyond)];
-    let mut rows: Vec<EquationLine> = touch::QUADRATIC
-        .into_iter()
-        .zip(quadratic)
-        .map(|(label, tree)| row(LeftSide::Named(label), tree))
-        .collect();
+    let mut rows: Vec<EquationLine> =
+        touch::QUADRATIC.into_iter().zip(quadratic).map(|(label, tree)| row(LeftSide::Named(label), tree)).collect();
     if let Some(step) = way {
         let squares = (0..3)
             .filter(|i| step_trees[*i] != Tree::Number(0.0))
@@ -69,24 +57,12 @@ pub(crate) fn sections(
         let length = Tree::Unary(Unary::Sqrt, Box::new(sum(squares.collect())));
         rows.push(row(LeftSide::Named(touch::STEP_LENGTH), length));
         let named = coordinates(step).into_iter().zip(step_trees);
-        sections.insert(
-            0,
-            Section {
-                heading: step.meaning.clone(),
-                rows: named
-                    .map(|(label, tree)| row(LeftSide::Named(label), tree))
-                    .collect(),
-            },
-        );
+        let named = named.map(|(label, tree)| row(LeftSide::Named(label), tree));
+        sections.insert(0, section(&step.meaning, named));
     }
-    rows.push(EquationLine {
-        approximate: !complete,
-        ..row(LeftSide::Output(0), distance_of_steps(6, way.is_some()))
-    });
-    sections.push(Section {
-        heading: quantity_heading(equation).to_string(),
-        rows,
-    });
+    let distance = distance_of_steps(6, way.is_some());
+    rows.push(truncated(LeftSide::Output(0), distance, complete));
+    sections.push(section(quantity_heading(equation), rows));
     (program, sections)
 }
 
@@ -96,10 +72,6 @@ fn distance_of_steps(start: usize, with_length: bool) -> Tree {
     let product_of = |x: &Tree, y: &Tree| binary(Binary::Mul, x.clone(), y.clone());
     let under = binary(Binary::Sub, product_of(&b, &b), product_of(&a, &c));
     let way = binary(Binary::Add, b, Tree::Unary(Unary::Sqrt, Box::new(under)));
-    let way = if with_length {
-        product_of(&length, &way)
-    } else {
-        way
-    };
+    let way = if with_length { product_of(&length, &way) } else { way };
     negative(binary(Binary::Div, way, a))
 }

@@ -18,12 +18,7 @@ pub(super) struct Hypothesis {
 impl Hypothesis {
     pub fn new(kind: SuggestionKind, subject: &str, words: String, session: Session) -> Hypothesis {
         let subject = subject.to_string();
-        Hypothesis {
-            kind,
-            subject,
-            words,
-            session,
-        }
+        Hypothesis { kind, subject, words, session }
     }
 }
 
@@ -40,10 +35,7 @@ pub(super) fn of_two_sides(session: &Session) -> Vec<Hypothesis> {
 }
 
 /// Applies a change to the readings of every test; positions by axis, observed values in mm.
-pub(super) fn with_readings(
-    session: &Session,
-    change: impl Fn(&Test, &mut Vec<Vec<f64>>, &mut Vec<f64>),
-) -> Session {
+pub(super) fn with_readings(session: &Session, change: impl Fn(&Test, &mut Vec<Vec<f64>>, &mut Vec<f64>)) -> Session {
     let mut changed = session.clone();
     for (test, stated) in changed.tests.iter_mut().zip(&session.tests) {
         if let Some(readings) = &mut test.readings {
@@ -74,9 +66,7 @@ fn axes(session: &Session) -> Vec<Hypothesis> {
             changed,
         ));
     }
-    let rotary: Vec<usize> = (0..machine.axes.len())
-        .filter(|k| machine.axes[*k].kind == AxisKind::Rotary)
-        .collect();
+    let rotary: Vec<usize> = (0..machine.axes.len()).filter(|k| machine.axes[*k].kind == AxisKind::Rotary).collect();
     for (place, &first) in rotary.iter().enumerate() {
         for &second in &rotary[place + 1..] {
             let mut changed = session.clone();
@@ -100,20 +90,14 @@ fn axes(session: &Session) -> Vec<Hypothesis> {
         }
     }
     for kind in [AxisKind::Rotary, AxisKind::Linear] {
-        let of_kind: Vec<usize> = used
-            .iter()
-            .copied()
-            .filter(|k| machine.axes[*k].kind == kind)
-            .collect();
+        let of_kind: Vec<usize> = used.iter().copied().filter(|k| machine.axes[*k].kind == kind).collect();
         if of_kind.is_empty() {
             continue;
         }
         let names: Vec<&str> = of_kind.iter().map(|k| machine.axes[*k].name.as_str()).collect();
         for (factor, unit) in units(kind) {
             let changed = with_readings(session, |_, positions, _| {
-                of_kind
-                    .iter()
-                    .for_each(|k| positions[*k].iter_mut().for_each(|value| *value *= factor));
+                of_kind.iter().for_each(|k| positions[*k].iter_mut().for_each(|value| *value *= factor));
             });
             list.push(Hypothesis::new(
                 SuggestionKind::ColumnUnit,
@@ -141,10 +125,7 @@ pub(super) fn units(kind: AxisKind) -> Vec<(f64, &'static str)> {
 pub(super) fn lengths() -> [(f64, &'static str); 4] {
     [
         (1e3, "1,000 times too small: in m, not in mm, or in mm, not in µm"),
-        (
-            1e-3,
-            "1,000 times too large: in µm, not in mm, or in mm, not in m",
-        ),
+        (1e-3, "1,000 times too large: in µm, not in mm, or in mm, not in m"),
         (25.4, "in inches, not in mm"),
         (1.0 / 25.4, "in mm, not in inches"),
     ]

@@ -15,11 +15,7 @@ pub(super) fn balls(session: &Session) -> Vec<Hypothesis> {
     let mut list = Vec::new();
     for (thing, of_workpiece) in [("workpiece ball", true), ("spindle ball", false)] {
         let group = |test: &Test| {
-            if of_workpiece {
-                test.setup.clone()
-            } else {
-                test.spindle_setup.clone()
-            }
+            if of_workpiece { test.setup.clone() } else { test.spindle_setup.clone() }
         };
         let mut groups: Vec<Vec<String>> = Vec::new();
         for test in measured(session) {
@@ -34,11 +30,7 @@ pub(super) fn balls(session: &Session) -> Vec<Hypothesis> {
             for (i, letter) in ["x", "y", "z"].into_iter().enumerate() {
                 let mut changed = session.clone();
                 let mut stated_mm = None;
-                for test in changed
-                    .tests
-                    .iter_mut()
-                    .filter(|test| members.contains(&group(test)))
-                {
+                for test in changed.tests.iter_mut().filter(|test| members.contains(&group(test))) {
                     let ball = match &mut test.station {
                         Station::BallBar(bar) if of_workpiece => &mut bar.workpiece_ball,
                         Station::BallBar(bar) => &mut bar.spindle_ball,
@@ -109,18 +101,12 @@ pub(super) fn readings(session: &Session) -> Vec<Hypothesis> {
             };
             if set.contains(&bar.bar) {
                 let other = 2.0 * bar.bar.round() - bar.bar;
-                readings
-                    .observed
-                    .iter_mut()
-                    .for_each(|value| *value += other - bar.bar);
+                readings.observed.iter_mut().for_each(|value| *value += other - bar.bar);
                 bar.bar = other;
             }
         }
         let each = |to: &dyn Fn(f64) -> f64| {
-            let lengths: Vec<String> = set
-                .iter()
-                .map(|length| format!("{:.4} mm", to(*length)))
-                .collect();
+            let lengths: Vec<String> = set.iter().map(|length| format!("{:.4} mm", to(*length))).collect();
             lengths.join(" and ")
         };
         let stated = each(&|length| length);
@@ -147,11 +133,8 @@ pub(super) fn things(session: &Session) -> Vec<Hypothesis> {
                 continue;
             }
             let group = test.group(unknown.shared_by);
-            let subject = if group.is_empty() {
-                unknown.thing.to_string()
-            } else {
-                format!("{}[{group}]", unknown.thing)
-            };
+            let subject =
+                if group.is_empty() { unknown.thing.to_string() } else { format!("{}[{group}]", unknown.thing) };
             if list.iter().any(|other| other.subject == subject) {
                 continue;
             }
@@ -165,11 +148,7 @@ pub(super) fn things(session: &Session) -> Vec<Hypothesis> {
                 }
             }
             let thing = unknown.thing.replace('_', " ");
-            let of = if group.is_empty() {
-                String::new()
-            } else {
-                format!(" of {group}")
-            };
+            let of = if group.is_empty() { String::new() } else { format!(" of {group}") };
             list.push(Hypothesis::new(
                 SuggestionKind::WrongSetup,
                 &subject,
@@ -196,10 +175,7 @@ pub(super) fn things(session: &Session) -> Vec<Hypothesis> {
         list.push(Hypothesis::new(
             SuggestionKind::OtherSession,
             &test.name,
-            format!(
-                "the readings of test {} were taken with another set-up or in another session",
-                test.name
-            ),
+            format!("the readings of test {} were taken with another set-up or in another session", test.name),
             changed,
         ));
     }

@@ -4,11 +4,12 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
 
-use abbe_model::effect::{Component, Driver, DriverSample, Effect, Shape};
+use abbe_model::driver::{Driver, DriverInput, DriverSample};
+use abbe_model::effect::shape::Curve;
+use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::instrument::InternalUnit;
 
 use super::Columns;
-use crate::drivers;
 
 /// The basis columns of an effect in each test.
 #[derive(Clone, Debug)]
@@ -30,19 +31,11 @@ impl EffectColumns {
     /// The largest absolute value of its basis functions.
     pub fn greatest(&self) -> f64 {
         let terms = self.terms.iter().flatten();
-        let factors = |term: &EffectTerm| {
-            term.factor
-                .as_ref()
-                .map_or(1.0, |f| f.iter().fold(0.0_f64, |a, b| a.max(b.abs())))
-        };
+        let factors =
+            |term: &EffectTerm| term.factor.as_ref().map_or(1.0, |f| f.iter().fold(0.0_f64, |a, b| a.max(b.abs())));
         terms
             .map(|term| {
-                factors(term)
-                    * term
-                        .basis
-                        .iter()
-                        .flat_map(|basis| basis.iter())
-                        .fold(0.0_f64, |a, b| a.max(b.abs()))
+                factors(term) * term.basis.iter().flat_map(|basis| basis.iter()).fold(0.0_f64, |a, b| a.max(b.abs()))
             })
             .fold(0.0, f64::max)
     }
@@ -85,19 +78,16 @@ impl Columns<'_, '_> {
             let mut of_test = Vec::new();
             if effect.acts_in(&test.name) {
                 let readings = test.readings.as_ref()?;
-                let axis = drivers::component_axis(session, &effect.component);
+                let axis = effect.component.axis(&session.machine);
                 let (follows, samples) = self.driver_samples(number, &effect.driver, axis)?;
-                let make = || Arc::new(drivers::basis_columns(&effect.shape, &samples));
+                let make = || Arc::new(effect.shape.columns(&samples));
                 let basis = if keep {
-                    cached(
-                        &self.bases,
-                        (number, format!("{follows} {:?}", effect.shape)),
-                        make,
-                    )
+                    cached(&self.bases, (number, format!("{follows} {:?}", effect.shape)), make)
                 } else {
                     make()
                 };
-                for (slot, factor) in drivers::component_slots(session, test, readings, &effect.component) {
+                let parameters = test.station.kind().unknowns();
+                for (slot, factor) in effect.component.slots_in(&session.machine, parameters, readings) {
                     if self.slot_index[number].contains_key(&slot) {
                         of_test.push(EffectTerm {
                             target: TermTarget::Slot(slot),
@@ -109,14 +99,11 @@ impl Columns<'_, '_> {
             }
             terms.push(of_test);
         }
-        Some(EffectColumns {
-            count: effect.shape.coefficients(),
-            numbers: effect.shape.numbers(),
-            terms,
-        })
+        Some(EffectColumns { count: effect.shape.coefficients(), numbers: effect.shape.numbers(), terms })
     }
 
-    /// The samples of a driver in a test, and its key in the caches. The moment of gravity differs from axis to axis.
+    /// The samples of a driver in a test, and its key in the caches. Some drivers, as the moment of gravity, differ
+    /// from axis to axis.
     fn driver_samples(
         &self,
         test: usize,
@@ -124,19 +111,23 @@ impl Columns<'_, '_> {
         axis: Option<usize>,
     ) -> Option<(String, Arc<Vec<DriverSample<f64>>>)> {
         let readings = self.problem.tests[test].readings.as_ref()?;
-        let name = match driver {
-            Driver::Gravity => format!("gravity {axis:?}"),
-            other => other.to_string(),
-        };
+        let kind = driver.kind();
+        let name = if kind.is_of_component() { format!("{driver} {axis:?}") } else { driver.to_string() };
         let samples = cached(&self.samples, (test, name.clone()), || {
-            let (machine, model) = (&self.problem.session.machine, &self.problem.models[test]);
-            drivers::samples(machine, model, readings, &self.problem.origin, driver, axis).map(Arc::new)
+            let input = DriverInput {
+                machine: &self.problem.session.machine,
+                model: &self.problem.models[test],
+                readings,
+                origin: &self.problem.origin,
+                component_axis: axis,
+            };
+            kind.samples(&input).map(Arc::new)
         })?;
         Some((name, samples))
     }
 
-    /// Places a shape on one coordinate of the readings of one test, without a component. `by_direction` changes its sign with
-    /// the direction of travel. `rows` confines it. `None` if the data lack its driver.
+    /// Places a shape on one coordinate of the readings of one test, without a component. `by_direction` changes its
+    /// sign with the direction of travel. `rows` confines it. `None` if the data lack its driver.
     pub fn reading_columns(
         &self,
         effect: &Effect,
@@ -146,7 +137,7 @@ impl Columns<'_, '_> {
         rows: Option<&Range<usize>>,
     ) -> Option<EffectColumns> {
         let (_, samples) = self.driver_samples(test, &effect.driver, None)?;
-        let basis = Arc::new(drivers::basis_columns(&effect.shape, &samples));
+        let basis = Arc::new(effect.shape.columns(&samples));
         let factor = (by_direction || rows.is_some()).then(|| {
             let turned = |sample: &DriverSample<f64>| if by_direction { sample.direction } else { 1.0 };
             let inside = |row: usize| rows.is_none_or(|rows| rows.contains(&row));
@@ -154,20 +145,12 @@ impl Columns<'_, '_> {
             Arc::new(samples.iter().enumerate().map(factor).collect())
         });
         let mut terms = vec![Vec::new(); self.problem.tests.len()];
-        terms[test].push(EffectTerm {
-            target: TermTarget::Reading(coordinate),
-            factor,
-            basis,
-        });
-        Some(EffectColumns {
-            count: effect.shape.coefficients(),
-            numbers: 0,
-            terms,
-        })
+        terms[test].push(EffectTerm { target: TermTarget::Reading(coordinate), factor, basis });
+        Some(EffectColumns { count: effect.shape.coefficients(), numbers: 0, terms })
     }
 
-    /// A nonparametric curve over an axis in the readings of each test in which the axis moves, without a component. Tests with
-    /// too few readings for that many intervals have none.
+    /// A nonparametric curve over an axis in the readings of each test in which the axis moves, without a component.
+    /// Tests with too few readings for that many intervals have none.
     pub fn curves_of_tests(&self, driver: &Driver, intervals: usize) -> Vec<(Effect, EffectColumns)> {
         let Driver::Axis(name) = driver else {
             return Vec::new();
@@ -188,12 +171,7 @@ impl Columns<'_, '_> {
             let effect = Effect {
                 component: Component::TriggerDelay,
                 driver: driver.clone(),
-                shape: Shape::Curve {
-                    from: low,
-                    to: high,
-                    intervals,
-                    closed: false,
-                },
+                shape: Shape::Curve(Curve { from: low, to: high, intervals, closed: false }),
                 tests: vec![test.name.clone()],
             };
             for coordinate in 0..self.problem.coordinates() {
@@ -204,12 +182,12 @@ impl Columns<'_, '_> {
         column_sets
     }
 
-    /// The largest plausible coefficient of an effect, in internal units: 0.1 mm and 1 mrad on a machine tool, ten times as much
-    /// on the robots and long chains that trackers and sockets measure.
+    /// The largest plausible coefficient of an effect, in internal units: 0.1 mm and 1 mrad on a machine tool, ten
+    /// times as much on the robots and long chains that trackers and sockets measure.
     pub fn plausible(&self, effect: &Effect, column_set: &EffectColumns) -> f64 {
         let machine_tool = self.problem.session.instrument.is_two_sided();
         let scale = if machine_tool { 1.0 } else { 10.0 };
-        let most = match drivers::component_unit(self.problem.session, &effect.component) {
+        let most = match effect.component.unit(self.problem.session.instrument.unknowns()) {
             Some(InternalUnit::Millimetre) => 0.1 * scale,
             Some(InternalUnit::Radian) => 1e-3 * scale,
             Some(InternalUnit::Ratio) => 0.1,
@@ -242,11 +220,7 @@ pub fn chunked(column_sets: &[EffectColumns]) -> Vec<Range<usize>> {
 }
 
 /// The cached value of a key. Computes and stores it if it is absent.
-fn cached<K: std::hash::Hash + Eq, V: Clone>(
-    store: &Mutex<HashMap<K, V>>,
-    key: K,
-    make: impl FnOnce() -> V,
-) -> V {
+fn cached<K: std::hash::Hash + Eq, V: Clone>(store: &Mutex<HashMap<K, V>>, key: K, make: impl FnOnce() -> V) -> V {
     let found = store.lock().ok().and_then(|store| store.get(&key).cloned());
     if let Some(value) = found {
         return value;
@@ -266,23 +240,14 @@ mod tests {
     #[test]
     fn chunks_are_filled_in_order() {
         let column_sets = |counts: &[usize]| -> Vec<EffectColumns> {
-            let of_count = |&count: &usize| EffectColumns {
-                count,
-                numbers: 0,
-                terms: Vec::new(),
-            };
+            let of_count = |&count: &usize| EffectColumns { count, numbers: 0, terms: Vec::new() };
             counts.iter().map(of_count).collect()
         };
         let ends = |counts: &[usize]| -> Vec<usize> {
             let chunks = chunked(&column_sets(counts));
             let starts: Vec<usize> = chunks.iter().map(|chunk| chunk.start).collect();
             let ends: Vec<usize> = chunks.iter().map(|chunk| chunk.end).collect();
-            assert!(
-                starts
-                    .iter()
-                    .zip([0].iter().chain(&ends))
-                    .all(|(start, end)| start == end)
-            );
+            assert!(starts.iter().zip([0].iter().chain(&ends)).all(|(start, end)| start == end));
             ends
         };
         assert_eq!(ends(&[]), [0; 0]);

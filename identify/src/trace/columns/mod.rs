@@ -1,6 +1,7 @@
 //! The columns of candidates: sensitivity × basis function, whitened as the readings are.
 //!
-//! The chain is evaluated once for the sensitivities of every component. Hundreds of candidates need no further kinematics.
+//! The chain is evaluated once for the sensitivities of every component. Hundreds of candidates need no further
+//! kinematics.
 
 mod basis;
 mod unwhitened;
@@ -9,7 +10,7 @@ use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
 
-use abbe_model::effect::DriverSample;
+use abbe_model::driver::DriverSample;
 use abbe_model::sensitivity::Sensitivities;
 use faer::{Mat, MatMut};
 use rayon::prelude::*;
@@ -54,13 +55,7 @@ impl<'p, 'a> Columns<'p, 'a> {
         let sensitivities = sensitivities(problem, beta);
         let slot_index = sensitivities
             .iter()
-            .map(|s| {
-                s.slots
-                    .iter()
-                    .enumerate()
-                    .map(|(index, slot)| (*slot, index))
-                    .collect()
-            })
+            .map(|s| s.slots.iter().enumerate().map(|(index, slot)| (*slot, index)).collect())
             .collect();
         let blocks = problem.blocks();
         let mut fold_of = Vec::new();
@@ -128,10 +123,7 @@ impl<'p, 'a> Columns<'p, 'a> {
                     // One coordinate per reading without a factor is the common case. The compiler vectorises it.
                     if let (1, Some(derivative), None) = (coordinates, derivative, factor) {
                         let terms = derivative.iter().zip(basis);
-                        entries
-                            .iter_mut()
-                            .zip(terms)
-                            .for_each(|(entry, (d, b))| *entry += d * b);
+                        entries.iter_mut().zip(terms).for_each(|(entry, (d, b))| *entry += d * b);
                         continue;
                     }
                     for (row, basis) in basis.iter().enumerate() {
@@ -157,15 +149,7 @@ impl<'p, 'a> Columns<'p, 'a> {
     pub fn moved_rows(&self, column_sets: &[EffectColumns]) -> Vec<Range<usize>> {
         let moved = |test: &usize| column_sets.iter().any(|column_set| column_set.acts_in(*test));
         let folds = self.fold_rows.iter().zip(&self.fold_tests);
-        folds
-            .map(|(rows, tests)| {
-                if tests.iter().any(moved) {
-                    rows.clone()
-                } else {
-                    rows.start..rows.start
-                }
-            })
-            .collect()
+        folds.map(|(rows, tests)| if tests.iter().any(moved) { rows.clone() } else { rows.start..rows.start }).collect()
     }
 
     /// The stretches of rows of some folds in which any of the effects acts.
@@ -176,11 +160,7 @@ impl<'p, 'a> Columns<'p, 'a> {
     ) -> Vec<Range<usize>> {
         let moved = self.moved_rows(column_sets);
         let mut stretches: Vec<Range<usize>> = Vec::new();
-        for rows in folds
-            .into_iter()
-            .map(|fold| &moved[fold])
-            .filter(|rows| !rows.is_empty())
-        {
+        for rows in folds.into_iter().map(|fold| &moved[fold]).filter(|rows| !rows.is_empty()) {
             match stretches.last_mut() {
                 Some(last) if last.end == rows.start => last.end = rows.end,
                 _ => stretches.push(rows.clone()),
@@ -196,11 +176,7 @@ impl<'p, 'a> Columns<'p, 'a> {
         for (block, kept) in self.blocks.iter().zip(&self.kept) {
             let target = &self.target[start..start + kept.len()];
             start += kept.len();
-            if target.is_empty()
-                || !column_sets
-                    .iter()
-                    .any(|column_set| column_set.acts_in(block.test))
-            {
+            if target.is_empty() || !column_sets.iter().any(|column_set| column_set.acts_in(block.test)) {
                 continue;
             }
             let white = self.problem.whitened(self.block_rows(column_sets, block), kept);
@@ -311,17 +287,14 @@ mod tests {
     /// No file holds a test without readings, but a calling program may supply one.
     #[test]
     fn sensitivities_match_their_tests_if_one_has_no_readings() {
-        let file =
-            Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
         let mut session = files::session(&file, &ReadOptions::default()).unwrap();
         let without = session.tests[1].readings.as_ref().unwrap().of_rows(&[]);
         session.tests[1].readings = Some(without);
         let (problem, fit) = prepare(&session, 1).unwrap();
         let rows: Vec<usize> = problem.models.iter().map(|model| model.rows()).collect();
-        let found: Vec<usize> = sensitivities(&problem, &fit.beta)
-            .iter()
-            .map(|of_test| of_test.readings_mm.len())
-            .collect();
+        let found: Vec<usize> =
+            sensitivities(&problem, &fit.beta).iter().map(|of_test| of_test.readings_mm.len()).collect();
         assert_eq!(found, rows);
         assert_eq!(found[1], 0);
     }

@@ -11,10 +11,7 @@ use crate::trace::paired::Units;
 impl Columns<'_, '_> {
     /// The rows of effects for the accepted readings, in mm, unwhitened, block after block.
     pub fn unwhitened_rows(&self, column_sets: &[&EffectColumns]) -> Mat<f64> {
-        let blocks = self
-            .blocks
-            .iter()
-            .map(|block| self.block_rows(column_sets, block));
+        let blocks = self.blocks.iter().map(|block| self.block_rows(column_sets, block));
         self.unwhitened(blocks.collect())
     }
 
@@ -31,17 +28,13 @@ impl Columns<'_, '_> {
     /// The fold of each row of [`Columns::unwhitened_rows`].
     pub fn unwhitened_folds(&self) -> Vec<usize> {
         let coordinates = self.problem.coordinates();
-        let fold = |block: &RowBlock, i: usize| {
-            self.problem.folds.of_row[block.test][block.rows.start + i / coordinates]
-        };
-        self.blocks
-            .iter()
-            .flat_map(|block| self.counting(block).into_iter().map(move |i| fold(block, i)))
-            .collect()
+        let fold =
+            |block: &RowBlock, i: usize| self.problem.folds.of_row[block.test][block.rows.start + i / coordinates];
+        self.blocks.iter().flat_map(|block| self.counting(block).into_iter().map(move |i| fold(block, i))).collect()
     }
 
-    /// The independent units over which held-out errors are paired: the poses if folds consist of poses, otherwise the folds
-    /// (runs or blocks), each of which belongs to one test. The rows are those of [`Columns::unwhitened_rows`].
+    /// The independent units over which held-out errors are paired: the poses if folds consist of poses, otherwise the
+    /// folds (runs or blocks), each of which belongs to one test. The rows are those of [`Columns::unwhitened_rows`].
     pub fn unwhitened_units(&self) -> Units {
         let coordinates = self.problem.coordinates();
         let rows = self.blocks.iter().flat_map(|block| {
@@ -59,18 +52,13 @@ impl Columns<'_, '_> {
     fn counting(&self, block: &RowBlock) -> Vec<usize> {
         let coordinates = self.problem.coordinates();
         let rejected = &self.problem.rejected[block.test];
-        (0..block.rows.len() * coordinates)
-            .filter(|i| !rejected[block.rows.start + i / coordinates])
-            .collect()
+        (0..block.rows.len() * coordinates).filter(|i| !rejected[block.rows.start + i / coordinates]).collect()
     }
 
     /// The accepted rows of all blocks, one block below another.
     fn unwhitened(&self, blocks: Vec<Mat<f64>>) -> Mat<f64> {
         let counting: Vec<Vec<usize>> = self.blocks.iter().map(|block| self.counting(block)).collect();
-        let mut rows = Mat::zeros(
-            counting.iter().map(Vec::len).sum(),
-            blocks.first().map_or(0, Mat::ncols),
-        );
+        let mut rows = Mat::zeros(counting.iter().map(Vec::len).sum(), blocks.first().map_or(0, Mat::ncols));
         let mut start = 0;
         for (block, counting) in blocks.iter().zip(&counting) {
             for (k, i) in counting.iter().enumerate() {

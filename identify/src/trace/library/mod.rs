@@ -5,7 +5,9 @@ mod shapes;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
-use abbe_model::effect::{Component, Driver, Effect, Shape};
+use abbe_model::driver::{Driver, Recorded};
+use abbe_model::effect::shape::Steps;
+use abbe_model::effect::{Component, Effect, Shape};
 use serde::Deserialize;
 
 use crate::error::IdentifyError;
@@ -15,8 +17,8 @@ use shapes::shapes;
 
 const LIBRARY: &str = include_str!("library.toml");
 
-/// Number of intervals of the travel between possible step positions.
-const STEP_POSITIONS: usize = 40;
+/// The words of the library for axes as drivers.
+const AXIS_DRIVERS: [&str; 4] = ["own", "own-rotary", "own-linear", "other"];
 
 /// A family of effects in the library.
 #[derive(Clone, Debug, Deserialize)]
@@ -25,12 +27,11 @@ pub struct Family {
     /// Description of the family.
     pub name: String,
     components: Components,
-    driver: DriverChoice,
-    shape: ShapeChoice,
+    driver: String,
+    shape: String,
+    /// The numbers of the shape's members, if the shape takes them from the library: degrees, time constants.
     #[serde(default)]
-    degrees: Vec<usize>,
-    #[serde(default)]
-    tau_s: Vec<f64>,
+    numbers: Vec<f64>,
     /// Cost of a member in the score.
     pub simplicity: f64,
     /// Whether it is searched only if no simpler candidate is significant and structure remains.
@@ -52,38 +53,6 @@ enum Components {
     Trigger,
 }
 
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
-#[serde(rename_all = "kebab-case")]
-enum DriverChoice {
-    None,
-    Own,
-    OwnRotary,
-    OwnLinear,
-    Other,
-    Time,
-    Temperature,
-    Gravity,
-}
-
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum ShapeChoice {
-    Constant,
-    ConstantPerMount,
-    Harmonic,
-    HarmonicLow,
-    Power,
-    Periodic,
-    Backlash,
-    Lag,
-    ReversalSpike,
-    Drift,
-    Warmup,
-    Steps,
-    Local,
-    Curve,
-}
-
 #[derive(Deserialize)]
 struct Library {
     family: Vec<Family>,
@@ -98,7 +67,8 @@ pub struct Candidate {
     pub family: usize,
     /// Cost in the score in addition to its degrees of freedom, in natural-logarithm units.
     pub cost: f64,
-    /// Selection penalty: the reduction of the evidence for the selection of several positions. 0 for an effect of the library.
+    /// Selection penalty: the reduction of the evidence for the selection of several positions. 0 for an effect of the
+    /// library.
     pub selection_penalty: f64,
     /// Whether it is searched only if no simpler candidate is significant and structure remains.
     pub last_resort: bool,
@@ -135,11 +105,18 @@ impl Candidate {
 pub fn families() -> Result<Vec<Family>, IdentifyError> {
     let library: Library = toml::from_str(LIBRARY)
         .map_err(|fault| IdentifyError::Request(format!("the library of effects cannot be read: {fault}")))?;
+    for family in &library.family {
+        let is_axis = matches!(Driver::parse(&family.driver), Driver::Axis(_));
+        if is_axis && !AXIS_DRIVERS.contains(&family.driver.as_str()) || !shapes::is_known(&family.shape) {
+            let fault = format!("the library of effects has an unknown driver or shape in \"{}\"", family.name);
+            return Err(IdentifyError::Request(fault));
+        }
+    }
     Ok(library.family)
 }
 
-/// The candidates of a session: all members that its axes, instrument and columns permit, except effects that the model already
-/// has.
+/// The candidates of a session: all members that its axes, instrument and columns permit, except effects that the model
+/// already has.
 ///
 /// # Errors
 /// See [`families`].
@@ -149,18 +126,13 @@ pub fn candidates(problem: &Problem<'_>) -> Result<Vec<Candidate>, IdentifyError
     let mut candidates = Vec::new();
     for (number, family) in families.iter().enumerate() {
         for component in components(problem, &sampling, family.components) {
-            for driver in drivers(problem, &sampling, family.driver, &component) {
+            for driver in drivers(problem, &sampling, &family.driver, &component) {
                 for (shape, tests, extra) in shapes(problem, &sampling, family, &component, &driver) {
-                    let effect = Effect {
-                        component: component.clone(),
-                        driver: driver.clone(),
-                        shape,
-                        tests,
-                    };
+                    let effect = Effect { component: component.clone(), driver: driver.clone(), shape, tests };
                     let cost = family.simplicity + extra + tilt_cost(problem, &component);
                     let last_resort = family.last_resort;
                     let grid = grid(problem, &sampling, &effect);
-                    let dictionary = matches!(&effect.shape, Shape::Steps { at } if at.len() > 1);
+                    let dictionary = matches!(&effect.shape, Shape::Steps(Steps { at }) if at.len() > 1);
                     candidates.push(Candidate {
                         effect,
                         family: number,
@@ -174,12 +146,7 @@ pub fn candidates(problem: &Problem<'_>) -> Result<Vec<Candidate>, IdentifyError
             }
         }
     }
-    let declared: Vec<String> = problem
-        .parameters
-        .list
-        .iter()
-        .map(|parameter| parameter.id.clone())
-        .collect();
+    let declared: Vec<String> = problem.parameters.list.iter().map(|parameter| parameter.id.clone()).collect();
     candidates.retain(|candidate| {
         let constant = candidate.effect.shape == Shape::Constant;
         let same_error = constant && declared.contains(&candidate.effect.component.to_string());
@@ -191,18 +158,8 @@ pub fn candidates(problem: &Problem<'_>) -> Result<Vec<Candidate>, IdentifyError
 
 /// See [`Candidate::grid`].
 fn grid(problem: &Problem<'_>, sampling: &Sampling, effect: &Effect) -> f64 {
-    let axis = match &effect.driver {
-        Driver::Axis(name) => problem.session.machine.axis_index(name),
-        _ => None,
-    };
-    let span = axis.map_or(0.0, |axis| sampling.span(axis));
-    match &effect.shape {
-        // Adjacent frequencies differ by half a cycle over the travel.
-        Shape::Periodic { period } => 0.5 * period * period / span,
-        Shape::Steps { .. } => span / STEP_POSITIONS as f64,
-        Shape::Local { width, .. } => *width,
-        _ => 0.0,
-    }
+    let axis = effect.driver.axis(&problem.session.machine);
+    effect.shape.spacing(axis.map_or(0.0, |axis| sampling.span(axis)))
 }
 
 /// Whether a set-up quantity is a free parameter already, so that it is no further effect.
@@ -210,28 +167,18 @@ fn is_free_setup(problem: &Problem<'_>, effect: &Effect) -> bool {
     let Component::Instrument { thing, coordinate } = &effect.component else {
         return false;
     };
-    let Some(test) = problem
-        .tests
-        .iter()
-        .find(|test| effect.tests.contains(&test.name))
-    else {
+    let Some(test) = problem.tests.iter().find(|test| effect.tests.contains(&test.name)) else {
         return false;
     };
     let setup_parameters = problem.session.instrument.unknowns();
-    let index = setup_parameters
-        .iter()
-        .position(|u| u.thing == thing && u.coordinate == coordinate);
+    let index = setup_parameters.iter().position(|u| u.thing == thing && u.coordinate == coordinate);
     index.is_some_and(|index| test.priors[index] == abbe_model::session::Prior::Free)
 }
 
 fn components(problem: &Problem<'_>, sampling: &Sampling, choice: Components) -> Vec<Component> {
     let machine = &problem.session.machine;
     let error = |axis: usize, kind: ErrorKind, freedom: Freedom| {
-        Component::Axis(ErrorName {
-            kind,
-            freedom,
-            axis: machine.axes[axis].name.clone(),
-        })
+        Component::Axis(ErrorName { kind, freedom, axis: machine.axes[axis].name.clone() })
     };
     let moving = || (0..machine.axes.len()).filter(|axis| sampling.moves[*axis]);
     let things = |names: &[&str]| -> Vec<Component> {
@@ -248,12 +195,12 @@ fn components(problem: &Problem<'_>, sampling: &Sampling, choice: Components) ->
             .collect()
     };
     match choice {
-        Components::Motion => moving()
-            .flat_map(|axis| Freedom::ALL.map(|freedom| error(axis, ErrorKind::Motion, freedom)))
-            .collect(),
-        Components::OwnMotion => moving()
-            .map(|axis| error(axis, ErrorKind::Motion, machine.axes[axis].own_freedom()))
-            .collect(),
+        Components::Motion => {
+            moving().flat_map(|axis| Freedom::ALL.map(|freedom| error(axis, ErrorKind::Motion, freedom))).collect()
+        }
+        Components::OwnMotion => {
+            moving().map(|axis| error(axis, ErrorKind::Motion, machine.axes[axis].own_freedom())).collect()
+        }
         Components::AnyMotion => (0..machine.axes.len())
             .filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary)
             .flat_map(|axis| Freedom::ALL.map(|freedom| error(axis, ErrorKind::Motion, freedom)))
@@ -266,8 +213,8 @@ fn components(problem: &Problem<'_>, sampling: &Sampling, choice: Components) ->
                 let body = choice == Components::Body;
                 Freedom::ALL
                     .into_iter()
-                    // An axis is a line. It has no location error along itself, and its zero offset is no error of the line. The
-                    // body that it carries can move in these directions too.
+                    // An axis is a line. It has no location error along itself, and its zero offset is no error of the
+                    // line. The body that it carries can move in these directions too.
                     .filter(move |f| {
                         if rotary {
                             body || *f != own && *f != along
@@ -291,14 +238,10 @@ fn components(problem: &Problem<'_>, sampling: &Sampling, choice: Components) ->
     }
 }
 
-fn drivers(
-    problem: &Problem<'_>,
-    sampling: &Sampling,
-    choice: DriverChoice,
-    component: &Component,
-) -> Vec<Driver> {
+/// The drivers of a component: axes by their relation to the component's own, or the driver of that word.
+fn drivers(problem: &Problem<'_>, sampling: &Sampling, choice: &str, component: &Component) -> Vec<Driver> {
     let machine = &problem.session.machine;
-    let own = crate::drivers::component_axis(problem.session, component);
+    let own = component.axis(machine);
     let own_of_kind = |kind: Option<AxisKind>| -> Vec<Driver> {
         own.filter(|axis| kind.is_none_or(|kind| machine.axes[*axis].kind == kind))
             .map(|axis| Driver::Axis(machine.axes[axis].name.clone()))
@@ -306,40 +249,32 @@ fn drivers(
             .collect()
     };
     match choice {
-        DriverChoice::None => vec![Driver::None],
-        DriverChoice::Own => own_of_kind(None),
-        DriverChoice::OwnRotary => own_of_kind(Some(AxisKind::Rotary)),
-        DriverChoice::OwnLinear => own_of_kind(Some(AxisKind::Linear)),
-        // With independent poses every axis moves at once, so that any pair of axes would be a candidate. There gravity covers
-        // compliance.
-        DriverChoice::Other if sampling.is_poses() => Vec::new(),
-        DriverChoice::Other => (0..machine.axes.len())
+        "own" => own_of_kind(None),
+        "own-rotary" => own_of_kind(Some(AxisKind::Rotary)),
+        "own-linear" => own_of_kind(Some(AxisKind::Linear)),
+        // With independent poses every axis moves at once, so that any pair of axes would be a candidate. There gravity
+        // covers compliance.
+        "other" if sampling.is_poses() => Vec::new(),
+        "other" => (0..machine.axes.len())
             .filter(|axis| sampling.moves[*axis] && Some(*axis) != own)
             .map(|axis| Driver::Axis(machine.axes[axis].name.clone()))
             .collect(),
-        DriverChoice::Time => {
-            if sampling.has_time {
-                vec![Driver::Time]
-            } else {
-                Vec::new()
-            }
-        }
-        DriverChoice::Temperature => {
-            if sampling.has_temperature {
-                vec![Driver::Temperature]
-            } else {
-                Vec::new()
-            }
-        }
-        DriverChoice::Gravity => {
-            let turns = own.is_some_and(|axis| machine.axes[axis].kind == AxisKind::Rotary);
-            if turns { vec![Driver::Gravity] } else { Vec::new() }
+        word => {
+            let driver = Driver::parse(word);
+            let recorded = Recorded {
+                time: sampling.has_time,
+                temperature: sampling.has_temperature,
+                swept: !sampling.is_poses(),
+            };
+            let kind = own.map(|axis| machine.axes[axis].kind);
+            let observable = driver.kind().is_observable(&recorded, kind);
+            observable.then_some(driver).into_iter().collect()
         }
     }
 }
 
-/// Additional cost of a tilt. A translation is a simpler cause than a tilt that displaces the point equally. The rotation about
-/// the axis itself is no tilt, and neither is the squareness of a linear axis.
+/// Additional cost of a tilt. A translation is a simpler cause than a tilt that displaces the point equally. The
+/// rotation about the axis itself is no tilt, and neither is the squareness of a linear axis.
 fn tilt_cost(problem: &Problem<'_>, component: &Component) -> f64 {
     match component {
         Component::Axis(name) if name.freedom.is_angle() => {

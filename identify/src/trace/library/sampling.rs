@@ -53,11 +53,8 @@ impl Sampling {
                     sampling.reverses_inside_runs[axis] |= directions(run).len() > 1;
                 }
                 if !readings.run.is_empty() && column.len() > 1 {
-                    let mut steps: Vec<f64> = column
-                        .windows(2)
-                        .map(|pair| (pair[1] - pair[0]).abs())
-                        .filter(|step| *step > 1e-9)
-                        .collect();
+                    let mut steps: Vec<f64> =
+                        column.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 1e-9).collect();
                     sampling.step[axis] = sampling.step[axis].max(crate::outliers::median(&mut steps));
                 }
             }

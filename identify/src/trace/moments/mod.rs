@@ -1,13 +1,14 @@
 //! Products of candidates with the model and the residual, for each fold.
 //!
-//! With these products, the search needs no further pass over the readings. The gain of any candidate added to any model on any set
-//! of folds is a small matrix expression. With `X` the model's columns, `y` the residual and `C` a candidate's columns over the
-//! training folds,
+//! With these products, the search needs no further pass over the readings. The gain of any candidate added to any
+//! model on any set of folds is a small matrix expression. With `X` the model's columns, `y` the residual and `C` a
+//! candidate's columns over the training folds,
 //! ```text
 //! gain = gᵀ D⁻¹ g,   D = CᵀC − CᵀX (XᵀX)⁻¹ XᵀC,   g = Cᵀy − CᵀX (XᵀX)⁻¹ Xᵀy
 //! ```
 //!
-//! `X` begins with an orthonormal basis of the fitted model (priors included), so that the normal equations lose no precision.
+//! `X` begins with an orthonormal basis of the fitted model (priors included), so that the normal equations lose no
+//! precision.
 
 mod products;
 
@@ -57,26 +58,17 @@ impl FoldMoments {
             sum.yy += fold.yy;
             add(&mut sum.base_y, &fold.base_y);
             add(&mut sum.cross_y, &fold.cross_y);
-            sum.own
-                .iter_mut()
-                .zip(&fold.own)
-                .for_each(|(to, more)| *to += more);
+            sum.own.iter_mut().zip(&fold.own).for_each(|(to, more)| *to += more);
         }
         sum
     }
 
-    /// Adds base columns by their products with the whole base (base × added), with the candidates (added × candidate columns)
-    /// and with the residual.
+    /// Adds base columns by their products with the whole base (base × added), with the candidates (added × candidate
+    /// columns) and with the residual.
     fn extend_base(&mut self, gram: &Mat<f64>, cross: &Mat<f64>, with_y: impl Iterator<Item = f64>) {
         let base = gram.nrows();
         let old = base - gram.ncols();
-        grow(&mut self.base, base, base, |i, j| {
-            if j < old {
-                gram[(j, i - old)]
-            } else {
-                gram[(i, j - old)]
-            }
-        });
+        grow(&mut self.base, base, base, |i, j| if j < old { gram[(j, i - old)] } else { gram[(i, j - old)] });
         grow(&mut self.cross, base, cross.ncols(), |i, j| cross[(i - old, j)]);
         self.base_y.extend(with_y);
     }
@@ -109,18 +101,10 @@ pub struct Moments {
 const BUFFER_ROWS: usize = 32;
 const BUFFER_COLUMNS: usize = 128;
 
-/// Enlarges a matrix and reserves capacity. Candidates and effects are added one at a time, and large matrices are not copied
-/// each time.
-pub(super) fn grow(
-    matrix: &mut Mat<f64>,
-    rows: usize,
-    columns: usize,
-    value: impl FnMut(usize, usize) -> f64,
-) {
-    matrix.reserve(
-        rows.next_multiple_of(BUFFER_ROWS),
-        columns.next_multiple_of(BUFFER_COLUMNS),
-    );
+/// Enlarges a matrix and reserves capacity. Candidates and effects are added one at a time, and large matrices are not
+/// copied each time.
+pub(super) fn grow(matrix: &mut Mat<f64>, rows: usize, columns: usize, value: impl FnMut(usize, usize) -> f64) {
+    matrix.reserve(rows.next_multiple_of(BUFFER_ROWS), columns.next_multiple_of(BUFFER_COLUMNS));
     matrix.resize_with(rows, columns, value);
 }
 
@@ -131,8 +115,8 @@ pub(super) fn transposed_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<
 }
 
 impl Moments {
-    /// From the orthonormal model columns (rows × rank), the residual and the null draws (rows × draws). Returns `None` if
-    /// `go_on` returns `false`.
+    /// From the orthonormal model columns (rows × rank), the residual and the null draws (rows × draws). Returns `None`
+    /// if `go_on` returns `false`.
     pub fn new(
         columns: &Columns<'_, '_>,
         column_sets: &[EffectColumns],
@@ -195,10 +179,7 @@ impl Moments {
         column_sets: &[EffectColumns],
         candidates: &[usize],
     ) -> Vec<Range<usize>> {
-        let chosen: Vec<&EffectColumns> = candidates
-            .iter()
-            .map(|candidate| &column_sets[*candidate])
-            .collect();
+        let chosen: Vec<&EffectColumns> = candidates.iter().map(|candidate| &column_sets[*candidate]).collect();
         let added: usize = chosen.iter().map(|column_set| column_set.count).sum();
         let (rows, old) = (columns.rows(), self.base());
         let mut places = Vec::new();
@@ -235,14 +216,9 @@ impl Moments {
         let side = beside(&self.base_columns, &self.residual);
         let candidates = self.count.len()..column_sets.len();
         let beside = (&side, &self.null);
-        let Some((fresh, products)) = multiply(
-            columns,
-            column_sets,
-            candidates.clone(),
-            &self.chunks,
-            beside,
-            &|| true,
-        ) else {
+        let Some((fresh, products)) =
+            multiply(columns, column_sets, candidates.clone(), &self.chunks, beside, &|| true)
+        else {
             return;
         };
         let draws = self.null.ncols();
@@ -257,27 +233,19 @@ impl Moments {
         self.chunks.extend(fresh);
         let of_null = products.null;
         for ((moments, product), own) in self.folds.iter_mut().zip(products.side).zip(products.own) {
-            grow(&mut moments.cross, rank, total + added, |i, j| {
-                product[(i, j - total)]
-            });
+            grow(&mut moments.cross, rank, total + added, |i, j| product[(i, j - total)]);
             moments.cross_y.extend((0..added).map(|k| product[(rank, k)]));
             moments.own.extend(own);
         }
         self.accumulate_totals(rank, total + added);
-        grow(&mut self.null_cross, draws, total + added, |d, j| {
-            of_null[(d, j - total)]
-        });
+        grow(&mut self.null_cross, draws, total + added, |d, j| of_null[(d, j - total)]);
     }
 
     /// Extends the products over all folds to the present number of base columns and candidate columns.
     fn accumulate_totals(&mut self, base: usize, total: usize) {
         let (folds, whole) = (&self.folds, &mut self.whole);
-        grow(&mut whole.base, base, base, |i, j| {
-            folds.iter().map(|fold| fold.base[(i, j)]).sum()
-        });
-        grow(&mut whole.cross, base, total, |i, j| {
-            folds.iter().map(|fold| fold.cross[(i, j)]).sum()
-        });
+        grow(&mut whole.base, base, base, |i, j| folds.iter().map(|fold| fold.base[(i, j)]).sum());
+        grow(&mut whole.cross, base, total, |i, j| folds.iter().map(|fold| fold.cross[(i, j)]).sum());
         for i in whole.base_y.len()..base {
             whole.base_y.push(folds.iter().map(|fold| fold.base_y[i]).sum());
         }

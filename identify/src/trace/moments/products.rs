@@ -18,8 +18,9 @@ pub(super) struct CandidateChunk {
     stored: Option<Mat<f64>>,
 }
 
-/// Computes the columns of candidates chunk by chunk and multiplies each chunk. Columns are stored as long as the memory limit
-/// permits it, including those stored already. `go_on` is called before each chunk. Returns `None` if it returns `false`.
+/// Computes the columns of candidates chunk by chunk and multiplies each chunk. Columns are stored as long as the
+/// memory limit permits it, including those stored already. `go_on` is called before each chunk. Returns `None` if it
+/// returns `false`.
 pub(super) fn multiply(
     columns: &Columns<'_, '_>,
     column_sets: &[EffectColumns],
@@ -28,15 +29,9 @@ pub(super) fn multiply(
     (side, null): (&Mat<f64>, &Mat<f64>),
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Option<(Vec<CandidateChunk>, CandidateProducts)> {
-    let count: Vec<usize> = column_sets[candidates.clone()]
-        .iter()
-        .map(|column_set| column_set.count)
-        .collect();
-    let mut stored: usize = present
-        .iter()
-        .filter_map(|chunk| chunk.stored.as_ref())
-        .map(|stored| stored.nrows() * stored.ncols())
-        .sum();
+    let count: Vec<usize> = column_sets[candidates.clone()].iter().map(|column_set| column_set.count).collect();
+    let mut stored: usize =
+        present.iter().filter_map(|chunk| chunk.stored.as_ref()).map(|stored| stored.nrows() * stored.ncols()).sum();
     let chunks: Vec<(Range<usize>, bool)> = chunked(&column_sets[candidates.clone()])
         .into_iter()
         .map(|chunk| {
@@ -81,9 +76,7 @@ pub(super) fn with_side(
             let column_sets = &column_sets[chunk.candidates.clone()];
             let recomputed = chunk.stored.is_none().then(|| filled(columns, column_sets));
             let all = chunk.stored.as_ref().or(recomputed.as_ref());
-            all.map_or_else(Vec::new, |all| {
-                cross_by_fold(columns, column_sets, side, all.as_ref())
-            })
+            all.map_or_else(Vec::new, |all| cross_by_fold(columns, column_sets, side, all.as_ref()))
         })
         .collect();
     joined_by_fold(&parts, columns.fold_rows.len(), side.ncols())
@@ -115,15 +108,9 @@ impl CandidateProducts {
         let mut own = vec![Vec::new(); folds];
         for part in parts {
             sides.push(part.side);
-            own.iter_mut()
-                .zip(part.own)
-                .for_each(|(own, more)| own.extend(more));
+            own.iter_mut().zip(part.own).for_each(|(own, more)| own.extend(more));
         }
-        CandidateProducts {
-            side: joined_by_fold(&sides, folds, side),
-            own,
-            null,
-        }
+        CandidateProducts { side: joined_by_fold(&sides, folds, side), own, null }
     }
 }
 
@@ -144,7 +131,8 @@ fn joined<'p>(rows: usize, parts: impl Iterator<Item = &'p Mat<f64>> + Clone) ->
     whole
 }
 
-/// For each fold `sideᵀ · candidates`. The product is zero without computation if none of the candidates acts in the fold.
+/// For each fold `sideᵀ · candidates`. The product is zero without computation if none of the candidates acts in the
+/// fold.
 fn cross_by_fold(
     columns: &Columns<'_, '_>,
     column_sets: &[EffectColumns],
@@ -161,11 +149,7 @@ fn cross_by_fold(
 }
 
 /// For each fold each candidate's product with itself.
-fn gram_by_fold(
-    columns: &Columns<'_, '_>,
-    column_sets: &[EffectColumns],
-    all: MatRef<'_, f64>,
-) -> Vec<Vec<Mat<f64>>> {
+fn gram_by_fold(columns: &Columns<'_, '_>, column_sets: &[EffectColumns], all: MatRef<'_, f64>) -> Vec<Vec<Mat<f64>>> {
     let moved = columns.moved_rows(column_sets).into_iter();
     moved
         .map(|rows| {
@@ -192,14 +176,7 @@ fn null_product(
     for rows in columns.moved_stretches(column_sets, 0..columns.fold_rows.len()) {
         let draws = null.as_ref().subrows(rows.start, rows.len());
         let part = all.subrows(rows.start, rows.len());
-        matmul(
-            product.as_mut(),
-            Accum::Add,
-            draws.transpose(),
-            part,
-            1.0,
-            Par::Seq,
-        );
+        matmul(product.as_mut(), Accum::Add, draws.transpose(), part, 1.0, Par::Seq);
     }
     product
 }

@@ -1,16 +1,17 @@
 //! A found effect as it is reported: its name, the numbers of its shape, its parameters, its curve.
 
-use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
-use abbe_model::effect::{Driver, DriverSample, Effect, Shape};
+use abbe_model::driver::DriverSample;
+use abbe_model::effect::shape::Curve;
+use abbe_model::effect::{Effect, Shape};
 
 use super::{HeldOut, Moves, TraceFindings, alias_shifts};
-use crate::effect_description::{explanations, meaning};
 use crate::fit::Fit;
 use crate::parameters::Role;
 use crate::problem::Problem;
 use crate::results::{CurvePoint, EffectName, EffectResult, ParameterResult, ShapeParameter};
 use crate::trace::library::Family;
+use abbe_model::effect::description::{explanations, meaning};
 
 /// An effect's name as it stands in results.
 pub fn effect_name(machine: &Machine, effect: &Effect) -> EffectName {
@@ -55,10 +56,7 @@ pub(super) fn result(
     let meanings: Vec<_> = alike.map(|effect| meaning(machine, effect)).collect();
     EffectResult {
         name: effect_name(machine, &candidate.effect),
-        family: families
-            .get(candidate.family)
-            .map(|family| family.name.clone())
-            .unwrap_or_default(),
+        family: families.get(candidate.family).map(|family| family.name.clone()).unwrap_or_default(),
         shape_parameters: shape_parameters_of(after, &candidate.effect),
         parameters: parameters_of(after, found.parameters, number),
         curve: curve_of(after, findings.after_fit, number, found.moves),
@@ -70,9 +68,7 @@ pub(super) fn result(
         unique: found.alias_effects.is_empty(),
         explanation_count: meanings.len(),
         explanations: explanations(&meanings),
-        aliases: (found.alias_effects.iter())
-            .map(|effect| effect_name(machine, effect))
-            .collect(),
+        aliases: (found.alias_effects.iter()).map(|effect| effect_name(machine, effect)).collect(),
         separated_by: None,
         separation: None,
         separating_tests: Vec::new(),
@@ -80,17 +76,12 @@ pub(super) fn result(
 }
 
 /// Of all parameters those of the `number`-th effect.
-fn parameters_of(
-    problem: &Problem<'_>,
-    parameters: &[ParameterResult],
-    number: usize,
-) -> Vec<ParameterResult> {
+fn parameters_of(problem: &Problem<'_>, parameters: &[ParameterResult], number: usize) -> Vec<ParameterResult> {
     let Some(id) = problem.parameters.effect_ids.get(number) else {
         return Vec::new();
     };
     let is_own = |p: &&ParameterResult| {
-        p.id.strip_prefix(id.as_str())
-            .is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+        p.id.strip_prefix(id.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
     };
     parameters.iter().filter(is_own).cloned().collect()
 }
@@ -103,7 +94,7 @@ fn curve_of(problem: &Problem<'_>, fit: &Fit, number: usize, moves: &Moves) -> V
     let Some(effect) = problem.parameters.effects.get(number) else {
         return Vec::new();
     };
-    let Shape::Curve { from, to, .. } = effect.shape else {
+    let Shape::Curve(Curve { from, to, .. }) = effect.shape else {
         return Vec::new();
     };
     let places: Vec<usize> = (0..problem.parameters.list.len())
@@ -113,24 +104,13 @@ fn curve_of(problem: &Problem<'_>, fit: &Fit, number: usize, moves: &Moves) -> V
         return Vec::new();
     };
     let outside = problem.parameters.list[*first].unit.display_per_internal;
-    let at_outside = if curve_units(problem, effect).0 == "deg" {
-        1.0_f64.to_degrees()
-    } else {
-        1.0
-    };
+    let at_outside = effect.driver_unit(&problem.session.machine).to_display(1.0);
     (0..CURVE_POINTS)
         .map(|k| {
             let q = from + (to - from) * k as f64 / (CURVE_POINTS - 1) as f64;
             let mut basis = Vec::new();
-            effect.shape.basis(
-                &DriverSample {
-                    value: q,
-                    ..DriverSample::default()
-                },
-                &mut basis,
-            );
-            let value_at =
-                |beta: &[f64]| -> f64 { basis.iter().zip(&places).map(|(b, j)| b * beta[*j]).sum() };
+            effect.shape.basis(&DriverSample { value: q, ..DriverSample::default() }, &mut basis);
+            let value_at = |beta: &[f64]| -> f64 { basis.iter().zip(&places).map(|(b, j)| b * beta[*j]).sum() };
             let value = value_at(&fit.beta);
             let variance: f64 = basis
                 .iter()
@@ -154,54 +134,27 @@ fn curve_units(problem: &Problem<'_>, effect: &Effect) -> (String, String) {
         return (String::new(), String::new());
     }
     (
-        driver_unit(problem, effect).0.to_string(),
-        crate::drivers::coefficient_unit(problem.session, effect, 0).name,
+        effect.driver_unit(&problem.session.machine).result.to_string(),
+        crate::unit::Unit::of_effect(problem.session, effect, 0).name,
     )
-}
-
-/// The unit in which results give places on what an effect follows, and how many of it are one internal unit.
-fn driver_unit(problem: &Problem<'_>, effect: &Effect) -> (&'static str, f64) {
-    let machine = &problem.session.machine;
-    let kind = match &effect.driver {
-        Driver::Axis(name) => machine.axis_index(name).map(|axis| machine.axes[axis].kind),
-        Driver::Time => return ("s", 1.0),
-        Driver::Temperature => return ("K", 1.0),
-        Driver::Gravity => return ("m", 1.0),
-        _ => None,
-    };
-    if kind == Some(AxisKind::Rotary) {
-        ("deg", 1.0_f64.to_degrees())
-    } else {
-        ("mm", 1.0)
-    }
 }
 
 /// The numbers and places of an effect's shape.
 fn shape_parameters_of(problem: &Problem<'_>, effect: &Effect) -> Vec<ShapeParameter> {
-    let (unit, display_per_internal) = driver_unit(problem, effect);
-    let numbers = match &effect.shape {
-        Shape::Periodic { period } => vec![("period", vec![*period])],
-        Shape::ReversalSpike { width } => vec![("width", vec![*width])],
-        Shape::Warmup { tau_s } => vec![("time constant", vec![*tau_s])],
-        Shape::Local { centre, width, .. } => vec![("centre", vec![*centre]), ("width", vec![*width])],
-        Shape::Steps { at } => vec![("at", at.clone())],
-        _ => Vec::new(),
-    };
+    let unit = effect.driver_unit(&problem.session.machine);
     let number = |(name, values): (&str, Vec<f64>)| ShapeParameter {
         name: name.to_string(),
-        values: values
-            .into_iter()
-            .map(|value| value * display_per_internal)
-            .collect(),
-        unit: unit.to_string(),
+        values: values.into_iter().map(|value| unit.to_display(value)).collect(),
+        unit: unit.result.to_string(),
     };
-    numbers.into_iter().map(number).collect()
+    effect.shape.reported().into_iter().map(number).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use std::path::Path;
 
+    use abbe_model::driver::Driver;
     use abbe_model::effect::Component;
     use abbe_model::files::{self, ReadOptions};
 
@@ -210,8 +163,7 @@ mod tests {
 
     #[test]
     fn the_band_of_a_curve_is_enlarged_as_every_uncertainty_is_and_covers_what_aliases_move() {
-        let file =
-            Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
         let session = files::session(&file, &ReadOptions::default()).unwrap();
         let (mut problem, _) = prepare(&session, 1).unwrap();
         let turn = 360_f64.to_radians();
@@ -219,12 +171,7 @@ mod tests {
             .add_effect(&Effect {
                 component: Component::parse("EZC").unwrap(),
                 driver: Driver::parse("C"),
-                shape: Shape::Curve {
-                    from: 0.0,
-                    to: turn,
-                    intervals: 6,
-                    closed: false,
-                },
+                shape: Shape::Curve(Curve { from: 0.0, to: turn, intervals: 6, closed: false }),
                 tests: Vec::new(),
             })
             .unwrap();
@@ -242,10 +189,9 @@ mod tests {
         }
 
         // Splines share out one: where an alias moves all coefficients by 1 µm, it moves the curve by that.
-        let of_curve = |j: usize| matches!(problem.parameters.list[j].role, Role::Coefficient { effect, .. } if effect == number);
-        let alias: Vec<f64> = (0..fit.beta.len())
-            .map(|j| if of_curve(j) { 1e-3 } else { 0.0 })
-            .collect();
+        let of_curve =
+            |j: usize| matches!(problem.parameters.list[j].role, Role::Coefficient { effect, .. } if effect == number);
+        let alias: Vec<f64> = (0..fit.beta.len()).map(|j| if of_curve(j) { 1e-3 } else { 0.0 }).collect();
         let covered = curve_of(&problem, &fit, number, &[vec![alias]]);
         for (enlarged, covered) in enlarged.iter().zip(&covered) {
             assert!((covered.u - enlarged.u.hypot(1.0)).abs() < 1e-9);

@@ -53,14 +53,7 @@ pub(super) struct ReportedEffect {
 
 /// What is reported, and for each effect what looks like it and what stands highest in its place.
 pub(super) fn report(findings: &TraceFindings<'_, '_>) -> Result<ReportedEffect, IdentifyError> {
-    let TraceFindings {
-        before,
-        before_fit,
-        after,
-        after_fit,
-        search,
-        ..
-    } = findings;
+    let TraceFindings { before, before_fit, after, after_fit, search, .. } = findings;
     let before_result = before_result(findings);
     let held_out = HeldOut::of(search, before_result.heldout_rms_um);
     let mut after_result = model_result(after, after_fit, held_out.last_um() * 1e-3);
@@ -119,8 +112,7 @@ pub(super) fn report(findings: &TraceFindings<'_, '_>) -> Result<ReportedEffect,
             Some(structure) if structure.is_significant() => structure.description.clone(),
             // Detectors look at one test at a time; the search adds up what all tests show of one effect.
             Some(_) if !search.selected().is_empty() => {
-                "structure that no single test shows beyond noise; the search over all tests finds it"
-                    .to_string()
+                "structure that no single test shows beyond noise; the search over all tests finds it".to_string()
             }
             Some(_) => "no structure beyond noise".to_string(),
             None => "independent poses: structure is looked for effect by effect".to_string(),
@@ -139,11 +131,7 @@ pub(super) fn report(findings: &TraceFindings<'_, '_>) -> Result<ReportedEffect,
     if findings.interrupted {
         result.mark_interrupted();
     }
-    Ok(ReportedEffect {
-        result,
-        alias_effects,
-        competing_effects,
-    })
+    Ok(ReportedEffect { result, alias_effects, competing_effects })
 }
 
 /// Held-out errors in µm: whitened sums of squares are turned into them by the declared model's own figure.
@@ -158,11 +146,7 @@ impl<'s> HeldOut<'s> {
     fn of(search: &'s Search<'_>, before_um: f64) -> HeldOut<'s> {
         let rows = search.columns.rows().max(1) as f64;
         let first = search.held_out.first().copied().unwrap_or(1.0);
-        HeldOut {
-            sums: &search.held_out,
-            rows,
-            scale_um: before_um / (first / rows).sqrt().max(f64::MIN_POSITIVE),
-        }
+        HeldOut { sums: &search.held_out, rows, scale_um: before_um / (first / rows).sqrt().max(f64::MIN_POSITIVE) }
     }
 
     /// With so many effects.
@@ -198,13 +182,7 @@ fn before_result(findings: &TraceFindings<'_, '_>) -> ModelResult {
     let [rms_um, heldout_rms_um] =
         [&fit.residuals, &fit.held_out.residuals].map(|residuals| rms_mm(after, residuals) * 1e3);
     let in_3d = |rms: f64| result.rms_3d_um.map(|_| rms * 3.0_f64.sqrt());
-    ModelResult {
-        rms_um,
-        heldout_rms_um,
-        rms_3d_um: in_3d(rms_um),
-        heldout_rms_3d_um: in_3d(heldout_rms_um),
-        ..result
-    }
+    ModelResult { rms_um, heldout_rms_um, rms_3d_um: in_3d(rms_um), heldout_rms_3d_um: in_3d(heldout_rms_um), ..result }
 }
 
 pub(super) fn model_result(problem: &Problem<'_>, fit: &Fit, held_out_mm: f64) -> ModelResult {
@@ -229,17 +207,13 @@ pub(super) fn model_result(problem: &Problem<'_>, fit: &Fit, held_out_mm: f64) -
     }
 }
 
-/// How far the unknowns after the search would move, internal units: by found effect, by alias in its place, by unknown.
+/// How far the unknowns after the search would move, internal units: by found effect, by alias in its place, by
+/// unknown.
 type Moves = [Vec<Vec<f64>>];
 
-/// By how much some values would move, where they are such functions of the unknowns: for each effect the largest move that one of its aliases makes,
-/// as the root of the sum of squares.
-fn alias_shifts(
-    moves: &Moves,
-    present: &[f64],
-    values: impl Fn(&[f64]) -> Vec<f64>,
-    beta: &[f64],
-) -> Vec<f64> {
+/// By how much some values would move, where they are such functions of the unknowns: for each effect the largest move
+/// that one of its aliases makes, as the root of the sum of squares.
+fn alias_shifts(moves: &Moves, present: &[f64], values: impl Fn(&[f64]) -> Vec<f64>, beta: &[f64]) -> Vec<f64> {
     let mut squares = vec![0.0; present.len()];
     for of_effect in moves {
         let mut largest = vec![0.0_f64; present.len()];
@@ -249,10 +223,7 @@ fn alias_shifts(
                 *most = most.max((moved - present).abs());
             }
         }
-        squares
-            .iter_mut()
-            .zip(largest)
-            .for_each(|(sum, most)| *sum += most * most);
+        squares.iter_mut().zip(largest).for_each(|(sum, most)| *sum += most * most);
     }
     squares.into_iter().map(f64::sqrt).collect()
 }
@@ -276,21 +247,16 @@ fn cover(parameters: &mut [ParameterResult], problem: &Problem<'_>, fit: &Fit, m
     phases_follow_amplitudes(parameters);
 }
 
-/// How far the unknowns move if an alias stands in the place of the `k`-th effect, internal units: `in_place` and `named` are the coefficients of the model
-/// without that effect beside the alias and beside the effect. Its own do not move: the alias has none of them.
+/// How far the unknowns move if an alias stands in the place of the `k`-th effect, internal units: `in_place` and
+/// `named` are the coefficients of the model without that effect beside the alias and beside the effect. Its own do not
+/// move: the alias has none of them.
 fn moves_by(findings: &TraceFindings<'_, '_>, k: usize, in_place: &[f64], named: &[f64]) -> Vec<f64> {
     let (search, to_unknowns) = (findings.search, &findings.start.to_parameters);
     let by: Vec<f64> = in_place.iter().zip(named).map(|(a, b)| a - b).collect();
     let (of_declared, of_found) = by.split_at(search.rank);
     // What was declared comes first among the unknowns, the found effects after it in their order.
     let mut moves: Vec<f64> = (0..to_unknowns.nrows())
-        .map(|j| {
-            of_declared
-                .iter()
-                .enumerate()
-                .map(|(k, by)| to_unknowns[(j, k)] * by)
-                .sum()
-        })
+        .map(|j| of_declared.iter().enumerate().map(|(k, by)| to_unknowns[(j, k)] * by).sum())
         .collect();
     let mut of_found = of_found.iter();
     for (l, taken) in search.selected().iter().enumerate() {
@@ -327,17 +293,10 @@ mod tests {
     #[test]
     fn parameters_that_change_by_more_than_their_uncertainty_are_listed() {
         let parameter = |id: &str, value: f64, u: f64| ParameterResult::new(id, value, u, "um");
-        let before = [
-            parameter("EX0C", 3.0, 0.1),
-            parameter("EY0C", 3.0, 0.1),
-            parameter("EZ0A", 1.0, 0.1),
-        ];
+        let before = [parameter("EX0C", 3.0, 0.1), parameter("EY0C", 3.0, 0.1), parameter("EZ0A", 1.0, 0.1)];
         let after = [parameter("EX0C", 1.0, 1.5), parameter("EY0C", 1.0, 2.5)];
         let changed = changed_parameters(&before, &after);
         assert_eq!(changed.len(), 1);
-        assert_eq!(
-            (changed[0].id.as_str(), changed[0].change, changed[0].u),
-            ("EX0C", -2.0, 1.5)
-        );
+        assert_eq!((changed[0].id.as_str(), changed[0].change, changed[0].u), ("EX0C", -2.0, 1.5));
     }
 }

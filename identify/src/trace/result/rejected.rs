@@ -7,12 +7,9 @@ use crate::results::RejectedCandidate;
 use crate::trace::paired::HeldOutDecrease;
 use crate::trace::search::Search;
 
-/// Candidates that score better than the null distribution of the search and did not lower the held-out error by more than the standard error of the fall.
-pub(super) fn candidates(
-    machine: &Machine,
-    search: &Search<'_>,
-    held_out: &HeldOut<'_>,
-) -> Vec<RejectedCandidate> {
+/// Candidates that score better than the null distribution of the search and did not lower the held-out error by more
+/// than the standard error of the fall.
+pub(super) fn candidates(machine: &Machine, search: &Search<'_>, held_out: &HeldOut<'_>) -> Vec<RejectedCandidate> {
     let rejected = search.rejected.iter().map(|rejected| {
         let (heldout_decrease_um, u_heldout_decrease_um) = held_out.decrease_um(rejected.decrease);
         RejectedCandidate {

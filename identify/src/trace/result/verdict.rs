@@ -17,22 +17,13 @@ pub(super) fn verdict(findings: &TraceFindings<'_, '_>, effects: &[EffectResult]
             (false, false) => "explained",
             (false, true) => "partly-explained",
         };
-        let remainder = Remainder {
-            structured: false,
-            p_value: findings.last_p_value,
-            place: None,
-        };
+        let remainder = Remainder { structured: false, p_value: findings.last_p_value, place: None };
         return (word.to_string(), remainder);
     };
     let structured = after.is_significant();
-    let remainder = Remainder {
-        structured,
-        p_value: after.p_value,
-        place: structured.then(|| after.description.clone()),
-    };
-    let before = findings
-        .structure_before
-        .map_or(0.0, |structure| structure.excess);
+    let remainder =
+        Remainder { structured, p_value: after.p_value, place: structured.then(|| after.description.clone()) };
+    let before = findings.structure_before.map_or(0.0, |structure| structure.excess);
     let share = if before > 0.0 { after.excess / before } else { 0.0 };
     let word = word(!effects.is_empty(), structured, share);
     (word.to_string(), remainder)
@@ -40,14 +31,11 @@ pub(super) fn verdict(findings: &TraceFindings<'_, '_>, effects: &[EffectResult]
 
 /// What is said of the residual of an interrupted trace.
 pub(super) fn not_examined() -> Remainder {
-    Remainder {
-        structured: false,
-        p_value: 1.0,
-        place: Some("not examined: the trace was interrupted".to_string()),
-    }
+    Remainder { structured: false, p_value: 1.0, place: Some("not examined: the trace was interrupted".to_string()) }
 }
 
-/// What is said of a search along runs: whether it found anything, whether structure remains, and what share of its excess over noise.
+/// What is said of a search along runs: whether it found anything, whether structure remains, and what share of its
+/// excess over noise.
 fn word(found: bool, structured: bool, share: f64) -> &'static str {
     match (found, structured) {
         (false, false) => "clean",

@@ -1,5 +1,5 @@
-//! The held-out error: each fold is predicted, unwhitened, by the model of the search that excludes it. Effects are accepted only
-//! if this error decreases by more than the standard error of the decrease.
+//! The held-out error: each fold is predicted, unwhitened, by the model of the search that excludes it. Effects are
+//! accepted only if this error decreases by more than the standard error of the decrease.
 
 use faer::Mat;
 use rayon::prelude::*;
@@ -31,11 +31,7 @@ impl UnwhitenedModel {
         let sigma_mm = self.sigma_mm;
         grow(&mut self.base, rows.nrows(), old + rows.ncols(), |i, j| {
             let norm = norms[j - old];
-            if norm > 0.0 {
-                rows[(i, j - old)] / (norm * sigma_mm)
-            } else {
-                0.0
-            }
+            if norm > 0.0 { rows[(i, j - old)] / (norm * sigma_mm) } else { 0.0 }
         });
     }
 }
@@ -67,8 +63,8 @@ pub struct RejectedByHeldOut {
 }
 
 impl Search<'_> {
-    /// Sums of squares of held-out residuals over the noise variance, by unit. The model of the search that excludes a fold
-    /// predicts it.
+    /// Sums of squares of held-out residuals over the noise variance, by unit. The model of the search that excludes a
+    /// fold predicts it.
     fn held_out_by_unit(&self) -> Result<Vec<f64>, IdentifyError> {
         let models: Vec<TrainedModel<'_>> = self.branches[ALL + 1..]
             .par_iter()
@@ -76,13 +72,11 @@ impl Search<'_> {
             .collect::<Result<_, _>>()?;
         let predicted = |model: &TrainedModel<'_>, row: usize| -> f64 {
             let along = model.base.iter().zip(&model.coefficients);
-            along
-                .map(|(column, c)| self.unwhitened.base[(row, *column)] * c)
-                .sum()
+            along.map(|(column, c)| self.unwhitened.base[(row, *column)] * c).sum()
         };
         let squares = self.unwhitened.folds.iter().enumerate();
-        let squares = squares
-            .map(|(row, fold)| (self.unwhitened.residual[row] - predicted(&models[*fold], row)).powi(2));
+        let squares =
+            squares.map(|(row, fold)| (self.unwhitened.residual[row] - predicted(&models[*fold], row)).powi(2));
         Ok(self.unwhitened.units.sums(squares))
     }
 
@@ -103,49 +97,37 @@ impl Search<'_> {
 
     /// The present state of the searches.
     pub(super) fn state(&self) -> HeldOutState {
-        HeldOutState {
-            branches: self.branches.clone(),
-            held_out: self.held_out.clone(),
-            units: self.units_now.clone(),
-        }
+        HeldOutState { branches: self.branches.clone(), held_out: self.held_out.clone(), units: self.units_now.clone() }
     }
 
-    /// Accepts the selected effects if the held-out error permits it. With more effects than are accepted, it has to decrease by
-    /// more than the standard error. With as many or fewer, it must not increase by more than the standard error. Returns whether
-    /// all selected effects are accepted.
+    /// Accepts the selected effects if the held-out error permits it. With more effects than are accepted, it has to
+    /// decrease by more than the standard error. With as many or fewer, it must not increase by more than the standard
+    /// error. Returns whether all selected effects are accepted.
     pub(in crate::trace) fn accept(&mut self) -> bool {
         let decrease = self.decrease_since_accepted();
         let added = self.selected().len() > self.accepted.effects().len();
-        let accepted = if added {
-            decrease.is_significant()
-        } else {
-            !decrease.is_increase() && self.lowers_heldout_error()
-        };
+        let accepted =
+            if added { decrease.is_significant() } else { !decrease.is_increase() && self.lowers_heldout_error() };
         if accepted {
             self.accepted = self.state();
             let accepted: Vec<usize> = self.branches[ALL].chosen();
-            self.rejected
-                .retain(|rejected| !accepted.contains(&rejected.selected.candidate));
+            self.rejected.retain(|rejected| !accepted.contains(&rejected.selected.candidate));
         }
         accepted
     }
 
     /// The decrease of the held-out error since the last acceptance.
     pub(in crate::trace) fn decrease_since_accepted(&self) -> HeldOutDecrease {
-        self.unwhitened
-            .units
-            .decrease(&self.accepted.units, &self.units_now)
+        self.unwhitened.units.decrease(&self.accepted.units, &self.units_now)
     }
 
     /// The decrease of the held-out error since the declared model.
     pub(in crate::trace) fn decrease_since_declared(&self) -> HeldOutDecrease {
-        self.unwhitened
-            .units
-            .decrease(&self.declared_units, &self.units_now)
+        self.unwhitened.units.decrease(&self.declared_units, &self.units_now)
     }
 
-    /// Whether nothing is selected, or the held-out error is below that of the declared model by more than the standard error of
-    /// the decrease.
+    /// Whether nothing is selected, or the held-out error is below that of the declared model by more than the standard
+    /// error of the decrease.
     fn lowers_heldout_error(&self) -> bool {
         self.selected().is_empty() || self.decrease_since_declared().is_significant()
     }
@@ -153,17 +135,9 @@ impl Search<'_> {
     /// Withdraws the effects added since the last acceptance, and records them as rejected.
     pub(in crate::trace) fn withdraw_rejected(&mut self) {
         let decrease = self.decrease_since_accepted();
-        let accepted: Vec<usize> = self
-            .accepted
-            .effects()
-            .iter()
-            .map(|selected| selected.candidate)
-            .collect();
+        let accepted: Vec<usize> = self.accepted.effects().iter().map(|selected| selected.candidate).collect();
         for selected in self.branches[ALL].selected.clone() {
-            let known = self
-                .rejected
-                .iter()
-                .any(|u| u.selected.candidate == selected.candidate);
+            let known = self.rejected.iter().any(|u| u.selected.candidate == selected.candidate);
             if !accepted.contains(&selected.candidate) && !known {
                 self.rejected.push(RejectedByHeldOut { selected, decrease });
             }
@@ -178,26 +152,19 @@ impl Search<'_> {
     }
 
     fn restore(&mut self) {
-        let HeldOutState {
-            branches,
-            held_out,
-            units,
-        } = self.accepted.clone();
+        let HeldOutState { branches, held_out, units } = self.accepted.clone();
         self.branches = branches;
         self.held_out = held_out;
         self.units_now = units;
     }
 
-    /// Withdraws all effects if together they do not lower the held-out error of the declared model by more than the standard
-    /// error of the decrease.
+    /// Withdraws all effects if together they do not lower the held-out error of the declared model by more than the
+    /// standard error of the decrease.
     pub(in crate::trace) fn withdraw_all_unless_better(&mut self) -> Result<(), IdentifyError> {
         if !self.lowers_heldout_error() {
             self.accepted = HeldOutState::default();
             self.accepted.branches = self.branches.clone();
-            self.accepted
-                .branches
-                .iter_mut()
-                .for_each(|branch| branch.selected.clear());
+            self.accepted.branches.iter_mut().for_each(|branch| branch.selected.clear());
             self.accepted.held_out = self.held_out[..1].to_vec();
             self.accepted.units = self.declared_units.clone();
             self.withdraw_rejected();

@@ -1,10 +1,10 @@
-//! The search. Each round projects out the present model, scores every candidate, adds the best and refits. It removes effects
-//! that are no longer significant, and exchanges effects for better candidates. The search ends when the best remaining candidate
-//! is no better than the best on readings without structure.
+//! The search. Each round projects out the present model, scores every candidate, adds the best and refits. It removes
+//! effects that are no longer significant, and exchanges effects for better candidates. The search ends when the best
+//! remaining candidate is no better than the best on readings without structure.
 //!
 //! One branch searches on all readings. One further branch for each fold searches on the readings outside that fold
-//! ([`SearchBranch`]). Each branch selects for itself, and uses only shape numbers and positions that it has tuned itself. The
-//! held-out error therefore belongs to a search without access to the held-out readings.
+//! ([`SearchBranch`]). Each branch selects for itself, and uses only shape numbers and positions that it has tuned
+//! itself. The held-out error therefore belongs to a search without access to the held-out readings.
 
 mod heldout;
 mod models;
@@ -29,8 +29,8 @@ pub struct StoppingRule {
     pub significance: f64,
     /// Maximum number of effects.
     pub max_effects: usize,
-    /// Whether gains are divided by the residual variance instead of the noise variance. This applies to poses, whose residual
-    /// always has structure.
+    /// Whether gains are divided by the residual variance instead of the noise variance. This applies to poses, whose
+    /// residual always has structure.
     pub in_residual_variance: bool,
 }
 
@@ -78,13 +78,15 @@ pub struct Search<'s> {
     pub rank: usize,
     /// The branch on all readings, then one for each fold.
     pub branches: Vec<SearchBranch>,
-    /// For each candidate the folds on which its shape numbers and positions were tuned. Empty for an effect of the library.
+    /// For each candidate the folds on which its shape numbers and positions were tuned. Empty for an effect of the
+    /// library.
     tuned_on: Vec<Vec<usize>>,
     /// For each candidate that was ever added, the range of its columns in the base.
     added_to_base: Vec<(usize, Range<usize>)>,
     /// Sum of squares of held-out residuals over the noise variance, for each number of effects.
     pub held_out: Vec<f64>,
-    /// For each round, the best score that readings without structure exceed with the probability of the significance level.
+    /// For each round, the best score that readings without structure exceed with the probability of the significance
+    /// level.
     pub thresholds: Vec<f64>,
     /// Whether candidates of last resort are searched.
     pub last_resort: bool,
@@ -92,7 +94,8 @@ pub struct Search<'s> {
     pub reserve: Vec<(Candidate, EffectColumns)>,
     /// The unwhitened base and residual for the held-out error.
     unwhitened: UnwhitenedModel,
-    /// Sums of squares of held-out residuals over the noise variance, by unit: at present, and under the declared model.
+    /// Sums of squares of held-out residuals over the noise variance, by unit: at present, and under the declared
+    /// model.
     units_now: Vec<f64>,
     declared_units: Vec<f64>,
     /// The accepted effects: additions that lowered the held-out error by more than the standard error of the decrease.
@@ -148,10 +151,7 @@ impl<'s> Search<'s> {
             moments,
             prior,
             rank,
-            branches: std::iter::once(None)
-                .chain(folds.clone().map(Some))
-                .map(without)
-                .collect(),
+            branches: std::iter::once(None).chain(folds.clone().map(Some)).map(without).collect(),
             added_to_base: Vec::new(),
             held_out: Vec::new(),
             thresholds: Vec::new(),
@@ -185,19 +185,11 @@ impl<'s> Search<'s> {
 
     /// A limit on rounds: enough for the maximum number of effects and some merges.
     pub fn max_rounds(&self) -> usize {
-        self.stop
-            .max_effects
-            .saturating_add(self.stop.max_effects / 2)
-            .max(1)
+        self.stop.max_effects.saturating_add(self.stop.max_effects / 2).max(1)
     }
 
     /// The best candidate for addition to a model with the chosen candidates, and its score.
-    pub(super) fn best_of(
-        &self,
-        model: &TrainedModel<'_>,
-        gains: &[Gain],
-        chosen: &[usize],
-    ) -> Option<(usize, f64)> {
+    pub(super) fn best_of(&self, model: &TrainedModel<'_>, gains: &[Gain], chosen: &[usize]) -> Option<(usize, f64)> {
         let variance = self.variance(model);
         let mut best: Option<(usize, f64)> = None;
         for (candidate, gain) in gains.iter().enumerate() {
@@ -258,9 +250,7 @@ impl<'s> Search<'s> {
         }
         let held_out = self.held_out_now()?;
         // P-values are unreliable for poses. There an addition also has to lower the held-out error.
-        if self.stop.in_residual_variance
-            && held_out >= self.held_out.last().copied().unwrap_or(f64::INFINITY)
-        {
+        if self.stop.in_residual_variance && held_out >= self.held_out.last().copied().unwrap_or(f64::INFINITY) {
             self.branches = before;
             return Ok(Round::Done { p_value });
         }
@@ -269,8 +259,8 @@ impl<'s> Search<'s> {
         Ok(Round::Added { candidate })
     }
 
-    /// The p-value of the best candidate with respect to the best scores of the null draws, and the score that these exceed with
-    /// the probability of the significance level.
+    /// The p-value of the best candidate with respect to the best scores of the null draws, and the score that these
+    /// exceed with the probability of the significance level.
     fn best_against_null(&self) -> Result<Option<(f64, f64)>, IdentifyError> {
         let chosen = self.branches[ALL].chosen();
         let model = self.model_without(None)?;
@@ -281,11 +271,7 @@ impl<'s> Search<'s> {
         let score = composed.iter().map(StepTable::score).fold(score, f64::max);
         let costs: Vec<f64> = (0..self.candidates.len())
             .map(|c| {
-                if self.may_be_added(c, &model.folds) {
-                    self.candidates[c].description_length()
-                } else {
-                    f64::INFINITY
-                }
+                if self.may_be_added(c, &model.folds) { self.candidates[c].description_length() } else { f64::INFINITY }
             })
             .collect();
         let mut null = model.null_best(&costs, self.null_variance()?);
@@ -297,8 +283,9 @@ impl<'s> Search<'s> {
         Ok(Some((p_value, threshold.copied().unwrap_or(0.0))))
     }
 
-    /// The candidate that a branch adds, if it reaches a score. On all readings it is the candidate with the shortest description
-    /// among those confounded with the best. With one fold left out, prediction matters and not the name, so it is the best.
+    /// The candidate that a branch adds, if it reaches a score. On all readings it is the candidate with the shortest
+    /// description among those confounded with the best. With one fold left out, prediction matters and not the name,
+    /// so it is the best.
     fn select(&mut self, branch: usize, least: f64) -> Result<Option<usize>, IdentifyError> {
         let SearchBranch { folds, .. } = self.branches[branch].clone();
         let chosen = self.branches[branch].chosen();

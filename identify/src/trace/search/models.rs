@@ -1,5 +1,5 @@
-//! The models that a search compares: the chosen effects, trained on the folds of a branch, and the score of a candidate in
-//! addition to them.
+//! The models that a search compares: the chosen effects, trained on the folds of a branch, and the score of a
+//! candidate in addition to them.
 
 use std::ops::Range;
 
@@ -15,16 +15,11 @@ use crate::trace::tuning::TunedEffect;
 impl Search<'_> {
     /// The range of a candidate's columns in the base. Empty if the candidate was never added.
     pub fn places(&self, candidate: usize) -> Range<usize> {
-        self.added_to_base
-            .iter()
-            .find(|(c, _)| *c == candidate)
-            .map_or(0..0, |(_, places)| places.clone())
+        self.added_to_base.iter().find(|(c, _)| *c == candidate).map_or(0..0, |(_, places)| places.clone())
     }
 
     fn base_with(&self, chosen: &[usize]) -> Vec<usize> {
-        (0..self.rank)
-            .chain(chosen.iter().flat_map(|candidate| self.places(*candidate)))
-            .collect()
+        (0..self.rank).chain(chosen.iter().flat_map(|candidate| self.places(*candidate))).collect()
     }
 
     /// The model with some candidates, trained on some folds.
@@ -77,15 +72,7 @@ impl Search<'_> {
     /// The lengths of a candidate's columns over all readings.
     pub fn norms(&self, candidate: usize) -> Vec<f64> {
         (0..self.moments.count[candidate])
-            .map(|k| {
-                self.moments
-                    .folds
-                    .iter()
-                    .map(|fold| fold.own[candidate][(k, k)])
-                    .sum::<f64>()
-                    .max(0.0)
-                    .sqrt()
-            })
+            .map(|k| self.moments.folds.iter().map(|fold| fold.own[candidate][(k, k)]).sum::<f64>().max(0.0).sqrt())
             .collect()
     }
 
@@ -94,16 +81,8 @@ impl Search<'_> {
         if !self.stop.in_residual_variance {
             return 1.0;
         }
-        let sum: f64 = model
-            .folds
-            .iter()
-            .map(|fold| model.sum_of_squares_on(*fold))
-            .sum();
-        let rows: usize = model
-            .folds
-            .iter()
-            .map(|fold| self.columns.fold_rows[*fold].len())
-            .sum();
+        let sum: f64 = model.folds.iter().map(|fold| model.sum_of_squares_on(*fold)).sum();
+        let rows: usize = model.folds.iter().map(|fold| self.columns.fold_rows[*fold].len()).sum();
         let freedom = rows.saturating_sub(model.base.len()).max(1) as f64;
         (sum / freedom).max(f64::MIN_POSITIVE)
     }
@@ -132,11 +111,7 @@ impl Search<'_> {
     }
 
     /// The products of any effect with a model. `None` if the data lack its driver.
-    pub(in crate::trace) fn tuned_effect(
-        &self,
-        model: &TrainedModel<'_>,
-        effect: &Effect,
-    ) -> Option<TunedEffect> {
+    pub(in crate::trace) fn tuned_effect(&self, model: &TrainedModel<'_>, effect: &Effect) -> Option<TunedEffect> {
         let column_set = self.columns.effect_columns_uncached(effect)?;
         Some(TunedEffect::new(self.columns, &self.moments, &column_set, model))
     }

@@ -10,8 +10,8 @@ use crate::trace::library::Candidate;
 use crate::trace::refine;
 use crate::trace::score::Gain;
 
-/// Least detectability of a searched effect. An effect of the largest plausible size has to change the readings by this many
-/// standard deviations in total, beyond what the model absorbs.
+/// Least detectability of a searched effect. An effect of the largest plausible size has to change the readings by this
+/// many standard deviations in total, beyond what the model absorbs.
 const MIN_PLAUSIBLE_SIGMA: f64 = 3.0;
 
 impl Search<'_> {
@@ -34,10 +34,7 @@ impl Search<'_> {
 
     /// Whether a branch with some training folds may add a candidate now.
     pub fn may_be_added(&self, candidate: usize, folds: &[usize]) -> bool {
-        let undetectable = self
-            .undetectable
-            .get(candidate)
-            .is_some_and(|undetectable| *undetectable);
+        let undetectable = self.undetectable.get(candidate).is_some_and(|undetectable| *undetectable);
         let effect = &self.candidates[candidate];
         !undetectable
             && !effect.dictionary
@@ -57,19 +54,13 @@ impl Search<'_> {
         (0..self.candidates.len())
             .into_par_iter()
             .filter(|candidate| self.candidates[*candidate].dictionary)
-            .filter_map(|candidate| {
-                compose::best_step_table(model, candidate, &self.candidates[candidate], variance)
-            })
+            .filter_map(|candidate| compose::best_step_table(model, candidate, &self.candidates[candidate], variance))
             .collect()
     }
 
-    /// Adds the candidates near the best, with their shape numbers tuned in addition to some candidates on some folds. Returns
-    /// the gains of the candidates that were present before.
-    pub(in crate::trace) fn refine(
-        &mut self,
-        beside: &[usize],
-        folds: &[usize],
-    ) -> Result<Vec<Gain>, IdentifyError> {
+    /// Adds the candidates near the best, with their shape numbers tuned in addition to some candidates on some folds.
+    /// Returns the gains of the candidates that were present before.
+    pub(in crate::trace) fn refine(&mut self, beside: &[usize], folds: &[usize]) -> Result<Vec<Gain>, IdentifyError> {
         if !self.candidates.iter().any(refine::can_be_tuned) {
             return Ok(Vec::new());
         }
@@ -104,14 +95,11 @@ impl Search<'_> {
         self.moments.append(self.columns, &self.column_sets);
     }
 
-    /// The number of the library's effects that are detectable at their largest plausible size. A dictionary counts once: its
-    /// step tables share its identifier, and their positions have a penalty of their own. Curves of last resort, some dozens
-    /// compared with thousands, do not count.
+    /// The number of the library's effects that are detectable at their largest plausible size. A dictionary counts
+    /// once: its step tables share its identifier, and their positions have a penalty of their own. Curves of last
+    /// resort, some dozens compared with thousands, do not count.
     pub(in crate::trace) fn detectable_effects(&self) -> usize {
-        self.undetectable
-            .iter()
-            .filter(|undetectable| !**undetectable)
-            .count()
+        self.undetectable.iter().filter(|undetectable| !**undetectable).count()
     }
 
     /// Computes the products of the candidates of last resort, and adds them to the candidates.

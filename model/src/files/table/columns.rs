@@ -60,9 +60,7 @@ impl Role {
             (InstrumentKind::Tracker, "py") => Some(Role::Coordinate(1, unit)),
             (InstrumentKind::Tracker, "pz") => Some(Role::Coordinate(2, unit)),
             (InstrumentKind::RTest, name) => {
-                let place = r_test_columns(request.sensors())
-                    .iter()
-                    .position(|own| *own == name)?;
+                let place = r_test_columns(request.sensors()).iter().position(|own| *own == name)?;
                 Some(Role::Coordinate(place, unit))
             }
             _ => None,
@@ -86,11 +84,7 @@ impl Role {
 /// The names of an R-test's columns before their unit: the values of the single sensors, or the vector in the frame
 /// that carries them.
 pub(crate) fn r_test_columns(sensors: bool) -> [&'static str; 3] {
-    if sensors {
-        ["du", "dv", "dw"]
-    } else {
-        ["dx", "dy", "dz"]
-    }
+    if sensors { ["du", "dv", "dw"] } else { ["dx", "dy", "dz"] }
 }
 
 /// The required columns of an R-test, for data with columns of the other kind.
@@ -145,16 +139,10 @@ pub(super) fn columns(
         None => own_columns(request, file, header)?,
     };
     for (index, column) in columns.iter().enumerate() {
-        if let Some(other) = columns[..index]
-            .iter()
-            .find(|other| other.role.same_as(column.role))
-        {
+        if let Some(other) = columns[..index].iter().find(|other| other.role.same_as(column.role)) {
             return Err(ModelError::Input {
                 location: Location::line(file, line),
-                message: format!(
-                    "columns `{}` and `{}` have the same meaning",
-                    other.name, column.name
-                ),
+                message: format!("columns `{}` and `{}` have the same meaning", other.name, column.name),
                 help: Some("keep one of them; [columns] can name the one to read".into()),
             });
         }
@@ -185,11 +173,7 @@ fn own_columns(request: &Request<'_>, file: &Path, header: Option<&Row>) -> Resu
                 help: Some(unknown_column_help(request, name, header, &known)),
             });
         };
-        columns.push(Column {
-            role,
-            index,
-            name: name.clone(),
-        });
+        columns.push(Column { role, index, name: name.clone() });
     }
     Ok(columns)
 }
@@ -197,20 +181,16 @@ fn own_columns(request: &Request<'_>, file: &Path, header: Option<&Row>) -> Resu
 fn unknown_column_help(request: &Request<'_>, name: &str, header: &[String], known: &[String]) -> String {
     let separators = [(';', "\";\""), ('\t', "\"\\t\""), (',', "\",\"")];
     if header.len() == 1
-        && let Some((_, other)) = separators
-            .iter()
-            .find(|(other, _)| *other as u8 != request.format.separator && name.contains(*other))
+        && let Some((_, other)) =
+            separators.iter().find(|(other, _)| *other as u8 != request.format.separator && name.contains(*other))
     {
-        return format!(
-            "the columns seem to be separated by {other}: declare `[format] separator = {other}`"
-        );
+        return format!("the columns seem to be separated by {other}: declare `[format] separator = {other}`");
     }
     if name.parse::<f64>().is_ok() {
         return NO_HEADER.into();
     }
     let id_stem = name.rsplit_once('_').map_or(name, |(id_stem, _)| id_stem);
-    if request.instrument() == InstrumentKind::RTest && r_test_columns(!request.sensors()).contains(&id_stem)
-    {
+    if request.instrument() == InstrumentKind::RTest && r_test_columns(!request.sensors()).contains(&id_stem) {
         return r_test_help(request).into();
     }
     format!(
@@ -237,17 +217,11 @@ fn mapped_columns(
             message,
             help: Some(help),
         };
-        let Some(role) =
-            Role::of(&entry.own, request).or_else(|| Role::of(&entry.own.to_lowercase(), request))
-        else {
+        let Some(role) = Role::of(&entry.own, request).or_else(|| Role::of(&entry.own.to_lowercase(), request)) else {
             let known = known(request);
             return Err(fault(
                 format!("[columns] has the unknown column `{}`", entry.own),
-                format!(
-                    "{}valid names are {}",
-                    suggestion(&entry.own, &known),
-                    listed(&known)
-                ),
+                format!("{}valid names are {}", suggestion(&entry.own, &known), listed(&known)),
             ));
         };
         let index = match &entry.foreign {
@@ -289,36 +263,23 @@ fn mapped_columns(
 /// Whether the first row is a row of readings instead of a header: columns are given by number only, and all of them
 /// contain numbers.
 fn are_readings(request: &Request<'_>, mapped: &[ColumnMapping], columns: &[Column], header: &Row) -> bool {
-    let mut of_numbers = columns
-        .iter()
-        .filter(|column| column.role != Role::Socket)
-        .peekable();
+    let mut of_numbers = columns.iter().filter(|column| column.role != Role::Socket).peekable();
     of_numbers.peek().is_some()
-        && mapped
-            .iter()
-            .all(|entry| matches!(entry.foreign, ForeignColumn::Number(_)))
+        && mapped.iter().all(|entry| matches!(entry.foreign, ForeignColumn::Number(_)))
         && of_numbers.all(|column| number(&header.cells[column.index], &request.format).is_ok())
 }
 
 /// The index of a column from its number; otherwise a message and what to do.
 fn number_in(number: usize, file: &Path, width: usize) -> Result<usize, (String, String)> {
     if number > width {
-        let message = format!(
-            "there is no column {number} in {}, which has {width}",
-            file.display()
-        );
+        let message = format!("there is no column {number} in {}, which has {width}", file.display());
         return Err((message, "columns are numbered from 1".into()));
     }
     Ok(number - 1)
 }
 
 /// The index of a column from its name in the header. If there is none or more than one: a message and what to do.
-fn name_in(
-    name: &str,
-    request: &Request<'_>,
-    file: &Path,
-    header: Option<&Row>,
-) -> Result<usize, (String, String)> {
+fn name_in(name: &str, request: &Request<'_>, file: &Path, header: Option<&Row>) -> Result<usize, (String, String)> {
     let Some(row) = header else {
         return Err((
             format!("column `{name}` of a file declared to have no header"),
@@ -350,10 +311,7 @@ fn name_in(
                     found.len(),
                     numbers.join(", ")
                 ),
-                format!(
-                    "use the number of one of them, counted from 1, such as {}",
-                    first + 1
-                ),
+                format!("use the number of one of them, counted from 1, such as {}", first + 1),
             ))
         }
     }

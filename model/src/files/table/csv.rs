@@ -48,10 +48,7 @@ impl CsvRows {
     /// The cells of a line with quotes.
     fn quoted(&self, text: &str) -> Result<Vec<String>, ModelError> {
         if text.matches('"').count() % 2 == 1 {
-            return Err(self.lines.fault(
-                "a quote is not closed".into(),
-                "a quoted cell must end on its line",
-            ));
+            return Err(self.lines.fault("a quote is not closed".into(), "a quoted cell must end on its line"));
         }
         let mut record = csv::StringRecord::new();
         let mut reader = csv::ReaderBuilder::new()
@@ -62,10 +59,9 @@ impl CsvRows {
         match reader.read_record(&mut record) {
             Ok(true) => Ok(record.iter().map(str::to_string).collect()),
             Ok(false) => Ok(Vec::new()),
-            Err(cause) => Err(self.lines.fault(
-                format!("invalid quotes: {cause}"),
-                "a quoted cell must end on its line",
-            )),
+            Err(cause) => {
+                Err(self.lines.fault(format!("invalid quotes: {cause}"), "a quoted cell must end on its line"))
+            }
         }
     }
 }
@@ -80,10 +76,7 @@ impl Rows for CsvRows {
             let cells = if line.text.contains('"') {
                 self.quoted(&line.text)?
             } else {
-                line.text
-                    .split(char::from(self.separator))
-                    .map(|cell| cell.trim().to_string())
-                    .collect()
+                line.text.split(char::from(self.separator)).map(|cell| cell.trim().to_string()).collect()
             };
             self.lines.count_row()?;
             return Ok(Some(Row::of_line(line, cells)));
@@ -98,12 +91,7 @@ impl Rows for CsvRows {
 ///
 /// # Errors
 /// If the file cannot be written; the previous file then remains.
-pub fn write(
-    path: &Path,
-    machine: &Machine,
-    station: &Station<f64>,
-    readings: &Readings,
-) -> Result<(), ModelError> {
+pub fn write(path: &Path, machine: &Machine, station: &Station<f64>, readings: &Readings) -> Result<(), ModelError> {
     whole::write(path, &text(machine, station, readings))
 }
 

@@ -29,9 +29,7 @@ pub(super) fn kept(readings: &Readings, cells: &[u64]) -> Option<Vec<usize>> {
         return None;
     }
     let mut first: HashMap<u64, usize> = HashMap::with_capacity(cells.len());
-    let original: Vec<usize> = (0..cells.len())
-        .map(|row| *first.entry(cells[row]).or_insert(row))
-        .collect();
+    let original: Vec<usize> = (0..cells.len()).map(|row| *first.entry(cells[row]).or_insert(row)).collect();
     // Rows repeated in the opposite order are a return traversal with equal readings.
     let backward = |row: usize| original[row - 1] < row - 1 && original[row] < original[row - 1];
     if readings.time_s.is_empty() && (1..cells.len()).any(backward) {
@@ -46,22 +44,15 @@ pub(super) fn kept(readings: &Readings, cells: &[u64]) -> Option<Vec<usize>> {
 /// The message; `line` has the line of each row.
 pub(super) fn message(file: &Path, line: &[usize], kept: &[usize]) -> String {
     let mut kept = kept.iter().peekable();
-    let copies: Vec<usize> = (0..line.len())
-        .filter(|row| kept.next_if_eq(&row).is_none())
-        .map(|row| line[row])
-        .collect();
+    let copies: Vec<usize> =
+        (0..line.len()).filter(|row| kept.next_if_eq(&row).is_none()).map(|row| line[row]).collect();
     let mut lines: Vec<String> = copies.iter().take(MAX_LISTED).map(usize::to_string).collect();
     if copies.len() > MAX_LISTED {
         lines.push("…".into());
     }
     let (count, are, copies_of, they) = match copies.len() {
         1 => ("1 row".to_string(), "is", "a copy of an earlier row", "it is"),
-        many => (
-            format!("{many} rows"),
-            "are",
-            "copies of earlier rows",
-            "they are",
-        ),
+        many => (format!("{many} rows"), "are", "copies of earlier rows", "they are"),
     };
     format!(
         "{}: {count} {are} {copies_of} in every column (line {}); {they} removed, not treated as repeats",
@@ -73,15 +64,11 @@ pub(super) fn message(file: &Path, line: &[usize], kept: &[usize]) -> String {
 /// Whether a state recurs within a run with a different reading.
 fn has_repeats(readings: &Readings, cells: &[u64], closed_runs: &HashMap<usize, usize>) -> bool {
     let mut seen: HashMap<(i64, Vec<u64>), u64> = HashMap::new();
-    (0..cells.len())
-        .filter(|row| !closed_runs.contains_key(row))
-        .any(|row| {
-            let state = readings.positions.iter().map(|axis| axis[row].to_bits());
-            let before = seen
-                .entry((readings.run[row], state.collect()))
-                .or_insert(cells[row]);
-            *before != cells[row]
-        })
+    (0..cells.len()).filter(|row| !closed_runs.contains_key(row)).any(|row| {
+        let state = readings.positions.iter().map(|axis| axis[row].to_bits());
+        let before = seen.entry((readings.run[row], state.collect())).or_insert(cells[row]);
+        *before != cells[row]
+    })
 }
 
 /// The last row of each run that ends at its start, with its first row: both may have the same reading. A time column

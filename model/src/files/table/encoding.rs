@@ -13,11 +13,7 @@ use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 pub(crate) fn of_name(name: &str) -> Option<&'static Encoding> {
     let name = name.trim();
     // `Latin-1` is not a label of the standard, `latin1` is.
-    let plain: String = name
-        .to_lowercase()
-        .chars()
-        .filter(|c| c.is_ascii_alphanumeric())
-        .collect();
+    let plain: String = name.to_lowercase().chars().filter(|c| c.is_ascii_alphanumeric()).collect();
     match plain.as_str() {
         "utf16" | "utf16le" => Some(UTF_16LE),
         "utf16be" => Some(UTF_16BE),
@@ -29,19 +25,12 @@ pub(crate) fn of_name(name: &str) -> Option<&'static Encoding> {
 
 /// The name of an encoding in messages.
 pub(super) fn name_of(encoding: &'static Encoding) -> &'static str {
-    if encoding == WINDOWS_1252 {
-        "Latin-1 (windows-1252)"
-    } else {
-        encoding.name()
-    }
+    if encoding == WINDOWS_1252 { "Latin-1 (windows-1252)" } else { encoding.name() }
 }
 
 /// The encoding by the first bytes of a file, and the length of its byte order mark. A mark overrides a stated
 /// encoding.
-pub(super) fn of_start(
-    bytes: &[u8],
-    stated: Option<&'static Encoding>,
-) -> (Option<&'static Encoding>, usize) {
+pub(super) fn of_start(bytes: &[u8], stated: Option<&'static Encoding>) -> (Option<&'static Encoding>, usize) {
     if let Some((encoding, mark)) = Encoding::for_bom(bytes) {
         return (Some(encoding), mark);
     }
@@ -64,10 +53,7 @@ pub(super) fn decode<'b>(
     encoding: Option<&'static Encoding>,
 ) -> Result<(Cow<'b, str>, &'static Encoding), &'static Encoding> {
     let valid = |encoding: &'static Encoding| {
-        encoding
-            .decode_without_bom_handling_and_without_replacement(bytes)
-            .map(|text| (text, encoding))
-            .ok_or(encoding)
+        encoding.decode_without_bom_handling_and_without_replacement(bytes).map(|text| (text, encoding)).ok_or(encoding)
     };
     match encoding {
         Some(encoding) => valid(encoding),
@@ -81,14 +67,7 @@ mod tests {
 
     #[test]
     fn names_in_any_case() {
-        for name in [
-            "latin1",
-            "Latin-1",
-            "iso-8859-1",
-            "ISO8859-1",
-            "windows-1252",
-            "cp1252",
-        ] {
+        for name in ["latin1", "Latin-1", "iso-8859-1", "ISO8859-1", "windows-1252", "cp1252"] {
             assert_eq!(of_name(name).map(Encoding::name), Some("windows-1252"), "{name}");
         }
         assert_eq!(of_name("UTF-16").map(Encoding::name), Some("UTF-16LE"));

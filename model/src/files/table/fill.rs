@@ -40,13 +40,7 @@ pub(super) fn read(
     let width = first.cells.len();
     let header = has_header.then_some(&first);
     let columns = columns::columns(request, file, &first, header)?;
-    required::required(
-        request,
-        file,
-        first.line,
-        &columns,
-        header.map(|row| row.cells.as_slice()),
-    )?;
+    required::required(request, file, first.line, &columns, header.map(|row| row.cells.as_slice()))?;
     let mut filled = ReadingColumns::new(request, file, columns);
     if header.is_none() {
         filled.push(&first)?;
@@ -146,10 +140,7 @@ impl<'a> ReadingColumns<'a> {
                 continue;
             }
             let fault = |message: String, help: &str| ModelError::Input {
-                location: Location {
-                    span: row.span(column.index),
-                    ..Location::line(&self.file, row.line)
-                },
+                location: Location { span: row.span(column.index), ..Location::line(&self.file, row.line) },
                 message: format!("{}: {message}", row.place(column.index, &column.name)),
                 help: Some(help.to_string()),
             };
@@ -196,13 +187,7 @@ impl<'a> ReadingColumns<'a> {
 
     /// The readings, split by socket if a column names it.
     fn by_socket(self) -> BySocket {
-        let all = Readings {
-            origin: Some(Origin {
-                file: self.file,
-                line: self.line,
-            }),
-            ..self.readings
-        };
+        let all = Readings { origin: Some(Origin { file: self.file, line: self.line }), ..self.readings };
         if self.sockets.is_empty() {
             return vec![(None, all)];
         }
@@ -210,9 +195,7 @@ impl<'a> ReadingColumns<'a> {
             .into_iter()
             .enumerate()
             .map(|(index, name)| {
-                let rows: Vec<usize> = (0..self.socket.len())
-                    .filter(|&row| self.socket[row] == index)
-                    .collect();
+                let rows: Vec<usize> = (0..self.socket.len()).filter(|&row| self.socket[row] == index).collect();
                 (Some(name), all.of_rows(&rows))
             })
             .collect()
@@ -224,23 +207,13 @@ fn socket_index(sockets: &mut Vec<String>, name: &str, location: Location) -> Re
     if let Some(known) = sockets.iter().position(|socket| socket == name) {
         return Ok(known);
     }
-    let fault = |message: String, help: &str| ModelError::Input {
-        location,
-        message,
-        help: Some(help.into()),
-    };
+    let fault = |message: String, help: &str| ModelError::Input { location, message, help: Some(help.into()) };
     if sockets.len() == MAX_SOCKETS {
         let message = format!("more than {MAX_SOCKETS} sockets in column `socket`");
-        return Err(fault(
-            message,
-            "a socket has many poses; does the column contain the socket's name?",
-        ));
+        return Err(fault(message, "a socket has many poses; does the column contain the socket's name?"));
     }
     if let Some(control) = name.chars().find(|c| c.is_control()) {
-        let message = format!(
-            "a socket's name contains the control character U+{:04X}",
-            control as u32
-        );
+        let message = format!("a socket's name contains the control character U+{:04X}", control as u32);
         return Err(fault(message, "remove it"));
     }
     sockets.push(name.to_string());

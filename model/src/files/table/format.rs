@@ -61,8 +61,6 @@ pub(super) struct WholeReadings {
 
 /// Whether the name of a file ends in one of these extensions, in any case.
 pub(super) fn has_extension(file: &Path, known: &[&str]) -> bool {
-    let extension = file
-        .extension()
-        .map(|extension| extension.to_string_lossy().to_lowercase());
+    let extension = file.extension().map(|extension| extension.to_string_lossy().to_lowercase());
     extension.is_some_and(|extension| known.contains(&extension.as_str()))
 }

@@ -17,9 +17,5 @@ const FORMATS: &[&dyn DataFormat] = &[
 
 /// The format of a file.
 pub(super) fn of(file: &Path) -> &'static dyn DataFormat {
-    FORMATS
-        .iter()
-        .copied()
-        .find(|format| format.reads(file))
-        .unwrap_or(&Csv)
+    FORMATS.iter().copied().find(|format| format.reads(file)).unwrap_or(&Csv)
 }

@@ -41,9 +41,8 @@ impl DataFormat for JsonLines {
 /// The key of the name of a socket, whose value may be a text.
 fn socket_key(request: &Request<'_>) -> String {
     let mapped = request.columns.unwrap_or(&[]).iter();
-    let foreign = mapped
-        .filter(|entry| entry.own.eq_ignore_ascii_case("socket"))
-        .find_map(|entry| match &entry.foreign {
+    let foreign =
+        mapped.filter(|entry| entry.own.eq_ignore_ascii_case("socket")).find_map(|entry| match &entry.foreign {
             ForeignColumn::Name(name) => Some(name.clone()),
             ForeignColumn::Number(_) => None,
         });
@@ -98,16 +97,13 @@ impl ObjectRows {
             let message = cause.to_string();
             let message = message.split(" at line ").next().unwrap_or_default();
             let place = cause.column();
-            self.lines
-                .fault(format!("not a JSON object: {message}, at byte {place}"), OBJECT)
+            self.lines.fault(format!("not a JSON object: {message}, at byte {place}"), OBJECT)
         })?;
         let mut cells: Vec<(String, String)> = Vec::with_capacity(object.0.len());
         for (key, value) in object.0 {
             let key = key.trim().to_string();
             if cells.iter().any(|(other, _)| *other == key) {
-                return Err(self
-                    .lines
-                    .fault(format!("key `{key}` occurs twice"), "keep one of them"));
+                return Err(self.lines.fault(format!("key `{key}` occurs twice"), "keep one of them"));
             }
             let cell = self.cell(&key, value);
             cells.push((key, cell));
@@ -132,8 +128,7 @@ impl ObjectRows {
 
     /// The cells in the order of the keys of the first object.
     fn in_order(&self, mut cells: Vec<(String, String)>) -> Result<Vec<String>, ModelError> {
-        const SAME: &str =
-            "every object has the keys of the first one; write `null` where a value is missing";
+        const SAME: &str = "every object has the keys of the first one; write `null` where a value is missing";
         let mut ordered = Vec::with_capacity(self.keys.len());
         for key in &self.keys {
             let Some(index) = cells.iter().position(|(other, _)| other == key) else {

@@ -78,21 +78,10 @@ impl Lines {
             }
             Ok((opened, found))
         });
-        let (opened, found) = opened.map_err(|cause| {
-            fault(
-                format!("the data file cannot be read: {cause}"),
-                "check `data` and the file",
-            )
-        })?;
+        let (opened, found) = opened
+            .map_err(|cause| fault(format!("the data file cannot be read: {cause}"), "check `data` and the file"))?;
         if found.len() > limits.bytes {
-            return Err(fault(
-                format!(
-                    "a data file of {} bytes; the limit is {}",
-                    found.len(),
-                    limits.bytes
-                ),
-                SPLIT,
-            ));
+            return Err(fault(format!("a data file of {} bytes; the limit is {}", found.len(), limits.bytes), SPLIT));
         }
         Ok(Lines {
             file: file.to_path_buf(),
@@ -204,20 +193,15 @@ impl Lines {
 
     /// Whether a character takes two bytes.
     fn is_wide(&self) -> bool {
-        self.encoding
-            .is_some_and(|encoding| encoding == UTF_16LE || encoding == UTF_16BE)
+        self.encoding.is_some_and(|encoding| encoding == UTF_16LE || encoding == UTF_16BE)
     }
 
     /// Whether the buffer ends with this character.
     fn ends_with(&self, character: u8) -> bool {
         let bytes = &self.buffer;
         match self.encoding {
-            Some(encoding) if encoding == UTF_16LE => {
-                bytes.len().is_multiple_of(2) && bytes.ends_with(&[character, 0])
-            }
-            Some(encoding) if encoding == UTF_16BE => {
-                bytes.len().is_multiple_of(2) && bytes.ends_with(&[0, character])
-            }
+            Some(encoding) if encoding == UTF_16LE => bytes.len().is_multiple_of(2) && bytes.ends_with(&[character, 0]),
+            Some(encoding) if encoding == UTF_16BE => bytes.len().is_multiple_of(2) && bytes.ends_with(&[0, character]),
             _ => bytes.last() == Some(&character),
         }
     }
@@ -231,10 +215,7 @@ impl Lines {
         })?;
         let text = text.into_owned();
         if text.contains('\r') {
-            return Err(self.fault(
-                "a carriage return within a line".into(),
-                "save the file with line ends LF or CRLF",
-            ));
+            return Err(self.fault("a carriage return within a line".into(), "save the file with line ends LF or CRLF"));
         }
         // One line that is not UTF-8 determines the encoding of all that follow.
         if found != UTF_8 {
@@ -245,10 +226,6 @@ impl Lines {
 
     /// An error in the line that was read last.
     pub fn fault(&self, message: String, help: &str) -> ModelError {
-        ModelError::Input {
-            location: Location::line(&self.file, self.line),
-            message,
-            help: Some(help.to_string()),
-        }
+        ModelError::Input { location: Location::line(&self.file, self.line), message, help: Some(help.to_string()) }
     }
 }

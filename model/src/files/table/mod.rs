@@ -51,19 +51,11 @@ pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<Data, ModelErro
         Content::Table(mut table) => {
             let (by_socket, warnings) = fill::read(file, table.rows.as_mut(), table.has_header, request)?;
             let name = &request.test.name;
-            let warnings = warnings
-                .into_iter()
-                .map(|warning| format!("test \"{name}\": {warning}"));
-            Ok(Data {
-                stamp: table.stamp,
-                by_socket,
-                warnings: warnings.collect(),
-            })
+            let warnings = warnings.into_iter().map(|warning| format!("test \"{name}\": {warning}"));
+            Ok(Data { stamp: table.stamp, by_socket, warnings: warnings.collect() })
         }
-        Content::Readings(whole) => Ok(Data {
-            stamp: whole.stamp,
-            by_socket: vec![(None, whole.readings)],
-            warnings: whole.warnings,
-        }),
+        Content::Readings(whole) => {
+            Ok(Data { stamp: whole.stamp, by_socket: vec![(None, whole.readings)], warnings: whole.warnings })
+        }
     }
 }

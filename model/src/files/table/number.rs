@@ -24,16 +24,12 @@ pub(super) fn number(cell: &str, format: &Format) -> Result<f64, (String, &'stat
         Ok(value) if value.abs() <= limits::LARGEST => Ok(value),
         Ok(value) if value.is_nan() => Err((format!("`{cell}` is not a number (NaN)"), NUMBER)),
         Ok(_) => {
-            let fault = format!(
-                "`{cell}` is infinite or too large; the limit is {:e}",
-                limits::LARGEST
-            );
+            let fault = format!("`{cell}` is infinite or too large; the limit is {:e}", limits::LARGEST);
             Err((fault, NUMBER))
         }
-        Err(_) if cell.replacen(',', ".", 1).parse::<f64>().is_ok() => Err((
-            format!("`{cell}` has a decimal comma, which is not declared"),
-            "declare `[format] decimal = \",\"`",
-        )),
+        Err(_) if cell.replacen(',', ".", 1).parse::<f64>().is_ok() => {
+            Err((format!("`{cell}` has a decimal comma, which is not declared"), "declare `[format] decimal = \",\"`"))
+        }
         Err(_) => Err((format!("`{cell}` is not a number"), NUMBER)),
     }
 }

@@ -41,18 +41,14 @@ pub(super) fn required(
             if !has(&|role| matches!(role, Role::Length(_) | Role::Outward(_))) {
                 return missing(
                     "with the probe readings".into(),
-                    "a probe needs `distance_mm` to the surface, or `deviation_um`, the deviation outwards"
-                        .into(),
+                    "a probe needs `distance_mm` to the surface, or `deviation_um`, the deviation outwards".into(),
                 );
             }
         }
         InstrumentKind::Tracker => {
             for (index, name) in ["px_mm", "py_mm", "pz_mm"].into_iter().enumerate() {
                 if !has(&|role| matches!(role, Role::Coordinate(i, _) if i == index)) {
-                    return missing(
-                        format!("`{name}`"),
-                        "a tracker needs px_mm, py_mm and pz_mm".into(),
-                    );
+                    return missing(format!("`{name}`"), "a tracker needs px_mm, py_mm and pz_mm".into());
                 }
             }
         }
@@ -67,8 +63,7 @@ pub(super) fn required(
             if request.test.socket.is_none() && !has(&|role| role == Role::Socket) {
                 return missing(
                     "`socket`".into(),
-                    "add the column, or add `socket = \"…\"` to the test if all its poses have one socket"
-                        .into(),
+                    "add the column, or add `socket = \"…\"` to the test if all its poses have one socket".into(),
                 );
             }
         }
@@ -95,15 +90,11 @@ pub(super) fn required(
             let name = axis.column("");
             missing(
                 format!("`{name}`"),
-                format!(
-                    "add the positions of axis `{}` to the data, or state it: `at = {{ {name} = 0 }}`",
-                    axis.name
-                ),
+                format!("add the positions of axis `{}` to the data, or state it: `at = {{ {name} = 0 }}`", axis.name),
             )
         }
-        Some(MissingPosition::All) => missing(
-            "with the position of an axis".into(),
-            format!("known here: {}", listed(&known(request))),
-        ),
+        Some(MissingPosition::All) => {
+            missing("with the position of an axis".into(), format!("known here: {}", listed(&known(request))))
+        }
     }
 }

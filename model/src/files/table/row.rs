@@ -26,26 +26,12 @@ pub(super) struct Row {
 impl Row {
     /// A row of a file that has no text, such as a spreadsheet.
     pub fn of_cells(line: usize, cells: Vec<String>) -> Row {
-        Row {
-            line,
-            cells,
-            keyed: false,
-            bytes: 0..0,
-            text: String::new(),
-            encoding: None,
-        }
+        Row { line, cells, keyed: false, bytes: 0..0, text: String::new(), encoding: None }
     }
 
     /// A row that is a line of a text.
     pub fn of_line(line: Line, cells: Vec<String>) -> Row {
-        Row {
-            line: line.number,
-            cells,
-            keyed: false,
-            bytes: line.bytes,
-            encoding: line.encoding,
-            text: line.text,
-        }
+        Row { line: line.number, cells, keyed: false, bytes: line.bytes, encoding: line.encoding, text: line.text }
     }
 
     /// The row, with cells that are found by a key.
@@ -55,11 +41,7 @@ impl Row {
 
     /// The place of a cell in messages; `name` is that of its column.
     pub fn place(&self, cell: usize, name: &str) -> String {
-        if self.keyed {
-            format!("key `{name}`")
-        } else {
-            format!("column {} (`{name}`)", cell + 1)
-        }
+        if self.keyed { format!("key `{name}`") } else { format!("column {} (`{name}`)", cell + 1) }
     }
 
     /// The bytes of a cell in the file, if it is not quoted.

@@ -55,11 +55,8 @@ const MAX_CELLS: usize = 20_000_000;
 
 /// The rows of a sheet, and the state of the file.
 fn rows(file: &Path, format: &Format) -> Result<(FileStamp, Vec<Row>), ModelError> {
-    let fault = |message: String, help: String| ModelError::Input {
-        location: Location::file(file),
-        message,
-        help: Some(help),
-    };
+    let fault =
+        |message: String, help: String| ModelError::Input { location: Location::file(file), message, help: Some(help) };
     let broken = |cause: calamine::Error| {
         fault(
             format!("the spreadsheet cannot be read: {cause}"),
@@ -88,10 +85,7 @@ fn rows(file: &Path, format: &Format) -> Result<(FileStamp, Vec<Row>), ModelErro
     let sheets_to_read: Vec<String> = match &format.sheet {
         Some(name) if names.contains(name) => vec![name.clone()],
         Some(name) => {
-            return Err(fault(
-                format!("there is no sheet `{name}`"),
-                format!("it has {}", names.join(", ")),
-            ));
+            return Err(fault(format!("there is no sheet `{name}`"), format!("it has {}", names.join(", "))));
         }
         None => names.clone(),
     };
@@ -121,9 +115,7 @@ fn rows(file: &Path, format: &Format) -> Result<(FileStamp, Vec<Row>), ModelErro
 /// Whether the parts of a ZIP file unpack to more than this number of bytes. The sizes stated in the file are not
 /// trusted.
 fn unpacks_beyond(file: &Path, most: u64) -> bool {
-    let archive = File::open(file)
-        .ok()
-        .and_then(|opened| ZipArchive::new(opened).ok());
+    let archive = File::open(file).ok().and_then(|opened| ZipArchive::new(opened).ok());
     // A file that is not ZIP is not packed.
     let Some(mut archive) = archive else { return false };
     let mut left = most;
@@ -178,9 +170,7 @@ fn cells(book: &mut Sheets<BufReader<File>>, name: &str) -> Result<Vec<PlacedCel
             let range = book.worksheet_range(name)?;
             let (top, left) = range.start().unwrap_or_default();
             let used = range.used_cells();
-            cells.extend(
-                used.map(|(row, column, cell)| (top + row as u32, left + column as u32, cell.clone())),
-            );
+            cells.extend(used.map(|(row, column, cell)| (top + row as u32, left + column as u32, cell.clone())));
         }
     }
     cells.retain(|(_, _, cell)| *cell != Data::Empty);
@@ -228,11 +218,7 @@ fn by_row(mut cells: Vec<PlacedCell>, format: &Format) -> Result<Vec<Row>, (Stri
 /// The text of a cell in a CSV file of this format.
 fn text(cell: &Data, format: &Format) -> String {
     let number = |text: String| {
-        if format.decimal == b',' {
-            text.replace('.', ",")
-        } else {
-            text
-        }
+        if format.decimal == b',' { text.replace('.', ",") } else { text }
     };
     match cell {
         Data::Empty => String::new(),

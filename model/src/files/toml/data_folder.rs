@@ -18,12 +18,7 @@ pub(super) fn folder(session: &Path) -> &Path {
 }
 
 /// Returns an error unless the session may read the file.
-pub(super) fn check(
-    session: &Path,
-    options: &ReadOptions,
-    named: &Value<'_>,
-    found: &Path,
-) -> Result<(), ModelError> {
+pub(super) fn check(session: &Path, options: &ReadOptions, named: &Value<'_>, found: &Path) -> Result<(), ModelError> {
     if options.allow_outside {
         return Ok(());
     }
@@ -31,9 +26,7 @@ pub(super) fn check(
     // A path that cannot be resolved (a pipe in /proc) lies in no folder.
     let real: Option<PathBuf> = found.canonicalize().ok();
     let inside = real.as_ref().is_some_and(|real| {
-        folders
-            .filter_map(|folder| folder.canonicalize().ok())
-            .any(|folder| real.starts_with(folder))
+        folders.filter_map(|folder| folder.canonicalize().ok()).any(|folder| real.starts_with(folder))
     });
     if inside {
         return Ok(());

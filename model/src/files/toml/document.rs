@@ -3,6 +3,7 @@
 
 mod value;
 
+use std::borrow::Cow;
 use std::fs::File;
 use std::io::Read;
 use std::ops::Range;
@@ -44,23 +45,18 @@ impl Source {
             help: Some(help.to_string()),
         };
         if file.is_dir() {
-            return Err(fault(
-                format!("this is a folder; {what} must be a file"),
-                "name the .toml file in it",
-            ));
+            return Err(fault(format!("this is a folder; {what} must be a file"), "name the .toml file in it"));
         }
         let unreadable = |cause: std::io::Error| {
-            let help = "check the name; a relative name starts from the file that contains it, or from the working directory";
+            let help =
+                "check the name; a relative name starts from the file that contains it, or from the working directory";
             fault(format!("{what} cannot be read: {cause}"), help)
         };
         let opened = File::open(file).map_err(unreadable)?;
         let stamp = FileStamp::of(file, &opened.metadata().map_err(unreadable)?);
         let mut bytes = Vec::new();
         // The length of a pipe is unknown in advance.
-        (&opened)
-            .take(MAX_BYTES + 1)
-            .read_to_end(&mut bytes)
-            .map_err(unreadable)?;
+        (&opened).take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
         if bytes.len() as u64 > MAX_BYTES {
             return Err(fault(
                 format!("{what} has more than {MAX_BYTES} bytes, which is the limit"),
@@ -70,28 +66,17 @@ impl Source {
         stamp.check(&opened)?;
         let text = String::from_utf8(bytes).map_err(|cause| {
             fault(
-                format!(
-                    "byte {} is not UTF-8, the encoding of TOML",
-                    cause.utf8_error().valid_up_to() + 1
-                ),
+                format!("byte {} is not UTF-8, the encoding of TOML", cause.utf8_error().valid_up_to() + 1),
                 "save the file as UTF-8",
             )
         })?;
-        Ok(Source {
-            stamp: Some(stamp),
-            ..Source::new(file, &text)
-        })
+        Ok(Source { stamp: Some(stamp), ..Source::new(file, &text) })
     }
 
     /// A given text of a file.
     pub fn new(file: &Path, text: &str) -> Source {
         let content = text.strip_prefix('\u{feff}').unwrap_or(text);
-        Source {
-            file: file.to_path_buf(),
-            text: content.to_string(),
-            skipped: text.len() - content.len(),
-            stamp: None,
-        }
+        Source { file: file.to_path_buf(), text: content.to_string(), skipped: text.len() - content.len(), stamp: None }
     }
 
     /// The whole file as a table.
@@ -100,9 +85,10 @@ impl Source {
             self.error(
                 fault.span().unwrap_or(0..0),
                 format!("not valid TOML: {}", fault.message()),
-                fault.message().contains("recursion").then(|| {
-                    format!("tables, lists and the parts of a key may be nested {MAX_DEPTH} levels deep")
-                }),
+                fault
+                    .message()
+                    .contains("recursion")
+                    .then(|| format!("tables, lists and the parts of a key may be nested {MAX_DEPTH} levels deep")),
             )
         })?;
         Ok(Table::new(self, String::new(), 0..0, root.into_inner()))
@@ -113,21 +99,14 @@ impl Source {
         let until = span.start.min(self.text.len());
         Location {
             file: self.file.clone(),
-            line: 1 + self.text.as_bytes()[..until]
-                .iter()
-                .filter(|byte| **byte == b'\n')
-                .count(),
+            line: 1 + self.text.as_bytes()[..until].iter().filter(|byte| **byte == b'\n').count(),
             span: Some(span.start + self.skipped..span.end + self.skipped),
         }
     }
 
     /// An error at a location of this file.
     pub fn error(&self, span: Range<usize>, message: impl Into<String>, help: Option<String>) -> ModelError {
-        ModelError::Input {
-            location: self.location(span),
-            message: message.into(),
-            help,
-        }
+        ModelError::Input { location: self.location(span), message: message.into(), help }
     }
 }
 
@@ -140,7 +119,7 @@ pub(crate) struct Table<'a> {
     /// Its location.
     pub span: Range<usize>,
     entries: Vec<Value<'a>>,
-    known_keys: Vec<&'static str>,
+    known_keys: Vec<Cow<'static, str>>,
 }
 
 impl<'a> Table<'a> {
@@ -156,41 +135,33 @@ impl<'a> Table<'a> {
             })
             .collect();
         entries.sort_by_key(|entry| entry.key_span.start);
-        Table {
-            source,
-            name,
-            span,
-            entries,
-            known_keys: Vec::new(),
-        }
+        Table { source, name, span, entries, known_keys: Vec::new() }
     }
 
     /// The value of a key, if present.
-    pub fn take(&mut self, key: &'static str) -> Option<Value<'a>> {
+    pub fn take(&mut self, key: impl Into<Cow<'static, str>>) -> Option<Value<'a>> {
+        let key = key.into();
+        let index = self.entries.iter().position(|entry| entry.key == key);
         self.known_keys.push(key);
-        let index = self.entries.iter().position(|entry| entry.key == key)?;
-        Some(self.entries.remove(index))
+        Some(self.entries.remove(index?))
     }
 
     /// The value of a required key; `expected` names the expected value.
     pub fn require(&mut self, key: &'static str, expected: &str) -> Result<Value<'a>, ModelError> {
         match self.take(key) {
             Some(value) => Ok(value),
-            None => Err(self.error(
-                format!("{} has no `{key}`", self.display_name()),
-                Some(format!("add `{key}`: {expected}")),
-            )),
+            None => {
+                Err(self
+                    .error(format!("{} has no `{key}`", self.display_name()), Some(format!("add `{key}`: {expected}"))))
+            }
         }
     }
 
     /// Every remaining value, in the order of the file: for tables whose keys are names.
     pub fn remaining_values(&mut self) -> Result<Vec<Value<'a>>, ModelError> {
         if self.entries.len() > MAX_ITEMS {
-            let message = format!(
-                "{} has {} entries; the limit is {MAX_ITEMS}",
-                self.display_name(),
-                self.entries.len()
-            );
+            let message =
+                format!("{} has {} entries; the limit is {MAX_ITEMS}", self.display_name(), self.entries.len());
             return Err(self.error(message, None));
         }
         Ok(std::mem::take(&mut self.entries))
@@ -201,26 +172,18 @@ impl<'a> Table<'a> {
         match self.entries.first() {
             None => Ok(()),
             Some(entry) => {
-                let mut known: Vec<&str> = self.known_keys.clone();
+                let mut known: Vec<&str> = self.known_keys.iter().map(AsRef::as_ref).collect();
                 known.sort_unstable();
                 known.dedup();
                 let message = format!("{} has the unknown key `{}`", self.display_name(), entry.key);
-                Err(self.source.error(
-                    entry.key_span.clone(),
-                    message,
-                    Some(known_names(&entry.key, &known)),
-                ))
+                Err(self.source.error(entry.key_span.clone(), message, Some(known_names(&entry.key, &known))))
             }
         }
     }
 
     /// The name of the table in messages.
     pub fn display_name(&self) -> &str {
-        if self.name.is_empty() {
-            "the file"
-        } else {
-            &self.name
-        }
+        if self.name.is_empty() { "the file" } else { &self.name }
     }
 
     /// An error about the table as a whole.

@@ -1,55 +1,44 @@
 //! Reader of `[[effect]]`: component × driver × shape.
 
-use super::shape::{self, DriverUnit};
+use super::shape::ShapeKeys;
 use super::{Context, Declared, quantity};
-use crate::axis::AxisKind;
 use crate::component::ErrorKind;
-use crate::effect::{Component, Driver, Effect, Shape};
+use crate::driver::Driver;
+use crate::effect::shape::{Entry, SHAPES};
+use crate::effect::{Component, Effect, Shape};
 use crate::error::ModelError;
 use crate::files::spelling::known_names;
 use crate::files::toml::document::{Table, Value};
 
 /// Reads one `[[effect]]`.
-pub(super) fn effect(
-    context: &Context<'_>,
-    declared: &[Declared],
-    item: Value<'_>,
-) -> Result<Effect, ModelError> {
+pub(super) fn effect(context: &Context<'_>, declared: &[Declared], item: Value<'_>) -> Result<Effect, ModelError> {
     let mut table = item.table("[[effect]]".into())?;
     let component = component(context, &mut table)?;
-    let word_value = table.require(
-        "shape",
-        "the dependence of the component on the driver, such as \"harmonic\"",
-    )?;
+    let word_value = table.require("shape", "the dependence of the component on the driver, such as \"harmonic\"")?;
     let word = word_value.text()?;
-    let driver = driver(context, &mut table, &component, &word)?;
-    let unit = DriverUnit::of(context, &driver);
-    let shape = shape::shape(
-        &mut table,
-        &word_value,
-        &word,
-        unit,
-        driver.default_scale(context.machine),
-    )?;
-    check_compatible(context, &word_value, &shape, &driver)?;
+    let entry = Shape::entry_of(&word);
+    let driver = driver(context, &mut table, &component, entry)?;
+    let Some(entry) = entry else {
+        let words: Vec<&str> = SHAPES.iter().map(|entry| entry.word).collect();
+        return Err(word_value.error(format!("\"{word}\" is not a shape"), Some(known_names(&word, &words))));
+    };
+    let axis = driver.kind_of_axis(context.machine, component.axis(context.machine));
+    let kind = driver.kind();
+    let (unit, default_scale) = (kind.unit(axis), kind.default_scale(axis));
+    let shape = (entry.read)(&mut ShapeKeys::new(&mut table, &word_value, &word, unit, default_scale))?;
+    drop(kind);
+    entry.follows.check(&driver, driver.axis_kind(context.machine)).map_err(|help| {
+        let message = format!("the shape \"{}\" cannot have the driver \"{driver}\"", shape.word());
+        word_value.error(message, Some(help.to_string()))
+    })?;
     let tests = tests(&mut table, declared)?;
-    shape
-        .check()
-        .map_err(|fault| word_value.error(fault.to_string(), None))?;
+    shape.check().map_err(|fault| word_value.error(fault.to_string(), None))?;
     table.finish()?;
-    Ok(Effect {
-        component,
-        driver,
-        shape,
-        tests,
-    })
+    Ok(Effect { component, driver, shape, tests })
 }
 
 fn component(context: &Context<'_>, table: &mut Table<'_>) -> Result<Component, ModelError> {
-    let value = table.require(
-        "component",
-        "the component, such as \"EZC\" or \"workpiece_ball.x\"",
-    )?;
+    let value = table.require("component", "the component, such as \"EZC\" or \"workpiece_ball.x\"")?;
     let text = value.text()?;
     let instrument = || {
         let own = context.instrument.unknowns().iter();
@@ -77,10 +66,7 @@ fn component(context: &Context<'_>, table: &mut Table<'_>) -> Result<Component, 
                 .iter()
                 .any(|unknown| unknown.thing == thing && unknown.coordinate == coordinate);
             if !own {
-                let message = format!(
-                    "effect on \"{text}\", which a {} does not have",
-                    context.instrument.word()
-                );
+                let message = format!("effect on \"{text}\", which a {} does not have", context.instrument.word());
                 return Err(value.error(message, Some(format!("it has {}", instrument()))));
             }
             Ok(Component::Instrument { thing, coordinate })
@@ -96,95 +82,48 @@ fn component(context: &Context<'_>, table: &mut Table<'_>) -> Result<Component, 
     }
 }
 
-/// The driver. The default is the own axis for an error motion, and time for a drift or warm-up.
+/// The driver. By default it is the one that the shape determines, or else the own axis of an error motion.
 fn driver(
     context: &Context<'_>,
     table: &mut Table<'_>,
     component: &Component,
-    shape: &str,
+    shape: Option<&Entry>,
 ) -> Result<Driver, ModelError> {
     let Some(value) = table.take("driver") else {
-        return match component {
-            _ if matches!(shape, "drift" | "warmup") => Ok(Driver::Time),
-            _ if shape == "constant" => Ok(Driver::None),
-            Component::Axis(name) if name.kind == ErrorKind::Motion => Ok(Driver::Axis(name.axis.clone())),
+        return match (shape.and_then(|entry| entry.follows.default_driver()), component) {
+            (Some(driver), _) => Ok(driver),
+            (None, Component::Axis(name)) if name.kind == ErrorKind::Motion => Ok(Driver::Axis(name.axis.clone())),
             _ => {
-                let help = "add `driver`: an axis, \"time\", \"temperature\" or \"gravity\"";
-                Err(table.error("[[effect]] has no `driver`", Some(help.into())))
+                let words: Vec<String> = Driver::words().iter().map(|word| format!("\"{word}\"")).collect();
+                let help = format!("add `driver`: an axis, {}", listed(&words, "or"));
+                Err(table.error("[[effect]] has no `driver`", Some(help)))
             }
         };
     };
     let text = value.text()?;
-    match Driver::parse(&text) {
+    let driver = match Driver::parse(&text) {
         Driver::Axis(name) => match quantity::axis_index(context.machine, &name) {
-            Some(index) => Ok(Driver::Axis(context.machine.axes[index].name.clone())),
+            Some(index) => Driver::Axis(context.machine.axes[index].name.clone()),
             None => {
                 let (message, help) = quantity::no_axis(context.machine, &name);
-                let help = format!("{help}; other drivers are time, temperature and gravity");
-                Err(value.error(format!("effect driven by \"{text}\": {message}"), Some(help)))
+                let help = format!("{help}; other drivers are {}", listed(&Driver::words(), "and"));
+                return Err(value.error(format!("effect driven by \"{text}\": {message}"), Some(help)));
             }
         },
-        Driver::Gravity => {
-            let rotary = match component {
-                Component::Axis(name) => context
-                    .machine
-                    .axis_index(&name.axis)
-                    .is_some_and(|index| context.machine.axes[index].kind == AxisKind::Rotary),
-                _ => false,
-            };
-            if !rotary {
-                let help = "gravity acts on the errors of rotary axes, by a moment about the axis";
-                return Err(value.error(
-                    format!("gravity exerts no moment about \"{component}\""),
-                    Some(help.into()),
-                ));
-            }
-            Ok(Driver::Gravity)
-        }
-        other => Ok(other),
-    }
+        other => other,
+    };
+    let own = component.axis(context.machine).map(|axis| context.machine.axes[axis].kind);
+    let checked = driver.kind().check_component(&component.to_string(), own);
+    checked.map_err(|fault| value.error(fault.message, Some(fault.help.into())))?;
+    Ok(driver)
 }
 
-/// Checks that a shape and a driver are compatible.
-fn check_compatible(
-    context: &Context<'_>,
-    word: &Value<'_>,
-    shape: &Shape,
-    driver: &Driver,
-) -> Result<(), ModelError> {
-    if (*driver == Driver::None) != (*shape == Shape::Constant) {
-        let message = format!(
-            "the shape \"{}\" cannot have the driver \"{driver}\"",
-            shape.word()
-        );
-        let help = "a constant has the driver \"none\" (omit `driver`); every other shape needs a driver";
-        return Err(word.error(message, Some(help.to_string())));
-    }
-    let axis = match driver {
-        Driver::Axis(name) => context
-            .machine
-            .axis_index(name)
-            .map(|i| context.machine.axes[i].kind),
-        _ => None,
-    };
-    let fault = |help: &str| {
-        let message = format!(
-            "the shape \"{}\" cannot have the driver \"{driver}\"",
-            shape.word()
-        );
-        Err(word.error(message, Some(help.to_string())))
-    };
-    match shape {
-        Shape::Harmonic { .. } if axis != Some(AxisKind::Rotary) => {
-            fault("a harmonic needs a rotary axis; for other drivers use \"periodic\" with its period")
-        }
-        Shape::Backlash | Shape::Lag | Shape::ReversalSpike { .. } if axis.is_none() => {
-            fault("its driver must be an axis")
-        }
-        Shape::Drift | Shape::Warmup { .. } if *driver != Driver::Time => {
-            fault("its driver must be \"time\"")
-        }
-        _ => Ok(()),
+/// `a, b and c`.
+fn listed(words: &[impl AsRef<str>], joint: &str) -> String {
+    let words: Vec<&str> = words.iter().map(AsRef::as_ref).collect();
+    match words.split_last() {
+        Some((last, [_, ..])) => format!("{} {joint} {last}", words[..words.len() - 1].join(", ")),
+        _ => words.concat(),
     }
 }
 

@@ -58,10 +58,7 @@ fn one_of(value: &Value<'_>, known: &[u8]) -> Result<u8, ModelError> {
     match text.as_bytes() {
         [one] if known.contains(one) => Ok(*one),
         _ => {
-            let names: Vec<String> = known
-                .iter()
-                .map(|byte| format!("{:?}", char::from(*byte).to_string()))
-                .collect();
+            let names: Vec<String> = known.iter().map(|byte| format!("{:?}", char::from(*byte).to_string())).collect();
             Err(value.unexpected(&format!("one of {}", names.join(" "))))
         }
     }

@@ -26,10 +26,7 @@ pub(super) fn source(path: &Path) -> Result<Source, ModelError> {
 
 /// A machine from the tables `name`, `chain`, `[axis.…]`.
 pub(super) fn from_table(mut table: Table<'_>) -> Result<Machine, ModelError> {
-    let chain = table.require(
-        "chain",
-        "the axes from workpiece over bed to tool, such as \"w C A b Y X Z t\"",
-    )?;
+    let chain = table.require("chain", "the axes from workpiece over bed to tool, such as \"w C A b Y X Z t\"")?;
     let text = chain.text()?;
     let code = StructuralCode::parse(&text).map_err(|fault| chain.error(fault.to_string(), None))?;
     let name = match table.take("name") {
@@ -48,13 +45,8 @@ pub(super) fn from_table(mut table: Table<'_>) -> Result<Machine, ModelError> {
         None => [0.0, 0.0, -1.0],
         Some(value) => {
             let (source, span) = (value.source, value.span.clone());
-            unit(value.vector()?).ok_or_else(|| {
-                source.error(
-                    span,
-                    "`gravity` has no direction",
-                    Some("down is [0, 0, -1]".into()),
-                )
-            })?
+            unit(value.vector()?)
+                .ok_or_else(|| source.error(span, "`gravity` has no direction", Some("down is [0, 0, -1]".into())))?
         }
     };
 
@@ -65,10 +57,7 @@ pub(super) fn from_table(mut table: Table<'_>) -> Result<Machine, ModelError> {
             if !code.axes().any(|axis| *axis == name) {
                 let known: Vec<&str> = code.axes().map(String::as_str).collect();
                 let message = format!("axis `{name}` is not in the chain `{text}`");
-                let help = format!(
-                    "add it to `chain` or remove its table; {}",
-                    known_names(&name, &known)
-                );
+                let help = format!("add it to `chain` or remove its table; {}", known_names(&name, &known));
                 return Err(entry.source.error(entry.key_span.clone(), message, Some(help)));
             }
             let called = format!("[axis.{name}]");
@@ -86,13 +75,7 @@ pub(super) fn from_table(mut table: Table<'_>) -> Result<Machine, ModelError> {
         axes.push(axis(name, table)?);
     }
     table.finish()?;
-    Ok(Machine {
-        name,
-        workpiece_side: code.workpiece_side.len(),
-        axes,
-        rotation,
-        gravity,
-    })
+    Ok(Machine { name, workpiece_side: code.workpiece_side.len(), axes, rotation, gravity })
 }
 
 fn axis(name: &str, mut table: Table<'_>) -> Result<Axis, ModelError> {
@@ -111,8 +94,7 @@ fn axis(name: &str, mut table: Table<'_>) -> Result<Axis, ModelError> {
                     quantity::kind_word(of_letter.unwrap_or(kind)),
                     quantity::kind_word(kind)
                 );
-                let help =
-                    "A B C are rotary and X Y Z U V W linear; give another axis another name, such as `J1`";
+                let help = "A B C are rotary and X Y Z U V W linear; give another axis another name, such as `J1`";
                 return Err(value.error(message, Some(help.into())));
             }
             Some(kind)
@@ -120,10 +102,7 @@ fn axis(name: &str, mut table: Table<'_>) -> Result<Axis, ModelError> {
     };
     let Some(kind) = stated.or(of_letter) else {
         let message = format!("axis `{name}` is not an ISO 841 letter and has no `kind`");
-        return Err(table.error(
-            message,
-            Some("add `kind = \"rotary\"` or `kind = \"linear\"`".into()),
-        ));
+        return Err(table.error(message, Some("add `kind = \"rotary\"` or `kind = \"linear\"`".into())));
     };
     let direction = match table.take("direction") {
         Some(value) => {
@@ -137,10 +116,7 @@ fn axis(name: &str, mut table: Table<'_>) -> Result<Axis, ModelError> {
         None => Axis::direction_of_letter(name).ok_or_else(|| {
             table.error(
                 format!("axis `{name}` is not an ISO 841 letter and has no `direction`"),
-                Some(
-                    "add `direction`: the direction in R along or about which it moves, such as [0, 0, 1]"
-                        .into(),
-                ),
+                Some("add `direction`: the direction in R along or about which it moves, such as [0, 0, 1]".into()),
             )
         })?,
     };
@@ -150,13 +126,7 @@ fn axis(name: &str, mut table: Table<'_>) -> Result<Axis, ModelError> {
     };
     let travel = travel(name, kind, &mut table)?;
     table.finish()?;
-    Ok(Axis {
-        name: name.to_string(),
-        kind,
-        direction,
-        origin_mm,
-        travel,
-    })
+    Ok(Axis { name: name.to_string(), kind, direction, origin_mm, travel })
 }
 
 fn travel(name: &str, kind: AxisKind, table: &mut Table<'_>) -> Result<Option<[f64; 2]>, ModelError> {
@@ -166,16 +136,8 @@ fn travel(name: &str, kind: AxisKind, table: &mut Table<'_>) -> Result<Option<[f
         AxisKind::Rotary => (deg, mm),
     };
     if let Some(wrong) = wrong {
-        let message = format!(
-            "`{}` for the {} axis `{name}`",
-            wrong.key,
-            quantity::kind_word(kind)
-        );
-        let right = if kind == AxisKind::Rotary {
-            "travel_deg"
-        } else {
-            "travel_mm"
-        };
+        let message = format!("`{}` for the {} axis `{name}`", wrong.key, quantity::kind_word(kind));
+        let right = if kind == AxisKind::Rotary { "travel_deg" } else { "travel_mm" };
         let help = format!("use `{right}`");
         return Err(wrong.source.error(wrong.key_span.clone(), message, Some(help)));
     }
@@ -183,10 +145,7 @@ fn travel(name: &str, kind: AxisKind, table: &mut Table<'_>) -> Result<Option<[f
     let (source, span) = (value.source, value.span.clone());
     let key = value.key.clone();
     let ends = value.list("a list of two numbers, minimum and maximum")?;
-    let numbers = ends
-        .iter()
-        .map(|end| end.number())
-        .collect::<Result<Vec<_>, _>>()?;
+    let numbers = ends.iter().map(|end| end.number()).collect::<Result<Vec<_>, _>>()?;
     match numbers[..] {
         [least, greatest] if least < greatest => Ok(Some([least, greatest].map(|end| kind.to_internal(end)))),
         _ => Err(source.error(

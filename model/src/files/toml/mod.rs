@@ -44,11 +44,7 @@ pub struct ReadOptions {
 impl Default for ReadOptions {
     /// Data are read, from the session's folder and below.
     fn default() -> Self {
-        ReadOptions {
-            data_directory: None,
-            read_data: true,
-            allow_outside: false,
-        }
+        ReadOptions { data_directory: None, read_data: true, allow_outside: false }
     }
 }
 
@@ -77,10 +73,7 @@ impl Context<'_> {
         let names: Vec<&str> = self.constants.iter().map(|(name, _)| name.as_str()).collect();
         let length = Length::parse(text, &names).map_err(|fault| {
             let help = "a length is a number or an expression in [constants] with + - * / ^2 sqrt( )";
-            value.error(
-                format!("`{}` = \"{text}\": {fault}", value.key),
-                Some(help.into()),
-            )
+            value.error(format!("`{}` = \"{text}\": {fault}", value.key), Some(help.into()))
         })?;
         let number = length.evaluate(&|name: &str| {
             let found = self.constants.iter().find(|(known, _)| known == name);
@@ -91,14 +84,8 @@ impl Context<'_> {
             return Err(value.error(message, None));
         }
         if !number.is_finite() {
-            let message = format!(
-                "`{}` = \"{text}\" evaluates to {number} with these constants",
-                value.key
-            );
-            return Err(value.error(
-                message,
-                Some("a root of a negative number, or a division by zero?".into()),
-            ));
+            let message = format!("`{}` = \"{text}\" evaluates to {number} with these constants", value.key);
+            return Err(value.error(message, Some("a root of a negative number, or a division by zero?".into())));
         }
         Ok((length, number))
     }
@@ -139,10 +126,7 @@ pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError
 pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Session, SourceMap), ModelError> {
     let source = Source::read(path, "the session file")?;
     let mut root = source.parse()?;
-    let SessionMachine {
-        machine,
-        source: machine_source,
-    } = session_machine(path, options, &mut root)?;
+    let SessionMachine { machine, source: machine_source } = session_machine(path, options, &mut root)?;
     let constants = constants(&mut root)?;
     let instrument = Instrument::read(&mut root)?;
     let about = about(&mut root)?;
@@ -181,10 +165,7 @@ pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Sessi
     let socket_distances = sockets::socket_distances(instrument.kind, &tests, &mut root, options.read_data)?;
     root.finish()?;
     let mut files: Vec<FileStamp> = Vec::new();
-    let own = source
-        .stamp
-        .iter()
-        .chain(machine_source.iter().filter_map(|source| source.stamp.as_ref()));
+    let own = source.stamp.iter().chain(machine_source.iter().filter_map(|source| source.stamp.as_ref()));
     for stamp in own.chain(&found.stamps) {
         if !files.contains(stamp) {
             files.push(stamp.clone());
@@ -228,38 +209,22 @@ struct SessionMachine {
 }
 
 /// Reads the machine: a file beside the session, or tables in the session.
-fn session_machine(
-    path: &Path,
-    options: &ReadOptions,
-    root: &mut Table<'_>,
-) -> Result<SessionMachine, ModelError> {
-    let value = root.require(
-        "machine",
-        "[machine] with `file = \"machine.toml\"`, or the machine's tables in it",
-    )?;
+fn session_machine(path: &Path, options: &ReadOptions, root: &mut Table<'_>) -> Result<SessionMachine, ModelError> {
+    let value = root.require("machine", "[machine] with `file = \"machine.toml\"`, or the machine's tables in it")?;
     let mut table = value.table("[machine]".into())?;
     let Some(file) = table.take("file") else {
-        return Ok(SessionMachine {
-            machine: machine::from_table(table)?,
-            source: None,
-        });
+        return Ok(SessionMachine { machine: machine::from_table(table)?, source: None });
     };
     let named = file.text()?;
     let found = path.parent().unwrap_or(Path::new("")).join(&named);
     if !found.exists() {
-        let message = format!(
-            "the machine file `{named}` does not exist; looked for {}",
-            found.display()
-        );
+        let message = format!("the machine file `{named}` does not exist; looked for {}", found.display());
         return Err(file.error(message, Some("its name is relative to the session file".into())));
     }
     data_folder::check(path, options, &file, &found)?;
     table.finish()?;
     let source = machine::source(&found)?;
-    Ok(SessionMachine {
-        machine: machine::from_table(source.parse()?)?,
-        source: Some(source),
-    })
+    Ok(SessionMachine { machine: machine::from_table(source.parse()?)?, source: Some(source) })
 }
 
 fn constants(root: &mut Table<'_>) -> Result<Vec<(String, f64)>, ModelError> {
@@ -276,9 +241,7 @@ fn constants(root: &mut Table<'_>) -> Result<Vec<(String, f64)>, ModelError> {
         if !valid {
             let help = "a name is a letter followed by letters, digits and `_`; `sqrt` is reserved";
             let message = format!("a constant cannot have the name `{name}`");
-            return Err(entry
-                .source
-                .error(entry.key_span.clone(), message, Some(help.into())));
+            return Err(entry.source.error(entry.key_span.clone(), message, Some(help.into())));
         }
         constants.push((name, entry.number()?));
     }
@@ -298,9 +261,7 @@ fn about(root: &mut Table<'_>) -> Result<Vec<(String, String)>, ModelError> {
             if control || note.key.trim().is_empty() {
                 let message = "a note of [about] has a name that cannot be displayed";
                 let help = "use names such as `serial_number`, `operator`, `date`, `comment`";
-                return Err(note
-                    .source
-                    .error(note.key_span.clone(), message, Some(help.into())));
+                return Err(note.source.error(note.key_span.clone(), message, Some(help.into())));
             }
             Ok((note.key.clone(), note.note()?))
         })
@@ -342,11 +303,7 @@ impl Instrument {
         let noise_mm = not_negative("noise_um")?;
         let resolution_mm = not_negative("resolution_um")?.filter(|step| *step > 0.0);
         table.finish()?;
-        Ok(Instrument {
-            kind,
-            noise_mm,
-            resolution_mm,
-        })
+        Ok(Instrument { kind, noise_mm, resolution_mm })
     }
 }
 
@@ -373,10 +330,7 @@ fn tests(
         let mut table = item.table(called)?;
         let name = test::name(&mut table, &declared)?;
         let parts = test::tests(context, &name, table, found)?;
-        declared.push(Declared {
-            name,
-            parts: parts.iter().map(|test| test.name.clone()).collect(),
-        });
+        declared.push(Declared { name, parts: parts.iter().map(|test| test.name.clone()).collect() });
         tests.extend(parts);
     }
     if tests.is_empty() {

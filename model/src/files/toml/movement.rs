@@ -13,34 +13,18 @@ const DEFAULT_FEED_MM_S: f64 = 1000.0 / 60.0;
 const DEFAULT_ROTARY_SPEED_RAD_S: f64 = 2.0 / 180.0 * std::f64::consts::PI;
 
 /// Reads `sweep = { axis, from_…, to_…, step_…, feed_…, runs, both_directions }`.
-pub(super) fn sweep(
-    context: &Context<'_>,
-    value: Value<'_>,
-    station: &Station<f64>,
-) -> Result<Motion, ModelError> {
+pub(super) fn sweep(context: &Context<'_>, value: Value<'_>, station: &Station<f64>) -> Result<Motion, ModelError> {
     let mut table = value.table("`sweep`".into())?;
     let (axis, kind) = moved_axis(context, &mut table)?;
     let range = StepRange::read(&mut table, kind, true)?;
     let speed = speed(context, &mut table, axis, station)?;
     let (runs, both_directions) = runs_and_directions(&mut table, range.steps())?;
     table.finish()?;
-    Ok(Motion::Sweep {
-        axis,
-        from: range.from,
-        to: range.to,
-        step: range.step,
-        speed,
-        runs,
-        both_directions,
-    })
+    Ok(Motion::Sweep { axis, from: range.from, to: range.to, step: range.step, speed, runs, both_directions })
 }
 
 /// Reads `path = { kind = "circle" | "follow" | "list", … }`.
-pub(super) fn path(
-    context: &Context<'_>,
-    value: Value<'_>,
-    station: &Station<f64>,
-) -> Result<Motion, ModelError> {
+pub(super) fn path(context: &Context<'_>, value: Value<'_>, station: &Station<f64>) -> Result<Motion, ModelError> {
     let mut table = value.table("`path`".into())?;
     let kind = table.require("kind", "\"circle\", \"follow\" or \"list\"")?;
     match kind.text()?.as_str() {
@@ -67,10 +51,7 @@ fn circle(context: &Context<'_>, mut table: Table<'_>) -> Result<Motion, ModelEr
             return Err(plane.error(message, Some(help)));
         };
         if context.machine.axes[index].kind != AxisKind::Linear {
-            return Err(plane.error(
-                format!("axis `{name}` is rotary; a circle moves two linear axes"),
-                None,
-            ));
+            return Err(plane.error(format!("axis `{name}` is rotary; a circle moves two linear axes"), None));
         }
         Ok(index)
     };
@@ -81,10 +62,7 @@ fn circle(context: &Context<'_>, mut table: Table<'_>) -> Result<Motion, ModelEr
     let radius_value = table.require("radius_mm", "the radius of the circle")?;
     let (_, radius) = context.length(&radius_value)?;
     if radius <= 0.0 {
-        return Err(radius_value.error(
-            format!("`radius_mm` is {radius}; it must be greater than 0"),
-            None,
-        ));
+        return Err(radius_value.error(format!("`radius_mm` is {radius}; it must be greater than 0"), None));
     }
     let centre = match table.take("centre_mm") {
         Some(value) => context.point(value)?.1,
@@ -121,10 +99,9 @@ fn follow(context: &Context<'_>, mut table: Table<'_>, station: &Station<f64>) -
     let (axis, kind) = moved_axis(context, &mut table)?;
     if kind != AxisKind::Rotary {
         let name = &context.machine.axes[axis].name;
-        return Err(table.error(
-            format!("axis `{name}` is linear; a path of kind \"follow\" needs a rotary axis"),
-            None,
-        ));
+        return Err(
+            table.error(format!("axis `{name}` is linear; a path of kind \"follow\" needs a rotary axis"), None)
+        );
     }
     let offset = match station {
         Station::BallBar(_) => {
@@ -156,16 +133,7 @@ fn follow(context: &Context<'_>, mut table: Table<'_>, station: &Station<f64>) -
     };
     let (runs, both_directions) = runs_and_directions(&mut table, range.steps())?;
     table.finish()?;
-    Ok(Motion::Follow {
-        axis,
-        from: range.from,
-        to: range.to,
-        step: range.step,
-        speed,
-        runs,
-        both_directions,
-        offset,
-    })
+    Ok(Motion::Follow { axis, from: range.from, to: range.to, step: range.step, speed, runs, both_directions, offset })
 }
 
 fn moved_axis(context: &Context<'_>, table: &mut Table<'_>) -> Result<(usize, AxisKind), ModelError> {
@@ -194,10 +162,7 @@ impl StepRange {
         let unit = kind.unit();
         let missing = |key: &str| {
             let help = format!("add `{key}_{unit}`");
-            table.error(
-                format!("{} has no `{key}_{unit}`", table.display_name()),
-                Some(help),
-            )
+            table.error(format!("{} has no `{key}_{unit}`", table.display_name()), Some(help))
         };
         let turn = kind == AxisKind::Rotary && !ends_needed;
         let from = match from {
@@ -214,10 +179,8 @@ impl StepRange {
             return Err(missing("step"));
         };
         if step <= 0.0 {
-            let message = format!(
-                "`{}` must be greater than 0; the return traversal is `both_directions = true`",
-                stepped.key
-            );
+            let message =
+                format!("`{}` must be greater than 0; the return traversal is `both_directions = true`", stepped.key);
             return Err(stepped.error(message, None));
         }
         if from == to {
@@ -225,10 +188,7 @@ impl StepRange {
         }
         let range = StepRange { from, to, step };
         if range.steps() > MAX_READINGS as f64 {
-            let message = format!(
-                "{:.2e} steps; the limit is {MAX_READINGS} readings",
-                range.steps()
-            );
+            let message = format!("{:.2e} steps; the limit is {MAX_READINGS} readings", range.steps());
             return Err(stepped.error(message, Some("use a larger step".into())));
         }
         if range.steps() < 1.0 {
@@ -264,12 +224,7 @@ fn end<'a>(
 
 /// The speed of an axis, in degrees or millimetres per minute; `feed_mm_min` of a rotary axis is the path speed of the
 /// ball that it carries.
-fn speed(
-    context: &Context<'_>,
-    table: &mut Table<'_>,
-    axis: usize,
-    station: &Station<f64>,
-) -> Result<f64, ModelError> {
+fn speed(context: &Context<'_>, table: &mut Table<'_>, axis: usize, station: &Station<f64>) -> Result<f64, ModelError> {
     let (mm, deg) = (table.take("feed_mm_min"), table.take("feed_deg_min"));
     match (context.machine.axes[axis].kind, mm, deg) {
         (_, Some(_), Some(deg)) => Err(deg.error("both `feed_mm_min` and `feed_deg_min`", None)),
@@ -297,10 +252,7 @@ fn programmed_speed(
     for key in ["feed_mm_min", "feed_deg_min"] {
         if let Some(other) = table.take(key) {
             let help = "the programmed feed determines the speed of the ball: keep one of them";
-            return Err(other.error(
-                format!("both `programmed_feed_mm_min` and `{key}`"),
-                Some(help.into()),
-            ));
+            return Err(other.error(format!("both `programmed_feed_mm_min` and `{key}`"), Some(help.into())));
         }
     }
     let radius = radius_on_axis(context, axis, station, feed)?;
@@ -315,9 +267,7 @@ fn radius_on_axis(
     feed: &Value<'_>,
 ) -> Result<f64, ModelError> {
     let carried = match station {
-        station if axis < context.machine.workpiece_side => {
-            station.table_point_mm().unwrap_or(station.tool_point_mm())
-        }
+        station if axis < context.machine.workpiece_side => station.table_point_mm().unwrap_or(station.tool_point_mm()),
         station => station.tool_point_mm(),
     };
     let radius = radius_about(&context.machine.axes[axis], carried);
@@ -346,10 +296,9 @@ fn runs_and_directions(table: &mut Table<'_>, steps: f64) -> Result<(usize, bool
         Some(value) => {
             let runs = value.count(1, MAX_READINGS)?;
             if runs as f64 * (steps + 1.0) * 2.0 > MAX_READINGS as f64 {
-                return Err(value.error(
-                    format!("{runs} runs of {steps:.0} steps; the limit is {MAX_READINGS} readings"),
-                    None,
-                ));
+                return Err(
+                    value.error(format!("{runs} runs of {steps:.0} steps; the limit is {MAX_READINGS} readings"), None)
+                );
             }
             runs
         }

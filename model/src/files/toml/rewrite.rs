@@ -14,10 +14,7 @@ use crate::error::ModelError;
 pub fn with_machine_file(original: &str, file: &Path, machine: &str) -> Result<String, ModelError> {
     let source = Source::new(file, original);
     let span = match source.parse()?.take("machine") {
-        Some(value) => value
-            .table("[machine]".into())?
-            .take("file")
-            .map(|value| value.span),
+        Some(value) => value.table("[machine]".into())?.take("file").map(|value| value.span),
         None => None,
     };
     Ok(match span {
@@ -99,26 +96,16 @@ fn parent(file: &Path) -> &Path {
 /// The name of a file relative to a folder; the absolute name if they share only the root.
 fn relative_path(folder: &Path, file: &Path) -> Result<String, ModelError> {
     let whole = |path: &Path| {
-        path.canonicalize().map_err(|cause| ModelError::Output {
-            file: path.to_path_buf(),
-            cause: cause.to_string(),
-        })
+        path.canonicalize().map_err(|cause| ModelError::Output { file: path.to_path_buf(), cause: cause.to_string() })
     };
     let (from, to) = (whole(folder)?, whole(parent(file))?);
-    let shared = from
-        .components()
-        .zip(to.components())
-        .take_while(|(a, b)| a == b)
-        .count();
+    let shared = from.components().zip(to.components()).take_while(|(a, b)| a == b).count();
     let name = file.file_name().unwrap_or_default();
     if shared <= 1 {
         return Ok(to.join(name).display().to_string());
     }
     let up = from.components().skip(shared).map(|_| "..".into());
-    let down = to
-        .components()
-        .skip(shared)
-        .map(|part| part.as_os_str().to_string_lossy());
+    let down = to.components().skip(shared).map(|part| part.as_os_str().to_string_lossy());
     let parts: Vec<_> = up.chain(down).chain([name.to_string_lossy()]).collect();
     Ok(parts.join("/"))
 }
@@ -137,15 +124,11 @@ pub fn without_tables(original: &str, names: &[&str]) -> String {
     for line in original.split_inclusive('\n') {
         if let Some(header) = line.trim_start().strip_prefix('[') {
             let header = header.trim_start_matches('[').trim_start();
-            let name: String = header
-                .chars()
-                .take_while(|c| c.is_alphanumeric() || matches!(c, '_' | '-' | '.'))
-                .collect();
+            let name: String =
+                header.chars().take_while(|c| c.is_alphanumeric() || matches!(c, '_' | '-' | '.')).collect();
             let closes = header[name.len()..].trim_start().starts_with(']');
             if closes {
-                dropping = names
-                    .iter()
-                    .any(|dropped| name == *dropped || name.starts_with(&format!("{dropped}.")));
+                dropping = names.iter().any(|dropped| name == *dropped || name.starts_with(&format!("{dropped}.")));
             }
         }
         if !dropping {
@@ -186,10 +169,7 @@ mod tests {
         let text = with_machine_file(SESSION, file, "machine.toml").unwrap();
         assert_eq!(text, SESSION.replace("../machine.toml", "machine.toml"));
         let text = with_noise(SESSION, file, 0.25).unwrap();
-        assert_eq!(
-            text,
-            SESSION.replace("# Renishaw\n", "# Renishaw\nnoise_um = 0.25\n")
-        );
+        assert_eq!(text, SESSION.replace("# Renishaw\n", "# Renishaw\nnoise_um = 0.25\n"));
         let text = with_noise(&text, file, 0.0).unwrap();
         assert!(text.ends_with("\nnoise_um = 0\n"), "{text}");
         let inline = with_noise("instrument = { kind = \"ballbar\" }\n", file, 1.5).unwrap();
@@ -209,14 +189,10 @@ mod tests {
         let file = at("ours/session.toml");
         let elsewhere = at("ours/elsewhere");
         let relocated_to = |folder: &str| relocated(session, &file, &at(folder), Some(&elsewhere)).unwrap();
-        let there = session
-            .replace("../machine.toml", "../../machine.toml")
-            .replace("data/a.csv", "../../ours/data/a.csv");
+        let there =
+            session.replace("../machine.toml", "../../machine.toml").replace("data/a.csv", "../../ours/data/a.csv");
         assert_eq!(relocated_to("theirs/next"), there);
         assert_eq!(relocated_to("ours"), session);
-        assert_eq!(
-            relocated_to("ours/data"),
-            session.replace("../", "../../").replace("data/a", "a")
-        );
+        assert_eq!(relocated_to("ours/data"), session.replace("../", "../../").replace("data/a", "a"));
     }
 }

@@ -17,10 +17,7 @@ pub(super) fn socket_distances(
         return Ok(Vec::new());
     };
     if kind != InstrumentKind::Socket {
-        let message = format!(
-            "[[socket_distance]] in a session whose instrument is a {}",
-            kind.word()
-        );
+        let message = format!("[[socket_distance]] in a session whose instrument is a {}", kind.word());
         return Err(value.source.error(value.key_span.clone(), message, None));
     }
     let mut distances = Vec::new();
@@ -32,11 +29,7 @@ pub(super) fn socket_distances(
         for name in between.list("a list of two sockets")? {
             let socket = name.text()?;
             // Sockets named by a column are known after the data are read.
-            if read
-                && !tests
-                    .iter()
-                    .any(|test| test.socket.as_deref() == Some(socket.as_str()))
-            {
+            if read && !tests.iter().any(|test| test.socket.as_deref() == Some(socket.as_str())) {
                 let mut known: Vec<&str> = tests.iter().filter_map(|test| test.socket.as_deref()).collect();
                 known.dedup();
                 let help = format!("sockets here: {}", known.join(", "));
@@ -62,11 +55,7 @@ pub(super) fn socket_distances(
             None => 0.0,
         };
         table.finish()?;
-        distances.push(SocketDistance {
-            between,
-            distance_mm,
-            u_mm,
-        });
+        distances.push(SocketDistance { between, distance_mm, u_mm });
     }
     Ok(distances)
 }

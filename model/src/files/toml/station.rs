@@ -70,13 +70,11 @@ const INSTRUMENT_KEYS: [(InstrumentKind, &[&str]); 5] = [
 
 /// Reads the instrument's keys of a test.
 pub(super) fn set_up(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
-    let own = INSTRUMENT_KEYS
-        .iter()
-        .find(|(kind, _)| *kind == context.instrument);
+    let own = INSTRUMENT_KEYS.iter().find(|(kind, _)| *kind == context.instrument);
     let own = own.map_or(&[][..], |(_, keys)| keys);
     for (kind, keys) in INSTRUMENT_KEYS {
         for key in keys.iter().filter(|key| !own.contains(key)) {
-            if let Some(value) = table.take(key) {
+            if let Some(value) = table.take(*key) {
                 let message = format!(
                     "`{key}` belongs to a {}; this session's instrument is a {}",
                     kind.word(),
@@ -101,24 +99,13 @@ fn ball_bar(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, Model
     if let Some(fault) = limits::not_positive("bar_mm", bar_mm) {
         return Err(bar.error(fault, None));
     }
-    let Balls {
-        workpiece: (workpiece, workpiece_mm),
-        spindle: (spindle, spindle_mm),
-        mut priors,
-    } = balls(context, table)?;
+    let Balls { workpiece: (workpiece, workpiece_mm), spindle: (spindle, spindle_mm), mut priors } =
+        balls(context, table)?;
     priors.extend(self::priors(table.take("bar_u_um"), 1)?);
     priors.push(Prior::Known); // gain of the sensor
     Ok(SetUp {
-        station: Station::BallBar(BallBar {
-            workpiece_ball: workpiece_mm,
-            spindle_ball: spindle_mm,
-            bar: bar_mm,
-        }),
-        geometry: Station::BallBar(BallBar {
-            workpiece_ball: workpiece,
-            spindle_ball: spindle,
-            bar: bar_as_written,
-        }),
+        station: Station::BallBar(BallBar { workpiece_ball: workpiece_mm, spindle_ball: spindle_mm, bar: bar_mm }),
+        geometry: Station::BallBar(BallBar { workpiece_ball: workpiece, spindle_ball: spindle, bar: bar_as_written }),
         priors,
         socket: None,
     })
@@ -132,22 +119,12 @@ struct Balls {
 }
 
 fn balls(context: &Context<'_>, table: &mut Table<'_>) -> Result<Balls, ModelError> {
-    let workpiece = table.require(
-        "workpiece_ball_mm",
-        "the workpiece ball in the table frame, such as [0, 100, 0]",
-    )?;
-    let spindle = table.require(
-        "spindle_ball_mm",
-        "the spindle ball in the tool frame, such as [0, 0, 0]",
-    )?;
+    let workpiece = table.require("workpiece_ball_mm", "the workpiece ball in the table frame, such as [0, 100, 0]")?;
+    let spindle = table.require("spindle_ball_mm", "the spindle ball in the tool frame, such as [0, 0, 0]")?;
     let (workpiece, spindle) = (context.point(workpiece)?, context.point(spindle)?);
     let mut priors = priors(table.take("workpiece_ball_u_um"), 3)?;
     priors.extend(self::priors(table.take("spindle_ball_u_um"), 3)?);
-    Ok(Balls {
-        workpiece,
-        spindle,
-        priors,
-    })
+    Ok(Balls { workpiece, spindle, priors })
 }
 
 fn r_test(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
@@ -158,20 +135,12 @@ fn r_test(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelEr
         "Es" => Setting::Spindle,
         _ => return Err(setting.unexpected(SETTINGS)),
     };
-    let Balls {
-        workpiece: (workpiece, workpiece_mm),
-        spindle: (spindle, spindle_mm),
-        mut priors,
-    } = balls(context, table)?;
+    let Balls { workpiece: (workpiece, workpiece_mm), spindle: (spindle, spindle_mm), mut priors } =
+        balls(context, table)?;
     let sensors = sensors(table)?;
     priors.extend(angle_priors(table.take("sensor_u_arcsec"))?);
     Ok(SetUp {
-        station: Station::RTest(RTest {
-            setting,
-            workpiece_ball: workpiece_mm,
-            spindle_ball: spindle_mm,
-            sensors,
-        }),
+        station: Station::RTest(RTest { setting, workpiece_ball: workpiece_mm, spindle_ball: spindle_mm, sensors }),
         geometry: Station::RTest(RTest {
             setting,
             workpiece_ball: workpiece,
@@ -206,10 +175,7 @@ fn sensors(table: &mut Table<'_>) -> Result<Option<[[f64; 3]; 3]>, ModelError> {
         (None, Some(directions)) => {
             let (source, span) = (directions.source, directions.span.clone());
             let mut rows = [[0.0; 3]; 3];
-            for (row, item) in rows
-                .iter_mut()
-                .zip(directions.three("a list of three directions")?)
-            {
+            for (row, item) in rows.iter_mut().zip(directions.three("a list of three directions")?) {
                 *row = unit_vector(item)?;
             }
             let [a, b, c] = rows;
@@ -219,8 +185,7 @@ fn sensors(table: &mut Table<'_>) -> Result<Option<[[f64; 3]; 3]>, ModelError> {
                 let message = format!(
                     "the three `sensor_directions` lie almost in a plane (their triple product is {volume:.3}; 1 at right angles)"
                 );
-                let help =
-                    "three coordinates need three independent measuring directions; check the directions";
+                let help = "three coordinates need three independent measuring directions; check the directions";
                 return Err(source.error(span, message, Some(help.into())));
             }
             Ok(Some(rows))
@@ -238,11 +203,7 @@ fn tracker(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelE
     priors.extend(self::priors(table.take("target_u_um"), 3)?);
     let identity = |zero: f64, one: f64| [[one, zero, zero], [zero, one, zero], [zero, zero, one]];
     Ok(SetUp {
-        station: Station::Tracker(Tracker {
-            target: target_mm,
-            rotation: identity(0.0, 1.0),
-            origin: [0.0; 3],
-        }),
+        station: Station::Tracker(Tracker { target: target_mm, rotation: identity(0.0, 1.0), origin: [0.0; 3] }),
         geometry: Station::Tracker(Tracker {
             target,
             rotation: identity(0.0, 1.0).map(|row| row.map(Length::Number)),
@@ -263,14 +224,8 @@ fn socket(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelEr
         None => None,
     };
     Ok(SetUp {
-        station: Station::Socket(Socket {
-            ball: ball_mm,
-            socket: [0.0; 3],
-        }),
-        geometry: Station::Socket(Socket {
-            ball,
-            socket: [const { Length::Number(0.0) }; 3],
-        }),
+        station: Station::Socket(Socket { ball: ball_mm, socket: [0.0; 3] }),
+        geometry: Station::Socket(Socket { ball, socket: [const { Length::Number(0.0) }; 3] }),
         priors,
         socket,
     })
@@ -301,13 +256,7 @@ fn probe(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelErr
     priors.extend(self::priors(table.take("stylus_u_um"), 3)?);
     let written = |vector: [f64; 3]| vector.map(Length::Number);
     Ok(SetUp {
-        station: Station::Probe(Probe {
-            artefact: artefact_mm,
-            axis,
-            radius: radius_mm,
-            stylus: stylus_mm,
-            direction,
-        }),
+        station: Station::Probe(Probe { artefact: artefact_mm, axis, radius: radius_mm, stylus: stylus_mm, direction }),
         geometry: Station::Probe(Probe {
             artefact,
             axis: written(axis),

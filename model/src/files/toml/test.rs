@@ -31,12 +31,7 @@ pub(super) fn tests(
     mut table: Table<'_>,
     found: &mut Found,
 ) -> Result<Vec<Test>, ModelError> {
-    let SetUp {
-        station,
-        geometry,
-        priors,
-        socket,
-    } = station::set_up(context, &mut table)?;
+    let SetUp { station, geometry, priors, socket } = station::set_up(context, &mut table)?;
     let mut group = |key: &'static str, default: &str| match table.take(key) {
         Some(value) => value.text(),
         None => Ok(default.to_string()),
@@ -47,19 +42,13 @@ pub(super) fn tests(
         InstrumentKind::BallBar => group("bar_setup", name)?,
         _ => name.to_string(),
     };
-    let HeldPositions {
-        mut at,
-        written: at_written,
-        listed,
-    } = at(context, &mut table)?;
+    let HeldPositions { mut at, written: at_written, listed } = at(context, &mut table)?;
     let format = match table.take("format") {
         Some(value) => format::format(value.table(format!("[test.format] of \"{name}\""))?)?,
         None => context.format.clone(),
     };
     let columns = match table.take("columns") {
-        Some(value) => Some(format::columns(
-            value.table(format!("[test.columns] of \"{name}\""))?,
-        )?),
+        Some(value) => Some(format::columns(value.table(format!("[test.columns] of \"{name}\""))?)?),
         None => context.columns.clone(),
     };
     let (sweep, path) = (table.take("sweep"), table.take("path"));
@@ -79,10 +68,7 @@ pub(super) fn tests(
     let data = table.take("data");
     if data.is_none() && matches!(motion, None | Some(Motion::List)) {
         let help = "add `data = \"….csv\"`, or the motion of the axes: `sweep = { … }` or `path = { … }`";
-        return Err(table.error(
-            format!("test \"{name}\" has neither data nor a motion"),
-            Some(help.into()),
-        ));
+        return Err(table.error(format!("test \"{name}\" has neither data nor a motion"), Some(help.into())));
     }
     let span = table.span.clone();
     let source = table.source;
@@ -160,11 +146,7 @@ struct HeldPositions {
 fn at(context: &Context<'_>, table: &mut Table<'_>) -> Result<HeldPositions, ModelError> {
     let machine = context.machine;
     let axes = machine.axes.len();
-    let mut held = HeldPositions {
-        at: vec![0.0; axes],
-        written: vec![None; axes],
-        listed: vec![false; axes],
-    };
+    let mut held = HeldPositions { at: vec![0.0; axes], written: vec![None; axes], listed: vec![false; axes] };
     let Some(value) = table.take("at") else {
         return Ok(held);
     };
@@ -176,10 +158,7 @@ fn at(context: &Context<'_>, table: &mut Table<'_>) -> Result<HeldPositions, Mod
             return Err(entry.source.error(entry.key_span.clone(), message, Some(help)));
         };
         if held.listed[axis] {
-            let message = format!(
-                "`at` gives the position of axis `{}` twice",
-                machine.axes[axis].name
-            );
+            let message = format!("`at` gives the position of axis `{}` twice", machine.axes[axis].name);
             return Err(entry.source.error(entry.key_span.clone(), message, None));
         }
         let (written, number) = context.length(&entry)?;
@@ -195,11 +174,7 @@ fn at(context: &Context<'_>, table: &mut Table<'_>) -> Result<HeldPositions, Mod
 fn data_file(context: &Context<'_>, data: &Value<'_>) -> Result<PathBuf, ModelError> {
     let named = data.text()?;
     let beside = context.file.parent().unwrap_or(Path::new("")).join(&named);
-    let elsewhere = context
-        .options
-        .data_directory
-        .as_ref()
-        .map(|folder| folder.join(&named));
+    let elsewhere = context.options.data_directory.as_ref().map(|folder| folder.join(&named));
     if let Some(found) = elsewhere.iter().chain([&beside]).find(|file| file.exists()) {
         data_folder::check(context.file, context.options, data, found)?;
         return Ok(found.clone());
@@ -209,10 +184,7 @@ fn data_file(context: &Context<'_>, data: &Value<'_>) -> Result<PathBuf, ModelEr
             format!("{} and {}", elsewhere.display(), beside.display()),
             "check that the data folder is the one to which `data` is relative",
         ),
-        None => (
-            beside.display().to_string(),
-            "state the data folder if the data are not beside the session file",
-        ),
+        None => (beside.display().to_string(), "state the data folder if the data are not beside the session file"),
     };
     let message = format!("the data file `{named}` does not exist; looked for {looked}");
     Err(data.file_error(message, help))

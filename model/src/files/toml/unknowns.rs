@@ -72,10 +72,7 @@ fn error_name(machine: &Machine, item: &Value<'_>) -> Result<ErrorName, ModelErr
     let text = item.text()?;
     let Some(mut name) = ErrorName::parse(&text) else {
         let help = "ISO 230-1 names such as \"EY0A\" (location) and \"EYA\" (motion), or `e_y0a`, `θ_z0c`";
-        return Err(item.error(
-            format!("\"{text}\" is not the name of an error"),
-            Some(help.into()),
-        ));
+        return Err(item.error(format!("\"{text}\" is not the name of an error"), Some(help.into())));
     };
     match quantity::axis_index(machine, &name.axis) {
         Some(index) => name.axis.clone_from(&machine.axes[index].name),

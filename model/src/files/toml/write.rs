@@ -5,21 +5,24 @@ use std::path::Path;
 
 use super::document::Source;
 use crate::chain::Machine;
-use crate::effect::{Driver, Effect, Shape};
+use crate::effect::Effect;
+use crate::effect::keys::KeyWriter;
 use crate::error::ModelError;
 
 /// A session's text with additional effects at its end; the existing text and its comments are unchanged.
 ///
 /// ```
 /// use abbe_model::chain::Machine;
-/// use abbe_model::effect::{Component, Driver, Effect, Shape};
+/// use abbe_model::driver::Driver;
+/// use abbe_model::effect::shape::Harmonic;
+/// use abbe_model::effect::{Component, Effect, Shape};
 /// use abbe_model::files::toml::write;
 ///
 /// let machine = Machine::from_code("wCAbYXZt")?;
 /// let effect = Effect {
 ///     component: Component::parse("EZC").unwrap(),
 ///     driver: Driver::parse("C"),
-///     shape: Shape::Harmonic { order: 2.0 },
+///     shape: Shape::Harmonic(Harmonic { order: 2.0 }),
 ///     tests: Vec::new(),
 /// };
 /// let text = write::with_effects("# a session\n", &[effect], &machine);
@@ -43,105 +46,16 @@ pub fn with_effects(original: &str, effects: &[Effect], machine: &Machine) -> St
 
 /// One `[[effect]]`.
 fn effect_table(effect: &Effect, machine: &Machine) -> String {
-    let mut text = String::from("[[effect]]\n");
-    let mut line = |key: &str, value: String| {
-        // Writing to a String does not fail.
-        let _ = writeln!(text, "{key} = {value}");
-    };
-    line("component", quoted(&effect.component.to_string()));
-    line("driver", quoted(&effect.driver.to_string()));
-    let word = match &effect.shape {
-        Shape::Power { .. } => "power",
-        other => other.word(),
-    };
-    line("shape", quoted(word));
-    let unit = unit(&effect.driver, machine);
-    let mut quantity = |id_stem: &str, value: f64| {
-        let (suffix, number) = in_unit(unit, value);
-        line(&format!("{id_stem}_{suffix}"), number);
-    };
-    match &effect.shape {
-        Shape::Constant | Shape::Backlash | Shape::Lag | Shape::Drift => {}
-        Shape::Polynomial { degree, scale } | Shape::Power { degree, scale } => {
-            quantity("scale", *scale);
-            line("order", degree.to_string());
-        }
-        Shape::Harmonic { order } => line("order", order.to_string()),
-        Shape::Periodic { period } => quantity("period", *period),
-        Shape::Curve {
-            from,
-            to,
-            intervals,
-            closed,
-        } => {
-            quantity("from", *from);
-            quantity("to", *to);
-            line("intervals", intervals.to_string());
-            line("closed", closed.to_string());
-        }
-        Shape::ReversalSpike { width } => quantity("width", *width),
-        Shape::Warmup { tau_s } => line("tau_s", tau_s.to_string()),
-        Shape::Steps { at } => {
-            // All positions in one unit: degrees if every one of them converts exactly both ways.
-            let all: Vec<(&str, String)> = at.iter().map(|position| in_unit(unit, *position)).collect();
-            let fallback = all.iter().any(|(suffix, _)| *suffix == "rad");
-            let suffix = if fallback {
-                "rad"
-            } else {
-                all.first().map_or(unit, |(suffix, _)| *suffix)
-            };
-            let numbers: Vec<String> = at
-                .iter()
-                .zip(all)
-                .map(|(position, (_, number))| if fallback { position.to_string() } else { number })
-                .collect();
-            line(&format!("at_{suffix}"), format!("[{}]", numbers.join(", ")));
-        }
-        Shape::Local {
-            centre,
-            width,
-            recurs,
-        } => {
-            quantity("centre", *centre);
-            quantity("width", *width);
-            if recurs.is_none() && unit == "deg" {
-                line("recurs", "false".into());
-            }
-        }
-    }
+    let mut keys = KeyWriter::new("[[effect]]", effect.driver_unit(machine));
+    keys.line("component", quoted(&effect.component.to_string()));
+    keys.line("driver", quoted(&effect.driver.to_string()));
+    keys.line("shape", quoted(effect.shape.entry().word));
+    effect.shape.write(&mut keys);
     if !effect.tests.is_empty() {
         let names: Vec<String> = effect.tests.iter().map(|name| quoted(name)).collect();
-        line("tests", format!("[{}]", names.join(", ")));
+        keys.line("tests", format!("[{}]", names.join(", ")));
     }
-    text
-}
-
-/// The suffix of a driver's unit in files.
-fn unit(driver: &Driver, machine: &Machine) -> &'static str {
-    match driver {
-        Driver::Axis(name) => match machine.axis_index(name).map(|index| machine.axes[index].kind) {
-            Some(kind) => kind.unit(),
-            None => "mm",
-        },
-        Driver::Time => "s",
-        Driver::Temperature => "c",
-        Driver::Gravity | Driver::None => "m",
-    }
-}
-
-/// A number in a driver's unit that reads back to the same bits: degrees if they do, else radians.
-fn in_unit(unit: &'static str, value: f64) -> (&'static str, String) {
-    if unit != "deg" {
-        return (unit, value.to_string());
-    }
-    let degrees = value.to_degrees();
-    let round = (degrees * 1e9).round() / 1e9;
-    for candidate in [round, degrees, degrees.next_up(), degrees.next_down()] {
-        if candidate.to_radians() == value {
-            return ("deg", candidate.to_string());
-        }
-    }
-    ("rad", value.to_string())
+    keys.finish()
 }
 
 /// A TOML string: JSON escapes are valid in TOML.

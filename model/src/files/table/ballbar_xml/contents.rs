@@ -60,14 +60,9 @@ fn decoded(file: &Path, stated: Option<&'static Encoding>) -> Result<(FileStamp,
     let opened = File::open(file).map_err(unreadable)?;
     let stamp = FileStamp::of(file, &opened.metadata().map_err(unreadable)?);
     let mut bytes = Vec::new();
-    (&opened)
-        .take(MAX_BYTES + 1)
-        .read_to_end(&mut bytes)
-        .map_err(unreadable)?;
+    (&opened).take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
     if bytes.len() as u64 > MAX_BYTES {
-        return Err(fault(format!(
-            "more than {MAX_BYTES} bytes, the limit of a ball-bar file in XML"
-        )));
+        return Err(fault(format!("more than {MAX_BYTES} bytes, the limit of a ball-bar file in XML")));
     }
     stamp.check(&opened)?;
     let (encoding, mark) = encoding::of_start(&bytes, stated);
@@ -81,10 +76,7 @@ fn decoded(file: &Path, stated: Option<&'static Encoding>) -> Result<(FileStamp,
 ///
 /// # Errors
 /// If it is not XML.
-pub(super) fn parse(
-    file: &Path,
-    encoding: Option<&'static Encoding>,
-) -> Result<(FileStamp, Contents), ModelError> {
+pub(super) fn parse(file: &Path, encoding: Option<&'static Encoding>) -> Result<(FileStamp, Contents), ModelError> {
     let (stamp, text) = decoded(file, encoding)?;
     let mut reader = Reader::from_str(&text);
     let mut contents = Contents::default();
@@ -92,17 +84,13 @@ pub(super) fn parse(
     let (mut line, mut counted) = (1, 0);
     loop {
         let until = (reader.buffer_position() as usize).min(text.len());
-        line += text.as_bytes()[counted..until]
-            .iter()
-            .filter(|byte| **byte == b'\n')
-            .count();
+        line += text.as_bytes()[counted..until].iter().filter(|byte| **byte == b'\n').count();
         counted = until;
         let broken = |cause: String| ModelError::Input {
             location: Location::line(file, line),
             message: format!("not valid XML: {cause}"),
             help: Some(
-                "a ball-bar file in XML is expected; other files need another name, such as .csv or .xlsx"
-                    .into(),
+                "a ball-bar file in XML is expected; other files need another name, such as .csv or .xlsx".into(),
             ),
         };
         match reader.read_event() {
@@ -143,14 +131,8 @@ fn opened(
     broken: &impl Fn(String) -> ModelError,
 ) -> Result<OpenElement, ModelError> {
     let name = start.local_name().as_ref().to_string();
-    let mut element = OpenElement {
-        name,
-        line,
-        text: String::new(),
-        direction: None,
-        once: false,
-        undirected_runs: Vec::new(),
-    };
+    let mut element =
+        OpenElement { name, line, text: String::new(), direction: None, once: false, undirected_runs: Vec::new() };
     for attribute in start.attributes() {
         let attribute = attribute.map_err(|cause| broken(cause.to_string()))?;
         let value = attribute.value.trim().to_string();
@@ -177,11 +159,7 @@ fn close(mut element: OpenElement, open: &mut [OpenElement], contents: &mut Cont
     match element.name.as_str() {
         READINGS => {
             element.undirected_runs.push(contents.runs.len());
-            contents.runs.push(Run {
-                line: element.line,
-                direction: None,
-                text: std::mem::take(&mut element.text),
-            });
+            contents.runs.push(Run { line: element.line, direction: None, text: std::mem::take(&mut element.text) });
         }
         DIRECTION => {
             if element.direction.is_none() {
@@ -215,9 +193,7 @@ fn assign_direction(element: &mut OpenElement, contents: &mut Contents) {
     };
     let settled = !element.undirected_runs.is_empty();
     for run in element.undirected_runs.drain(..) {
-        contents.runs[run]
-            .direction
-            .get_or_insert_with(|| direction.clone());
+        contents.runs[run].direction.get_or_insert_with(|| direction.clone());
     }
     if settled && element.once {
         element.direction = None;

@@ -3,14 +3,8 @@
 use super::contents::Run;
 
 const CLOCKWISE: [&str; 3] = ["CW", "CLOCKWISE", "CLOCK_WISE"];
-const ANTICLOCKWISE: [&str; 6] = [
-    "CCW",
-    "ACW",
-    "ANTICLOCKWISE",
-    "COUNTERCLOCKWISE",
-    "ANTI_CLOCKWISE",
-    "COUNTER_CLOCKWISE",
-];
+const ANTICLOCKWISE: [&str; 6] =
+    ["CCW", "ACW", "ANTICLOCKWISE", "COUNTERCLOCKWISE", "ANTI_CLOCKWISE", "COUNTER_CLOCKWISE"];
 const KNOWN: &str = "known words are CW, CCW, CLOCKWISE, ANTICLOCKWISE, COUNTERCLOCKWISE; for others use \
                      `[format] anticlockwise = \"…\"`, the word for the direction from the first axis of the plane towards the second";
 
@@ -77,25 +71,14 @@ mod tests {
     fn of(directions: &[&str], stated: Option<&str>) -> Result<Vec<bool>, String> {
         let runs: Vec<Run> = directions
             .iter()
-            .map(|direction| Run {
-                line: 1,
-                direction: Some(direction.to_string()),
-                text: String::new(),
-            })
+            .map(|direction| Run { line: 1, direction: Some(direction.to_string()), text: String::new() })
             .collect();
         of_runs(&runs, stated).map_err(|(_, message, _)| message)
     }
 
     #[test]
     fn known_words_keep_their_meaning_whatever_is_stated() {
-        for stated in [
-            None,
-            Some("0"),
-            Some("true"),
-            Some("CCW"),
-            Some("ccw"),
-            Some("anti-clockwise"),
-        ] {
+        for stated in [None, Some("0"), Some("true"), Some("CCW"), Some("ccw"), Some("anti-clockwise")] {
             for words in [["CCW", "CW"], ["ccw", "cw"], ["Counter-Clockwise", "clockwise"]] {
                 assert_eq!(of(&words, stated), Ok(vec![true, false]), "{words:?} {stated:?}");
             }

@@ -45,11 +45,7 @@ fn read(file: &Path, request: &Request<'_>) -> Result<WholeReadings, ModelError>
     let role = value_role(file, request)?;
     let (stamp, contents) = contents::parse(file, request.format.encoding)?;
     let fault = |line: usize, message: String, help: String| ModelError::Input {
-        location: if line == 0 {
-            Location::file(file)
-        } else {
-            Location::line(file, line)
-        },
+        location: if line == 0 { Location::file(file) } else { Location::line(file, line) },
         message,
         help: Some(help),
     };
@@ -57,25 +53,12 @@ fn read(file: &Path, request: &Request<'_>) -> Result<WholeReadings, ModelError>
         let help = "only ball-bar files with runs of READINGS are read; export the readings as CSV and map its columns";
         return Err(fault(0, "it has no element READINGS".into(), help.into()));
     }
-    let Some(Motion::Circle {
-        first,
-        second,
-        from,
-        to,
-        ..
-    }) = &test.motion
-    else {
+    let Some(Motion::Circle { first, second, from, to, .. }) = &test.motion else {
         let help = "state the circle: `path = { kind = \"circle\", plane = \"XY\", radius_mm = …, from_deg = …, to_deg = …, step_deg = 1 }`; \
                     readings are evenly distributed from one end to the other";
-        return Err(fault(
-            0,
-            "READINGS have no angles, and the test has no `path`".into(),
-            help.into(),
-        ));
+        return Err(fault(0, "READINGS have no angles, and the test has no `path`".into(), help.into()));
     };
-    let plane = [*first, *second]
-        .map(|axis| request.machine.axes[axis].name.clone())
-        .concat();
+    let plane = [*first, *second].map(|axis| request.machine.axes[axis].name.clone()).concat();
     if let Some((stated, line)) = &contents.plane {
         let letters = |text: &str| {
             let mut letters: Vec<char> = text.to_uppercase().chars().collect();
@@ -84,18 +67,11 @@ fn read(file: &Path, request: &Request<'_>) -> Result<WholeReadings, ModelError>
         };
         if letters(stated) != letters(&plane) {
             let message = format!("TEST_PLANE is `{stated}`, but the test's `path` is in {plane}");
-            return Err(fault(
-                *line,
-                message,
-                "name the file that belongs to the test".into(),
-            ));
+            return Err(fault(*line, message, "name the file that belongs to the test".into()));
         }
     }
-    let mut readings = Readings {
-        positions: vec![Vec::new(); request.machine.axes.len()],
-        coordinates: 1,
-        ..Readings::default()
-    };
+    let mut readings =
+        Readings { positions: vec![Vec::new(); request.machine.axes.len()], coordinates: 1, ..Readings::default() };
     let mut line = Vec::new();
     let directions = direction::of_runs(&contents.runs, request.format.anticlockwise.as_deref())
         .map_err(|(line, message, help)| fault(line, message, help))?;
@@ -104,28 +80,18 @@ fn read(file: &Path, request: &Request<'_>) -> Result<WholeReadings, ModelError>
         let numbers: Vec<&str> = run.text.split(part).filter(|word| !word.is_empty()).collect();
         let count = numbers.len();
         if count < 2 {
-            let message = format!(
-                "READINGS with {count} number{}",
-                if count == 1 { "" } else { "s" }
-            );
-            return Err(fault(
-                run.line,
-                message,
-                "a run has one for each point of the circle".into(),
-            ));
+            let message = format!("READINGS with {count} number{}", if count == 1 { "" } else { "s" });
+            return Err(fault(run.line, message, "a run has one for each point of the circle".into()));
         }
         let (start, end) = if forward { (*from, *to) } else { (*to, *from) };
-        let angles: Vec<f64> = (0..count)
-            .map(|k| start + (end - start) * k as f64 / (count - 1) as f64)
-            .collect();
+        let angles: Vec<f64> = (0..count).map(|k| start + (end - start) * k as f64 / (count - 1) as f64).collect();
         let Some(states) = trajectory::on_circle(request.machine, test, &angles) else {
             continue;
         };
         let states = states.map_err(|(message, help)| fault(0, message, help))?;
         for (state, cell) in states.iter().zip(&numbers) {
-            let value = number(cell, &request.format).map_err(|(message, help)| {
-                fault(run.line, format!("READINGS: {message}"), help.to_string())
-            })?;
+            let value = number(cell, &request.format)
+                .map_err(|(message, help)| fault(run.line, format!("READINGS: {message}"), help.to_string()))?;
             for (column, at) in readings.positions.iter_mut().zip(state) {
                 column.push(*at);
             }
@@ -143,13 +109,7 @@ fn read(file: &Path, request: &Request<'_>) -> Result<WholeReadings, ModelError>
         let names: Vec<String> = contents
             .unread
             .iter()
-            .map(|(name, count)| {
-                if *count > 1 {
-                    format!("{name} ({count})")
-                } else {
-                    name.clone()
-                }
-            })
+            .map(|(name, count)| if *count > 1 { format!("{name} ({count})") } else { name.clone() })
             .collect();
         warnings.push(format!(
             "{}: {} runs read; not read, since their meaning is not publicly known: {}",
@@ -158,34 +118,17 @@ fn read(file: &Path, request: &Request<'_>) -> Result<WholeReadings, ModelError>
             names.join(", ")
         ));
     }
-    readings.origin = Some(Origin {
-        file: file.to_path_buf(),
-        line,
-    });
-    Ok(WholeReadings {
-        stamp,
-        readings,
-        warnings,
-    })
+    readings.origin = Some(Origin { file: file.to_path_buf(), line });
+    Ok(WholeReadings { stamp, readings, warnings })
 }
 
 /// The column of ours that READINGS contains, as `[columns]` states.
 fn value_role(file: &Path, request: &Request<'_>) -> Result<Role, ModelError> {
     let help = "state their unit: `[columns]` with `deviation_um = \"READINGS\"` (from `bar_mm`), or `length_mm = \"READINGS\"`";
     let mapped = request.columns.unwrap_or(&[]);
-    let fault = |location: Location, message: String| ModelError::Input {
-        location,
-        message,
-        help: Some(help.into()),
-    };
-    let Some(entry) = mapped
-        .iter()
-        .find(|entry| entry.foreign == ForeignColumn::Name(READINGS.into()))
-    else {
-        return Err(fault(
-            Location::file(file),
-            "the file does not state the unit of its READINGS".into(),
-        ));
+    let fault = |location: Location, message: String| ModelError::Input { location, message, help: Some(help.into()) };
+    let Some(entry) = mapped.iter().find(|entry| entry.foreign == ForeignColumn::Name(READINGS.into())) else {
+        return Err(fault(Location::file(file), "the file does not state the unit of its READINGS".into()));
     };
     if let Some(other) = mapped.iter().find(|other| other.own != entry.own) {
         let message = format!("a ball-bar file in XML has no column for `{}`", other.own);
@@ -193,9 +136,6 @@ fn value_role(file: &Path, request: &Request<'_>) -> Result<Role, ModelError> {
     }
     match Role::of(&entry.own, request) {
         Some(role @ (Role::Deviation(_) | Role::Length(_))) => Ok(role),
-        _ => Err(fault(
-            entry.location.clone(),
-            format!("READINGS cannot be `{}`", entry.own),
-        )),
+        _ => Err(fault(entry.location.clone(), format!("READINGS cannot be `{}`", entry.own))),
     }
 }

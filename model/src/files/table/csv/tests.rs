@@ -30,15 +30,9 @@ fn a_file_at_its_limits_is_read_and_one_beyond_them_is_refused() {
     let still = |_: &Path| {};
     assert_eq!(read("1,2\n3,4\n5,6\n", limits, still), Ok(3));
     let long = read("1,2\n3,4\n5,67\n", limits, still).unwrap_err();
-    assert!(
-        long.ends_with("a data file of 13 bytes; the limit is 12"),
-        "{long}"
-    );
+    assert!(long.ends_with("a data file of 13 bytes; the limit is 12"), "{long}");
     let many = read("1\n2\n3\n4\n", limits, still).unwrap_err();
-    assert!(
-        many.ends_with("data.csv:4: more than 3 rows, which is the limit"),
-        "{many}"
-    );
+    assert!(many.ends_with("data.csv:4: more than 3 rows, which is the limit"), "{many}");
 }
 
 #[test]
@@ -50,10 +44,7 @@ fn cell_spans_are_correct_after_a_byte_order_mark_and_non_ascii_text() {
         let mut rows = opened(&file, &Format::default(), LIMITS).unwrap();
         [(); 2].map(|()| rows.next_row().unwrap().unwrap().span(1))
     };
-    assert_eq!(
-        spans("\u{feff}0,pq\r\nµµm,7\n".as_bytes()),
-        [Some(5..7), Some(15..16)]
-    );
+    assert_eq!(spans("\u{feff}0,pq\r\nµµm,7\n".as_bytes()), [Some(5..7), Some(15..16)]);
     // The whole line, because the file has two bytes where the text has four.
     assert_eq!(spans(b"0,pq\r\n\xb5\xb5m,7\n"), [Some(2..4), Some(6..11)]);
 }
@@ -65,9 +56,7 @@ fn every_encoding_gives_the_same_cells() {
     let cells = |bytes: &[u8], format: &Format| -> Vec<(usize, Vec<String>)> {
         std::fs::write(&file, bytes).unwrap();
         let mut rows = opened(&file, format, LIMITS).unwrap();
-        std::iter::from_fn(|| rows.next_row().unwrap())
-            .map(|row| (row.line, row.cells))
-            .collect()
+        std::iter::from_fn(|| rows.next_row().unwrap()).map(|row| (row.line, row.cells)).collect()
     };
     // U+0A05 and U+010A contain the byte of a line end.
     let text = "Länge,b\u{a05}\u{10a}\r\n1,2\n\n3,4";
@@ -81,25 +70,15 @@ fn every_encoding_gives_the_same_cells() {
             let bytes: Vec<u8> = units.iter().copied().flat_map(of).collect();
             // The first letter need not be ASCII with a zero byte: the mark or the stated encoding decides.
             let stated = Format {
-                encoding: encoding::of_name(if bytes[0] == 0 || bytes[0] == 0xfe {
-                    "utf-16be"
-                } else {
-                    "utf-16"
-                }),
+                encoding: encoding::of_name(if bytes[0] == 0 || bytes[0] == 0xfe { "utf-16be" } else { "utf-16" }),
                 ..Format::default()
             };
             assert_eq!(cells(&bytes, &stated), expected);
         }
     }
-    assert_eq!(
-        cells(b"L\xe4nge,b\r\n1,2\n", &Format::default())[0].1,
-        ["Länge", "b"]
-    );
+    assert_eq!(cells(b"L\xe4nge,b\r\n1,2\n", &Format::default())[0].1, ["Länge", "b"]);
     // Lines above the table may contain anything.
-    let skipping = Format {
-        skip_lines: 2,
-        ..Format::default()
-    };
+    let skipping = Format { skip_lines: 2, ..Format::default() };
     let rows = cells(b"measured on \"Tuesday\r\n\nx,y\n1,2\n", &skipping);
     assert_eq!(rows[0], (3, vec!["x".to_string(), "y".to_string()]));
 }
@@ -109,17 +88,11 @@ fn a_line_that_is_not_in_the_stated_encoding_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("data.csv");
     std::fs::write(&file, b"x,y\nL\xe4nge,2\n").unwrap();
-    let format = Format {
-        encoding: encoding::of_name("utf-8"),
-        ..Format::default()
-    };
+    let format = Format { encoding: encoding::of_name("utf-8"), ..Format::default() };
     let mut rows = opened(&file, &format, LIMITS).unwrap();
     rows.next_row().unwrap();
     let fault = rows.next_row().unwrap_err();
-    assert!(
-        fault.to_string().ends_with(":2: the line is not valid UTF-8"),
-        "{fault}"
-    );
+    assert!(fault.to_string().ends_with(":2: the line is not valid UTF-8"), "{fault}");
     assert!(fault.help().unwrap().contains("encoding = \"latin1\""));
 }
 
@@ -130,16 +103,10 @@ fn a_file_that_changes_while_it_is_read_is_refused() {
         std::io::Write::write_all(&mut open, b"5,6\n").unwrap();
     };
     let changed = read("1,2\n3,4\n", LIMITS, append).unwrap_err();
-    assert!(
-        changed.ends_with("the file changed while it was read"),
-        "{changed}"
-    );
+    assert!(changed.ends_with("the file changed while it was read"), "{changed}");
     let cut = |file: &Path| std::fs::write(file, "1,2\n").unwrap();
     let changed = read("1,2\n3,4\n", LIMITS, cut).unwrap_err();
-    assert!(
-        changed.ends_with("the file changed while it was read"),
-        "{changed}"
-    );
+    assert!(changed.ends_with("the file changed while it was read"), "{changed}");
 }
 
 #[cfg(unix)]

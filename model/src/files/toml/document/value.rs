@@ -30,11 +30,7 @@ impl<'a> Value<'a> {
 
     /// An error about the file that the value names.
     pub fn file_error(&self, message: String, help: &str) -> ModelError {
-        ModelError::FileAccess {
-            location: self.source.location(self.span.clone()),
-            message,
-            help: help.to_string(),
-        }
+        ModelError::FileAccess { location: self.source.location(self.span.clone()), message, help: help.to_string() }
     }
 
     /// An error with the found value and the expected one.
@@ -56,10 +52,7 @@ impl<'a> Value<'a> {
             DeValue::String(text) => match text.chars().find(|c| c.is_control() && *c != '\t') {
                 None => Ok(text.to_string()),
                 Some(control) => Err(self.error(
-                    format!(
-                        "`{}` contains the control character U+{:04X}",
-                        self.key, control as u32
-                    ),
+                    format!("`{}` contains the control character U+{:04X}", self.key, control as u32),
                     Some("remove it".into()),
                 )),
             },
@@ -79,15 +72,12 @@ impl<'a> Value<'a> {
             DeValue::Float(number) => Ok(number.as_str().to_string()),
             DeValue::Boolean(truth) => Ok(truth.to_string()),
             DeValue::Datetime(date) => Ok(date.to_string()),
-            DeValue::String(text) => match text.chars().find(|c| c.is_control() && !matches!(c, '\t' | '\n'))
-            {
+            DeValue::String(text) => match text.chars().find(|c| c.is_control() && !matches!(c, '\t' | '\n')) {
                 // A comment may have several lines.
                 None => Ok(text.trim().to_string()),
                 Some(_) => self.text(),
             },
-            DeValue::Array(_) | DeValue::Table(_) => {
-                Err(self.unexpected("a text in quotes, a number or a date"))
-            }
+            DeValue::Array(_) | DeValue::Table(_) => Err(self.unexpected("a text in quotes, a number or a date")),
         }
     }
 
@@ -98,9 +88,7 @@ impl<'a> Value<'a> {
 
     /// true or false.
     pub fn boolean(&self) -> Result<bool, ModelError> {
-        self.value
-            .as_bool()
-            .ok_or_else(|| self.unexpected("true or false"))
+        self.value.as_bool().ok_or_else(|| self.unexpected("true or false"))
     }
 
     /// A number within [`limits::LARGEST`], possibly infinite, never NaN.
@@ -144,10 +132,7 @@ impl<'a> Value<'a> {
         if number > 0.0 {
             Ok(number)
         } else {
-            Err(self.error(
-                format!("`{}` is {number}; it must be greater than 0", self.key),
-                None,
-            ))
+            Err(self.error(format!("`{}` is {number}; it must be greater than 0", self.key), None))
         }
     }
 
@@ -157,13 +142,8 @@ impl<'a> Value<'a> {
         if number.fract() == 0.0 && number >= least as f64 && number <= most as f64 {
             Ok(number as usize)
         } else {
-            Err(self.error(
-                format!(
-                    "`{}` is {number}; a whole number from {least} to {most} is expected",
-                    self.key
-                ),
-                None,
-            ))
+            Err(self
+                .error(format!("`{}` is {number}; a whole number from {least} to {most} is expected", self.key), None))
         }
     }
 
@@ -219,11 +199,7 @@ impl<'a> Value<'a> {
             return Err(self.unexpected("a table"));
         }
         // Messages about the table point at its header `[name]`.
-        let span = if self.key_span.start < self.span.start {
-            self.key_span.clone()
-        } else {
-            self.span.clone()
-        };
+        let span = if self.key_span.start < self.span.start { self.key_span.clone() } else { self.span.clone() };
         match self.value {
             DeValue::Table(table) => Ok(Table::new(self.source, name, span, table)),
             _ => Ok(Table::new(self.source, name, span, DeTable::new())),

@@ -1,0 +1,109 @@
+//! `harmonic`: whole or broken cycles per revolution of a rotary axis: cos nq, sin nq.
+
+use std::f64::consts::TAU;
+
+use super::kind::{Basis, Entry, Follows, ShapeFault, ShapeKind, positive};
+use super::words::EffectWords;
+use super::{DriverSample, Key, KeyForm, KeyWriter, Shape};
+use crate::effect::sampled::{READINGS_PER_CYCLE, Sampled};
+use crate::scalar::Nominal;
+
+/// Cosine and sine of `order` times a rotary position.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Harmonic {
+    /// Cycles per revolution.
+    pub order: f64,
+}
+
+/// Highest order of the library.
+const HIGHEST_ORDER: usize = 120;
+/// Highest order for poses, which sample an axis at random. An independent search found no significant order above it.
+const HIGHEST_ORDER_OF_POSES: usize = 40;
+
+const ORDER: Key = Key {
+    name: "order",
+    form: KeyForm::Positive,
+    meaning: "cycles per revolution of a harmonic",
+};
+
+pub(super) const ENTRY: Entry = Entry {
+    word: "harmonic",
+    keys: &[ORDER],
+    follows: Follows::RotaryAxis,
+    read: |keys| {
+        Ok(Shape::Harmonic(Harmonic {
+            order: keys.required_positive("order", "add `order = 1`")?,
+        }))
+    },
+    members: |sampled| Harmonic::up_to(highest_order(sampled)),
+};
+
+/// The highest order that the sampling resolves.
+fn highest_order(sampled: &Sampled) -> usize {
+    if sampled.poses {
+        HIGHEST_ORDER_OF_POSES
+    } else if sampled.step > 0.0 {
+        ((TAU / (READINGS_PER_CYCLE * sampled.step)) as usize).clamp(1, HIGHEST_ORDER)
+    } else {
+        0
+    }
+}
+
+impl Harmonic {
+    /// The members of the library up to an order. There are many high orders, and each single one is unlikely. The cost
+    /// therefore grows as the logarithm of the order.
+    pub fn up_to(most: usize) -> Vec<(Shape, f64)> {
+        let orders = (1..=most).map(|order| order as f64);
+        orders
+            .map(|order| (Shape::Harmonic(Harmonic { order }), order.ln()))
+            .collect()
+    }
+
+    /// `once`, `twice`, `17 times`.
+    fn times(&self) -> String {
+        if self.order == 1.0 {
+            "once".to_string()
+        } else if self.order == 2.0 {
+            "twice".to_string()
+        } else {
+            format!("{} times", self.order)
+        }
+    }
+}
+
+impl ShapeKind for Harmonic {
+    fn entry(&self) -> &'static Entry {
+        &ENTRY
+    }
+    fn write(&self, keys: &mut KeyWriter) {
+        keys.line("order", self.order);
+    }
+    fn check(&self) -> Result<(), ShapeFault> {
+        positive(self.order, "the order of a harmonic")
+    }
+    fn describe(&self, words: &EffectWords) -> String {
+        format!("{} {} per turn{}", words.motion, self.times(), words.of_another_axis)
+    }
+    fn tag(&self) -> String {
+        format!("h{}", self.order)
+    }
+    fn order(&self) -> Option<f64> {
+        Some(self.order)
+    }
+    fn coefficients(&self) -> usize {
+        2
+    }
+    fn coefficient_names(&self) -> Vec<String> {
+        vec!["cos".into(), "sin".into()]
+    }
+    fn is_wave(&self) -> bool {
+        true
+    }
+}
+
+impl Basis for Harmonic {
+    fn basis<N: Nominal>(&self, sample: &DriverSample<N>, basis: &mut Vec<N>) {
+        let (sin, cos) = (N::constant(self.order) * sample.value).sin_cos();
+        basis.extend([cos, sin]);
+    }
+}
