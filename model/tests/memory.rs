@@ -16,6 +16,11 @@ use abbe_model::session::{Prior, Session};
 const SESSION: &str = r#"
 [machine]
 chain = "w C A b Y X Z t"
+[machine.axis.C]
+[machine.axis.A]
+[machine.axis.X]
+[machine.axis.Y]
+[machine.axis.Z]
 [instrument]
 kind = "ballbar"
 [[test]]

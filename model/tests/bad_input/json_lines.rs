@@ -89,7 +89,7 @@ fn every_fault_has_its_line_and_key() {
 
 #[test]
 fn a_socket_is_named_by_a_text_or_a_number() {
-    let text = "[machine]\nchain = \"w b C t\"\n[instrument]\nkind = \"socket\"\n[[test]]\nname = \"T\"\n\
+    let text = "[machine]\nchain = \"w b C t\"\n[machine.axis.C]\n[instrument]\nkind = \"socket\"\n[[test]]\nname = \"T\"\n\
                 data = \"T.ndjson\"\nball_mm = [0, 0, 100]\n";
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("session.toml"), text).unwrap();
