@@ -106,7 +106,7 @@ impl Pulls {
         self.freedom > 0 && law.is_ok_and(|law| law.sf(self.together) < SIGNIFICANCE)
     }
 
-    /// By how much χ² of the set-up parameters exceeds its least value with the probability [`SIGNIFICANCE`] if their
+    /// By how much χ² of the set-up parameters exceeds its least value with the probability `SIGNIFICANCE` if their
     /// statements are right.
     pub fn allowed(&self) -> f64 {
         let law = ChiSquared::new(self.freedom as f64);

@@ -11,7 +11,7 @@ use crate::scalar::Nominal;
 pub struct Polynomial {
     /// Highest power, at least 1.
     pub degree: usize,
-    /// The divisor of the driver, which makes coefficients comparable: see [`crate::effect::Driver::default_scale`].
+    /// The divisor of the driver, which makes coefficients comparable: see [`crate::driver`].
     pub scale: f64,
 }
 

@@ -95,7 +95,7 @@ pub fn write(path: &Path, machine: &Machine, station: &Station<f64>, readings: &
     whole::write(path, &text(machine, station, readings))
 }
 
-/// The text of [`write`].
+/// The text of [`write()`].
 pub fn text(machine: &Machine, station: &Station<f64>, readings: &Readings) -> String {
     let mut header = Vec::new();
     if !readings.time_s.is_empty() {

@@ -1,11 +1,11 @@
 //! Data files: tables of readings in any format, and foreign files through `[format]` and `[columns]`.
 //!
-//! - [`format`]: what a data format is; [`formats`]: the registry; one module per format: [`csv`], [`spreadsheet`],
-//!   [`ballbar_xml`],
-//!   [`json_lines`];
-//! - [`request`]: what a test requires of its file; [`columns`], [`required`]: roles of columns; [`fill`]: readings
+//! - `format`: what a data format is; `formats`: the registry; one module per format: `csv`, `spreadsheet`,
+//!   `ballbar_xml`,
+//!   `json_lines`;
+//! - `request`: what a test requires of its file; `columns`, `required`: roles of columns; `fill`: readings
 //!   from rows;
-//! - [`lines`], [`encoding`], [`row`], [`number`]: lines of a text, rows and cells.
+//! - `lines`, `encoding`, `row`, `number`: lines of a text, rows and cells.
 
 mod ballbar_xml;
 mod columns;
