@@ -69,7 +69,7 @@ impl CompensationArguments {
         self.compensation.is_some()
     }
 
-    /// Refuses tables that cannot be written, before the work.
+    /// Checks before the fit that the tables can be written.
     pub fn check(&self) -> Result<(), Failure> {
         let Some(folder) = &self.compensation else {
             return Ok(());

@@ -16,13 +16,13 @@ use crate::start::nominal_points;
 
 /// Poses that are refitted with each mistake.
 const MAX_POSES: usize = 300;
-/// How many times smaller a mistake has to make the residual of the nominal machine.
+/// Least factor by which a mistake lowers the residual of the nominal machine.
 const LOWERED: f64 = 5.0;
-/// Mistakes that leave no more than this many times what the best leaves are listed too.
+/// Mistakes whose residual is below this multiple of the least residual are also listed.
 const NOT_SEPARABLE: f64 = 1.5;
-/// The most that are listed.
+/// Maximum number of listed mistakes.
 const MAX_LISTED: usize = 5;
-/// Any noise will do where residuals are compared, mm.
+/// Noise for the comparison of residuals, mm; its value has no influence.
 const NOISE_MM: f64 = 1.0;
 
 /// Mean square of the distances of the positions from their mean, mm²: of those measured, or, where a ball sits in

@@ -1,4 +1,4 @@
-//! How well a session with one statement changed fits its readings: a fit to some of them.
+//! A fit of a session with one changed statement to a part of its readings.
 //!
 //! The fit is iterated to its minimum. A freed parameter may be poorly determined; full Gauss–Newton steps then move it
 //! by as much as its prior allows, and the square of such a step exceeds the noise.
@@ -12,7 +12,7 @@ use crate::preference::pivot_preference;
 use crate::problem::Problem;
 use crate::rank::Rank;
 
-/// The fit of a session in figures.
+/// The result of a quick fit.
 #[derive(Clone, Debug)]
 pub(super) struct Trial {
     /// χ² of readings and priors.
@@ -22,7 +22,7 @@ pub(super) struct Trial {
     pub excess: f64,
     /// Residual over scalar readings, mm.
     pub rms_mm: f64,
-    /// What the parameters cost: twice the logarithm of the volume of the priors over that after the fit.
+    /// Complexity penalty: twice the logarithm of the ratio of prior volume to posterior volume.
     pub cost: f64,
 }
 

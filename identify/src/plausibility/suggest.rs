@@ -1,5 +1,5 @@
-//! Which single mistake would remove the conflicts: a refit with each. The likelihood decides which are listed, the
-//! evidence in what order.
+//! The single mistakes that remove the conflicts, found by a refit with each. The likelihood decides which are listed,
+//! the evidence decides their order.
 
 use abbe_model::session::Session;
 use rayon::prelude::*;
@@ -12,7 +12,7 @@ use crate::problem::Problem;
 
 /// Number of readings that are refitted with each mistake.
 const MAX_READINGS: usize = 1500;
-/// By how much a mistake has to lower χ² for it to be listed: a likelihood ratio of 150.
+/// Least decrease of χ² by a listed mistake: a likelihood ratio of 150.
 const MIN_FALL: f64 = 10.0;
 /// Maximum number of mistakes that are listed.
 const MAX_LISTED: usize = 10;
@@ -23,7 +23,7 @@ const MAX_HYPOTHESES: usize = 40;
 const MAX_EXCESS: f64 = 1.2;
 /// Scores that differ by less than the reciprocal of this are equal.
 const TIED: f64 = 100.0;
-/// By what factor a mistake has to lower χ² for it to be suggested on the residual alone.
+/// Least factor by which a mistake that is suggested from the residual alone lowers χ².
 const LOWERED: f64 = 4.0;
 
 /// The mistakes that remove the conflicts of a session whose instrument reads between table and tool, the most probable
@@ -45,7 +45,7 @@ pub(super) fn suggestions(problem: &Problem<'_>, conflicts: &[Conflict], allowed
     if by_residual {
         tried.retain(|(_, found)| found.chi_square * LOWERED < base.chi_square);
     }
-    // What remains with the best of them is noise: no mistake of the session explains it. Priors keep their weight.
+    // The residual of the best fit is noise that no mistake explains. The priors keep their weight.
     let excess = (tried.iter()).map(|(_, found)| found.excess).fold(base.excess, f64::min);
     if excess > MAX_EXCESS {
         let list = tried.into_iter().map(|(hypothesis, _)| hypothesis).collect();
@@ -73,7 +73,7 @@ pub(super) fn suggestions(problem: &Problem<'_>, conflicts: &[Conflict], allowed
 /// Fits the session as it is stated, and with each mistake that can be fitted.
 fn trials(stated: &Session, list: Vec<Hypothesis>, sigma_mm: f64) -> (Trial, Vec<(Hypothesis, Trial)>) {
     let noise = Noise::white(sigma_mm, NoiseSource::Stated);
-    // Where the session as stated cannot be fitted, anything that can is better.
+    // If the session as stated cannot be fitted, every mistake that can be fitted is better.
     let base = trial(stated, &noise).unwrap_or(Trial {
         chi_square: f64::INFINITY,
         excess: f64::INFINITY,

@@ -12,10 +12,10 @@ use crate::problem::Problem;
 /// Maximum number of rounds: a conflict may appear only after another is removed.
 const MAX_ROUNDS: usize = 5;
 
-/// A changed statement that makes the residual so many times smaller is the explanation.
+/// A changed statement that lowers the residual by this factor is the explanation.
 const STATEMENT_EXPLAINS: f64 = 5.0;
 
-/// Whether readings and session have so little in common that a search for effects makes no sense.
+/// Whether readings and session disagree so much that a search for effects is meaningless.
 pub(crate) fn is_another_session(plausibility: &Plausibility) -> bool {
     plausibility.conflicts.iter().any(|conflict| match conflict.kind {
         ConflictKind::Residual => true,
@@ -26,7 +26,7 @@ pub(crate) fn is_another_session(plausibility: &Plausibility) -> bool {
 }
 
 /// Replaces the priors of the set-up parameters whose statements the readings contradict by wide ones, so that no
-/// effect is claimed in the place of a wrong statement. Returns the identifiers of these parameters and the fit; `None`
+/// effect is accepted instead of a wrong statement. Returns the identifiers of these parameters and the fit; `None`
 /// where nothing is contradicted.
 ///
 /// # Errors

@@ -208,7 +208,7 @@ fn with_noise_of_repeats<'a>(
     Ok(first)
 }
 
-/// Traces with a given noise model. The repeats in the residuals `pure` determine the null distribution.
+/// Traces with a given noise model. The null distribution is drawn from the repeats in the residuals `pure`.
 fn trace_with<'a>(
     problem: Problem<'a>,
     before_fit: Fit,

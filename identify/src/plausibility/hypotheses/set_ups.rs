@@ -1,4 +1,4 @@
-//! Mistakes in what is stated of balls, bars and readings.
+//! Mistakes in the statements about balls, bars and readings.
 
 use abbe_model::instrument::Station;
 use abbe_model::session::{Prior, Session, Test};
@@ -7,7 +7,7 @@ use super::super::results::SuggestionKind;
 use super::{Hypothesis, ZERO_MM, measured, with_readings};
 use crate::parameters::physical_size;
 
-/// Corrections of a bar's calibration between these are plausible, mm.
+/// Plausible range of the correction of a bar's calibration, mm.
 const CORRECTIONS_MM: [f64; 2] = [1e-3, 0.5];
 
 /// Balls on the other side.
@@ -123,7 +123,7 @@ pub(super) fn readings(session: &Session) -> Vec<Hypothesis> {
     list
 }
 
-/// Things of the set-up that are not where they are stated, and tests from another session.
+/// Balls and bars that differ from their statements, and tests from another session.
 pub(super) fn things(session: &Session) -> Vec<Hypothesis> {
     let unknowns = session.instrument.unknowns();
     let mut list: Vec<Hypothesis> = Vec::new();

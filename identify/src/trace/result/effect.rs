@@ -1,4 +1,4 @@
-//! A found effect as it is reported: its name, the numbers of its shape, its parameters, its curve.
+//! Results of a found effect: name, numbers of the shape, parameters, curve.
 
 use abbe_model::chain::Machine;
 use abbe_model::driver::DriverSample;
@@ -13,7 +13,7 @@ use crate::results::{CurvePoint, EffectName, EffectResult, ParameterResult, Shap
 use crate::trace::library::Family;
 use abbe_model::effect::description::{explanations, meaning};
 
-/// An effect's name as it stands in results.
+/// The name of an effect in results.
 pub fn effect_name(machine: &Machine, effect: &Effect) -> EffectName {
     EffectName {
         component: effect.component.to_string(),
@@ -25,21 +25,21 @@ pub fn effect_name(machine: &Machine, effect: &Effect) -> EffectName {
     }
 }
 
-/// A found effect and what is known of it.
+/// A found effect with the results that its report needs.
 pub(super) struct Found<'f> {
-    /// Its place among the found effects.
+    /// Index among the found effects.
     pub number: usize,
-    /// All parameters after the search, what aliases would move covered.
+    /// All parameters after the search; their `u` cover the changes by aliases.
     pub parameters: &'f [ParameterResult],
-    /// How far the unknowns would move by the aliases of each found effect.
+    /// Changes of the parameters by the aliases of each found effect.
     pub moves: &'f Moves,
-    /// What it takes off the residual, µm.
+    /// Decrease of the residual by the effect, µm.
     pub rms_gain_um: f64,
-    /// What the readings cannot tell from it.
+    /// The effects with which it is confounded.
     pub alias_effects: &'f [Effect],
 }
 
-/// A found effect as it is reported.
+/// The results of a found effect.
 pub(super) fn result(
     findings: &TraceFindings<'_, '_>,
     families: &[Family],
@@ -75,7 +75,7 @@ pub(super) fn result(
     }
 }
 
-/// Of all parameters those of the `number`-th effect.
+/// The parameters of the `number`-th effect.
 fn parameters_of(problem: &Problem<'_>, parameters: &[ParameterResult], number: usize) -> Vec<ParameterResult> {
     let Some(id) = problem.parameters.effect_ids.get(number) else {
         return Vec::new();
@@ -86,10 +86,10 @@ fn parameters_of(problem: &Problem<'_>, parameters: &[ParameterResult], number: 
     parameters.iter().filter(is_own).cloned().collect()
 }
 
-/// Points at which a curve is reported.
+/// Number of points of a reported curve.
 const CURVE_POINTS: usize = 73;
 
-/// The points of a free curve with their band; empty for other shapes.
+/// The points of a nonparametric curve with their standard uncertainty; empty for other shapes.
 fn curve_of(problem: &Problem<'_>, fit: &Fit, number: usize, moves: &Moves) -> Vec<CurvePoint> {
     let Some(effect) = problem.parameters.effects.get(number) else {
         return Vec::new();
@@ -128,7 +128,7 @@ fn curve_of(problem: &Problem<'_>, fit: &Fit, number: usize, moves: &Moves) -> V
         .collect()
 }
 
-/// Units of a curve's places and values; empty for other shapes.
+/// Units of the positions and values of a curve; empty for other shapes.
 fn curve_units(problem: &Problem<'_>, effect: &Effect) -> (String, String) {
     if !matches!(effect.shape, Shape::Curve { .. }) {
         return (String::new(), String::new());
@@ -139,7 +139,7 @@ fn curve_units(problem: &Problem<'_>, effect: &Effect) -> (String, String) {
     )
 }
 
-/// The numbers and places of an effect's shape.
+/// The numbers and positions of the shape of an effect.
 fn shape_parameters_of(problem: &Problem<'_>, effect: &Effect) -> Vec<ShapeParameter> {
     let unit = effect.driver_unit(&problem.session.machine);
     let number = |(name, values): (&str, Vec<f64>)| ShapeParameter {
@@ -188,7 +188,7 @@ mod tests {
             assert_eq!(enlarged.value, by_noise.value);
         }
 
-        // Splines share out one: where an alias moves all coefficients by 1 µm, it moves the curve by that.
+        // The splines sum to one: an alias that changes all coefficients by 1 µm changes the curve by 1 µm.
         let of_curve =
             |j: usize| matches!(problem.parameters.list[j].role, Role::Coefficient { effect, .. } if effect == number);
         let alias: Vec<f64> = (0..fit.beta.len()).map(|j| if of_curve(j) { 1e-3 } else { 0.0 }).collect();

@@ -1,4 +1,4 @@
-//! From a finished search to what is reported.
+//! Results of a finished search.
 
 mod effect;
 mod rejected;
@@ -25,7 +25,7 @@ pub(super) use effect::effect_name;
 pub(super) use unsearched::unsearched;
 use verdict::{not_examined, verdict};
 
-/// What a search has come to.
+/// The end state of a search.
 pub(super) struct TraceFindings<'f, 'a> {
     pub before: &'f Problem<'a>,
     pub before_fit: &'f Fit,
@@ -44,14 +44,14 @@ pub(super) struct TraceFindings<'f, 'a> {
     pub candidates_seen: usize,
 }
 
-/// What is reported, and what stands behind it.
+/// The result, with the data that reports need.
 pub(super) struct ReportedEffect {
     pub result: TraceResult,
     pub alias_effects: Vec<Vec<Effect>>,
     pub competing_effects: Vec<Vec<CompetingEffect>>,
 }
 
-/// What is reported, and for each effect what looks like it and what stands highest in its place.
+/// The result, and for each effect its aliases and the best competing effects.
 pub(super) fn report(findings: &TraceFindings<'_, '_>) -> Result<ReportedEffect, IdentifyError> {
     let TraceFindings { before, before_fit, after, after_fit, search, .. } = findings;
     let before_result = before_result(findings);
@@ -110,7 +110,7 @@ pub(super) fn report(findings: &TraceFindings<'_, '_>) -> Result<ReportedEffect,
         remainder,
         residual_before: match findings.structure_before {
             Some(structure) if structure.is_significant() => structure.description.clone(),
-            // Detectors look at one test at a time; the search adds up what all tests show of one effect.
+            // Detectors examine one test at a time; the search sums the evidence of all tests for one effect.
             Some(_) if !search.selected().is_empty() => {
                 "structure that no single test shows beyond noise; the search over all tests finds it".to_string()
             }
@@ -134,7 +134,7 @@ pub(super) fn report(findings: &TraceFindings<'_, '_>) -> Result<ReportedEffect,
     Ok(ReportedEffect { result, alias_effects, competing_effects })
 }
 
-/// Held-out errors in µm: whitened sums of squares are turned into them by the declared model's own figure.
+/// Held-out errors in µm. The held-out error of the declared model converts whitened sums of squares to µm.
 struct HeldOut<'s> {
     sums: &'s [f64],
     /// Whitened rows.
@@ -149,7 +149,7 @@ impl<'s> HeldOut<'s> {
         HeldOut { sums: &search.held_out, rows, scale_um: before_um / (first / rows).sqrt().max(f64::MIN_POSITIVE) }
     }
 
-    /// With so many effects.
+    /// With this number of effects.
     fn um(&self, effects: usize) -> f64 {
         let sum = self.sums.get(effects).or(self.sums.last());
         (sum.copied().unwrap_or(1.0) / self.rows).sqrt() * self.scale_um
@@ -160,19 +160,20 @@ impl<'s> HeldOut<'s> {
     }
 }
 
-/// The variance that aliases are separated by, in that of the noise: among poses, what the found effects leave.
+/// Variance for the comparison of aliases, relative to that of the noise. For poses it is that of the remaining
+/// residual.
 fn residual_variance(findings: &TraceFindings<'_, '_>) -> f64 {
     if !findings.search.stop.in_residual_variance {
         return 1.0;
     }
     let residuals = findings.after_fit.residuals.iter().flatten();
-    // Evidence is counted in the noise that the search went by.
+    // The evidence uses the noise of the search.
     let sigma_mm = findings.before.noise.sigma_mm;
     let sum: f64 = residuals.map(|v| (v / sigma_mm).powi(2)).sum();
     (sum / findings.search.columns.rows().max(1) as f64).max(1.0)
 }
 
-/// The declared model, on the readings that count after the search as well.
+/// The declared model, on the readings that are not excluded after the search.
 fn before_result(findings: &TraceFindings<'_, '_>) -> ModelResult {
     let (before, fit, after) = (findings.before, findings.before_fit, findings.after);
     let result = model_result(before, fit, fit.held_out.rms_mm);
@@ -207,12 +208,12 @@ pub(super) fn model_result(problem: &Problem<'_>, fit: &Fit, held_out_mm: f64) -
     }
 }
 
-/// How far the unknowns after the search would move, internal units: by found effect, by alias in its place, by
-/// unknown.
+/// Changes of the parameters after the search, internal units: by found effect, by alias that replaces it, by
+/// parameter.
 type Moves = [Vec<Vec<f64>>];
 
-/// By how much some values would move, where they are such functions of the unknowns: for each effect the largest move
-/// that one of its aliases makes, as the root of the sum of squares.
+/// Changes of functions of the parameters: the root sum of squares over the effects of the largest change by one of
+/// their aliases.
 fn alias_shifts(moves: &Moves, present: &[f64], values: impl Fn(&[f64]) -> Vec<f64>, beta: &[f64]) -> Vec<f64> {
     let mut squares = vec![0.0; present.len()];
     for of_effect in moves {
@@ -228,7 +229,7 @@ fn alias_shifts(moves: &Moves, present: &[f64], values: impl Fn(&[f64]) -> Vec<f
     squares.into_iter().map(f64::sqrt).collect()
 }
 
-/// Lets uncertainties cover what aliases would move.
+/// Enlarges the uncertainties to cover the changes by aliases.
 fn cover(parameters: &mut [ParameterResult], problem: &Problem<'_>, fit: &Fit, moves: &Moves) {
     let quantities = fit::quantities(problem, &fit.rank);
     let values = |beta: &[f64]| {
@@ -247,20 +248,20 @@ fn cover(parameters: &mut [ParameterResult], problem: &Problem<'_>, fit: &Fit, m
     phases_follow_amplitudes(parameters);
 }
 
-/// How far the unknowns move if an alias stands in the place of the `k`-th effect, internal units: `in_place` and
-/// `named` are the coefficients of the model without that effect beside the alias and beside the effect. Its own do not
-/// move: the alias has none of them.
+/// Changes of the parameters if an alias replaces the `k`-th effect, internal units. `in_place` and `named` are the
+/// coefficients of the model without that effect, fitted together with the alias and with the effect. The coefficients
+/// of the effect itself do not change: the alias has none of them.
 fn moves_by(findings: &TraceFindings<'_, '_>, k: usize, in_place: &[f64], named: &[f64]) -> Vec<f64> {
     let (search, to_unknowns) = (findings.search, &findings.start.to_parameters);
     let by: Vec<f64> = in_place.iter().zip(named).map(|(a, b)| a - b).collect();
     let (of_declared, of_found) = by.split_at(search.rank);
-    // What was declared comes first among the unknowns, the found effects after it in their order.
+    // The parameters of the declared model come first, then the found effects in their order.
     let mut moves: Vec<f64> = (0..to_unknowns.nrows())
         .map(|j| of_declared.iter().enumerate().map(|(k, by)| to_unknowns[(j, k)] * by).sum())
         .collect();
     let mut of_found = of_found.iter();
     for (l, taken) in search.selected().iter().enumerate() {
-        // Base columns are unit-length copies of the candidate's own.
+        // Base columns are the columns of the candidate scaled to unit length.
         for norm in search.norms(taken.candidate) {
             let by = if l == k { None } else { of_found.next() };
             moves.push(by.map_or(0.0, |by| by / norm.max(f64::MIN_POSITIVE)));

@@ -1,4 +1,4 @@
-//! Candidates that the search added and that are not claimed.
+//! Candidates that the search added and that are rejected by the held-out error.
 
 use abbe_model::chain::Machine;
 
@@ -23,7 +23,7 @@ pub(super) fn candidates(machine: &Machine, search: &Search<'_>, held_out: &Held
 }
 
 impl HeldOut<'_> {
-    /// A fall of the sum of squares as a fall of the rms, with its standard error: `Δ(rms²) = 2 rms Δrms`.
+    /// A decrease of the sum of squares as a decrease of the rms, with its standard error: `Δ(rms²) = 2 rms Δrms`.
     fn decrease_um(&self, fall: HeldOutDecrease) -> (f64, f64) {
         let by_um = |by: f64| {
             let squares_um = by / self.rows * self.scale_um * self.scale_um;

@@ -1,4 +1,4 @@
-//! What is reported of a trace without a search: the declared model.
+//! Result of a trace without a search: that of the declared model.
 
 use super::{model_result, not_examined};
 use crate::fit::{self, Fit};

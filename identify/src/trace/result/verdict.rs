@@ -29,7 +29,7 @@ pub(super) fn verdict(findings: &TraceFindings<'_, '_>, effects: &[EffectResult]
     (word.to_string(), remainder)
 }
 
-/// What is said of the residual of an interrupted trace.
+/// Description of the residual of an interrupted trace.
 pub(super) fn not_examined() -> Remainder {
     Remainder { structured: false, p_value: 1.0, place: Some("not examined: the trace was interrupted".to_string()) }
 }
