@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use super::Driver;
 use super::kind::{DriverInput, DriverKind, Entry, Recorded, SymbolInput, Symbols};
 use super::quantity::DriverQuantity;
-use super::sample::{DriverSample, DriverPart};
+use super::sample::{DriverPart, DriverSample};
 use super::unit::DriverUnit;
 use crate::axis::AxisKind;
 use crate::scalar::Nominal;
@@ -19,11 +19,8 @@ pub(super) const MILLIMETRE: DriverUnit = DriverUnit::new("mm", "mm", "mm", " mm
 /// Positions of a rotary axis: degrees in files, radians inside.
 pub(super) const ANGLE: DriverUnit = DriverUnit::new("deg", "rad", "deg", "°");
 
-pub(super) const ENTRY: Entry = Entry {
-    word: None,
-    driver: |name| Driver::Axis(name.to_string()),
-    units: &[MILLIMETRE, ANGLE],
-};
+pub(super) const ENTRY: Entry =
+    Entry { word: None, driver: |name| Driver::Axis(name.to_string()), units: &[MILLIMETRE, ANGLE] };
 
 impl DriverKind for AxisDriver<'_> {
     fn unit(&self, axis: Option<AxisKind>) -> DriverUnit {

@@ -18,11 +18,7 @@ pub(super) struct Gravity;
 const METRE: DriverUnit = DriverUnit::new("m", "m", "m", " m");
 const MILLIMETRES_PER_METRE: f64 = 1000.0;
 
-pub(super) const ENTRY: Entry = Entry {
-    word: Some("gravity"),
-    driver: |_| Driver::Gravity,
-    units: &[METRE],
-};
+pub(super) const ENTRY: Entry = Entry { word: Some("gravity"), driver: |_| Driver::Gravity, units: &[METRE] };
 
 impl DriverKind for Gravity {
     fn unit(&self, _: Option<AxisKind>) -> DriverUnit {
@@ -32,11 +28,7 @@ impl DriverKind for Gravity {
         let DriverInput { machine, model, .. } = input;
         let axis = input.component_axis?;
         let station = model.station();
-        let point = if axis < machine.workpiece_side {
-            station.table_point_mm()?
-        } else {
-            station.tool_point_mm()
-        };
+        let point = if axis < machine.workpiece_side { station.table_point_mm()? } else { station.tool_point_mm() };
         let moment = |row| machine.gravity_moment_mm(axis, &model.state(row), point) / MILLIMETRES_PER_METRE;
         let sample = |row| DriverSample::plain(moment(row), 0.0);
         Some((0..model.rows()).map(sample).collect())

@@ -11,11 +11,7 @@ use crate::scalar::Nominal;
 /// No driver.
 pub(super) struct NoDriver;
 
-pub(super) const ENTRY: Entry = Entry {
-    word: Some("none"),
-    driver: |_| Driver::None,
-    units: &[axis::MILLIMETRE],
-};
+pub(super) const ENTRY: Entry = Entry { word: Some("none"), driver: |_| Driver::None, units: &[axis::MILLIMETRE] };
 
 impl DriverKind for NoDriver {
     fn unit(&self, _: Option<AxisKind>) -> DriverUnit {
@@ -33,11 +29,7 @@ impl DriverKind for NoDriver {
 }
 
 impl Symbols for NoDriver {
-    fn symbols<N: Nominal>(
-        &self,
-        _: &SymbolInput<'_, N>,
-        _: &impl Fn(DriverQuantity) -> N,
-    ) -> Option<DriverSample<N>> {
+    fn symbols<N: Nominal>(&self, _: &SymbolInput<'_, N>, _: &impl Fn(DriverQuantity) -> N) -> Option<DriverSample<N>> {
         let zero = N::constant(0.0);
         Some(DriverSample::plain(zero, zero))
     }

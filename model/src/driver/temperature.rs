@@ -14,11 +14,7 @@ pub(super) struct Temperature;
 /// A difference in results is in kelvins.
 const CELSIUS: DriverUnit = DriverUnit::new("c", "c", "K", " °C");
 
-pub(super) const ENTRY: Entry = Entry {
-    word: Some("temperature"),
-    driver: |_| Driver::Temperature,
-    units: &[CELSIUS],
-};
+pub(super) const ENTRY: Entry = Entry { word: Some("temperature"), driver: |_| Driver::Temperature, units: &[CELSIUS] };
 
 impl DriverKind for Temperature {
     fn unit(&self, _: Option<AxisKind>) -> DriverUnit {

@@ -14,11 +14,7 @@ pub(super) struct Time;
 const SECOND: DriverUnit = DriverUnit::new("s", "s", "s", " s");
 const SECONDS_PER_HOUR: f64 = 3600.0;
 
-pub(super) const ENTRY: Entry = Entry {
-    word: Some("time"),
-    driver: |_| Driver::Time,
-    units: &[SECOND],
-};
+pub(super) const ENTRY: Entry = Entry { word: Some("time"), driver: |_| Driver::Time, units: &[SECOND] };
 
 impl DriverKind for Time {
     fn unit(&self, _: Option<AxisKind>) -> DriverUnit {

@@ -17,11 +17,7 @@ pub(super) const ENTRY: Entry = Entry {
     follows: Follows::Axis,
     read: |_| Ok(Shape::Backlash),
     members: |sampled| {
-        if sampled.both_directions && !sampled.poses {
-            vec![(Shape::Backlash, 0.0)]
-        } else {
-            Vec::new()
-        }
+        if sampled.both_directions && !sampled.poses { vec![(Shape::Backlash, 0.0)] } else { Vec::new() }
     },
 };
 
@@ -37,11 +33,7 @@ impl ShapeKind for Backlash {
         if words.is_positioning {
             "lost motion (backlash) at reversal".to_string()
         } else {
-            let EffectWords {
-                motion,
-                of_another_axis,
-                ..
-            } = words;
+            let EffectWords { motion, of_another_axis, .. } = words;
             format!("{motion} that changes at reversal{of_another_axis} (backlash)")
         }
     }

@@ -29,34 +29,14 @@ const MAX_INTERVALS: usize = 500;
 /// Highest number of intervals in the library for poses.
 const MAX_INTERVALS_OF_POSES: usize = 16;
 
-const INTERVALS: Key = Key {
-    name: "intervals",
-    form: KeyForm::Count(1, MAX_INTERVALS),
-    meaning: "intervals of a curve",
-};
-const CLOSED: Key = Key {
-    name: "closed",
-    form: KeyForm::Flag,
-    meaning: "whether a curve is periodic",
-};
-const FROM: Key = Key {
-    name: "from",
-    form: KeyForm::Quantity,
-    meaning: "start of a curve",
-};
-const TO: Key = Key {
-    name: "to",
-    form: KeyForm::Quantity,
-    meaning: "end of a curve",
-};
+const INTERVALS: Key =
+    Key { name: "intervals", form: KeyForm::Count(1, MAX_INTERVALS), meaning: "intervals of a curve" };
+const CLOSED: Key = Key { name: "closed", form: KeyForm::Flag, meaning: "whether a curve is periodic" };
+const FROM: Key = Key { name: "from", form: KeyForm::Quantity, meaning: "start of a curve" };
+const TO: Key = Key { name: "to", form: KeyForm::Quantity, meaning: "end of a curve" };
 
-pub(super) const ENTRY: Entry = Entry {
-    word: "curve",
-    keys: &[INTERVALS, CLOSED, FROM, TO],
-    follows: Follows::Anything,
-    read,
-    members,
-};
+pub(super) const ENTRY: Entry =
+    Entry { word: "curve", keys: &[INTERVALS, CLOSED, FROM, TO], follows: Follows::Anything, read, members };
 
 /// Reads a curve. By default it covers the full revolution of a rotary axis and is closed; for other drivers its ends
 /// are required.
@@ -75,12 +55,7 @@ fn read(keys: &mut dyn KeyReader) -> Result<Shape, ModelError> {
         (keys.required_quantity(&FROM)?, keys.required_quantity(&TO)?)
     };
     let intervals = keys.count("intervals", 1, MAX_INTERVALS)?;
-    Ok(Shape::Curve(Curve {
-        from,
-        to,
-        intervals: intervals.unwrap_or(DEFAULT_INTERVALS),
-        closed,
-    }))
+    Ok(Shape::Curve(Curve { from, to, intervals: intervals.unwrap_or(DEFAULT_INTERVALS), closed }))
 }
 
 fn members(sampled: &Sampled) -> Vec<(Shape, f64)> {
@@ -94,17 +69,8 @@ fn members(sampled: &Sampled) -> Vec<(Shape, f64)> {
         sampled.poses && *intervals <= MAX_INTERVALS_OF_POSES
             || sampled.step > 0.0 && 1.5 * sampled.step * *intervals as f64 <= sampled.span()
     };
-    let curve = |intervals| Curve {
-        from,
-        to,
-        intervals,
-        closed,
-    };
-    [8, 16, 32, 64]
-        .into_iter()
-        .filter(observable)
-        .map(|intervals| (Shape::Curve(curve(intervals)), 0.0))
-        .collect()
+    let curve = |intervals| Curve { from, to, intervals, closed };
+    [8, 16, 32, 64].into_iter().filter(observable).map(|intervals| (Shape::Curve(curve(intervals)), 0.0)).collect()
 }
 
 impl ShapeKind for Curve {
@@ -129,17 +95,10 @@ impl ShapeKind for Curve {
         Ok(())
     }
     fn describe(&self, words: &EffectWords) -> String {
-        format!(
-            "{}, a nonparametric curve over {} in {} intervals",
-            words.motion, words.driver, self.intervals
-        )
+        format!("{}, a nonparametric curve over {} in {} intervals", words.motion, words.driver, self.intervals)
     }
     fn coefficients(&self) -> usize {
-        if self.closed {
-            self.intervals
-        } else {
-            self.intervals + 3
-        }
+        if self.closed { self.intervals } else { self.intervals + 3 }
     }
     fn varies_within(&self) -> Option<[f64; 2]> {
         let margin = 0.1 * (self.to - self.from);
@@ -156,21 +115,13 @@ impl Basis for Curve {
         let start = basis.len();
         basis.resize(start + self.coefficients(), constant(0.0));
         let mut along = (sample.value - constant(self.from)) / constant(self.to - self.from);
-        along = if closed {
-            along - along.floor()
-        } else {
-            along.at_least(0.0).at_most(1.0)
-        };
+        along = if closed { along - along.floor() } else { along.at_least(0.0).at_most(1.0) };
         let position = along * constant(intervals as f64);
         let interval = position.floor().at_most((intervals - 1) as f64);
         let four = pieces(position - interval);
         let mut add = |interval: usize, value: &dyn Fn(N) -> N| {
             for (k, piece) in four.into_iter().enumerate() {
-                let index = if closed {
-                    (interval + k) % intervals
-                } else {
-                    interval + k
-                };
+                let index = if closed { (interval + k) % intervals } else { interval + k };
                 basis[start + index] = basis[start + index] + value(piece);
             }
         };

@@ -20,21 +20,13 @@ const HIGHEST_ORDER: usize = 120;
 /// Highest order for poses, which sample an axis at random. An independent search found no significant order above it.
 const HIGHEST_ORDER_OF_POSES: usize = 40;
 
-const ORDER: Key = Key {
-    name: "order",
-    form: KeyForm::Positive,
-    meaning: "cycles per revolution of a harmonic",
-};
+const ORDER: Key = Key { name: "order", form: KeyForm::Positive, meaning: "cycles per revolution of a harmonic" };
 
 pub(super) const ENTRY: Entry = Entry {
     word: "harmonic",
     keys: &[ORDER],
     follows: Follows::RotaryAxis,
-    read: |keys| {
-        Ok(Shape::Harmonic(Harmonic {
-            order: keys.required_positive("order", "add `order = 1`")?,
-        }))
-    },
+    read: |keys| Ok(Shape::Harmonic(Harmonic { order: keys.required_positive("order", "add `order = 1`")? })),
     members: |sampled| Harmonic::up_to(highest_order(sampled)),
 };
 
@@ -54,9 +46,7 @@ impl Harmonic {
     /// therefore grows as the logarithm of the order.
     pub fn up_to(most: usize) -> Vec<(Shape, f64)> {
         let orders = (1..=most).map(|order| order as f64);
-        orders
-            .map(|order| (Shape::Harmonic(Harmonic { order }), order.ln()))
-            .collect()
+        orders.map(|order| (Shape::Harmonic(Harmonic { order }), order.ln())).collect()
     }
 
     /// `once`, `twice`, `17 times`.

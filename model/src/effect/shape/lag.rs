@@ -17,11 +17,7 @@ pub(super) const ENTRY: Entry = Entry {
     follows: Follows::Axis,
     read: |_| Ok(Shape::Lag),
     members: |sampled| {
-        if sampled.has_time && !sampled.poses {
-            vec![(Shape::Lag, 0.0)]
-        } else {
-            Vec::new()
-        }
+        if sampled.has_time && !sampled.poses { vec![(Shape::Lag, 0.0)] } else { Vec::new() }
     },
 };
 
@@ -37,11 +33,7 @@ impl ShapeKind for Lag {
         if words.is_positioning {
             "lag behind the command in proportion to the speed".to_string()
         } else {
-            let EffectWords {
-                motion,
-                of_another_axis,
-                ..
-            } = words;
+            let EffectWords { motion, of_another_axis, .. } = words;
             format!("{motion} in proportion to the speed{of_another_axis}")
         }
     }

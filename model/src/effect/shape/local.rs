@@ -22,16 +22,8 @@ pub struct Local {
 /// Half widths of the library, as shares of the travel. Centres are one width apart.
 const WIDTHS: [f64; 3] = [0.02, 0.04, 0.08];
 
-const CENTRE: Key = Key {
-    name: "centre",
-    form: KeyForm::Quantity,
-    meaning: "centre of a local effect",
-};
-const WIDTH: Key = Key {
-    name: "width",
-    form: KeyForm::Quantity,
-    meaning: "half width of a local effect",
-};
+const CENTRE: Key = Key { name: "centre", form: KeyForm::Quantity, meaning: "centre of a local effect" };
+const WIDTH: Key = Key { name: "width", form: KeyForm::Quantity, meaning: "half width of a local effect" };
 const RECURS: Key = Key {
     name: "recurs",
     form: KeyForm::Flag,
@@ -46,11 +38,7 @@ pub(super) const ENTRY: Entry = Entry {
         let centre = keys.required_quantity(&CENTRE)?;
         let width = keys.required_quantity(&WIDTH)?;
         let recurs = keys.flag("recurs")?.unwrap_or(true);
-        Ok(Shape::Local(Local {
-            centre,
-            width,
-            recurs: (recurs && keys.unit().is_angle()).then_some(TAU),
-        }))
+        Ok(Shape::Local(Local { centre, width, recurs: (recurs && keys.unit().is_angle()).then_some(TAU) }))
     },
     members,
 };
@@ -66,11 +54,7 @@ fn members(sampled: &Sampled) -> Vec<(Shape, f64)> {
         let count = (1.0 / share) as usize;
         for k in 0..count {
             let centre = low + sampled.span() * (k as f64 + 0.5) / count as f64;
-            let local = Local {
-                centre,
-                width,
-                recurs,
-            };
+            let local = Local { centre, width, recurs };
             members.push((Shape::Local(local), 0.0));
         }
     }
@@ -118,10 +102,7 @@ impl ShapeKind for Local {
         self.width
     }
     fn brackets(&self, _: f64) -> Vec<[f64; 2]> {
-        vec![
-            [self.centre - self.width, self.centre + self.width],
-            [self.width * 0.5, self.width * 2.0],
-        ]
+        vec![[self.centre - self.width, self.centre + self.width], [self.width * 0.5, self.width * 2.0]]
     }
     fn set_number(&mut self, which: usize, value: f64) {
         match which {

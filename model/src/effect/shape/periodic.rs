@@ -20,21 +20,13 @@ const MAX_HALF_CYCLES: usize = 240;
 /// Cost of a member.
 const COST: f64 = 0.5;
 
-pub(super) const PERIOD: Key = Key {
-    name: "period",
-    form: KeyForm::Quantity,
-    meaning: "length of a period",
-};
+pub(super) const PERIOD: Key = Key { name: "period", form: KeyForm::Quantity, meaning: "length of a period" };
 
 pub(super) const ENTRY: Entry = Entry {
     word: "periodic",
     keys: &[PERIOD],
     follows: Follows::Anything,
-    read: |keys| {
-        Ok(Shape::Periodic(Periodic {
-            period: keys.required_quantity(&PERIOD)?,
-        }))
-    },
+    read: |keys| Ok(Shape::Periodic(Periodic { period: keys.required_quantity(&PERIOD)? })),
     members,
 };
 
@@ -79,12 +71,7 @@ impl ShapeKind for Periodic {
         positive(self.period, "a period")
     }
     fn describe(&self, words: &EffectWords) -> String {
-        format!(
-            "{}, repeating every {}{}",
-            words.motion,
-            words.at_value(self.period),
-            words.of_another_axis
-        )
+        format!("{}, repeating every {}{}", words.motion, words.at_value(self.period), words.of_another_axis)
     }
     fn coefficients(&self) -> usize {
         2

@@ -18,17 +18,10 @@ pub struct Polynomial {
 /// Highest degree. Powers of more are collinear to rounding.
 const HIGHEST_DEGREE: usize = 30;
 
-pub(super) const SCALE: Key = Key {
-    name: "scale",
-    form: KeyForm::Quantity,
-    meaning: "divisor of the driver in a polynomial",
-};
+pub(super) const SCALE: Key =
+    Key { name: "scale", form: KeyForm::Quantity, meaning: "divisor of the driver in a polynomial" };
 
-pub(super) const ORDER: Key = Key {
-    name: "order",
-    form: KeyForm::Positive,
-    meaning: "degree of a polynomial",
-};
+pub(super) const ORDER: Key = Key { name: "order", form: KeyForm::Positive, meaning: "degree of a polynomial" };
 
 pub(super) const ENTRY: Entry = Entry {
     word: "polynomial",
@@ -76,10 +69,7 @@ impl ShapeKind for Polynomial {
         check(self.degree, self.scale)
     }
     fn describe(&self, words: &EffectWords) -> String {
-        format!(
-            "{}, a polynomial of degree {} in {}",
-            words.motion, self.degree, words.driver
-        )
+        format!("{}, a polynomial of degree {} in {}", words.motion, self.degree, words.driver)
     }
     fn tag(&self) -> String {
         format!("p{}", self.degree)
@@ -91,11 +81,7 @@ impl ShapeKind for Polynomial {
         self.degree
     }
     fn per(&self, k: usize) -> Per {
-        if self.scale == 1.0 {
-            Per::Power(k + 1)
-        } else {
-            Per::One
-        }
+        if self.scale == 1.0 { Per::Power(k + 1) } else { Per::One }
     }
 }
 

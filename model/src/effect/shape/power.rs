@@ -25,10 +25,7 @@ pub(super) const ENTRY: Entry = Entry {
     members: |sampled| {
         let scale = sampled.default_scale;
         let member = |degree: &f64| {
-            let shape = Shape::Power(Power {
-                degree: *degree as usize,
-                scale,
-            });
+            let shape = Shape::Power(Power { degree: *degree as usize, scale });
             (shape, COST_PER_DEGREE * degree)
         };
         sampled.numbers.iter().map(member).collect()
@@ -68,11 +65,7 @@ impl ShapeKind for Power {
         Some(self.degree as f64)
     }
     fn per(&self, _: usize) -> Per {
-        if self.scale == 1.0 {
-            Per::Power(self.degree)
-        } else {
-            Per::One
-        }
+        if self.scale == 1.0 { Per::Power(self.degree) } else { Per::One }
     }
 }
 

@@ -3,8 +3,8 @@
 use super::kind::{Basis, Entry, Follows, ShapeFault, ShapeKind, positive};
 use super::words::EffectWords;
 use super::{DriverSample, Key, KeyForm, KeyWriter, Shape};
-use crate::effect::sampled::Sampled;
 use crate::driver::DriverPart;
+use crate::effect::sampled::Sampled;
 use crate::scalar::Nominal;
 
 /// A peak after each reversal that decays with the distance moved.
@@ -17,21 +17,13 @@ pub struct ReversalSpike {
 /// Widths of the library, as shares of the travel.
 const WIDTHS: [f64; 5] = [0.002, 0.005, 0.01, 0.02, 0.05];
 
-const WIDTH: Key = Key {
-    name: "width",
-    form: KeyForm::Quantity,
-    meaning: "decay distance of a reversal spike",
-};
+const WIDTH: Key = Key { name: "width", form: KeyForm::Quantity, meaning: "decay distance of a reversal spike" };
 
 pub(super) const ENTRY: Entry = Entry {
     word: "reversal-spike",
     keys: &[WIDTH],
     follows: Follows::Axis,
-    read: |keys| {
-        Ok(Shape::ReversalSpike(ReversalSpike {
-            width: keys.required_quantity(&WIDTH)?,
-        }))
-    },
+    read: |keys| Ok(Shape::ReversalSpike(ReversalSpike { width: keys.required_quantity(&WIDTH)? })),
     members,
 };
 
@@ -41,11 +33,7 @@ fn members(sampled: &Sampled) -> Vec<(Shape, f64)> {
     if !observable || sampled.poses {
         return Vec::new();
     }
-    let spike = |share: f64| {
-        Shape::ReversalSpike(ReversalSpike {
-            width: share * sampled.span(),
-        })
-    };
+    let spike = |share: f64| Shape::ReversalSpike(ReversalSpike { width: share * sampled.span() });
     WIDTHS.map(|share| (spike(share), 0.0)).to_vec()
 }
 

@@ -18,21 +18,13 @@ const POSITIONS: usize = 40;
 /// Maximum number of steps in a description.
 const MAX_LISTED: usize = 6;
 
-const AT: Key = Key {
-    name: "at",
-    form: KeyForm::Quantities,
-    meaning: "positions of the steps",
-};
+const AT: Key = Key { name: "at", form: KeyForm::Quantities, meaning: "positions of the steps" };
 
 pub(super) const ENTRY: Entry = Entry {
     word: "steps",
     keys: &[AT],
     follows: Follows::Anything,
-    read: |keys| {
-        Ok(Shape::Steps(Steps {
-            at: keys.required_quantities(&AT)?,
-        }))
-    },
+    read: |keys| Ok(Shape::Steps(Steps { at: keys.required_quantities(&AT)? })),
     members,
 };
 
@@ -44,10 +36,7 @@ fn members(sampled: &Sampled) -> Vec<(Shape, f64)> {
     let position = |k: usize| low + sampled.span() * k as f64 / POSITIONS as f64;
     let positions: Vec<f64> = (1..POSITIONS).map(position).collect();
     let singles = positions.iter().map(|position| vec![*position]);
-    singles
-        .chain([positions.clone()])
-        .map(|at| (Shape::Steps(Steps { at }), 0.0))
-        .collect()
+    singles.chain([positions.clone()]).map(|at| (Shape::Steps(Steps { at }), 0.0)).collect()
 }
 
 impl ShapeKind for Steps {
