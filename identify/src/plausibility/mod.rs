@@ -157,11 +157,10 @@ fn one_clause(clauses: &[&str]) -> String {
     let end = (1..=shortest.saturating_sub(begin + 1))
         .take_while(|i| words.iter().all(|other| other[other.len() - i] == first[first.len() - i]))
         .count();
-    if words.len() == 1 || begin + end == 0 {
-        return clauses.join(" or ");
-    }
     let middles: Vec<String> = (words.iter()).map(|words| words[begin..words.len() - end].join(" ")).collect();
-    let (last, others) = middles.split_last().expect("there is more than one clause");
+    let (Some((last, others)), true) = (middles.split_last(), words.len() > 1 && begin + end > 0) else {
+        return clauses.join(" or ");
+    };
     let middle = format!("{} or {last}", others.join(", "));
     let parts = [first[..begin].join(" "), middle, first[first.len() - end..].join(" ")];
     let parts: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).collect();

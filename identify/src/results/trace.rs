@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::Outlier;
 use super::parameter::{Covariance, NullSpace, ParameterResult, Unobservable};
@@ -50,14 +50,23 @@ pub struct EffectName {
     pub driver: String,
     /// Shape of the dependence.
     pub shape: String,
-    /// Order of a harmonic (periods per turn), degree of a polynomial.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub order: Option<usize>,
+    /// Order of a harmonic (periods per turn), degree of a polynomial. An integer unless the session states a fraction.
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "whole_as_integer")]
+    pub order: Option<f64>,
     /// The tests to which the effect is confined; absent for all tests.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub tests: Vec<String>,
     /// What the effect is, in words: `C table: axial motion twice per turn`.
     pub meaning: String,
+}
+
+/// Writes 2 for an order of 2.0, and 2.5 for one of 2.5.
+fn whole_as_integer<S: Serializer>(order: &Option<f64>, serializer: S) -> Result<S::Ok, S::Error> {
+    match order {
+        Some(order) if order.fract() == 0.0 && order.abs() < 1e9 => serializer.serialize_i64(*order as i64),
+        Some(order) => serializer.serialize_f64(*order),
+        None => serializer.serialize_none(),
+    }
 }
 
 /// A point of a nonparametric curve. The curve excludes what location errors can absorb.
@@ -265,4 +274,25 @@ pub struct TraceResult {
     /// Notes of the session file's `[about]`: `serial_number`, `operator`, `date`, `comment` and others.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub about: BTreeMap<String, String>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::EffectName;
+
+    #[test]
+    fn an_order_is_written_as_it_is_stated() {
+        let written = |order| {
+            let name = EffectName {
+                component: "EZC".into(),
+                driver: "C".into(),
+                shape: "harmonic".into(),
+                order,
+                tests: Vec::new(),
+                meaning: String::new(),
+            };
+            serde_json::to_value(&name).unwrap()["order"].to_string()
+        };
+        assert_eq!([Some(2.0), Some(2.5), None].map(written), ["2", "2.5", "null"]);
+    }
 }

@@ -19,7 +19,7 @@ pub fn effect_name(machine: &Machine, effect: &Effect) -> EffectName {
         component: effect.component.to_string(),
         driver: effect.driver.to_string(),
         shape: effect.shape.word().to_string(),
-        order: effect.shape.order().map(|order| order.round() as usize),
+        order: effect.shape.order(),
         tests: effect.tests.clone(),
         meaning: meaning(machine, effect).to_string(),
     }
