@@ -8,4 +8,5 @@ pub mod library;
 pub(crate) mod moments;
 pub(crate) mod observable;
 mod sampling;
+pub(crate) mod step_table;
 pub(crate) mod tuned;

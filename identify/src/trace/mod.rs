@@ -13,22 +13,20 @@
 //!    (`remainder`).
 
 pub mod alias;
-mod compose;
 mod constants;
-mod description_length;
 mod implausible;
 pub(crate) mod interrupt;
 mod judge;
+mod moves;
 mod noise_model;
 mod null;
-mod refine;
+mod policy;
 mod remainder;
 pub(crate) mod result;
-mod rounds;
 pub mod screening;
 mod search;
 mod start;
-mod swap;
+mod state;
 
 use abbe_model::effect::Effect;
 use abbe_model::session::Session;
@@ -38,16 +36,17 @@ use crate::candidates::library::Candidate;
 use crate::candidates::moments::Moments;
 use crate::error::IdentifyError;
 use crate::fit::{Fit, fit, prepare};
-use crate::heldout::FoldKind;
 use crate::problem::Problem;
 use crate::results::TraceResult;
+use constants::{BLOCK, SINGLE};
 use implausible::Contradicted;
 use interrupt::Interrupt;
 use judge::RefittedModel;
 use noise_model::estimate_noise_model;
-use rounds::{SearchRecord, search_on};
-use search::{Search, StoppingRule};
+use policy::Policy;
+use search::{SearchRecord, search_on, withdraw_unexplaining};
 use start::Start;
+use state::SearchState;
 
 /// Options of a trace.
 #[derive(Clone, Debug)]
@@ -95,11 +94,6 @@ pub enum Progress {
     /// No new event. Reported often, so that the caller can stop the trace soon.
     Working,
 }
-
-/// Maximum number of effects for readings along runs. A larger number indicates a different cause.
-const MAX_ALONG_RUNS: usize = 12;
-/// Maximum number of effects for independent poses.
-const MAX_OF_POSES: usize = 200;
 
 /// One addition of the search.
 #[derive(Clone, Debug, PartialEq)]
@@ -225,7 +219,7 @@ fn trace_or_interrupted<'a>(
 ) -> Result<TraceOutcome, IdentifyError> {
     let interrupt = Interrupt(progress);
     interrupt.check()?;
-    let poses = problem.folds.kind == FoldKind::Poses;
+    let policy = Policy::of(problem);
     let columns = Columns::new(problem, &before_fit.beta);
     let start = Start::of(problem, &columns, before_fit)?;
     interrupt.check()?;
@@ -235,10 +229,10 @@ fn trace_or_interrupted<'a>(
     };
     let structure_before = || {
         let (model, prior) = (start.model.clone(), start.prior());
-        let draws = null(null::SINGLE);
+        let draws = null(SINGLE);
         remainder::structure(problem, &columns, model, &start.residual, draws, &prior)
     };
-    let (draws, structure_before) = rayon::join(|| null(null::BLOCK), || (!poses).then(structure_before));
+    let (draws, structure_before) = rayon::join(|| null(BLOCK), || policy.tests_structure.then(structure_before));
 
     let structure_before = structure_before.transpose()?;
     interrupt.check()?;
@@ -252,14 +246,20 @@ fn trace_or_interrupted<'a>(
     let go_on = || interrupt.check().is_ok();
     let moments = Moments::new(&columns, &column_sets, model, &start.residual, draws, &go_on)
         .ok_or(IdentifyError::Interrupted)?;
-    let max_effects = if poses { MAX_OF_POSES } else { MAX_ALONG_RUNS };
-    let stop = StoppingRule {
-        significance: options.significance,
-        max_effects: options.max_effects.unwrap_or(max_effects),
-        in_residual_variance: poses,
-    };
+    let max_effects = options.max_effects.unwrap_or(policy.max_effects);
     let unwhitened = start.unwhitened(&columns, &before_fit.beta, problem.noise.sigma_mm)?;
-    let mut search = Search::new(&columns, candidates, column_sets, moments, prior, unwhitened, stop)?;
+    let significance = options.significance;
+    let mut search = SearchState::new(
+        &columns,
+        candidates,
+        column_sets,
+        moments,
+        prior,
+        unwhitened,
+        policy,
+        significance,
+        max_effects,
+    )?;
     search.reserve = reserve;
     search.interrupt = Some(interrupt);
     let gains = search.model_without(None)?.gains();
@@ -267,7 +267,7 @@ fn trace_or_interrupted<'a>(
 
     let mut record = SearchRecord { steps: Vec::new(), noise_um: problem.noise.sigma_mm * 1e3, progress };
     let structure_before = structure_before.as_ref();
-    let judge = |search: &Search<'_>| RefittedModel::of(problem, before_fit, search, options, structure_before);
+    let judge = |search: &SearchState<'_>| RefittedModel::of(problem, before_fit, search, options, structure_before);
     let found = match search_and_refit(&mut search, &mut record, judge) {
         Err(IdentifyError::Interrupted) => {
             search.roll_back();
@@ -294,7 +294,7 @@ fn trace_or_interrupted<'a>(
         structure_before,
         structure_after: structure_after.as_ref(),
         last_p_value: ended.unwrap_or(1.0),
-        stopped_early: ended.is_none() || search.selected().len() >= stop.max_effects,
+        stopped_early: ended.is_none() || search.selected().len() >= max_effects,
         interrupted,
         candidates: candidate_count,
         candidates_seen: observable,
@@ -321,16 +321,14 @@ fn trace_or_interrupted<'a>(
 /// # Errors
 /// [`IdentifyError::Interrupted`] if the caller stopped the trace.
 fn search_and_refit<'a>(
-    search: &mut Search<'_>,
+    search: &mut SearchState<'_>,
     record: &mut SearchRecord<'_>,
-    judge: impl Fn(&Search<'_>) -> Result<RefittedModel, IdentifyError>,
+    judge: impl Fn(&SearchState<'_>) -> Result<RefittedModel, IdentifyError>,
 ) -> Result<(f64, RefittedModel), IdentifyError> {
     let mut ended = search_on(search, record)?;
     (record.progress)(Progress::Judging);
     let mut judged = judge(search)?;
-    // For poses the residual always has structure, so the structure test cannot decide.
-    let poses = search.stop.in_residual_variance;
-    if (poses || judged.is_structured()) && search.selected().len() < search.stop.max_effects {
+    if judged.is_structured() && search.selected().len() < search.max_effects {
         search.add_reserve_candidates();
         search.last_resort = true;
         ended = search_on(search, record)?;
@@ -338,9 +336,8 @@ fn search_and_refit<'a>(
             judged = judge(search)?;
         }
     }
-    if !poses {
-        search.withdraw(judged.is_structured())?;
-        search.withdraw_all_unless_better()?;
+    if search.policy.withdraws {
+        withdraw_unexplaining(search, judged.is_structured())?;
         if !judged.is_of(search) {
             judged = judge(search)?;
         }

@@ -12,6 +12,7 @@ use abbe_model::effect::shape::{Curve, Local, Periodic};
 use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::session::readings::Readings;
 
+use super::constants::STRUCTURED;
 use crate::candidates::chi_square_tail::ln_chi_square_tail;
 use crate::candidates::columns::{Columns, EffectColumns};
 use crate::candidates::gain::{PriorMoments, TrainedModel};
@@ -30,9 +31,6 @@ pub struct Structure {
     /// Description: the test, the driver, and the amplitude.
     pub description: String,
 }
-
-/// Significance level of the structure test.
-const STRUCTURED: f64 = 0.01;
 
 impl Structure {
     /// Whether the structure is significant.

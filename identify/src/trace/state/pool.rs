@@ -1,20 +1,19 @@
 //! The candidates that a search may add: the library's detectable effects, and the effects that it has tuned itself.
 
+use abbe_model::driver::Driver;
+use abbe_model::effect::Shape;
+use abbe_model::effect::shape::Steps;
 use rayon::prelude::*;
 
-use super::{Search, TrainedModel};
+use super::SearchState;
 use crate::candidates::columns::EffectColumns;
-use crate::candidates::gain::Gain;
+use crate::candidates::gain::TrainedModel;
 use crate::candidates::library::Candidate;
+use crate::candidates::step_table::{StepTable, best_step_table};
 use crate::error::IdentifyError;
-use crate::trace::compose::{self, StepTable};
-use crate::trace::refine;
+use crate::trace::constants::MIN_PLAUSIBLE_SIGMA;
 
-/// Least detectability of a searched effect. An effect of the largest plausible size has to change the readings by this
-/// many standard deviations in total, beyond what the model absorbs.
-const MIN_PLAUSIBLE_SIGMA: f64 = 3.0;
-
-impl Search<'_> {
+impl SearchState<'_> {
     /// For each candidate whether it is undetectable at its largest plausible size.
     pub(super) fn undetectable_candidates(&self) -> Result<Vec<bool>, IdentifyError> {
         let model = self.model_without(None)?;
@@ -23,8 +22,7 @@ impl Search<'_> {
             .into_par_iter()
             .map(|candidate| {
                 let (d, _, _) = model.projected(candidate);
-                let effect = &self.candidates[candidate].effect;
-                let plausible = self.columns.plausible(effect, &self.column_sets[candidate]);
+                let plausible = self.columns.plausible(self.effect(candidate), &self.column_sets[candidate]);
                 let largest = (0..d.nrows()).map(|k| d[(k, k)]).fold(0.0, f64::max);
                 plausible * largest.max(0.0).sqrt() < MIN_PLAUSIBLE_SIGMA
             })
@@ -43,48 +41,59 @@ impl Search<'_> {
     }
 
     /// Whether a candidate is an effect of the library or was tuned on exactly these folds.
-    pub(in crate::trace) fn may_be_used(&self, candidate: usize, folds: &[usize]) -> bool {
+    pub fn may_be_used(&self, candidate: usize, folds: &[usize]) -> bool {
         let tuned_on = &self.tuned_on[candidate];
         tuned_on.is_empty() || tuned_on == folds
     }
 
+    /// Whether a candidate has shape numbers or positions that the search tunes.
+    pub fn is_tunable(&self, candidate: usize) -> bool {
+        self.moments.numbers[candidate] > 0 || matches!(self.effect(candidate).shape, Shape::Steps { .. })
+    }
+
+    /// Whether one of some candidates is a table of more than two steps.
+    pub fn is_composed(&self, group: &[usize]) -> bool {
+        let composed = |c: &usize| matches!(&self.effect(*c).shape, Shape::Steps(Steps { at }) if at.len() > 2);
+        group.iter().any(composed)
+    }
+
+    /// The axes that the selected effects of a branch follow, each once.
+    pub fn axes_followed(&self, branch: usize) -> Vec<Driver> {
+        let mut drivers: Vec<Driver> = Vec::new();
+        for candidate in self.branches[branch].chosen() {
+            let driver = &self.effect(candidate).driver;
+            if matches!(driver, Driver::Axis(_)) && !drivers.contains(driver) {
+                drivers.push(driver.clone());
+            }
+        }
+        drivers
+    }
+
+    /// Divides the selected effects of a branch into those that follow a driver and the others.
+    pub fn following(&self, driver: &Driver, branch: usize) -> (Vec<usize>, Vec<usize>) {
+        let chosen = self.branches[branch].chosen();
+        chosen.into_iter().partition(|candidate| self.effect(*candidate).driver == *driver)
+    }
+
     /// The step tables from the library's dictionaries for addition to a model.
-    pub(super) fn step_tables(&self, model: &TrainedModel<'_>) -> Vec<StepTable> {
+    pub fn step_tables(&self, model: &TrainedModel<'_>) -> Vec<StepTable> {
         let variance = self.variance(model);
         (0..self.candidates.len())
             .into_par_iter()
             .filter(|candidate| self.candidates[*candidate].dictionary)
-            .filter_map(|candidate| compose::best_step_table(model, candidate, &self.candidates[candidate], variance))
+            .filter_map(|candidate| best_step_table(model, candidate, &self.candidates[candidate], variance))
             .collect()
     }
 
-    /// Adds the candidates near the best, with their shape numbers tuned in addition to some candidates on some folds.
-    /// Returns the gains of the candidates that were present before.
-    pub(in crate::trace) fn refine(&mut self, beside: &[usize], folds: &[usize]) -> Result<Vec<Gain>, IdentifyError> {
-        if !self.candidates.iter().any(refine::can_be_tuned) {
-            return Ok(Vec::new());
-        }
-        let (gains, fresh) = {
-            let model = self.model_of(beside, folds)?;
-            let gains = model.gains();
-            let fresh = refine::refined(self, &model, &gains, &self.step_tables(&model));
-            (gains, fresh)
-        };
-        for candidate in fresh {
-            self.add_tuned(candidate, folds);
-        }
-        Ok(gains)
-    }
-
     /// Adds a candidate that was tuned on some folds. Returns its index, or `None` if the data lack its driver.
-    pub(in crate::trace) fn add_tuned(&mut self, candidate: Candidate, folds: &[usize]) -> Option<usize> {
+    pub(super) fn add_tuned(&mut self, candidate: Candidate, folds: &[usize]) -> Option<usize> {
         let column_set = self.columns.effect_columns(&candidate.effect)?;
         self.append(vec![(candidate, column_set)], folds);
         Some(self.candidates.len() - 1)
     }
 
     /// Adds candidates that were tuned on some folds, or effects of the library if `tuned_on` is empty.
-    pub(in crate::trace) fn append(&mut self, fresh: Vec<(Candidate, EffectColumns)>, tuned_on: &[usize]) {
+    fn append(&mut self, fresh: Vec<(Candidate, EffectColumns)>, tuned_on: &[usize]) {
         if fresh.is_empty() {
             return;
         }
@@ -98,7 +107,7 @@ impl Search<'_> {
     /// The number of the library's effects that are detectable at their largest plausible size. A dictionary counts
     /// once: its step tables share its identifier, and their positions have a penalty of their own. Curves of last
     /// resort, some dozens compared with thousands, do not count.
-    pub(in crate::trace) fn detectable_effects(&self) -> usize {
+    pub(super) fn detectable_effects(&self) -> usize {
         self.undetectable.iter().filter(|undetectable| !**undetectable).count()
     }
 
@@ -106,5 +115,19 @@ impl Search<'_> {
     pub fn add_reserve_candidates(&mut self) {
         let reserve = std::mem::take(&mut self.reserve);
         self.append(reserve, &[]);
+    }
+
+    /// Curves over an axis, one for each test, without a component. Their columns are computed at the first call.
+    pub fn test_curves(&mut self, driver: &Driver, intervals: usize) -> Vec<usize> {
+        let fresh = self.columns.curves_of_tests(driver, intervals);
+        let present: Vec<usize> =
+            (0..self.candidates.len()).filter(|c| fresh.iter().any(|(effect, _)| effect == self.effect(*c))).collect();
+        if !present.is_empty() {
+            return present;
+        }
+        let first = self.candidates.len();
+        let fresh = fresh.into_iter().map(|(effect, column_set)| (Candidate::test_curve(effect), column_set));
+        self.append(fresh.collect(), &[]);
+        (first..self.candidates.len()).collect()
     }
 }

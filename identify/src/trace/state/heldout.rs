@@ -4,7 +4,7 @@
 use faer::Mat;
 use rayon::prelude::*;
 
-use super::{ALL, Search, SearchBranch, SelectedEffect};
+use super::{ALL, SearchBranch, SearchState, SelectedEffect};
 use crate::candidates::gain::TrainedModel;
 use crate::candidates::moments::grow;
 use crate::error::IdentifyError;
@@ -41,7 +41,7 @@ impl UnwhitenedModel {
 pub struct HeldOutState {
     /// The branches of the search.
     branches: Vec<SearchBranch>,
-    /// [`Search::held_out`].
+    /// [`SearchState::held_out`].
     held_out: Vec<f64>,
     /// Sums of squares of held-out residuals over the variance of the noise, by unit.
     units: Vec<f64>,
@@ -62,7 +62,7 @@ pub struct RejectedByHeldOut {
     pub decrease: HeldOutDecrease,
 }
 
-impl Search<'_> {
+impl SearchState<'_> {
     /// Sums of squares of held-out residuals over the noise variance, by unit. The model of the search that excludes a
     /// fold predicts it.
     fn held_out_by_unit(&self) -> Result<Vec<f64>, IdentifyError> {
@@ -81,12 +81,12 @@ impl Search<'_> {
     }
 
     /// Sum of squares of held-out residuals over the noise variance.
-    pub(super) fn held_out_now(&self) -> Result<f64, IdentifyError> {
+    pub fn held_out_now(&self) -> Result<f64, IdentifyError> {
         Ok(self.held_out_by_unit()?.iter().sum())
     }
 
     /// Records the held-out error for the present number of effects.
-    pub(in crate::trace) fn note_held_out(&mut self) -> Result<(), IdentifyError> {
+    pub fn note_held_out(&mut self) -> Result<(), IdentifyError> {
         self.units_now = self.held_out_by_unit()?;
         let held_out = self.units_now.iter().sum();
         let selected = self.selected().len();
@@ -103,7 +103,7 @@ impl Search<'_> {
     /// Accepts the selected effects if the held-out error permits it. With more effects than are accepted, it has to
     /// decrease by more than the standard error. With as many or fewer, it must not increase by more than the standard
     /// error. Returns whether all selected effects are accepted.
-    pub(in crate::trace) fn accept(&mut self) -> bool {
+    pub fn accept(&mut self) -> bool {
         let decrease = self.decrease_since_accepted();
         let added = self.selected().len() > self.accepted.effects().len();
         let accepted =
@@ -117,12 +117,12 @@ impl Search<'_> {
     }
 
     /// The decrease of the held-out error since the last acceptance.
-    pub(in crate::trace) fn decrease_since_accepted(&self) -> HeldOutDecrease {
+    pub fn decrease_since_accepted(&self) -> HeldOutDecrease {
         self.unwhitened.units.decrease(&self.accepted.units, &self.units_now)
     }
 
     /// The decrease of the held-out error since the declared model.
-    pub(in crate::trace) fn decrease_since_declared(&self) -> HeldOutDecrease {
+    pub fn decrease_since_declared(&self) -> HeldOutDecrease {
         self.unwhitened.units.decrease(&self.declared_units, &self.units_now)
     }
 
@@ -133,7 +133,7 @@ impl Search<'_> {
     }
 
     /// Withdraws the effects added since the last acceptance, and records them as rejected.
-    pub(in crate::trace) fn withdraw_rejected(&mut self) {
+    pub fn withdraw_rejected(&mut self) {
         let decrease = self.decrease_since_accepted();
         let accepted: Vec<usize> = self.accepted.effects().iter().map(|selected| selected.candidate).collect();
         for selected in self.branches[ALL].selected.clone() {
@@ -146,7 +146,7 @@ impl Search<'_> {
     }
 
     /// Restores the accepted effects after an interruption within a round. The search is not interrupted again.
-    pub(in crate::trace) fn roll_back(&mut self) {
+    pub fn roll_back(&mut self) {
         self.restore();
         self.interrupt = None;
     }
@@ -160,7 +160,7 @@ impl Search<'_> {
 
     /// Withdraws all effects if together they do not lower the held-out error of the declared model by more than the
     /// standard error of the decrease.
-    pub(in crate::trace) fn withdraw_all_unless_better(&mut self) -> Result<(), IdentifyError> {
+    pub fn withdraw_all_unless_better(&mut self) {
         if !self.lowers_heldout_error() {
             self.accepted = HeldOutState::default();
             self.accepted.branches = self.branches.clone();
@@ -170,6 +170,5 @@ impl Search<'_> {
             self.withdraw_rejected();
         }
         self.accepted = self.state();
-        Ok(())
     }
 }

@@ -1,0 +1,176 @@
+//! The state of the search: the candidates with their products, and the selected effects.
+//!
+//! One branch searches on all readings. One further branch for each fold searches on the readings outside that fold
+//! ([`SearchBranch`]). Each branch selects for itself, and uses only shape numbers and positions that it has tuned
+//! itself. The held-out error therefore belongs to a search without access to the held-out readings.
+
+mod heldout;
+mod models;
+mod objective;
+mod pool;
+mod tuning;
+
+use std::ops::Range;
+
+use abbe_model::effect::Effect;
+
+use super::constants::{Effort, ON_ALL, ON_FOLDS};
+use super::interrupt::Interrupt;
+use super::policy::Policy;
+use crate::candidates::columns::{Columns, EffectColumns};
+use crate::candidates::gain::PriorMoments;
+use crate::candidates::library::Candidate;
+use crate::candidates::moments::Moments;
+use crate::error::IdentifyError;
+use heldout::HeldOutState;
+pub use heldout::{RejectedByHeldOut, UnwhitenedModel};
+
+/// An effect that a search has selected.
+#[derive(Clone, Copy, Debug)]
+pub struct SelectedEffect {
+    /// Index of the candidate.
+    pub candidate: usize,
+    /// Probability that the search finds at least as high a score on readings without structure.
+    pub p_value: f64,
+}
+
+/// One branch of the search: on all readings, or on all but one fold.
+#[derive(Clone, Debug)]
+pub struct SearchBranch {
+    /// The training folds, ascending.
+    pub folds: Vec<usize>,
+    /// The selected effects.
+    pub selected: Vec<SelectedEffect>,
+}
+
+impl SearchBranch {
+    /// Indices of the selected candidates.
+    pub fn chosen(&self) -> Vec<usize> {
+        self.selected.iter().map(|selected| selected.candidate).collect()
+    }
+}
+
+/// Index of the branch on all readings. The branch that excludes fold `k` has index `k + 1`.
+pub(super) const ALL: usize = 0;
+
+/// The state of the search.
+pub struct SearchState<'s> {
+    /// The policy for the readings.
+    pub policy: &'static Policy,
+    /// Probability that the search accepts an effect on readings without structure.
+    pub significance: f64,
+    /// Maximum number of effects.
+    pub max_effects: usize,
+    /// The columns.
+    pub columns: &'s Columns<'s>,
+    /// The candidates.
+    pub candidates: Vec<Candidate>,
+    /// The basis columns of the candidates.
+    column_sets: Vec<EffectColumns>,
+    /// All products.
+    pub moments: Moments,
+    /// The priors.
+    prior: PriorMoments,
+    /// Number of base columns that the fitted model has.
+    pub rank: usize,
+    /// The branch on all readings, then one for each fold.
+    pub branches: Vec<SearchBranch>,
+    /// For each candidate the folds on which its shape numbers and positions were tuned. Empty for an effect of the
+    /// library.
+    tuned_on: Vec<Vec<usize>>,
+    /// For each candidate that was ever added, the range of its columns in the base.
+    added_to_base: Vec<(usize, Range<usize>)>,
+    /// Sum of squares of held-out residuals over the noise variance, for each number of effects.
+    pub held_out: Vec<f64>,
+    /// For each round, the best score that readings without structure exceed with the probability of the significance
+    /// level.
+    pub thresholds: Vec<f64>,
+    /// Whether candidates of last resort are searched.
+    pub last_resort: bool,
+    /// Candidates of last resort whose products are not computed yet.
+    pub reserve: Vec<(Candidate, EffectColumns)>,
+    /// The unwhitened base and residual for the held-out error.
+    unwhitened: UnwhitenedModel,
+    /// Sums of squares of held-out residuals over the noise variance, by unit: at present, and under the declared
+    /// model.
+    units_now: Vec<f64>,
+    declared_units: Vec<f64>,
+    /// The accepted effects: additions that lowered the held-out error by more than the standard error of the decrease.
+    accepted: HeldOutState,
+    /// Effects that scored better than readings without structure but were not accepted, in order of addition.
+    pub rejected: Vec<RejectedByHeldOut>,
+    /// For each effect of the library whether it is undetectable at its largest plausible size.
+    undetectable: Vec<bool>,
+    /// Checked before each model is trained. `None` if the search must not be interrupted.
+    pub interrupt: Option<Interrupt<'s>>,
+}
+
+impl<'s> SearchState<'s> {
+    /// The state before the first round.
+    ///
+    /// # Errors
+    /// If products are not finite.
+    pub fn new(
+        columns: &'s Columns<'s>,
+        candidates: Vec<Candidate>,
+        column_sets: Vec<EffectColumns>,
+        moments: Moments,
+        prior: PriorMoments,
+        unwhitened: UnwhitenedModel,
+        policy: &'static Policy,
+        significance: f64,
+        max_effects: usize,
+    ) -> Result<SearchState<'s>, IdentifyError> {
+        let rank = moments.base();
+        let folds = 0..columns.fold_rows.len();
+        let without = |left_out: Option<usize>| SearchBranch {
+            folds: folds.clone().filter(|fold| Some(*fold) != left_out).collect(),
+            selected: Vec::new(),
+        };
+        let mut search = SearchState {
+            policy,
+            significance,
+            max_effects,
+            columns,
+            tuned_on: vec![Vec::new(); candidates.len()],
+            candidates,
+            column_sets,
+            moments,
+            prior,
+            rank,
+            branches: std::iter::once(None).chain(folds.clone().map(Some)).map(without).collect(),
+            added_to_base: Vec::new(),
+            held_out: Vec::new(),
+            thresholds: Vec::new(),
+            last_resort: false,
+            reserve: Vec::new(),
+            unwhitened,
+            units_now: Vec::new(),
+            declared_units: Vec::new(),
+            accepted: HeldOutState::default(),
+            rejected: Vec::new(),
+            undetectable: Vec::new(),
+            interrupt: None,
+        };
+        search.undetectable = search.undetectable_candidates()?;
+        search.note_held_out()?;
+        search.declared_units = search.units_now.clone();
+        search.accepted = search.state();
+        Ok(search)
+    }
+
+    /// The selected effects of the branch on all readings.
+    pub fn selected(&self) -> &[SelectedEffect] {
+        &self.branches[ALL].selected
+    }
+
+    /// The effect of a candidate.
+    pub fn effect(&self, candidate: usize) -> &Effect {
+        &self.candidates[candidate].effect
+    }
+
+    /// How many candidates the steps of a branch with some training folds try.
+    pub fn effort(&self, folds: &[usize]) -> &'static Effort {
+        if folds.len() == self.branches[ALL].folds.len() { &ON_ALL } else { &ON_FOLDS }
+    }
+}
