@@ -277,6 +277,8 @@ fn effects_without_a_closed_form_are_refused_by_name() {
     assert!(message.contains("EZA~A:backlash") && message.contains("`A`"), "{message}");
     let message = refused(effect("tracker.x", "time", Shape::Drift));
     assert!(message.contains("tracker.x~time:drift"), "{message}");
+    let message = refused(effect("bar", "gravity", Shape::Backlash));
+    assert!(message.contains("cannot be written: gravity exerts no moment about \"bar\"; to omit it"), "{message}");
     let twice = effect("EZC", "C", Shape::Backlash);
     let equation = Equation::of(&machine, &Bar, &[], &with(vec![twice.clone(), twice]));
     assert!(matches!(equation, Err(CodegenError::Twice { .. })));
