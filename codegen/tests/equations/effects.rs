@@ -8,7 +8,9 @@ use abbe_codegen::{CodegenError, Equation, Options, Order, Source, Subject, Vari
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::driver::{Driver, DriverPart};
-use abbe_model::effect::shape::{Curve, Harmonic, Local, Periodic, Polynomial, Power, ReversalSpike, Steps, Warmup};
+use abbe_model::effect::shape::{
+    Curve, Harmonic, Local, Periodic, Polynomial, Power, ReversalSpike, Steps, Triangle, Warmup,
+};
 use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::instrument::{Station, ballbar::BallBar, socket::Socket};
 use abbe_model::scalar::Nominal;
@@ -102,6 +104,17 @@ fn smooth_shapes_by_hand() {
     near(&bases("X", Shape::Lag, HERE), &[-4.0]);
 }
 
+/// A triangular wave is the arc sine of a sine, scaled to 1.
+#[test]
+fn triangles_by_the_arc_sine() {
+    for q in [-50.0, -7.0, 0.0, 2.9, 3.1, 8.0, 38.0_f64] {
+        let angle = TAU * q / 12.0;
+        let expected = [angle.cos(), angle.sin()].map(|wave| wave.asin() / (PI / 2.0));
+        near(&bases("X", Shape::Triangle(Triangle { period: 12.0 }), here(q)), &expected);
+    }
+    near(&bases("X", Shape::Triangle(Triangle { period: 12.0 }), here(38.0)), &[1.0 / 3.0, 2.0 / 3.0]);
+}
+
 #[test]
 fn shapes_of_reversal_by_hand() {
     near(&bases("X", Shape::Backlash, HERE), &[0.5]);
@@ -162,6 +175,7 @@ pub fn every_shape() -> Vec<Effect> {
     vec![
         effect("EZC", "C", Shape::Harmonic(Harmonic { order: 2.0 })),
         effect("EXC", "C", Shape::Periodic(Periodic { period: 0.3 })),
+        effect("EXC", "C", Shape::Triangle(Triangle { period: 0.7 })),
         effect("EYC", "C", polynomial(2, PI)),
         effect("EX0C", "temperature", polynomial(1, 1.0)),
         effect("EY0C", "time", Shape::Drift),
