@@ -102,6 +102,8 @@ fn smooth_shapes_by_hand() {
     let warmup = Shape::Warmup(Warmup { tau_s: 600.0 });
     near(&bases("time", warmup, here(1200.0)), &[1.0 - (-2.0_f64).exp()]);
     near(&bases("X", Shape::Lag, HERE), &[-4.0]);
+    let square = Shape::Polynomial(Polynomial { degree: 2, scale: 10.0 });
+    near(&bases("speed-squared", square, HERE), &[1.6, 2.56]);
 }
 
 /// A triangular wave is the arc sine of a sine, scaled to 1.
