@@ -5,7 +5,6 @@
 
 use std::path::Path;
 
-use super::columns::r_test_columns;
 use super::format::{Content, DataFormat, Rows, Table};
 use super::lines::Lines;
 use super::request::Request;
@@ -14,6 +13,7 @@ use crate::chain::Machine;
 use crate::error::ModelError;
 use crate::files::whole;
 use crate::instrument::Station;
+use crate::instrument::column::{Column, Quantity};
 use crate::session::readings::Readings;
 
 /// The format. It reads every file that is of no other format.
@@ -110,16 +110,8 @@ pub fn text(machine: &Machine, station: &Station<f64>, readings: &Readings) -> S
     if !readings.temperature_c.is_empty() {
         header.push("temperature_c".into());
     }
-    match station {
-        Station::BallBar(_) => header.push("length_mm".into()),
-        Station::Tracker(_) => header.extend(["px_mm", "py_mm", "pz_mm"].map(String::from)),
-        // A pose of a socket consists of axis positions only.
-        Station::Socket(_) => {}
-        Station::Probe(_) => header.push("distance_mm".into()),
-        Station::RTest(rtest) => {
-            header.extend(r_test_columns(rtest.sensors.is_some()).map(|name| format!("{name}_mm")));
-        }
-    }
+    let is_reading = |column: &&Column| matches!(column.quantity, Quantity::Length | Quantity::Coordinate(_));
+    header.extend(station.columns().iter().filter(is_reading).map(|column| column.name("mm")));
     let mut text = header.join(",");
     text.push('\n');
     for row in 0..readings.rows() {
@@ -136,7 +128,7 @@ pub fn text(machine: &Machine, station: &Station<f64>, readings: &Readings) -> S
         if let Some(temperature) = readings.temperature_c.get(row) {
             cells.push(decimal(*temperature));
         }
-        if !matches!(station, Station::Socket(_)) {
+        if station.entry().has_readings {
             let start = row * readings.coordinates;
             for k in start..start + readings.coordinates {
                 cells.push(readings.observed.get(k).map_or(String::new(), |mm| decimal(*mm)));

@@ -4,7 +4,7 @@ use super::{Context, quantity};
 use crate::axis::AxisKind;
 use crate::error::ModelError;
 use crate::files::toml::document::{Table, Value};
-use crate::instrument::Station;
+use crate::instrument::{Following, Station};
 use crate::session::motion::{
     DEFAULT_FEED_MM_S, FollowOffset, MAX_READINGS, Motion, default_speed, programmed_over_path_feed,
 };
@@ -62,7 +62,7 @@ fn circle(context: &Context<'_>, mut table: Table<'_>) -> Result<Motion, ModelEr
         return Err(radius_value.error(format!("`radius_mm` is {radius}; it must be greater than 0"), None));
     }
     let centre = match table.take("centre_mm") {
-        Some(value) => context.point(value)?.1,
+        Some(value) => context.point_mm(value)?,
         None => [0.0; 3],
     };
     let range = StepRange::read(&mut table, AxisKind::Rotary, false)?;
@@ -100,8 +100,8 @@ fn follow(context: &Context<'_>, mut table: Table<'_>, station: &Station<f64>) -
             table.error(format!("axis `{name}` is linear; a path of kind \"follow\" needs a rotary axis"), None)
         );
     }
-    let offset = match station {
-        Station::BallBar(_) => {
+    let offset = match station.following() {
+        Following::AtBar => {
             let offset = table.require("offset", "\"radial\", \"tangential\" or \"axial\"")?;
             match offset.text()?.as_str() {
                 "radial" => FollowOffset::Radial,
@@ -110,18 +110,13 @@ fn follow(context: &Context<'_>, mut table: Table<'_>, station: &Station<f64>) -
                 _ => return Err(offset.unexpected("\"radial\", \"tangential\" or \"axial\"")),
             }
         }
-        Station::RTest(_) => {
+        Following::Touching(message, help) => {
             if let Some(offset) = table.take("offset") {
-                return Err(offset.source.error(
-                    offset.key_span.clone(),
-                    "`offset` is the direction of a bar; an R-test has no bar and measures all three directions at once",
-                    Some("remove it; the readings can be resolved into radial, tangential and axial components after a fit".into()),
-                ));
+                return Err(offset.source.error(offset.key_span.clone(), message, Some(help.into())));
             }
             FollowOffset::Touching
         }
-        // The points have no fixed distance.
-        _ => FollowOffset::None,
+        Following::Apart => FollowOffset::None,
     };
     let range = StepRange::read(&mut table, kind, false)?;
     let speed = match table.take("programmed_feed_mm_min") {

@@ -1,47 +1,14 @@
-//! Defaults of a session: what applies where nothing is stated.
+//! Errors of the machine that an instrument estimates if the session states none.
 
 use crate::axis::AxisKind;
 use crate::chain::Machine;
 use crate::component::{ErrorKind, ErrorName, Freedom};
-use crate::instrument::InstrumentKind;
 use crate::pattern;
-use crate::session::Prior;
-
-/// The errors to be estimated with an instrument.
-pub fn unknowns(machine: &Machine, kind: InstrumentKind) -> Vec<ErrorName> {
-    match kind {
-        InstrumentKind::BallBar | InstrumentKind::Probe | InstrumentKind::RTest => {
-            position_and_orientation_errors(machine)
-        }
-        InstrumentKind::Tracker | InstrumentKind::Socket => all_location_errors(machine),
-    }
-}
-
-/// The priors of an instrument's parameters, in their order: known exactly, but for the place of a tracker and of a
-/// socket.
-pub fn priors(kind: InstrumentKind) -> Vec<Prior> {
-    let parameters = kind.unknowns().iter();
-    parameters
-        .map(|parameter| match parameter.thing {
-            "tracker" | "socket" => Prior::Free,
-            _ => Prior::Known,
-        })
-        .collect()
-}
-
-/// The name shared by tests with the same mounted spindle ball. The ball at a robot's flange stays mounted from socket
-/// to socket; a ball in a spindle is mounted for each test.
-pub fn spindle_setup(kind: InstrumentKind, test: &str) -> &str {
-    match kind {
-        InstrumentKind::Socket => "tool",
-        _ => test,
-    }
-}
 
 /// All location errors of all axes, except the rotation of a linear axis about its own direction, which affects no
 /// reading. The joints of a robot have six each, more than its readings identify; the fit names the confounded
 /// combinations.
-fn all_location_errors(machine: &Machine) -> Vec<ErrorName> {
+pub(super) fn all_locations(machine: &Machine) -> Vec<ErrorName> {
     let mut errors = pattern::errors(machine);
     errors.retain(|name| {
         let of_linear = machine.axes.iter().find(|axis| axis.name == name.axis && axis.kind == AxisKind::Linear);
@@ -53,7 +20,7 @@ fn all_location_errors(machine: &Machine) -> Vec<ErrorName> {
 
 /// The position and orientation errors of every rotary axis, in alphabetical order of the axes. The two location errors
 /// in the axis' own degrees of freedom are excluded, because its own motion is confounded with them.
-fn position_and_orientation_errors(machine: &Machine) -> Vec<ErrorName> {
+pub(super) fn positions_and_orientations(machine: &Machine) -> Vec<ErrorName> {
     let mut rotary: Vec<_> = machine.axes.iter().filter(|axis| axis.kind == AxisKind::Rotary).collect();
     rotary.sort_by(|a, b| a.name.cmp(&b.name));
     rotary
