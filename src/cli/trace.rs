@@ -6,9 +6,10 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::Duration;
 
+use abbe::identify::candidates::library;
 use abbe::identify::plan::test_variations::TestVariations;
-use abbe::identify::trace::separating_tests::separate_aliases;
-use abbe::identify::trace::{Progress, TraceOptions, library};
+use abbe::identify::separating_tests::separate_aliases;
+use abbe::identify::trace::{Progress, TraceOptions};
 use abbe::model::files::toml::{rewrite, write};
 use abbe::model::words::counted;
 use clap::Args;

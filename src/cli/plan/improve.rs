@@ -1,13 +1,13 @@
 //! `abbe plan --improve`, `--separate`, `--range`.
 
 use abbe::identify::IdentifyError;
+use abbe::identify::candidates::library;
 use abbe::identify::plan::criterion::Goal;
 use abbe::identify::plan::improve::{ImproveOptions, Improvement, improve};
 use abbe::identify::plan::range::Shrinkage;
 use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::problem::Problem;
 use abbe::identify::results::Interval;
-use abbe::identify::trace::library;
 use abbe::model::words::counted;
 use clap::{Args, ValueEnum};
 

@@ -7,9 +7,9 @@ use std::ops::Range;
 use faer::Mat;
 
 use super::columns::{Columns, EffectColumns};
+use super::gain::TrainedModel;
 use super::moments::{Moments, transposed_product};
 use super::observable::quadratic_gain;
-use super::score::TrainedModel;
 
 /// The columns of an effect and their products over the training folds of a model.
 pub struct TunedEffect {

@@ -103,12 +103,12 @@ const BUFFER_COLUMNS: usize = 128;
 
 /// Enlarges a matrix and reserves capacity. Candidates and effects are added one at a time, and large matrices are not
 /// copied each time.
-pub(super) fn grow(matrix: &mut Mat<f64>, rows: usize, columns: usize, value: impl FnMut(usize, usize) -> f64) {
+pub(crate) fn grow(matrix: &mut Mat<f64>, rows: usize, columns: usize, value: impl FnMut(usize, usize) -> f64) {
     matrix.reserve(rows.next_multiple_of(BUFFER_ROWS), columns.next_multiple_of(BUFFER_COLUMNS));
     matrix.resize_with(rows, columns, value);
 }
 
-pub(super) fn transposed_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
+pub(crate) fn transposed_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     let mut product = Mat::zeros(a.ncols(), b.ncols());
     matmul(product.as_mut(), Accum::Replace, a.transpose(), b, 1.0, Par::Seq);
     product

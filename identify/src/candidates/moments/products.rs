@@ -7,7 +7,7 @@ use faer::{Accum, Mat, MatRef, Par};
 use rayon::prelude::*;
 
 use super::transposed_product;
-use crate::trace::columns::{Columns, EffectColumns, chunked};
+use crate::candidates::columns::{Columns, EffectColumns, chunked};
 
 /// Maximum number of stored column entries: 320 MB.
 const MAX_STORED: usize = 40_000_000;

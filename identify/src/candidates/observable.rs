@@ -15,7 +15,7 @@ pub fn quadratic_gain(d: &Mat<f64>, own: &Mat<f64>, g: &[f64]) -> f64 {
 }
 
 /// The inverse of a candidate's projected product on its observable directions.
-pub(super) struct ObservableSubspace {
+pub(crate) struct ObservableSubspace {
     vectors: Mat<f64>,
     values: Vec<f64>,
     scale: Vec<f64>,
@@ -107,7 +107,7 @@ impl ObservableSubspace {
 ///
 /// # Errors
 /// If the product has entries that are not finite.
-pub(super) fn pseudo_inverse(gram: &Mat<f64>) -> Result<Mat<f64>, IdentifyError> {
+pub(crate) fn pseudo_inverse(gram: &Mat<f64>) -> Result<Mat<f64>, IdentifyError> {
     let n = gram.nrows();
     let eigen = gram.self_adjoint_eigen(faer::Side::Lower).map_err(|_| IdentifyError::Decomposition)?;
     let values: Vec<f64> = eigen.S().column_vector().iter().copied().collect();

@@ -9,7 +9,7 @@ use abbe_model::effect::{Component, Shape};
 use abbe_model::instrument::SharedBy;
 
 use super::Family;
-use super::sampling::Sampling;
+use crate::candidates::sampling::Sampling;
 use crate::problem::Problem;
 
 /// A constant in the tests of one mount of a set-up component.

@@ -1,6 +1,5 @@
 //! The library of effects. Its data are in `library.toml`. This module lists its members for a session.
 
-mod sampling;
 mod shapes;
 
 use abbe_model::axis::AxisKind;
@@ -10,9 +9,9 @@ use abbe_model::effect::shape::Steps;
 use abbe_model::effect::{Component, Effect, Shape};
 use serde::Deserialize;
 
+use super::sampling::Sampling;
 use crate::error::IdentifyError;
 use crate::problem::Problem;
-use sampling::Sampling;
 use shapes::shapes;
 
 const LIBRARY: &str = include_str!("library.toml");

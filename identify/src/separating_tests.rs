@@ -2,14 +2,14 @@
 
 use abbe_model::effect::Effect;
 
-use super::interrupt::Interrupt;
-use super::result::effect_name;
-use super::{Progress, TraceOutcome};
 use crate::error::IdentifyError;
 use crate::parameters::Role;
 use crate::plan::separate::{AlternativeSeparation, SeparatingTest, separating_tests};
 use crate::plan::test_variations::TestVariations;
 use crate::results::{AlternativeResult, EffectResult, SeparatingTestResult, SeparationResult};
+use crate::trace::interrupt::Interrupt;
+use crate::trace::result::effect_name;
+use crate::trace::{Progress, TraceOutcome};
 
 /// Maximum number of aliases that are compared with an effect, the nearest first. Each alias adds columns.
 const MAX_COMPARED_TESTS: usize = 24;

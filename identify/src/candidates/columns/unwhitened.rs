@@ -5,8 +5,8 @@ use faer::Mat;
 use super::{Columns, EffectColumns};
 use crate::error::IdentifyError;
 use crate::heldout::FoldKind;
+use crate::heldout::paired::Units;
 use crate::problem::RowBlock;
-use crate::trace::paired::Units;
 
 impl Columns<'_> {
     /// The rows of effects for the accepted readings, in mm, unwhitened, block after block.

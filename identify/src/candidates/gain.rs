@@ -14,9 +14,6 @@ use crate::error::IdentifyError;
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
-/// Difference in `−ln P` below which two candidates are confounded. It corresponds to 2 σ for one column.
-pub(super) const INDISTINGUISHABLE: f64 = 2.0;
-
 /// A model over the base: its base columns and its training folds.
 pub struct TrainedModel<'m> {
     moments: &'m Moments,

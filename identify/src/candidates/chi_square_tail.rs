@@ -38,7 +38,7 @@ pub fn ln_chi_square_tail(x: f64, k: usize) -> f64 {
 
 /// An upper bound of `−ln P(χ²ₖ > x)` that is fast to compute. For two degrees of freedom the tail is `e^(−x/2)`, for
 /// more it is larger, and for one it is at least `√(2/π) √x/(1 + x) e^(−x/2)`.
-pub(super) fn most_evidence(x: f64, k: usize) -> f64 {
+pub(crate) fn most_evidence(x: f64, k: usize) -> f64 {
     if k == 1 && x > 0.0 {
         0.5 * x + ((1.0 + x) / x.sqrt()).ln() + 0.5 * std::f64::consts::FRAC_PI_2.ln()
     } else {
