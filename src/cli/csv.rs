@@ -4,10 +4,9 @@ use std::path::Path;
 
 use abbe::identify::circular::CircularTest;
 use abbe::identify::results::{FitResult, ParameterResult, TraceResult};
-use abbe::model::component::ErrorName;
 
 use super::failure::Failure;
-use super::{compensation, output};
+use super::output;
 
 /// How the signs are meant, in front of the table.
 const CONVENTION: &str = "# Errors by their names of ISO 230-1: EX0C is a location error, EXC an error motion. Value = actual less nominal: the body that the axis\n\
@@ -25,11 +24,10 @@ impl Rows {
 
     fn parameters(&mut self, section: &str, parameters: &[ParameterResult]) {
         for parameter in parameters {
-            let meaning = ErrorName::parse(&parameter.id).map_or(String::new(), |name| compensation::words(&name));
             self.row([
                 section.to_string(),
                 parameter.id.clone(),
-                meaning,
+                parameter.meaning.clone(),
                 parameter.value.to_string(),
                 parameter.u.to_string(),
                 parameter.unit.clone(),

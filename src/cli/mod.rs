@@ -13,7 +13,6 @@ mod equation;
 mod failure;
 mod fit;
 mod folder;
-mod from_code;
 pub mod geometric;
 mod interrupt;
 pub mod json;

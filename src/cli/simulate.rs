@@ -4,9 +4,7 @@ use std::path::PathBuf;
 
 use abbe::identify::quantity::{self, Given};
 use abbe::identify::simulate::{Simulated, Simulation, simulate};
-use abbe::model::files::table::csv;
-use abbe::model::files::toml::{rewrite, write};
-use abbe::model::files::{self, SourceMap};
+use abbe::model::files::{self, Changes, SourceMap, with_readings};
 use abbe::model::session::Session;
 use abbe::model::session::limits::{LARGEST, MIN_UM};
 use abbe::model::words::counted;
@@ -107,7 +105,8 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
         seed: arguments.common.seed,
     };
     let simulated = simulate(&session, &simulation)?;
-    let files = files((&session, &sources), &simulated, arguments)?;
+    let changes = Changes { noise_um: arguments.noise_um, hide_effects: arguments.hide_effects };
+    let files = with_readings((&session, &sources), &simulated.readings, changes)?;
     if output::is_same(output::folder_of(&sources.file), &arguments.out) {
         return Err(Failure::Other(format!(
             "{}: this folder contains the plan itself; write the readings to another folder",
@@ -123,52 +122,6 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
         Ok(())
     })?;
     report((&session, &sources), &simulated, arguments, outputs.tables(arguments.common.quiet))
-}
-
-/// The files; `session.toml` is the last, so that the others exist when it does.
-fn files(
-    (session, sources): (&Session, &SourceMap),
-    simulated: &Simulated,
-    arguments: &SimulateArguments,
-) -> Result<Vec<folder::NewFile>, Failure> {
-    let file = sources.file.as_path();
-    let mut files = Vec::new();
-    let mut data: Vec<(String, String)> = Vec::new();
-    for (test, readings) in session.tests.iter().zip(&simulated.readings) {
-        let name = data_name(&test.name, &data);
-        let text = csv::text(&session.machine, &test.station, readings);
-        data.push((test.name.clone(), name.clone()));
-        files.push((name, text));
-    }
-    if let Some(machine) = &sources.machine_text {
-        files.push(("machine.toml".into(), machine.clone()));
-    }
-    let mut text = write::with_data(&sources.text, file, &data)?;
-    text = rewrite::with_machine_file(&text, file, "machine.toml")?;
-    if let Some(noise_um) = arguments.noise_um {
-        text = rewrite::with_noise(&text, file, noise_um)?;
-    }
-    // The data files have the standard columns, whatever the columns of the original.
-    text = rewrite::without_tables(&text, &["format", "columns"]);
-    if arguments.hide_effects {
-        text = rewrite::without_tables(&text, &["effect"]);
-    }
-    files.push(("session.toml".into(), text));
-    Ok(files)
-}
-
-/// A portable file name for the data of a test, different from those of other tests.
-fn data_name(test: &str, taken: &[(String, String)]) -> String {
-    let plain: String =
-        test.chars().map(|c| if c.is_alphanumeric() || matches!(c, '-' | '_' | '.') { c } else { '-' }).collect();
-    let plain = plain.trim_start_matches('.');
-    let mut name = format!("{plain}.csv");
-    let mut number = 2;
-    while taken.iter().any(|(_, other)| other.eq_ignore_ascii_case(&name)) {
-        name = format!("{plain}-{number}.csv");
-        number += 1;
-    }
-    name
 }
 
 /// The simulated session and the true values of its parameters.

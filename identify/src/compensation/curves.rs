@@ -1,4 +1,4 @@
-//! Identified error motions as functions of the position of their own axis, for compensation tables.
+//! Identified error motions as functions of the position of their own axis.
 //!
 //! `E(q) = Σ kᵢ·bᵢ(q)` sums the declared effects of one error motion that depend on the position of its own axis or on
 //! its direction of travel. A curve covers the positions through which its axis moved in runs that observe the error.
@@ -7,14 +7,13 @@
 //!
 //! A table over a position cannot hold an effect of time, temperature or speed. Such effects are listed as excluded.
 
-mod range;
-
 use std::ops::Range;
 
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::driver::{Driver, DriverPart, DriverSample};
 use abbe_model::effect::{Component, Effect};
 
+use super::range::observed_range;
 use crate::fit::Fit;
 use crate::parameters::Role;
 use crate::problem::Problem;
@@ -82,6 +81,18 @@ impl ErrorCurve {
     }
 }
 
+/// Equidistant positions that all of these curves cover, internal units. Curves without a common position have none.
+pub(super) fn positions<'c>(
+    curves: impl IntoIterator<Item = &'c ErrorCurve>,
+    points: usize,
+) -> impl Iterator<Item = f64> {
+    let ranges = curves.into_iter().map(|curve| &curve.range);
+    let (from, to) =
+        ranges.fold((f64::NEG_INFINITY, f64::INFINITY), |(from, to), range| (from.max(range.start), to.min(range.end)));
+    let points = if from < to { points } else { 0 };
+    (0..points).map(move |k| from + (to - from) * k as f64 / (points - 1) as f64)
+}
+
 /// The identified errors that a control can compensate, and those that it cannot.
 #[derive(Clone, Debug, Default)]
 pub struct Compensation {
@@ -146,7 +157,7 @@ pub fn of_fit(problem: &Problem<'_>, fit: &Fit) -> Compensation {
             curve.coefficients.extend(coefficients);
             continue;
         }
-        let Some(observed) = range::observed_range(problem, error, axis) else {
+        let Some(observed) = observed_range(problem, error, axis) else {
             let why = "its axis stands still wherever readings observe it, and the positions between are not measured";
             result.left_out.push(format!("{id}: {why}"));
             continue;

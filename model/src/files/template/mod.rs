@@ -1,42 +1,30 @@
-//! `abbe new --from-code`: a machine and a plan for any structural code, with a comment on each line.
+//! Files of a new machine: `machine.toml` and a plan for any structural code, with a comment on each line.
+//!
+//! A code states neither lengths nor travels. The files hold usual ones, and each comment says what to enter.
 
+mod body;
 mod mounts;
 mod plan;
 
 use std::fmt::Write;
 
-use abbe::model::axis::{Axis, AxisKind};
-use abbe::model::code::StructuralCode;
+use crate::axis::{Axis, AxisKind};
+use crate::code::StructuralCode;
+use crate::error::ModelError;
 
-use self::mounts::Side;
-use super::failure::Failure;
-use super::folder::NewFile;
+use self::body::Body;
 
-/// An axis of the code.
-struct Body {
-    name: String,
-    kind: AxisKind,
-    /// 0, 1, 2 for X, Y, Z of R.
-    along: usize,
-    on_table: bool,
-}
-
-impl Body {
-    fn side(&self) -> Side {
-        if self.on_table { Side::Workpiece } else { Side::Tool }
-    }
-}
-
-/// `machine.toml` and `plan.toml` of a structural code.
-pub fn files(code: &str) -> Result<Vec<NewFile>, Failure> {
-    let parsed = StructuralCode::parse(code).map_err(|fault| Failure::Other(fault.to_string()))?;
+/// The texts of `machine.toml` and of a plan that refers to it: two tests of each rotary axis, a circle of each pair of
+/// linear axes.
+///
+/// # Errors
+/// If the code is invalid, has no axis, or has an axis that is no letter of ISO 841, so that its kind is not known.
+pub fn of_code(code: &str) -> Result<[String; 2], ModelError> {
+    let parsed = StructuralCode::parse(code)?;
     let mut bodies = Vec::new();
     for (index, name) in parsed.axes().enumerate() {
         let (Some(kind), Some(direction)) = (AxisKind::of_letter(name), Axis::direction_of_letter(name)) else {
-            return Err(Failure::Other(format!(
-                "axis `{name}` of `{code}` is no letter of ISO 841 (X Y Z U V W are linear, A B C rotary), so its kind is not known; \
-                 `abbe new DIR --template ur10` shows a machine whose axes state their kind and direction"
-            )));
+            return Err(ModelError::UnknownAxisKind { axis: name.clone() });
         };
         bodies.push(Body {
             name: name.clone(),
@@ -46,9 +34,9 @@ pub fn files(code: &str) -> Result<Vec<NewFile>, Failure> {
         });
     }
     if bodies.is_empty() {
-        return Err(Failure::Other(format!("`{code}` has no axis; a code such as [wCXbYZAt] is expected")));
+        return Err(ModelError::StructuralCode { code: code.to_string(), found: "it has no axis".into() });
     }
-    Ok(vec![("machine.toml".into(), machine(&parsed, &bodies)), ("plan.toml".into(), plan::text(&bodies))])
+    Ok([machine(&parsed, &bodies), plan::text(&bodies)])
 }
 
 fn machine(code: &StructuralCode, bodies: &[Body]) -> String {

@@ -3,19 +3,19 @@
 //! A ball is mounted once. Linear axes move the spindle ball to the position relative to the workpiece ball that a test
 //! needs. If no axis moves along a required direction, the ball that does not move in the test is mounted again.
 
-use abbe::model::axis::AxisKind;
+use crate::axis::AxisKind;
 
-use super::Body;
+use super::body::{Body, Side};
 
 /// A length over the constants of the plan: `radius` times `R` plus `lift` times `sqrt(R_e^2 - R^2)`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Length {
+pub(super) struct Length {
     pub radius: i32,
     pub lift: i32,
 }
 
 /// A point or a distance, along X, Y and Z of R.
-pub type Vector = [Length; 3];
+pub(super) type Vector = [Length; 3];
 
 impl Length {
     const ZERO: Length = Length { radius: 0, lift: 0 };
@@ -51,26 +51,19 @@ impl Length {
 }
 
 /// A point as in a session file: `[0, "R", 0]`.
-pub fn point_text(point: &Vector) -> String {
+pub(super) fn point_text(point: &Vector) -> String {
     let [x, y, z] = point.map(Length::text);
     format!("[{x}, {y}, {z}]")
 }
 
-/// The side of the chain from the bed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
-    Workpiece,
-    Tool,
-}
-
 /// All mounting points: workpiece balls in the table frame, spindle balls in the tool frame.
-pub struct Mounts {
+pub(super) struct Mounts {
     pub workpiece: Vec<Vector>,
     pub spindle: Vec<Vector>,
 }
 
 /// The set-up of a test: its mounting points by number, and the positions of the axes that it does not move.
-pub struct Setting {
+pub(super) struct Setting {
     pub workpiece: usize,
     pub spindle: usize,
     /// Linear axes that the test does not move, by name and position.

@@ -1,23 +1,20 @@
-//! `plan.toml` of a structural code: two tests of each rotary axis, a circle of each pair of linear axes.
+//! The plan of a structural code: two tests of each rotary axis, a circle of each pair of linear axes.
 //!
 //! The balls are mounted once. Each test states the positions of the axes that it does not move. These are the
 //! coordinates that the operator enters and that the data contain.
 
 use std::fmt::Write;
 
-use abbe::model::axis::AxisKind;
+use crate::axis::AxisKind;
 
-use super::Body;
-use super::mounts::{Mounts, Setting, Side, point_text};
+use super::body::{Body, Side};
+use super::mounts::{Mounts, Setting, point_text};
 
 /// Names of the directions of R, and of the angles about them.
 const LETTERS: [&str; 3] = ["X", "Y", "Z"];
 const ANGLES: [&str; 3] = ["A", "B", "C"];
 
-const HEAD: &str = "# A plan. `abbe plan plan.toml` analyses which errors these tests identify, and with which uncertainty.\n\
-    # Change the tests until the uncertainties suffice.\n\
-    # `abbe simulate plan.toml --out run1 --error …` simulates readings. A measured test has a line `data = \"….csv\"`.\n\n\
-    [machine]\n\
+const HEAD: &str = "[machine]\n\
     # The chain and its axes, beside this file.\n\
     file = \"machine.toml\"\n\n\
     [constants]\n\
@@ -41,8 +38,8 @@ const PRIORS: &str = "# Set-up priors: standard uncertainty of the ball position
     spindle_ball_u_um = [1, 1, 1]\n\
     bar_u_um = 0.5\n";
 
-/// The text of `plan.toml`.
-pub fn text(bodies: &[Body]) -> String {
+/// The text of the plan.
+pub(super) fn text(bodies: &[Body]) -> String {
     let pairs = pairs(bodies);
     let mut text = HEAD.to_string();
     unknowns(&mut text, bodies, &pairs);
