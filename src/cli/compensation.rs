@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use abbe::identify::compensation::curves::of_fit;
-use abbe::identify::compensation::{CONTROLS, Control, MAX_POINTS, PointUncertainty, tables};
+use abbe::identify::compensation::{CONTROLS, Control, MAX_POINTS, tables};
 use abbe::identify::fit::Fit;
 use abbe::identify::problem::Problem;
 use clap::Args;
@@ -12,6 +12,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use super::failure::Failure;
 use super::message::{Kind, tell};
 use super::{folder, output};
+use crate::present::compensation::uncertainties;
 
 /// The file of the uncertainties.
 const UNCERTAINTIES: &str = "uncertainty.csv";
@@ -78,7 +79,7 @@ impl CompensationArguments {
         }
         let mut files: Vec<(String, Vec<u8>)> =
             found.files.into_iter().map(|(name, text)| (name, text.into_bytes())).collect();
-        files.push((UNCERTAINTIES.to_string(), uncertainties(&found.uncertainties)?));
+        files.push((UNCERTAINTIES.to_string(), output::csv(&uncertainties(&found.uncertainties))?));
         folder::write(folder, &files, false, |_| Ok(()))?;
         if !shown {
             for line in &found.left_out {
@@ -99,21 +100,4 @@ impl CompensationArguments {
         }
         Ok(())
     }
-}
-
-/// One row per point: position, error and u, with their units.
-fn uncertainties(points: &[PointUncertainty]) -> Result<Vec<u8>, Failure> {
-    let header = ["error", "position", "position_unit", "direction", "value", "u", "unit"].map(str::to_string);
-    let row = |point: &PointUncertainty| {
-        vec![
-            point.error.to_string(),
-            format!("{:.6}", point.position),
-            point.axis.unit().to_string(),
-            point.direction.map_or("both", |direction| if direction > 0.0 { "+" } else { "-" }).to_string(),
-            format!("{:.6}", point.value),
-            format!("{:.6}", point.u),
-            point.unit.to_string(),
-        ]
-    };
-    output::csv(&header, points.iter().map(row))
 }

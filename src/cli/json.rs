@@ -12,7 +12,7 @@ use serde_json::{Map, Value};
 
 use super::failure::Failure;
 use super::{Arguments, output};
-use crate::report::provenance::{self, Input};
+use crate::present::report::provenance::{self, Input};
 
 /// Version of the schemas of all documents.
 pub const SCHEMA_VERSION: u32 = 2;

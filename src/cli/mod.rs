@@ -5,33 +5,26 @@ macro_rules! say {
     ($($text:tt)*) => { $crate::cli::output::line(format_args!($($text)*)) };
 }
 
-pub mod circular;
 mod compensation;
-mod csv;
-mod directions;
 mod equation;
 mod failure;
 mod fit;
 mod folder;
-pub mod geometric;
+mod geometric;
 mod interrupt;
-pub mod json;
+mod json;
 mod map;
 mod message;
 mod new;
-pub mod output;
-pub mod plan;
-mod plausibility;
+mod output;
+mod plan;
 mod repeated;
 mod report;
-mod residuals;
 mod schema;
 mod screen;
 mod self_calibration;
 mod simulate;
-pub mod table;
-pub mod trace;
-pub mod uniqueness;
+mod trace;
 
 use std::path::PathBuf;
 use std::process::ExitCode;

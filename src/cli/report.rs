@@ -9,9 +9,9 @@ use maud::Markup;
 
 use super::failure::Failure;
 use super::{folder, output};
-use crate::report::document::Document;
-use crate::report::page;
-use crate::report::provenance::Provenance;
+use crate::present::report::document::Document;
+use crate::present::report::page;
+use crate::present::report::provenance::Provenance;
 
 /// The files of a report.
 #[derive(Args, Clone)]
@@ -84,13 +84,13 @@ impl ReportArguments {
 
 fn write_plots(document: &Document, path: &Path) -> Result<(), Failure> {
     #[cfg(feature = "png")]
-    let fonts = crate::report::plot::png::Fonts::bundled();
+    let fonts = crate::present::figure::png::Fonts::bundled();
     let mut files = Vec::new();
     for plot in &document.plots {
         files.push((format!("{}.svg", plot.name), plot.svg().into_bytes()));
         #[cfg(feature = "png")]
         {
-            let png = crate::report::plot::png::png(plot, &fonts)
+            let png = crate::present::figure::png::png(plot, &fonts)
                 .ok_or_else(|| Failure::Other(format!("the plot `{}` cannot be drawn as PNG", plot.name)))?;
             files.push((format!("{}.png", plot.name), png));
         }

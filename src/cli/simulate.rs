@@ -13,7 +13,10 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::failure::Failure;
-use super::{CommonArguments, SessionArguments, folder, json, message, output, read_session, table};
+use super::{CommonArguments, SessionArguments, folder, json, message, output, read_session};
+use crate::present::number::micrometres;
+use crate::present::simulation::truth;
+use crate::present::table::Table;
 
 /// Examples of `abbe simulate`, and the names of values.
 pub const HELP: &str = "Names of values are those of results, with a unit: errors (EY0A of ISO 230-1, e_y0a of the literature), set-up \
@@ -171,7 +174,7 @@ fn report(
         warnings: simulated.warnings.clone(),
     };
     if tables {
-        print(session, &report, arguments.common.seed);
+        print(session, &report, &truth(simulated), arguments.common.seed);
     }
     message::print_warnings(&report.warnings);
     if let Some(path) = &arguments.common.json {
@@ -180,24 +183,19 @@ fn report(
     Ok(())
 }
 
-fn print(session: &Session, report: &SimulationResult, seed: u64) {
+fn print(session: &Session, report: &SimulationResult, truth: &Table, seed: u64) {
     say!(
         "{}: {} of {}, noise {}, seed {}",
         report.written_session,
         counted(report.readings, "reading"),
         counted(session.tests.len(), "test"),
-        table::micrometres(report.noise_um),
+        micrometres(report.noise_um),
         seed
     );
-    let rows: Vec<Vec<String>> = report
-        .truth
-        .iter()
-        .map(|value| vec![value.id.clone(), format!("{:.4}", value.value), table::unit(&value.unit)])
-        .collect();
-    if rows.is_empty() {
+    if truth.rows.is_empty() {
         say!("No error is given: the readings are those of the nominal machine.");
     } else {
         say!("");
-        table::print(&["parameter", "value", "unit"], &rows);
+        output::print(truth);
     }
 }

@@ -18,7 +18,8 @@ use super::failure::Failure;
 use super::interrupt::Interrupts;
 use super::message::{Kind, tell};
 use super::report::ReportArguments;
-use super::{CommonArguments, SessionArguments, compensation, csv, json, message, output, read_session, residuals};
+use super::{CommonArguments, SessionArguments, compensation, json, message, output, read_session};
+use crate::present::{readings, trace as present};
 
 /// Examples of `abbe trace`.
 pub const HELP: &str = "Examples:
@@ -165,14 +166,14 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         }
     }
     if let Some(path) = &arguments.csv {
-        csv::write_trace(path, &trace.result)?;
+        output::write_figures(path, &present::figures(&trace.result))?;
     }
     if let Some(path) = &arguments.residuals {
-        residuals::write(&trace.after, &trace.after_fit, path)?;
+        output::write_whole(path, &output::csv(&readings::residuals(&trace.after, &trace.after_fit))?)?;
     }
     if arguments.report.asked() {
-        let document = crate::report::trace::document(&trace)?;
-        let method = crate::report::trace::method(&trace.result);
+        let document = crate::present::report::trace::document(&trace)?;
+        let method = crate::present::report::trace::method(&trace.result);
         arguments.report.write(&document, &method, (&session, &sources), arguments.common.seed)?;
     }
     if trace.result.interrupted {
