@@ -6,7 +6,7 @@
 use abbe::identify::circular::{CircularTest, Diagnosis};
 
 use super::number::{micrometres, unit};
-use super::table::{Cell, Table, cells, numbers, numbers_in, words};
+use super::table::{Cell, Table, cells};
 
 /// The test and its path.
 pub fn heading(test: &CircularTest) -> String {
@@ -38,14 +38,7 @@ pub fn summary(tests: &[CircularTest]) -> Table {
             fault
         ]
     });
-    let columns = [
-        words("test"),
-        words("path of"),
-        numbers_in("G(b)", "µm"),
-        numbers_in("D", "µm"),
-        numbers_in("H", "µm"),
-        words("largest fault"),
-    ];
+    let columns = ["test", "path of", ">G(b), µm", ">D, µm", ">H, µm", "largest fault"];
     let count = if tests.iter().any(|test| !test.diagnosis.is_empty()) { columns.len() } else { columns.len() - 1 };
     Table::new(columns, rows).first_columns(count)
 }
@@ -69,11 +62,11 @@ fn directions(test: &CircularTest) -> Table {
         ]
     });
     let columns = [
-        words("direction"),
-        numbers("runs"),
-        numbers_in("circular error (G)", "µm"),
-        numbers_in("maximum radial error (F max)", "µm"),
-        numbers_in("minimum radial error (F min)", "µm"),
+        "direction",
+        ">runs",
+        ">circular error (G), µm",
+        ">maximum radial error (F max), µm",
+        ">minimum radial error (F min), µm",
     ];
     Table::new(columns, rows)
 }
@@ -86,13 +79,12 @@ fn both(test: &CircularTest) -> Table {
         ("circular hysteresis (H, edition of 1996)", test.hysteresis_um),
     ];
     let rows = figures.into_iter().filter_map(|(name, um)| Some(cells![name, Cell::fixed(um?, 2)]));
-    Table::new([words("both directions"), numbers("µm")], rows)
+    Table::new(["both directions", ">µm"], rows)
 }
 
 /// One row per figure of a fault; the first row of a fault has its share.
 fn faults(test: &CircularTest) -> Table {
-    let columns =
-        [words("fault"), numbers("value"), numbers("u"), words("unit"), numbers("share"), numbers("on the path")];
+    let columns = ["fault", ">value", ">u", "unit", ">share", ">on the path"];
     let mut table = Table::new(columns, test.diagnosis.iter().flat_map(fault_rows));
     if let (Some(rms), false) = (test.diagnosis_rms_um, test.diagnosis.is_empty()) {
         table.notes.push(format!("residual of the diagnosis: {} rms", micrometres(rms)));

@@ -2,7 +2,7 @@
 
 use abbe::identify::compensation::PointUncertainty;
 
-use super::table::{Cell, Table, cells, numbers, words};
+use super::table::{Cell, Table, cells};
 
 /// One row per point: position, error and u, with their units.
 pub fn uncertainties(points: &[PointUncertainty]) -> Table {
@@ -11,14 +11,6 @@ pub fn uncertainties(points: &[PointUncertainty]) -> Table {
         let [position, value, u] = [point.position, point.value, point.u].map(|number| Cell::fixed(number, 6));
         cells![point.error.to_string(), position, point.axis.unit(), direction, value, u, point.unit]
     });
-    let columns = [
-        words("error"),
-        numbers("position"),
-        words("position_unit"),
-        words("direction"),
-        numbers("value"),
-        numbers("u"),
-        words("unit"),
-    ];
+    let columns = ["error", ">position", "position_unit", "direction", ">value", ">u", "unit"];
     Table::new(columns, rows)
 }

@@ -4,7 +4,7 @@ use abbe::identify::results::{Outlier, Unobservable};
 use abbe::model::words::counted;
 
 use super::number::{micrometres, with_symbols};
-use super::table::{Table, cells, numbers, words};
+use super::table::{Table, cells};
 
 /// One sentence for each combination that leaves every reading unchanged.
 pub fn sentences(directions: &[Unobservable]) -> Vec<String> {
@@ -16,5 +16,5 @@ pub fn outliers<'o>(outliers: impl ExactSizeIterator<Item = &'o Outlier>) -> Tab
     let is_are = if outliers.len() == 1 { "is" } else { "are" };
     let title = format!("{} {is_are} excluded as outliers", counted(outliers.len(), "reading"));
     let rows = outliers.map(|o| cells![&o.test, &o.file, o.line.to_string(), micrometres(o.residual_um)]);
-    Table::new([words("test"), words("file"), numbers("line"), numbers("residual")], rows).titled(title)
+    Table::new(["test", "file", ">line", ">residual"], rows).titled(title)
 }

@@ -11,7 +11,7 @@ pub fn cell(text: String) -> String {
     if formula && text.parse::<f64>().is_err() { format!("'{text}") } else { text }
 }
 
-/// The table as CSV: cells that hold a separator stand in quotes. Headings stand without the unit.
+/// The table as CSV: cells that hold a separator stand in quotes.
 ///
 /// # Errors
 /// If a row is not as long as the header.

@@ -5,7 +5,7 @@ use abbe::identify::results::{FitMonteCarlo, FitResult, ParameterResult, Verdict
 use abbe::model::words::counted;
 
 use super::number::{fixed, micrometres, places, unit};
-use super::table::{Cell, Table, cells, numbers, words};
+use super::table::{Cell, Column, Table, cells, numbers, words};
 
 /// χ²/ν below which the noise is said to be overstated.
 const MIN_RATIO: f64 = 0.5;
@@ -52,16 +52,9 @@ pub fn propagations(drawn: &FitMonteCarlo, is_shown: impl Fn(&str) -> bool) -> T
         let [low, high] = [quoted.low, quoted.high].map(|end| fixed(end, places(parameter.u)));
         cells![&parameter.id, value, gum_u, u, format!("{low} to {high}"), unit(&parameter.unit), source]
     });
-    let interval = format!("{} %", drawn.coverage_probability * 100.0);
-    let columns = [
-        words("parameter"),
-        numbers("value"),
-        numbers("u GUM"),
-        numbers("u MC"),
-        numbers(interval),
-        words("unit"),
-        words("quoted"),
-    ];
+    let interval = numbers(format!("{} %", drawn.coverage_probability * 100.0));
+    let mut columns = ["parameter", ">value", ">u GUM", ">u MC", "unit", "quoted"].map(Column::from).to_vec();
+    columns.insert(4, interval);
     Table::new(columns, rows)
         .titled("Estimates with standard uncertainty u by GUM and by Monte Carlo, and the quoted coverage interval")
 }

@@ -15,7 +15,7 @@ pub fn table(table: &Table) -> Markup {
         div class="scroll" {
             table {
                 thead {
-                    tr { @for (column, class) in table.columns.iter().zip(&class) { th class=[*class] { (column.label()) } } }
+                    tr { @for (column, class) in table.columns.iter().zip(&class) { th class=[*class] { (column.heading) } } }
                 }
                 tbody {
                     @for row in &table.rows {

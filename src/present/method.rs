@@ -3,7 +3,7 @@
 use abbe::identify::geometric::{Comparison, ComparisonRow};
 
 use super::number::unit;
-use super::table::{Cell, Table, cells, numbers, numbers_in, words};
+use super::table::{Cell, Column, Table, cells, numbers};
 
 /// The errors by the method and by the full fit, one row per error.
 pub fn errors(result: &Comparison) -> Table {
@@ -17,8 +17,8 @@ pub fn errors(result: &Comparison) -> Table {
         let [full, full_u] = pair(row.full_value, row.full_u);
         cells![&row.id, value, u, bias(row.bias), full, full_u, bias(row.full_bias), unit(&row.unit)]
     });
-    let numbered = [result.method.as_str(), "u", "bias", "full fit", "u", "bias"].map(numbers);
-    let columns: Vec<_> = std::iter::once(words("error")).chain(numbered).chain([words("unit")]).collect();
+    let mut columns = ["error", ">u", ">bias", ">full fit", ">u", ">bias", "unit"].map(Column::from).to_vec();
+    columns.insert(1, numbers(&result.method));
     Table::new(columns, rows).titled(format!(
         "{} beside the full fit, with standard uncertainty u and bias (on noise-free readings with the errors of the full fit)",
         result.method
@@ -41,14 +41,7 @@ pub fn centres(result: &Comparison) -> Table {
             cells![&centre.test, centre_of, offset, u, radius, height, shares.join(" ")]
         })
     });
-    let columns = [
-        words("test"),
-        words("centre"),
-        numbers_in("offset", "µm"),
-        numbers("u"),
-        numbers_in("radius", "mm"),
-        numbers_in("cone height", "mm"),
-        words("first-order shares, in µm and ″"),
-    ];
+    let columns =
+        ["test", "centre", ">offset, µm", ">u", ">radius, mm", ">cone height, mm", "first-order shares, in µm and ″"];
     Table::new(columns, rows).titled("Offset of each axis at the fixed ball from its nominal position")
 }

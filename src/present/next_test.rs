@@ -5,7 +5,7 @@ use abbe::identify::plan::range::Shrinkage;
 use abbe::identify::results::Interval;
 
 use super::number::{quantity, three_digits, unit};
-use super::table::{Cell, Table, cells, numbers, numbers_in, words};
+use super::table::{Cell, Column, Table, cells, numbers};
 
 /// The figure of merit with the symbols of its units.
 pub fn criterion(found: &Improvement) -> String {
@@ -28,14 +28,14 @@ pub fn proposed(found: &Improvement) -> Table {
         ]
     });
     let columns = [
-        numbers("number"),
-        numbers("figure of merit"),
-        numbers_in("duration", "min"),
-        numbers_in("workpiece ball", "mm"),
-        numbers_in("spindle ball", "mm"),
-        numbers_in("bar", "mm"),
-        words("makes identifiable"),
-        words("test"),
+        ">number",
+        ">figure of merit",
+        ">duration, min",
+        ">workpiece ball, mm",
+        ">spindle ball, mm",
+        ">bar, mm",
+        "makes identifiable",
+        "test",
     ];
     Table::new(columns, rows)
 }
@@ -47,7 +47,7 @@ pub fn uncertainties(found: &Improvement) -> Table {
         cells![&before.id, three_digits(before.u)].into_iter().chain(with).collect()
     });
     let with = (1..=found.steps.len()).map(|number| numbers(format!("with test {number}")));
-    let columns: Vec<_> = [words("error"), numbers("plan")].into_iter().chain(with).collect();
+    let columns = ["error", ">plan"].map(Column::from).into_iter().chain(with);
     Table::new(columns, rows).titled("Predicted standard uncertainty u, µm or ″ (∞: not identifiable)")
 }
 
@@ -57,7 +57,7 @@ pub fn alternatives(found: &Improvement) -> Table {
         .alternatives
         .iter()
         .map(|other| cells![three_digits(other.after), Cell::fixed(other.duration_min, 1), &other.test]);
-    let columns = [numbers("figure of merit"), numbers_in("duration", "min"), words("test")];
+    let columns = [">figure of merit", ">duration, min", "test"];
     Table::new(columns, rows).titled("Best single tests")
 }
 
@@ -73,6 +73,6 @@ pub fn ranges(ranges: &[Shrinkage]) -> Table {
             range.first_to_double.clone().unwrap_or("–".into()),
         ]
     });
-    let columns = [words("test"), words("axis"), numbers("planned"), numbers("smallest"), words("doubles first")];
+    let columns = ["test", "axis", ">planned", ">smallest", "doubles first"];
     Table::new(columns, rows).titled("Smallest range of each sweep about its middle before an uncertainty doubles")
 }

@@ -7,8 +7,8 @@ use abbe::identify::problem::Problem;
 use abbe::identify::results::ParameterResult;
 use abbe::model::words::counted;
 
-use super::number::{self, fixed, places};
-use super::table::{Cell, Table, cells, numbers, words};
+use super::number::{places, unit, value_and_u};
+use super::table::{Cell, Table, cells};
 
 /// The parameters of a fit.
 pub struct Estimates<'r> {
@@ -56,10 +56,9 @@ impl<'r> Estimates<'r> {
             let [value, u] = Cell::estimate(p.value, p.u);
             let pull = self.pulls.iter().find(|(id, _)| *id == p.id);
             let pull = Cell::or_dash(pull.map(|(_, pull)| Cell::fixed(pull.pull, 1)));
-            cells![&p.id, value, u, number::unit(&p.unit), pull, &p.meaning]
+            cells![&p.id, value, u, unit(&p.unit), pull, &p.meaning]
         });
-        let columns =
-            [words("parameter"), numbers("value"), numbers("u"), words("unit"), numbers("pull"), words("meaning")];
+        let columns = ["parameter", ">value", ">u", "unit", ">pull", "meaning"];
         let table = Table::new(columns, rows).titled("Set-up parameters, as deviations from their stated values");
         beside(table, &self.setup, before)
     }
@@ -83,10 +82,9 @@ pub fn table(parameters: &[&ParameterResult], before: Option<&[ParameterResult]>
         // Rounded to the same place.
         let expanded = Cell::fixed(p.expanded_u, places(p.u));
         let mark = if p.significant { "*" } else { "" };
-        cells![&p.id, value, u, expanded, number::unit(&p.unit), mark, &p.meaning]
+        cells![&p.id, value, u, expanded, unit(&p.unit), mark, &p.meaning]
     });
-    let columns =
-        [words("parameter"), numbers("value"), numbers("u"), numbers("U"), words("unit"), words(""), words("meaning")];
+    let columns = ["parameter", ">value", ">u", ">U", "unit", "", "meaning"];
     let table = Table::new(columns, rows)
         .titled("Estimates with standard uncertainty u and expanded uncertainty U = 2u (*: significant, |value| > U)");
     beside(table, parameters, before)
@@ -97,14 +95,10 @@ fn beside(mut table: Table, parameters: &[&ParameterResult], before: Option<&[Pa
     let Some(before) = before else {
         return table;
     };
-    table.columns.push(numbers("before ± u"));
-    for (row, parameter) in table.rows.iter_mut().zip(parameters) {
-        let earlier = before.iter().find(|value| value.id == parameter.id);
-        row.push(
-            earlier
-                .map_or(String::new(), |p| format!("{} ± {}", fixed(p.value, places(p.u)), fixed(p.u, places(p.u))))
-                .into(),
-        );
-    }
+    let cells = parameters.iter().map(|parameter| {
+        let earlier = before.iter().find(|value| value.id == parameter.id).map(|p| value_and_u(p.value, p.u));
+        Cell::from(earlier.map_or(String::new(), |(value, u)| format!("{value} ± {u}")))
+    });
+    table.push(">before ± u", cells);
     table
 }

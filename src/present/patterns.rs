@@ -14,9 +14,7 @@ pub fn sizes(found: &Patterns) -> Table {
             [pattern.largest_um, pattern.mean_um, pattern.standard_deviation_um].map(|um| Cell::fixed(um, 3));
         cells![&pattern.test, &pattern.error, size, largest, mean, deviation]
     });
-    let numbered = ["size", "largest, µm", "mean, µm", "standard deviation, µm"].map(numbers);
-    let columns: Vec<_> = ["test", "error"].map(words).into_iter().chain(numbered).collect();
-    Table::new(columns, rows)
+    Table::new(["test", "error", ">size", ">largest, µm", ">mean, µm", ">standard deviation, µm"], rows)
 }
 
 /// One row per reading and error: test, error and its size, run, positions of the axes, deviation.

@@ -3,7 +3,7 @@
 use abbe::identify::plausibility::{ConflictKind, Plausibility, Suggestion};
 
 use super::number::{micrometres, unit};
-use super::table::{Cell, Table, cells, numbers, words};
+use super::table::{Cell, Table, cells};
 
 /// What contradicts the session and what may have caused it.
 pub struct Conflicts {
@@ -29,7 +29,7 @@ pub fn conflicts(plausibility: &Plausibility) -> Option<Conflicts> {
         let stated = Cell::exact(conflict.stated);
         Some(cells![&conflict.subject, value, stated, unit(&conflict.unit), Cell::fixed(pull, 1)])
     });
-    let columns = [words("set-up parameter"), numbers("estimate"), numbers("stated u"), words("unit"), numbers("pull")];
+    let columns = ["set-up parameter", ">estimate", ">stated u", "unit", ">pull"];
     let cause = |cause: &Suggestion| format!("{} (residual {})", cause.words, micrometres(cause.rms_um));
     let (explanation, causes) = match plausibility.suggestions.as_slice() {
         [] => ("No single mistake among those tried explains this.".to_string(), Vec::new()),

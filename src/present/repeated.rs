@@ -3,7 +3,7 @@
 use abbe::identify::repeated::{Repeated, Scatter};
 
 use super::number::{places, unit};
-use super::table::{Cell, Table, cells, numbers, words};
+use super::table::{Cell, Table, cells};
 
 /// Mean and scatter of each parameter.
 pub fn parameters(result: &Repeated) -> Table {
@@ -27,17 +27,7 @@ pub fn parameters(result: &Repeated) -> Table {
             },
         ]
     });
-    let columns = [
-        words("parameter"),
-        numbers("mean"),
-        numbers("s/√n (A)"),
-        numbers("s (A)"),
-        numbers("u (B)"),
-        words("unit"),
-        numbers("s/u"),
-        numbers("p"),
-        words(""),
-    ];
+    let columns = ["parameter", ">mean", ">s/√n (A)", ">s (A)", ">u (B)", "unit", ">s/u", ">p", ""];
     Table::new(columns, rows)
 }
 
@@ -48,13 +38,6 @@ pub fn deviating(result: &Repeated) -> Table {
         let ratio = Cell::fixed((deviation.deviation / deviation.u).abs(), 1);
         cells![&deviation.session, &deviation.id, difference, u, unit(&deviation.unit), ratio]
     });
-    let columns = [
-        words("session"),
-        words("parameter"),
-        numbers("deviation"),
-        numbers("u"),
-        words("unit"),
-        numbers("deviation/u"),
-    ];
+    let columns = ["session", "parameter", ">deviation", ">u", "unit", ">deviation/u"];
     Table::new(columns, rows).titled("Significant deviations of a session from the mean of the others")
 }

@@ -30,8 +30,7 @@ pub fn functions(functions: &[FunctionResult]) -> Table {
         let cells = functions.iter().map(|function| cell(function, *angle));
         std::iter::once(format!("{angle}°").into()).chain(cells).collect()
     });
-    let columns: Vec<_> =
-        [words("angle")].into_iter().chain(functions.iter().map(|function| numbers(&function.id))).collect();
+    let columns = [words("angle")].into_iter().chain(functions.iter().map(|function| numbers(&function.id)));
     Table::new(columns, rows)
 }
 
@@ -46,6 +45,6 @@ pub fn intervals(drawn: &MonteCarloResult) -> Table {
         let shortest = interval(quantity.shortest_interval_um);
         cells![&quantity.id, mean, u, shortest, interval(quantity.symmetric_interval_um)]
     });
-    let columns = [words("quantity"), numbers("mean"), numbers("u"), numbers("shortest"), numbers("symmetric")];
+    let columns = ["quantity", ">mean", ">u", ">shortest", ">symmetric"];
     Table::new(columns, rows)
 }

@@ -3,10 +3,10 @@
 use abbe::identify::simulate::Simulated;
 
 use super::number::unit;
-use super::table::{Cell, Table, cells, numbers, words};
+use super::table::{Cell, Table, cells};
 
 /// The parameters that are not zero.
 pub fn truth(simulated: &Simulated) -> Table {
     let rows = simulated.truth.iter().map(|(id, value, name)| cells![id, Cell::fixed(*value, 4), unit(name)]);
-    Table::new([words("parameter"), numbers("value"), words("unit")], rows)
+    Table::new(["parameter", ">value", "unit"], rows)
 }

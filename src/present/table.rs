@@ -14,34 +14,27 @@ pub enum Align {
 /// A column.
 #[derive(Clone, Debug)]
 pub struct Column {
-    /// Heading, without the unit.
+    /// Heading, with the unit of all cells if they have one: `offset, µm`.
     pub heading: String,
-    /// Symbol of the unit of all cells; empty if there is none or the cells state it.
-    pub unit: &'static str,
     /// Alignment.
     pub align: Align,
 }
 
-impl Column {
-    /// The heading with its unit: `offset, µm`.
-    pub fn label(&self) -> String {
-        if self.unit.is_empty() { self.heading.clone() } else { format!("{}, {}", self.heading, self.unit) }
-    }
-}
-
 /// A column of words.
 pub fn words(heading: impl Into<String>) -> Column {
-    Column { heading: heading.into(), unit: "", align: Align::Left }
+    Column { heading: heading.into(), align: Align::Left }
 }
 
 /// A column of numbers.
 pub fn numbers(heading: impl Into<String>) -> Column {
-    Column { heading: heading.into(), unit: "", align: Align::Right }
+    Column { heading: heading.into(), align: Align::Right }
 }
 
-/// A column of numbers in one unit.
-pub fn numbers_in(heading: impl Into<String>, unit: &'static str) -> Column {
-    Column { unit, ..numbers(heading) }
+/// A column of numbers after `>`, else of words.
+impl From<&'static str> for Column {
+    fn from(text: &'static str) -> Column {
+        text.strip_prefix('>').map_or_else(|| words(text), numbers)
+    }
 }
 
 /// A cell.
@@ -125,8 +118,18 @@ pub struct Table {
 
 impl Table {
     /// A table without a title.
-    pub fn new(columns: impl Into<Vec<Column>>, rows: impl IntoIterator<Item = Vec<Cell>>) -> Table {
-        Table { columns: columns.into(), rows: rows.into_iter().collect(), ..Table::default() }
+    pub fn new<C: Into<Column>>(
+        columns: impl IntoIterator<Item = C>,
+        rows: impl IntoIterator<Item = Vec<Cell>>,
+    ) -> Table {
+        let columns = columns.into_iter().map(Into::into).collect();
+        Table { columns, rows: rows.into_iter().collect(), ..Table::default() }
+    }
+
+    /// A column at the end, with its cells from the first row on.
+    pub fn push(&mut self, column: impl Into<Column>, cells: impl IntoIterator<Item = Cell>) {
+        self.columns.push(column.into());
+        self.rows.iter_mut().zip(cells).for_each(|(row, cell)| row.push(cell));
     }
 
     /// The table with a title.

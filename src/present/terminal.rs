@@ -4,7 +4,7 @@ use super::table::{Align, Table};
 
 /// The table without its title: one line per row under the header, then the notes, without a line end at the end.
 pub fn text(table: &Table) -> String {
-    let header: Vec<String> = table.columns.iter().map(|column| column.label()).collect();
+    let header: Vec<String> = table.columns.iter().map(|column| column.heading.clone()).collect();
     let rows: Vec<Vec<String>> = table.rows.iter().map(|row| row.iter().map(ToString::to_string).collect()).collect();
     let mut width: Vec<usize> = header.iter().map(|cell| cell.chars().count()).collect();
     for row in &rows {

@@ -5,7 +5,7 @@ use abbe::identify::results::{ModelResult, TraceResult};
 use super::effect::name;
 use super::fit::{Figures, noise as noise_in_words, rank};
 use super::number::{micrometres, quantity, value_and_u};
-use super::table::{Cell, Table, cells, numbers, words};
+use super::table::{Cell, Table, cells};
 
 /// The noise and its source in words. A residual is not called noise.
 pub fn noise(result: &TraceResult) -> String {
@@ -34,14 +34,14 @@ pub fn before_and_after(result: &TraceResult) -> Table {
         cells.push(rank(model.identifiable.len(), model.parameter_count, model.rank).into());
         cells
     };
-    let mut columns = vec![words("residual, µm"), numbers("rms"), numbers("held out")];
+    let mut columns = vec!["residual, µm", ">rms", ">held out"];
     if result.before.rms_3d_um.is_some() {
-        columns.extend(["3-vector", "held out"].map(numbers));
+        columns.extend([">3-vector", ">held out"]);
     }
     if judges {
-        columns.push(numbers("χ²/ν"));
+        columns.push(">χ²/ν");
     }
-    columns.push(words(""));
+    columns.push("");
     let mut table = Table::new(columns, [row("before", &result.before), row("after", &result.after)]);
     table.notes.push(format!("held out: leaving out {}", result.heldout_by));
     table

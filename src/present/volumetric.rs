@@ -3,7 +3,7 @@
 use abbe::identify::volumetric::{Size, Summary, VolumetricPoint};
 use abbe::model::chain::Machine;
 
-use super::table::{Cell, Column, Table, cells, numbers, words};
+use super::table::{Cell, Column, Table, cells, numbers};
 
 /// The size of the error: in total, by coordinate, by axis, after compensation.
 pub fn sizes(summary: &Summary) -> Table {
@@ -18,7 +18,7 @@ pub fn sizes(summary: &Summary) -> Table {
         let [largest, rms] = [residual.largest_um, residual.rms_um].map(|um| format!("{um:.1e}"));
         cells!["after compensation", largest, rms]
     }));
-    Table::new([words("µm"), numbers("largest"), numbers("rms")], rows)
+    Table::new(["µm", ">largest", ">rms"], rows)
 }
 
 /// One row per place: positions, the nominal point, the error; with compensation the commands and what they leave.

@@ -5,7 +5,7 @@ use abbe::identify::plan::results::{EffectDetectability, EffectsAnalysis};
 
 use super::optional;
 use crate::present::number::{three_digits, unit};
-use crate::present::table::{Table, cells, numbers, words};
+use crate::present::table::{Table, cells};
 
 /// Effects in one table; the JSON lists all.
 const MAX_EFFECTS: usize = 16;
@@ -65,8 +65,7 @@ pub fn by_error(found: &EffectsAnalysis) -> Table {
         };
         cells![error, format!("{}{more}", named.join(", "))]
     });
-    Table::new([words("error"), words("effects")], rows)
-        .titled("Effects confounded with each error, the largest bias first")
+    Table::new(["error", "effects"], rows).titled("Effects confounded with each error, the largest bias first")
 }
 
 /// Component and driver of an effect: `EZC~C` of `EZC~C:h2`.
@@ -102,8 +101,7 @@ fn table<'e>(effects: impl Iterator<Item = &'e EffectDetectability>) -> Table {
             alike.to_string(),
         ]
     });
-    let numbered = ["single", "search", "unit", "remains", "bias", "further"].map(numbers);
-    let columns: Vec<_> = [words("effect")].into_iter().chain(numbered).collect();
+    let columns = ["effect", ">single", ">search", "unit", ">remains", "bias", ">further"];
     let mut table = Table::new(columns, rows);
     if chosen.len() > MAX_EFFECTS {
         table.notes.push(format!("… {} more in the JSON", chosen.len() - MAX_EFFECTS));

@@ -42,16 +42,7 @@ pub fn uncertainties(errors: &[ErrorAnalysis]) -> Table {
             largest.map_or(String::new(), |part| format!("{} {:.0} %", part.source, part.share * 100.0)),
         ]
     });
-    let columns = [
-        words("error"),
-        numbers("u"),
-        numbers("U"),
-        words("unit"),
-        numbers("noise"),
-        numbers("set-up"),
-        numbers("conditional"),
-        words("largest contribution"),
-    ];
+    let columns = ["error", ">u", ">U", "unit", ">noise", ">set-up", ">conditional", "largest contribution"];
     Table::new(columns, rows).titled(
         "Predicted standard uncertainty u and expanded uncertainty U = 2u; parts of u from noise and from the set-up;\n\
          conditional u (all other errors known); the largest contribution to the variance",
@@ -65,7 +56,7 @@ pub fn sensitivity(errors: &[ErrorAnalysis]) -> Table {
         let test = if of.largest == 0.0 { "–" } else { of.largest_in_test.as_str() };
         cells![&error.id, unit(&error.unit), three_digits(of.largest), three_digits(of.rms), test]
     });
-    let columns = [words("error"), words("unit"), numbers("largest"), numbers("rms"), words("largest in")];
+    let columns = ["error", "unit", ">largest", ">rms", "largest in"];
     Table::new(columns, rows)
         .titled("Sensitivity of a reading, µm per unit of the error (largest, rms, the test in which it is largest)")
 }
@@ -84,7 +75,7 @@ pub fn budgets(errors: &[ErrorAnalysis]) -> Table {
         let shared: Vec<String> = shared.map(|other| format!("{} {:+.2}", other.id, other.correlation)).collect();
         cells![&error.id, parts.join(", "), shared.join(", ")]
     });
-    Table::new([words("error"), words("contributions"), words("correlated with")], rows)
+    Table::new(["error", "contributions", "correlated with"], rows)
         .titled("Largest contributions to the variance of each error, and its largest correlations")
 }
 
@@ -94,8 +85,7 @@ pub fn small_plots(analysis: &PlanAnalysis) -> Vec<Table> {
         return Vec::new();
     }
     let tables = analysis.tests.chunks(PLOTS_PER_ROW).map(|group| {
-        let columns: Vec<_> =
-            [words("error")].into_iter().chain(group.iter().map(|test| numbers(&test.name))).collect();
+        let columns = [words("error")].into_iter().chain(group.iter().map(|test| numbers(&test.name)));
         let rows = analysis.errors.iter().map(|error| {
             let values = error.curves.iter().flat_map(|curve| &curve.values);
             let most = values.fold(0.0_f64, |most, value| most.max(value.abs()));
@@ -135,7 +125,7 @@ pub fn correlation(analysis: &PlanAnalysis) -> Option<Table> {
         cells.resize(ids.len() + 1, "".into());
         cells
     });
-    let columns: Vec<_> = [words("")].into_iter().chain(ids.iter().map(numbers)).collect();
+    let columns = [words("")].into_iter().chain(ids.iter().map(numbers));
     Some(Table::new(columns, rows).titled("Correlation"))
 }
 
@@ -154,7 +144,7 @@ pub fn indices(indices: &Indices) -> Table {
         row("O4", indices.o4, "square of the smallest over the largest singular value: noise amplification"),
         row("O5", indices.o5, "reciprocal of the sum of reciprocal singular values: mean uncertainty"),
     ];
-    let mut table = Table::new([words("index"), numbers("value"), words("meaning")], rows).titled(format!(
+    let mut table = Table::new(["index", ">value", "meaning"], rows).titled(format!(
         "Observability indices of {} of {}, set-up parameters within their priors",
         indices.identifiable_count,
         counted(indices.error_count, "error")

@@ -7,7 +7,7 @@ use super::embed;
 use super::provenance::Provenance;
 use crate::present::figure::{DARK, LIGHT, STYLE, file_name};
 use crate::present::html::{capitalised, list, prose, table};
-use crate::present::table::{Table, cells, numbers, words};
+use crate::present::table::{Table, cells};
 
 const SCRIPT: &str = include_str!("page.js");
 const PAGE_STYLE: &str = include_str!("page.css");
@@ -120,7 +120,7 @@ fn label(name: &str) -> String {
 fn provenance_tables(provenance: &Provenance) -> Markup {
     let inputs = provenance.inputs.iter();
     let rows = inputs.map(|input| cells![&input.path, input.bytes.to_string(), &input.sha256]);
-    let inputs = Table::new([words("input"), numbers("bytes"), words("SHA-256")], rows);
+    let inputs = Table::new(["input", ">bytes", "SHA-256"], rows);
     html! {
         dl {
             dt { "Command" } dd { code { (provenance.command) } }
