@@ -177,7 +177,7 @@ fn written_effects_read_back_equal() {
     let folder = tempfile::tempdir().unwrap();
     fs::copy(ready("hermle-c600u/machine.toml"), folder.path().join("machine.toml")).unwrap();
     let written = folder.path().join("session.toml");
-    whole::write(&written, &text).unwrap();
+    std::fs::write(&written, &text).unwrap();
     let read = files::session(&written, &ReadOptions::default()).unwrap();
     assert_eq!(read.effects.len(), effects.len());
     for (read, effect) in read.effects.iter().zip(&effects) {
@@ -196,7 +196,7 @@ fn a_plan_becomes_a_measured_session() {
     for (test, mut readings) in session.tests.iter().zip(plans) {
         readings.observed = nominal(&session, test, &readings);
         let name = format!("{}.csv", test.name);
-        csv::write(&folder.path().join(&name), &session.machine, &test.station, &readings).unwrap();
+        std::fs::write(folder.path().join(&name), csv::text(&session.machine, &test.station, &readings)).unwrap();
         data.push((test.name.clone(), name));
         measured.push(readings);
     }

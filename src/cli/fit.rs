@@ -10,7 +10,7 @@ use super::failure::Failure;
 use super::message::print_warnings;
 use super::report::ReportArguments;
 use super::{
-    CommonArguments, SessionArguments, compensation, geometric, json, output, read_session, repeated, self_calibration,
+    CommonArguments, SessionArguments, compensation, geometric, output, read_session, repeated, self_calibration,
 };
 use crate::present::fit::Figures;
 use crate::present::readings;
@@ -164,16 +164,13 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
         screen::print(&problem, &fit, &result, &arguments.session, arguments.all);
     }
     print_warnings(&result.warnings);
-    if let Some(path) = &arguments.common.json {
-        json::write_of_session(path, &sources, arguments.common.seed, &result)?;
-    }
+    arguments.common.write_json(&sources, &result)?;
     if let Some(path) = &arguments.csv {
         output::write_figures(path, &Figures::of_fit(&result))?;
     }
     if arguments.report.asked() {
         let document = crate::present::report::fit::document(&problem, &fit, &result)?;
-        let method = crate::present::report::fit::method(&result);
-        arguments.report.write(&document, &method, (&session, &sources), arguments.common.seed)?;
+        arguments.report.write(&document, (&session, &sources), arguments.common.seed)?;
     }
     arguments.compensation.run(&problem, &fit, tables)
 }

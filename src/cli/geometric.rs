@@ -7,7 +7,7 @@ use abbe::model::words::counted;
 
 use super::failure::Failure;
 use super::report::ReportArguments;
-use super::{CommonArguments, json, message, output};
+use super::{CommonArguments, message, output};
 use crate::present::fit::noise;
 use crate::present::method::{centres, errors};
 use crate::present::number::micrometres;
@@ -25,14 +25,11 @@ pub fn run(
         print(&result);
     }
     message::print_warnings(&result.warnings);
-    if let Some(path) = &common.json {
-        json::write_of_session(path, sources, common.seed, &result)?;
-    }
+    common.write_json(sources, &result)?;
     if report.asked() {
         let (problem, _) = abbe::identify::fit::prepare(session, common.seed)?;
         let document = crate::present::report::method::document(&problem, &result);
-        let method = crate::present::report::method::method(&result);
-        report.write(&document, &method, (session, sources), common.seed)?;
+        report.write(&document, (session, sources), common.seed)?;
     }
     Ok(())
 }

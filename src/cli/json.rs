@@ -148,14 +148,6 @@ pub fn write<T: Serialize>(path: &Path, origin: Origin, seed: Option<u64>, resul
     output::write_whole(path, text.as_bytes())
 }
 
-/// Writes the document of a command on a session.
-///
-/// # Errors
-/// See [`Origin::of_session`] and [`write()`].
-pub fn write_of_session<T: Serialize>(path: &Path, sources: &SourceMap, seed: u64, result: &T) -> Result<(), Failure> {
-    write(path, Origin::of_session(sources)?, Some(seed), result)
-}
-
 /// The name of the command, and the options on the command line of this process.
 fn command_line() -> (String, Map<String, Value>) {
     let parser = Arguments::command();

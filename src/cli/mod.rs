@@ -155,6 +155,14 @@ impl CommonArguments {
     fn outputs(&self, others: &[Option<&PathBuf>]) -> Result<Outputs, Failure> {
         Outputs::new(others.iter().copied().flatten().chain(&self.json))
     }
+
+    /// Writes the result as JSON if it is requested.
+    fn write_json<T: serde::Serialize>(&self, sources: &SourceMap, result: &T) -> Result<(), Failure> {
+        match &self.json {
+            Some(path) => json::write(path, json::Origin::of_session(sources)?, Some(self.seed), result),
+            None => Ok(()),
+        }
+    }
 }
 
 /// Runs the command line and returns the exit status.

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use abbe::model::files::SourceMap;
 use abbe::model::session::Session;
 use clap::Args;
-use maud::Markup;
 
 use super::failure::Failure;
 use super::{folder, output};
@@ -58,13 +57,7 @@ impl ReportArguments {
     }
 
     /// Writes the requested files.
-    pub fn write(
-        &self,
-        document: &Document,
-        method: &Markup,
-        read: (&Session, &SourceMap),
-        seed: u64,
-    ) -> Result<(), Failure> {
+    pub fn write(&self, document: &Document, read: (&Session, &SourceMap), seed: u64) -> Result<(), Failure> {
         if let Some(path) = &self.report {
             let provenance = Provenance::of(read, seed).map_err(|(path, error)| {
                 Failure::Other(format!(
@@ -72,7 +65,7 @@ impl ReportArguments {
                     path.display()
                 ))
             })?;
-            let text = page::html(document, method, &provenance);
+            let text = page::html(document, &provenance).map_err(Failure::Other)?;
             output::write_whole(path, text.as_bytes())?;
         }
         if let Some(path) = &self.plots {

@@ -8,7 +8,7 @@ use abbe::model::words::counted;
 use clap::Args;
 
 use super::failure::Failure;
-use super::{CommonArguments, json, message, output, screen};
+use super::{CommonArguments, message, output, screen};
 use crate::present::fit::noise;
 use crate::present::number::micrometres;
 use crate::present::{parameters, self_calibration as present};
@@ -78,10 +78,7 @@ pub fn run(
         print(&result);
     }
     message::print_warnings(&result.warnings);
-    if let Some(path) = &common.json {
-        json::write_of_session(path, sources, common.seed, &result)?;
-    }
-    Ok(())
+    common.write_json(sources, &result)
 }
 
 fn print(result: &SelfCalibration) {

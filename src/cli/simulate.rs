@@ -13,7 +13,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::failure::Failure;
-use super::{CommonArguments, SessionArguments, folder, json, message, output, read_session};
+use super::{CommonArguments, SessionArguments, folder, message, output, read_session};
 use crate::present::number::micrometres;
 use crate::present::simulation::truth;
 use crate::present::table::Table;
@@ -177,10 +177,7 @@ fn report(
         print(session, &report, &truth(simulated), arguments.common.seed);
     }
     message::print_warnings(&report.warnings);
-    if let Some(path) = &arguments.common.json {
-        json::write_of_session(path, sources, arguments.common.seed, &report)?;
-    }
-    Ok(())
+    arguments.common.write_json(sources, &report)
 }
 
 fn print(session: &Session, report: &SimulationResult, truth: &Table, seed: u64) {

@@ -18,7 +18,7 @@ use super::failure::Failure;
 use super::interrupt::Interrupts;
 use super::message::{Kind, tell};
 use super::report::ReportArguments;
-use super::{CommonArguments, SessionArguments, compensation, json, message, output, read_session};
+use super::{CommonArguments, SessionArguments, compensation, message, output, read_session};
 use crate::present::{readings, trace as present};
 
 /// Examples of `abbe trace`.
@@ -144,9 +144,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         screen::print(&trace, &arguments.session, arguments.all);
     }
     message::print_warnings(&trace.result.warnings);
-    if let Some(path) = &arguments.common.json {
-        json::write_of_session(path, &sources, arguments.common.seed, &trace.result)?;
-    }
+    arguments.common.write_json(&sources, &trace.result)?;
     if let Some(path) = &arguments.write {
         let data = arguments.session.data.as_deref();
         let text = rewrite::relocated(&sources.text, &sources.file, output::folder_of(path), data)?;
@@ -173,8 +171,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     }
     if arguments.report.asked() {
         let document = crate::present::report::trace::document(&trace)?;
-        let method = crate::present::report::trace::method(&trace.result);
-        arguments.report.write(&document, &method, (&session, &sources), arguments.common.seed)?;
+        arguments.report.write(&document, (&session, &sources), arguments.common.seed)?;
     }
     if trace.result.interrupted {
         if arguments.compensation.wanted() {

@@ -4,8 +4,7 @@
 //! - [`with_readings()`]: a copy of a session with other readings;
 //! - [`template`]: files of a new machine from its structural code;
 //! - [`SourceMap`]: the files and texts of a session that was read;
-//! - [`schema`]: JSON Schema of machine and session files; [`stamp`]: state of the files that were read; [`whole`]:
-//!   files written as a whole.
+//! - [`schema`]: JSON Schema of machine and session files; [`stamp`]: state of the files that were read.
 
 mod quantity;
 pub mod schema;
@@ -15,7 +14,6 @@ pub mod stamp;
 pub mod table;
 pub mod template;
 pub mod toml;
-pub mod whole;
 mod with_readings;
 
 pub use self::source_map::SourceMap;

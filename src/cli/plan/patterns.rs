@@ -9,7 +9,7 @@ use abbe::model::session::Session;
 use clap::Args;
 
 use crate::cli::failure::Failure;
-use crate::cli::{CommonArguments, json, output};
+use crate::cli::{CommonArguments, output};
 use crate::present::patterns as present;
 
 /// Trace patterns: the change of the readings by each error alone.
@@ -59,11 +59,7 @@ impl PatternArguments {
         if tables {
             output::print(&present::sizes(&found));
         }
-        if let Some(path) = &common.json {
-            let result = PatternSizes { patterns: found.patterns };
-            json::write_of_session(path, sources, common.seed, &result)?;
-        }
-        Ok(())
+        common.write_json(sources, &PatternSizes { patterns: found.patterns })
     }
 }
 

@@ -4,6 +4,7 @@ use maud::{Markup, html};
 use serde_json::Value;
 
 use crate::present::figure::{Plot, file_name};
+use crate::present::table::Table;
 
 /// The contents of a report, independent of the page around it.
 #[derive(Default)]
@@ -18,14 +19,16 @@ pub struct Document {
     pub figures: Vec<KeyFigure>,
     /// Warnings, shown below the key figures.
     pub warnings: Vec<String>,
+    /// Method, in sentences.
+    pub method: String,
     /// Sections in order: anchor, heading, contents.
     pub sections: Vec<(String, String, Markup)>,
     /// All plots of the sections.
     pub plots: Vec<Plot>,
     /// Data of the interactive plots. Null if the page has none.
     pub data: Value,
-    /// All readings as CSV.
-    pub csv: String,
+    /// All readings, for a download as CSV; no rows if the page has none.
+    pub readings: Table,
 }
 
 /// A key figure of the summary.

@@ -1,6 +1,5 @@
 //! Data inside the page: the drawn readings as scaled 16-bit integers, and all readings as compressed CSV.
 
-use std::fmt::Write as _;
 use std::io::Write as _;
 
 use abbe::identify::series::Cause;
@@ -10,7 +9,7 @@ use serde_json::{Value, json};
 
 use super::abscissae::axes_of;
 use super::plots::{Column, SessionPlots};
-use crate::present::csv::cell;
+use crate::present::table::{self, Cell, Table, cells, numbers};
 
 /// Maximum number of sliders.
 pub const MAX_SLIDERS: usize = 40;
@@ -95,60 +94,42 @@ pub fn data(session: &SessionPlots<'_>) -> Value {
     json!({"coordinates": coordinates, "tests": tests})
 }
 
-/// All readings as CSV.
-pub fn csv(session: &SessionPlots<'_>) -> String {
+/// All readings with deviation and residuals.
+pub fn readings(session: &SessionPlots<'_>) -> Table {
     let machine = &session.problem.session.machine;
-    let mut text = String::from("test,file_line,run,time_s");
-    for axis in &machine.axes {
-        let unit = if axis.kind == abbe::model::axis::AxisKind::Rotary { "deg" } else { "mm" };
-        text.push_str(&format!(",{}_{unit}", axis.name));
-    }
     let coordinates = session.series.coordinates;
-    let names: &[&str] = if coordinates == 3 { &["_x", "_y", "_z"] } else { &[""] };
+    let labels: &[&str] = if coordinates == 3 { &["_x", "_y", "_z"] } else { &[""] };
+    let mut columns = ["test", ">file_line", ">run", ">time_s"].map(table::Column::from).to_vec();
+    columns.extend(machine.axes.iter().map(|axis| numbers(format!("{}_{}", axis.name, axis.kind.unit()))));
     for column in ["deviation", "residual_before", "residual_after"] {
-        for name in names {
-            text.push_str(&format!(",{column}{name}_um"));
-        }
+        columns.extend(labels.iter().map(|label| numbers(format!("{column}{label}_um"))));
     }
-    text.push('\n');
+    let mut rows = Vec::new();
     for (test, series) in session.problem.tests.iter().zip(&session.series.tests) {
         let Some(readings) = &test.readings else { continue };
         for row in 0..readings.rows() {
-            text.push_str(&quoted(&test.name));
-            let number = |text: &mut String, value: Option<String>| {
-                text.push(',');
-                text.push_str(&value.unwrap_or_default());
-            };
-            number(&mut text, readings.line(row).map(|line| line.to_string()));
-            number(&mut text, readings.run.get(row).map(ToString::to_string));
-            number(&mut text, readings.time_s.get(row).map(|t| format!("{t:.3}")));
-            for (axis, column) in machine.axes.iter().zip(&readings.positions) {
-                let rotary = axis.kind == abbe::model::axis::AxisKind::Rotary;
-                let value = if rotary { column[row].to_degrees() } else { column[row] };
-                // `write!` to a string always succeeds.
-                let _ = write!(text, ",{value:.5}");
-            }
+            let mut cells = cells![
+                &test.name,
+                readings.line(row).map_or(String::new(), |line| line.to_string()),
+                readings.run.get(row).map_or(String::new(), ToString::to_string),
+                readings.time_s.get(row).map_or("".into(), |time| Cell::fixed(*time, 3)),
+            ];
+            let at = machine.axes.iter().zip(&readings.positions);
+            cells.extend(at.map(|(axis, column)| Cell::fixed(axis.kind.to_display(column[row]), 5)));
+            let own = row * coordinates..(row + 1) * coordinates;
             for column in [Column::Deviation, Column::Before, Column::After] {
-                for value in &column.of(series)[row * coordinates..(row + 1) * coordinates] {
-                    let _ = write!(text, ",{value:.3}");
-                }
+                cells.extend(column.of(series)[own.clone()].iter().map(|um| Cell::fixed(*um, 3)));
             }
-            text.push('\n');
+            rows.push(cells);
         }
     }
-    text
-}
-
-/// A field of a CSV file.
-fn quoted(field: &str) -> String {
-    let field = cell(field.to_string());
-    if field.contains([',', '"', '\n', '\r']) { format!("\"{}\"", field.replace('"', "\"\"")) } else { field }
+    Table::new(columns, rows)
 }
 
 /// Compresses text in zlib format (`deflate` in browsers) and encodes it in base64.
-pub fn compressed(text: &str) -> String {
+pub fn compressed(text: &[u8]) -> String {
     let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::best());
-    let whole = encoder.write_all(text.as_bytes()).and_then(|()| encoder.finish());
+    let whole = encoder.write_all(text).and_then(|()| encoder.finish());
     whole.map(|bytes| STANDARD.encode(bytes)).unwrap_or_default()
 }
 
@@ -172,7 +153,7 @@ mod tests {
     fn compressed_text_is_recovered() {
         use std::io::Read as _;
         let text = "test,µm\n\"a,b\",1.25\n".repeat(40);
-        let bytes = STANDARD.decode(compressed(&text)).unwrap();
+        let bytes = STANDARD.decode(compressed(text.as_bytes())).unwrap();
         let mut found = String::new();
         flate2::read::ZlibDecoder::new(bytes.as_slice()).read_to_string(&mut found).unwrap();
         assert_eq!(found, text);

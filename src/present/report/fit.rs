@@ -18,14 +18,14 @@ use crate::present::number::micrometres;
 use crate::present::parameters::Estimates;
 
 /// Method of a fit.
-pub fn method(result: &FitResult) -> Markup {
-    html! {
-        p {
-            "Least squares on the kinematic chain. All parameters are estimated together in the identifiable subspace. The covariance follows from the law of \
-             propagation of uncertainty (JCGM 100, JCGM 102). " (noise_sentence(result.noise_um, &result.noise_source))
-            ". Held-out error: each fold leaves out " (result.heldout_by) "."
-        }
-    }
+fn method(result: &FitResult) -> String {
+    format!(
+        "Least squares on the kinematic chain. All parameters are estimated together in the identifiable subspace. The \
+         covariance follows from the law of propagation of uncertainty (JCGM 100, JCGM 102). {}. Held-out error: each \
+         fold leaves out {}.",
+        noise_sentence(result.noise_um, &result.noise_source),
+        result.heldout_by
+    )
 }
 
 /// The report.
@@ -41,6 +41,7 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
         verdict: verdict(result),
         figures: figures(problem, result),
         warnings: result.warnings.clone(),
+        method: method(result),
         ..Document::default()
     };
     readings::add_data(&mut document, &session, &result.parameters);

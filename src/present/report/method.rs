@@ -2,7 +2,7 @@
 
 use abbe::identify::geometric::Comparison;
 use abbe::identify::problem::Problem;
-use maud::{Markup, html};
+use maud::html;
 
 use super::document::Document;
 use super::readings;
@@ -14,14 +14,14 @@ use crate::present::method::{centres, errors};
 use crate::present::number::{micrometres, unit, units};
 
 /// Method of the comparison.
-pub fn method(result: &Comparison) -> Markup {
-    html! {
-        p {
-            "The " (result.method) " method of the literature and the full least-squares fit, applied to the same readings. "
-            (noise_sentence(result.noise_um, &result.noise_source))
-            ". Bias: both methods are applied to noise-free readings that are simulated with the errors of the full fit; these errors are subtracted."
-        }
-    }
+fn method(result: &Comparison) -> String {
+    format!(
+        "The {} method of the literature and the full least-squares fit, applied to the same readings. {}. Bias: both \
+         methods are applied to noise-free readings that are simulated with the errors of the full fit; these errors \
+         are subtracted.",
+        result.method,
+        noise_sentence(result.noise_um, &result.noise_source)
+    )
 }
 
 /// The report.
@@ -36,6 +36,7 @@ pub fn document(problem: &Problem<'_>, result: &Comparison) -> Document {
             micrometres(result.rms_um)
         ),
         warnings: result.warnings.clone(),
+        method: method(result),
         ..Document::default()
     };
     let shown = document.show(plots(result));

@@ -14,15 +14,10 @@ use crate::present::next_test as present;
 use crate::present::number::{three_digits, unit};
 
 /// Method of the proposal.
-pub fn method() -> Markup {
-    html! {
-        p {
-            "Each candidate test is rated by the information that it adds to the plan, linearised at the nominal machine. Tests are selected one by one, \
-             then improved by exchange: V. V. Fedorov, Theory of Optimal Experiments, Academic Press, 1972; A. C. Atkinson, A. N. Donev and R. D. Tobias, \
-             Optimum Experimental Designs, with SAS, Oxford University Press, 2007, ch. 12."
-        }
-    }
-}
+const METHOD: &str = "Each candidate test is rated by the information that it adds to the plan, linearised at the \
+    nominal machine. Tests are selected one by one, then improved by exchange: V. V. Fedorov, Theory of Optimal \
+    Experiments, Academic Press, 1972; A. C. Atkinson, A. N. Donev and R. D. Tobias, Optimum Experimental Designs, with \
+    SAS, Oxford University Press, 2007, ch. 12.";
 
 /// The report.
 pub fn document(problem: &Problem<'_>, improvement: Option<&Improvement>, ranges: &[Shrinkage]) -> Document {
@@ -32,6 +27,7 @@ pub fn document(problem: &Problem<'_>, improvement: Option<&Improvement>, ranges
             Some(found) => verdict(found),
             None => format!("Minimum sweep range of {}.", counted(ranges.len(), "test")),
         },
+        method: METHOD.to_string(),
         ..Document::default()
     };
     if let Some(found) = improvement {

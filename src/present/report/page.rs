@@ -5,6 +5,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use super::document::Document;
 use super::embed;
 use super::provenance::Provenance;
+use crate::present::csv;
 use crate::present::figure::{DARK, LIGHT, STYLE, file_name};
 use crate::present::html::{capitalised, list, prose, table};
 use crate::present::table::{Table, cells};
@@ -16,9 +17,12 @@ const PAGE_STYLE: &str = include_str!("page.css");
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:; form-action 'none'; base-uri 'none'";
 
 /// Returns the complete page.
-pub fn html(document: &Document, method: &Markup, provenance: &Provenance) -> String {
+/// # Errors
+/// If the readings cannot be written as CSV.
+pub fn html(document: &Document, provenance: &Provenance) -> Result<String, String> {
     let is_interactive = !document.data.is_null();
-    html! {
+    let csv = csv::text(&document.readings)?;
+    let page = html! {
         (DOCTYPE)
         html lang="en" {
             head {
@@ -50,9 +54,9 @@ pub fn html(document: &Document, method: &Markup, provenance: &Provenance) -> St
                     }
                     section id="method" {
                         h2 { "Method and provenance" }
-                        (method)
+                        p { (prose(&document.method)) }
                         (provenance_tables(provenance))
-                        @if !document.csv.is_empty() {
+                        @if !document.readings.rows.is_empty() {
                             p class="needs-script" hidden {
                                 button id="download" type="button" { "Download all readings (CSV)" }
                                 " All readings with deviation and residuals, outliers included."
@@ -63,13 +67,13 @@ pub fn html(document: &Document, method: &Markup, provenance: &Provenance) -> St
                 div id="tip" role="status" hidden {}
                 @if is_interactive {
                     script type="application/json" id="data" { (json(&document.data)) }
-                    script type="text/plain" id="csv" { (PreEscaped(embed::compressed(&document.csv))) }
+                    script type="text/plain" id="csv" { (PreEscaped(embed::compressed(&csv))) }
                     script { (PreEscaped(SCRIPT)) }
                 }
             }
         }
-    }
-    .into_string()
+    };
+    Ok(page.into_string())
 }
 
 /// JSON inside a script element. `<` is escaped, because it could end the element.

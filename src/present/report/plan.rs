@@ -19,13 +19,13 @@ use crate::present::plan::{self as present, effects};
 const MAX_ROWS: usize = 30;
 
 /// Method of the analysis.
-pub fn method(analysis: &PlanAnalysis) -> Markup {
-    html! {
-        p {
-            "The model is linearised at the nominal machine and every planned state. The uncertainties follow from the noise (" (micrometres(analysis.noise_um))
-            " per reading) and from the priors of the set-up by the law of propagation of uncertainty (JCGM 100, JCGM 102)."
-        }
-    }
+fn method(analysis: &PlanAnalysis) -> String {
+    format!(
+        "The model is linearised at the nominal machine and every planned state. The uncertainties follow from the \
+         noise ({} per reading) and from the priors of the set-up by the law of propagation of uncertainty (JCGM 100, \
+         JCGM 102).",
+        micrometres(analysis.noise_um)
+    )
 }
 
 /// The report.
@@ -46,6 +46,7 @@ pub fn document(problem: &Problem<'_>, analysis: &PlanAnalysis) -> Result<Docume
         ),
         figures: figures(problem, analysis),
         warnings: analysis.warnings.clone(),
+        method: method(analysis),
         ..Document::default()
     };
     let plots = uncertainties(&analysis.errors);

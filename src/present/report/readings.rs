@@ -43,7 +43,7 @@ pub fn add_data(document: &mut Document, session: &SessionPlots<'_>, parameters:
         .collect();
     data["sliders"] = sliders.into();
     document.data = data;
-    document.csv = embed::csv(session);
+    document.readings = embed::readings(session);
 }
 
 /// Deviations from nominal with switches and sliders. Tests that the model does not change are folded.

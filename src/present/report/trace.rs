@@ -18,16 +18,17 @@ use crate::present::parameters::Estimates;
 use crate::present::{trace as present, uniqueness};
 
 /// Method of a trace.
-pub fn method(result: &TraceResult) -> Markup {
-    html! {
-        p {
-            "The search screens " (integer(result.candidates)) " candidate effects of the library against the residual of the declared model. "
-            (integer(result.candidates_detectable)) " of them are detectable in these readings. An effect is added if the same search rarely finds an effect \
-             as good in readings without structure. All parameters are then refitted together. "
-            (noise_sentence(result.noise_um, &result.noise_source)) ". Held-out error: each fold leaves out " (result.heldout_by)
-            "; the search is repeated in each fold."
-        }
-    }
+fn method(result: &TraceResult) -> String {
+    format!(
+        "The search screens {} candidate effects of the library against the residual of the declared model. {} of them \
+         are detectable in these readings. An effect is added if the same search rarely finds an effect as good in \
+         readings without structure. All parameters are then refitted together. {}. Held-out error: each fold leaves \
+         out {}; the search is repeated in each fold.",
+        integer(result.candidates),
+        integer(result.candidates_detectable),
+        noise_sentence(result.noise_um, &result.noise_source),
+        result.heldout_by
+    )
 }
 
 /// Verdict as a sentence.
@@ -67,6 +68,7 @@ pub fn document(trace: &TraceOutcome<'_>) -> Result<Document, IdentifyError> {
         verdict: verdict(result),
         figures: figures(trace),
         warnings: result.warnings.clone(),
+        method: method(result),
         ..Document::default()
     };
     readings::add_data(&mut document, &session, &result.after.parameters);

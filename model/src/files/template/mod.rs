@@ -53,57 +53,48 @@ fn machine(code: &StructuralCode, bodies: &[Body]) -> String {
     );
     for body in bodies {
         let name = &body.name;
-        let vector = vector(body.along, 1.0);
-        let _ = writeln!(text, "\n[axis.{name}]");
+        let direction = vector(body.along);
         let carries = if body.on_table { "workpiece" } else { "tool" };
-        match body.kind {
-            AxisKind::Linear => {
-                let _ = writeln!(
-                    text,
-                    "# Physical direction of motion of the body that carries the {carries} for an increasing command of {name}."
-                );
-                if body.on_table {
-                    let _ = writeln!(
-                        text,
-                        "# By ISO 841 a table moves against the direction of its letter. Reverse the sign for such a table."
-                    );
-                }
-                let _ = writeln!(text, "direction = {vector}");
-                let _ = writeln!(
-                    text,
-                    "# Smallest and largest position, mm. Enter the travel of the machine.\ntravel_mm = [-300, 300]"
-                );
-            }
-            AxisKind::Rotary => {
-                let _ = writeln!(
-                    text,
-                    "# Physical axis of rotation of the body that carries the {carries} for an increasing command of {name} (right-hand rule)."
-                );
-                if body.on_table {
-                    let _ = writeln!(
-                        text,
-                        "# By ISO 841 a table turns against the direction of its letter. Reverse the sign for such a table."
-                    );
-                }
-                let _ = writeln!(text, "direction = {vector}");
-                let _ = writeln!(
-                    text,
-                    "# A point on the axis of rotation in R, mm. Choose the origin of R where the rotary axes meet, and enter the offset of others."
-                );
-                let _ = writeln!(text, "origin_mm = [0, 0, 0]");
-                let _ = writeln!(
-                    text,
-                    "# Smallest and largest position, degrees. Enter the travel of the machine.\ntravel_deg = {}",
+        let (physical, moves, turning, rest) = match body.kind {
+            AxisKind::Linear => (
+                "direction of motion",
+                "moves",
+                "",
+                "# Smallest and largest position, mm. Enter the travel of the machine.\ntravel_mm = [-300, 300]"
+                    .to_string(),
+            ),
+            AxisKind::Rotary => (
+                "axis of rotation",
+                "turns",
+                " (right-hand rule)",
+                format!(
+                    "# A point on the axis of rotation in R, mm. Choose the origin of R where the rotary axes meet, and enter the \
+                     offset of others.\n\
+                     origin_mm = [0, 0, 0]\n\
+                     # Smallest and largest position, degrees. Enter the travel of the machine.\n\
+                     travel_deg = {}",
                     if body.along == 2 { "[-360, 360]" } else { "[-120, 120]" }
-                );
-            }
+                ),
+            ),
+        };
+        let _ = write!(
+            text,
+            "\n[axis.{name}]\n\
+             # Physical {physical} of the body that carries the {carries} for an increasing command of {name}{turning}.\n"
+        );
+        if body.on_table {
+            let _ = writeln!(
+                text,
+                "# By ISO 841 a table {moves} against the direction of its letter. Reverse the sign for such a table."
+            );
         }
+        let _ = writeln!(text, "direction = {direction}\n{rest}");
     }
     text
 }
 
-fn vector(along: usize, value: f64) -> String {
-    let mut vector = [0.0; 3];
-    vector[along] = value;
+/// The unit vector along a direction of R.
+fn vector(along: usize) -> String {
+    let vector: [f64; 3] = std::array::from_fn(|k| if k == along { 1.0 } else { 0.0 });
     format!("[{}, {}, {}]", vector[0], vector[1], vector[2])
 }
