@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::table::{Align, Cell, Table};
+use super::table::{Align, Table};
 
 /// A word column with a longer cell than this wraps.
 const MAX_UNWRAPPED: usize = 26;
@@ -19,20 +19,12 @@ pub fn table(table: &Table) -> Markup {
                 }
                 tbody {
                     @for row in &table.rows {
-                        tr { @for (cell, class) in row.iter().zip(&class) { td class=[*class] { (shown(cell, *class)) } } }
+                        tr { @for (cell, class) in row.iter().zip(&class) { td class=[*class] { (with_minus_signs(&cell.to_string())) } } }
                     }
                 }
             }
         }
         @for note in &table.notes { p class="note" { (prose(note)) } }
-    }
-}
-
-/// A cell. A path or a name in a column of words keeps its hyphens.
-fn shown(cell: &Cell, class: Option<&str>) -> String {
-    match (cell, class) {
-        (Cell::Text(text), Some(_)) => text.clone(),
-        _ => with_minus_signs(&cell.to_string()),
     }
 }
 
