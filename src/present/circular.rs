@@ -61,16 +61,22 @@ fn directions(test: &CircularTest) -> Table {
             figure(Some(direction.radial_deviation_min_um)),
         ]
     });
-    let columns = ["direction", ">runs", ">circular error G, µm", ">radial error F max, µm", ">radial error F min, µm"];
+    let columns = [
+        "direction",
+        ">runs",
+        ">circular error (G), µm",
+        ">maximum radial error (F max), µm",
+        ">minimum radial error (F min), µm",
+    ];
     Table::new(columns, rows)
 }
 
 /// The figures of both directions together that the test has.
 fn both(test: &CircularTest) -> Table {
     let figures = [
-        ("bidirectional circular error G(b)", test.bidirectional_circular_deviation_um),
-        ("mean bidirectional radial error D", test.mean_bidirectional_radial_deviation_um),
-        ("circular hysteresis H (edition of 1996)", test.hysteresis_um),
+        ("bidirectional circular error (G(b))", test.bidirectional_circular_deviation_um),
+        ("mean bidirectional radial error (D)", test.mean_bidirectional_radial_deviation_um),
+        ("circular hysteresis (H, edition of 1996)", test.hysteresis_um),
     ];
     let rows = figures.into_iter().filter_map(|(name, um)| Some(cells![name, Cell::fixed(um?, 2)]));
     Table::new(["both directions", ">µm"], rows)

@@ -58,7 +58,7 @@ pub fn outliers(outliers: &[Outlier]) -> Markup {
 pub fn ball_bar(tests: &[CircularTest]) -> Markup {
     html! {
         p {
-            "Terms of ISO 230-4:2022, symbols of the edition of 2005. The figures describe the readings without any correction \
+            "Terms of ISO 230-4:2022, symbols of the edition of 2005 in brackets. The figures describe the readings without any correction \
              by the fit. Centre and radius are those of the least-squares circle."
         }
         @for test in tests {
