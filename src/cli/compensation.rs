@@ -65,7 +65,7 @@ impl CompensationArguments {
     }
 
     /// Writes the tables if they are requested, and lists the errors that they do not contain.
-    pub fn run(&self, problem: &Problem<'_>, fit: &Fit, shown: bool) -> Result<(), Failure> {
+    pub fn run(&self, problem: &Problem, fit: &Fit, shown: bool) -> Result<(), Failure> {
         let (Some(folder), Some(control)) = (&self.compensation, self.control) else {
             return Ok(());
         };

@@ -22,7 +22,7 @@ pub struct Estimates<'r> {
 
 impl<'r> Estimates<'r> {
     /// Of the results of a fit.
-    pub fn new(problem: &'r Problem<'_>, fit: &Fit, parameters: &'r [ParameterResult]) -> Estimates<'r> {
+    pub fn new(problem: &'r Problem, fit: &Fit, parameters: &'r [ParameterResult]) -> Estimates<'r> {
         let list = &problem.parameters.list;
         let is_setup =
             |result: &&ParameterResult| list.iter().any(|p: &Parameter| p.role == Role::Setup && p.id == result.id);

@@ -17,18 +17,18 @@ fn start(test: &str, readings: &Readings, row: usize) -> Vec<Cell> {
 }
 
 /// The positions of all axes in a row.
-fn positions<'r>(problem: &'r Problem<'_>, readings: &'r Readings, row: usize) -> impl Iterator<Item = Cell> + 'r {
+fn positions<'r>(problem: &'r Problem, readings: &'r Readings, row: usize) -> impl Iterator<Item = Cell> + 'r {
     let at = problem.session.machine.axes.iter().zip(&readings.positions);
     at.map(move |(axis, column)| Cell::fixed(axis.kind.to_display(column[row]), 6))
 }
 
 /// Columns of the positions of all axes.
-fn axes<'r>(problem: &'r Problem<'_>) -> impl Iterator<Item = Column> + 'r {
+fn axes<'r>(problem: &'r Problem) -> impl Iterator<Item = Column> + 'r {
     problem.session.machine.axes.iter().map(|axis| numbers(axis.column("")))
 }
 
 /// Reading, residual in µm and over the noise standard deviation, and whether the reading counts or is an outlier.
-pub fn residuals(problem: &Problem<'_>, fit: &Fit) -> Table {
+pub fn residuals(problem: &Problem, fit: &Fit) -> Table {
     let coordinates = problem.coordinates();
     let labels: &[&str] = if coordinates == 3 { &["_x", "_y", "_z"] } else { &[""] };
     let mut columns: Vec<Column> = ["test", "run", "line"].map(words).into();
@@ -61,7 +61,7 @@ pub fn residuals(problem: &Problem<'_>, fit: &Fit) -> Table {
 ///
 /// # Errors
 /// If the session is of another instrument.
-pub fn by_direction(problem: &Problem<'_>, fit: &Fit) -> Result<Table, IdentifyError> {
+pub fn by_direction(problem: &Problem, fit: &Fit) -> Result<Table, IdentifyError> {
     let mut columns: Vec<Column> = ["test", "run"].map(words).into();
     columns.extend(axes(problem));
     columns.extend(DIRECTIONS.map(|name| numbers(format!("{name}_um"))));

@@ -50,7 +50,7 @@ fn plan(code: &str) -> Session {
 }
 
 /// One Gauss–Newton step from the nominal machine.
-fn linear_step(problem: &Problem<'_>, basis: &Mat<f64>) -> Vec<f64> {
+fn linear_step(problem: &Problem, basis: &Mat<f64>) -> Vec<f64> {
     let nominal = vec![0.0; problem.parameters.list.len()];
     let mut whole = problem.prior_triangle(&nominal);
     problem.triangles(&nominal).unwrap().iter().for_each(|triangle| whole.merge(triangle));
@@ -82,10 +82,7 @@ fn squares(code: &str, first_seed: usize, complete_fit: bool) -> Vec<(String, f6
             &Simulation { given, noise_mm: None, draw_setups: true, seed: (first_seed + number) as u64 },
         )
         .unwrap();
-        let mut measured = plan.clone();
-        for (test, readings) in measured.tests.iter_mut().zip(drawn.readings) {
-            test.readings = Some(readings);
-        }
+        let measured = plan.clone().with_readings(drawn.readings);
         let mut problem = Problem::new(&measured, noise_um(0.3), 1).unwrap();
         states::fold_by_test(&mut problem);
         let found = if complete_fit {

@@ -38,15 +38,11 @@ fn given() -> Vec<Given> {
 fn measured(plan: &Session, simulation: &Simulation) -> (Session, Vec<(String, f64, String)>) {
     let simulated = simulate(plan, simulation).unwrap();
     assert!(simulated.warnings.is_empty(), "{:?}", simulated.warnings);
-    let mut session = plan.clone();
-    for (test, readings) in session.tests.iter_mut().zip(simulated.readings) {
-        test.readings = Some(readings);
-    }
-    (session, simulated.truth)
+    (plan.clone().with_readings(simulated.readings), simulated.truth)
 }
 
 /// Value and uncertainty of a parameter in its display unit.
-fn found(problem: &Problem<'_>, fit: &Fit, id: &str) -> (f64, f64) {
+fn found(problem: &Problem, fit: &Fit, id: &str) -> (f64, f64) {
     let list = &problem.parameters.list;
     let place = list.iter().position(|parameter| parameter.id == id).unwrap();
     assert!(fit.rank.is_identifiable(place), "{id} is not identifiable");

@@ -18,6 +18,8 @@ mod runs;
 pub(crate) mod setups;
 pub(crate) mod trajectory;
 
+use std::sync::Arc;
+
 use crate::chain::Machine;
 use crate::component::ErrorName;
 use crate::driver::Origin;
@@ -30,7 +32,7 @@ use readings::Readings;
 #[derive(Clone, Debug)]
 pub struct Session {
     /// The machine.
-    pub machine: Machine,
+    pub machine: Arc<Machine>,
     /// Named lengths in the order of the file, mm.
     pub constants: Vec<(String, f64)>,
     /// The instrument.
@@ -57,7 +59,15 @@ pub struct Session {
 impl Session {
     /// Reference time and temperature, from which the drivers of effects count.
     pub fn origin(&self) -> Origin {
-        Origin::of(self.tests.iter().filter_map(|test| test.readings.as_ref()))
+        Origin::of(self.tests.iter().filter_map(|test| test.readings.as_deref()))
+    }
+
+    /// The session with these readings, in the order of its tests.
+    pub fn with_readings(mut self, readings: impl IntoIterator<Item = Readings>) -> Session {
+        for (test, readings) in self.tests.iter_mut().zip(readings) {
+            test.readings = Some(Arc::new(readings));
+        }
+        self
     }
 }
 
@@ -87,7 +97,7 @@ pub struct Test {
     /// The same as expressions, for linear axes stated in mm; equations keep them as symbols.
     pub at_written: Vec<Option<expression::Length>>,
     /// The measured readings.
-    pub readings: Option<Readings>,
+    pub readings: Option<Arc<Readings>>,
 }
 
 impl Test {

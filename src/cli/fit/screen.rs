@@ -14,7 +14,7 @@ use crate::present::number::micrometres;
 use crate::present::parameters::Estimates;
 
 /// Prints the result of a fit of a session. With `all`, no list is folded.
-pub fn print(problem: &Problem<'_>, fit: &Fit, result: &FitResult, session: &SessionArguments, all: bool) {
+pub fn print(problem: &Problem, fit: &Fit, result: &FitResult, session: &SessionArguments, all: bool) {
     screen::print_conflicts(&result.plausibility);
     quality(result);
     let estimates = Estimates::new(problem, fit, &result.parameters);
@@ -54,7 +54,7 @@ fn print_drawn(drawn: &FitMonteCarlo, estimates: &Estimates<'_>, all: bool) {
 }
 
 /// What to do next.
-fn next(problem: &Problem<'_>, result: &FitResult, session: &SessionArguments) -> Vec<Step> {
+fn next(problem: &Problem, result: &FitResult, session: &SessionArguments) -> Vec<Step> {
     let mut steps: Vec<Step> = Vec::new();
     if !result.plausibility.conflicts.is_empty() {
         steps.push(("correct the session".into(), "the readings contradict it".into()));

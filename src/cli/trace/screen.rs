@@ -13,7 +13,7 @@ use crate::present::parameters::Estimates;
 use crate::present::{trace as present, uniqueness};
 
 /// Prints the result of a trace of a session. With `all`, no list is folded.
-pub fn print(trace: &TraceOutcome<'_>, session: &SessionArguments, all: bool) {
+pub fn print(trace: &TraceOutcome, session: &SessionArguments, all: bool) {
     let result = &trace.result;
     verdict(result);
     screen::print_conflicts(&result.plausibility);

@@ -25,7 +25,7 @@ fn method(result: &Comparison) -> String {
 }
 
 /// The report.
-pub fn document(problem: &Problem<'_>, result: &Comparison) -> Document {
+pub fn document(problem: &Problem, result: &Comparison) -> Document {
     let mut document = Document {
         title: format!("{}: {} method and full fit", problem.session.machine.name, result.method),
         verdict: format!(

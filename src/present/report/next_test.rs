@@ -20,7 +20,7 @@ const METHOD: &str = "Each candidate test is rated by the information that it ad
     SAS, Oxford University Press, 2007, ch. 12.";
 
 /// The report.
-pub fn document(problem: &Problem<'_>, improvement: Option<&Improvement>, ranges: &[Shrinkage]) -> Document {
+pub fn document(problem: &Problem, improvement: Option<&Improvement>, ranges: &[Shrinkage]) -> Document {
     let mut document = Document {
         title: format!("Next test for {}", problem.session.machine.name),
         verdict: match improvement {

@@ -56,7 +56,7 @@ fn verdict(result: &TraceResult) -> String {
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn document(trace: &TraceOutcome<'_>) -> Result<Document, IdentifyError> {
+pub fn document(trace: &TraceOutcome) -> Result<Document, IdentifyError> {
     let result = &trace.result;
     let problem = &trace.after;
     let series = views(problem, &trace.after_fit, Some(&trace.before_fit.residuals))?;
@@ -122,7 +122,7 @@ fn quality<'r>(result: &'r TraceResult, model: &ModelResult) -> Quality<'r> {
 }
 
 /// Key figures of the summary.
-fn figures(trace: &TraceOutcome<'_>) -> Vec<KeyFigure> {
+fn figures(trace: &TraceOutcome) -> Vec<KeyFigure> {
     let result = &trace.result;
     let [before, after] = [&result.before, &result.after].map(|model| quality(result, model));
     let mut figures = vec![
