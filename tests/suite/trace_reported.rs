@@ -36,9 +36,7 @@ fn measured(effects: Vec<Effect>, values: &[&str], declared: usize) -> Session {
         ..Simulation::default()
     };
     let simulated = simulate(&session, &simulation).unwrap();
-    for (test, readings) in session.tests.iter_mut().zip(simulated.readings) {
-        test.readings = Some(Arc::new(readings));
-    }
+    session = session.with_readings(simulated.readings);
     session.effects.truncate(declared);
     session
 }
