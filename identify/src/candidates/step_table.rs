@@ -11,9 +11,9 @@ use faer::Mat;
 use faer::prelude::Solve;
 use statrs::function::gamma::ln_gamma;
 
+use super::candidate::Candidate;
 use super::chi_square_tail::ln_chi_square_tail;
 use super::gain::TrainedModel;
-use super::library::Candidate;
 use super::observable::MIN_OBSERVABLE;
 
 /// Maximum number of positions of one effect. An effect with more positions is a curve.
@@ -24,8 +24,14 @@ const MAX_SWEEPS: usize = 4;
 /// An effect with several step positions.
 #[derive(Clone, Debug)]
 pub struct StepTable {
-    /// The effect as a candidate, with its selection penalty.
-    pub candidate: Candidate,
+    /// Index of its dictionary among the candidates.
+    pub dictionary: usize,
+    /// The effect.
+    pub effect: Effect,
+    /// Penalty for the selection of its positions.
+    pub selection_penalty: f64,
+    /// Cost of its dictionary.
+    pub cost: f64,
     /// `−ln P` of its gain, less the selection penalty.
     pub evidence: f64,
 }
@@ -33,7 +39,7 @@ pub struct StepTable {
 impl StepTable {
     /// Evidence less cost: the criterion of comparison.
     pub fn score(&self) -> f64 {
-        self.evidence - self.candidate.cost
+        self.evidence - self.cost
     }
 }
 
@@ -68,8 +74,8 @@ pub fn best_step_table(
             let mut positions: Vec<f64> = chosen.iter().map(|k| at[*k]).collect();
             positions.sort_by(f64::total_cmp);
             let effect = Effect { shape: Shape::Steps(Steps { at: positions }), ..dictionary.effect.clone() };
-            let candidate = Candidate { effect, selection_penalty, dictionary: false, ..dictionary.clone() };
-            best = Some(StepTable { candidate, evidence });
+            let cost = dictionary.cost;
+            best = Some(StepTable { dictionary: number, effect, selection_penalty, cost, evidence });
         }
     }
     best

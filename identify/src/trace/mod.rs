@@ -32,7 +32,6 @@ use abbe_model::effect::Effect;
 use abbe_model::session::Session;
 
 use crate::candidates::columns::{Columns, EffectColumns};
-use crate::candidates::library::Candidate;
 use crate::candidates::moments::Moments;
 use crate::error::IdentifyError;
 use crate::fit::{Fit, fit, prepare};
@@ -240,8 +239,8 @@ fn trace_or_interrupted<'a>(
     let searched = screening::searched_candidates(problem, &columns, options)?;
     let candidate_count = searched.len();
     progress(Progress::Screening(candidate_count));
-    let (reserve, searched): (Vec<_>, Vec<_>) = searched.into_iter().partition(|(candidate, _)| candidate.last_resort);
-    let (candidates, column_sets): (Vec<Candidate>, Vec<EffectColumns>) = searched.into_iter().unzip();
+    let (reserve, candidates): (Vec<_>, Vec<_>) = searched.into_iter().partition(|candidate| candidate.last_resort);
+    let column_sets: Vec<&EffectColumns> = candidates.iter().map(|candidate| &candidate.columns).collect();
     let (model, prior) = (start.model.clone(), start.prior());
     let go_on = || interrupt.check().is_ok();
     let moments = Moments::new(&columns, &column_sets, model, &start.residual, draws, &go_on)
@@ -249,17 +248,8 @@ fn trace_or_interrupted<'a>(
     let max_effects = options.max_effects.unwrap_or(policy.max_effects);
     let unwhitened = start.unwhitened(&columns, &before_fit.beta, problem.noise.sigma_mm)?;
     let significance = options.significance;
-    let mut search = SearchState::new(
-        &columns,
-        candidates,
-        column_sets,
-        moments,
-        prior,
-        unwhitened,
-        policy,
-        significance,
-        max_effects,
-    )?;
+    let mut search =
+        SearchState::new(&columns, candidates, moments, prior, unwhitened, policy, significance, max_effects)?;
     search.reserve = reserve;
     search.interrupt = Some(interrupt);
     let gains = search.model_without(None)?.gains();

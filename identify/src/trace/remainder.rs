@@ -205,7 +205,7 @@ pub fn structure(
             description: "no detector applies to these readings".to_string(),
         });
     }
-    let column_sets: Vec<EffectColumns> = detectors.iter().map(|detector| detector.column_set.clone()).collect();
+    let column_sets: Vec<&EffectColumns> = detectors.iter().map(|detector| &detector.column_set).collect();
     let rank = model.ncols();
     let moments =
         Moments::new(columns, &column_sets, model, residual, null, &|| true).ok_or(IdentifyError::Interrupted)?;

@@ -6,19 +6,7 @@ use abbe::identify::plan::criterion::Goal;
 use abbe::identify::plan::improve::{ImproveOptions, Improvement, improve};
 use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::problem::Problem;
-use abbe::identify::
-<<<<<<< ours
-results::Interval;
-use abbe::
-||||||| base
-results::Interval;
-use abbe::identify::trace::library;
-use abbe::
-=======
-trace::library;
-use abbe::
->>>>>>> theirs
-model::words::counted;
+use abbe::model::words::counted;
 use clap::{Args, ValueEnum};
 
 use crate::cli::failure::Failure;

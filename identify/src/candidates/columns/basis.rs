@@ -203,7 +203,7 @@ impl Columns<'_> {
 const CHUNK_COLUMNS: usize = 48;
 
 /// Groups consecutive effects whose columns are computed together: as many as fit into a chunk, and at least one.
-pub fn chunked(column_sets: &[EffectColumns]) -> Vec<Range<usize>> {
+pub fn chunked(column_sets: &[&EffectColumns]) -> Vec<Range<usize>> {
     let mut chunks = Vec::new();
     let (mut start, mut width) = (0, 0);
     for (index, column_set) in column_sets.iter().enumerate() {
@@ -244,7 +244,8 @@ mod tests {
             counts.iter().map(of_count).collect()
         };
         let ends = |counts: &[usize]| -> Vec<usize> {
-            let chunks = chunked(&column_sets(counts));
+            let column_sets = column_sets(counts);
+            let chunks = chunked(&column_sets.iter().collect::<Vec<_>>());
             let starts: Vec<usize> = chunks.iter().map(|chunk| chunk.start).collect();
             let ends: Vec<usize> = chunks.iter().map(|chunk| chunk.end).collect();
             assert!(starts.iter().zip([0].iter().chain(&ends)).all(|(start, end)| start == end));

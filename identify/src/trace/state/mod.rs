@@ -17,9 +17,9 @@ use abbe_model::effect::Effect;
 use super::constants::{Effort, ON_ALL, ON_FOLDS};
 use super::interrupt::Interrupt;
 use super::policy::Policy;
-use crate::candidates::columns::{Columns, EffectColumns};
+use crate::candidates::candidate::Candidate;
+use crate::candidates::columns::Columns;
 use crate::candidates::gain::PriorMoments;
-use crate::candidates::library::Candidate;
 use crate::candidates::moments::Moments;
 use crate::error::IdentifyError;
 use heldout::HeldOutState;
@@ -65,8 +65,6 @@ pub struct SearchState<'s> {
     pub columns: &'s Columns<'s>,
     /// The candidates.
     pub candidates: Vec<Candidate>,
-    /// The basis columns of the candidates.
-    column_sets: Vec<EffectColumns>,
     /// All products.
     pub moments: Moments,
     /// The priors.
@@ -75,9 +73,6 @@ pub struct SearchState<'s> {
     pub rank: usize,
     /// The branch on all readings, then one for each fold.
     pub branches: Vec<SearchBranch>,
-    /// For each candidate the folds on which its shape numbers and positions were tuned. Empty for an effect of the
-    /// library.
-    tuned_on: Vec<Vec<usize>>,
     /// For each candidate that was ever added, the range of its columns in the base.
     added_to_base: Vec<(usize, Range<usize>)>,
     /// Sum of squares of held-out residuals over the noise variance, for each number of effects.
@@ -88,7 +83,7 @@ pub struct SearchState<'s> {
     /// Whether candidates of last resort are searched.
     pub last_resort: bool,
     /// Candidates of last resort whose products are not computed yet.
-    pub reserve: Vec<(Candidate, EffectColumns)>,
+    pub reserve: Vec<Candidate>,
     /// The unwhitened base and residual for the held-out error.
     unwhitened: UnwhitenedModel,
     /// Sums of squares of held-out residuals over the noise variance, by unit: at present, and under the declared
@@ -99,8 +94,10 @@ pub struct SearchState<'s> {
     accepted: HeldOutState,
     /// Effects that scored better than readings without structure but were not accepted, in order of addition.
     pub rejected: Vec<RejectedByHeldOut>,
-    /// For each effect of the library whether it is undetectable at its largest plausible size.
-    undetectable: Vec<bool>,
+    /// Number of the library's detectable effects. A dictionary counts once: its step tables share its identifier, and
+    /// their positions have a penalty of their own. Curves of last resort, some dozens compared with thousands, do not
+    /// count.
+    detectable_effects: usize,
     /// Checked before each model is trained. `None` if the search must not be interrupted.
     pub interrupt: Option<Interrupt<'s>>,
 }
@@ -113,7 +110,6 @@ impl<'s> SearchState<'s> {
     pub fn new(
         columns: &'s Columns<'s>,
         candidates: Vec<Candidate>,
-        column_sets: Vec<EffectColumns>,
         moments: Moments,
         prior: PriorMoments,
         unwhitened: UnwhitenedModel,
@@ -132,9 +128,7 @@ impl<'s> SearchState<'s> {
             significance,
             max_effects,
             columns,
-            tuned_on: vec![Vec::new(); candidates.len()],
             candidates,
-            column_sets,
             moments,
             prior,
             rank,
@@ -149,10 +143,10 @@ impl<'s> SearchState<'s> {
             declared_units: Vec::new(),
             accepted: HeldOutState::default(),
             rejected: Vec::new(),
-            undetectable: Vec::new(),
+            detectable_effects: 0,
             interrupt: None,
         };
-        search.undetectable = search.undetectable_candidates()?;
+        search.judge_detectability()?;
         search.note_held_out()?;
         search.declared_units = search.units_now.clone();
         search.accepted = search.state();

@@ -51,8 +51,9 @@ impl SearchState<'_> {
         if fresh.is_empty() {
             return;
         }
-        let places = self.moments.add_to_base(self.columns, &self.column_sets, &fresh);
-        let chosen: Vec<&EffectColumns> = fresh.iter().map(|c| &self.column_sets[*c]).collect();
+        let column_sets: Vec<&EffectColumns> = self.candidates.iter().map(|candidate| &candidate.columns).collect();
+        let places = self.moments.add_to_base(self.columns, &column_sets, &fresh);
+        let chosen: Vec<&EffectColumns> = fresh.iter().map(|c| column_sets[*c]).collect();
         let rows = self.columns.unwhitened_rows(&chosen);
         let norms: Vec<f64> = fresh.iter().flat_map(|c| self.norms(*c)).collect();
         self.unwhitened.extend(&rows, &norms);

@@ -50,7 +50,7 @@ impl SearchState<'_> {
 
     /// Description length of the choice of one effect in the library.
     pub fn choice(&self) -> f64 {
-        (self.detectable_effects().max(1) as f64).ln()
+        (self.detectable_effects.max(1) as f64).ln()
     }
 
     /// The objective of a group beside other effects.

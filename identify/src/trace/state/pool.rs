@@ -6,43 +6,44 @@ use abbe_model::effect::shape::Steps;
 use rayon::prelude::*;
 
 use super::SearchState;
+use super::tuning::Tuned;
+use crate::candidates::candidate::Candidate;
 use crate::candidates::columns::EffectColumns;
 use crate::candidates::gain::TrainedModel;
-use crate::candidates::library::Candidate;
 use crate::candidates::step_table::{StepTable, best_step_table};
 use crate::error::IdentifyError;
 use crate::trace::constants::MIN_PLAUSIBLE_SIGMA;
 
 impl SearchState<'_> {
-    /// For each candidate whether it is undetectable at its largest plausible size.
-    pub(super) fn undetectable_candidates(&self) -> Result<Vec<bool>, IdentifyError> {
+    /// Judges for each candidate whether it is detectable at its largest plausible size.
+    pub(super) fn judge_detectability(&mut self) -> Result<(), IdentifyError> {
         let model = self.model_without(None)?;
-        let candidates = 0..self.candidates.len();
-        let undetectable = candidates
+        let detectable: Vec<bool> = (0..self.candidates.len())
             .into_par_iter()
             .map(|candidate| {
                 let (d, _, _) = model.projected(candidate);
-                let plausible = self.columns.plausible(self.effect(candidate), &self.column_sets[candidate]);
+                let plausible = self.columns.plausible(self.effect(candidate), &self.candidates[candidate].columns);
                 let largest = (0..d.nrows()).map(|k| d[(k, k)]).fold(0.0, f64::max);
-                plausible * largest.max(0.0).sqrt() < MIN_PLAUSIBLE_SIGMA
+                plausible * largest.max(0.0).sqrt() >= MIN_PLAUSIBLE_SIGMA
             })
             .collect();
-        Ok(undetectable)
+        self.detectable_effects = detectable.iter().filter(|detectable| **detectable).count();
+        self.candidates
+            .iter_mut()
+            .zip(detectable)
+            .for_each(|(candidate, detectable)| candidate.detectable = detectable);
+        Ok(())
     }
 
     /// Whether a branch with some training folds may add a candidate now.
     pub fn may_be_added(&self, candidate: usize, folds: &[usize]) -> bool {
-        let undetectable = self.undetectable.get(candidate).is_some_and(|undetectable| *undetectable);
-        let effect = &self.candidates[candidate];
-        !undetectable
-            && !effect.dictionary
-            && (!effect.last_resort || self.last_resort)
-            && self.may_be_used(candidate, folds)
+        let Candidate { detectable, dictionary, last_resort, .. } = self.candidates[candidate];
+        detectable && !dictionary && (!last_resort || self.last_resort) && self.may_be_used(candidate, folds)
     }
 
     /// Whether a candidate is an effect of the library or was tuned on exactly these folds.
     pub fn may_be_used(&self, candidate: usize, folds: &[usize]) -> bool {
-        let tuned_on = &self.tuned_on[candidate];
+        let tuned_on = &self.candidates[candidate].tuned_on;
         tuned_on.is_empty() || tuned_on == folds
     }
 
@@ -85,36 +86,31 @@ impl SearchState<'_> {
             .collect()
     }
 
-    /// Adds a candidate that was tuned on some folds. Returns its index, or `None` if the data lack its driver.
-    pub(super) fn add_tuned(&mut self, candidate: Candidate, folds: &[usize]) -> Option<usize> {
-        let column_set = self.columns.effect_columns(&candidate.effect)?;
-        self.append(vec![(candidate, column_set)], folds);
+    /// Adds a tuned effect in addition to the candidate that it was tuned from, for the folds on which it was tuned.
+    /// Returns its index, or `None` if the data lack its driver.
+    pub(super) fn add_tuned(&mut self, tuned: Tuned, folds: &[usize]) -> Option<usize> {
+        let Tuned { original, effect, selection_penalty } = tuned;
+        let columns = self.columns.effect_columns(&effect)?;
+        let (tuned_on, original) = (folds.to_vec(), self.candidates[original].clone());
+        let (dictionary, detectable) = (false, true);
+        self.append([Candidate { effect, columns, selection_penalty, tuned_on, dictionary, detectable, ..original }]);
         Some(self.candidates.len() - 1)
     }
 
-    /// Adds candidates that were tuned on some folds, or effects of the library if `tuned_on` is empty.
-    fn append(&mut self, fresh: Vec<(Candidate, EffectColumns)>, tuned_on: &[usize]) {
-        if fresh.is_empty() {
-            return;
+    /// Adds candidates and computes their products.
+    fn append(&mut self, fresh: impl IntoIterator<Item = Candidate>) {
+        let present = self.candidates.len();
+        self.candidates.extend(fresh);
+        if self.candidates.len() > present {
+            let column_sets: Vec<&EffectColumns> = self.candidates.iter().map(|candidate| &candidate.columns).collect();
+            self.moments.append(self.columns, &column_sets);
         }
-        let (candidates, column_sets): (Vec<Candidate>, Vec<EffectColumns>) = fresh.into_iter().unzip();
-        self.candidates.extend(candidates);
-        self.column_sets.extend(column_sets);
-        self.tuned_on.resize(self.candidates.len(), tuned_on.to_vec());
-        self.moments.append(self.columns, &self.column_sets);
-    }
-
-    /// The number of the library's effects that are detectable at their largest plausible size. A dictionary counts
-    /// once: its step tables share its identifier, and their positions have a penalty of their own. Curves of last
-    /// resort, some dozens compared with thousands, do not count.
-    pub(super) fn detectable_effects(&self) -> usize {
-        self.undetectable.iter().filter(|undetectable| !**undetectable).count()
     }
 
     /// Computes the products of the candidates of last resort, and adds them to the candidates.
     pub fn add_reserve_candidates(&mut self) {
         let reserve = std::mem::take(&mut self.reserve);
-        self.append(reserve, &[]);
+        self.append(reserve);
     }
 
     /// Curves over an axis, one for each test, without a component. Their columns are computed at the first call.
@@ -126,8 +122,7 @@ impl SearchState<'_> {
             return present;
         }
         let first = self.candidates.len();
-        let fresh = fresh.into_iter().map(|(effect, column_set)| (Candidate::test_curve(effect), column_set));
-        self.append(fresh.collect(), &[]);
+        self.append(fresh.into_iter().map(|(effect, columns)| Candidate::test_curve(effect, columns)));
         (first..self.candidates.len()).collect()
     }
 }

@@ -11,17 +11,33 @@ use abbe_model::effect::{Effect, Shape};
 use rayon::prelude::*;
 
 use super::SearchState;
+use crate::candidates::candidate::Candidate;
 use crate::candidates::gain::{Gain, TrainedModel};
-use crate::candidates::library::Candidate;
 use crate::candidates::step_table::{StepTable, best_step_table};
 use crate::error::IdentifyError;
 use crate::trace::constants::{MAX_EVIDENCE_DEFICIT, MIN_EVIDENCE_SHARE};
+
+/// An effect with tuned numbers or positions.
+pub(super) struct Tuned {
+    /// Index of the candidate that it was tuned from, or of its dictionary.
+    pub original: usize,
+    /// The effect.
+    pub effect: Effect,
+    /// Penalty for the selection of its positions.
+    pub selection_penalty: f64,
+}
+
+impl Tuned {
+    fn of(StepTable { dictionary, effect, selection_penalty, .. }: StepTable) -> Tuned {
+        Tuned { original: dictionary, effect, selection_penalty }
+    }
+}
 
 impl SearchState<'_> {
     /// Adds to the candidates those near the best, with their shape numbers tuned beside some candidates on some folds,
     /// and the step tables near the best. Returns the gains of the candidates that were present before.
     pub fn tune_near_best(&mut self, beside: &[usize], folds: &[usize]) -> Result<Vec<Gain>, IdentifyError> {
-        let can_be_tuned = |candidate: &Candidate| candidate.dictionary || !brackets(candidate).is_empty();
+        let can_be_tuned = |candidate: &Candidate| candidate.dictionary || !candidate.brackets().is_empty();
         if !self.candidates.iter().any(can_be_tuned) {
             return Ok(Vec::new());
         }
@@ -31,13 +47,13 @@ impl SearchState<'_> {
             let fresh = self.tuned_near_best(&model, &gains);
             (gains, fresh)
         };
-        for candidate in fresh {
-            self.add_tuned(candidate, folds);
+        for tuned in fresh {
+            self.add_tuned(tuned, folds);
         }
         Ok(gains)
     }
 
-    fn tuned_near_best(&self, model: &TrainedModel<'_>, gains: &[Gain]) -> Vec<Candidate> {
+    fn tuned_near_best(&self, model: &TrainedModel<'_>, gains: &[Gain]) -> Vec<Tuned> {
         let variance = self.variance(model);
         let most = self.effort(&model.folds).tuned;
         let mut nearest: HashMap<String, (usize, f64)> = HashMap::new();
@@ -48,7 +64,7 @@ impl SearchState<'_> {
             }
             let evidence = self.evidence(gain, variance);
             best = best.max(evidence);
-            if brackets(&self.candidates[candidate]).is_empty() {
+            if self.candidates[candidate].brackets().is_empty() {
                 continue;
             }
             let best_of_id = nearest.entry(self.effect(candidate).id()).or_insert((candidate, evidence));
@@ -60,35 +76,29 @@ impl SearchState<'_> {
             nearest.into_values().filter(|(_, evidence)| *evidence >= MIN_EVIDENCE_SHARE * best).collect();
         near.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         near.truncate(most);
-        let tuned = |(candidate, _): (usize, f64)| {
-            let original = &self.candidates[candidate];
-            let effect = self.with_best_numbers(model, original, gains[candidate].gain)?;
-            Some(Candidate { effect, ..original.clone() })
-        };
-        let mut fresh: Vec<Candidate> = near.into_par_iter().filter_map(tuned).collect();
+        let tuned = |(candidate, _): (usize, f64)| self.with_best_numbers(model, candidate, gains[candidate].gain);
+        let mut fresh: Vec<Tuned> = near.into_par_iter().filter_map(tuned).collect();
         fresh.extend(self.step_tables_near_best(model, best, most));
-        fresh.retain(|candidate| {
-            let is_same =
-                |present: usize| *self.effect(present) == candidate.effect && self.may_be_used(present, &model.folds);
-            !(0..self.candidates.len()).any(is_same)
+        fresh.retain(|tuned| {
+            let present = |c: usize| *self.effect(c) == tuned.effect && self.may_be_used(c, &model.folds);
+            !(0..self.candidates.len()).any(present)
         });
         fresh
     }
 
     /// The step tables near the best evidence, with their positions tuned.
-    fn step_tables_near_best(&self, model: &TrainedModel<'_>, best: f64, most: usize) -> Vec<Candidate> {
+    fn step_tables_near_best(&self, model: &TrainedModel<'_>, best: f64, most: usize) -> Vec<Tuned> {
         let variance = self.variance(model);
         let mut nearest = self.step_tables(model);
         nearest.retain(|table| table.evidence >= MIN_EVIDENCE_SHARE * best);
         nearest.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
         nearest.truncate(most);
-        let moved = |StepTable { candidate, .. }: StepTable| {
-            let (effect, gain) = self.with_best_positions(model, &candidate);
+        let moved = |table: StepTable| {
+            let (effect, gain) = self.with_best_positions(model, &table);
             let gain = Gain { gain, freedom: effect.shape.coefficients() + effect.shape.numbers() };
             let evidence = self.evidence(&gain, variance);
-            let near =
-                evidence >= best - MAX_EVIDENCE_DEFICIT || evidence - candidate.cost >= MIN_EVIDENCE_SHARE * best;
-            near.then_some(Candidate { effect, ..candidate })
+            let near = evidence >= best - MAX_EVIDENCE_DEFICIT || evidence - table.cost >= MIN_EVIDENCE_SHARE * best;
+            near.then(|| Tuned { effect, ..Tuned::of(table) })
         };
         nearest.into_par_iter().filter_map(moved).collect()
     }
@@ -101,32 +111,31 @@ impl SearchState<'_> {
         beside: &[usize],
         folds: &[usize],
     ) -> Result<Option<usize>, IdentifyError> {
-        let original = &self.candidates[tunable];
         let model = self.projection_of(beside, folds)?;
-        let fresh = if matches!(original.effect.shape, Shape::Steps { .. }) {
-            self.step_table_of(&model, &original.effect.id())
+        let fresh = if matches!(self.effect(tunable).shape, Shape::Steps { .. }) {
+            self.step_table_of(&model, &self.effect(tunable).id()).map(Tuned::of)
         } else {
-            match self.with_best_numbers(&model, original, model.gain(tunable).gain) {
-                Some(effect) => Some(Candidate { effect, ..original.clone() }),
+            match self.with_best_numbers(&model, tunable, model.gain(tunable).gain) {
                 None => return Ok(Some(tunable)),
+                fresh => fresh,
             }
         };
         Ok(fresh.and_then(|fresh| self.add_tuned(fresh, folds)))
     }
 
     /// The best step table of the dictionary of an identifier for addition to a model.
-    fn step_table_of(&self, model: &TrainedModel<'_>, id: &str) -> Option<Candidate> {
+    fn step_table_of(&self, model: &TrainedModel<'_>, id: &str) -> Option<StepTable> {
         let dictionary = self.candidates.iter().position(|candidate| {
             candidate.dictionary && candidate.effect.id() == id && matches!(candidate.effect.shape, Shape::Steps { .. })
         })?;
-        let table = best_step_table(model, dictionary, &self.candidates[dictionary], self.variance(model))?;
-        Some(table.candidate)
+        best_step_table(model, dictionary, &self.candidates[dictionary], self.variance(model))
     }
 
     /// Tunes the shape numbers of an effect for the largest gain. `None` if the gain does not increase.
-    fn with_best_numbers(&self, model: &TrainedModel<'_>, original: &Candidate, before: f64) -> Option<Effect> {
-        let mut effect = original.effect.clone();
-        let brackets = brackets(original);
+    fn with_best_numbers(&self, model: &TrainedModel<'_>, original: usize, before: f64) -> Option<Tuned> {
+        let Candidate { selection_penalty, ref effect, .. } = self.candidates[original];
+        let mut effect = effect.clone();
+        let brackets = self.candidates[original].brackets();
         let mut best = before;
         let steps = self.effort(&model.folds).line_search;
         // The numbers of one shape are tuned in turn.
@@ -144,12 +153,12 @@ impl SearchState<'_> {
                 }
             }
         }
-        (best > before * (1.0 + 1e-6)).then_some(effect)
+        (best > before * (1.0 + 1e-6)).then_some(Tuned { original, effect, selection_penalty })
     }
 
     /// Moves each step position by fractions of the grid for the largest joint gain. Returns the effect and its gain.
-    fn with_best_positions(&self, model: &TrainedModel<'_>, candidate: &Candidate) -> (Effect, f64) {
-        let original = &candidate.effect;
+    fn with_best_positions(&self, model: &TrainedModel<'_>, table: &StepTable) -> (Effect, f64) {
+        let (original, grid) = (&table.effect, self.candidates[table.dictionary].grid);
         let (Shape::Steps(Steps { at }), Some(mut present)) = (&original.shape, self.tuned_effect(model, original))
         else {
             return (original.clone(), 0.0);
@@ -164,7 +173,7 @@ impl SearchState<'_> {
             for k in 0..positions.len() {
                 let middle = positions[k];
                 for part in -3..=3 {
-                    let position = middle + candidate.grid * f64::from(part) / 4.0;
+                    let position = middle + grid * f64::from(part) / 4.0;
                     let Some(moved) = self.tuned_effect(model, &with(&[position])) else {
                         continue;
                     };
@@ -203,9 +212,4 @@ fn highest<T>(value_at: impl Fn(f64) -> (f64, T), steps: usize) -> (f64, T) {
         }
     }
     if at_c.0 > at_d.0 { at_c } else { at_d }
-}
-
-/// The interval between its neighbours on the grid, for each shape number that can be tuned.
-fn brackets(candidate: &Candidate) -> Vec<[f64; 2]> {
-    candidate.effect.shape.brackets(candidate.grid)
 }
