@@ -5,8 +5,7 @@
 //! evidence of `n` selected out of `m` positions is reduced by `ln C(m, n)`, the logarithm of the number of possible
 //! selections. By the union bound this penalty keeps the significance level of the search.
 
-use abbe_model::effect::shape::Steps;
-use abbe_model::effect::{Effect, Shape};
+use abbe_model::effect::Effect;
 use faer::Mat;
 use faer::prelude::Solve;
 use statrs::function::gamma::ln_gamma;
@@ -51,9 +50,10 @@ pub fn best_step_table(
     dictionary: &Candidate,
     variance: f64,
 ) -> Option<StepTable> {
-    let Shape::Steps(Steps { at }) = &dictionary.effect.shape else {
+    let at = dictionary.effect.shape.positions();
+    if at.is_empty() {
         return None;
-    };
+    }
     let (d, g, own) = model.projected(number);
     let subset = Subset { d: &d, g: &g, own: &own };
     let mut chosen: Vec<usize> = Vec::new();
@@ -73,7 +73,8 @@ pub fn best_step_table(
         if best.as_ref().is_none_or(|best| evidence - dictionary.cost > best.score()) {
             let mut positions: Vec<f64> = chosen.iter().map(|k| at[*k]).collect();
             positions.sort_by(f64::total_cmp);
-            let effect = Effect { shape: Shape::Steps(Steps { at: positions }), ..dictionary.effect.clone() };
+            let effect =
+                Effect { shape: dictionary.effect.shape.with_positions(positions), ..dictionary.effect.clone() };
             let cost = dictionary.cost;
             best = Some(StepTable { dictionary: number, effect, selection_penalty, cost, evidence });
         }

@@ -5,7 +5,6 @@ mod shapes;
 use abbe_model::axis::AxisKind;
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
 use abbe_model::driver::{Driver, Recorded};
-use abbe_model::effect::shape::Steps;
 use abbe_model::effect::{Component, Effect, Shape};
 use serde::Deserialize;
 
@@ -108,7 +107,7 @@ pub fn candidates(problem: &Problem) -> Result<Vec<LibraryEffect>, IdentifyError
                     let cost = family.simplicity + extra + tilt_cost(problem, &component);
                     let last_resort = family.last_resort;
                     let grid = grid(problem, &sampling, &effect);
-                    let dictionary = matches!(&effect.shape, Shape::Steps(Steps { at }) if at.len() > 1);
+                    let dictionary = effect.shape.positions().len() > 1;
                     candidates.push(LibraryEffect { effect, family: number, cost, last_resort, dictionary, grid });
                 }
             }

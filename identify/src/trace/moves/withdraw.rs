@@ -1,7 +1,6 @@
 //! Withdraws effects that explain nothing.
 
 use abbe_model::driver::Driver;
-use abbe_model::effect::Shape;
 
 use super::{Move, Proposal};
 use crate::error::IdentifyError;
@@ -20,7 +19,7 @@ impl Move for Withdraw {
         let mut changed = false;
         for driver in search.axes_followed(branch) {
             let (group, rest) = search.following(&driver, branch);
-            let is_curve = |c: &usize| matches!(search.effect(*c).shape, Shape::Curve { .. });
+            let is_curve = |c: &usize| search.effect(*c).shape.curve_ends().is_some();
             let few = group.len() < 2 && !search.is_composed(&group) && !self.structured;
             if few || group.iter().all(is_curve) {
                 continue;

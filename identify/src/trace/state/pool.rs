@@ -1,8 +1,6 @@
 //! The candidates that a search may add: the library's detectable effects, and the effects that it has tuned itself.
 
 use abbe_model::driver::Driver;
-use abbe_model::effect::Shape;
-use abbe_model::effect::shape::Steps;
 use rayon::prelude::*;
 
 use super::SearchState;
@@ -49,13 +47,12 @@ impl SearchState<'_> {
 
     /// Whether a candidate has shape numbers or positions that the search tunes.
     pub fn is_tunable(&self, candidate: usize) -> bool {
-        self.moments.numbers[candidate] > 0 || matches!(self.effect(candidate).shape, Shape::Steps { .. })
+        self.moments.numbers[candidate] > 0 || !self.effect(candidate).shape.positions().is_empty()
     }
 
     /// Whether one of some candidates is a table of more than two steps.
     pub fn is_composed(&self, group: &[usize]) -> bool {
-        let composed = |c: &usize| matches!(&self.effect(*c).shape, Shape::Steps(Steps { at }) if at.len() > 2);
-        group.iter().any(composed)
+        group.iter().any(|c| self.effect(*c).shape.positions().len() > 2)
     }
 
     /// The axes that the selected effects of a branch follow, each once.

@@ -6,8 +6,7 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use abbe_model::effect::shape::Steps;
-use abbe_model::effect::{Effect, Shape};
+use abbe_model::effect::Effect;
 use rayon::prelude::*;
 
 use super::SearchState;
@@ -112,7 +111,7 @@ impl SearchState<'_> {
         folds: &[usize],
     ) -> Result<Option<usize>, IdentifyError> {
         let model = self.projection_of(beside, folds)?;
-        let fresh = if matches!(self.effect(tunable).shape, Shape::Steps { .. }) {
+        let fresh = if !self.effect(tunable).shape.positions().is_empty() {
             self.step_table_of(&model, &self.effect(tunable).id()).map(Tuned::of)
         } else {
             match self.with_best_numbers(&model, tunable, model.gain(tunable).gain) {
@@ -125,9 +124,10 @@ impl SearchState<'_> {
 
     /// The best step table of the dictionary of an identifier for addition to a model.
     fn step_table_of(&self, model: &TrainedModel<'_>, id: &str) -> Option<StepTable> {
-        let dictionary = self.candidates.iter().position(|candidate| {
-            candidate.dictionary && candidate.effect.id() == id && matches!(candidate.effect.shape, Shape::Steps { .. })
-        })?;
+        let has_positions = |candidate: &Candidate| !candidate.effect.shape.positions().is_empty();
+        let own =
+            |candidate: &Candidate| candidate.dictionary && has_positions(candidate) && candidate.effect.id() == id;
+        let dictionary = self.candidates.iter().position(own)?;
         best_step_table(model, dictionary, &self.candidates[dictionary], self.variance(model))
     }
 
@@ -159,14 +159,13 @@ impl SearchState<'_> {
     /// Moves each step position by fractions of the grid for the largest joint gain. Returns the effect and its gain.
     fn with_best_positions(&self, model: &TrainedModel<'_>, table: &StepTable) -> (Effect, f64) {
         let (original, grid) = (&table.effect, self.candidates[table.dictionary].grid);
-        let (Shape::Steps(Steps { at }), Some(mut present)) = (&original.shape, self.tuned_effect(model, original))
-        else {
+        let Some(mut present) = self.tuned_effect(model, original) else {
             return (original.clone(), 0.0);
         };
         let mut best = present.gain(model);
-        let mut positions = at.clone();
+        let mut positions = original.shape.positions().to_vec();
         let with =
-            |positions: &[f64]| Effect { shape: Shape::Steps(Steps { at: positions.to_vec() }), ..original.clone() };
+            |positions: &[f64]| Effect { shape: original.shape.with_positions(positions.to_vec()), ..original.clone() };
         let trained: Vec<Range<usize>> =
             (model.folds.iter()).map(|fold| self.columns.fold_rows[*fold].clone()).collect();
         for _ in 0..2 {
