@@ -74,7 +74,7 @@ fn competing_effects(
             gain.freedom > 0
                 && (*candidate == selected || !others.contains(candidate))
                 && !search.candidates[*candidate].last_resort
-                && search.may_be_added(*candidate, &search.branches[ALL].folds)
+                && search.may_be_added(*candidate, &search.selection.branches[ALL].folds)
         })
         .map(|(candidate, gain)| {
             let evidence = search.evidence_for(candidate, gain, variance);

@@ -42,7 +42,7 @@ use implausible::Contradicted;
 use interrupt::Interrupt;
 use judge::RefittedModel;
 use noise_model::estimate_noise_model;
-use policy::Policy;
+use policy::{Policy, SIGNIFICANCE};
 use search::{SearchRecord, search_on, withdraw_unexplaining};
 use start::Start;
 use state::SearchState;
@@ -74,7 +74,7 @@ impl Default for TraceOptions {
             only: Vec::new(),
             exclude: Vec::new(),
             draws: 199,
-            significance: 0.005,
+            significance: SIGNIFICANCE,
         }
     }
 }
@@ -219,6 +219,11 @@ fn trace_or_interrupted<'a>(
     let interrupt = Interrupt(progress);
     interrupt.check()?;
     let policy = Policy::of(problem);
+    let policy = Policy {
+        significance: options.significance,
+        max_effects: options.max_effects.unwrap_or(policy.max_effects),
+        ..policy
+    };
     let columns = Columns::new(problem, &before_fit.beta);
     let start = Start::of(problem, &columns, before_fit)?;
     interrupt.check()?;
@@ -245,11 +250,8 @@ fn trace_or_interrupted<'a>(
     let go_on = || interrupt.check().is_ok();
     let moments = Moments::new(&columns, &column_sets, model, &start.residual, draws, &go_on)
         .ok_or(IdentifyError::Interrupted)?;
-    let max_effects = options.max_effects.unwrap_or(policy.max_effects);
     let unwhitened = start.unwhitened(&columns, &before_fit.beta, problem.noise.sigma_mm)?;
-    let significance = options.significance;
-    let mut search =
-        SearchState::new(&columns, candidates, moments, prior, unwhitened, policy, significance, max_effects)?;
+    let mut search = SearchState::new(&columns, candidates, moments, prior, unwhitened, policy)?;
     search.reserve = reserve;
     search.interrupt = Some(interrupt);
     let gains = search.model_without(None)?.gains();
@@ -284,7 +286,7 @@ fn trace_or_interrupted<'a>(
         structure_before,
         structure_after: structure_after.as_ref(),
         last_p_value: ended.unwrap_or(1.0),
-        stopped_early: ended.is_none() || search.selected().len() >= max_effects,
+        stopped_early: ended.is_none() || search.selected().len() >= policy.max_effects,
         interrupted,
         candidates: candidate_count,
         candidates_seen: observable,
@@ -318,7 +320,7 @@ fn search_and_refit<'a>(
     let mut ended = search_on(search, record)?;
     (record.progress)(Progress::Judging);
     let mut judged = judge(search)?;
-    if judged.is_structured() && search.selected().len() < search.max_effects {
+    if judged.is_structured() && search.selected().len() < search.policy.max_effects {
         search.add_reserve_candidates();
         search.last_resort = true;
         ended = search_on(search, record)?;

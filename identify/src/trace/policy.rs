@@ -26,8 +26,10 @@ pub enum MoveName {
 }
 
 /// The numbers and choices that differ between kinds of readings.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Policy {
+    /// Probability that the search accepts an effect on readings without structure.
+    pub significance: f64,
     /// Maximum number of effects. A larger number indicates a different cause.
     pub max_effects: usize,
     /// Where the null draws come from.
@@ -51,8 +53,12 @@ pub struct Policy {
     pub withdraws: bool,
 }
 
+/// The significance level if the caller states none.
+pub const SIGNIFICANCE: f64 = 0.005;
+
 /// The policy for readings along runs.
 const RUNS: Policy = Policy {
+    significance: SIGNIFICANCE,
     max_effects: 12,
     null: NullSource::Repeats,
     noise_of_repeats: true,
@@ -67,6 +73,7 @@ const RUNS: Policy = Policy {
 
 /// The policy for independent poses.
 const POSES: Policy = Policy {
+    significance: SIGNIFICANCE,
     max_effects: 200,
     null: NullSource::SignFlips,
     noise_of_repeats: false,
@@ -81,7 +88,7 @@ const POSES: Policy = Policy {
 
 impl Policy {
     /// The policy for the readings of a problem.
-    pub fn of(problem: &Problem) -> &'static Policy {
-        if problem.folds.kind == FoldKind::Poses { &POSES } else { &RUNS }
+    pub fn of(problem: &Problem) -> Policy {
+        if problem.folds.kind == FoldKind::Poses { POSES } else { RUNS }
     }
 }

@@ -25,7 +25,7 @@ pub(super) struct SearchRecord<'t> {
 impl SearchRecord<'_> {
     /// Records accepted additions.
     fn note(&mut self, search: &SearchState<'_>, added: impl Iterator<Item = usize>) {
-        let held_out = search.held_out.last().copied().unwrap_or(0.0);
+        let held_out = search.selection.held_out.last().copied().unwrap_or(0.0);
         let heldout_rms_um = (held_out / search.columns.rows().max(1) as f64).sqrt() * self.noise_um;
         let effects = search.selected().len();
         for candidate in added {
@@ -57,7 +57,7 @@ pub(super) fn search_on(search: &mut SearchState<'_>, record: &mut SearchRecord<
     let mut pending = Vec::new();
     let mut ended = None;
     // A merge of effects permits further additions. The limit on rounds guarantees termination.
-    for _ in 0..search.max_effects.saturating_add(search.max_effects / 2).max(1) {
+    for _ in 0..search.policy.max_effects.saturating_add(search.policy.max_effects / 2).max(1) {
         match round(search)? {
             Round::Done(p_value) => ended = Some(p_value),
             Round::Changed => pending.push(None),
@@ -98,17 +98,17 @@ fn add_best(search: &mut SearchState<'_>) -> Result<(f64, Option<usize>), Identi
         return Ok((1.0, None));
     };
     search.thresholds.push(threshold);
-    if p_value > search.significance || search.selected().len() >= search.max_effects {
+    if p_value > search.policy.significance || search.selected().len() >= search.policy.max_effects {
         return Ok((p_value, None));
     }
-    let before = search.branches.clone();
+    let before = search.selection.branches.clone();
     if !moves::on_every_branch(&Add { p_value, threshold }, search)? {
         return Ok((p_value, None));
     }
     let added = search.selected().last().map(|selected| selected.candidate);
-    let before_heldout = search.held_out.last().copied().unwrap_or(f64::INFINITY);
+    let before_heldout = search.selection.held_out.last().copied().unwrap_or(f64::INFINITY);
     if search.policy.every_addition_lowers_heldout && search.held_out_now()? >= before_heldout {
-        search.branches = before;
+        search.selection.branches = before;
         return Ok((p_value, None));
     }
     Remove { threshold }.try_on(search, ALL)?;

@@ -15,8 +15,8 @@ pub struct Add {
 
 impl Move for Add {
     fn try_on(&self, search: &mut SearchState<'_>, branch: usize) -> Result<bool, IdentifyError> {
-        let SearchBranch { folds, mut selected } = search.branches[branch].clone();
-        let chosen = search.branches[branch].chosen();
+        let SearchBranch { folds, mut selected } = search.selection.branches[branch].clone();
+        let chosen = search.selection.branches[branch].chosen();
         let known = search.tune_near_best(&chosen, &folds)?;
         let (candidate, score) = {
             let model = search.model_of(&chosen, &folds)?;

@@ -23,8 +23,8 @@ pub struct SetComparison {
 impl SetComparison {
     /// Starts a comparison with the selected set. `None` if the set is empty or too large.
     pub fn with_selected(search: &SearchState<'_>, branch: usize) -> Result<Option<SetComparison>, IdentifyError> {
-        let folds = search.branches[branch].folds.clone();
-        let chosen = search.branches[branch].chosen();
+        let folds = search.selection.branches[branch].folds.clone();
+        let chosen = search.selection.branches[branch].chosen();
         if !(1..=MAX_COMPARED).contains(&chosen.len()) {
             return Ok(None);
         }
@@ -71,7 +71,7 @@ impl SetComparison {
         if set.is_empty() {
             return false;
         }
-        let replaced = search.branches[self.branch].selected.iter();
+        let replaced = search.selection.branches[self.branch].selected.iter();
         let p_value = replaced.map(|selected| selected.p_value).fold(0.0, f64::max);
         let selected = set.into_iter().map(|candidate| SelectedEffect { candidate, p_value }).collect();
         Proposal { selected, increase: value - self.present, margin: INDISTINGUISHABLE }.accept(search, self.branch)

@@ -40,7 +40,7 @@ fn merged(search: &mut SearchState<'_>, branch: usize, group: &[usize]) -> Resul
     if group.len() < 2 && !curves {
         return Ok(None);
     }
-    let SearchBranch { folds, selected } = search.branches[branch].clone();
+    let SearchBranch { folds, selected } = search.selection.branches[branch].clone();
     let (grouped, mut selected): (Vec<SelectedEffect>, Vec<SelectedEffect>) =
         selected.into_iter().partition(|selected| group.contains(&selected.candidate));
     let rest: Vec<usize> = selected.iter().map(|selected| selected.candidate).collect();

@@ -71,7 +71,7 @@ impl Proposal {
         }
         let chosen: Vec<usize> = self.selected.iter().map(|selected| selected.candidate).collect();
         search.add_to_base(&chosen);
-        search.branches[branch].selected = self.selected;
+        search.selection.branches[branch].selected = self.selected;
         true
     }
 }
@@ -93,7 +93,7 @@ pub fn named(name: MoveName) -> &'static dyn Move {
 pub fn on_every_branch(tried: &dyn Move, search: &mut SearchState<'_>) -> Result<bool, IdentifyError> {
     let all = tried.try_on(search, ALL)?;
     if all || !tried.follows_all_readings() {
-        for branch in ALL + 1..search.branches.len() {
+        for branch in ALL + 1..search.selection.branches.len() {
             tried.try_on(search, branch)?;
         }
     }

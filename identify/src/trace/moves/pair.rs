@@ -20,7 +20,7 @@ impl Move for Pair {
         let places = 0..chosen.len();
         let removed = places.clone().flat_map(|i| places.clone().filter(move |j| i <= *j).map(move |j| (i, j)));
         for (i, j) in removed {
-            if i == j && chosen.len() >= search.max_effects {
+            if i == j && chosen.len() >= search.policy.max_effects {
                 continue;
             }
             let base: Vec<usize> = places.clone().filter(|k| *k != i && *k != j).map(|k| chosen[k]).collect();

@@ -22,7 +22,7 @@ impl Move for Refine {
         for tunable in tunable {
             let removed = chosen.iter().copied().filter(|c| *c != tunable).map(Some);
             for removed in removed.chain([None]) {
-                if removed.is_none() && chosen.len() >= search.max_effects {
+                if removed.is_none() && chosen.len() >= search.policy.max_effects {
                     continue;
                 }
                 let kept = |c: &&usize| **c != tunable && Some(**c) != removed;

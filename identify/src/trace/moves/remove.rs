@@ -12,10 +12,10 @@ pub struct Remove {
 
 impl Move for Remove {
     fn try_on(&self, search: &mut SearchState<'_>, branch: usize) -> Result<bool, IdentifyError> {
-        let folds = search.branches[branch].folds.clone();
+        let folds = search.selection.branches[branch].folds.clone();
         let mut changed = false;
         loop {
-            let chosen = search.branches[branch].chosen();
+            let chosen = search.selection.branches[branch].chosen();
             let scored = (0..chosen.len().saturating_sub(1)).map(|k| {
                 let mut others = chosen.clone();
                 let candidate = others.remove(k);
@@ -25,7 +25,7 @@ impl Move for Remove {
             let Some((k, score)) = scored.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)) else {
                 return Ok(changed);
             };
-            let mut selected = search.branches[branch].selected.clone();
+            let mut selected = search.selection.branches[branch].selected.clone();
             selected.remove(k);
             if !(Proposal { selected, increase: -score, margin: -self.threshold }).accept(search, branch) {
                 return Ok(changed);

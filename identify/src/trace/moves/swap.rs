@@ -12,7 +12,7 @@ pub struct Swap;
 impl Move for Swap {
     fn try_on(&self, search: &mut SearchState<'_>, branch: usize) -> Result<bool, IdentifyError> {
         let mut changed = false;
-        for k in 0..search.branches[branch].selected.len() {
+        for k in 0..search.selection.branches[branch].selected.len() {
             if let Some(proposal) = exchanged(search, branch, k)? {
                 changed |= proposal.accept(search, branch);
             }
@@ -27,8 +27,8 @@ impl Move for Swap {
 
 /// The `k`-th effect exchanged for the best candidate beside the others, in its simplest form.
 fn exchanged(search: &mut SearchState<'_>, branch: usize, k: usize) -> Result<Option<Proposal>, IdentifyError> {
-    let SearchBranch { folds, mut selected } = search.branches[branch].clone();
-    let mut others = search.branches[branch].chosen();
+    let SearchBranch { folds, mut selected } = search.selection.branches[branch].clone();
+    let mut others = search.selection.branches[branch].chosen();
     let present = others.remove(k);
     let tunes = !others.is_empty() && selected.len() < search.policy.swap_tunes_below;
     let known = if tunes { search.tune_near_best(&others, &folds)? } else { Vec::new() };

@@ -24,14 +24,14 @@ impl Move for Withdraw {
             if few || group.iter().all(is_curve) {
                 continue;
             }
-            let folds = search.branches[branch].folds.clone();
+            let folds = search.selection.branches[branch].folds.clone();
             let of_group = search.objective(&group, &rest, &folds)?;
             let mut of_curves = f64::NEG_INFINITY;
             for intervals in INTERVALS {
                 let one = objective_of_test_curves(search, &driver, intervals, &rest, &folds)?;
                 of_curves = one.map_or(of_curves, |one| of_curves.max(one));
             }
-            let mut selected = search.branches[branch].selected.clone();
+            let mut selected = search.selection.branches[branch].selected.clone();
             selected.retain(|selected| !group.contains(&selected.candidate));
             changed |= Proposal { selected, increase: of_curves - of_group, margin: 0.0 }.accept(search, branch);
         }

@@ -145,8 +145,12 @@ struct HeldOut<'s> {
 impl<'s> HeldOut<'s> {
     fn of(search: &'s SearchState<'_>, before_um: f64) -> HeldOut<'s> {
         let rows = search.columns.rows().max(1) as f64;
-        let first = search.held_out.first().copied().unwrap_or(1.0);
-        HeldOut { sums: &search.held_out, rows, scale_um: before_um / (first / rows).sqrt().max(f64::MIN_POSITIVE) }
+        let first = search.selection.held_out.first().copied().unwrap_or(1.0);
+        HeldOut {
+            sums: &search.selection.held_out,
+            rows,
+            scale_um: before_um / (first / rows).sqrt().max(f64::MIN_POSITIVE),
+        }
     }
 
     /// With this number of effects.

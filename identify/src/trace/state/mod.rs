@@ -22,8 +22,7 @@ use crate::candidates::columns::Columns;
 use crate::candidates::gain::PriorMoments;
 use crate::candidates::moments::Moments;
 use crate::error::IdentifyError;
-use heldout::HeldOutState;
-pub use heldout::{RejectedByHeldOut, UnwhitenedModel};
+pub use heldout::{RejectedByHeldOut, Selection, UnwhitenedModel};
 
 /// An effect that a search has selected.
 #[derive(Clone, Copy, Debug)]
@@ -56,11 +55,7 @@ pub(super) const ALL: usize = 0;
 /// The state of the search.
 pub struct SearchState<'s> {
     /// The policy for the readings.
-    pub policy: &'static Policy,
-    /// Probability that the search accepts an effect on readings without structure.
-    pub significance: f64,
-    /// Maximum number of effects.
-    pub max_effects: usize,
+    pub policy: Policy,
     /// The columns.
     pub columns: &'s Columns<'s>,
     /// The candidates.
@@ -71,12 +66,14 @@ pub struct SearchState<'s> {
     prior: PriorMoments,
     /// Number of base columns that the fitted model has.
     pub rank: usize,
-    /// The branch on all readings, then one for each fold.
-    pub branches: Vec<SearchBranch>,
+    /// The selected effects.
+    pub selection: Selection,
+    /// The accepted effects: additions that lowered the held-out error by more than the standard error of the decrease.
+    accepted: Selection,
+    /// The declared model: no effects.
+    declared: Selection,
     /// For each candidate that was ever added, the range of its columns in the base.
     added_to_base: Vec<(usize, Range<usize>)>,
-    /// Sum of squares of held-out residuals over the noise variance, for each number of effects.
-    pub held_out: Vec<f64>,
     /// For each round, the best score that readings without structure exceed with the probability of the significance
     /// level.
     pub thresholds: Vec<f64>,
@@ -86,12 +83,6 @@ pub struct SearchState<'s> {
     pub reserve: Vec<Candidate>,
     /// The unwhitened base and residual for the held-out error.
     unwhitened: UnwhitenedModel,
-    /// Sums of squares of held-out residuals over the noise variance, by unit: at present, and under the declared
-    /// model.
-    units_now: Vec<f64>,
-    declared_units: Vec<f64>,
-    /// The accepted effects: additions that lowered the held-out error by more than the standard error of the decrease.
-    accepted: HeldOutState,
     /// Effects that scored better than readings without structure but were not accepted, in order of addition.
     pub rejected: Vec<RejectedByHeldOut>,
     /// Number of the library's detectable effects. A dictionary counts once: its step tables share its identifier, and
@@ -113,49 +104,39 @@ impl<'s> SearchState<'s> {
         moments: Moments,
         prior: PriorMoments,
         unwhitened: UnwhitenedModel,
-        policy: &'static Policy,
-        significance: f64,
-        max_effects: usize,
+        policy: Policy,
     ) -> Result<SearchState<'s>, IdentifyError> {
         let rank = moments.base();
-        let folds = 0..columns.fold_rows.len();
-        let without = |left_out: Option<usize>| SearchBranch {
-            folds: folds.clone().filter(|fold| Some(*fold) != left_out).collect(),
-            selected: Vec::new(),
-        };
+        let none = Selection::none(columns.fold_rows.len());
         let mut search = SearchState {
             policy,
-            significance,
-            max_effects,
             columns,
             candidates,
             moments,
             prior,
             rank,
-            branches: std::iter::once(None).chain(folds.clone().map(Some)).map(without).collect(),
+            selection: none.clone(),
+            accepted: none.clone(),
+            declared: none,
             added_to_base: Vec::new(),
-            held_out: Vec::new(),
             thresholds: Vec::new(),
             last_resort: false,
             reserve: Vec::new(),
             unwhitened,
-            units_now: Vec::new(),
-            declared_units: Vec::new(),
-            accepted: HeldOutState::default(),
             rejected: Vec::new(),
             detectable_effects: 0,
             interrupt: None,
         };
         search.judge_detectability()?;
         search.note_held_out()?;
-        search.declared_units = search.units_now.clone();
-        search.accepted = search.state();
+        search.declared = search.selection.clone();
+        search.accepted = search.selection.clone();
         Ok(search)
     }
 
     /// The selected effects of the branch on all readings.
     pub fn selected(&self) -> &[SelectedEffect] {
-        &self.branches[ALL].selected
+        self.selection.effects()
     }
 
     /// The effect of a candidate.
@@ -165,6 +146,6 @@ impl<'s> SearchState<'s> {
 
     /// How many candidates the steps of a branch with some training folds try.
     pub fn effort(&self, folds: &[usize]) -> &'static Effort {
-        if folds.len() == self.branches[ALL].folds.len() { &ON_ALL } else { &ON_FOLDS }
+        if folds.len() == self.selection.branches[ALL].folds.len() { &ON_ALL } else { &ON_FOLDS }
     }
 }

@@ -34,11 +34,11 @@ impl SearchState<'_> {
 
     /// The model with the selected effects, without the `k`-th if one is given, on all readings.
     pub fn model_without(&self, left_out: Option<usize>) -> Result<TrainedModel<'_>, IdentifyError> {
-        let mut chosen = self.branches[ALL].chosen();
+        let mut chosen = self.selection.branches[ALL].chosen();
         if let Some(k) = left_out {
             chosen.remove(k);
         }
-        self.model_of(&chosen, &self.branches[ALL].folds)
+        self.model_of(&chosen, &self.selection.branches[ALL].folds)
     }
 
     /// Adds the columns of candidates to the base, if they are not there yet.

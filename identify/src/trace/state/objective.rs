@@ -157,7 +157,7 @@ impl SearchState<'_> {
     /// The p-value of the best candidate with respect to the best scores of the null draws, and the score that these
     /// exceed with the probability of the significance level. `None` if no candidate can be added.
     pub fn best_against_null(&self) -> Result<Option<(f64, f64)>, IdentifyError> {
-        let chosen = self.branches[ALL].chosen();
+        let chosen = self.selection.branches[ALL].chosen();
         let model = self.model_without(None)?;
         let Some((_, score)) = self.best_of(&model, &model.gains(), &chosen) else {
             return Ok(None);
@@ -168,12 +168,12 @@ impl SearchState<'_> {
                 if self.may_be_added(c, &model.folds) { self.candidates[c].description_length() } else { f64::INFINITY }
             })
             .collect();
-        let null_variance = self.variance(&self.projection_of(&[], &self.branches[ALL].folds)?);
+        let null_variance = self.variance(&self.projection_of(&[], &self.selection.branches[ALL].folds)?);
         let mut null = model.null_best(&costs, null_variance);
         null.sort_by(f64::total_cmp);
         let above = null.iter().filter(|best| **best >= score).count();
         let p_value = (above + 1) as f64 / (null.len() + 1) as f64;
-        let rank = ((1.0 - self.significance) * null.len() as f64).ceil() as usize;
+        let rank = ((1.0 - self.policy.significance) * null.len() as f64).ceil() as usize;
         let threshold = null.get(rank.min(null.len().saturating_sub(1)));
         Ok(Some((p_value, threshold.copied().unwrap_or(0.0))))
     }

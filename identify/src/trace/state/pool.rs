@@ -58,7 +58,7 @@ impl SearchState<'_> {
     /// The axes that the selected effects of a branch follow, each once.
     pub fn axes_followed(&self, branch: usize) -> Vec<Driver> {
         let mut drivers: Vec<Driver> = Vec::new();
-        for candidate in self.branches[branch].chosen() {
+        for candidate in self.selection.branches[branch].chosen() {
             let driver = &self.effect(candidate).driver;
             if matches!(driver, Driver::Axis(_)) && !drivers.contains(driver) {
                 drivers.push(driver.clone());
@@ -69,7 +69,7 @@ impl SearchState<'_> {
 
     /// Divides the selected effects of a branch into those that follow a driver and the others.
     pub fn following(&self, driver: &Driver, branch: usize) -> (Vec<usize>, Vec<usize>) {
-        let chosen = self.branches[branch].chosen();
+        let chosen = self.selection.branches[branch].chosen();
         chosen.into_iter().partition(|candidate| self.effect(*candidate).driver == *driver)
     }
 
