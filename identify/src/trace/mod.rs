@@ -2,12 +2,12 @@
 //!
 //! 1. The noise standard deviation and autocorrelation follow from repeats ([`crate::noise`]). Outliers are excluded by
 //!    name ([`crate::outliers`]).
-//! 2. The basis columns of the library's effects ([`library`]) are computed for the session (`columns`). Their products
-//!    with the model, the residual and the null draws are computed once (`moments`).
-//! 3. The search (`search`) adds, removes and exchanges effects. Its p-values come from the same search on readings
-//!    without structure (`null`). An effect is accepted if its p-value is below the significance level and the held-out
-//!    error decreases by more than the standard error of the decrease. That standard error follows from paired
-//!    differences over runs, blocks or poses (`paired`).
+//! 2. The columns of the library's effects ([`crate::candidates`]) are computed for the session. Their products with the
+//!    model, the residual and the null draws are computed once.
+//! 3. The search (`search`) adds, removes, exchanges and merges effects (`moves`). Its p-values come from the same search
+//!    on readings without structure (`null`). An effect is accepted if its p-value is below the significance level and
+//!    the held-out error decreases by more than the standard error of the decrease. That standard error follows from
+//!    paired differences over runs, blocks or poses.
 //! 4. All parameters are refitted together (`judge`). The result (`result`) states the held-out error before and after.
 //! 5. For each effect the trace lists its aliases ([`alias`]). It tests the residual for remaining structure
 //!    (`remainder`).
@@ -43,7 +43,7 @@ use interrupt::Interrupt;
 use judge::RefittedModel;
 use noise_model::estimate_noise_model;
 use policy::{Policy, SIGNIFICANCE};
-use search::{SearchRecord, search_on, withdraw_unexplaining};
+use search::{SearchRecord, search_and_refit};
 use start::Start;
 use state::SearchState;
 
@@ -135,8 +135,8 @@ pub struct TraceOutcome {
 ///
 /// # Errors
 /// If the session cannot be fitted.
-pub fn trace<'a>(
-    session: &'a Session,
+pub fn trace(
+    session: &Session,
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<TraceOutcome, IdentifyError> {
@@ -163,7 +163,7 @@ pub fn trace<'a>(
 
 /// Searches with the noise model estimated from repeats. Searches once more if the found effects change that noise
 /// model.
-fn with_noise_of_repeats<'a>(
+fn with_noise_of_repeats(
     mut problem: Problem,
     mut before_fit: Fit,
     options: &TraceOptions,
@@ -194,7 +194,7 @@ fn with_noise_of_repeats<'a>(
 }
 
 /// Traces with a given noise model. The null distribution is drawn from the repeats in the residuals `pure`.
-fn trace_with<'a>(
+fn trace_with(
     problem: Problem,
     before_fit: Fit,
     pure: &[Vec<f64>],
@@ -209,7 +209,7 @@ fn trace_with<'a>(
 
 /// Traces with a given noise model, and returns [`IdentifyError::Interrupted`] if it was interrupted before the search
 /// began.
-fn trace_or_interrupted<'a>(
+fn trace_or_interrupted(
     problem: &Problem,
     before_fit: &Fit,
     pure: &[Vec<f64>],
@@ -305,36 +305,6 @@ fn trace_or_interrupted<'a>(
         steps: record.steps,
         result: reported.result,
     })
-}
-
-/// Searches and refits. If significant structure remains, the search continues with nonparametric curves. Effects that
-/// explain nothing are withdrawn. Returns the p-value at which the search ended ([`search_on`]) and the refitted model.
-///
-/// # Errors
-/// [`IdentifyError::Interrupted`] if the caller stopped the trace.
-fn search_and_refit<'a>(
-    search: &mut SearchState<'_>,
-    record: &mut SearchRecord<'_>,
-    judge: impl Fn(&SearchState<'_>) -> Result<RefittedModel, IdentifyError>,
-) -> Result<(f64, RefittedModel), IdentifyError> {
-    let mut ended = search_on(search, record)?;
-    (record.progress)(Progress::Judging);
-    let mut judged = judge(search)?;
-    if judged.is_structured() && search.selected().len() < search.policy.max_effects {
-        search.add_reserve_candidates();
-        search.last_resort = true;
-        ended = search_on(search, record)?;
-        if !judged.is_of(search) {
-            judged = judge(search)?;
-        }
-    }
-    if search.policy.withdraws {
-        withdraw_unexplaining(search, judged.is_structured())?;
-        if !judged.is_of(search) {
-            judged = judge(search)?;
-        }
-    }
-    Ok((ended, judged))
 }
 
 /// The number of null draws: the requested number, but at least as many as the significance level needs.

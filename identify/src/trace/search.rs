@@ -4,6 +4,7 @@
 //! additions do not lower the held-out error.
 
 use super::constants::MAX_REJECTED_IN_A_ROW;
+use super::judge::RefittedModel;
 use super::moves::add::Add;
 use super::moves::remove::Remove;
 use super::moves::withdraw::Withdraw;
@@ -46,13 +47,43 @@ enum Round {
     Done(f64),
 }
 
-/// Runs rounds until no candidate is significant, or until additions do not lower the held-out error. The accepted
-/// effects remain. Returns the p-value of the best candidate that was not added.
+/// Searches and refits. If significant structure remains, the search continues with nonparametric curves. Effects that
+/// explain nothing are withdrawn: those that curves replace, and all of them if together they do not lower the held-out
+/// error. Returns the p-value at which the search ended ([`search_on`]) and the refitted model.
 ///
 /// # Errors
 /// [`IdentifyError::Interrupted`] if the caller stopped the trace. [`SearchState::roll_back`] then restores the accepted
 /// effects.
-pub(super) fn search_on(search: &mut SearchState<'_>, record: &mut SearchRecord<'_>) -> Result<f64, IdentifyError> {
+pub(super) fn search_and_refit(
+    search: &mut SearchState<'_>,
+    record: &mut SearchRecord<'_>,
+    judge: impl Fn(&SearchState<'_>) -> Result<RefittedModel, IdentifyError>,
+) -> Result<(f64, RefittedModel), IdentifyError> {
+    let mut ended = search_on(search, record)?;
+    (record.progress)(Progress::Judging);
+    let mut judged = judge(search)?;
+    if judged.is_structured() && search.selected().len() < search.policy.max_effects {
+        search.add_reserve_candidates();
+        search.last_resort = true;
+        ended = search_on(search, record)?;
+        if !judged.is_of(search) {
+            judged = judge(search)?;
+        }
+    }
+    if search.policy.withdraws {
+        moves::on_every_branch(&Withdraw { structured: judged.is_structured() }, search)?;
+        search.note_held_out()?;
+        search.withdraw_all_unless_better();
+        if !judged.is_of(search) {
+            judged = judge(search)?;
+        }
+    }
+    Ok((ended, judged))
+}
+
+/// Runs rounds until no candidate is significant, or until additions do not lower the held-out error. The accepted
+/// effects remain. Returns the p-value of the best candidate that was not added.
+fn search_on(search: &mut SearchState<'_>, record: &mut SearchRecord<'_>) -> Result<f64, IdentifyError> {
     // Additions since the last acceptance.
     let mut pending = Vec::new();
     let mut ended = None;
@@ -114,16 +145,4 @@ fn add_best(search: &mut SearchState<'_>) -> Result<(f64, Option<usize>), Identi
     Remove { threshold }.try_on(search, ALL)?;
     search.note_held_out()?;
     Ok((p_value, added))
-}
-
-/// Withdraws the effects that explain nothing: those that curves replace, and all of them if together they do not lower
-/// the held-out error. `structured` is whether significant structure remains.
-///
-/// # Errors
-/// See [`search_on`].
-pub(super) fn withdraw_unexplaining(search: &mut SearchState<'_>, structured: bool) -> Result<(), IdentifyError> {
-    moves::on_every_branch(&Withdraw { structured }, search)?;
-    search.note_held_out()?;
-    search.withdraw_all_unless_better();
-    Ok(())
 }

@@ -49,7 +49,7 @@ pub struct Columns<'p> {
 type SharedColumns = Arc<Vec<Vec<f64>>>;
 type SharedSamples = Option<Arc<Vec<DriverSample<f64>>>>;
 
-impl<'p, 'a> Columns<'p> {
+impl<'p> Columns<'p> {
     /// Computes the sensitivities at the parameter values of a fit.
     pub fn new(problem: &'p Problem, beta: &[f64]) -> Columns<'p> {
         let sensitivities = sensitivities(problem, beta);
