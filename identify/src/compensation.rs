@@ -94,7 +94,7 @@ pub struct Compensation {
 }
 
 /// The curves and location errors of a fit.
-pub fn of_fit(problem: &Problem<'_>, fit: &Fit) -> Compensation {
+pub fn of_fit(problem: &Problem, fit: &Fit) -> Compensation {
     let mut result = Compensation::default();
     let machine = &problem.session.machine;
     let list = &problem.parameters.list;

@@ -49,7 +49,7 @@ pub struct DirectionComponents {
 ///
 /// # Errors
 /// If the session's instrument is no R-test.
-pub fn views(problem: &Problem<'_>, fit: &Fit) -> Result<Vec<Vec<DirectionComponents>>, IdentifyError> {
+pub fn views(problem: &Problem, fit: &Fit) -> Result<Vec<Vec<DirectionComponents>>, IdentifyError> {
     let machine = &problem.session.machine;
     let values = problem.slot_values(&fit.beta);
     let mut all = Vec::with_capacity(problem.tests.len());

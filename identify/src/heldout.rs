@@ -26,7 +26,7 @@ pub struct HeldOut {
 }
 
 /// Root mean square over the scalar readings that are not excluded, mm.
-pub fn rms_mm(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> f64 {
+pub fn rms_mm(problem: &Problem, residuals: &[Vec<f64>]) -> f64 {
     let coordinates = problem.coordinates();
     let (mut sum, mut count) = (0.0, 0_usize);
     for (residual, rejected) in residuals.iter().zip(&problem.rejected) {
@@ -46,7 +46,7 @@ pub fn rms_mm(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> f64 {
 /// # Errors
 /// If the model cannot be evaluated.
 pub fn held_out(
-    problem: &Problem<'_>,
+    problem: &Problem,
     beta: &[f64],
     triangles: &[Triangle],
     whole: &Triangle,

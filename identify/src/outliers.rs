@@ -21,7 +21,7 @@ const OUTLIER_ALONG_RUN: f64 = 5.3;
 const OUTLIER_POSE: f64 = 5.0;
 
 /// The outliers of the problem, by test and row.
-pub fn reject(problem: &Problem<'_>, fit: &Fit) -> Vec<Vec<bool>> {
+pub fn reject(problem: &Problem, fit: &Fit) -> Vec<Vec<bool>> {
     let coordinates = problem.coordinates();
     if problem.folds.kind == FoldKind::Poses {
         let lengths: Vec<Vec<f64>> = fit

@@ -114,7 +114,7 @@ impl Parameters {
     ///
     /// # Errors
     /// If an error belongs to no axis of the machine or is declared twice.
-    pub fn declared(session: &Session, tests: &[&Test], models: &[TestModel<'_>]) -> Result<Parameters, IdentifyError> {
+    pub fn declared(session: &Session, tests: &[Test], models: &[TestModel]) -> Result<Parameters, IdentifyError> {
         let mut parameters = Parameters { contributions: vec![Vec::new(); tests.len()], ..Parameters::default() };
         for name in &session.unknowns {
             let id = name.to_string();
@@ -185,8 +185,8 @@ impl Parameters {
     pub fn add_effect(
         &mut self,
         session: &Session,
-        tests: &[&Test],
-        models: &[TestModel<'_>],
+        tests: &[Test],
+        models: &[TestModel],
         origin: &Origin,
         effect: &Effect,
     ) -> Result<(), IdentifyError> {
@@ -270,7 +270,7 @@ impl Parameters {
     }
 
     /// The components of every test at the parameters `beta` (internal units).
-    pub fn slot_values(&self, models: &[TestModel<'_>], beta: &[f64]) -> Vec<SlotValues> {
+    pub fn slot_values(&self, models: &[TestModel], beta: &[f64]) -> Vec<SlotValues> {
         self.contributions
             .iter()
             .zip(models)

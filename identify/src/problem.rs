@@ -7,6 +7,7 @@
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::ops::Range;
+use std::sync::Arc;
 
 use abbe_model::effect::Effect;
 use abbe_model::instrument::Station;
@@ -25,13 +26,13 @@ use abbe_model::driver::Origin;
 
 /// A session with readings, its parameters, and the weights of its readings.
 #[derive(Clone)]
-pub struct Problem<'a> {
+pub struct Problem {
     /// The session.
-    pub session: &'a Session,
-    /// The tests that have readings.
-    pub tests: Vec<&'a Test>,
+    pub session: Arc<Session>,
+    /// The tests that have readings, which they share with the session.
+    pub tests: Vec<Test>,
     /// The models of these tests.
-    pub models: Vec<TestModel<'a>>,
+    pub models: Vec<TestModel>,
     /// The parameters.
     pub parameters: Parameters,
     /// Reference time and temperature of the session.
@@ -63,33 +64,34 @@ const SHORT_RUN: usize = 8;
 /// Number of blocks that one parallel task evaluates.
 const BLOCKS_PER_SEGMENT: usize = 16;
 
-impl<'a> Problem<'a> {
+impl Problem {
     /// The problem of a session with its declared parameters and effects.
     ///
     /// # Errors
     /// If there are no readings, or an effect cannot be evaluated.
-    pub fn new(session: &'a Session, noise: Noise, seed: u64) -> Result<Problem<'a>, IdentifyError> {
-        let tests: Vec<&Test> = session.tests.iter().filter(|test| test.readings.is_some()).collect();
+    pub fn new(session: &Session, noise: Noise, seed: u64) -> Result<Problem, IdentifyError> {
+        let tests: Vec<Test> = session.tests.iter().filter(|test| test.readings.is_some()).cloned().collect();
         if tests.is_empty() {
             return Err(IdentifyError::NoReadings);
         }
         let stations = crate::start::stations(session, &tests);
-        let models: Vec<TestModel<'a>> = tests
+        let models: Vec<TestModel> = tests
             .iter()
             .zip(stations)
             .filter_map(|(test, station)| {
                 let readings = test.readings.as_ref()?;
-                Some(TestModel::new(&session.machine, station, readings))
+                Some(TestModel::new(Arc::clone(&session.machine), station, readings))
             })
             .collect();
         let origin = session.origin();
         let parameters = Parameters::declared(session, &tests, &models)?;
         let rejected = models.iter().map(|model| vec![false; model.rows()]).collect();
         let folds = Folds::of(session, &tests, seed);
+        let session = Arc::new(session.clone());
         let mut problem =
             Problem { session, tests, models, parameters, origin, noise, rejected, folds, test_parameters: Vec::new() };
         problem.update_test_parameters();
-        for effect in &session.effects {
+        for effect in &problem.session.clone().effects {
             problem.add_effect(effect)?;
         }
         Ok(problem)
@@ -100,7 +102,7 @@ impl<'a> Problem<'a> {
     /// # Errors
     /// See [`Parameters::add_effect`].
     pub fn add_effect(&mut self, effect: &Effect) -> Result<(), IdentifyError> {
-        self.parameters.add_effect(self.session, &self.tests, &self.models, &self.origin, effect)?;
+        self.parameters.add_effect(&self.session, &self.tests, &self.models, &self.origin, effect)?;
         self.update_test_parameters();
         Ok(())
     }

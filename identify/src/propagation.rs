@@ -31,8 +31,8 @@ const MAX_SHARED_STEPS: usize = 8;
 const MIN_DECREASE: f64 = 1e-4;
 
 /// The function from the deviations of the inputs to the reported quantities.
-struct Refit<'p, 'a> {
-    problem: &'p Problem<'a>,
+struct Refit<'p> {
+    problem: &'p Problem,
     fit: &'p Fit,
     blocks: Vec<RowBlock>,
     /// Index among the inputs of each test's first reading.
@@ -50,8 +50,8 @@ struct Refit<'p, 'a> {
     u: Vec<f64>,
 }
 
-impl<'p, 'a> Refit<'p, 'a> {
-    fn new(problem: &'p Problem<'a>, fit: &'p Fit) -> Result<Self, IdentifyError> {
+impl<'p, 'a> Refit<'p> {
+    fn new(problem: &'p Problem, fit: &'p Fit) -> Result<Self, IdentifyError> {
         // The factor on uncertainties applies here as in the fit.
         let enlarged = fit.u_enlargement;
         let mut u = Vec::new();
@@ -120,7 +120,7 @@ impl<'p, 'a> Refit<'p, 'a> {
     }
 }
 
-impl Function for Refit<'_, '_> {
+impl Function for Refit<'_> {
     type Scratch = ();
     const BLOCK: u64 = 32;
     const PILOT: u64 = 512;
@@ -153,12 +153,12 @@ impl Function for Refit<'_, '_> {
 }
 
 /// One simulated session as a least-squares problem in the identifiable directions.
-struct SimulatedFit<'r, 'p, 'a> {
-    refit: &'r Refit<'p, 'a>,
+struct SimulatedFit<'r, 'p> {
+    refit: &'r Refit<'p>,
     deviations: &'r [f64],
 }
 
-impl SimulatedFit<'_, '_, '_> {
+impl SimulatedFit<'_, '_> {
     fn prior_triangle(&self, beta: &[f64]) -> Triangle {
         let refit = self.refit;
         let centre = |j: usize| refit.priors[j].map_or(0.0, |place| self.deviations[place]);
@@ -204,7 +204,7 @@ impl SimulatedFit<'_, '_, '_> {
     }
 }
 
-impl LeastSquares for SimulatedFit<'_, '_, '_> {
+impl LeastSquares for SimulatedFit<'_, '_> {
     fn parameters(&self) -> usize {
         self.refit.end.len()
     }
@@ -256,7 +256,7 @@ impl LeastSquares for SimulatedFit<'_, '_, '_> {
 /// # Errors
 /// If nothing is identifiable, or too few simulated sessions can be fitted for a distribution.
 pub fn add_monte_carlo(
-    problem: &Problem<'_>,
+    problem: &Problem,
     fit: &Fit,
     draws: &MonteCarlo,
     result: &mut FitResult,

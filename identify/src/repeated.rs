@@ -38,7 +38,7 @@ pub struct Session {
 
 impl Session {
     /// A fitted session with the name of its file.
-    pub fn new(name: &str, problem: &Problem<'_>, fit: &Fit) -> Session {
+    pub fn new(name: &str, problem: &Problem, fit: &Fit) -> Session {
         let list = &problem.parameters.list;
         let setup = |id: &str| list.iter().any(|p| p.id == id && p.role == Role::Setup);
         let tests: Vec<&str> = problem.tests.iter().map(|test| test.name.as_str()).collect();

@@ -5,10 +5,12 @@
 //! and `L` the chain in `f64`. The identifiers are those of the results, so that the estimates of a fit can be
 //! simulated again.
 
+use std::sync::Arc;
+
 use abbe_model::component::ErrorName;
 use abbe_model::sensitivity::TestModel;
 use abbe_model::session::readings::Readings;
-use abbe_model::session::{Prior, Session, Test, planned};
+use abbe_model::session::{Prior, Session, planned};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
@@ -63,7 +65,7 @@ const SETUP_STREAM: u128 = 0;
 /// let given = vec![Given::parse("EY0A=35.3um")?, Given::parse("EB0A=-1.29arcsec")?];
 /// let drawn = simulate(&session, &Simulation { given, noise_mm: Some(0.0), ..Simulation::default() })?;
 /// for (test, readings) in session.tests.iter_mut().zip(drawn.readings) {
-///     test.readings = Some(readings);
+///     test.readings = Some(Arc::new(readings));
 /// }
 /// let (problem, found) = fit::prepare(&session, 1)?;
 /// let parameters = fit::parameters(&problem, &found);
@@ -95,24 +97,23 @@ pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated,
         given.push((id, value));
     }
 
-    let tests: Vec<&Test> = open.tests.iter().collect();
-    let models: Vec<TestModel<'_>> = tests
+    let tests = &open.tests;
+    let models: Vec<TestModel> = tests
         .iter()
         .filter_map(|test| {
             let states = test.readings.as_ref()?;
-            Some(TestModel::new(&open.machine, test.station.clone(), states))
+            Some(TestModel::new(Arc::clone(&open.machine), test.station.clone(), states))
         })
         .collect();
-    let mut parameters = Parameters::declared(&open, &tests, &models)?;
+    let mut parameters = Parameters::declared(&open, tests, &models)?;
     let origin = open.origin();
     for effect in &session.effects {
-        parameters.add_effect(&open, &tests, &models, &origin, effect)?;
+        parameters.add_effect(&open, tests, &models, &origin, effect)?;
     }
 
     let mut beta = vec![0.0; parameters.list.len()];
     if simulation.draw_setups {
-        let stated: Vec<&Test> = session.tests.iter().collect();
-        let stated = Parameters::declared(session, &stated, &models)?;
+        let stated = Parameters::declared(session, &session.tests, &models)?;
         let mut random = Pcg64::new(u128::from(simulation.seed), SETUP_STREAM);
         for parameter in &stated.list {
             let (Role::Setup, Prior::Gaussian(u)) = (parameter.role, parameter.prior) else {
@@ -147,7 +148,7 @@ pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated,
                 *value = rounded(*value, step);
             }
         }
-        let states = tests[index].readings.clone().unwrap_or_default();
+        let states = tests[index].readings.as_deref().cloned().unwrap_or_default();
         readings.push(Readings { observed, ..states });
     }
     let truth = parameters
@@ -179,7 +180,7 @@ fn rounded(value: f64, step: f64) -> f64 {
 fn with_free_setups(session: &Session, planned: Vec<Readings>) -> Session {
     let mut open = session.clone();
     for (test, states) in open.tests.iter_mut().zip(planned) {
-        test.readings = Some(states);
+        test.readings = Some(Arc::new(states));
         for prior in &mut test.priors {
             if *prior == Prior::Known {
                 *prior = Prior::Free;

@@ -48,3 +48,13 @@ fn the_offset_of_an_axis_is_found_in_readings_in_memory() {
         assert!(parameter.u < 0.02, "{name}: {}", parameter.u);
     }
 }
+
+/// Results outlive the session that was passed in, and cross threads.
+#[test]
+fn a_fit_and_a_trace_own_what_they_need() {
+    fn owned<T: Send + Sync + 'static>() {}
+    owned::<Session>();
+    owned::<abbe_identify::problem::Problem>();
+    owned::<fit::Fit>();
+    owned::<abbe_identify::trace::TraceOutcome>();
+}

@@ -6,6 +6,7 @@
 #![allow(missing_docs)]
 
 use std::hint::black_box;
+use std::sync::Arc;
 
 use abbe_model::chain::{AxisPosition, Machine};
 use abbe_model::component::ErrorName;
@@ -79,7 +80,7 @@ fn chain(criterion: &mut Criterion) {
             });
         });
         let readings = readings(rows);
-        let model = TestModel::new(&machine, station(), &readings);
+        let model = TestModel::new(Arc::new(machine.clone()), station(), &readings);
         let mut values = SlotValues::zero(model.slots());
         for (slot, error) in slots.iter().zip(ERRORS) {
             values.constant[*slot] = error;
@@ -121,7 +122,7 @@ fn all_components(criterion: &mut Criterion) {
     let mut machine = machine();
     machine.rotation = Rotation::Exact;
     let rows = 1_000;
-    let model = TestModel::new(&machine, station(), &readings(rows));
+    let model = TestModel::new(Arc::new(machine.clone()), station(), &readings(rows));
     // Six error motions per axis, both balls and the bar.
     let motions = (0..machine.error_slots()).filter(|slot| slot % 12 >= 6);
     let slots: Vec<usize> = motions.chain(machine.error_slots()..machine.error_slots() + 7).collect();

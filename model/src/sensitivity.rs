@@ -119,25 +119,21 @@ impl AxisColumn {
 
 /// A test prepared for evaluation: its states with sines and cosines, and its recorded chain.
 #[derive(Clone, Debug)]
-pub struct TestModel<'a> {
-    machine: &'a Machine,
+pub struct TestModel {
+    machine: Arc<Machine>,
     station: Station<f64>,
     axis_columns: Vec<AxisColumn>,
     rows: usize,
     recorded: Arc<Mutex<HashMap<RecordingKey, Arc<Replay<Quantity>>>>>,
 }
 
-impl<'a> TestModel<'a> {
+impl TestModel {
     /// From the axis positions of the readings.
-    pub fn new(machine: &'a Machine, station: Station<f64>, readings: &Readings) -> Self {
+    pub fn new(machine: impl Into<Arc<Machine>>, station: Station<f64>, readings: &Readings) -> Self {
+        let machine = machine.into();
         let axes = machine.axes.iter().zip(&readings.positions);
-        TestModel {
-            machine,
-            station,
-            axis_columns: axes.map(|(axis, positions)| AxisColumn::new(axis.kind, positions)).collect(),
-            rows: readings.rows(),
-            recorded: Arc::default(),
-        }
+        let axis_columns = axes.map(|(axis, positions)| AxisColumn::new(axis.kind, positions)).collect();
+        TestModel { machine, station, axis_columns, rows: readings.rows(), recorded: Arc::default() }
     }
 
     /// The instrument as set up.
@@ -228,7 +224,7 @@ impl<'a> TestModel<'a> {
         let bodies = self.machine.body_errors(|slot| slots.contains_key(&slot), |slot| slots[&slot]);
         let first = self.machine.error_slots();
         let station = self.station.map(|number| constant(*number));
-        let reading = station.read(self.machine, &state, &bodies, |unknown| slots.get(&(first + unknown)).copied());
+        let reading = station.read(&self.machine, &state, &bodies, |unknown| slots.get(&(first + unknown)).copied());
         let coordinates: Vec<Operand> = reading.coordinates().iter().map(|value| value.operand()).collect();
         let by: Vec<Operand> = key.derivatives.iter().map(|slot| slots[slot].operand()).collect();
         let gradients = coordinates.iter().flat_map(|coordinate| arena.gradient(*coordinate, &by));

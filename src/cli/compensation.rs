@@ -84,7 +84,7 @@ impl CompensationArguments {
     }
 
     /// Writes the tables if they are requested.
-    pub fn run(&self, problem: &Problem<'_>, fit: &Fit, tables: bool) -> Result<(), Failure> {
+    pub fn run(&self, problem: &Problem, fit: &Fit, tables: bool) -> Result<(), Failure> {
         let (Some(folder), Some(control)) = (&self.compensation, self.control) else {
             return Ok(());
         };

@@ -13,7 +13,7 @@ use super::output;
 const DIRECTIONS: [&str; 9] = ["dx", "dy", "dz", "x_wise", "y_wise", "z_wise", "radial", "tangential", "axial"];
 
 /// Writes the file.
-pub fn write(problem: &Problem<'_>, fit: &Fit, path: &Path) -> Result<(), Failure> {
+pub fn write(problem: &Problem, fit: &Fit, path: &Path) -> Result<(), Failure> {
     let machine = &problem.session.machine;
     let mut header = vec!["test".to_string(), "run".to_string()];
     header.extend(machine.axes.iter().map(|axis| axis.column("")));

@@ -12,7 +12,7 @@ use super::output;
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn write(problem: &Problem<'_>, fit: &Fit, path: &Path) -> Result<(), Failure> {
+pub fn write(problem: &Problem, fit: &Fit, path: &Path) -> Result<(), Failure> {
     let machine = &problem.session.machine;
     let coordinates = problem.coordinates();
     let labels: &[&str] = if coordinates == 3 { &["_x", "_y", "_z"] } else { &[""] };

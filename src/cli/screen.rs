@@ -45,7 +45,7 @@ pub struct Estimates<'r> {
 impl<'r> Estimates<'r> {
     /// Of the results of a fit, without the parameters that are printed elsewhere.
     pub fn new(
-        problem: &'r Problem<'_>,
+        problem: &'r Problem,
         fit: &Fit,
         parameters: &'r [ParameterResult],
         elsewhere: impl Fn(&str) -> bool,

@@ -16,7 +16,7 @@ pub struct PlotAxis {
 
 /// Abscissae of a test with their values: the angle or position of its traversal, or for separate poses each axis that
 /// moves.
-pub fn axes_of(problem: &Problem<'_>, test: &TestSeries, number: usize) -> Vec<(PlotAxis, Vec<f64>)> {
+pub fn axes_of(problem: &Problem, test: &TestSeries, number: usize) -> Vec<(PlotAxis, Vec<f64>)> {
     let is_traversal = test.stretches.iter().all(|stretch| stretch.forward.is_some());
     let readings = problem.tests[number].readings.as_ref();
     let (Some(readings), false) = (readings, is_traversal || test.way.moving.is_empty()) else {

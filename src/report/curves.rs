@@ -199,7 +199,7 @@ pub fn spectrum_plot(spectrum: &Spectrum, maximum: f64, effects: &[Effect]) -> P
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn sensitivities(document: &mut Document, problem: &Problem<'_>, beta: &[f64]) -> Result<Markup, IdentifyError> {
+pub fn sensitivities(document: &mut Document, problem: &Problem, beta: &[f64]) -> Result<Markup, IdentifyError> {
     const DIVISION_UM: f64 = 5.0;
     if problem.folds.kind == FoldKind::Poses {
         let plots = pose_sensitivities(&sensitivity::over_poses(problem, beta)?);

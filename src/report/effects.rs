@@ -24,7 +24,7 @@ const MAX_RANKED: usize = 12;
 const MAX_NAMED: usize = 8;
 
 /// Found effects, rejected candidates, remaining structure and convergence of the search.
-pub fn section(document: &mut Document, trace: &TraceOutcome<'_>) -> Markup {
+pub fn section(document: &mut Document, trace: &TraceOutcome) -> Markup {
     let result = &trace.result;
     let blocks: Vec<Markup> = result
         .effects
@@ -212,7 +212,7 @@ fn curve(effect: &EffectResult) -> Plot {
 }
 
 /// Held-out error after each addition of the search.
-fn convergence(trace: &TraceOutcome<'_>) -> Plot {
+fn convergence(trace: &TraceOutcome) -> Plot {
     let before = trace.result.before.heldout_rms_um;
     let mut points = vec![(0.0, before)];
     points.extend(trace.steps.iter().enumerate().map(|(k, step)| (k as f64 + 1.0, step.heldout_rms_um)));

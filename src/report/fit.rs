@@ -30,7 +30,7 @@ pub fn method(result: &FitResult) -> Markup {
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<Document, IdentifyError> {
+pub fn document(problem: &Problem, fit: &Fit, result: &FitResult) -> Result<Document, IdentifyError> {
     let series = views(problem, fit, None)?;
     let session = SessionPlots::new(problem, &series);
     let spectra = spectrum::spectra(problem, &series);
@@ -88,7 +88,7 @@ fn verdict(result: &FitResult) -> String {
 }
 
 /// Key figures of the summary.
-fn figures(problem: &Problem<'_>, result: &FitResult) -> Vec<KeyFigure> {
+fn figures(problem: &Problem, result: &FitResult) -> Vec<KeyFigure> {
     let quality = Quality {
         chi_square: result.chi_square,
         degrees_of_freedom: result.degrees_of_freedom,

@@ -23,7 +23,7 @@ pub fn method(result: &Comparison) -> Markup {
 }
 
 /// The report.
-pub fn document(problem: &Problem<'_>, result: &Comparison) -> Document {
+pub fn document(problem: &Problem, result: &Comparison) -> Document {
     let mut document = Document {
         title: format!("{}: {} method and full fit", problem.session.machine.name, result.method),
         verdict: format!(

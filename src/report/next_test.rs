@@ -24,7 +24,7 @@ pub fn method() -> Markup {
 }
 
 /// The report.
-pub fn document(problem: &Problem<'_>, improvement: Option<&Improvement>, ranges: &[Shrinkage]) -> Document {
+pub fn document(problem: &Problem, improvement: Option<&Improvement>, ranges: &[Shrinkage]) -> Document {
     let mut document = Document {
         title: format!("Next test for {}", problem.session.machine.name),
         verdict: match improvement {

@@ -31,7 +31,7 @@ pub fn method(analysis: &PlanAnalysis) -> Markup {
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn document(problem: &Problem<'_>, analysis: &PlanAnalysis) -> Result<Document, IdentifyError> {
+pub fn document(problem: &Problem, analysis: &PlanAnalysis) -> Result<Document, IdentifyError> {
     let identifiable = analysis.errors.iter().filter(|error| error.u.is_some()).count();
     let mut document = Document {
         title: format!("Plan for {}", problem.session.machine.name),
@@ -73,7 +73,7 @@ pub fn document(problem: &Problem<'_>, analysis: &PlanAnalysis) -> Result<Docume
 }
 
 /// Key figures of the summary.
-fn figures(problem: &Problem<'_>, analysis: &PlanAnalysis) -> Vec<KeyFigure> {
+fn figures(problem: &Problem, analysis: &PlanAnalysis) -> Vec<KeyFigure> {
     let identifiable = analysis.errors.iter().filter(|error| error.u.is_some()).count();
     let mut figures = vec![
         KeyFigure::new("Identifiable errors", format!("{identifiable} of {}", analysis.errors.len()), ""),

@@ -59,7 +59,7 @@ impl Column {
 /// A session prepared for plotting.
 pub struct SessionPlots<'d> {
     /// The estimation problem.
-    pub problem: &'d Problem<'d>,
+    pub problem: &'d Problem,
     /// Deviations, residuals and shares of all readings.
     pub series: &'d SessionSeries,
     /// Drawn rows of each traversal of each test.
@@ -68,7 +68,7 @@ pub struct SessionPlots<'d> {
 
 impl<'d> SessionPlots<'d> {
     /// Decimates the readings of a session.
-    pub fn new(problem: &'d Problem<'d>, series: &'d SessionSeries) -> SessionPlots<'d> {
+    pub fn new(problem: &'d Problem, series: &'d SessionSeries) -> SessionPlots<'d> {
         let rows = series
             .tests
             .iter()

@@ -90,7 +90,7 @@ pub fn traces(document: &mut Document, session: &SessionPlots<'_>) -> Markup {
 }
 
 /// Correlation map of the errors and effects of a fit.
-pub fn correlations(document: &mut Document, problem: &Problem<'_>, fit: &Fit) -> Markup {
+pub fn correlations(document: &mut Document, problem: &Problem, fit: &Fit) -> Markup {
     let (mut ids, mut matrix) = correlation(problem, fit);
     let all = ids.len();
     ids.truncate(MAX_CORRELATED);
@@ -121,7 +121,7 @@ pub fn correlation_map(ids: &[String], matrix: &[Vec<Option<f64>>]) -> Plot {
 }
 
 /// The kinematic chain with the estimated errors.
-pub fn machine(document: &mut Document, problem: &Problem<'_>) -> Markup {
+pub fn machine(document: &mut Document, problem: &Problem) -> Markup {
     let list = problem.parameters.list.iter();
     let mut errors: Vec<String> =
         list.filter(|parameter| parameter.role == Role::Error).map(|parameter| parameter.id.clone()).collect();

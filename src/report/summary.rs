@@ -89,7 +89,7 @@ pub fn rank(rank: usize, parameters: usize) -> KeyFigure {
 }
 
 /// Number of readings, tests and outliers.
-pub fn readings(problem: &Problem<'_>, readings: usize, outliers: usize) -> KeyFigure {
+pub fn readings(problem: &Problem, readings: usize, outliers: usize) -> KeyFigure {
     let tests = counted(problem.tests.len(), "test");
     let excluded = match outliers {
         0 => "no outliers".to_string(),

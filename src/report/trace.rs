@@ -55,7 +55,7 @@ fn verdict(result: &TraceResult) -> String {
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn document(trace: &TraceOutcome<'_>) -> Result<Document, IdentifyError> {
+pub fn document(trace: &TraceOutcome) -> Result<Document, IdentifyError> {
     let result = &trace.result;
     let problem = &trace.after;
     let series = views(problem, &trace.after_fit, Some(&trace.before_fit.residuals))?;
@@ -123,7 +123,7 @@ fn quality<'r>(result: &'r TraceResult, model: &ModelResult) -> Quality<'r> {
 }
 
 /// Key figures of the summary.
-fn figures(trace: &TraceOutcome<'_>) -> Vec<KeyFigure> {
+fn figures(trace: &TraceOutcome) -> Vec<KeyFigure> {
     let result = &trace.result;
     let [before, after] = [&result.before, &result.after].map(|model| quality(result, model));
     let mut figures = vec![
@@ -158,7 +158,7 @@ fn figures(trace: &TraceOutcome<'_>) -> Vec<KeyFigure> {
 }
 
 /// Parameters that changed when the effects were added: the bias of the declared model.
-fn changes(problem: &Problem<'_>, result: &TraceResult) -> Markup {
+fn changes(problem: &Problem, result: &TraceResult) -> Markup {
     let sentence = |parameter: &ChangedParameter| {
         let (change, u) = value_and_u(parameter.change, parameter.u);
         format!("{} changed by {change} {} (u = {u}).", parameter.id, unit(&parameter.unit))

@@ -17,7 +17,7 @@ const MAX_ROWS: usize = 30;
 /// Values of the errors and effects as a table with plots. The set-up parameters are folded.
 pub fn section(
     document: &mut Document,
-    problem: &Problem<'_>,
+    problem: &Problem,
     after: &[ParameterResult],
     before: Option<&[ParameterResult]>,
 ) -> Markup {
@@ -38,7 +38,7 @@ pub fn section(
 }
 
 /// Whether a parameter belongs to the set-up.
-pub fn is_setup(problem: &Problem<'_>, id: &str) -> bool {
+pub fn is_setup(problem: &Problem, id: &str) -> bool {
     let list = &problem.parameters.list;
     list.iter().any(|parameter| parameter.role == Role::Setup && parameter.id == id)
 }

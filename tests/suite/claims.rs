@@ -1,6 +1,8 @@
 //! The rule of a claim: an effect exceeds the null distribution *and* lowers the held-out error by more than the
 //! standard error of the fall. It holds for any run column.
 
+use std::sync::Arc;
+
 use abbe::identify::results::{EffectName, TraceResult};
 use abbe::identify::trace::{TraceOptions, trace};
 use abbe::model::files::{self, ReadOptions};
@@ -72,7 +74,7 @@ const MISLABELLED: [&str; 4] = ["shuffled", "all one", "alternating", "one each"
 
 fn mislabel(session: &mut Session, how: &str) {
     let mut random = Pcg64Mcg::seed_from_u64(3);
-    for readings in session.tests.iter_mut().filter_map(|test| test.readings.as_mut()) {
+    for readings in session.tests.iter_mut().filter_map(|test| test.readings.as_mut()).map(Arc::make_mut) {
         let numbers = 0..readings.run.len() as i64;
         match how {
             "shuffled" => readings.run.shuffle(&mut random),
@@ -94,7 +96,7 @@ fn mislabelled_runs_cause_neither_false_claims_nor_missed_effects() {
         1.0,
     );
     let is_axial_motion =
-        |name: &EffectName| name.component == "EZC" && name.shape == "harmonic" && name.order == Some(3);
+        |name: &EffectName| name.component == "EZC" && name.shape == "harmonic" && name.order == Some(3.0);
     for effects in [vec![], vec![axial_motion]] {
         let recipe = Recipe { effects, ..Recipe::new(Kind::Rotary, 11) };
         let session = session_of(&recipe);

@@ -1,6 +1,8 @@
 //! The geometric methods of the thesis on lengths from plain matrices: their results, their bias, and the printed signs
 //! that are wrong.
 
+use std::sync::Arc;
+
 use abbe::identify::circle;
 use abbe::identify::fit::prepare;
 use abbe::identify::geometric::{Estimator, Method, compare};
@@ -82,12 +84,12 @@ fn measured(plan: &Session, errors: &Errors, moved: [f64; 3], noise: Option<(f64
             let normal: f64 = StandardNormal.sample(&mut random);
             readings.observed[row] = (workpiece - spindle).norm() + noise.map_or(0.0, |(sigma, _)| sigma * normal);
         }
-        test.readings = Some(readings);
+        test.readings = Some(Arc::new(readings));
     }
     session
 }
 
-fn problem(session: &Session) -> Problem<'_> {
+fn problem(session: &Session) -> Problem {
     Problem::new(session, Noise::white(0.3e-3, NoiseSource::Stated), 1).unwrap()
 }
 

@@ -132,7 +132,7 @@ fn an_interrupted_fit_ends_by_the_signal() {
 }
 
 /// Runs a trace that is interrupted at the `until`-th query. Returns the number of queries.
-fn traced(session: &Session, until: usize) -> (TraceOutcome<'_>, usize) {
+fn traced(session: &Session, until: usize) -> (TraceOutcome, usize) {
     let asked = AtomicUsize::new(0);
     let progress = |progress: Progress| match progress {
         Progress::Working => asked.fetch_add(1, Ordering::Relaxed) < until,
@@ -146,7 +146,7 @@ fn traced(session: &Session, until: usize) -> (TraceOutcome<'_>, usize) {
     (found, asked.into_inner())
 }
 
-fn ids(trace: &TraceOutcome<'_>) -> Vec<String> {
+fn ids(trace: &TraceOutcome) -> Vec<String> {
     trace.effects.iter().map(|effect| effect.id()).collect()
 }
 

@@ -1,6 +1,8 @@
 //! Predicted uncertainties against the scatter of simulated fits, for every topology of Table 1.1 and of Fig. 1.1 of
 //! the thesis.
 
+use std::sync::Arc;
+
 use abbe::identify::fit::fit;
 use abbe::identify::plan::states;
 use abbe::identify::problem::Problem;
@@ -50,7 +52,7 @@ fn plan(code: &str) -> Session {
 }
 
 /// One Gauss–Newton step from the nominal machine.
-fn linear_step(problem: &Problem<'_>, basis: &Mat<f64>) -> Vec<f64> {
+fn linear_step(problem: &Problem, basis: &Mat<f64>) -> Vec<f64> {
     let nominal = vec![0.0; problem.parameters.list.len()];
     let mut whole = problem.prior_triangle(&nominal);
     problem.triangles(&nominal).unwrap().iter().for_each(|triangle| whole.merge(triangle));
@@ -84,7 +86,7 @@ fn squares(code: &str, first_seed: usize, complete_fit: bool) -> Vec<(String, f6
         .unwrap();
         let mut measured = plan.clone();
         for (test, readings) in measured.tests.iter_mut().zip(drawn.readings) {
-            test.readings = Some(readings);
+            test.readings = Some(Arc::new(readings));
         }
         let mut problem = Problem::new(&measured, noise_um(0.3), 1).unwrap();
         states::fold_by_test(&mut problem);

@@ -1,5 +1,7 @@
 //! The full fit by Monte Carlo: the law of propagation for a linear model, a closed form for a nonlinear one.
 
+use std::sync::Arc;
+
 use abbe::identify::fit::{prepare, report};
 use abbe::identify::monte_carlo::MonteCarlo;
 use abbe::identify::propagation::add_monte_carlo;
@@ -26,7 +28,7 @@ fn measured(plan: &Session, simulation: &Simulation) -> (Session, Vec<(String, f
     let simulated = simulate(plan, simulation).unwrap();
     let mut session = plan.clone();
     for (test, readings) in session.tests.iter_mut().zip(simulated.readings) {
-        test.readings = Some(readings);
+        test.readings = Some(Arc::new(readings));
     }
     (session, simulated.truth)
 }

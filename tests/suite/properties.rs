@@ -5,6 +5,7 @@
 mod machines;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use abbe::identify::fit::{prepare, report};
 use abbe::identify::noise::{Noise, NoiseSource};
@@ -76,7 +77,7 @@ fn session(drawn: &Drawn, balls: &[([f64; 3], [f64; 3])], bar: bool, seed: u64) 
             coordinates: station.kind().coordinates(),
             ..Readings::default()
         };
-        let model = TestModel::new(machine, station.clone(), &readings);
+        let model = TestModel::new(Arc::new(machine.clone()), station.clone(), &readings);
         let mut values = SlotValues::zero(model.slots());
         // A tenth of the drawn errors: 10 µm and 0.2 mrad. The location errors are applied, the error motions are not.
         for (slot, error) in drawn.errors.iter().enumerate().filter(|(slot, _)| slot % 12 < 6) {
@@ -91,7 +92,7 @@ fn session(drawn: &Drawn, balls: &[([f64; 3], [f64; 3])], bar: bool, seed: u64) 
     let tests: Vec<Test> = tests.collect();
     let ready = super::ready("hermle-c600u/chapter5.toml");
     Session {
-        machine: machine.clone(),
+        machine: Arc::new(machine.clone()),
         constants: Vec::new(),
         instrument: tests[0].station.kind(),
         noise_mm: Some(NOISE_MM),
@@ -124,7 +125,7 @@ fn test(number: usize, station: Station<f64>, readings: Readings, axes: usize) -
         motion: None,
         at: vec![0.0; axes],
         at_written: vec![None; axes],
-        readings: Some(readings),
+        readings: Some(Arc::new(readings)),
     }
 }
 
@@ -183,7 +184,7 @@ proptest! {
                 rand::seq::SliceRandom::shuffle(&mut run[..], &mut random);
                 rows.extend(run);
             }
-            test.readings = Some(readings.of_rows(&rows));
+            test.readings = Some(Arc::new(readings.of_rows(&rows)));
         }
         let (one, other) = (fitted(&session), fitted(&other));
         same(&one, &other, 1e-4, |_, value| value)?;
@@ -205,7 +206,7 @@ proptest! {
     #[test]
     fn mirrored_machines_give_mirrored_errors(session in sessions(), coordinate in 0_usize..3) {
         let mut other = session.clone();
-        other.machine = machines::mirrored(&session.machine, coordinate);
+        other.machine = Arc::new(machines::mirrored(&session.machine, coordinate));
         for test in &mut other.tests {
             let mirror = |point: &mut [f64; 3]| point[coordinate] *= -1.0;
             match &mut test.station {
@@ -216,7 +217,7 @@ proptest! {
                 Station::RTest(rtest) => {
                     mirror(&mut rtest.workpiece_ball);
                     mirror(&mut rtest.spindle_ball);
-                    let observed = &mut test.readings.as_mut().unwrap().observed;
+                    let observed = &mut Arc::make_mut(test.readings.as_mut().unwrap()).observed;
                     observed.iter_mut().skip(coordinate).step_by(3).for_each(|value| *value = -*value);
                 }
                 _ => {}

@@ -1,6 +1,8 @@
 //! The fit of a simulated session recovers the simulated errors: exactly without noise, and within the stated
 //! uncertainty with noise.
 
+use std::sync::Arc;
+
 use abbe::identify::fit::{Fit, prepare};
 use abbe::identify::problem::Problem;
 use abbe::identify::quantity::Given;
@@ -40,13 +42,13 @@ fn measured(plan: &Session, simulation: &Simulation) -> (Session, Vec<(String, f
     assert!(simulated.warnings.is_empty(), "{:?}", simulated.warnings);
     let mut session = plan.clone();
     for (test, readings) in session.tests.iter_mut().zip(simulated.readings) {
-        test.readings = Some(readings);
+        test.readings = Some(Arc::new(readings));
     }
     (session, simulated.truth)
 }
 
 /// Value and uncertainty of a parameter in its display unit.
-fn found(problem: &Problem<'_>, fit: &Fit, id: &str) -> (f64, f64) {
+fn found(problem: &Problem, fit: &Fit, id: &str) -> (f64, f64) {
     let list = &problem.parameters.list;
     let place = list.iter().position(|parameter| parameter.id == id).unwrap();
     assert!(fit.rank.is_identifiable(place), "{id} is not identifiable");

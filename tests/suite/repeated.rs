@@ -1,5 +1,7 @@
 //! Repeated sessions: the scatter of their fits against the standard uncertainties of the fits.
 
+use std::sync::Arc;
+
 use abbe::identify::fit::prepare;
 use abbe::identify::quantity::Given;
 use abbe::identify::repeated::{Repeated, Scatter, Session as Fitted, compare};
@@ -34,7 +36,7 @@ fn session(plan: &Session, seed: u64, draw_setups: bool, changed: Option<&str>) 
     let simulation = Simulation { given, draw_setups, seed, ..Simulation::default() };
     let mut measured = plan.clone();
     for (test, readings) in measured.tests.iter_mut().zip(simulate(plan, &simulation).unwrap().readings) {
-        test.readings = Some(readings);
+        test.readings = Some(Arc::new(readings));
     }
     let (problem, fit) = prepare(&measured, 1).unwrap();
     Fitted::new(&format!("session {seed}"), &problem, &fit)

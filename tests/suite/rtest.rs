@@ -1,6 +1,7 @@
 //! The R-test against the paper (Yamaji, Hamabata & Ihara, HPC 2014) and against the plant.
 
 use std::f64::consts::FRAC_1_SQRT_2;
+use std::sync::Arc;
 
 use abbe::identify::directions::views;
 use abbe::identify::fit::prepare;
@@ -165,7 +166,7 @@ fn both_settings_agree_with_the_plant() {
             positions: machine.axes.iter().map(|axis| vec![position[of_axis(&axis.name)]]).collect(),
             ..Readings::default()
         };
-        let model = TestModel::new(&machine, station, &readings);
+        let model = TestModel::new(Arc::new(machine.clone()), station, &readings);
         let found = model.readings_mm(&slots);
         near([found[0], found[1], found[2]], expected, 1e-10);
     }
@@ -229,7 +230,7 @@ fn linear_axes_that_follow_keep_the_ball_in_the_nest() {
                 })
                 .count();
             assert_eq!(moving, if test.name == "C-alone" { 0 } else { 2 }, "{}", test.name);
-            let model = TestModel::new(&session.machine, test.station.clone(), &planned);
+            let model = TestModel::new(session.machine.clone(), test.station.clone(), &planned);
             let nominal = model.readings_mm(&SlotValues::zero(model.slots()));
             assert!(nominal.iter().all(|reading| reading.abs() < 1e-9), "{}", test.name);
         }

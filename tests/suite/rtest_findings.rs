@@ -93,7 +93,7 @@ fn pitch_compensation() -> Vec<Injected> {
 }
 
 /// Writes a session of the plant, reads it and traces it.
-fn traced<T>(session: &Session, examine: impl FnOnce(&TraceOutcome<'_>) -> T) -> T {
+fn traced<T>(session: &Session, examine: impl FnOnce(&TraceOutcome) -> T) -> T {
     let folder = tempfile::tempdir().unwrap();
     session.write(folder.path()).unwrap();
     let session = files::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
@@ -110,7 +110,7 @@ fn traced<T>(session: &Session, examine: impl FnOnce(&TraceOutcome<'_>) -> T) ->
 }
 
 /// The staircase that trace finds for a component: positions and heights, µm.
-fn staircase(outcome: &TraceOutcome<'_>, component: &str) -> Option<Vec<(f64, f64)>> {
+fn staircase(outcome: &TraceOutcome, component: &str) -> Option<Vec<(f64, f64)>> {
     let number = outcome.effects.iter().position(|effect| effect.component.to_string() == component)?;
     let effect = &outcome.result.effects[number];
     let at = effect.shape_parameters.iter().find(|number| number.name == "at")?;

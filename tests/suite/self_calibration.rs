@@ -1,6 +1,8 @@
 //! Self-calibration by probing (Zimmermann & Ibaraki 2020) against the tables of the paper and against readings from
 //! plane geometry.
 
+use std::sync::Arc;
+
 use abbe::identify::self_calibration::{
     Calibration, Equations, Function, MonteCarlo, Reference, calibrate, conditions, rank_before, reduce, solve,
 };
@@ -57,7 +59,7 @@ fn unmoved(count: usize, second_deg: f64) -> Session {
     let simulation = Simulation { noise_mm: Some(0.0), ..Simulation::default() };
     let simulated = simulate(&session, &simulation).unwrap();
     for (test, readings) in session.tests.iter_mut().zip(simulated.readings) {
-        test.readings = Some(readings);
+        test.readings = Some(Arc::new(readings));
     }
     session
 }
@@ -190,7 +192,7 @@ fn touched(session: &mut Session, case: &Touched) {
             let normal: f64 = StandardNormal.sample(&mut random);
             readings.observed[row] = distance + case.noise.0 * normal;
         }
-        test.readings = Some(readings);
+        test.readings = Some(Arc::new(readings));
     }
 }
 
@@ -211,7 +213,7 @@ fn a_declared_direction_is_the_one_that_is_probed_along() {
     readings.positions[place("C")][0] = 30.0_f64.to_radians();
     readings.positions[place("X")][0] = 58.0;
     readings.positions[place("Y")][0] = -20.0;
-    let model = TestModel::new(&machine, station, &readings);
+    let model = TestModel::new(machine.clone(), station, &readings);
     let mut values = SlotValues::zero(model.slots());
     values.constant[machine.error_slot(&ErrorName::parse("EX0C").unwrap()).unwrap()] = 0.2;
     let (sin, cos) = 30.0_f64.to_radians().sin_cos();

@@ -1,6 +1,8 @@
 //! Consistency of the result of a trace: effects, coefficients, residuals before and after, and uncertainties that
 //! cover aliases.
 
+use std::sync::Arc;
+
 use abbe::identify::fit::fit;
 use abbe::identify::noise::Noise;
 use abbe::identify::plan::candidate_tests::candidate_tests;
@@ -35,7 +37,7 @@ fn measured(effects: Vec<Effect>, values: &[&str], declared: usize) -> Session {
     };
     let simulated = simulate(&session, &simulation).unwrap();
     for (test, readings) in session.tests.iter_mut().zip(simulated.readings) {
-        test.readings = Some(readings);
+        test.readings = Some(Arc::new(readings));
     }
     session.effects.truncate(declared);
     session
@@ -83,7 +85,7 @@ fn the_uncertainty_of_a_declared_harmonic_covers_the_aliases_of_the_found_effect
     let result = trace(&session, &TraceOptions::default(), &|_| true).unwrap().result;
     assert_eq!(result.effects.len(), 1);
     let is_truth = |name: &&abbe::identify::results::EffectName| {
-        name.component == "EAC" && name.shape == "harmonic" && name.order == Some(3)
+        name.component == "EAC" && name.shape == "harmonic" && name.order == Some(3.0)
     };
     let effect = &result.effects[0];
     assert!(effect.aliases.iter().chain([&effect.name]).any(|name| is_truth(&name)));
@@ -106,11 +108,11 @@ fn the_uncertainty_of_a_found_harmonic_covers_the_aliases_of_another_effect() {
     let session = wave_and_tilt(0);
     let options = TraceOptions { only: ["EZC~C:h", "EAC~C:h3"].map(String::from).to_vec(), ..TraceOptions::default() };
     let result = trace(&session, &options, &|_| true).unwrap().result;
-    let named: Vec<(&str, Option<usize>)> =
+    let named: Vec<(&str, Option<f64>)> =
         result.effects.iter().map(|effect| (effect.name.component.as_str(), effect.name.order)).collect();
-    assert_eq!(named, [("EZC", Some(2)), ("EZC", Some(4))]);
+    assert_eq!(named, [("EZC", Some(2.0)), ("EZC", Some(4.0))]);
     let fourth = &result.effects[1];
-    assert!(fourth.aliases.iter().any(|name| name.component == "EAC" && name.order == Some(3)));
+    assert!(fourth.aliases.iter().any(|name| name.component == "EAC" && name.order == Some(3.0)));
     for parameters in [&result.after.parameters, &result.effects[0].parameters] {
         let found = |id: &str| {
             let parameter = parameters.iter().find(|parameter| parameter.id == id).unwrap();
@@ -134,7 +136,7 @@ fn as_with_effect(session: &Session, noise: &Noise, effect: &Effect, coefficient
     let residuals = problem.residuals(&beta);
     let mut changed = session.clone();
     for (test, residuals) in changed.tests.iter_mut().zip(residuals) {
-        let readings = test.readings.as_mut().unwrap();
+        let readings = Arc::make_mut(test.readings.as_mut().unwrap());
         assert_eq!(readings.observed.len(), residuals.len());
         for (observed, residual) in readings.observed.iter_mut().zip(residuals) {
             *observed -= residual;

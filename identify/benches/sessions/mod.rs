@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 use std::path::Path;
+use std::sync::Arc;
 
 use abbe_identify::quantity::Given;
 use abbe_identify::simulate::{Simulation, simulate};
@@ -29,7 +30,7 @@ fn drawn(plan: Session, given: &[&str]) -> Session {
     let readings = simulate(&plan, &simulation).expect("a simulation").readings;
     let mut session = plan;
     for (test, readings) in session.tests.iter_mut().zip(readings) {
-        test.readings = Some(readings);
+        test.readings = Some(Arc::new(readings));
     }
     session
 }

@@ -2,6 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
+use std::sync::Arc;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
@@ -98,13 +99,13 @@ pub(super) struct Path {
 
 impl Path {
     /// The path of a ball-bar test that is circular.
-    pub fn of(machine: &Machine, test: &Test) -> Option<Path> {
+    pub fn of(machine: &Arc<Machine>, test: &Test) -> Option<Path> {
         let readings = test.readings.as_ref()?;
         let Station::BallBar(_) = test.station else {
             return None;
         };
         debug_assert_eq!(test.station.kind(), InstrumentKind::BallBar);
-        let model = TestModel::new(machine, test.station.clone(), readings);
+        let model = TestModel::new(Arc::clone(machine), test.station.clone(), readings);
         let nominal_mm = model.readings_mm(&SlotValues::zero(model.slots()));
         let moves = moves(machine, &readings.positions, &nominal_mm)?;
         let mut angle = match moves {

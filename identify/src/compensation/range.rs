@@ -29,7 +29,7 @@ pub(super) struct ObservedRange {
 }
 
 /// The ranges in which an axis moved while readings observed its error; `None` if it stood still.
-pub(super) fn observed_range(problem: &Problem<'_>, error: &ErrorName, axis: usize) -> Option<ObservedRange> {
+pub(super) fn observed_range(problem: &Problem, error: &ErrorName, axis: usize) -> Option<ObservedRange> {
     let machine = &problem.session.machine;
     let slot = machine.error_slot(error)?;
     let sensitivity: Vec<Vec<f64>> = problem

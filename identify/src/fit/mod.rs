@@ -58,20 +58,20 @@ pub struct Fit {
 const BIRGE_SIGNIFICANCE: f64 = 1e-3;
 
 /// The least-squares problem of a session, restricted to the identifiable directions.
-struct IdentifiableDirections<'p, 'a> {
-    problem: &'p Problem<'a>,
+struct IdentifiableDirections<'p> {
+    problem: &'p Problem,
     basis: &'p Mat<f64>,
     /// The last linearisation: the parameters, and the triangular factors of the folds at these values.
     last: RefCell<(Vec<f64>, Vec<Triangle>)>,
 }
 
-impl IdentifiableDirections<'_, '_> {
+impl IdentifiableDirections<'_> {
     fn beta(&self, z: &[f64]) -> Vec<f64> {
         (0..self.basis.nrows()).map(|j| (0..z.len()).map(|k| self.basis[(j, k)] * z[k]).sum()).collect()
     }
 }
 
-impl LeastSquares for IdentifiableDirections<'_, '_> {
+impl LeastSquares for IdentifiableDirections<'_> {
     fn parameters(&self) -> usize {
         self.basis.ncols()
     }
@@ -92,7 +92,7 @@ impl LeastSquares for IdentifiableDirections<'_, '_> {
 }
 
 /// The triangular factor of all readings and priors.
-pub(crate) fn whole(problem: &Problem<'_>, beta: &[f64], triangles: &[Triangle]) -> Triangle {
+pub(crate) fn whole(problem: &Problem, beta: &[f64], triangles: &[Triangle]) -> Triangle {
     let mut whole = problem.prior_triangle(beta);
     triangles.iter().for_each(|triangle| whole.merge(triangle));
     whole
@@ -118,7 +118,7 @@ pub fn in_directions(triangle: &Triangle, basis: &Mat<f64>) -> Triangle {
 ///
 /// # Errors
 /// If there are no parameters, the model cannot be evaluated, or the iterations do not converge.
-pub fn fit(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Fit, IdentifyError> {
+pub fn fit(problem: &Problem, start: Option<&[f64]>) -> Result<Fit, IdentifyError> {
     finish(problem, minimum(problem, start)?)
 }
 
@@ -136,7 +136,7 @@ pub(crate) struct Minimum {
 ///
 /// # Errors
 /// If the model cannot be evaluated, or the iterations do not converge.
-pub(crate) fn minimum(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Minimum, IdentifyError> {
+pub(crate) fn minimum(problem: &Problem, start: Option<&[f64]>) -> Result<Minimum, IdentifyError> {
     let parameter_count = problem.parameters.list.len();
     let size: Vec<f64> = problem.parameters.list.iter().map(|parameter| parameter.size).collect();
     let nominal = vec![0.0; parameter_count];
@@ -161,7 +161,7 @@ pub(crate) fn minimum(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Mi
 }
 
 /// Computes covariance, residuals, cross-validation and χ² at the solution.
-fn finish(problem: &Problem<'_>, minimum: Minimum) -> Result<Fit, IdentifyError> {
+fn finish(problem: &Problem, minimum: Minimum) -> Result<Fit, IdentifyError> {
     let Minimum { beta, triangles, rank } = minimum;
     let whole = whole(problem, &beta, &triangles);
     let covariance = parameter_covariance(&whole, &rank.identifiable_basis)?;

@@ -28,7 +28,7 @@ const NOISE_TOLERANCE: f64 = 1e-4;
 ///
 /// # Errors
 /// See [`Problem::new`]; also if the iterations do not converge.
-pub fn prepare(session: &Session, seed: u64) -> Result<(Problem<'_>, Fit), IdentifyError> {
+pub fn prepare(session: &Session, seed: u64) -> Result<(Problem, Fit), IdentifyError> {
     prepare_with(session, &[], seed)
 }
 
@@ -37,11 +37,7 @@ pub fn prepare(session: &Session, seed: u64) -> Result<(Problem<'_>, Fit), Ident
 ///
 /// # Errors
 /// See [`prepare`].
-pub fn prepare_with<'a>(
-    session: &'a Session,
-    effects: &[Effect],
-    seed: u64,
-) -> Result<(Problem<'a>, Fit), IdentifyError> {
+pub fn prepare_with<'a>(session: &'a Session, effects: &[Effect], seed: u64) -> Result<(Problem, Fit), IdentifyError> {
     let stated = session.noise_mm.filter(|sigma| *sigma > 0.0);
     let floor = session.resolution_mm.unwrap_or(0.0) / 12.0_f64.sqrt();
     let first = match stated {
@@ -80,7 +76,7 @@ pub fn prepare_with<'a>(
 /// Root mean square of the residual of the nominal machine, mm, after a linearised fit of the set-up quantities. It
 /// serves as the noise in the first decision on the rank. Machine errors are excluded: in a socket session, shrinking
 /// the machine to a point would explain every reading.
-fn nominal_residual_mm(problem: &Problem<'_>) -> Result<f64, IdentifyError> {
+fn nominal_residual_mm(problem: &Problem) -> Result<f64, IdentifyError> {
     let list = &problem.parameters.list;
     let nominal = vec![0.0; list.len()];
     let mut whole = Triangle::new(list.len());
@@ -100,7 +96,7 @@ fn nominal_residual_mm(problem: &Problem<'_>) -> Result<f64, IdentifyError> {
     Ok((sum_of_squares / count.max(1.0)).sqrt() * problem.noise.sigma_mm)
 }
 
-fn estimated_noise(problem: &Problem<'_>, fit: &Fit, floor: f64) -> Noise {
+fn estimated_noise(problem: &Problem, fit: &Fit, floor: f64) -> Noise {
     let pure = PureError::of(&problem.tests, &fit.residuals, |test, row| !problem.rejected[test][row]);
     if let Some(sigma) = pure.sigma_mm() {
         return Noise::white(sigma.max(floor).max(MIN_NOISE_MM), NoiseSource::Repeats);

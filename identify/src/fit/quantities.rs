@@ -15,7 +15,7 @@ pub(crate) enum Quantity {
 }
 
 /// The reported quantities in their order: those of the identifiable parameters.
-pub(crate) fn quantities(problem: &Problem<'_>, rank: &Rank) -> Vec<Quantity> {
+pub(crate) fn quantities(problem: &Problem, rank: &Rank) -> Vec<Quantity> {
     let list = &problem.parameters.list;
     let mut quantities = Vec::new();
     let mut j = 0;
@@ -40,7 +40,7 @@ pub(crate) fn quantities(problem: &Problem<'_>, rank: &Rank) -> Vec<Quantity> {
 /// Passes the reported quantities at the parameters `beta` to a function, in display units, amplitude before phase.
 /// Each phase lies within half a turn of the fit's phase.
 pub(crate) fn values_at(
-    problem: &Problem<'_>,
+    problem: &Problem,
     fit: &Fit,
     quantities: &[Quantity],
     beta: &[f64],

@@ -14,7 +14,7 @@ use crate::rank::Rank;
 use crate::results::{FitResult, Outlier, ParameterResult, Unobservable, phases_follow_amplitudes};
 
 /// The fit in its reported form.
-pub fn report(problem: &Problem<'_>, fit: &Fit) -> FitResult {
+pub fn report(problem: &Problem, fit: &Fit) -> FitResult {
     let three = problem.coordinates() == 3;
     let rms = rms_mm(problem, &fit.residuals);
     let held = fit.held_out.rms_mm;
@@ -48,7 +48,7 @@ pub fn report(problem: &Problem<'_>, fit: &Fit) -> FitResult {
         unobservable: unobservable(problem, &fit.rank),
         null_space: covariance::null_space(problem, &fit.rank),
         outliers: outliers(problem, fit),
-        circular: circular::of_session(problem.session, problem.noise.sigma_mm, &problem.rejected),
+        circular: circular::of_session(&problem.session, problem.noise.sigma_mm, &problem.rejected),
         plausibility,
         warnings,
         about: problem.session.about.iter().cloned().collect(),
@@ -58,7 +58,7 @@ pub fn report(problem: &Problem<'_>, fit: &Fit) -> FitResult {
 
 /// The identifiable parameters, in display units. A harmonic has amplitude and phase of
 /// `amplitude · cos(order · angle + phase)`.
-pub fn parameters(problem: &Problem<'_>, fit: &Fit) -> Vec<ParameterResult> {
+pub fn parameters(problem: &Problem, fit: &Fit) -> Vec<ParameterResult> {
     let list = &problem.parameters.list;
     let u_internal = |j: usize| fit.covariance[(j, j)].max(0.0).sqrt() * fit.u_enlargement;
     let mut results = Vec::new();
@@ -79,7 +79,7 @@ pub fn parameters(problem: &Problem<'_>, fit: &Fit) -> Vec<ParameterResult> {
     results
 }
 
-fn amplitude_and_phase(problem: &Problem<'_>, fit: &Fit, j: usize) -> [ParameterResult; 2] {
+fn amplitude_and_phase(problem: &Problem, fit: &Fit, j: usize) -> [ParameterResult; 2] {
     let id = problem.parameters.list[j].id.trim_end_matches(".cos");
     let (a, b) = (fit.beta[j], fit.beta[j + 1]);
     let cov = |p: usize, q: usize| fit.covariance[(p, q)] * fit.u_enlargement.powi(2);
@@ -121,7 +121,7 @@ pub(crate) fn u_of_undetermined_phase_deg() -> f64 {
 }
 
 /// The null-space combinations, in display units and in words.
-pub fn unobservable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
+pub fn unobservable(problem: &Problem, rank: &Rank) -> Vec<Unobservable> {
     let list = &problem.parameters.list;
     rank.null_combinations
         .iter()
@@ -155,7 +155,7 @@ pub fn unobservable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
 }
 
 /// The excluded outliers, by test, file and line.
-pub fn outliers(problem: &Problem<'_>, fit: &Fit) -> Vec<Outlier> {
+pub fn outliers(problem: &Problem, fit: &Fit) -> Vec<Outlier> {
     let coordinates = problem.coordinates();
     let mut list = Vec::new();
     for (number, test) in problem.tests.iter().enumerate() {

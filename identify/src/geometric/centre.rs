@@ -59,7 +59,7 @@ pub struct Centre {
 
 impl CircleGeometry {
     /// From the nominal machine. The error states why the path is no circle.
-    pub fn of(machine: &Machine, model: &TestModel<'_>) -> Result<CircleGeometry, String> {
+    pub fn of(machine: &Machine, model: &TestModel) -> Result<CircleGeometry, String> {
         let Station::BallBar(bar) = model.station() else {
             return Err("it is not a ball-bar test".into());
         };
@@ -148,7 +148,7 @@ impl CircleGeometry {
 }
 
 /// The single axis that turns in a test.
-fn turning(machine: &Machine, model: &TestModel<'_>) -> Result<usize, String> {
+fn turning(machine: &Machine, model: &TestModel) -> Result<usize, String> {
     let moves = |axis: &usize| {
         let first = model.state(0)[*axis].value;
         (1..model.rows()).any(|row| (model.state(row)[*axis].value - first).abs() > MOTION_TOLERANCE)
@@ -168,20 +168,14 @@ fn turning(machine: &Machine, model: &TestModel<'_>) -> Result<usize, String> {
 }
 
 /// Nominal positions of the moving ball and the fixed one in R.
-fn balls(
-    machine: &Machine,
-    model: &TestModel<'_>,
-    bar: &BallBar<f64>,
-    row: usize,
-    on_table: bool,
-) -> ([f64; 3], [f64; 3]) {
+fn balls(machine: &Machine, model: &TestModel, bar: &BallBar<f64>, row: usize, on_table: bool) -> ([f64; 3], [f64; 3]) {
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let (workpiece, spindle) = bar.balls::<f64>(machine, &model.state(row), &none, &|_| None);
     if on_table { (workpiece.0, spindle.0) } else { (spindle.0, workpiece.0) }
 }
 
 /// A point of an axis and its direction in R, at the positions of the first reading.
-fn line(machine: &Machine, model: &TestModel<'_>, axis: usize) -> ([f64; 3], [f64; 3]) {
+fn line(machine: &Machine, model: &TestModel, axis: usize) -> ([f64; 3], [f64; 3]) {
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let state = &model.state(0);
     let in_r = |point: [f64; 3]| {

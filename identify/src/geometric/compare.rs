@@ -1,5 +1,7 @@
 //! Comparison of a geometric method with the full fit on the same readings: value, uncertainty, and bias.
 
+use std::sync::Arc;
+
 use abbe_model::session::Session;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -179,29 +181,29 @@ pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Compariso
     })
 }
 
-fn observed<'p>(problem: &'p Problem<'_>) -> Vec<&'p [f64]> {
-    let of = |test: &&'p abbe_model::session::Test| {
+fn observed<'p>(problem: &'p Problem) -> Vec<&'p [f64]> {
+    let of = |test: &'p abbe_model::session::Test| {
         test.readings.as_ref().map_or(&[][..], |readings| readings.observed.as_slice())
     };
     problem.tests.iter().map(of).collect()
 }
 
 /// Noise-free readings at given parameters, test by test, mm.
-fn readings(problem: &Problem<'_>, beta: &[f64]) -> Vec<Vec<f64>> {
+fn readings(problem: &Problem, beta: &[f64]) -> Vec<Vec<f64>> {
     let values = problem.slot_values(beta);
     let models = problem.models.iter().zip(&values);
     models.map(|(model, values)| model.readings_mm(values)).collect()
 }
 
 /// The parameters of the full fit to other readings of the same tests.
-fn refitted(problem: &Problem<'_>, readings: &[Vec<f64>], full: &Fit) -> Result<Vec<f64>, IdentifyError> {
-    let mut session = problem.session.clone();
+fn refitted(problem: &Problem, readings: &[Vec<f64>], full: &Fit) -> Result<Vec<f64>, IdentifyError> {
+    let mut session = Session::clone(&problem.session);
     let mut remaining = readings.iter();
     for test in &mut session.tests {
         if let (Some(known), Some(drawn)) =
             (&mut test.readings, test_has(problem, &test.name).then(|| remaining.next()).flatten())
         {
-            known.observed.clone_from(drawn);
+            Arc::make_mut(known).observed.clone_from(drawn);
         }
     }
     let mut again = Problem::new(&session, problem.noise.clone(), 0)?;
@@ -209,11 +211,11 @@ fn refitted(problem: &Problem<'_>, readings: &[Vec<f64>], full: &Fit) -> Result<
     Ok(fit::fit(&again, Some(&full.beta))?.beta)
 }
 
-fn test_has(problem: &Problem<'_>, name: &str) -> bool {
+fn test_has(problem: &Problem, name: &str) -> bool {
     problem.tests.iter().any(|test| test.name == name)
 }
 
-fn centres(problem: &Problem<'_>, estimator: &Estimator, estimate: &Estimate, u_enlargement: f64) -> Vec<CentreResult> {
+fn centres(problem: &Problem, estimator: &Estimator, estimate: &Estimate, u_enlargement: f64) -> Vec<CentreResult> {
     let list = &problem.parameters.list;
     let declared: Vec<usize> = (0..list.len()).filter(|p| list[*p].role == Role::Error).collect();
     let letter = |k: usize| ["X", "Y", "Z"][k].to_string();

@@ -88,7 +88,7 @@ impl Estimator {
     ///
     /// # Errors
     /// If the session lacks tests for the method, or the errors are not identifiable from them.
-    pub fn new(problem: &Problem<'_>, method: Method) -> Result<Estimator, IdentifyError> {
+    pub fn new(problem: &Problem, method: Method) -> Result<Estimator, IdentifyError> {
         let machine = &problem.session.machine;
         let refuse = |message: String| IdentifyError::Request(format!("method {}: {message}", method.word()));
         let mut circles = Vec::new();
@@ -140,7 +140,7 @@ impl Estimator {
     ///
     /// # Errors
     /// If the readings of a test do not lie on a circle.
-    pub fn estimate(&self, problem: &Problem<'_>, observed: &[&[f64]]) -> Result<Estimate, IdentifyError> {
+    pub fn estimate(&self, problem: &Problem, observed: &[&[f64]]) -> Result<Estimate, IdentifyError> {
         let mut centres = Vec::new();
         for (test, geometry) in self.tests.iter().zip(&self.geometries) {
             let centre = geometry
@@ -196,7 +196,7 @@ fn chosen(method: Method, circles: Vec<(usize, CircleGeometry)>) -> Vec<(usize, 
 }
 
 /// The declared errors of the turning axes that the method identifies.
-fn errors(problem: &Problem<'_>, method: Method, geometries: &[CircleGeometry]) -> Vec<usize> {
+fn errors(problem: &Problem, method: Method, geometries: &[CircleGeometry]) -> Vec<usize> {
     let machine = &problem.session.machine;
     let of_method = |id: &str| {
         let Some(name) = ErrorName::parse(id) else {
@@ -210,11 +210,7 @@ fn errors(problem: &Problem<'_>, method: Method, geometries: &[CircleGeometry]) 
 }
 
 /// `S` at the nominal machine.
-fn sensitivities(
-    problem: &Problem<'_>,
-    tests: &[usize],
-    geometries: &[CircleGeometry],
-) -> Result<Mat<f64>, IdentifyError> {
+fn sensitivities(problem: &Problem, tests: &[usize], geometries: &[CircleGeometry]) -> Result<Mat<f64>, IdentifyError> {
     let parameters = problem.parameters.list.len();
     let nominal = problem.slot_values(&vec![0.0; parameters]);
     let mut sensitivities = Mat::zeros(2 * tests.len(), parameters);

@@ -52,7 +52,7 @@ const FOLDS_OF_MANY_RUNS: usize = 32;
 
 impl Folds {
     /// The folds of a session.
-    pub fn of(session: &Session, tests: &[&Test], seed: u64) -> Folds {
+    pub fn of(session: &Session, tests: &[Test], seed: u64) -> Folds {
         let readings: Vec<_> = tests.iter().filter_map(|test| test.readings.as_ref()).collect();
         let poses = !session.instrument.is_two_sided() && readings.iter().all(|r| r.run.is_empty());
         if poses {
@@ -119,8 +119,8 @@ const SHORT_RUN: f64 = 4.0;
 const MIN_READINGS: usize = 24;
 
 /// A warning for each test whose run column does not number traversals: its number changes from reading to reading.
-pub fn mislabelled_runs(tests: &[&Test]) -> Vec<String> {
-    let warning = |test: &&Test| {
+pub fn mislabelled_runs(tests: &[Test]) -> Vec<String> {
+    let warning = |test: &Test| {
         let readings = test.readings.as_ref()?;
         let runs = readings.runs();
         let numbers: BTreeSet<i64> = runs.iter().map(|run| readings.run.get(run.start).copied().unwrap_or(0)).collect();
@@ -144,6 +144,7 @@ pub fn mislabelled_runs(tests: &[&Test]) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use std::path::Path;
+    use std::sync::Arc;
 
     use abbe_model::files::{self, ReadOptions};
 
@@ -153,7 +154,7 @@ mod tests {
     fn numbered(number: impl Fn(usize, i64) -> i64) -> Session {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
         let mut session = files::session(&file, &ReadOptions::default()).unwrap();
-        for readings in session.tests.iter_mut().filter_map(|test| test.readings.as_mut()) {
+        for readings in session.tests.iter_mut().filter_map(|test| test.readings.as_mut()).map(Arc::make_mut) {
             for (row, run) in readings.run.iter_mut().enumerate() {
                 *run = number(row, *run);
             }
@@ -162,8 +163,7 @@ mod tests {
     }
 
     fn folds(session: &Session) -> Folds {
-        let tests: Vec<&Test> = session.tests.iter().collect();
-        Folds::of(session, &tests, 1)
+        Folds::of(session, &session.tests, 1)
     }
 
     #[test]
@@ -192,7 +192,7 @@ mod tests {
 
     #[test]
     fn a_run_column_that_does_not_number_traversals_gives_a_warning() {
-        let warnings = |session: &Session| mislabelled_runs(&session.tests.iter().collect::<Vec<_>>()).len();
+        let warnings = |session: &Session| mislabelled_runs(&session.tests).len();
         assert_eq!(warnings(&numbered(|_, run| run)), 0);
         assert_eq!(warnings(&numbered(|_, _| 1)), 0);
         // Forward runs have number 1 and backward runs 2; then short runs with increasing numbers.

@@ -15,7 +15,7 @@ impl PureError {
     /// run, more than half of its slow part. The autocovariances are therefore corrected. The correction ends when
     /// noise with the estimated coefficients, after the same treatment, has the observed autocovariances (indirect
     /// inference: Gouriéroux, Monfort & Renault, J. Appl. Econometrics 8 (1993) S85).
-    pub fn autocorrelation(&self, tests: &[&Test], kept: impl Fn(usize, usize) -> bool) -> Option<Autocorrelation> {
+    pub fn autocorrelation(&self, tests: &[Test], kept: impl Fn(usize, usize) -> bool) -> Option<Autocorrelation> {
         self.autocorrelation_up_to(MAX_ORDER, tests, kept)
     }
 
@@ -23,7 +23,7 @@ impl PureError {
     pub(super) fn autocorrelation_up_to(
         &self,
         order: usize,
-        tests: &[&Test],
+        tests: &[Test],
         kept: impl Fn(usize, usize) -> bool,
     ) -> Option<Autocorrelation> {
         // Deviations before their rescaling for the trends: the variance that trends remove depends on the

@@ -98,8 +98,8 @@ pub struct PureError {
 impl PureError {
     /// From the residuals of any model. A model error that is equal in all repeats cancels. `kept(test, row)` is false
     /// for outliers.
-    pub fn of(tests: &[&Test], residuals: &[Vec<f64>], kept: impl Fn(usize, usize) -> bool) -> PureError {
-        let readings: Vec<Option<&Readings>> = tests.iter().map(|test| test.readings.as_ref()).collect();
+    pub fn of(tests: &[Test], residuals: &[Vec<f64>], kept: impl Fn(usize, usize) -> bool) -> PureError {
+        let readings: Vec<Option<&Readings>> = tests.iter().map(|test| test.readings.as_deref()).collect();
         PureError::of_readings(&readings, residuals, kept)
     }
 

@@ -34,7 +34,7 @@ impl PureError {
     /// Removes waves along runs that no autocorrelation explains: they vary from run to run, so they are structure that
     /// would count as noise. A band is removed from all tests or from one. The criterion is the periodogram of the
     /// whitened deviations, summed over runs, against the median of all ordinates.
-    pub fn without_waves(mut self, tests: &[&Test], kept: impl Fn(usize, usize) -> bool) -> PureError {
+    pub fn without_waves(mut self, tests: &[Test], kept: impl Fn(usize, usize) -> bool) -> PureError {
         let Some(mut autocorrelation) = self.autocorrelation_up_to(1, tests, &kept) else {
             return self;
         };

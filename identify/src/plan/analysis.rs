@@ -75,7 +75,7 @@ pub fn prepared(session: &Session, options: &PlanOptions) -> Result<(Session, No
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn analyse_problem(problem: &Problem<'_>, travel_mm: f64) -> Result<PlanAnalysis, IdentifyError> {
+pub fn analyse_problem(problem: &Problem, travel_mm: f64) -> Result<PlanAnalysis, IdentifyError> {
     let list = &problem.parameters.list;
     let nominal = vec![0.0; list.len()];
     let linear = Linearisation::of(problem, &nominal)?;
@@ -144,8 +144,8 @@ fn mounted(test: &abbe_model::session::Test) -> &str {
     test.socket.as_deref().unwrap_or(&test.setup)
 }
 
-fn summary(problem: &Problem<'_>, number: usize) -> TestSummary {
-    let (test, model) = (problem.tests[number], &problem.models[number]);
+fn summary(problem: &Problem, number: usize) -> TestSummary {
+    let (test, model) = (&problem.tests[number], &problem.models[number]);
     let readings = test.readings.as_ref();
     let time = readings.map_or(&[][..], |readings| readings.time_s.as_slice());
     TestSummary {
@@ -163,7 +163,7 @@ fn summary(problem: &Problem<'_>, number: usize) -> TestSummary {
     }
 }
 
-fn correlation(problem: &Problem<'_>, linear: &Linearisation, of_interest: &[usize]) -> Correlation {
+fn correlation(problem: &Problem, linear: &Linearisation, of_interest: &[usize]) -> Correlation {
     let both_identifiable = |i: usize, j: usize| linear.rank.is_identifiable(i) && linear.rank.is_identifiable(j);
     Correlation {
         ids: of_interest.iter().map(|j| problem.parameters.list[*j].id.clone()).collect(),
@@ -179,7 +179,7 @@ fn correlation(problem: &Problem<'_>, linear: &Linearisation, of_interest: &[usi
 
 /// Determines the uncertainties without each test in turn.
 fn leave_one_out(
-    problem: &Problem<'_>,
+    problem: &Problem,
     linear: &Linearisation,
     of_interest: &[usize],
 ) -> Result<Vec<LeaveOneOut>, IdentifyError> {

@@ -26,7 +26,7 @@ const MIN_SHARE: f64 = 1e-4;
 const MIN_CORRELATION: f64 = 0.1;
 
 /// The contributions to an error's uncertainty, largest first.
-pub fn budget(problem: &Problem<'_>, linear: &Linearisation, error: usize) -> Vec<Contribution> {
+pub fn budget(problem: &Problem, linear: &Linearisation, error: usize) -> Vec<Contribution> {
     let list = &problem.parameters.list;
     let covariance = &linear.covariance;
     let variance = covariance[(error, error)];
@@ -52,7 +52,7 @@ fn noise_variance(linear: &Linearisation, error: usize) -> f64 {
 }
 
 /// The errors that are correlated with an error, the most correlated first.
-pub fn correlated_with(problem: &Problem<'_>, linear: &Linearisation, error: usize) -> Vec<CorrelatedWith> {
+pub fn correlated_with(problem: &Problem, linear: &Linearisation, error: usize) -> Vec<CorrelatedWith> {
     let mut shared: Vec<CorrelatedWith> = problem
         .parameters
         .list

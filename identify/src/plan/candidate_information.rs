@@ -37,7 +37,7 @@ impl PreparedCandidates {
     /// # Errors
     /// If the model cannot be evaluated.
     pub fn new(
-        problem: &Problem<'_>,
+        problem: &Problem,
         beta: &[f64],
         tests: Vec<CandidateTest>,
         variations: &TestVariations,
@@ -84,7 +84,7 @@ impl PreparedCandidates {
 
 /// Whether a new test can share a parameter: errors and effects, a mounted workpiece ball, the spindle ball of the last
 /// test, the sensor.
-fn may_be_shared(problem: &Problem<'_>, parameter: &Parameter) -> bool {
+fn may_be_shared(problem: &Problem, parameter: &Parameter) -> bool {
     if parameter.role != Role::Setup {
         return true;
     }
@@ -97,12 +97,12 @@ fn may_be_shared(problem: &Problem<'_>, parameter: &Parameter) -> bool {
 /// The information of a candidate test with a newly mounted spindle ball and, if permitted, with the spindle ball that
 /// stays mounted. The readings are the same.
 fn ready(
-    problem: &Problem<'_>,
+    problem: &Problem,
     shared: &SharedParameters,
     candidate: CandidateTest,
     variations: &TestVariations,
 ) -> Result<Vec<CandidateInformation>, IdentifyError> {
-    let mut session = problem.session.clone();
+    let mut session = abbe_model::session::Session::clone(&problem.session);
     session.tests = vec![candidate.test.clone()];
     session.effects = Vec::new();
     session.socket_distances = Vec::new();

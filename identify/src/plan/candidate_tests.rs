@@ -6,6 +6,8 @@
 //! range, or one direction, never gives more information than the whole. Such tests are candidates only if the gain per
 //! minute decides. Tests beyond the travel of an axis or the reach of the bar are not candidates.
 
+use std::sync::Arc;
+
 use abbe_model::axis::AxisKind;
 use abbe_model::instrument::Station;
 use abbe_model::session::{Session, Test};
@@ -33,8 +35,8 @@ pub struct CandidateTest {
 
 /// Whether candidate tests exist for a problem: it has errors to identify, the instrument is a ball bar, and a rotary
 /// axis can be swept.
-pub fn has_candidates(problem: &Problem<'_>) -> bool {
-    let session = problem.session;
+pub fn has_candidates(problem: &Problem) -> bool {
+    let session = &problem.session;
     let has_errors = problem.parameters.list.iter().any(|parameter| parameter.role == Role::Error);
     let last = session.tests.last().map(|test| &test.station);
     has_errors
@@ -82,7 +84,7 @@ fn finished(session: &Session, variations: &TestVariations, draft: Draft) -> Opt
         let mean = session.origin().temperature_c;
         readings.temperature_c = vec![mean; readings.rows()];
     }
-    test.readings = Some(readings);
+    test.readings = Some(Arc::new(readings));
     let minutes = variations.test_min + moving_s / 60.0 + if new_setup { variations.setup_min } else { 0.0 };
     Some(CandidateTest { name, test, new_setup, minutes })
 }

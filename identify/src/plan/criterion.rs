@@ -24,7 +24,7 @@ pub enum Goal {
 }
 
 /// Indices of the target parameters of a goal.
-pub fn targets(problem: &Problem<'_>, goal: &Goal) -> Vec<usize> {
+pub fn targets(problem: &Problem, goal: &Goal) -> Vec<usize> {
     let list = &problem.parameters.list;
     let is_target = |parameter: &Parameter| match (goal, parameter.role) {
         (Goal::WorstUncertainty, _) => is_of_interest(parameter),

@@ -51,7 +51,7 @@ const MIN_BIAS: f64 = 1e-3;
 ///
 /// # Errors
 /// If the model or the library cannot be evaluated.
-pub fn effects(problem: &Problem<'_>) -> Result<EffectsAnalysis, IdentifyError> {
+pub fn effects(problem: &Problem) -> Result<EffectsAnalysis, IdentifyError> {
     let nominal = vec![0.0; problem.parameters.list.len()];
     let linear = Linearisation::of(problem, &nominal)?;
     let columns = Columns::new(problem, &nominal);
@@ -132,14 +132,14 @@ struct EffectProjection<'m> {
 const EQUAL_WITHIN: f64 = 1e-6;
 
 fn judge(
-    problem: &Problem<'_>,
+    problem: &Problem,
     candidate: &Candidate,
     family: &str,
     products: &EffectProjection<'_>,
     greatest: f64,
     threshold: &[f64; 2],
 ) -> EffectDetectability {
-    let session = problem.session;
+    let session = &problem.session;
     let effect = &candidate.effect;
     let unit = Unit::of_effect(session, effect, 0);
     // The coefficient that moves the component by its physical size somewhere in the tests, whatever the scale of the
@@ -196,7 +196,7 @@ fn gram(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
     DMatrix::from_fn(product.nrows(), product.ncols(), |i, j| product[(i, j)])
 }
 
-fn biases(problem: &Problem<'_>, moved: MatRef<'_, f64>, unit: &Unit) -> Vec<Bias> {
+fn biases(problem: &Problem, moved: MatRef<'_, f64>, unit: &Unit) -> Vec<Bias> {
     let mut biases: Vec<Bias> = problem
         .parameters
         .list

@@ -85,7 +85,7 @@ fn format_short(value: f64) -> String {
 }
 
 /// Null-space combinations: they leave every reading unchanged, and no prior determines them.
-pub fn unidentifiable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
+pub fn unidentifiable(problem: &Problem, rank: &Rank) -> Vec<Unobservable> {
     let list = &problem.parameters.list;
     rank.null_combinations
         .iter()
@@ -107,7 +107,7 @@ pub fn unidentifiable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
 
 /// A row over scaled parameters in display units: the pivot first, with 1, then the others in the order of the
 /// parameters.
-fn in_display_units(problem: &Problem<'_>, row: &[f64], pivot: usize) -> Vec<(String, f64)> {
+fn in_display_units(problem: &Problem, row: &[f64], pivot: usize) -> Vec<(String, f64)> {
     let list = &problem.parameters.list;
     let largest = row.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
     let others = (0..row.len()).filter(|j| *j != pivot && row[*j].abs() > NEGLIGIBLE * largest);
@@ -128,10 +128,7 @@ fn in_display_units(problem: &Problem<'_>, row: &[f64], pivot: usize) -> Vec<(St
 ///
 /// # Errors
 /// If the decomposition fails.
-pub fn determined_by_prior(
-    problem: &Problem<'_>,
-    linear: &Linearisation,
-) -> Result<Vec<DeterminedByPrior>, IdentifyError> {
+pub fn determined_by_prior(problem: &Problem, linear: &Linearisation) -> Result<Vec<DeterminedByPrior>, IdentifyError> {
     let list = &problem.parameters.list;
     let r = linear.readings.parts().0;
     let alone = Rank::decide(r.as_ref(), &linear.size, &linear.preference)?;
@@ -200,7 +197,7 @@ fn sparser(mut row: Vec<f64>, others: &[Vec<f64>]) -> Vec<f64> {
 /// # Errors
 /// If the decomposition fails.
 pub fn nearly_collinear(
-    problem: &Problem<'_>,
+    problem: &Problem,
     linear: &Linearisation,
     of_interest: &[usize],
 ) -> Result<Vec<NearDependency>, IdentifyError> {

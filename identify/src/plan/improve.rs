@@ -111,12 +111,12 @@ const MAX_ROUNDS: usize = 10;
 /// # Errors
 /// If there is no candidate test or the model cannot be evaluated.
 pub fn improve(
-    problem: &Problem<'_>,
+    problem: &Problem,
     variations: &TestVariations,
     options: &ImproveOptions,
 ) -> Result<Improvement, IdentifyError> {
     let list = &problem.parameters.list;
-    let tests = super::candidate_tests::candidate_tests(problem.session, variations)?;
+    let tests = super::candidate_tests::candidate_tests(&problem.session, variations)?;
     let nominal = vec![0.0; list.len()];
     let targets = targets(problem, &options.goal);
     if targets.is_empty() {

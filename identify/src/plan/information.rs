@@ -32,7 +32,7 @@ pub type Root = Mat<f64>;
 
 impl SharedParameters {
     /// Parameters of a problem by index: the `kept` ones first, the `targets` ones last.
-    pub fn of(problem: &Problem<'_>, kept: &[usize], targets: &[usize]) -> SharedParameters {
+    pub fn of(problem: &Problem, kept: &[usize], targets: &[usize]) -> SharedParameters {
         let list = &problem.parameters.list;
         let order: Vec<usize> = kept.iter().chain(targets).copied().collect();
         SharedParameters {
@@ -58,7 +58,7 @@ impl SharedParameters {
     ///
     /// # Errors
     /// If a parameter does not belong to the problem.
-    pub fn root_of(&self, problem: &Problem<'_>, linear: &Linearisation) -> Result<Root, IdentifyError> {
+    pub fn root_of(&self, problem: &Problem, linear: &Linearisation) -> Result<Root, IdentifyError> {
         let list = &problem.parameters.list;
         let index: HashMap<&str, usize> =
             list.iter().enumerate().map(|(j, parameter)| (parameter.id.as_str(), j)).collect();
@@ -82,7 +82,7 @@ impl SharedParameters {
     /// The root of the readings of a problem with one test, from their triangular factor `r`. Parameters that are not
     /// shared are eliminated within their priors. `as_shared` maps a parameter's identifier to that of the shared
     /// parameter.
-    pub fn root_of_test(&self, problem: &Problem<'_>, r: MatRef<'_, f64>, as_shared: impl Fn(&str) -> String) -> Root {
+    pub fn root_of_test(&self, problem: &Problem, r: MatRef<'_, f64>, as_shared: impl Fn(&str) -> String) -> Root {
         let list = &problem.parameters.list;
         let column_of = |id: &str| {
             let name = as_shared(id);

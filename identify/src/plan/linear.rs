@@ -40,7 +40,7 @@ impl Linearisation {
     ///
     /// # Errors
     /// If the model cannot be evaluated.
-    pub fn of(problem: &Problem<'_>, beta: &[f64]) -> Result<Linearisation, IdentifyError> {
+    pub fn of(problem: &Problem, beta: &[f64]) -> Result<Linearisation, IdentifyError> {
         let tests = problem.triangles(beta)?;
         let prior = problem.prior_triangle(beta);
         let size: Vec<f64> = problem.parameters.list.iter().map(|parameter| parameter.size).collect();

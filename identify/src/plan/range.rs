@@ -38,7 +38,7 @@ const BISECTIONS: usize = 10;
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError> {
+pub fn shrinkages(problem: &Problem) -> Result<Vec<Shrinkage>, IdentifyError> {
     let nominal = vec![0.0; problem.parameters.list.len()];
     let linear = Linearisation::of(problem, &nominal)?;
     let of_interest: Vec<usize> = (0..problem.parameters.list.len())
@@ -107,7 +107,7 @@ pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError
 }
 
 /// The axis that moves alone in a test, and its limits.
-fn swept(problem: &Problem<'_>, test: usize) -> Option<(usize, f64, f64)> {
+fn swept(problem: &Problem, test: usize) -> Option<(usize, f64, f64)> {
     let readings = problem.tests[test].readings.as_ref()?;
     let mut moving = readings.positions.iter().enumerate().filter_map(|(axis, positions)| {
         let low = positions.iter().copied().fold(f64::INFINITY, f64::min);
@@ -119,7 +119,7 @@ fn swept(problem: &Problem<'_>, test: usize) -> Option<(usize, f64, f64)> {
 }
 
 /// The whitened rows of a test, block by block, each with the position of an axis.
-fn whitened(problem: &Problem<'_>, test: usize, axis: usize) -> Result<Vec<PlacedRows>, IdentifyError> {
+fn whitened(problem: &Problem, test: usize, axis: usize) -> Result<Vec<PlacedRows>, IdentifyError> {
     let values = problem.slot_values(&vec![0.0; problem.parameters.list.len()]);
     let Some(readings) = &problem.tests[test].readings else {
         return Ok(Vec::new());

@@ -36,11 +36,7 @@ struct BlockSensitivity {
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn sensitivities(
-    problem: &Problem<'_>,
-    beta: &[f64],
-    covariance: &Mat<f64>,
-) -> Result<Sensitivities, IdentifyError> {
+pub fn sensitivities(problem: &Problem, beta: &[f64], covariance: &Mat<f64>) -> Result<Sensitivities, IdentifyError> {
     let values = problem.slot_values(beta);
     let parameters = beta.len();
     let parts: Vec<BlockSensitivity> = problem
@@ -75,7 +71,7 @@ pub fn sensitivities(
 }
 
 fn of_block(
-    problem: &Problem<'_>,
+    problem: &Problem,
     block: &RowBlock,
     rows: &Mat<f64>,
     parameters: usize,
@@ -131,7 +127,7 @@ fn of_block(
 }
 
 /// The summary of a parameter in display units: µm of reading per display unit.
-pub fn reported(problem: &Problem<'_>, found: &Sensitivities, parameter: usize) -> Sensitivity {
+pub fn reported(problem: &Problem, found: &Sensitivities, parameter: usize) -> Sensitivity {
     let (largest, test, rms) = found.summary[parameter];
     let scale = display_scale(problem, parameter);
     Sensitivity {
@@ -143,7 +139,7 @@ pub fn reported(problem: &Problem<'_>, found: &Sensitivities, parameter: usize) 
 }
 
 /// The curves of a parameter in display units, without tests that do not depend on it.
-pub fn curves(problem: &Problem<'_>, found: &Sensitivities, parameter: usize) -> Vec<Curve> {
+pub fn curves(problem: &Problem, found: &Sensitivities, parameter: usize) -> Vec<Curve> {
     let scale = display_scale(problem, parameter);
     found.curves[parameter]
         .iter()
@@ -160,6 +156,6 @@ pub fn curves(problem: &Problem<'_>, found: &Sensitivities, parameter: usize) ->
 const MIN_SENSITIVITY: f64 = 1e-9;
 
 /// Converts mm of reading per internal unit into µm per display unit.
-fn display_scale(problem: &Problem<'_>, parameter: usize) -> f64 {
+fn display_scale(problem: &Problem, parameter: usize) -> f64 {
     1e3 / problem.parameters.list[parameter].unit.display_per_internal
 }

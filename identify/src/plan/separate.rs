@@ -86,7 +86,7 @@ impl AlternativeSeparation {
 /// If the columns of an effect cannot be computed for the session, or if there are no candidate tests for its
 /// instrument.
 pub fn separation(
-    problem: &Problem<'_>,
+    problem: &Problem,
     beta: &[f64],
     found: &Effect,
     coefficients: &[f64],
@@ -119,7 +119,7 @@ pub fn separation(
 /// If the columns of an effect cannot be computed for the session, or if there are no candidate tests for its
 /// instrument.
 pub fn separating_tests(
-    problem: &Problem<'_>,
+    problem: &Problem,
     beta: &[f64],
     found: &Effect,
     coefficients: &[f64],
@@ -172,7 +172,7 @@ struct SeparationComparison {
 
 impl SeparationComparison {
     fn new(
-        problem: &Problem<'_>,
+        problem: &Problem,
         beta: &[f64],
         found: &Effect,
         coefficients: &[f64],
@@ -198,7 +198,7 @@ impl SeparationComparison {
         let targets: Vec<usize> =
             (0..all.parameters.list.len()).filter(|j| effect_of(*j).is_some() && effect_of(*j) == found_at).collect();
         let variations = &variations.clone().for_effects(std::iter::once(found).chain(alternatives));
-        let tests = super::candidate_tests::candidate_tests(all.session, variations)?;
+        let tests = super::candidate_tests::candidate_tests(&all.session, variations)?;
         let prepared = PreparedCandidates::new(&all, &values, tests, variations, &targets)?;
         // An alternative that is part of the model always remains in it.
         let is_added = |effect: usize| effect >= known && Some(effect) != found_at;

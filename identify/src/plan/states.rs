@@ -1,5 +1,7 @@
 //! Completes a plan to a session with readings: its planned states, each with the reading of a machine without errors.
 
+use std::sync::Arc;
+
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test, motion, planned};
@@ -25,7 +27,7 @@ pub fn complete(session: &Session, planned_only: bool) -> Result<Session, Identi
         if test.readings.is_none() || (planned_only && moves) {
             let mut readings = planned(session, test)?;
             readings.time_s.iter_mut().for_each(|time| *time += clock_s);
-            test.readings = Some(readings);
+            test.readings = Some(Arc::new(readings));
         }
         let end = test.readings.as_ref().and_then(|readings| readings.time_s.last().copied());
         clock_s = end.map_or(clock_s, |end| end + BETWEEN_TESTS_S);
@@ -40,7 +42,7 @@ pub fn complete(session: &Session, planned_only: bool) -> Result<Session, Identi
 pub fn planned(session: &Session, test: &Test) -> Result<Readings, IdentifyError> {
     let mut readings = planned::planned(&session.machine, test)?;
     readings.coordinates = test.station.kind().coordinates();
-    let model = TestModel::new(&session.machine, test.station.clone(), &readings);
+    let model = TestModel::new(Arc::clone(&session.machine), test.station.clone(), &readings);
     readings.observed = model.readings_mm(&SlotValues::zero(model.slots()));
     Ok(readings)
 }
@@ -50,14 +52,14 @@ pub fn planned(session: &Session, test: &Test) -> Result<Readings, IdentifyError
 ///
 /// # Errors
 /// See [`Problem::new`].
-pub fn problem_by_test(session: &Session, noise: Noise) -> Result<Problem<'_>, IdentifyError> {
+pub fn problem_by_test(session: &Session, noise: Noise) -> Result<Problem, IdentifyError> {
     let mut problem = Problem::new(session, noise, 0)?;
     fold_by_test(&mut problem);
     Ok(problem)
 }
 
 /// Makes the folds of a problem its tests.
-pub fn fold_by_test(problem: &mut Problem<'_>) {
+pub fn fold_by_test(problem: &mut Problem) {
     problem.folds = Folds {
         kind: FoldKind::Runs,
         count: problem.models.len(),

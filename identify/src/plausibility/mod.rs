@@ -41,7 +41,7 @@ const CHECK_ABOVE_SIGMA: f64 = 5.0;
 const MAX_NAMED: usize = 3;
 
 /// The statements that the readings contradict, and the mistakes that explain it.
-pub fn examine(problem: &Problem<'_>, fit: &Fit) -> Plausibility {
+pub fn examine(problem: &Problem, fit: &Fit) -> Plausibility {
     if !problem.session.instrument.is_two_sided() {
         return of_poses(problem, fit);
     }
@@ -77,7 +77,7 @@ pub fn examine(problem: &Problem<'_>, fit: &Fit) -> Plausibility {
 ///
 /// # Errors
 /// If the fit failed, or nothing is identifiable.
-pub(crate) fn checked(problem: &Problem<'_>, fit: Result<Fit, IdentifyError>) -> Result<Fit, IdentifyError> {
+pub(crate) fn checked(problem: &Problem, fit: Result<Fit, IdentifyError>) -> Result<Fit, IdentifyError> {
     let found = match fit {
         // Noise that is stated may well be larger than anything that the tests show.
         Ok(fit)
@@ -168,7 +168,7 @@ fn one_clause(clauses: &[&str]) -> String {
 }
 
 /// A residual of a hundred times the noise in every test.
-fn residual(problem: &Problem<'_>, fit: &Fit) -> Option<Conflict> {
+fn residual(problem: &Problem, fit: &Fit) -> Option<Conflict> {
     let noise = problem.noise.sigma_mm;
     if problem.noise.source == NoiseSource::Residual || noise <= 0.0 {
         return None;
@@ -197,7 +197,7 @@ fn residual(problem: &Problem<'_>, fit: &Fit) -> Option<Conflict> {
 }
 
 /// Set-up parameters that contradict their statements, or all of them together.
-fn set_ups(problem: &Problem<'_>, pulls: &Pulls) -> Vec<Conflict> {
+fn set_ups(problem: &Problem, pulls: &Pulls) -> Vec<Conflict> {
     let conflicts: Vec<Conflict> = (pulls.contradicted().into_iter())
         .map(|pull| {
             let parameter = &problem.parameters.list[pull.parameter];
@@ -248,7 +248,7 @@ fn symbol(unit: &str) -> &str {
 }
 
 /// Poses: what the model explains of the spread of the measured positions.
-fn of_poses(problem: &Problem<'_>, fit: &Fit) -> Plausibility {
+fn of_poses(problem: &Problem, fit: &Fit) -> Plausibility {
     let three = problem.coordinates() as f64;
     let Some(spread) = poses::spread_mm2(problem) else {
         return Plausibility::default();
@@ -279,7 +279,7 @@ fn of_poses(problem: &Problem<'_>, fit: &Fit) -> Plausibility {
 }
 
 /// Whether any set-up parameter has a stated uncertainty.
-fn has_priors(problem: &Problem<'_>) -> bool {
+fn has_priors(problem: &Problem) -> bool {
     let list = &problem.parameters.list;
     list.iter().any(|parameter| matches!(parameter.prior, Prior::Gaussian(_)))
 }

@@ -4,6 +4,7 @@
 use abbe_model::axis::AxisKind;
 use abbe_model::instrument::Station;
 use abbe_model::session::Session;
+use abbe_model::session::readings::Readings;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -28,7 +29,7 @@ const NOISE_MM: f64 = 1.0;
 /// Mean square of the distances of the positions from their mean, mm²: of those measured, or, where a ball sits in
 /// sockets, of those that the ball would take if the positions of the axes were combined at random. `None` if they do
 /// not scatter.
-pub(super) fn spread_mm2(problem: &Problem<'_>) -> Option<f64> {
+pub(super) fn spread_mm2(problem: &Problem) -> Option<f64> {
     let (mut sum, mut count) = (0.0, 0_usize);
     let mut groups: Vec<&str> = problem.tests.iter().map(|test| test.setup.as_str()).collect();
     groups.sort_unstable();
@@ -41,7 +42,7 @@ pub(super) fn spread_mm2(problem: &Problem<'_>) -> Option<f64> {
             };
             let kept = |row: &usize| !problem.rejected[number][*row];
             if let Station::Socket(_) = test.station {
-                let mut mixed = readings.clone();
+                let mut mixed = Readings::clone(readings);
                 for (axis, column) in mixed.positions.iter_mut().enumerate() {
                     let by = (axis * 7 + 1) % column.len().max(1);
                     column.rotate_left(by);
@@ -62,7 +63,7 @@ pub(super) fn spread_mm2(problem: &Problem<'_>) -> Option<f64> {
 }
 
 /// The mistakes with which the nominal machine fits poses far better, the best first.
-pub(super) fn suggestions(problem: &Problem<'_>) -> Vec<Suggestion> {
+pub(super) fn suggestions(problem: &Problem) -> Vec<Suggestion> {
     let noise = Noise::white(NOISE_MM, NoiseSource::Stated);
     let mut nominal = thinned(problem, MAX_POSES);
     nominal.unknowns.clear();

@@ -58,7 +58,7 @@ pub struct Pulls {
 
 impl Pulls {
     /// Of a fit.
-    pub fn of(problem: &Problem<'_>, fit: &Fit) -> Pulls {
+    pub fn of(problem: &Problem, fit: &Fit) -> Pulls {
         let (places, prior): (Vec<usize>, Vec<f64>) = (problem.parameters.list.iter().enumerate())
             .filter_map(|(j, parameter)| match (parameter.role, parameter.prior) {
                 (Role::Setup, Prior::Gaussian(u)) if fit.rank.is_identifiable(j) => Some((j, u)),
@@ -146,7 +146,7 @@ fn together(covariance: &Mat<f64>, moved: &[f64]) -> (f64, usize) {
 
 /// By how much the noise of an average exceeds what the fit assumes: the readings' own χ² over their degrees of
 /// freedom, where that is above 1, times what the autocorrelation of the residual along a run adds.
-fn excess(problem: &Problem<'_>, fit: &Fit) -> f64 {
+fn excess(problem: &Problem, fit: &Fit) -> f64 {
     let coordinates = problem.coordinates();
     let (mut squares, mut count, mut products, mut pairs) = (0.0, 0_usize, 0.0, 0.0);
     for (number, test) in problem.tests.iter().enumerate() {

@@ -3,6 +3,8 @@
 //! The fit is iterated to its minimum. A freed parameter may be poorly determined; full Gauss–Newton steps then move it
 //! by as much as its prior allows, and the square of such a step exceeds the noise.
 
+use std::sync::Arc;
+
 use abbe_model::session::{Prior, Session};
 
 use crate::fit::{minimum, whole};
@@ -63,8 +65,8 @@ pub(super) fn trial(session: &Session, noise: &Noise) -> Option<Trial> {
 }
 
 /// The session with at most about `most` of its readings, evenly taken, without outliers.
-pub(super) fn thinned(problem: &Problem<'_>, most: usize) -> Session {
-    let mut session = problem.session.clone();
+pub(super) fn thinned(problem: &Problem, most: usize) -> Session {
+    let mut session = Session::clone(&problem.session);
     let each = problem.readings().div_ceil(most).max(1);
     let mut number = 0;
     for test in &mut session.tests {
@@ -73,7 +75,7 @@ pub(super) fn thinned(problem: &Problem<'_>, most: usize) -> Session {
         };
         let kept = &problem.rejected[number];
         let rows: Vec<usize> = (0..readings.rows()).filter(|row| !kept[*row]).step_by(each).collect();
-        *readings = readings.of_rows(&rows);
+        *readings = Arc::new(readings.of_rows(&rows));
         number += 1;
     }
     session

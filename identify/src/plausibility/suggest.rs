@@ -32,7 +32,7 @@ const LOWERED: f64 = 4.0;
 /// A mistake is listed if the readings do not reject it: its χ² exceeds the least χ² of all mistakes by no more than
 /// `allowed`. What the readings do not reject is ordered by evidence, which depends on the prior volume of the
 /// parameters that a mistake frees; that volume decides nothing else.
-pub(super) fn suggestions(problem: &Problem<'_>, conflicts: &[Conflict], allowed: f64) -> Vec<Suggestion> {
+pub(super) fn suggestions(problem: &Problem, conflicts: &[Conflict], allowed: f64) -> Vec<Suggestion> {
     let by_residual = conflicts.is_empty();
     let sigma_mm = problem.noise.sigma_mm;
     let stated = thinned(problem, MAX_READINGS);
@@ -87,7 +87,7 @@ fn trials(stated: &Session, list: Vec<Hypothesis>, sigma_mm: f64) -> (Trial, Vec
 }
 
 /// Whether a mistake is about something whose parameters the readings contradict.
-fn is_contradicted(hypothesis: &Hypothesis, problem: &Problem<'_>, conflicts: &[Conflict]) -> bool {
+fn is_contradicted(hypothesis: &Hypothesis, problem: &Problem, conflicts: &[Conflict]) -> bool {
     let group = |id: &str| id.split_once('[').map(|(_, group)| group.trim_end_matches(']').to_string());
     let test = problem.tests.iter().find(|test| test.name == hypothesis.subject);
     conflicts.iter().any(|conflict| match (hypothesis.kind, test) {

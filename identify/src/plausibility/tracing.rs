@@ -32,7 +32,7 @@ pub(crate) fn is_another_session(plausibility: &Plausibility) -> bool {
 /// # Errors
 /// If the freed problem cannot be fitted.
 pub(crate) fn with_set_ups_freed(
-    problem: &mut Problem<'_>,
+    problem: &mut Problem,
     before: &Fit,
 ) -> Result<Option<(Vec<String>, Fit)>, IdentifyError> {
     if !has_priors(problem) {

@@ -1,6 +1,7 @@
 //! Readings of a probe as linear equations in four functions of an angle.
 
 use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{BodyErrors, ERRORS_PER_AXIS};
@@ -123,7 +124,7 @@ impl Equations {
                 session.instrument.word()
             )));
         }
-        let tests: Vec<&Test> = session.tests.iter().filter(|test| test.readings.is_some()).collect();
+        let tests: Vec<Test> = session.tests.iter().filter(|test| test.readings.is_some()).cloned().collect();
         let Some(first) = tests.first() else {
             return Err(IdentifyError::NoReadings);
         };
@@ -198,7 +199,7 @@ impl Equations {
             return Ok(Vec::new());
         };
         let machine = &session.machine;
-        let model = TestModel::new(machine, test.station.clone(), readings);
+        let model = TestModel::new(Arc::clone(machine), test.station.clone(), readings);
         let motions = self.axis * ERRORS_PER_AXIS + 6;
         let slots = [motions + self.across[0], motions + self.across[1], machine.error_slots() + FORM];
         let touched: Vec<TouchAngles> =
@@ -239,7 +240,7 @@ impl Equations {
         &self,
         machine: &abbe_model::chain::Machine,
         probe: &Probe<f64>,
-        model: &TestModel<'_>,
+        model: &TestModel,
         row: usize,
     ) -> TouchAngles {
         let state = &model.state(row);
@@ -280,7 +281,7 @@ struct TouchAngles {
 }
 
 /// The rotary axis that turns under the artefact.
-fn turning_axis(session: &Session, tests: &[&Test]) -> Result<usize, String> {
+fn turning_axis(session: &Session, tests: &[Test]) -> Result<usize, String> {
     let machine = &session.machine;
     let moves = |axis: usize| {
         tests.iter().filter_map(|test| test.readings.as_ref()).any(|readings| {

@@ -82,7 +82,7 @@ pub struct SessionSeries {
 
 impl SessionSeries {
     /// Root mean square of the residual of the model before over the scalar readings that are not excluded, µm.
-    pub fn rms_before_um(&self, problem: &Problem<'_>) -> f64 {
+    pub fn rms_before_um(&self, problem: &Problem) -> f64 {
         let before: Vec<Vec<f64>> = self.tests.iter().map(|test| test.before_um.clone()).collect();
         rms_mm(problem, &before)
     }
@@ -95,7 +95,7 @@ impl SessionSeries {
 }
 
 /// The shares of a fit: each identified error, each effect, the set-up, and the confounded parameters.
-fn shares(problem: &Problem<'_>, fit: &Fit) -> Vec<Share> {
+fn shares(problem: &Problem, fit: &Fit) -> Vec<Share> {
     let mut shares: Vec<Share> = Vec::new();
     let mut add = |id: &str, cause: Cause, unknown: usize| match shares.iter_mut().find(|share| share.id == id) {
         Some(share) => share.unknowns.push(unknown),
@@ -119,7 +119,7 @@ fn shares(problem: &Problem<'_>, fit: &Fit) -> Vec<Share> {
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn views(problem: &Problem<'_>, fit: &Fit, before_mm: Option<&[Vec<f64>]>) -> Result<SessionSeries, IdentifyError> {
+pub fn views(problem: &Problem, fit: &Fit, before_mm: Option<&[Vec<f64>]>) -> Result<SessionSeries, IdentifyError> {
     let shares = shares(problem, fit);
     let three = problem.coordinates() == 3;
     let nominal_mm = problem.residuals(&vec![0.0; fit.beta.len()]);
@@ -159,7 +159,7 @@ pub fn views(problem: &Problem<'_>, fit: &Fit, before_mm: Option<&[Vec<f64>]>) -
 }
 
 /// `J_k β_k` of every share, µm, by test.
-fn shares_of_readings(problem: &Problem<'_>, fit: &Fit, shares: &[Share]) -> Result<Vec<Vec<Vec<f64>>>, IdentifyError> {
+fn shares_of_readings(problem: &Problem, fit: &Fit, shares: &[Share]) -> Result<Vec<Vec<Vec<f64>>>, IdentifyError> {
     let coordinates = problem.coordinates();
     let values = problem.slot_values(&fit.beta);
     let mut of_tests: Vec<Vec<Vec<f64>>> =
@@ -188,7 +188,7 @@ pub fn lengths(values: &[f64], coordinates: usize) -> Vec<f64> {
 
 /// Correlation matrix of the identified errors and effects' coefficients, with identifiers, row by row. Set-up
 /// parameters and confounded parameters are excluded.
-pub fn correlation(problem: &Problem<'_>, fit: &Fit) -> (Vec<String>, Vec<Vec<f64>>) {
+pub fn correlation(problem: &Problem, fit: &Fit) -> (Vec<String>, Vec<Vec<f64>>) {
     let list = &problem.parameters.list;
     let chosen: Vec<usize> = (0..list.len())
         .filter(|j| list[*j].role != Role::Setup && fit.rank.is_identifiable(*j) && fit.covariance[(*j, *j)] > 0.0)

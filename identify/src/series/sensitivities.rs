@@ -47,7 +47,7 @@ pub struct Sensitivity {
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn sensitivities(problem: &Problem<'_>, beta: &[f64]) -> Result<Vec<TestSensitivities>, IdentifyError> {
+pub fn sensitivities(problem: &Problem, beta: &[f64]) -> Result<Vec<TestSensitivities>, IdentifyError> {
     let values = problem.slot_values(beta);
     let coordinates = problem.coordinates();
     let list = &problem.parameters.list;
@@ -95,7 +95,7 @@ pub fn sensitivities(problem: &Problem<'_>, beta: &[f64]) -> Result<Vec<TestSens
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn over_poses(problem: &Problem<'_>, beta: &[f64]) -> Result<Vec<Sensitivity>, IdentifyError> {
+pub fn over_poses(problem: &Problem, beta: &[f64]) -> Result<Vec<Sensitivity>, IdentifyError> {
     let values = problem.slot_values(beta);
     let list = &problem.parameters.list;
     let mut squares = vec![0.0; list.len()];

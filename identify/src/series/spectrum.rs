@@ -66,7 +66,7 @@ fn explained(basis: &[[f64; 3]], values: &[f64], coordinates: usize) -> f64 {
 }
 
 /// The spectra of a session: each test over its angular abscissa, poses over every rotary axis.
-pub fn spectra(problem: &Problem<'_>, views: &SessionSeries) -> Vec<Spectrum> {
+pub fn spectra(problem: &Problem, views: &SessionSeries) -> Vec<Spectrum> {
     let machine = &problem.session.machine;
     let coordinates = views.coordinates;
     let of = |of: &str, over: &str, angle: &[f64], before: &[f64], after: &[f64]| Spectrum {

@@ -12,20 +12,20 @@ use crate::problem::Problem;
 use crate::results::{Remainder, TraceResult};
 
 /// The contradictions between the readings and a session.
-pub(super) struct Contradicted<'a> {
+pub(super) struct Contradicted {
     plausibility: Plausibility,
     /// Identifiers of the set-up parameters whose stated values are contradicted.
     parameters: Vec<String>,
     /// The problem without the priors of these parameters, and its fit. `None` if no set-up value is contradicted.
-    pub freed: Option<(Problem<'a>, Fit)>,
+    pub freed: Option<(Problem, Fit)>,
 }
 
-impl<'a> Contradicted<'a> {
+impl Contradicted {
     /// Examines a fit for contradictions.
     ///
     /// # Errors
     /// If the problem cannot be fitted without the set-up priors.
-    pub fn of(problem: &Problem<'a>, fit: &Fit) -> Result<Contradicted<'a>, IdentifyError> {
+    pub fn of(problem: &Problem, fit: &Fit) -> Result<Contradicted, IdentifyError> {
         let mut contradicted =
             Contradicted { plausibility: plausibility::examine(problem, fit), parameters: Vec::new(), freed: None };
         let mut freed = problem.clone();
@@ -42,12 +42,7 @@ impl<'a> Contradicted<'a> {
     ///
     /// # Errors
     /// If the model with the effects cannot be fitted.
-    pub fn contradicted_by(
-        &self,
-        problem: &Problem<'a>,
-        fitted: &Fit,
-        effects: &[Effect],
-    ) -> Result<bool, IdentifyError> {
+    pub fn contradicted_by(&self, problem: &Problem, fitted: &Fit, effects: &[Effect]) -> Result<bool, IdentifyError> {
         if effects.is_empty() {
             return Ok(true);
         }
@@ -81,7 +76,7 @@ impl<'a> Contradicted<'a> {
     }
 
     /// The trace that ends before its search.
-    pub fn outcome_without_search(&self, problem: Problem<'a>, fit: Fit) -> TraceOutcome<'a> {
+    pub fn outcome_without_search(&self, problem: Problem, fit: Fit) -> TraceOutcome {
         let mut result = TraceResult {
             verdict: "unexplained".to_string(),
             remainder: Remainder {

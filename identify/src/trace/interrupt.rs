@@ -45,16 +45,16 @@ impl TraceResult {
     }
 }
 
-impl<'a> TraceOutcome<'a> {
+impl<'a> TraceOutcome {
     /// A trace that was interrupted before its search began. It contains the declared model only.
-    pub(super) fn unsearched(problem: Problem<'a>, fit: Fit) -> TraceOutcome<'a> {
+    pub(super) fn unsearched(problem: Problem, fit: Fit) -> TraceOutcome {
         let mut result = unsearched(&problem, &fit);
         result.mark_interrupted();
         TraceOutcome::of_declared(problem, fit, result)
     }
 
     /// A trace that contains the declared model only, with its result.
-    pub(super) fn of_declared(problem: Problem<'a>, fit: Fit, result: TraceResult) -> TraceOutcome<'a> {
+    pub(super) fn of_declared(problem: Problem, fit: Fit, result: TraceResult) -> TraceOutcome {
         TraceOutcome {
             after: problem.clone(),
             after_fit: fit.clone(),

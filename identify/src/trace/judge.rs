@@ -14,24 +14,24 @@ use crate::noise::NoiseSource;
 use crate::problem::Problem;
 
 /// The refitted model with the selected effects, and the remaining structure.
-pub(super) struct RefittedModel<'a> {
-    pub after: Problem<'a>,
+pub(super) struct RefittedModel {
+    pub after: Problem,
     pub after_fit: Fit,
     pub effects: Vec<Effect>,
     /// Remaining structure. `None` if the residual of the declared model was not tested either.
     pub structure: Option<Structure>,
 }
 
-impl<'a> RefittedModel<'a> {
+impl RefittedModel {
     /// Refits with the selected effects of a search. `structure_before` is the structure in the residual of the
     /// declared model.
     pub fn of(
-        problem: &Problem<'a>,
+        problem: &Problem,
         before_fit: &Fit,
         search: &Search<'_>,
         options: &TraceOptions,
         structure_before: Option<&Structure>,
-    ) -> Result<RefittedModel<'a>, IdentifyError> {
+    ) -> Result<RefittedModel, IdentifyError> {
         let effects: Vec<Effect> = selected_effects(search).cloned().collect();
         if effects.is_empty() {
             return Ok(RefittedModel {
@@ -43,7 +43,7 @@ impl<'a> RefittedModel<'a> {
         }
         // Noise, outliers and rank are determined anew, as in a fit of a session that declares these effects. The
         // residual of the declared model contains the effects and overstates the noise.
-        let (mut after, mut after_fit) = prepare_with(problem.session, &effects, options.seed)?;
+        let (mut after, mut after_fit) = prepare_with(&problem.session, &effects, options.seed)?;
         if noise_is_from_residual(problem, &after) {
             after.noise = problem.noise.clone();
             after_fit = fit(&after, Some(&after_fit.beta))?;
@@ -72,14 +72,14 @@ fn selected_effects<'s>(search: &'s Search<'_>) -> impl Iterator<Item = &'s Effe
 
 /// Whether the search used a noise model from repeats along runs that differs from that of a fit: autocorrelated, or
 /// with another standard deviation.
-fn noise_is_from_residual(search: &Problem<'_>, fit: &Problem<'_>) -> bool {
+fn noise_is_from_residual(search: &Problem, fit: &Problem) -> bool {
     let (of_search, of_fit) = (&search.noise, &fit.noise);
     let of_one_size = (of_search.sigma_mm / of_fit.sigma_mm - 1.0).abs() < SCATTER;
     of_search.source == NoiseSource::Repeats && !(of_search.ar_coefficients.is_empty() && of_one_size)
 }
 
 /// The remaining structure in the residual of a fit.
-fn remaining_structure(problem: &Problem<'_>, fit: &Fit, options: &TraceOptions) -> Result<Structure, IdentifyError> {
+fn remaining_structure(problem: &Problem, fit: &Fit, options: &TraceOptions) -> Result<Structure, IdentifyError> {
     let columns = Columns::new(problem, &fit.beta);
     let start = Start::of(problem, &columns, fit)?;
     let (count, seed) = (null_draw_count(options), options.seed.wrapping_add(1));

@@ -121,13 +121,13 @@ pub struct SearchStep {
 }
 
 /// The outcome of a trace: the models before and after, and the result.
-pub struct TraceOutcome<'a> {
+pub struct TraceOutcome {
     /// The declared model.
-    pub before: Problem<'a>,
+    pub before: Problem,
     /// The fit of the declared model.
     pub before_fit: Fit,
     /// The model with the found effects.
-    pub after: Problem<'a>,
+    pub after: Problem,
     /// The fit of the model with the found effects.
     pub after_fit: Fit,
     /// The found effects.
@@ -154,7 +154,7 @@ pub fn trace<'a>(
     session: &'a Session,
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
-) -> Result<TraceOutcome<'a>, IdentifyError> {
+) -> Result<TraceOutcome, IdentifyError> {
     progress(Progress::Fitting);
     let (problem, fitted) = prepare(session, options.seed)?;
     let contradicted = Contradicted::of(&problem, &fitted)?;
@@ -179,11 +179,11 @@ pub fn trace<'a>(
 /// Searches with the noise model estimated from repeats. Searches once more if the found effects change that noise
 /// model.
 fn with_noise_of_repeats<'a>(
-    mut problem: Problem<'a>,
+    mut problem: Problem,
     mut before_fit: Fit,
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
-) -> Result<TraceOutcome<'a>, IdentifyError> {
+) -> Result<TraceOutcome, IdentifyError> {
     if estimate_noise_model(&mut problem, &before_fit.residuals) {
         before_fit = fit(&problem, Some(&before_fit.beta))?;
     }
@@ -210,12 +210,12 @@ fn with_noise_of_repeats<'a>(
 
 /// Traces with a given noise model. The null distribution is drawn from the repeats in the residuals `pure`.
 fn trace_with<'a>(
-    problem: Problem<'a>,
+    problem: Problem,
     before_fit: Fit,
     pure: &[Vec<f64>],
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
-) -> Result<TraceOutcome<'a>, IdentifyError> {
+) -> Result<TraceOutcome, IdentifyError> {
     match trace_or_interrupted(&problem, &before_fit, pure, options, progress) {
         Err(IdentifyError::Interrupted) => Ok(TraceOutcome::unsearched(problem, before_fit)),
         traced => traced,
@@ -225,12 +225,12 @@ fn trace_with<'a>(
 /// Traces with a given noise model, and returns [`IdentifyError::Interrupted`] if it was interrupted before the search
 /// began.
 fn trace_or_interrupted<'a>(
-    problem: &Problem<'a>,
+    problem: &Problem,
     before_fit: &Fit,
     pure: &[Vec<f64>],
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
-) -> Result<TraceOutcome<'a>, IdentifyError> {
+) -> Result<TraceOutcome, IdentifyError> {
     let interrupt = Interrupt(progress);
     interrupt.check()?;
     let poses = problem.folds.kind == FoldKind::Poses;
@@ -331,8 +331,8 @@ fn trace_or_interrupted<'a>(
 fn search_and_refit<'a>(
     search: &mut Search<'_>,
     record: &mut SearchRecord<'_>,
-    judge: impl Fn(&Search<'_>) -> Result<RefittedModel<'a>, IdentifyError>,
-) -> Result<(f64, RefittedModel<'a>), IdentifyError> {
+    judge: impl Fn(&Search<'_>) -> Result<RefittedModel, IdentifyError>,
+) -> Result<(f64, RefittedModel), IdentifyError> {
     let mut ended = search_on(search, record)?;
     (record.progress)(Progress::Judging);
     let mut judged = judge(search)?;

@@ -9,7 +9,7 @@ pub(super) const SCATTER: f64 = 0.02;
 
 /// Sets the noise standard deviation and autocorrelation from repeats, if there are enough. Returns whether this
 /// changed them by more than their sampling scatter.
-pub(super) fn estimate_noise_model(problem: &mut Problem<'_>, residuals: &[Vec<f64>]) -> bool {
+pub(super) fn estimate_noise_model(problem: &mut Problem, residuals: &[Vec<f64>]) -> bool {
     if problem.folds.kind == FoldKind::Poses {
         return false;
     }

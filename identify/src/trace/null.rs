@@ -33,8 +33,8 @@ const SMOOTHING: usize = 7;
 
 /// Null draws (whitened rows in fold order × draws), in blocks of `block` readings.
 pub fn draws(
-    problem: &Problem<'_>,
-    columns: &Columns<'_, '_>,
+    problem: &Problem,
+    columns: &Columns<'_>,
     residuals: &[Vec<f64>],
     whitened: &[f64],
     count: usize,
@@ -58,7 +58,7 @@ pub fn draws(
 }
 
 /// The residual with a random sign for each pose.
-fn sign_flipped(columns: &Columns<'_, '_>, whitened: &[f64], count: usize, generator: &mut Pcg64) -> Mat<f64> {
+fn sign_flipped(columns: &Columns<'_>, whitened: &[f64], count: usize, generator: &mut Pcg64) -> Mat<f64> {
     let origins = columns.origin_of_rows();
     let mut draws = Mat::zeros(columns.rows(), count);
     for draw in 0..count {
@@ -126,7 +126,7 @@ fn with_noise_spectrum(values: &mut [f64], noise: &Noise, generator: &mut Pcg64)
 }
 
 /// Whitened deviations without structure, of unit variance, in uninterrupted stretches.
-fn pool(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> Vec<Vec<f64>> {
+fn pool(problem: &Problem, residuals: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let kept = |test: usize, row: usize| !problem.rejected[test][row];
     let pure = PureError::of(&problem.tests, residuals, kept).without_waves(&problem.tests, kept);
     let repeats = pure.freedom >= MIN_POOL;

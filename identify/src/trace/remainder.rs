@@ -47,7 +47,7 @@ struct Detector {
     description: String,
 }
 
-fn detectors(problem: &Problem<'_>, columns: &Columns<'_, '_>) -> Vec<Detector> {
+fn detectors(problem: &Problem, columns: &Columns<'_>) -> Vec<Detector> {
     let machine = &problem.session.machine;
     let mut detectors = Vec::new();
     for (number, test) in problem.tests.iter().enumerate() {
@@ -67,15 +67,15 @@ fn detectors(problem: &Problem<'_>, columns: &Columns<'_, '_>) -> Vec<Detector> 
 }
 
 /// Collects the detectors of one test.
-struct TestResidual<'t, 'p, 'a> {
-    columns: &'t Columns<'p, 'a>,
+struct TestResidual<'t, 'p> {
+    columns: &'t Columns<'p>,
     number: usize,
     name: &'t str,
     readings: &'t Readings,
     detectors: Vec<Detector>,
 }
 
-impl TestResidual<'_, '_, '_> {
+impl TestResidual<'_, '_> {
     /// Adds a shape over each coordinate of the readings.
     fn add(&mut self, driver: &Driver, shape: Shape, description: String) {
         self.add_confined(driver, shape, false, None, description);
@@ -192,8 +192,8 @@ fn curve(from: f64, to: f64, intervals: usize) -> Shape {
 /// # Errors
 /// If products are not finite.
 pub fn structure(
-    problem: &Problem<'_>,
-    columns: &Columns<'_, '_>,
+    problem: &Problem,
+    columns: &Columns<'_>,
     model: faer::Mat<f64>,
     residual: &[f64],
     null: faer::Mat<f64>,

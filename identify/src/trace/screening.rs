@@ -60,8 +60,8 @@ pub fn screened_effects(session: &Session, options: &TraceOptions) -> Result<Vec
 /// # Errors
 /// If a requested string occurs in no identifier: a misspelt string would otherwise look like an absent effect.
 pub(super) fn searched_candidates(
-    problem: &Problem<'_>,
-    columns: &Columns<'_, '_>,
+    problem: &Problem,
+    columns: &Columns<'_>,
     options: &TraceOptions,
 ) -> Result<Vec<(Candidate, EffectColumns)>, IdentifyError> {
     let mut candidates = library::candidates(problem)?;
@@ -83,7 +83,7 @@ pub(super) fn searched_candidates(
 }
 
 /// A warning for each exclusion that matches no candidate.
-pub(super) fn unused_exclusions(problem: &Problem<'_>, options: &TraceOptions) -> Result<Vec<String>, IdentifyError> {
+pub(super) fn unused_exclusions(problem: &Problem, options: &TraceOptions) -> Result<Vec<String>, IdentifyError> {
     let candidates = library::candidates(problem)?;
     Ok(matching_no_candidate(&candidates, &options.exclude)
         .map(|text| format!("`{text}` excludes nothing: no candidate of this session has it in its identifier"))

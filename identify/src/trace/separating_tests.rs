@@ -21,7 +21,7 @@ const MAX_COMPARED_TESTS: usize = 24;
 /// # Errors
 /// If the basis columns of an effect cannot be computed for the session.
 pub fn separate_aliases(
-    trace: &mut TraceOutcome<'_>,
+    trace: &mut TraceOutcome,
     variations: &TestVariations,
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<(), IdentifyError> {
@@ -31,7 +31,7 @@ pub fn separate_aliases(
     let interrupt = Interrupt(progress);
     for k in 0..trace.effects.len() {
         match interrupt.check().and_then(|()| tests_for(trace, k, variations)) {
-            Ok(tests) => fill_in(&mut trace.result.effects[k], &trace.alias_effects[k], trace.after.session, tests),
+            Ok(tests) => fill_in(&mut trace.result.effects[k], &trace.alias_effects[k], &trace.after.session, tests),
             Err(IdentifyError::Request(_)) => break,
             Err(IdentifyError::Interrupted) => break,
             Err(error) => return Err(error),
@@ -45,7 +45,7 @@ pub fn separate_aliases(
 
 /// The tests that separate the `k`-th found effect from its aliases.
 fn tests_for(
-    trace: &TraceOutcome<'_>,
+    trace: &TraceOutcome,
     k: usize,
     variations: &TestVariations,
 ) -> Result<Vec<SeparatingTest>, IdentifyError> {

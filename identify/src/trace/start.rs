@@ -27,7 +27,7 @@ pub(super) struct Start {
 
 impl Start {
     /// Computes the start from a fit, whose triangular factors contain the readings.
-    pub fn of(problem: &Problem<'_>, columns: &Columns<'_, '_>, fit: &Fit) -> Result<Start, IdentifyError> {
+    pub fn of(problem: &Problem, columns: &Columns<'_>, fit: &Fit) -> Result<Start, IdentifyError> {
         let parameters = fit.beta.len();
         let basis = &fit.rank.identifiable_basis;
         let rank = basis.ncols();
@@ -50,7 +50,7 @@ impl Start {
     /// The same model and residual without whitening.
     pub fn unwhitened(
         &self,
-        columns: &Columns<'_, '_>,
+        columns: &Columns<'_>,
         beta: &[f64],
         sigma_mm: f64,
     ) -> Result<UnwhitenedModel, IdentifyError> {

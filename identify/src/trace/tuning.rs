@@ -31,7 +31,7 @@ struct EffectProducts {
 impl TunedEffect {
     /// Computes the columns of an effect and their products.
     pub fn new(
-        columns: &Columns<'_, '_>,
+        columns: &Columns<'_>,
         moments: &Moments,
         column_set: &EffectColumns,
         model: &TrainedModel<'_>,

@@ -14,6 +14,7 @@ mod page;
 mod poses;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use abbe_model::driver::Driver;
 use abbe_model::effect::shape::Warmup;
@@ -54,7 +55,7 @@ fn session(toml: &str) -> Session {
     let planned = planned_session(&session).unwrap();
     for (test, mut readings) in session.tests.iter_mut().zip(planned) {
         readings.temperature_c = readings.time_s.iter().map(|time_s| 20.0 + time_s / 3600.0).collect();
-        test.readings = Some(readings);
+        test.readings = Some(Arc::new(readings));
     }
     session
 }

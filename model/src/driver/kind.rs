@@ -26,7 +26,7 @@ pub struct DriverInput<'a> {
     /// The machine.
     pub machine: &'a Machine,
     /// The chain and the instrument of the test.
-    pub model: &'a TestModel<'a>,
+    pub model: &'a TestModel,
     /// The readings of the test.
     pub readings: &'a Readings,
     /// Reference time and temperature of the session.

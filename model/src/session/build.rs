@@ -34,6 +34,8 @@
 //! # Ok::<(), abbe_model::ModelError>(())
 //! ```
 
+use std::sync::Arc;
+
 use super::check;
 use super::columns::{Columns, axis_index, number};
 use super::expression::Length;
@@ -48,7 +50,7 @@ impl Session {
     pub fn new(machine: Machine, instrument: InstrumentKind) -> Session {
         Session {
             unknowns: instrument.default_errors(&machine),
-            machine,
+            machine: Arc::new(machine),
             constants: Vec::new(),
             instrument,
             noise_mm: None,
@@ -221,7 +223,7 @@ impl NewTest {
             }
         };
         warnings.extend(setups::differing(&session.tests, &test));
-        test.readings = readings;
+        test.readings = readings.map(Arc::new);
         Ok((test, warnings))
     }
 

@@ -17,6 +17,8 @@ mod runs;
 pub(crate) mod setups;
 pub(crate) mod trajectory;
 
+use std::sync::Arc;
+
 use crate::chain::Machine;
 use crate::component::ErrorName;
 use crate::driver::Origin;
@@ -28,7 +30,7 @@ use readings::Readings;
 #[derive(Clone, Debug)]
 pub struct Session {
     /// The machine.
-    pub machine: Machine,
+    pub machine: Arc<Machine>,
     /// Named lengths in the order of the file, mm.
     pub constants: Vec<(String, f64)>,
     /// The instrument.
@@ -55,7 +57,7 @@ pub struct Session {
 impl Session {
     /// Reference time and temperature, from which the drivers of effects count.
     pub fn origin(&self) -> Origin {
-        Origin::of(self.tests.iter().filter_map(|test| test.readings.as_ref()))
+        Origin::of(self.tests.iter().filter_map(|test| test.readings.as_deref()))
     }
 }
 
@@ -85,7 +87,7 @@ pub struct Test {
     /// The same as expressions, for linear axes stated in mm; equations keep them as symbols.
     pub at_written: Vec<Option<expression::Length>>,
     /// The measured readings.
-    pub readings: Option<Readings>,
+    pub readings: Option<Arc<Readings>>,
 }
 
 impl Test {

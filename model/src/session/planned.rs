@@ -52,7 +52,7 @@ pub(crate) fn checked_plan(machine: &Machine, test: &Test) -> Result<Readings, (
                     "add `sweep = { … }` or `path = { … }`, or read its data".into(),
                 ));
             };
-            return Ok(data.clone());
+            return Ok(Readings::clone(data));
         }
         Some(motion) => trajectory::states(machine, test, motion)?,
     };

@@ -90,7 +90,7 @@ fn is_angle(machine: &Machine, kind: InstrumentKind, slot: usize) -> bool {
 fn worst(machine: &Machine, station: Station<f64>, random: &mut impl Rng) -> f64 {
     let readings = states(machine, 6, random);
     let kind = station.kind();
-    let model = TestModel::new(machine, station, &readings);
+    let model = TestModel::new(machine.clone(), station, &readings);
     let slots: Vec<usize> = (0..model.slots()).collect();
     let values = errors(model.slots(), machine, kind, random);
     let found = model.sensitivities(&values, &slots, 0..model.rows());
@@ -145,7 +145,7 @@ fn worst_against_duals(machine: &Machine, station: Station<f64>, random: &mut im
     // An axis that does not move is a constant of the recording.
     readings.positions[machine.axes.len() - 1].fill(0.3);
     let kind = station.kind();
-    let model = TestModel::new(machine, station.clone(), &readings);
+    let model = TestModel::new(machine.clone(), station.clone(), &readings);
     let size = |slot: usize| if is_angle(machine, kind, slot) { 0.1 } else { 10.0 };
     let mut values = SlotValues::zero(model.slots());
     for slot in 0..model.slots() {
@@ -217,7 +217,7 @@ fn the_first_order_of_the_bar_is_the_closed_form() {
             readings.positions[machine.axis_index(axis).unwrap()].fill(0.0);
         }
         let station = ball_bar([0.0, r, h], [-d, 0.0, 0.0]);
-        let model = TestModel::new(&machine, station, &readings);
+        let model = TestModel::new(machine.clone(), station, &readings);
         let found = model.sensitivities(&SlotValues::zero(model.slots()), &slots, 0..model.rows());
         for row in 0..model.rows() {
             let (sc, cc) = readings.positions[machine.axis_index("C").unwrap()][row].sin_cos();

@@ -1,5 +1,7 @@
 //! Properties of readings of random tests and of their derivatives.
 
+use std::sync::Arc;
+
 use abbe_model::axis::AxisKind;
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::instrument::rtest::{RTest, Setting};
@@ -62,8 +64,8 @@ fn tests() -> impl Strategy<Value = DrawnTest> {
 }
 
 impl DrawnTest {
-    fn model(&self) -> TestModel<'_> {
-        TestModel::new(&self.drawn.machine, self.station.clone(), &self.readings)
+    fn model(&self) -> TestModel {
+        TestModel::new(Arc::new(self.drawn.machine.clone()), self.station.clone(), &self.readings)
     }
 }
 

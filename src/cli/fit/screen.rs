@@ -14,7 +14,7 @@ use crate::cli::{SessionArguments, circular, plausibility, table};
 const MIN_RATIO: f64 = 0.5;
 
 /// Prints the result of a fit of a session. With `all`, no list is folded.
-pub fn print(problem: &Problem<'_>, fit: &Fit, result: &FitResult, session: &SessionArguments, all: bool) {
+pub fn print(problem: &Problem, fit: &Fit, result: &FitResult, session: &SessionArguments, all: bool) {
     plausibility::print(&result.plausibility);
     quality(result);
     let estimates = Estimates::new(problem, fit, &result.parameters, |_| false);
@@ -101,7 +101,7 @@ fn print_drawn(drawn: &FitMonteCarlo, estimates: &Estimates<'_>, all: bool) {
 }
 
 /// What to do next.
-fn next(problem: &Problem<'_>, result: &FitResult, session: &SessionArguments) -> Vec<Step> {
+fn next(problem: &Problem, result: &FitResult, session: &SessionArguments) -> Vec<Step> {
     let mut steps: Vec<Step> = Vec::new();
     if !result.plausibility.conflicts.is_empty() {
         steps.push(("correct the session".into(), "the readings contradict it".into()));

@@ -170,7 +170,7 @@ impl ImproveArguments {
     }
 
     /// Proposes tests.
-    pub fn run(&self, problem: &Problem<'_>) -> Result<Improvement, Failure> {
+    pub fn run(&self, problem: &Problem) -> Result<Improvement, Failure> {
         let candidates = self.candidate_tests()?;
         let by_minute = self.by_minute();
         if let Some(pair) = &self.separate {
@@ -208,7 +208,7 @@ fn not_negative(flag: &str, value: f64) -> Result<f64, Failure> {
 }
 
 /// Adds an effect of the library by its identifier.
-fn add(problem: &mut Problem<'_>, id: &str) -> Result<(), IdentifyError> {
+fn add(problem: &mut Problem, id: &str) -> Result<(), IdentifyError> {
     if problem.parameters.effects.iter().any(|effect| effect.id() == id) {
         return Ok(());
     }

@@ -10,7 +10,7 @@ use crate::cli::{SessionArguments, plausibility, table, uniqueness};
 use crate::present::effect::name;
 
 /// Prints the result of a trace of a session. With `all`, no list is folded.
-pub fn print(trace: &TraceOutcome<'_>, session: &SessionArguments, all: bool) {
+pub fn print(trace: &TraceOutcome, session: &SessionArguments, all: bool) {
     let result = &trace.result;
     verdict(result);
     plausibility::print(&result.plausibility);

@@ -1,5 +1,7 @@
 //! Draws errors and set-ups and simulates the readings with the plant.
 
+use std::sync::Arc;
+
 use abbe::model::session::planned::planned_session;
 use abbe::model::session::{Prior, Session, Test};
 use rand::SeedableRng;
@@ -80,7 +82,7 @@ pub fn draw(code: &str, plan: &Session, seed: u64, noise_um: f64) -> DrawnSessio
             }
             readings.observed[row] = length;
         }
-        test.readings = Some(readings);
+        test.readings = Some(Arc::new(readings));
     }
     DrawnSession { values, measured }
 }

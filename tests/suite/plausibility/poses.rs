@@ -1,5 +1,7 @@
 //! Poses of the UR10 whose columns are misread.
 
+use std::sync::Arc;
+
 use abbe::identify::IdentifyError;
 use abbe::identify::fit::{prepare, report};
 use abbe::identify::plausibility::{ConflictKind, SuggestionKind};
@@ -109,7 +111,7 @@ fn a_joint_of_the_opposite_sign_is_named() {
     let machine_sign = |axis: usize| {
         let mut session = ur10(test, |text| text)?;
         let direction = session.machine.axes[axis].direction;
-        session.machine.axes[axis].direction = direction.map(|along| -along);
+        Arc::make_mut(&mut session.machine).axes[axis].direction = direction.map(|along| -along);
         Some(session)
     };
     for axis in 1..5 {

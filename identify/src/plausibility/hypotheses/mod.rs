@@ -2,6 +2,8 @@
 
 mod set_ups;
 
+use std::sync::Arc;
+
 use abbe_model::axis::AxisKind;
 use abbe_model::session::{Session, Test};
 
@@ -38,7 +40,7 @@ pub(super) fn of_two_sides(session: &Session) -> Vec<Hypothesis> {
 pub(super) fn with_readings(session: &Session, change: impl Fn(&Test, &mut Vec<Vec<f64>>, &mut Vec<f64>)) -> Session {
     let mut changed = session.clone();
     for (test, stated) in changed.tests.iter_mut().zip(&session.tests) {
-        if let Some(readings) = &mut test.readings {
+        if let Some(readings) = test.readings.as_mut().map(Arc::make_mut) {
             change(stated, &mut readings.positions, &mut readings.observed);
         }
     }
@@ -57,7 +59,7 @@ fn axes(session: &Session) -> Vec<Hypothesis> {
     let mut list = Vec::new();
     for &k in &used {
         let mut changed = session.clone();
-        changed.machine.axes[k].direction = machine.axes[k].direction.map(|along| -along);
+        Arc::make_mut(&mut changed.machine).axes[k].direction = machine.axes[k].direction.map(|along| -along);
         let name = &machine.axes[k].name;
         list.push(Hypothesis::new(
             SuggestionKind::AxisReversed,
@@ -70,13 +72,13 @@ fn axes(session: &Session) -> Vec<Hypothesis> {
     for (place, &first) in rotary.iter().enumerate() {
         for &second in &rotary[place + 1..] {
             let mut changed = session.clone();
-            changed.machine.axes.swap(first, second);
+            Arc::make_mut(&mut changed.machine).axes.swap(first, second);
             for test in &mut changed.tests {
                 test.at.swap(first, second);
                 if test.at_written.len() > second {
                     test.at_written.swap(first, second);
                 }
-                if let Some(readings) = &mut test.readings {
+                if let Some(readings) = test.readings.as_mut().map(Arc::make_mut) {
                     readings.positions.swap(first, second);
                 }
             }

@@ -1,5 +1,7 @@
 //! Mistakes in the statements about balls, bars and readings.
 
+use std::sync::Arc;
+
 use abbe_model::instrument::Station;
 use abbe_model::session::{Prior, Session, Test};
 
@@ -88,7 +90,9 @@ pub(super) fn readings(session: &Session) -> Vec<Hypothesis> {
     for set in sets {
         let mut changed = session.clone();
         for test in &mut changed.tests {
-            let (Station::BallBar(bar), Some(readings)) = (&mut test.station, &mut test.readings) else {
+            let (Station::BallBar(bar), Some(readings)) =
+                (&mut test.station, test.readings.as_mut().map(Arc::make_mut))
+            else {
                 continue;
             };
             if set.contains(&bar.bar) {

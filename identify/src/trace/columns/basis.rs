@@ -60,7 +60,7 @@ pub(super) enum TermTarget {
     Reading(usize),
 }
 
-impl Columns<'_, '_> {
+impl Columns<'_> {
     /// Computes the basis columns of an effect. `None` if the data lack its driver.
     pub fn effect_columns(&self, effect: &Effect) -> Option<EffectColumns> {
         self.compute(effect, true)
@@ -72,7 +72,7 @@ impl Columns<'_, '_> {
     }
 
     fn compute(&self, effect: &Effect, keep: bool) -> Option<EffectColumns> {
-        let session = self.problem.session;
+        let session = &self.problem.session;
         let mut terms = Vec::new();
         for (number, test) in self.problem.tests.iter().enumerate() {
             let mut of_test = Vec::new();

@@ -24,8 +24,8 @@ pub use basis::{EffectColumns, chunked};
 const ROWS_AT_ONCE: usize = 512;
 
 /// The whitened rows of a problem in fold order, and the data to compute the columns of any effect.
-pub struct Columns<'p, 'a> {
-    problem: &'p Problem<'a>,
+pub struct Columns<'p> {
+    problem: &'p Problem,
     /// The sensitivities of each test.
     sensitivities: Vec<Sensitivities>,
     /// Index of each slot among the sensitivities, by test.
@@ -49,9 +49,9 @@ pub struct Columns<'p, 'a> {
 type SharedColumns = Arc<Vec<Vec<f64>>>;
 type SharedSamples = Option<Arc<Vec<DriverSample<f64>>>>;
 
-impl<'p, 'a> Columns<'p, 'a> {
+impl<'p, 'a> Columns<'p> {
     /// Computes the sensitivities at the parameter values of a fit.
-    pub fn new(problem: &'p Problem<'a>, beta: &[f64]) -> Columns<'p, 'a> {
+    pub fn new(problem: &'p Problem, beta: &[f64]) -> Columns<'p> {
         let sensitivities = sensitivities(problem, beta);
         let slot_index = sensitivities
             .iter()
@@ -240,7 +240,7 @@ impl<'p, 'a> Columns<'p, 'a> {
 }
 
 /// The sensitivities of every test, computed in pieces that keep all cores busy with both short and long tests.
-fn sensitivities(problem: &Problem<'_>, beta: &[f64]) -> Vec<Sensitivities> {
+fn sensitivities(problem: &Problem, beta: &[f64]) -> Vec<Sensitivities> {
     let values = problem.slot_values(beta);
     let pieces: Vec<(usize, Range<usize>)> = problem
         .models
@@ -290,7 +290,7 @@ mod tests {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
         let mut session = files::session(&file, &ReadOptions::default()).unwrap();
         let without = session.tests[1].readings.as_ref().unwrap().of_rows(&[]);
-        session.tests[1].readings = Some(without);
+        session.tests[1].readings = Some(std::sync::Arc::new(without));
         let (problem, fit) = prepare(&session, 1).unwrap();
         let rows: Vec<usize> = problem.models.iter().map(|model| model.rows()).collect();
         let found: Vec<usize> =

@@ -8,7 +8,7 @@ use crate::heldout::FoldKind;
 use crate::problem::RowBlock;
 use crate::trace::paired::Units;
 
-impl Columns<'_, '_> {
+impl Columns<'_> {
     /// The rows of effects for the accepted readings, in mm, unwhitened, block after block.
     pub fn unwhitened_rows(&self, column_sets: &[&EffectColumns]) -> Mat<f64> {
         let blocks = self.blocks.iter().map(|block| self.block_rows(column_sets, block));

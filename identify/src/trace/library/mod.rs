@@ -120,7 +120,7 @@ pub fn families() -> Result<Vec<Family>, IdentifyError> {
 ///
 /// # Errors
 /// See [`families`].
-pub fn candidates(problem: &Problem<'_>) -> Result<Vec<Candidate>, IdentifyError> {
+pub fn candidates(problem: &Problem) -> Result<Vec<Candidate>, IdentifyError> {
     let sampling = Sampling::of(problem);
     let families = families()?;
     let mut candidates = Vec::new();
@@ -157,13 +157,13 @@ pub fn candidates(problem: &Problem<'_>) -> Result<Vec<Candidate>, IdentifyError
 }
 
 /// See [`Candidate::grid`].
-fn grid(problem: &Problem<'_>, sampling: &Sampling, effect: &Effect) -> f64 {
+fn grid(problem: &Problem, sampling: &Sampling, effect: &Effect) -> f64 {
     let axis = effect.driver.axis(&problem.session.machine);
     effect.shape.spacing(axis.map_or(0.0, |axis| sampling.span(axis)))
 }
 
 /// Whether a set-up quantity is a free parameter already, so that it is no further effect.
-fn is_free_setup(problem: &Problem<'_>, effect: &Effect) -> bool {
+fn is_free_setup(problem: &Problem, effect: &Effect) -> bool {
     let Component::Instrument { thing, coordinate } = &effect.component else {
         return false;
     };
@@ -175,7 +175,7 @@ fn is_free_setup(problem: &Problem<'_>, effect: &Effect) -> bool {
     index.is_some_and(|index| test.priors[index] == abbe_model::session::Prior::Free)
 }
 
-fn components(problem: &Problem<'_>, sampling: &Sampling, choice: Components) -> Vec<Component> {
+fn components(problem: &Problem, sampling: &Sampling, choice: Components) -> Vec<Component> {
     let machine = &problem.session.machine;
     let error = |axis: usize, kind: ErrorKind, freedom: Freedom| {
         Component::Axis(ErrorName { kind, freedom, axis: machine.axes[axis].name.clone() })
@@ -239,7 +239,7 @@ fn components(problem: &Problem<'_>, sampling: &Sampling, choice: Components) ->
 }
 
 /// The drivers of a component: axes by their relation to the component's own, or the driver of that word.
-fn drivers(problem: &Problem<'_>, sampling: &Sampling, choice: &str, component: &Component) -> Vec<Driver> {
+fn drivers(problem: &Problem, sampling: &Sampling, choice: &str, component: &Component) -> Vec<Driver> {
     let machine = &problem.session.machine;
     let own = component.axis(machine);
     let own_of_kind = |kind: Option<AxisKind>| -> Vec<Driver> {
@@ -275,7 +275,7 @@ fn drivers(problem: &Problem<'_>, sampling: &Sampling, choice: &str, component: 
 
 /// Additional cost of a tilt. A translation is a simpler cause than a tilt that displaces the point equally. The
 /// rotation about the axis itself is no tilt, and neither is the squareness of a linear axis.
-fn tilt_cost(problem: &Problem<'_>, component: &Component) -> f64 {
+fn tilt_cost(problem: &Problem, component: &Component) -> f64 {
     match component {
         Component::Axis(name) if name.freedom.is_angle() => {
             let machine = &problem.session.machine;

@@ -17,7 +17,7 @@ pub(super) struct Sampling {
 }
 
 impl Sampling {
-    pub fn of(problem: &Problem<'_>) -> Sampling {
+    pub fn of(problem: &Problem) -> Sampling {
         let axes = problem.session.machine.axes.len();
         let mut sampling = Sampling {
             moves: vec![false; axes],

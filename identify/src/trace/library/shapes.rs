@@ -29,7 +29,7 @@ pub(super) fn is_known(word: &str) -> bool {
 
 /// Shapes of a family for a component and a driver.
 pub(super) fn shapes(
-    problem: &Problem<'_>,
+    problem: &Problem,
     sampling: &Sampling,
     family: &Family,
     component: &Component,
@@ -57,7 +57,7 @@ pub(super) fn shapes(
 }
 
 /// The sampling of a driver.
-fn sampled(problem: &Problem<'_>, sampling: &Sampling, component: &Component, driver: &Driver) -> Sampled {
+fn sampled(problem: &Problem, sampling: &Sampling, component: &Component, driver: &Driver) -> Sampled {
     let machine = &problem.session.machine;
     let axis = driver.axis(machine);
     Sampled {
@@ -76,7 +76,7 @@ fn sampled(problem: &Problem<'_>, sampling: &Sampling, component: &Component, dr
 
 /// The groups of tests that share one mount of a set-up component, each test alone, and each mount from a later test
 /// on.
-fn mounts(problem: &Problem<'_>, component: &Component) -> Vec<Vec<String>> {
+fn mounts(problem: &Problem, component: &Component) -> Vec<Vec<String>> {
     let Component::Instrument { thing, .. } = component else {
         return Vec::new();
     };
@@ -106,7 +106,7 @@ fn mounts(problem: &Problem<'_>, component: &Component) -> Vec<Vec<String>> {
     // A mount may have been disturbed once, so its later tests are a group too.
     for first in 1..problem.tests.len() {
         let mount = problem.tests[first].group(shared_by);
-        let of_mount = |test: &&&abbe_model::session::Test| test.group(shared_by) == mount;
+        let of_mount = |test: &&abbe_model::session::Test| test.group(shared_by) == mount;
         let later = problem.tests[first..].iter().filter(of_mount);
         let later: Vec<String> = later.map(|test| test.name.clone()).collect();
         if problem.tests[first - 1].group(shared_by) == mount && !mounts.contains(&later) {

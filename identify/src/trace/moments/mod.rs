@@ -118,7 +118,7 @@ impl Moments {
     /// From the orthonormal model columns (rows × rank), the residual and the null draws (rows × draws). Returns `None`
     /// if `go_on` returns `false`.
     pub fn new(
-        columns: &Columns<'_, '_>,
+        columns: &Columns<'_>,
         column_sets: &[EffectColumns],
         model: Mat<f64>,
         residual: &[f64],
@@ -175,7 +175,7 @@ impl Moments {
     /// Adds the columns of candidates to the base, each at unit length. Returns their ranges in the base.
     pub fn add_to_base(
         &mut self,
-        columns: &Columns<'_, '_>,
+        columns: &Columns<'_>,
         column_sets: &[EffectColumns],
         candidates: &[usize],
     ) -> Vec<Range<usize>> {
@@ -211,7 +211,7 @@ impl Moments {
     }
 
     /// Computes the products of those effects in `column_sets` that are not yet candidates.
-    pub fn append(&mut self, columns: &Columns<'_, '_>, column_sets: &[EffectColumns]) {
+    pub fn append(&mut self, columns: &Columns<'_>, column_sets: &[EffectColumns]) {
         let rank = self.base();
         let side = beside(&self.base_columns, &self.residual);
         let candidates = self.count.len()..column_sets.len();
@@ -271,7 +271,7 @@ impl Moments {
 }
 
 /// The columns of effects, each at unit length.
-fn unit_columns(columns: &Columns<'_, '_>, column_sets: &[&EffectColumns]) -> Mat<f64> {
+fn unit_columns(columns: &Columns<'_>, column_sets: &[&EffectColumns]) -> Mat<f64> {
     let width = column_sets.iter().map(|column_set| column_set.count).sum();
     let mut fresh = Mat::zeros(columns.rows(), width);
     columns.fill(column_sets, fresh.as_mut());

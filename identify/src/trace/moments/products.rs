@@ -22,7 +22,7 @@ pub(super) struct CandidateChunk {
 /// memory limit permits it, including those stored already. `go_on` is called before each chunk. Returns `None` if it
 /// returns `false`.
 pub(super) fn multiply(
-    columns: &Columns<'_, '_>,
+    columns: &Columns<'_>,
     column_sets: &[EffectColumns],
     candidates: Range<usize>,
     present: &[CandidateChunk],
@@ -66,7 +66,7 @@ pub(super) fn multiply(
 /// For each fold `sideᵀ · candidates` of all candidates. Columns that are not stored are computed again.
 pub(super) fn with_side(
     chunks: &[CandidateChunk],
-    columns: &Columns<'_, '_>,
+    columns: &Columns<'_>,
     column_sets: &[EffectColumns],
     side: MatRef<'_, f64>,
 ) -> Vec<Mat<f64>> {
@@ -82,7 +82,7 @@ pub(super) fn with_side(
     joined_by_fold(&parts, columns.fold_rows.len(), side.ncols())
 }
 
-fn filled(columns: &Columns<'_, '_>, column_sets: &[EffectColumns]) -> Mat<f64> {
+fn filled(columns: &Columns<'_>, column_sets: &[EffectColumns]) -> Mat<f64> {
     let chosen: Vec<&EffectColumns> = column_sets.iter().collect();
     let width: usize = chosen.iter().map(|column_set| column_set.count).sum();
     let mut chunk = Mat::zeros(columns.rows(), width);
@@ -134,7 +134,7 @@ fn joined<'p>(rows: usize, parts: impl Iterator<Item = &'p Mat<f64>> + Clone) ->
 /// For each fold `sideᵀ · candidates`. The product is zero without computation if none of the candidates acts in the
 /// fold.
 fn cross_by_fold(
-    columns: &Columns<'_, '_>,
+    columns: &Columns<'_>,
     column_sets: &[EffectColumns],
     side: MatRef<'_, f64>,
     all: MatRef<'_, f64>,
@@ -149,7 +149,7 @@ fn cross_by_fold(
 }
 
 /// For each fold each candidate's product with itself.
-fn gram_by_fold(columns: &Columns<'_, '_>, column_sets: &[EffectColumns], all: MatRef<'_, f64>) -> Vec<Vec<Mat<f64>>> {
+fn gram_by_fold(columns: &Columns<'_>, column_sets: &[EffectColumns], all: MatRef<'_, f64>) -> Vec<Vec<Mat<f64>>> {
     let moved = columns.moved_rows(column_sets).into_iter();
     moved
         .map(|rows| {
@@ -167,7 +167,7 @@ fn gram_by_fold(columns: &Columns<'_, '_>, column_sets: &[EffectColumns], all: M
 
 /// Null draws with candidates, over all folds in which any of them acts.
 fn null_product(
-    columns: &Columns<'_, '_>,
+    columns: &Columns<'_>,
     column_sets: &[EffectColumns],
     null: &Mat<f64>,
     all: MatRef<'_, f64>,

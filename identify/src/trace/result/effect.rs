@@ -41,7 +41,7 @@ pub(super) struct Found<'f> {
 
 /// The results of a found effect.
 pub(super) fn result(
-    findings: &TraceFindings<'_, '_>,
+    findings: &TraceFindings<'_>,
     families: &[Family],
     held_out: &HeldOut<'_>,
     found: &Found<'_>,
@@ -76,7 +76,7 @@ pub(super) fn result(
 }
 
 /// The parameters of the `number`-th effect.
-fn parameters_of(problem: &Problem<'_>, parameters: &[ParameterResult], number: usize) -> Vec<ParameterResult> {
+fn parameters_of(problem: &Problem, parameters: &[ParameterResult], number: usize) -> Vec<ParameterResult> {
     let Some(id) = problem.parameters.effect_ids.get(number) else {
         return Vec::new();
     };
@@ -90,7 +90,7 @@ fn parameters_of(problem: &Problem<'_>, parameters: &[ParameterResult], number: 
 const CURVE_POINTS: usize = 73;
 
 /// The points of a nonparametric curve with their standard uncertainty; empty for other shapes.
-fn curve_of(problem: &Problem<'_>, fit: &Fit, number: usize, moves: &Moves) -> Vec<CurvePoint> {
+fn curve_of(problem: &Problem, fit: &Fit, number: usize, moves: &Moves) -> Vec<CurvePoint> {
     let Some(effect) = problem.parameters.effects.get(number) else {
         return Vec::new();
     };
@@ -129,18 +129,18 @@ fn curve_of(problem: &Problem<'_>, fit: &Fit, number: usize, moves: &Moves) -> V
 }
 
 /// Units of the positions and values of a curve; empty for other shapes.
-fn curve_units(problem: &Problem<'_>, effect: &Effect) -> (String, String) {
+fn curve_units(problem: &Problem, effect: &Effect) -> (String, String) {
     if !matches!(effect.shape, Shape::Curve { .. }) {
         return (String::new(), String::new());
     }
     (
         effect.driver_unit(&problem.session.machine).result.to_string(),
-        crate::unit::Unit::of_effect(problem.session, effect, 0).name,
+        crate::unit::Unit::of_effect(&problem.session, effect, 0).name,
     )
 }
 
 /// The numbers and positions of the shape of an effect.
-fn shape_parameters_of(problem: &Problem<'_>, effect: &Effect) -> Vec<ShapeParameter> {
+fn shape_parameters_of(problem: &Problem, effect: &Effect) -> Vec<ShapeParameter> {
     let unit = effect.driver_unit(&problem.session.machine);
     let number = |(name, values): (&str, Vec<f64>)| ShapeParameter {
         name: name.to_string(),

@@ -26,10 +26,10 @@ pub(super) use unsearched::unsearched;
 use verdict::{not_examined, verdict};
 
 /// The end state of a search.
-pub(super) struct TraceFindings<'f, 'a> {
-    pub before: &'f Problem<'a>,
+pub(super) struct TraceFindings<'f> {
+    pub before: &'f Problem,
     pub before_fit: &'f Fit,
-    pub after: &'f Problem<'a>,
+    pub after: &'f Problem,
     pub after_fit: &'f Fit,
     pub search: &'f Search<'f>,
     pub start: &'f Start,
@@ -52,7 +52,7 @@ pub(super) struct ReportedEffect {
 }
 
 /// The result, and for each effect its aliases and the best competing effects.
-pub(super) fn report(findings: &TraceFindings<'_, '_>) -> Result<ReportedEffect, IdentifyError> {
+pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, IdentifyError> {
     let TraceFindings { before, before_fit, after, after_fit, search, .. } = findings;
     let before_result = before_result(findings);
     let held_out = HeldOut::of(search, before_result.heldout_rms_um);
@@ -162,7 +162,7 @@ impl<'s> HeldOut<'s> {
 
 /// Variance for the comparison of aliases, relative to that of the noise. For poses it is that of the remaining
 /// residual.
-fn residual_variance(findings: &TraceFindings<'_, '_>) -> f64 {
+fn residual_variance(findings: &TraceFindings<'_>) -> f64 {
     if !findings.search.stop.in_residual_variance {
         return 1.0;
     }
@@ -174,7 +174,7 @@ fn residual_variance(findings: &TraceFindings<'_, '_>) -> f64 {
 }
 
 /// The declared model, on the readings that are not excluded after the search.
-fn before_result(findings: &TraceFindings<'_, '_>) -> ModelResult {
+fn before_result(findings: &TraceFindings<'_>) -> ModelResult {
     let (before, fit, after) = (findings.before, findings.before_fit, findings.after);
     let result = model_result(before, fit, fit.held_out.rms_mm);
     if before.rejected == after.rejected {
@@ -186,7 +186,7 @@ fn before_result(findings: &TraceFindings<'_, '_>) -> ModelResult {
     ModelResult { rms_um, heldout_rms_um, rms_3d_um: in_3d(rms_um), heldout_rms_3d_um: in_3d(heldout_rms_um), ..result }
 }
 
-pub(super) fn model_result(problem: &Problem<'_>, fit: &Fit, held_out_mm: f64) -> ModelResult {
+pub(super) fn model_result(problem: &Problem, fit: &Fit, held_out_mm: f64) -> ModelResult {
     let three = problem.coordinates() == 3;
     let rms = rms_mm(problem, &fit.residuals) * 1e3;
     let held = held_out_mm * 1e3;
@@ -230,7 +230,7 @@ fn alias_shifts(moves: &Moves, present: &[f64], values: impl Fn(&[f64]) -> Vec<f
 }
 
 /// Enlarges the uncertainties to cover the changes by aliases.
-fn cover(parameters: &mut [ParameterResult], problem: &Problem<'_>, fit: &Fit, moves: &Moves) {
+fn cover(parameters: &mut [ParameterResult], problem: &Problem, fit: &Fit, moves: &Moves) {
     let quantities = fit::quantities(problem, &fit.rank);
     let values = |beta: &[f64]| {
         let mut values = Vec::with_capacity(parameters.len());
@@ -251,7 +251,7 @@ fn cover(parameters: &mut [ParameterResult], problem: &Problem<'_>, fit: &Fit, m
 /// Changes of the parameters if an alias replaces the `k`-th effect, internal units. `in_place` and `named` are the
 /// coefficients of the model without that effect, fitted together with the alias and with the effect. The coefficients
 /// of the effect itself do not change: the alias has none of them.
-fn moves_by(findings: &TraceFindings<'_, '_>, k: usize, in_place: &[f64], named: &[f64]) -> Vec<f64> {
+fn moves_by(findings: &TraceFindings<'_>, k: usize, in_place: &[f64], named: &[f64]) -> Vec<f64> {
     let (search, to_unknowns) = (findings.search, &findings.start.to_parameters);
     let by: Vec<f64> = in_place.iter().zip(named).map(|(a, b)| a - b).collect();
     let (of_declared, of_found) = by.split_at(search.rank);

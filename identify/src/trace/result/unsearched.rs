@@ -8,7 +8,7 @@ use crate::problem::Problem;
 use crate::results::TraceResult;
 
 /// The declared model alone, without a verdict.
-pub(in crate::trace) fn unsearched(problem: &Problem<'_>, fit: &Fit) -> TraceResult {
+pub(in crate::trace) fn unsearched(problem: &Problem, fit: &Fit) -> TraceResult {
     let declared = model_result(problem, fit, fit.held_out.rms_mm);
     let remainder = not_examined();
     let mut warnings = problem.session.warnings.clone();

@@ -7,7 +7,7 @@ use crate::results::{EffectResult, Remainder};
 const EXPLAINED_SHARE: f64 = 0.5;
 
 /// The verdict, and the residual of the model with the found effects.
-pub(super) fn verdict(findings: &TraceFindings<'_, '_>, effects: &[EffectResult]) -> (String, Remainder) {
+pub(super) fn verdict(findings: &TraceFindings<'_>, effects: &[EffectResult]) -> (String, Remainder) {
     if findings.interrupted {
         return (String::new(), not_examined());
     }

@@ -65,7 +65,7 @@ pub(super) const ALL: usize = 0;
 /// The state of the search.
 pub struct Search<'s> {
     /// The columns.
-    pub columns: &'s Columns<'s, 's>,
+    pub columns: &'s Columns<'s>,
     /// The candidates.
     pub candidates: Vec<Candidate>,
     /// The basis columns of the candidates.
@@ -129,7 +129,7 @@ impl<'s> Search<'s> {
     /// # Errors
     /// If products are not finite.
     pub fn new(
-        columns: &'s Columns<'s, 's>,
+        columns: &'s Columns<'s>,
         candidates: Vec<Candidate>,
         column_sets: Vec<EffectColumns>,
         moments: Moments,

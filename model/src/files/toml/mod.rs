@@ -15,6 +15,7 @@ mod unknowns;
 pub mod write;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 pub use machine::machine;
 
@@ -187,7 +188,7 @@ pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Sessi
         socket_distances,
         warnings: found.warnings,
         about,
-        machine,
+        machine: Arc::new(machine),
     };
     Ok((session, sources))
 }

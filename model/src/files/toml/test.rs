@@ -1,6 +1,7 @@
 //! Reader of `[[test]]`: one test, or one for each socket in its data.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::{Context, Declared, Found, data_folder, format, movement, quantity, station};
 use crate::axis::AxisKind;
@@ -113,7 +114,7 @@ pub(super) fn tests(
         let doubts = check::readings(context.machine, &test, &readings).map_err(here)?;
         found.warnings.extend(doubts);
         let Some(socket) = socket else {
-            test.readings = Some(readings);
+            test.readings = Some(Arc::new(readings));
             return Ok(vec![test]);
         };
         if test.socket.is_some() {
@@ -125,7 +126,7 @@ pub(super) fn tests(
         tests.push(Test {
             name: format!("{name}/{socket}"),
             socket: Some(socket),
-            readings: Some(readings),
+            readings: Some(Arc::new(readings)),
             ..test.clone()
         });
     }
