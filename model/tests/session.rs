@@ -125,7 +125,7 @@ fn the_square_of_the_speed_follows_from_the_columns() {
     let squares = |axis: &str, readings: &Readings| {
         let input = DriverInput {
             machine: &session.machine,
-            model: &TestModel::new(&session.machine, session.tests[0].station.clone(), readings),
+            model: &TestModel::new(session.machine.clone(), session.tests[0].station.clone(), readings),
             readings,
             origin: &Origin::default(),
             component_axis: session.machine.axis_index(axis),
