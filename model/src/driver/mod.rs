@@ -12,6 +12,7 @@ pub use kind::{DriverFault, DriverInput, DriverKind, Entry, Recorded, SymbolInpu
 pub use origin::Origin;
 pub use quantity::DriverQuantity;
 pub use sample::{DriverPart, DriverSample};
+pub use time::SECONDS_PER_HOUR;
 pub use unit::DriverUnit;
 
 use std::fmt;

@@ -12,7 +12,8 @@ use crate::scalar::Nominal;
 pub(super) struct Time;
 
 const SECOND: DriverUnit = DriverUnit::new("s", "s", "s", " s");
-const SECONDS_PER_HOUR: f64 = 3600.0;
+/// Seconds per hour.
+pub const SECONDS_PER_HOUR: f64 = 3600.0;
 
 pub(super) const ENTRY: Entry = Entry { word: Some("time"), driver: |_| Driver::Time, units: &[SECOND] };
 
