@@ -174,6 +174,17 @@ impl InstrumentKind {
     }
 }
 
+impl Station<f64> {
+    /// Nominal position of the object that a group of tests shares, mm.
+    pub fn shared_mm(&self, group: SharedBy) -> [f64; 3] {
+        match group {
+            SharedBy::Setup => self.table_point_mm().unwrap_or([0.0; 3]),
+            SharedBy::BarSetup => [self.reference_mm(), 0.0, 0.0],
+            _ => self.tool_point_mm(),
+        }
+    }
+}
+
 /// The scalar coordinates of one reading in mm: one length, or three coordinates.
 #[derive(Clone, Copy, Debug)]
 pub struct Reading<S> {

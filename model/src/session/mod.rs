@@ -106,7 +106,7 @@ impl Test {
 
     /// The group of tests that share the object whose place no session knows: a tracker, a socket.
     pub fn free_place(&self) -> Option<&str> {
-        let Entry { parameters, free, .. } = self.station.entry();
+        let Entry { parameters, free, .. } = self.station.kind().entry();
         let parameter = parameters.iter().find(|parameter| *free == Some(parameter.thing))?;
         Some(self.group(parameter.shared_by))
     }
