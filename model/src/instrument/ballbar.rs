@@ -147,17 +147,11 @@ impl<N> Geometry<N> for BallBar<N> {
             None => length,
         })
     }
-    fn table_point_mm(&self) -> Option<[N; 3]>
-    where
-        N: Copy,
-    {
-        Some(self.workpiece_ball)
+    fn table_point_mm(&self) -> Option<&[N; 3]> {
+        Some(&self.workpiece_ball)
     }
-    fn tool_point_mm(&self) -> [N; 3]
-    where
-        N: Copy,
-    {
-        self.spindle_ball
+    fn tool_point_mm(&self) -> &[N; 3] {
+        &self.spindle_ball
     }
 }
 

@@ -58,13 +58,9 @@ pub trait Geometry<N> {
     where
         N: Nominal;
     /// The instrument's point in the table frame, mm, if it has one.
-    fn table_point_mm(&self) -> Option<[N; 3]>
-    where
-        N: Copy;
+    fn table_point_mm(&self) -> Option<&[N; 3]>;
     /// The instrument's point in the tool frame, mm.
-    fn tool_point_mm(&self) -> [N; 3]
-    where
-        N: Copy;
+    fn tool_point_mm(&self) -> &[N; 3];
 }
 
 /// How the tool point follows the instrument's point of the table on a path of kind `follow`.

@@ -84,7 +84,7 @@ macro_rules! instruments {
                 N: Copy,
             {
                 match self {
-                    $(Station::$kind(geometry) => geometry.table_point_mm(),)+
+                    $(Station::$kind(geometry) => geometry.table_point_mm().copied(),)+
                 }
             }
 
@@ -94,7 +94,7 @@ macro_rules! instruments {
                 N: Copy,
             {
                 match self {
-                    $(Station::$kind(geometry) => geometry.tool_point_mm(),)+
+                    $(Station::$kind(geometry) => *geometry.tool_point_mm(),)+
                 }
             }
         }

@@ -236,17 +236,11 @@ impl<N> Geometry<N> for Probe<N> {
     {
         Reading::length(self.geometry(machine, state, errors, unknown).distance())
     }
-    fn table_point_mm(&self) -> Option<[N; 3]>
-    where
-        N: Copy,
-    {
-        Some(self.artefact)
+    fn table_point_mm(&self) -> Option<&[N; 3]> {
+        Some(&self.artefact)
     }
-    fn tool_point_mm(&self) -> [N; 3]
-    where
-        N: Copy,
-    {
-        self.stylus
+    fn tool_point_mm(&self) -> &[N; 3] {
+        &self.stylus
     }
 }
 

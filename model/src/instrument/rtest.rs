@@ -259,17 +259,11 @@ impl<N> Geometry<N> for RTest<N> {
         let [x, y, z] = vector.0;
         Reading::vector(sensors.map(|[a, b, c]| x * a + y * b + z * c))
     }
-    fn table_point_mm(&self) -> Option<[N; 3]>
-    where
-        N: Copy,
-    {
-        Some(self.workpiece_ball)
+    fn table_point_mm(&self) -> Option<&[N; 3]> {
+        Some(&self.workpiece_ball)
     }
-    fn tool_point_mm(&self) -> [N; 3]
-    where
-        N: Copy,
-    {
-        self.spindle_ball
+    fn tool_point_mm(&self) -> &[N; 3] {
+        &self.spindle_ball
     }
 }
 

@@ -86,17 +86,11 @@ impl<N> Geometry<N> for Socket<N> {
         let ball = machine.tool_point(state, errors, displaced(self.ball, 3, &unknown));
         Reading::vector(ball.minus(displaced(self.socket, 0, &unknown)).0)
     }
-    fn table_point_mm(&self) -> Option<[N; 3]>
-    where
-        N: Copy,
-    {
+    fn table_point_mm(&self) -> Option<&[N; 3]> {
         None
     }
-    fn tool_point_mm(&self) -> [N; 3]
-    where
-        N: Copy,
-    {
-        self.ball
+    fn tool_point_mm(&self) -> &[N; 3] {
+        &self.ball
     }
 }
 

@@ -101,17 +101,11 @@ impl<N> Geometry<N> for Tracker<N> {
             x * a + y * b + z * c + self.origin[i]
         }))
     }
-    fn table_point_mm(&self) -> Option<[N; 3]>
-    where
-        N: Copy,
-    {
+    fn table_point_mm(&self) -> Option<&[N; 3]> {
         None
     }
-    fn tool_point_mm(&self) -> [N; 3]
-    where
-        N: Copy,
-    {
-        self.target
+    fn tool_point_mm(&self) -> &[N; 3] {
+        &self.target
     }
 }
 
