@@ -45,6 +45,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod candidates;
 pub mod circle;
 pub mod circular;
 pub mod compensation;
@@ -70,6 +71,7 @@ pub mod rank;
 pub mod repeated;
 pub mod results;
 pub mod self_calibration;
+pub mod separating_tests;
 pub mod series;
 pub mod simulate;
 pub mod start;

@@ -64,9 +64,7 @@ const SETUP_STREAM: u128 = 0;
 /// session.resolution_mm = None;
 /// let given = vec![Given::parse("EY0A=35.3um")?, Given::parse("EB0A=-1.29arcsec")?];
 /// let drawn = simulate(&session, &Simulation { given, noise_mm: Some(0.0), ..Simulation::default() })?;
-/// for (test, readings) in session.tests.iter_mut().zip(drawn.readings) {
-///     test.readings = Some(Arc::new(readings));
-/// }
+/// let session = session.with_readings(drawn.readings);
 /// let (problem, found) = fit::prepare(&session, 1)?;
 /// let parameters = fit::parameters(&problem, &found);
 /// let value = |id: &str| parameters.iter().find(|parameter| parameter.id == id).map(|parameter| parameter.value);

@@ -8,8 +8,8 @@ use abbe_model::driver::{Driver, DriverInput, Reference};
 use abbe_model::effect::shape::{Curve, Harmonic, Local, Periodic, Polynomial, Power, ReversalSpike, Steps, Warmup};
 use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::files::table::csv;
+use abbe_model::files::toml::write;
 use abbe_model::files::{self, ReadOptions};
-use abbe_model::files::{toml::write, whole};
 use abbe_model::sensitivity::TestModel;
 use abbe_model::session::planned;
 use abbe_model::session::readings::Readings;
@@ -209,7 +209,7 @@ fn written_effects_read_back_equal() {
     let folder = tempfile::tempdir().unwrap();
     fs::copy(ready("hermle-c600u/machine.toml"), folder.path().join("machine.toml")).unwrap();
     let written = folder.path().join("session.toml");
-    whole::write(&written, &text).unwrap();
+    std::fs::write(&written, &text).unwrap();
     let read = files::session(&written, &ReadOptions::default()).unwrap();
     assert_eq!(read.effects.len(), effects.len());
     for (read, effect) in read.effects.iter().zip(&effects) {
@@ -228,7 +228,7 @@ fn a_plan_becomes_a_measured_session() {
     for (test, mut readings) in session.tests.iter().zip(plans) {
         readings.observed = nominal(&session, test, &readings);
         let name = format!("{}.csv", test.name);
-        csv::write(&folder.path().join(&name), &session.machine, &test.station, &readings).unwrap();
+        std::fs::write(folder.path().join(&name), csv::text(&session.machine, &test.station, &readings)).unwrap();
         data.push((test.name.clone(), name));
         measured.push(readings);
     }

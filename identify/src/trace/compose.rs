@@ -11,10 +11,10 @@ use faer::Mat;
 use faer::prelude::Solve;
 use statrs::function::gamma::ln_gamma;
 
-use super::chi_square_tail::ln_chi_square_tail;
-use super::library::Candidate;
-use super::observable::MIN_OBSERVABLE;
-use super::score::TrainedModel;
+use crate::candidates::chi_square_tail::ln_chi_square_tail;
+use crate::candidates::gain::TrainedModel;
+use crate::candidates::library::Candidate;
+use crate::candidates::observable::MIN_OBSERVABLE;
 
 /// Maximum number of positions of one effect. An effect with more positions is a curve.
 const MAX_POSITIONS: usize = 6;

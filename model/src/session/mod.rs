@@ -59,6 +59,14 @@ impl Session {
     pub fn reference(&self) -> Reference {
         Reference::of(self.tests.iter().filter_map(|test| test.readings.as_deref()))
     }
+
+    /// The session with these readings, in the order of its tests.
+    pub fn with_readings(mut self, readings: impl IntoIterator<Item = Readings>) -> Session {
+        for (test, readings) in self.tests.iter_mut().zip(readings) {
+            test.readings = Some(Arc::new(readings));
+        }
+        self
+    }
 }
 
 /// One test.

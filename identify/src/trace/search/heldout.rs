@@ -5,10 +5,10 @@ use faer::Mat;
 use rayon::prelude::*;
 
 use super::{ALL, Search, SearchBranch, SelectedEffect};
+use crate::candidates::gain::TrainedModel;
+use crate::candidates::moments::grow;
 use crate::error::IdentifyError;
-use crate::trace::moments::grow;
-use crate::trace::paired::{HeldOutDecrease, Units};
-use crate::trace::score::TrainedModel;
+use crate::heldout::paired::{HeldOutDecrease, Units};
 
 /// The unwhitened base and residual, divided by the noise standard deviation. Held-out errors refer to these.
 pub struct UnwhitenedModel {

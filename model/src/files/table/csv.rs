@@ -11,7 +11,6 @@ use super::request::Request;
 use super::row::Row;
 use crate::chain::Machine;
 use crate::error::ModelError;
-use crate::files::whole;
 use crate::instrument::Station;
 use crate::instrument::column::{Column, Quantity};
 use crate::session::readings::Readings;
@@ -85,17 +84,9 @@ impl Rows for CsvRows {
     }
 }
 
-/// Writes readings as a CSV file with our column names, atomically.
+/// Readings as the text of a CSV file with our column names.
 ///
 /// Numbers have up to twelve decimals of mm, degree or s, so that the rounding is far below any resolution.
-///
-/// # Errors
-/// If the file cannot be written; the previous file then remains.
-pub fn write(path: &Path, machine: &Machine, station: &Station<f64>, readings: &Readings) -> Result<(), ModelError> {
-    whole::write(path, &text(machine, station, readings))
-}
-
-/// The text of [`write()`].
 pub fn text(machine: &Machine, station: &Station<f64>, readings: &Readings) -> String {
     let mut header = Vec::new();
     if !readings.time_s.is_empty() {
