@@ -56,7 +56,7 @@ impl SetComparison {
         let set: Vec<usize> = beside.iter().copied().chain([one]).collect();
         for added in added {
             let others: Vec<usize> = set.iter().copied().filter(|c| c != added).collect();
-            if !(search.score_beside(*added, &others, &self.folds)? >= self.threshold) {
+            if search.score_beside(*added, &others, &self.folds)? < self.threshold {
                 return Ok(());
             }
         }
