@@ -45,7 +45,6 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod circle;
 pub mod circular;
 pub mod compensation;
 pub mod directions;
@@ -53,20 +52,17 @@ pub mod error;
 pub mod fit;
 pub mod geometric;
 pub mod heldout;
-pub mod least_squares;
 pub mod monte_carlo;
 pub mod noise;
-pub mod outliers;
+pub mod numerics;
 pub mod parameter_description;
 pub mod parameters;
 pub mod patterns;
 pub mod plan;
 pub mod plausibility;
-mod preference;
 pub mod problem;
 pub mod propagation;
 pub mod quantity;
-pub mod rank;
 pub mod repeated;
 pub mod results;
 pub mod self_calibration;
@@ -74,7 +70,6 @@ pub mod series;
 pub mod simulate;
 pub mod start;
 pub mod trace;
-pub mod triangle;
 pub mod unit;
 pub mod volumetric;
 

@@ -15,13 +15,13 @@ use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::{Prior, Session, Test};
 use faer::Mat;
 use num_dual::DualNum;
-use rayon::prelude::*;
 
 use crate::error::IdentifyError;
 use crate::heldout::folds::Folds;
 use crate::noise::Noise;
+use crate::numerics::parallel;
+use crate::numerics::triangle::{BLOCK_ROWS, Triangle};
 use crate::parameters::{Parameters, TestParameters};
-use crate::triangle::{BLOCK_ROWS, Triangle};
 use abbe_model::driver::Origin;
 
 /// A session with readings, its parameters, and the weights of its readings.
@@ -300,16 +300,18 @@ impl Problem {
     pub fn triangles(&self, beta: &[f64]) -> Result<Vec<Triangle>, IdentifyError> {
         let values = self.slot_values(beta);
         // Segments have a fixed length, so that the sums do not depend on the number of threads.
-        let segments: Vec<FactorsByTestAndFold> = (self.blocks().par_chunks(BLOCKS_PER_SEGMENT))
-            .map(|blocks| self.factors_of_blocks(&values, blocks))
-            .collect::<Result<_, IdentifyError>>()?;
+        let blocks = self.blocks();
+        let segments: Vec<&[RowBlock]> = blocks.chunks(BLOCKS_PER_SEGMENT).collect();
+        let of_segments = parallel::map(segments.len(), &|k| self.factors_of_blocks(&values, segments[k]));
         let mut factors = FactorsByTestAndFold::new();
-        for ((test, fold), triangle) in segments.into_iter().flatten() {
-            match factors.entry((test, fold)) {
-                Entry::Vacant(entry) => {
-                    entry.insert(triangle);
+        for of_segment in of_segments {
+            for (place, triangle) in of_segment? {
+                match factors.entry(place) {
+                    Entry::Vacant(entry) => {
+                        entry.insert(triangle);
+                    }
+                    Entry::Occupied(mut sum) => sum.get_mut().merge(&triangle),
                 }
-                Entry::Occupied(mut sum) => sum.get_mut().merge(&triangle),
             }
         }
         let count = self.parameters.list.len();
@@ -410,9 +412,7 @@ impl Problem {
             row[count] = (distance.distance_mm + longer(number) - length.re) / distance.u_mm;
             rows.push(row);
         }
-        let mut triangle = Triangle::new(count);
-        triangle.absorb(Mat::from_fn(rows.len(), count + 1, |i, j| rows[i][j]).as_ref());
-        triangle
+        Triangle::of(Mat::from_fn(rows.len(), count + 1, |i, j| rows[i][j]))
     }
 
     /// The parameters of a socket and its nominal position.
@@ -432,28 +432,27 @@ impl Problem {
     /// Residuals observed − model of every test, mm, outliers included.
     pub fn residuals(&self, beta: &[f64]) -> Vec<Vec<f64>> {
         let values = self.slot_values(beta);
-        (self.models.par_iter().zip(&self.tests).zip(&values))
-            .map(|((model, test), values)| {
-                let mut residuals = model.readings_mm(values);
-                let observed = test.readings.iter().flat_map(|readings| &readings.observed);
-                residuals.iter_mut().zip(observed).for_each(|(value, observed)| *value = observed - *value);
-                residuals
-            })
-            .collect()
+        parallel::map(self.models.len(), &|test| {
+            let mut residuals = self.models[test].readings_mm(&values[test]);
+            let observed = self.tests[test].readings.iter().flat_map(|readings| &readings.observed);
+            residuals.iter_mut().zip(observed).for_each(|(value, observed)| *value = observed - *value);
+            residuals
+        })
     }
 
     /// Sum of squares of whitened residuals and priors.
     pub fn sum_of_squares(&self, beta: &[f64]) -> f64 {
         let residuals = self.residuals(beta);
         let coordinates = self.coordinates();
-        let squares = self.blocks().into_par_iter().map(|block| {
+        let blocks = self.blocks();
+        let squares = parallel::map(blocks.len(), &|k| {
+            let block = &blocks[k];
             let residual = &residuals[block.test][block.rows.start * coordinates..block.rows.end * coordinates];
             let column = Mat::from_fn(residual.len(), 1, |i, _| residual[i]);
-            let (white, _) = self.whiten(&column, &block);
+            let (white, _) = self.whiten(&column, block);
             white.col(0).iter().map(|value| value * value).sum::<f64>()
         });
-        let readings: f64 = squares.collect::<Vec<f64>>().iter().sum();
-        let zero_step = vec![0.0; beta.len()];
-        readings + self.prior_triangle(beta).sum_of_squares_after(&zero_step)
+        let readings: f64 = squares.iter().sum();
+        readings + self.prior_triangle(beta).sum_of_squares()
     }
 }

@@ -10,19 +10,20 @@
 //! differ by `δ = ½·10^l`.
 
 use faer::Mat;
-use statrs::distribution::{Continuous, ContinuousCDF, Normal};
+use statrs::distribution::{Continuous, Normal};
 
 use abbe_model::session::Prior;
 use abbe_model::words::counted;
 
 use crate::error::IdentifyError;
 use crate::fit;
-use crate::fit::{Fit, Quantity, in_directions, parameter_covariance, quantities, values_at};
-use crate::least_squares::{LeastSquares, Scaling, minimise};
+use crate::fit::{Fit, Quantity, quantities, values_at};
 use crate::monte_carlo::{self, Distribution, Draws, Function, MonteCarlo};
+use crate::numerics::least_squares::{LeastSquares, Scaling, minimise};
+use crate::numerics::tails::normal_quantile;
+use crate::numerics::triangle::{BLOCK_ROWS, Triangle};
 use crate::problem::{Problem, RowBlock};
 use crate::results::{DrawnParameter, FitMonteCarlo, FitResult, Verdict, phases_follow_amplitudes};
-use crate::triangle::{BLOCK_ROWS, Triangle};
 
 /// Number of steps with the curvature of the original fit. After these the simulated session is fitted with its own
 /// curvature.
@@ -73,11 +74,8 @@ impl<'p, 'a> Refit<'p> {
         let distances = u.len();
         let stated = &problem.session.socket_distances;
         u.extend(stated.iter().map(|distance| distance.u_mm * enlarged));
-        let size: Vec<f64> = problem.parameters.list.iter().map(|p| p.size).collect();
-        let mut whole = problem.prior_triangle(&fit.beta);
-        fit.triangles.iter().for_each(|triangle| whole.merge(triangle));
-        let rank = fit.rank.identifiable_basis.ncols();
-        let reduced = in_directions(&whole, &fit.rank.identifiable_basis);
+        let basis = &fit.rank.identifiable_basis;
+        let reduced = problem.prior_triangle(&fit.beta).merged(&fit.triangles).in_directions(basis);
         Ok(Refit {
             problem,
             fit,
@@ -86,8 +84,8 @@ impl<'p, 'a> Refit<'p> {
             priors,
             distances,
             quantities: quantities(problem, &fit.rank),
-            end: fit.rank.coordinates(&fit.beta, &size),
-            inverse: parameter_covariance(&reduced, &Mat::identity(rank, rank))?,
+            end: fit.rank.coordinates(&fit.beta, &problem.parameters.sizes()),
+            inverse: reduced.covariance(&Mat::identity(basis.ncols(), basis.ncols()))?,
             u,
         })
     }
@@ -220,7 +218,7 @@ impl LeastSquares for SimulatedFit<'_, '_> {
             }
             whole.merge(&narrow.over_columns(own, beta.len()));
         })?;
-        Ok(in_directions(&whole, &self.refit.fit.rank.identifiable_basis))
+        Ok(whole.in_directions(&self.refit.fit.rank.identifiable_basis))
     }
 
     fn sum_of_squares(&self, z: &[f64]) -> f64 {
@@ -245,8 +243,7 @@ impl LeastSquares for SimulatedFit<'_, '_> {
                 sum += (0..white.nrows()).map(|i| white[(i, 0)].powi(2)).sum::<f64>();
             }
         }
-        let zero_step = vec![0.0; beta.len()];
-        sum + self.prior_triangle(&beta).sum_of_squares_after(&zero_step)
+        sum + self.prior_triangle(&beta).sum_of_squares()
     }
 }
 
@@ -310,15 +307,14 @@ pub fn add_monte_carlo(
 
 /// Law of propagation and Monte Carlo for one parameter.
 fn compared(id: &str, value: f64, gum_u: f64, unit: &str, drawn: &Distribution, draws: &MonteCarlo) -> DrawnParameter {
-    let normal = Normal::standard();
     let tail = (1.0 - draws.coverage) / 2.0;
-    let factor = -normal.inverse_cdf(tail);
+    let factor = normal_quantile(tail);
     let gum_interval = [value - factor * gum_u, value + factor * gum_u];
     let endpoint_differences = [0, 1].map(|end| (drawn.symmetric[end] - gum_interval[end]).abs());
     let tolerance = tolerance(gum_u);
     // Standard deviation of a quantile: √(q(1 − q)/M) over the density there, with a Gaussian density.
     let share = (tail * (1.0 - tail) / draws.runs as f64).sqrt();
-    let endpoint_u = drawn.u * share / normal.pdf(factor);
+    let endpoint_u = drawn.u * share / Normal::standard().pdf(factor);
     let worst = endpoint_differences[0].max(endpoint_differences[1]);
     let verdict = if worst - 2.0 * endpoint_u > tolerance {
         Verdict::Differ
@@ -386,8 +382,7 @@ mod tests {
         let deviations: Vec<f64> = refit.u.iter().zip(signs).map(|(u, sign)| u * sign).collect();
         let drawn = SimulatedFit { refit: &refit, deviations: &deviations };
         let z = drawn.refit.end.clone();
-        let zero_step = vec![0.0; z.len()];
-        let whole = drawn.linearise(&z).unwrap().sum_of_squares_after(&zero_step);
+        let whole = drawn.linearise(&z).unwrap().sum_of_squares();
         let of_residuals = drawn.sum_of_squares(&z);
         assert!(of_residuals > 0.5 * problem.readings() as f64, "{of_residuals}");
         assert!((of_residuals / whole - 1.0).abs() < 1e-9, "{of_residuals} and {whole}");

@@ -5,7 +5,9 @@ use abbe_model::frames::Point;
 use abbe_model::instrument::Station;
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
+
+use crate::numerics::rigid_motion::rigid_motion;
 
 /// The stations of the tests, with start values for free poses and sockets from which the iterations converge.
 pub fn stations(session: &Session, tests: &[Test]) -> Vec<Station<f64>> {
@@ -74,27 +76,4 @@ pub(crate) fn nominal_points(machine: &Machine, station: &Station<f64>, readings
             Vector3::from(point.0)
         })
         .collect()
-}
-
-/// The rotation and translation that map `from` onto `to` with the least sum of squares (Kabsch, Acta Cryst. A32 (1976)
-/// 922).
-fn rigid_motion(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> (Matrix3<f64>, Vector3<f64>) {
-    if from.is_empty() {
-        return (Matrix3::identity(), Vector3::zeros());
-    }
-    let count = from.len() as f64;
-    let centre_from = from.iter().sum::<Vector3<f64>>() / count;
-    let centre_to = to.iter().sum::<Vector3<f64>>() / count;
-    let covariance: Matrix3<f64> =
-        from.iter().zip(to).map(|(a, b)| (b - centre_to) * (a - centre_from).transpose()).sum();
-    let svd = covariance.svd(true, true);
-    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
-        return (Matrix3::identity(), centre_to - centre_from);
-    };
-    // The sign on the smallest singular value makes the result a rotation, not a reflection.
-    let mut signs = Matrix3::identity();
-    let least = svd.singular_values.imin();
-    signs[(least, least)] = (u * v_t).determinant().signum();
-    let rotation = u * signs * v_t;
-    (rotation, centre_to - rotation * centre_from)
 }

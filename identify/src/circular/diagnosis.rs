@@ -17,10 +17,11 @@ use abbe_model::chain::Machine;
 
 use super::fault::{Fault, columns, variance_and_correlation};
 use super::path::{MovingAxes, Path};
-use super::regression::Regression;
 use super::results::{CircularTest, Diagnosis};
 use super::search::{cyclic, is_separable, is_third_order, spikes, third_order};
 use super::terms::PathRows;
+use crate::numerics::regression::Regression;
+use crate::numerics::robust_deviation;
 use crate::results::ParameterResult;
 
 /// Limit for a single outlier, in robust standard deviations.
@@ -84,10 +85,7 @@ impl Decomposition {
 pub(super) fn reject_outliers(machine: &Machine, path: &Path) -> Option<Vec<bool>> {
     let model = Decomposition::of(machine, path).ok()?;
     let residual = &model.regression.residual;
-    let mut sizes: Vec<f64> = residual.iter().map(|r| r.abs()).collect();
-    sizes.sort_by(f64::total_cmp);
-    // The median of |x| for a normal distribution is 0.6745 σ.
-    let limit = OUTLIER_SIGMA * sizes[sizes.len() / 2] / 0.6745;
+    let limit = OUTLIER_SIGMA * robust_deviation(residual);
     let mut outliers = path.left_out.clone();
     for (i, value) in residual.iter().enumerate() {
         let neighbours = [i.checked_sub(1), Some(i + 1)];

@@ -1,7 +1,7 @@
 //! A fault as columns of a regression, and the values that follow from its coefficients.
 
-use super::regression::Regression;
 use super::terms::PathRows;
+use crate::numerics::regression::Regression;
 use crate::results::ParameterResult;
 
 /// A value of a fault: its name, a weight per column, and the conversion from internal units (mm) to its unit.

@@ -3,12 +3,11 @@
 //! A fault is significant if `P(χ² ≥ gain / s²)` times the number of candidates is below one in a thousand. `s²` is the
 //! variance of the residual, enlarged for the correlation of neighbours.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF};
-
 use super::fault::{Fault, columns, variance_and_correlation};
 use super::path::Path;
-use super::regression::{Orthonormal, Regression};
 use super::terms::PathRows;
+use crate::numerics::regression::{Orthonormal, Regression};
+use crate::numerics::tails::chi_square_tail;
 use crate::results::ParameterResult;
 
 /// Significance level of a spike or cyclic error.
@@ -55,8 +54,7 @@ fn gain_variance(rows: &PathRows, regression: &Regression) -> f64 {
 
 /// Whether a gain of this many columns is significant after this many candidates.
 fn is_significant(gain: f64, variance: f64, columns: usize, candidates: usize) -> bool {
-    let chance = ChiSquared::new(columns as f64).map_or(1.0, |chi| chi.sf(gain / variance));
-    variance > 0.0 && chance * candidates as f64 <= SIGNIFICANCE
+    variance > 0.0 && chi_square_tail(gain / variance, columns as f64) * candidates as f64 <= SIGNIFICANCE
 }
 
 /// The reversal spikes of each axis, at the width with the largest gain.
@@ -110,7 +108,7 @@ pub(super) fn cyclic(rows: &PathRows, names: &[String; 2], faults: &[Fault], reg
             .map(|pitch| (basis.gain(&regression.residual, rows.cyclic(axis, pitch).to_vec()), pitch))
             .max_by(|a, b| a.0.total_cmp(&b.0));
         let Some((gain, pitch)) = best else { continue };
-        if variance <= 0.0 || (-0.5 * gain / variance).exp() * (2 * tried) as f64 > SIGNIFICANCE {
+        if !is_significant(gain, variance, 2, 2 * tried) {
             continue;
         }
         // A significant cyclic error has a separate amplitude for each direction of travel.

@@ -11,6 +11,7 @@
 //! deviations.
 
 mod autocorrelation;
+pub mod outliers;
 mod stated;
 mod trends;
 mod waves;

@@ -12,11 +12,11 @@ use abbe_model::effect::shape::{Curve, Local, Periodic};
 use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::session::readings::Readings;
 
-use super::chi_square_tail::ln_chi_square_tail;
 use super::columns::{Columns, EffectColumns};
 use super::moments::Moments;
 use super::score::{PriorMoments, TrainedModel};
 use crate::error::IdentifyError;
+use crate::numerics::tails::ln_chi_square_tail;
 use crate::problem::Problem;
 
 /// Structure in a residual.

@@ -8,8 +8,8 @@ use faer::Mat;
 
 use super::columns::{Columns, EffectColumns};
 use super::moments::{Moments, transposed_product};
-use super::observable::quadratic_gain;
 use super::score::TrainedModel;
+use crate::numerics::gain::quadratic_gain;
 
 /// The columns of an effect and their products over the training folds of a model.
 pub struct TunedEffect {

@@ -7,7 +7,7 @@ use abbe_model::effect::Effect;
 
 use super::{ALL, Search};
 use crate::error::IdentifyError;
-use crate::trace::chi_square_tail::ln_chi_square_tail;
+use crate::numerics::tails::ln_chi_square_tail;
 use crate::trace::columns::EffectColumns;
 use crate::trace::score::{Gain, TrainedModel};
 use crate::trace::tuning::TunedEffect;

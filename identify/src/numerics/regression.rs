@@ -2,13 +2,12 @@
 
 use faer::Mat;
 
-use crate::triangle::Triangle;
-
-/// Singular values below this share of the largest (columns of unit length) count as zero.
-const NEGLIGIBLE: f64 = 1e-7;
+use super::solve::Directions;
+use super::tolerances::COLLINEAR;
+use super::triangle::Triangle;
 
 /// A solved regression `y ≈ Σ βⱼ·xⱼ`.
-pub(super) struct Regression {
+pub(crate) struct Regression {
     /// The coefficients.
     pub beta: Vec<f64>,
     /// `(XᵀX)⁻¹`.
@@ -24,24 +23,21 @@ impl Regression {
         if y.len() <= n {
             return None;
         }
-        let mut triangle = Triangle::new(n);
-        triangle.absorb(Mat::from_fn(y.len(), n + 1, |i, j| if j < n { columns[j][i] } else { y[i] }).as_ref());
-        let (r, c, _) = triangle.parts();
-        let norms: Vec<f64> = (0..n).map(|j| (0..n).map(|i| r[(i, j)].powi(2)).sum::<f64>().sqrt()).collect();
+        let rows = Mat::from_fn(y.len(), n + 1, |i, j| if j < n { columns[j][i] } else { y[i] });
+        let (r, c, _) = Triangle::of(rows).parts();
+        let norms: Vec<f64> = r.col_iter().map(|column| column.norm_l2()).collect();
         if norms.iter().any(|norm| *norm <= 0.0) {
             return None;
         }
-        let scaled = Mat::from_fn(n, n, |i, j| r[(i, j)] / norms[j]);
-        let svd = scaled.svd().ok()?;
-        let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
-        if singular.last()? / singular.first()? < NEGLIGIBLE {
+        let directions = Directions::of(Mat::from_fn(n, n, |i, j| r[(i, j)] / norms[j]).as_ref()).ok()?;
+        if directions.rank(COLLINEAR) < n {
             return None;
         }
-        let spread = Mat::from_fn(n, n, |j, k| svd.V()[(j, k)] / singular[k] / norms[j]);
-        let projected: Vec<f64> = (0..n).map(|k| (0..n).map(|i| svd.U()[(i, k)] * c[i]).sum()).collect();
-        let beta: Vec<f64> = (0..n).map(|j| (0..n).map(|k| spread[(j, k)] * projected[k]).sum()).collect();
+        let root = directions.inverse_root();
+        let root = Mat::from_fn(n, n, |j, k| root[(j, k)] / norms[j]);
+        let beta: Vec<f64> = directions.solve(&c, 0.0).iter().zip(&norms).map(|(scaled, norm)| scaled / norm).collect();
         let residual = (0..y.len()).map(|i| y[i] - (0..n).map(|j| columns[j][i] * beta[j]).sum::<f64>()).collect();
-        Some(Regression { beta, inverse: &spread * spread.transpose(), residual })
+        Some(Regression { beta, inverse: &root * root.transpose(), residual })
     }
 
     /// Sum of squares of the residual.
@@ -58,7 +54,7 @@ impl Regression {
 }
 
 /// An orthonormal basis of columns, for the gain from further columns.
-pub(super) struct Orthonormal(Vec<Vec<f64>>);
+pub(crate) struct Orthonormal(Vec<Vec<f64>>);
 
 impl Orthonormal {
     /// Orthonormalises columns.
@@ -81,7 +77,7 @@ impl Orthonormal {
             }
         }
         let norm = dot(&remainder, &remainder).sqrt();
-        let independent = norm > 1e-6 * before.max(f64::MIN_POSITIVE);
+        let independent = norm > COLLINEAR * before.max(f64::MIN_POSITIVE);
         if independent {
             remainder.iter_mut().for_each(|r| *r /= norm);
             self.0.push(remainder);
