@@ -1,26 +1,26 @@
 //! Abbe: a modelling workspace for the geometric errors of machine tools and other serial chains.
 //!
-//! The facade of three crates: [`model`] (chain, effects, instruments, sessions), [`identify`] (fit, trace, simulate)
-//! and [`codegen`] (closed forms). The command `abbe` is built on the same.
+//! The facade of three crates. The command `abbe` is built on the same.
 //!
-//! The three together: the change that a simulated error of 10 µm makes is what the equation of the same test says,
-//! −R·sin C/L₀.
+//! | for | look in |
+//! |---|---|
+//! | a program that fits, traces, simulates or prints an equation | [`prelude`] |
+//! | the machine, instruments, effects, sessions and their files | [`model`] |
+//! | estimates, uncertainty, plans, the trace of unmodelled effects | [`identify`] |
+//! | closed forms and their languages | [`codegen`] |
+//!
+//! The change that a simulated error of 10 µm makes is what the equation of the same test says, −R·sin C/L₀:
 //!
 //! ```
-//! use std::path::Path;
-//!
-//! use abbe::codegen::{Equation, Options, Order, SessionTest, check, language};
 //! use abbe::identify::patterns::patterns;
-//! use abbe::identify::quantity::Given;
-//! use abbe::model::component::ErrorName;
-//! use abbe::model::files::{self, ReadOptions};
+//! use abbe::prelude::*;
 //!
-//! let plan = Path::new(env!("CARGO_MANIFEST_DIR")).join("sessions/hermle-c600u/chapter5.toml");
-//! let session = files::session(&plan, &ReadOptions::default())?;
+//! let plan = concat!(env!("CARGO_MANIFEST_DIR"), "/sessions/hermle-c600u/chapter5.toml");
+//! let session = read_session(plan)?;
 //! let test = session.tests.iter().position(|test| test.name == "C150").unwrap();
 //!
 //! let source = SessionTest::new(&session, &session.tests[test])?;
-//! let options = Options { order: Order::First, ..Options::default() };
+//! let options = EquationOptions { order: Order::First, ..EquationOptions::default() };
 //! let equation = Equation::of(&session.machine, &source, &[ErrorName::parse("EX0C").unwrap()], &options)?;
 //! let text = language("text")?.print(&check(&equation, &source)?)?;
 //! assert!(text.contains("∂L/∂e_x0c = −R·s_c/L_0"));
@@ -37,3 +37,33 @@
 pub use abbe_codegen as codegen;
 pub use abbe_identify as identify;
 pub use abbe_model as model;
+
+/// What a program needs to build or read a session, to simulate, fit, plan and trace it, and to print an equation.
+pub mod prelude {
+    use std::path::Path;
+
+    pub use abbe_codegen::{Equation, Options as EquationOptions, Order, SessionTest, check, language};
+    pub use abbe_identify::fit::SessionFit;
+    pub use abbe_identify::plan::{PlanOptions, analyse};
+    pub use abbe_identify::quantity::Given;
+    pub use abbe_identify::results::{FitResult, ParameterResult, TraceResult};
+    pub use abbe_identify::simulate::{Simulated, Simulation, simulate};
+    pub use abbe_identify::trace::{Progress, TraceOptions, TraceOutcome, trace};
+    pub use abbe_model::chain::Machine;
+    pub use abbe_model::component::ErrorName;
+    pub use abbe_model::error::ModelError;
+    pub use abbe_model::instrument::ballbar::BallBar;
+    pub use abbe_model::instrument::{InstrumentKind, Station};
+    pub use abbe_model::session::Session;
+    pub use abbe_model::session::build::NewTest;
+    pub use abbe_model::session::columns::Columns;
+    pub use abbe_model::session::motion::Motion;
+
+    /// Reads a session file and the machine and data that it names.
+    ///
+    /// # Errors
+    /// [`ModelError`] with file, line and key of what cannot be used.
+    pub fn read_session(file: impl AsRef<Path>) -> Result<Session, ModelError> {
+        abbe_model::files::session(file.as_ref(), &abbe_model::files::ReadOptions::default())
+    }
+}

@@ -2,7 +2,6 @@
 
 mod cli;
 mod present;
-mod report;
 
 use std::process::ExitCode;
 

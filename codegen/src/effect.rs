@@ -37,10 +37,13 @@ impl<N: Nominal> AxisStates<'_, N> {
         let sample = effect.driver.symbols(&input, &named);
         sample.ok_or_else(|| match &effect.driver {
             Driver::Axis(name) => CodegenError::no_axis(self.machine, effect.id(), name),
-            driver => CodegenError::EffectWithoutForm {
-                effect: effect.id(),
-                why: format!("{driver} needs an axis about which it exerts a moment, and the component has none"),
-            },
+            driver => {
+                let axis = input.component_axis.map(|axis| self.machine.axes[axis].kind);
+                let fault = driver.kind().check_component(&effect.component.to_string(), axis).err();
+                let why =
+                    fault.map_or_else(|| format!("the driver {driver} has no symbol here"), |fault| fault.message);
+                CodegenError::EffectWithoutForm { effect: effect.id(), why }
+            }
         })
     }
 

@@ -7,6 +7,7 @@
 //! (Woodbury). If the other folds barely determine a direction, their triangular factors are merged and solved again.
 
 pub(crate) mod folds;
+pub(crate) mod paired;
 
 use faer::Mat;
 

@@ -1,7 +1,7 @@
 //! Identification: estimates of geometric errors with standard uncertainties, and the search for unmodelled effects in
 //! the residual.
 //!
-//! - [`least_squares`], [`triangle`], [`rank`]: numerical core, independent of any machine;
+//! - [`numerics`]: linear algebra and statistics, independent of any machine;
 //! - [`parameters`], [`problem`]: a session as a least-squares problem;
 //! - [`fit`]: parameter estimation; [`heldout`]: cross-validation; [`noise`]: noise standard deviation and
 //!   autocorrelation;
@@ -45,6 +45,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod candidates;
 pub mod circular;
 pub mod compensation;
 pub mod directions;
@@ -66,6 +67,7 @@ pub mod quantity;
 pub mod repeated;
 pub mod results;
 pub mod self_calibration;
+pub mod separating_tests;
 pub mod series;
 pub mod simulate;
 pub mod start;

@@ -8,7 +8,6 @@
 use std::sync::Arc;
 
 use abbe_model::component::ErrorName;
-use abbe_model::instrument::InstrumentKind;
 use abbe_model::sensitivity::TestModel;
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Prior, Session, planned};
@@ -65,9 +64,7 @@ const SETUP_STREAM: u128 = 0;
 /// session.resolution_mm = None;
 /// let given = vec![Given::parse("EY0A=35.3um")?, Given::parse("EB0A=-1.29arcsec")?];
 /// let drawn = simulate(&session, &Simulation { given, noise_mm: Some(0.0), ..Simulation::default() })?;
-/// for (test, readings) in session.tests.iter_mut().zip(drawn.readings) {
-///     test.readings = Some(Arc::new(readings));
-/// }
+/// let session = session.with_readings(drawn.readings);
 /// let (problem, found) = fit::prepare(&session, 1)?;
 /// let parameters = fit::parameters(&problem, &found);
 /// let value = |id: &str| parameters.iter().find(|parameter| parameter.id == id).map(|parameter| parameter.value);
@@ -79,7 +76,7 @@ const SETUP_STREAM: u128 = 0;
 /// If the plan cannot be carried out, a name or a unit does not fit the session, or the model yields a number that is
 /// not finite.
 pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated, IdentifyError> {
-    if session.instrument == InstrumentKind::Socket {
+    if !session.instrument.entry().has_readings {
         return Err(IdentifyError::Request("a socket session has no readings to draw: its poses are its data".into()));
     }
     let planned = planned::planned_session(session)?;

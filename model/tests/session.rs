@@ -4,12 +4,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use abbe_model::chain::BodyErrors;
-use abbe_model::driver::Driver;
+use abbe_model::driver::{Driver, DriverInput, Origin};
 use abbe_model::effect::shape::{Curve, Harmonic, Local, Periodic, Polynomial, Power, ReversalSpike, Steps, Warmup};
 use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::files::table::csv;
+use abbe_model::files::toml::write;
 use abbe_model::files::{self, ReadOptions};
-use abbe_model::files::{toml::write, whole};
+use abbe_model::sensitivity::TestModel;
 use abbe_model::session::planned;
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test};
@@ -113,6 +114,36 @@ fn linear_axes_follow_a_rotary_one_at_the_length_of_the_bar() {
     }
 }
 
+/// The square of the speed on a circle of 100 mm at 1000 mm/min, with central differences over steps of 0.5°: of X
+/// (v sin θ · sin δ/δ)², of C, which stands, 0.
+#[test]
+fn the_square_of_the_speed_follows_from_the_columns() {
+    let test = "bar_mm = 100\nworkpiece_ball_mm = [0, 0, 0]\n\
+                path = { kind = \"circle\", plane = \"XY\", radius_mm = 100, step_deg = 0.5, feed_mm_min = 1000 }";
+    let session = one_test(test).unwrap();
+    let mut readings = planned::planned(&session.machine, &session.tests[0]).unwrap();
+    let squares = |axis: &str, readings: &Readings| {
+        let input = DriverInput {
+            machine: &session.machine,
+            model: &TestModel::new(session.machine.clone(), session.tests[0].station.clone(), readings),
+            readings,
+            origin: &Origin::default(),
+            component_axis: session.machine.axis_index(axis),
+        };
+        Driver::parse("speed-squared").kind().samples(&input)
+    };
+    let (v, step) = (1000.0 / 60.0, 0.5_f64.to_radians());
+    let of_x = squares("X", &readings).unwrap();
+    for (row, sample) in of_x.iter().enumerate().take(720).skip(1) {
+        let expected = (v * (step * row as f64).sin() * step.sin() / step).powi(2);
+        assert!((sample.value - expected).abs() < 1e-9, "{row}: {} {expected}", sample.value);
+    }
+    assert!(squares("C", &readings).unwrap().iter().all(|sample| sample.value == 0.0));
+    assert!(squares("none", &readings).is_none());
+    readings.time_s.clear();
+    assert!(squares("X", &readings).is_none());
+}
+
 #[test]
 fn a_plan_beyond_the_travel_is_refused() {
     let test = "bar_mm = 100\nworkpiece_ball_mm = [150, 0, 0]\n\
@@ -143,6 +174,7 @@ fn written_effects_read_back_equal() {
         effect("bar", "time", Shape::Warmup(Warmup { tau_s: 1234.5 })),
         effect("workpiece_ball.z", "temperature", Shape::Polynomial(Polynomial { degree: 1, scale: 1.0 })),
         effect("EAA", "gravity", Shape::Polynomial(Polynomial { degree: 1, scale: 1.0 })),
+        effect("EXX", "speed-squared", Shape::Polynomial(Polynomial { degree: 1, scale: 2.5e3 })),
         effect("EXX", "X", Shape::Steps(Steps { at: vec![-50.0, 0.1, 50.0] })),
         effect("ECC", "C", Shape::Steps(Steps { at: vec![0.3, 1.0, 2.0_f64.to_radians()] })),
         effect("EZC", "none", Shape::Constant),
@@ -177,7 +209,7 @@ fn written_effects_read_back_equal() {
     let folder = tempfile::tempdir().unwrap();
     fs::copy(ready("hermle-c600u/machine.toml"), folder.path().join("machine.toml")).unwrap();
     let written = folder.path().join("session.toml");
-    whole::write(&written, &text).unwrap();
+    std::fs::write(&written, &text).unwrap();
     let read = files::session(&written, &ReadOptions::default()).unwrap();
     assert_eq!(read.effects.len(), effects.len());
     for (read, effect) in read.effects.iter().zip(&effects) {
@@ -196,7 +228,7 @@ fn a_plan_becomes_a_measured_session() {
     for (test, mut readings) in session.tests.iter().zip(plans) {
         readings.observed = nominal(&session, test, &readings);
         let name = format!("{}.csv", test.name);
-        csv::write(&folder.path().join(&name), &session.machine, &test.station, &readings).unwrap();
+        std::fs::write(folder.path().join(&name), csv::text(&session.machine, &test.station, &readings)).unwrap();
         data.push((test.name.clone(), name));
         measured.push(readings);
     }

@@ -10,9 +10,10 @@ use super::failure::Failure;
 use super::message::print_warnings;
 use super::report::ReportArguments;
 use super::{
-    CommonArguments, SessionArguments, compensation, csv, directions, geometric, json, read_session, repeated,
-    residuals, self_calibration,
+    CommonArguments, SessionArguments, compensation, geometric, output, read_session, repeated, self_calibration,
 };
+use crate::present::fit::Figures;
+use crate::present::readings;
 
 /// Examples of `abbe fit`.
 pub const HELP: &str = "Examples:
@@ -150,10 +151,10 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     let draws = arguments.draws.draws(arguments.common.seed)?;
     let (problem, fit) = abbe::identify::fit::prepare(&session, arguments.common.seed)?;
     if let Some(path) = &arguments.views {
-        directions::write(&problem, &fit, path)?;
+        output::write_whole(path, &output::csv(&readings::by_direction(&problem, &fit)?)?)?;
     }
     if let Some(path) = &arguments.residuals {
-        residuals::write(&problem, &fit, path)?;
+        output::write_whole(path, &output::csv(&readings::residuals(&problem, &fit))?)?;
     }
     let mut result = abbe::identify::fit::report(&problem, &fit);
     if let Some(draws) = &draws {
@@ -163,16 +164,13 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
         screen::print(&problem, &fit, &result, &arguments.session, arguments.all);
     }
     print_warnings(&result.warnings);
-    if let Some(path) = &arguments.common.json {
-        json::write_of_session(path, &sources, arguments.common.seed, &result)?;
-    }
+    arguments.common.write_json(&sources, &result)?;
     if let Some(path) = &arguments.csv {
-        csv::write_fit(path, &result)?;
+        output::write_figures(path, &Figures::of_fit(&result))?;
     }
     if arguments.report.asked() {
-        let document = crate::report::fit::document(&problem, &fit, &result)?;
-        let method = crate::report::fit::method(&result);
-        arguments.report.write(&document, &method, (&session, &sources), arguments.common.seed)?;
+        let document = crate::present::report::fit::document(&problem, &fit, &result)?;
+        arguments.report.write(&document, (&session, &sources), arguments.common.seed)?;
     }
     arguments.compensation.run(&problem, &fit, tables)
 }

@@ -7,8 +7,10 @@ use abbe::model::words::counted;
 
 use super::failure::Failure;
 use super::report::ReportArguments;
-use super::{CommonArguments, json, message, screen, table};
-use crate::present::method::{error_header, error_rows};
+use super::{CommonArguments, message, output};
+use crate::present::fit::noise;
+use crate::present::method::{centres, errors};
+use crate::present::number::micrometres;
 
 /// Runs a geometric method and the full fit on the same readings.
 pub fn run(
@@ -23,53 +25,23 @@ pub fn run(
         print(&result);
     }
     message::print_warnings(&result.warnings);
-    if let Some(path) = &common.json {
-        json::write_of_session(path, sources, common.seed, &result)?;
-    }
+    common.write_json(sources, &result)?;
     if report.asked() {
         let (problem, _) = abbe::identify::fit::prepare(session, common.seed)?;
-        let document = crate::report::method::document(&problem, &result);
-        let method = crate::report::method::method(&result);
-        report.write(&document, &method, (session, sources), common.seed)?;
+        let document = crate::present::report::method::document(&problem, &result);
+        report.write(&document, (session, sources), common.seed)?;
     }
     Ok(())
 }
 
 fn print(result: &Comparison) {
-    say!("{}, {}", counted(result.readings, "reading"), screen::noise(result.noise_um, &result.noise_source));
-    say!("\nOffset of each axis at the fixed ball from its nominal position:");
-    let rows: Vec<Vec<String>> = result
-        .centres
-        .iter()
-        .flat_map(|centre| {
-            centre.offsets.iter().map(move |found| {
-                let (offset, u) = table::value_and_u(found.offset_um, found.u_um);
-                let shares: Vec<String> = found
-                    .sensitivities
-                    .iter()
-                    .filter(|share| share.value.abs() > 1e-6)
-                    .map(|share| format!("{:+.3} {}", share.value, share.id))
-                    .collect();
-                vec![
-                    centre.test.clone(),
-                    format!("{} of {}", found.direction, centre.axis),
-                    offset,
-                    u,
-                    shares.join(" "),
-                ]
-            })
-        })
-        .collect();
-    table::print(&["test", "centre", "offset, µm", "u", "first-order shares, in µm and ″"], &rows);
-    say!(
-        "\n{} beside the full fit, with standard uncertainty u and bias (on noise-free readings with the errors of the full fit):",
-        result.method
-    );
-    table::print(&error_header(result), &error_rows(result));
+    say!("{}, {}", counted(result.readings, "reading"), noise(result.noise_um, &result.noise_source));
+    output::print(&centres(result));
+    output::print(&errors(result));
     say!(
         "\nResidual rms of the tests of the method: {} nominal, {} with its errors. Of all tests with the full fit: {}",
-        table::micrometres(result.nominal_rms_um),
-        table::micrometres(result.method_rms_um),
-        table::micrometres(result.rms_um)
+        micrometres(result.nominal_rms_um),
+        micrometres(result.method_rms_um),
+        micrometres(result.rms_um)
     );
 }

@@ -12,7 +12,7 @@ use serde_json::{Map, Value};
 
 use super::failure::Failure;
 use super::{Arguments, output};
-use crate::report::provenance::{self, Input};
+use crate::present::report::provenance::{self, Input};
 
 /// Version of the schemas of all documents.
 pub const SCHEMA_VERSION: u32 = 2;
@@ -146,14 +146,6 @@ pub fn write<T: Serialize>(path: &Path, origin: Origin, seed: Option<u64>, resul
         .map_err(|error| Failure::Other(format!("the result cannot be written as JSON: {error}")))?;
     text.push('\n');
     output::write_whole(path, text.as_bytes())
-}
-
-/// Writes the document of a command on a session.
-///
-/// # Errors
-/// See [`Origin::of_session`] and [`write()`].
-pub fn write_of_session<T: Serialize>(path: &Path, sources: &SourceMap, seed: u64, result: &T) -> Result<(), Failure> {
-    write(path, Origin::of_session(sources)?, Some(seed), result)
 }
 
 /// The name of the command, and the options on the command line of this process.

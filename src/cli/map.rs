@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use abbe::identify::volumetric::{self, MachineWithErrors, Summary, VolumetricPoint, functions};
+use abbe::identify::volumetric::{self, MachineWithErrors, Summary, functions};
 use abbe::model::axis::AxisKind;
 use abbe::model::chain::Machine;
 use abbe::model::session::limits::LARGEST;
@@ -11,7 +11,8 @@ use clap::Args;
 
 use super::failure::Failure;
 use super::json::{self, Origin};
-use super::{output, table};
+use super::output;
+use crate::present::volumetric as present;
 
 /// A map of the volumetric error.
 #[derive(Args)]
@@ -77,7 +78,7 @@ pub fn run(machine_file: &Path, machine: &Machine, arguments: &MapArguments, tab
     let grid = grid(machine, arguments)?;
     let erring = MachineWithErrors { machine, functions: &functions, tool_mm };
     let (places, summary) = volumetric::map(&erring, &grid, arguments.compensate)?;
-    output::write_whole(path, &csv(machine, &places)?)?;
+    output::write_whole(path, &output::csv(&present::places(machine, &places))?)?;
     if tables {
         print(&summary, functions.len(), &path.display().to_string());
     }
@@ -153,53 +154,9 @@ fn grid(machine: &Machine, arguments: &MapArguments) -> Result<Vec<Vec<f64>>, Fa
     (0..machine.axes.len()).map(along).collect()
 }
 
-/// The map as a table: positions, the nominal point, the error; with compensation the commands and what they leave.
-fn csv(machine: &Machine, places: &[VolumetricPoint]) -> Result<Vec<u8>, Failure> {
-    let named = |suffix: &'static str| machine.axes.iter().map(move |axis| axis.column(suffix));
-    let mut header: Vec<String> = named("").collect();
-    header.extend(["px_mm", "py_mm", "pz_mm", "ex_um", "ey_um", "ez_um", "e_um"].map(String::from));
-    if places.iter().any(|place| place.compensated.is_some()) {
-        header.extend(named("_command"));
-        header.push("left_um".into());
-    }
-    let norm = |e: [f64; 3]| e.iter().map(|x| x * x).sum::<f64>().sqrt() * 1e3;
-    let row = |place: &VolumetricPoint| {
-        let at = machine.axes.iter().zip(&place.positions);
-        let mut cells: Vec<String> = at.map(|(axis, q)| format!("{:.6}", axis.kind.to_display(*q))).collect();
-        cells.extend(place.nominal_mm.iter().map(|p| format!("{p:.6}")));
-        cells.extend(place.error_mm.iter().map(|e| format!("{:.6}", e * 1e3)));
-        cells.push(format!("{:.6}", norm(place.error_mm)));
-        if let Some(compensated) = &place.compensated {
-            let at = machine.axes.iter().zip(&compensated.positions);
-            cells.extend(at.map(|(axis, q)| format!("{:.9}", axis.kind.to_display(*q))));
-            cells.push(format!("{:.9}", norm(compensated.error_mm)));
-        }
-        cells
-    };
-    output::csv(&header, places.iter().map(row))
-}
-
 fn print(summary: &Summary, functions: usize, path: &str) {
     say!("{path}: {}, {}", counted(summary.points, "place"), counted(functions, "error function"));
     let at: Vec<String> = summary.largest_at.iter().map(|at| format!("{} {:.1}", at.axis, at.position)).collect();
     say!("largest at {}\n", at.join(", "));
-    let row = |name: String, size: &volumetric::Size| {
-        vec![name, format!("{:.3}", size.largest_um), format!("{:.3}", size.rms_um)]
-    };
-    let mut rows = vec![row("error vector".into(), &summary.error)];
-    let coordinates = &summary.coordinates;
-    for (name, size) in [("X", &coordinates.x), ("Y", &coordinates.y), ("Z", &coordinates.z)] {
-        rows.push(row(format!("its {name}"), size));
-    }
-    for share in &summary.by_axis {
-        rows.push(row(format!("from axis {} alone", share.axis), &share.size));
-    }
-    if let Some(residual) = &summary.residual {
-        rows.push(vec![
-            "after compensation".into(),
-            format!("{:.1e}", residual.largest_um),
-            format!("{:.1e}", residual.rms_um),
-        ]);
-    }
-    table::print(&["µm", "largest", "rms"], &rows);
+    output::print(&present::sizes(summary));
 }

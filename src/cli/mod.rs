@@ -5,34 +5,26 @@ macro_rules! say {
     ($($text:tt)*) => { $crate::cli::output::line(format_args!($($text)*)) };
 }
 
-pub mod circular;
 mod compensation;
-mod csv;
-mod directions;
 mod equation;
 mod failure;
 mod fit;
 mod folder;
-mod from_code;
-pub mod geometric;
+mod geometric;
 mod interrupt;
-pub mod json;
+mod json;
 mod map;
 mod message;
 mod new;
-pub mod output;
-pub mod plan;
-mod plausibility;
+mod output;
+mod plan;
 mod repeated;
 mod report;
-mod residuals;
 mod schema;
 mod screen;
 mod self_calibration;
 mod simulate;
-pub mod table;
-pub mod trace;
-pub mod uniqueness;
+mod trace;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -162,6 +154,14 @@ impl CommonArguments {
     /// The requested output files. A file that cannot be written is refused before the work.
     fn outputs(&self, others: &[Option<&PathBuf>]) -> Result<Outputs, Failure> {
         Outputs::new(others.iter().copied().flatten().chain(&self.json))
+    }
+
+    /// Writes the result as JSON if it is requested.
+    fn write_json<T: serde::Serialize>(&self, sources: &SourceMap, result: &T) -> Result<(), Failure> {
+        match &self.json {
+            Some(path) => json::write(path, json::Origin::of_session(sources)?, Some(self.seed), result),
+            None => Ok(()),
+        }
     }
 }
 

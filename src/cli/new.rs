@@ -2,10 +2,12 @@
 
 use std::path::PathBuf;
 
+use abbe::model::ModelError;
+use abbe::model::files::template;
 use clap::Args;
 
 use super::failure::Failure;
-use super::{folder, from_code};
+use super::folder::{self, NewFile};
 
 /// Examples of `abbe new`.
 pub const HELP: &str = "Examples:
@@ -144,8 +146,8 @@ pub fn run(arguments: &NewArguments, quiet: bool) -> Result<(), Failure> {
         return Ok(());
     };
     let files = match (&arguments.template, &arguments.from_code) {
-        (Some(name), _) => template(name)?,
-        (None, Some(code)) => from_code::files(code)?,
+        (Some(name), _) => copied(name)?,
+        (None, Some(code)) => of_code(code)?,
         (None, None) => return Ok(()),
     };
     folder::write(folder, &files, arguments.force, |_| Ok(()))?;
@@ -171,7 +173,24 @@ fn names() -> String {
     names.join(", ")
 }
 
-fn template(name: &str) -> Result<Vec<folder::NewFile>, Failure> {
+/// What to do with a plan, at its start.
+const PLAN_HEAD: &str = "# A plan. `abbe plan plan.toml` analyses which errors these tests identify, and with which uncertainty.\n\
+    # Change the tests until the uncertainties suffice.\n\
+    # `abbe simulate plan.toml --out run1 --error …` simulates readings. A measured test has a line `data = \"….csv\"`.\n\n";
+
+/// The files of a structural code.
+fn of_code(code: &str) -> Result<Vec<NewFile>, Failure> {
+    let [machine, plan] = template::of_code(code).map_err(|fault| match fault {
+        ModelError::UnknownAxisKind { .. } => Failure::Other(format!(
+            "{fault}; `abbe new DIR --template ur10` shows a machine whose axes state their kind and direction"
+        )),
+        fault => fault.into(),
+    })?;
+    Ok(vec![("machine.toml".into(), machine), ("plan.toml".into(), format!("{PLAN_HEAD}{plan}"))])
+}
+
+/// The files of a template.
+fn copied(name: &str) -> Result<Vec<NewFile>, Failure> {
     let Some(template) = TEMPLATES.iter().find(|template| template.name == name) else {
         return Err(Failure::Other(format!("no template `{name}`; the templates are {}", names())));
     };

@@ -8,6 +8,13 @@ use abbe::model::files::SourceMap;
 
 use super::failure::Failure;
 use super::message::{Kind, tell};
+use crate::present::table::Table;
+use crate::present::{csv, terminal};
+
+/// How the signs are meant, in front of a table of figures.
+const CONVENTION: &str = "# Errors by their names of ISO 230-1: EX0C is a location error, EXC an error motion. Value = actual less nominal: the body that the axis\n\
+# carries is displaced along +X, +Y, +Z of R and turned about them by the right-hand rule, E = Trans(EX, EY, EZ) Rx(EA) Ry(EB) Rz(EC), whatever\n\
+# the axis' own direction. A correction has the opposite sign. u is one standard uncertainty.\n";
 
 /// Writes a file through a temporary one beside it, so that a reader finds the old file or the whole new one, whatever
 /// happens meanwhile.
@@ -172,22 +179,20 @@ fn write_out(contents: &[u8]) {
     }
 }
 
-/// A cell that a spreadsheet takes for text: one that begins as a formula does (`=`, `+`, `-`, `@`) and is no number
-/// stands behind an apostrophe.
-///
-/// Names in a table come from session files, which others may have written.
-pub fn cell(text: String) -> String {
-    let formula = text.trim_start().starts_with(['=', '+', '-', '@']) || text.starts_with(['\t', '\r', '\n']);
-    if formula && text.parse::<f64>().is_err() { format!("'{text}") } else { text }
+/// Prints a table under its title.
+pub fn print(table: &Table) {
+    if !table.title.is_empty() {
+        say!("\n{}:", table.title);
+    }
+    say!("{}", terminal::text(table));
 }
 
-/// A table as CSV: cells that hold a separator stand in quotes.
-pub fn csv(header: &[String], rows: impl IntoIterator<Item = Vec<String>>) -> Result<Vec<u8>, Failure> {
-    let fault = |error: String| Failure::Other(format!("the table cannot be written as CSV: {error}"));
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(header.iter().cloned().map(cell)).map_err(|error| fault(error.to_string()))?;
-    for row in rows {
-        writer.write_record(row.into_iter().map(cell)).map_err(|error| fault(error.to_string()))?;
-    }
-    writer.into_inner().map_err(|error| fault(error.to_string()))
+/// The table as CSV.
+pub fn csv(table: &Table) -> Result<Vec<u8>, Failure> {
+    csv::text(table).map_err(|error| Failure::Other(format!("the table cannot be written as CSV: {error}")))
+}
+
+/// Writes the figures of a result as CSV, under a comment that states the convention of their signs.
+pub fn write_figures(path: &Path, table: &Table) -> Result<(), Failure> {
+    write_whole(path, &[CONVENTION.as_bytes(), &csv(table)?].concat())
 }

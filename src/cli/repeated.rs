@@ -2,13 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use abbe::identify::repeated::{self, Repeated, Scatter};
+use abbe::identify::repeated::{self, Repeated};
 use abbe::model::words::counted;
 
 use super::failure::Failure;
 use super::json::{self, Origin};
 use super::output::{self, Outputs};
-use super::{CommonArguments, SessionArguments, message, read_session, table};
+use super::{CommonArguments, SessionArguments, message, read_session};
+use crate::present::repeated as present;
 
 /// Fits each session separately and compares the fits.
 pub fn run(
@@ -49,60 +50,14 @@ pub fn run(
 
 fn print(result: &Repeated) {
     say!("{} of one plan, each fitted separately\n", counted(result.sessions.len(), "session"));
-    let rows: Vec<Vec<String>> = result
-        .parameters
-        .iter()
-        .map(|parameter| {
-            let (mean, u_type_a) = table::value_and_u(parameter.mean, parameter.u_type_a);
-            let (_, s) = table::value_and_u(parameter.mean, parameter.s);
-            let (_, u_type_b) = table::value_and_u(parameter.mean, parameter.u_type_b);
-            let number = |value: Option<f64>, digits: usize| {
-                value.map_or("–".to_string(), |value| format!("{value:.digits$}"))
-            };
-            vec![
-                parameter.id.clone(),
-                mean,
-                u_type_a,
-                s,
-                u_type_b,
-                table::unit(&parameter.unit),
-                number(parameter.ratio, 2),
-                number(parameter.p_value, 3),
-                match parameter.scatter {
-                    Scatter::AsStated => "",
-                    Scatter::More => "scatters more than u states",
-                    Scatter::Less => "scatters less than u states",
-                }
-                .to_string(),
-            ]
-        })
-        .collect();
-    table::print(&["parameter", "mean", "s/√n (A)", "s (A)", "u (B)", "unit", "s/u", "p", ""], &rows);
+    output::print(&present::parameters(result));
     say!(
         "\nType A: from the scatter of the sessions, s/√n of their mean, s of one session. Type B: standard uncertainty u of one fit.\n\
          p: probability of such a ratio s/u by chance."
     );
-    if result.deviating.is_empty() {
-        if result.sessions.len() > 2 {
-            say!("No session deviates significantly from the others.");
-        }
-        return;
+    if !result.deviating.is_empty() {
+        output::print(&present::deviating(result));
+    } else if result.sessions.len() > 2 {
+        say!("No session deviates significantly from the others.");
     }
-    say!("\nSignificant deviations of a session from the mean of the others:");
-    let rows: Vec<Vec<String>> = result
-        .deviating
-        .iter()
-        .map(|deviation| {
-            let (difference, u) = table::value_and_u(deviation.deviation, deviation.u);
-            vec![
-                deviation.session.clone(),
-                deviation.id.clone(),
-                difference,
-                u,
-                table::unit(&deviation.unit),
-                format!("{:.1}", (deviation.deviation / deviation.u).abs()),
-            ]
-        })
-        .collect();
-    table::print(&["session", "parameter", "deviation", "u", "unit", "deviation/u"], &rows);
 }

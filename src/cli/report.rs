@@ -5,13 +5,12 @@ use std::path::{Path, PathBuf};
 use abbe::model::files::SourceMap;
 use abbe::model::session::Session;
 use clap::Args;
-use maud::Markup;
 
 use super::failure::Failure;
 use super::{folder, output};
-use crate::report::document::Document;
-use crate::report::page;
-use crate::report::provenance::Provenance;
+use crate::present::report::document::Document;
+use crate::present::report::page;
+use crate::present::report::provenance::Provenance;
 
 /// The files of a report.
 #[derive(Args, Clone)]
@@ -58,13 +57,7 @@ impl ReportArguments {
     }
 
     /// Writes the requested files.
-    pub fn write(
-        &self,
-        document: &Document,
-        method: &Markup,
-        read: (&Session, &SourceMap),
-        seed: u64,
-    ) -> Result<(), Failure> {
+    pub fn write(&self, document: &Document, read: (&Session, &SourceMap), seed: u64) -> Result<(), Failure> {
         if let Some(path) = &self.report {
             let provenance = Provenance::of(read, seed).map_err(|(path, error)| {
                 Failure::Other(format!(
@@ -72,7 +65,7 @@ impl ReportArguments {
                     path.display()
                 ))
             })?;
-            let text = page::html(document, method, &provenance);
+            let text = page::html(document, &provenance).map_err(Failure::Other)?;
             output::write_whole(path, text.as_bytes())?;
         }
         if let Some(path) = &self.plots {
@@ -84,13 +77,13 @@ impl ReportArguments {
 
 fn write_plots(document: &Document, path: &Path) -> Result<(), Failure> {
     #[cfg(feature = "png")]
-    let fonts = crate::report::plot::png::Fonts::bundled();
+    let fonts = crate::present::figure::png::Fonts::bundled();
     let mut files = Vec::new();
     for plot in &document.plots {
         files.push((format!("{}.svg", plot.name), plot.svg().into_bytes()));
         #[cfg(feature = "png")]
         {
-            let png = crate::report::plot::png::png(plot, &fonts)
+            let png = crate::present::figure::png::png(plot, &fonts)
                 .ok_or_else(|| Failure::Other(format!("the plot `{}` cannot be drawn as PNG", plot.name)))?;
             files.push((format!("{}.png", plot.name), png));
         }

@@ -83,18 +83,18 @@ pub fn run(arguments: &SchemaArguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The session's schema with that of the machine and the keys of all shapes in it.
+/// The session's schema with that of the machine and the keys of all shapes and instruments in it.
 fn session() -> Result<Value, Failure> {
     let mut session = parsed(schema::SESSION)?;
     let mut machine = parsed(schema::MACHINE)?;
     // A schema within a schema is a resource of its own: its references start from it.
     machine["$id"] = json!("machine");
     session["$defs"]["machine"] = machine;
-    let properties = &mut session["$defs"]["effect"]["properties"];
-    if let (Some(properties), Value::Object(of_shapes)) =
-        (properties.as_object_mut(), parsed(&schema::effect_properties())?)
-    {
-        properties.extend(of_shapes);
+    for (definition, registered) in schema::registered_properties() {
+        let properties = session["$defs"][definition]["properties"].as_object_mut();
+        if let (Some(properties), Value::Object(registered)) = (properties, parsed(&registered)?) {
+            properties.extend(registered);
+        }
     }
     Ok(session)
 }

@@ -1,21 +1,24 @@
-//! Parts of the first screens of `fit` and `trace`: the table of errors, the folded set-up parameters, what is
-//! confounded, the next steps.
+//! Parts of the first screens of `fit` and `trace`: what is folded without `--all`, the next steps.
 
 use std::path::Path;
 
-use abbe::identify::fit::Fit;
-use abbe::identify::parameters::{Parameter, Role};
-use abbe::identify::plausibility::{Pull, Pulls};
-use abbe::identify::problem::Problem;
-use abbe::identify::results::{Outlier, ParameterResult, Unobservable};
+use abbe::identify::circular::CircularTest;
+use abbe::identify::plausibility::Plausibility;
+use abbe::identify::results::{Outlier, Unobservable};
 use abbe::model::words::counted;
 
-use super::{SessionArguments, table};
+use super::{SessionArguments, output};
+use crate::present::parameters::{self, Estimates};
+use crate::present::plausibility::conflicts;
+use crate::present::table::Table;
+use crate::present::{circular, confounded};
 
 /// Entries of a long list that the first screen shows.
-pub const MAX_LISTED: usize = 3;
+const MAX_LISTED: usize = 3;
 /// Errors that the first screen shows.
 const MAX_ERRORS: usize = 20;
+/// Circular tests that the first screen shows.
+const MAX_CIRCULAR: usize = 6;
 
 /// Prints the first lines of a list and the number of the others; every line with `all`.
 pub fn list(lines: &[String], indent: &str, all: bool) {
@@ -29,133 +32,68 @@ pub fn list(lines: &[String], indent: &str, all: bool) {
     }
 }
 
-/// `identifiable` of `count` parameters, and the rank.
-pub fn rank(identifiable: usize, count: usize, rank: usize) -> String {
-    format!("{identifiable} of {} identifiable (numerical rank {rank})", counted(count, "parameter"))
-}
-
-/// The parameters of a fit, errors and coefficients of effects apart from set-up parameters.
-pub struct Estimates<'r> {
-    errors: Vec<&'r ParameterResult>,
-    setup: Vec<&'r ParameterResult>,
-    /// Pulls of set-up parameters, by their identifiers.
-    pulls: Vec<(&'r str, Pull)>,
-}
-
-impl<'r> Estimates<'r> {
-    /// Of the results of a fit, without the parameters that are printed elsewhere.
-    pub fn new(
-        problem: &'r Problem,
-        fit: &Fit,
-        parameters: &'r [ParameterResult],
-        elsewhere: impl Fn(&str) -> bool,
-    ) -> Estimates<'r> {
-        let list = &problem.parameters.list;
-        let is_setup =
-            |result: &&ParameterResult| list.iter().any(|p: &Parameter| p.role == Role::Setup && p.id == result.id);
-        let (setup, errors) = parameters.iter().filter(|p| !elsewhere(&p.id)).partition(is_setup);
-        let pulls = Pulls::of(problem, fit).each.into_iter();
-        Estimates { errors, setup, pulls: pulls.map(|pull| (list[pull.parameter].id.as_str(), pull)).collect() }
-    }
-
-    /// Prints the errors in a table and the set-up parameters in one line; the set-up parameters in a table too with
-    /// `all`.
-    pub fn print(&self, all: bool) {
-        if !self.errors.is_empty() {
-            say!(
-                "\nEstimates with standard uncertainty u and expanded uncertainty U = 2u (*: significant, |value| > U):"
-            );
-            print_parameters(&self.shown(all));
-            match self.errors.len().saturating_sub(MAX_ERRORS) {
-                more if more > 0 && !all => say!("  … {more} less significant; --all lists them"),
-                _ => {}
-            }
-        }
-        if self.setup.is_empty() {
-            return;
-        }
-        if all {
-            say!("\nSet-up parameters, as deviations from their stated values:");
-            self.print_setup();
-        } else {
-            self.print_folded_setup();
+/// Prints the errors in a table and the set-up parameters in one line; the set-up parameters in a table too with `all`.
+pub fn print_estimates(estimates: &Estimates<'_>, all: bool) {
+    let shown = estimates.most_significant(if all { usize::MAX } else { MAX_ERRORS });
+    if !shown.is_empty() {
+        output::print(&parameters::table(&shown, None));
+        if shown.len() < estimates.errors.len() {
+            say!("  … {} less significant; --all lists them", estimates.errors.len() - shown.len());
         }
     }
-
-    /// Prints the set-up parameters in one line.
-    pub fn print_folded_setup(&self) {
-        if self.setup.is_empty() {
-            return;
-        }
-        let largest = match self.largest_pull() {
-            Some((id, pull)) => format!(", largest pull {:.1} ({id})", pull.pull.abs()),
-            None => String::new(),
-        };
-        say!("  {}{largest}; --all lists them", counted(self.setup.len(), "set-up parameter"));
-    }
-
-    /// Whether this is a set-up parameter.
-    pub fn is_setup(&self, id: &str) -> bool {
-        self.setup.iter().any(|p| p.id == id)
-    }
-
-    /// All errors, or the most significant ones in the order of the session.
-    fn shown(&self, all: bool) -> Vec<&'r ParameterResult> {
-        let ratio = |p: &ParameterResult| {
-            if p.u > 0.0 { (p.value / p.u).abs() } else { f64::INFINITY }
-        };
-        let mut order: Vec<usize> = (0..self.errors.len()).collect();
-        if !all && order.len() > MAX_ERRORS {
-            order.sort_by(|a, b| ratio(self.errors[*b]).total_cmp(&ratio(self.errors[*a])));
-            order.truncate(MAX_ERRORS);
-            order.sort_unstable();
-        }
-        order.into_iter().map(|k| self.errors[k]).collect()
-    }
-
-    fn print_setup(&self) {
-        let rows: Vec<Vec<String>> = (self.setup.iter())
-            .map(|p| {
-                let (value, u) = table::value_and_u(p.value, p.u);
-                let pull = self.pulls.iter().find(|(id, _)| *id == p.id);
-                vec![
-                    p.id.clone(),
-                    value,
-                    u,
-                    table::unit(&p.unit),
-                    pull.map_or("–".to_string(), |(_, pull)| pull_text(pull.pull)),
-                    p.meaning.clone(),
-                ]
-            })
-            .collect();
-        table::print_aligned(&["parameter", "value", "u", "unit", "pull", "meaning"], &rows, &[0, 3, 5]);
-    }
-
-    /// The set-up parameter that the readings move furthest from its stated value, in standard deviations.
-    fn largest_pull(&self) -> Option<&(&'r str, Pull)> {
-        let largest = |a: &&(&str, Pull), b: &&(&str, Pull)| a.1.pull.abs().total_cmp(&b.1.pull.abs());
-        self.pulls.iter().max_by(largest)
+    if all && !estimates.setup.is_empty() {
+        output::print(&estimates.setup_table(None));
+    } else {
+        print_folded_setup(estimates);
     }
 }
 
-/// A pull with one decimal. A pull that rounds to zero has no sign.
-fn pull_text(pull: f64) -> String {
-    format!("{:.1}", (pull * 10.0).round() / 10.0 + 0.0)
+/// Prints the set-up parameters in one line.
+pub fn print_folded_setup(estimates: &Estimates<'_>) {
+    if !estimates.setup.is_empty() {
+        say!("  {}; --all lists them", estimates.setup_in_short());
+    }
 }
 
-/// A table of parameters with u, U, significance and meaning.
-pub fn print_parameters(parameters: &[&ParameterResult]) {
-    let rows: Vec<Vec<String>> = parameters
-        .iter()
-        .map(|p| {
-            let (value, u) = table::value_and_u(p.value, p.u);
-            // Rounded to the same place.
-            let (expanded, _) = table::value_and_u(p.expanded_u, p.u);
-            let mark = if p.significant { "*" } else { "" };
-            vec![p.id.clone(), value, u, expanded, table::unit(&p.unit), mark.to_string(), p.meaning.clone()]
-        })
-        .collect();
-    table::print_aligned(&["parameter", "value", "u", "U", "unit", "", "meaning"], &rows, &[0, 4, 5, 6]);
+/// Prints the conflicts between readings and session, if there are any.
+pub fn print_conflicts(plausibility: &Plausibility) {
+    let Some(found) = conflicts(plausibility) else {
+        return;
+    };
+    say!("The readings contradict the session:");
+    found.sentences.iter().for_each(|sentence| say!("  {sentence}"));
+    if !found.setup.rows.is_empty() {
+        output::print(&found.setup);
+    }
+    say!("{}", found.explanation);
+    found.causes.iter().for_each(|cause| say!("  {cause}"));
+    say!("");
+}
+
+/// Prints the figures of circular tests, one row per test; with `all`, the figures of each direction, the diagnosis and
+/// its limitations.
+pub fn print_circular(tests: &[CircularTest], all: bool) {
+    if !all && !tests.is_empty() {
+        say!("\nBall-bar figures (ISO 230-4); --all lists directions, diagnosis and limitations:");
+        let mut table = circular::summary(tests);
+        fold_rows(&mut table, MAX_CIRCULAR, "");
+        output::print(&table);
+        return;
+    }
+    for test in tests {
+        say!("\n{}", circular::heading(test));
+        circular::tables(test).iter().for_each(output::print);
+        test.not_identifiable.iter().for_each(|line| say!("  limitation: {line}"));
+    }
+}
+
+/// Keeps the first rows of a table, and notes the number of the others.
+fn fold_rows(table: &mut Table, max: usize, how: &str) {
+    let more = table.rows.len().saturating_sub(max);
+    if more > 0 {
+        table.rows.truncate(max);
+        table.notes.push(format!("… {more} more{how}"));
+    }
 }
 
 /// Prints what the readings leave open: null-space directions, then outliers. One line where there is nothing.
@@ -169,28 +107,20 @@ pub fn print_missing(null_space: &[Unobservable], outliers: &[Outlier], all: boo
     } else {
         let directions = counted(null_space.len(), "null-space direction");
         say!("\nConfounded: {directions} (a combination that leaves every reading unchanged)");
-        let lines: Vec<String> = null_space.iter().map(|item| table::with_symbols(&item.why)).collect();
-        list(&lines, "  ", all);
+        list(&confounded::sentences(null_space), "  ", all);
     }
     if outliers.is_empty() {
         return;
     }
-    let line = |reading: &Outlier| {
-        format!(
-            "{}  {}:{}  residual {}",
-            reading.test,
-            reading.file,
-            reading.line,
-            table::micrometres(reading.residual_um)
-        )
-    };
-    let is_are = if outliers.len() == 1 { "is" } else { "are" };
-    say!("{} {is_are} excluded as outliers:", counted(outliers.len(), "reading"));
     let mut sorted: Vec<&Outlier> = outliers.iter().collect();
     if !all {
         sorted.sort_by(|a, b| b.residual_um.abs().total_cmp(&a.residual_um.abs()));
     }
-    list(&sorted.into_iter().map(line).collect::<Vec<_>>(), "  ", all);
+    let mut table = confounded::outliers(sorted.into_iter());
+    if !all && table.rows.len() > MAX_LISTED + 1 {
+        fold_rows(&mut table, MAX_LISTED, "; --all lists them");
+    }
+    output::print(&table);
 }
 
 /// A next step: what to type or to do, and what it is for.
@@ -226,13 +156,4 @@ pub fn command(verb: &str, session: &SessionArguments, options: &str) -> String 
         words.push(options.to_string());
     }
     words.join(" ")
-}
-
-/// The noise and its source in words. A residual is not called noise.
-pub fn noise(noise_um: f64, source: &str) -> String {
-    let figure = table::micrometres(noise_um);
-    match source {
-        "residual" => format!("residual of the declared model {figure} (no noise stated, no repeats)"),
-        other => format!("noise {figure} ({other})"),
-    }
 }

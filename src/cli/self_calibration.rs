@@ -1,14 +1,17 @@
 //! `abbe fit --method self-calibration`: rotary axis, linear axes and artefact separately.
 
-use abbe::identify::results::Interval;
-use abbe::identify::self_calibration::{self, FunctionResult, MonteCarlo, SelfCalibration};
+use abbe::identify::results::ParameterResult;
+use abbe::identify::self_calibration::{self, MonteCarlo, SelfCalibration};
 use abbe::model::files::SourceMap;
 use abbe::model::session::Session;
 use abbe::model::words::counted;
 use clap::Args;
 
 use super::failure::Failure;
-use super::{CommonArguments, json, message, screen, table};
+use super::{CommonArguments, message, output, screen};
+use crate::present::fit::noise;
+use crate::present::number::micrometres;
+use crate::present::{parameters, self_calibration as present};
 
 /// Monte Carlo propagation of a self-calibration or of the full fit.
 #[derive(Args)]
@@ -75,18 +78,15 @@ pub fn run(
         print(&result);
     }
     message::print_warnings(&result.warnings);
-    if let Some(path) = &common.json {
-        json::write_of_session(path, sources, common.seed, &result)?;
-    }
-    Ok(())
+    common.write_json(sources, &result)
 }
 
 fn print(result: &SelfCalibration) {
     say!(
         "{}, {}, residual {}",
         counted(result.readings, "reading"),
-        screen::noise(result.noise_um, &result.noise_source),
-        table::micrometres(result.rms_um)
+        noise(result.noise_um, &result.noise_source),
+        micrometres(result.rms_um)
     );
     say!(
         "{} of four functions, numerical rank {} without boundary conditions",
@@ -102,80 +102,28 @@ fn print(result: &SelfCalibration) {
     for condition in &result.conditions {
         say!("  {condition}");
     }
-    say!("\nFunctions, µm, value ± standard uncertainty:");
-    print_functions(&result.functions);
+    output::print(&present::functions(&result.functions).titled("Functions, µm, value ± standard uncertainty"));
+    let estimates =
+        |list: &[&ParameterResult], title: &str| output::print(&parameters::table(list, None).titled(title));
     if let Some(radius) = &result.radius {
         say!("");
-        screen::print_parameters(&[radius]);
+        estimates(&[radius], "");
     }
     if !result.parameters.is_empty() {
-        say!("\nPosition of axis {}, by the least-squares circle of its displacements:", result.axis);
-        screen::print_parameters(&result.parameters.iter().collect::<Vec<_>>());
-        say!("\nThe same, from the angles of rotation:");
-        screen::print_parameters(&result.parameters_by_turn.iter().collect::<Vec<_>>());
-        say!("\nError motions of axis {}, µm:", result.axis);
-        print_functions(&result.error_motions);
+        let axis = &result.axis;
+        let title = format!("Position of axis {axis}, by the least-squares circle of its displacements");
+        estimates(&result.parameters.iter().collect::<Vec<_>>(), &title);
+        estimates(&result.parameters_by_turn.iter().collect::<Vec<_>>(), "The same, from the angles of rotation");
+        let title = format!("Error motions of axis {axis}, µm");
+        output::print(&present::functions(&result.error_motions).titled(title));
     }
     screen::print_missing(&result.unobservable, &[], true);
     if let Some(drawn) = &result.monte_carlo {
-        say!(
-            "\nMonte Carlo, {}, seed {}; coverage intervals of {} %, µm:",
+        output::print(&present::intervals(drawn).titled(format!(
+            "Monte Carlo, {}, seed {}; coverage intervals of {} %, µm",
             counted(drawn.runs, "run"),
             drawn.seed,
             drawn.coverage_probability * 100.0
-        );
-        let rows: Vec<Vec<String>> = drawn
-            .quantities
-            .iter()
-            .map(|quantity| {
-                let (mean, u) = table::value_and_u(quantity.mean_um, quantity.u_um);
-                let interval = |Interval { low, high }: Interval| {
-                    let (low, _) = table::value_and_u(low, quantity.u_um);
-                    let (high, _) = table::value_and_u(high, quantity.u_um);
-                    format!("{low} to {high}")
-                };
-                vec![
-                    quantity.id.clone(),
-                    mean,
-                    u,
-                    interval(quantity.shortest_interval_um),
-                    interval(quantity.symmetric_interval_um),
-                ]
-            })
-            .collect();
-        table::print(&["quantity", "mean", "u", "shortest", "symmetric"], &rows);
+        )));
     }
-}
-
-/// Functions side by side, one line per angle.
-fn print_functions(functions: &[FunctionResult]) {
-    let mut angles: Vec<f64> = Vec::new();
-    for point in functions.iter().flat_map(|function| &function.points) {
-        if !angles.contains(&point.at_deg) {
-            angles.push(point.at_deg);
-        }
-    }
-    angles.sort_by(f64::total_cmp);
-    let mut header = vec!["angle"];
-    header.extend(functions.iter().map(|function| function.id.as_str()));
-    let cell = |function: &FunctionResult, angle: f64| {
-        let point = function.points.iter().find(|point| point.at_deg == angle);
-        let Some((value, u)) = point.and_then(|point| Some((point.value_um?, point.u_um?))) else {
-            return "–".to_string();
-        };
-        if u < 1e-9 {
-            return format!("{:.2}", value + 0.0);
-        }
-        let (value, u) = table::value_and_u(value, u);
-        format!("{value} ± {u}")
-    };
-    let rows: Vec<Vec<String>> = angles
-        .iter()
-        .map(|angle| {
-            let mut row = vec![format!("{angle}°")];
-            row.extend(functions.iter().map(|function| cell(function, *angle)));
-            row
-        })
-        .collect();
-    table::print(&header, &rows);
 }

@@ -4,9 +4,7 @@ use std::path::PathBuf;
 
 use abbe::identify::quantity::{self, Given};
 use abbe::identify::simulate::{Simulated, Simulation, simulate};
-use abbe::model::files::table::csv;
-use abbe::model::files::toml::{rewrite, write};
-use abbe::model::files::{self, SourceMap};
+use abbe::model::files::{self, Changes, SourceMap, with_readings};
 use abbe::model::session::Session;
 use abbe::model::session::limits::{LARGEST, MIN_UM};
 use abbe::model::words::counted;
@@ -15,7 +13,10 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::failure::Failure;
-use super::{CommonArguments, SessionArguments, folder, json, message, output, read_session, table};
+use super::{CommonArguments, SessionArguments, folder, message, output, read_session};
+use crate::present::number::micrometres;
+use crate::present::simulation::truth;
+use crate::present::table::Table;
 
 /// Examples of `abbe simulate`, and the names of values.
 pub const HELP: &str = "Names of values are those of results, with a unit: errors (EY0A of ISO 230-1, e_y0a of the literature), set-up \
@@ -107,7 +108,8 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
         seed: arguments.common.seed,
     };
     let simulated = simulate(&session, &simulation)?;
-    let files = files((&session, &sources), &simulated, arguments)?;
+    let changes = Changes { noise_um: arguments.noise_um, hide_effects: arguments.hide_effects };
+    let files = with_readings((&session, &sources), &simulated.readings, changes)?;
     if output::is_same(output::folder_of(&sources.file), &arguments.out) {
         return Err(Failure::Other(format!(
             "{}: this folder contains the plan itself; write the readings to another folder",
@@ -123,52 +125,6 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
         Ok(())
     })?;
     report((&session, &sources), &simulated, arguments, outputs.tables(arguments.common.quiet))
-}
-
-/// The files; `session.toml` is the last, so that the others exist when it does.
-fn files(
-    (session, sources): (&Session, &SourceMap),
-    simulated: &Simulated,
-    arguments: &SimulateArguments,
-) -> Result<Vec<folder::NewFile>, Failure> {
-    let file = sources.file.as_path();
-    let mut files = Vec::new();
-    let mut data: Vec<(String, String)> = Vec::new();
-    for (test, readings) in session.tests.iter().zip(&simulated.readings) {
-        let name = data_name(&test.name, &data);
-        let text = csv::text(&session.machine, &test.station, readings);
-        data.push((test.name.clone(), name.clone()));
-        files.push((name, text));
-    }
-    if let Some(machine) = &sources.machine_text {
-        files.push(("machine.toml".into(), machine.clone()));
-    }
-    let mut text = write::with_data(&sources.text, file, &data)?;
-    text = rewrite::with_machine_file(&text, file, "machine.toml")?;
-    if let Some(noise_um) = arguments.noise_um {
-        text = rewrite::with_noise(&text, file, noise_um)?;
-    }
-    // The data files have the standard columns, whatever the columns of the original.
-    text = rewrite::without_tables(&text, &["format", "columns"]);
-    if arguments.hide_effects {
-        text = rewrite::without_tables(&text, &["effect"]);
-    }
-    files.push(("session.toml".into(), text));
-    Ok(files)
-}
-
-/// A portable file name for the data of a test, different from those of other tests.
-fn data_name(test: &str, taken: &[(String, String)]) -> String {
-    let plain: String =
-        test.chars().map(|c| if c.is_alphanumeric() || matches!(c, '-' | '_' | '.') { c } else { '-' }).collect();
-    let plain = plain.trim_start_matches('.');
-    let mut name = format!("{plain}.csv");
-    let mut number = 2;
-    while taken.iter().any(|(_, other)| other.eq_ignore_ascii_case(&name)) {
-        name = format!("{plain}-{number}.csv");
-        number += 1;
-    }
-    name
 }
 
 /// The simulated session and the true values of its parameters.
@@ -218,33 +174,25 @@ fn report(
         warnings: simulated.warnings.clone(),
     };
     if tables {
-        print(session, &report, arguments.common.seed);
+        print(session, &report, &truth(simulated), arguments.common.seed);
     }
     message::print_warnings(&report.warnings);
-    if let Some(path) = &arguments.common.json {
-        json::write_of_session(path, sources, arguments.common.seed, &report)?;
-    }
-    Ok(())
+    arguments.common.write_json(sources, &report)
 }
 
-fn print(session: &Session, report: &SimulationResult, seed: u64) {
+fn print(session: &Session, report: &SimulationResult, truth: &Table, seed: u64) {
     say!(
         "{}: {} of {}, noise {}, seed {}",
         report.written_session,
         counted(report.readings, "reading"),
         counted(session.tests.len(), "test"),
-        table::micrometres(report.noise_um),
+        micrometres(report.noise_um),
         seed
     );
-    let rows: Vec<Vec<String>> = report
-        .truth
-        .iter()
-        .map(|value| vec![value.id.clone(), format!("{:.4}", value.value), table::unit(&value.unit)])
-        .collect();
-    if rows.is_empty() {
+    if truth.rows.is_empty() {
         say!("No error is given: the readings are those of the nominal machine.");
     } else {
         say!("");
-        table::print(&["parameter", "value", "unit"], &rows);
+        output::print(truth);
     }
 }

@@ -6,9 +6,10 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::Duration;
 
+use abbe::identify::candidates::library;
 use abbe::identify::plan::test_variations::TestVariations;
-use abbe::identify::trace::separating_tests::separate_aliases;
-use abbe::identify::trace::{Progress, TraceOptions, library};
+use abbe::identify::separating_tests::separate_aliases;
+use abbe::identify::trace::{Progress, TraceOptions};
 use abbe::model::files::toml::{rewrite, write};
 use abbe::model::words::counted;
 use clap::Args;
@@ -18,7 +19,8 @@ use super::failure::Failure;
 use super::interrupt::Interrupts;
 use super::message::{Kind, tell};
 use super::report::ReportArguments;
-use super::{CommonArguments, SessionArguments, compensation, csv, json, message, output, read_session, residuals};
+use super::{CommonArguments, SessionArguments, compensation, message, output, read_session};
+use crate::present::{readings, trace as present};
 
 /// Examples of `abbe trace`.
 pub const HELP: &str = "Examples:
@@ -143,9 +145,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         screen::print(&trace, &arguments.session, arguments.all);
     }
     message::print_warnings(&trace.result.warnings);
-    if let Some(path) = &arguments.common.json {
-        json::write_of_session(path, &sources, arguments.common.seed, &trace.result)?;
-    }
+    arguments.common.write_json(&sources, &trace.result)?;
     if let Some(path) = &arguments.write {
         let data = arguments.session.data.as_deref();
         let text = rewrite::relocated(&sources.text, &sources.file, output::folder_of(path), data)?;
@@ -165,15 +165,14 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         }
     }
     if let Some(path) = &arguments.csv {
-        csv::write_trace(path, &trace.result)?;
+        output::write_figures(path, &present::figures(&trace.result))?;
     }
     if let Some(path) = &arguments.residuals {
-        residuals::write(&trace.after, &trace.after_fit, path)?;
+        output::write_whole(path, &output::csv(&readings::residuals(&trace.after, &trace.after_fit))?)?;
     }
     if arguments.report.asked() {
-        let document = crate::report::trace::document(&trace)?;
-        let method = crate::report::trace::method(&trace.result);
-        arguments.report.write(&document, &method, (&session, &sources), arguments.common.seed)?;
+        let document = crate::present::report::trace::document(&trace)?;
+        arguments.report.write(&document, (&session, &sources), arguments.common.seed)?;
     }
     if trace.result.interrupted {
         if arguments.compensation.wanted() {

@@ -1,4 +1,4 @@
-//! The name of an effect in a table.
+//! The name of an effect in tables and sentences.
 
 use abbe::identify::results::EffectName;
 

@@ -1,4 +1,35 @@
-//! Results as tables and texts that the terminal and the reports share.
+//! Results as tables and figures, and the printers that show them. Nothing here computes a result or knows an option.
+//!
+//! - [`table`]: a table as data; [`number`]: digits and units; [`figure`]: plots;
+//! - printers: [`terminal`], [`csv`], [`html`];
+//! - one file per result: [`fit`], [`trace`], [`plan`], [`next_test`], [`method`], [`repeated`], [`self_calibration`],
+//!   [`simulation`], [`patterns`], [`volumetric`], [`compensation`];
+//! - parts of several results: [`parameters`], [`confounded`], [`circular`], [`plausibility`], [`effect`],
+//!   [`uniqueness`], [`readings`];
+//! - [`report`]: the pages of `--report`.
 
+pub mod circular;
+pub mod compensation;
+pub mod confounded;
+pub mod csv;
 pub mod effect;
+pub mod figure;
+pub mod fit;
+pub mod html;
 pub mod method;
+pub mod next_test;
+pub mod number;
+pub mod parameters;
+pub mod patterns;
+pub mod plan;
+pub mod plausibility;
+pub mod readings;
+pub mod repeated;
+pub mod report;
+pub mod self_calibration;
+pub mod simulation;
+pub mod table;
+pub mod terminal;
+pub mod trace;
+pub mod uniqueness;
+pub mod volumetric;

@@ -3,8 +3,8 @@
 use std::collections::{BTreeSet, HashMap};
 use std::fmt::Write;
 
+use abbe::identify::candidates::library;
 use abbe::identify::problem::Problem;
-use abbe::identify::trace::library;
 use abbe::model::chain::Machine;
 use abbe::model::component::{ErrorKind, Freedom};
 use abbe::model::driver::Driver;

@@ -10,6 +10,7 @@ mod data;
 mod effect_description;
 mod equation_command;
 mod equation_effects;
+mod examples;
 mod faults;
 mod field_files;
 mod first_screen;

@@ -111,8 +111,8 @@ fn any_structural_code_gives_a_plan_that_runs() {
     }
     for (code, message) in [
         ("[wCAYXZt]", "it contains 0 beds"),
-        ("w b J1 J2 t", "axis `J1` of `w b J1 J2 t` is no letter of ISO 841"),
-        ("wbt", "has no axis"),
+        ("w b J1 J2 t", "axis `J1` is not an ISO 841 letter"),
+        ("wbt", "it has no axis"),
     ] {
         let output = abbe(&["new", text(&folder.path().join("no")), "--from-code", code]);
         assert_eq!(output.status.code(), Some(1));

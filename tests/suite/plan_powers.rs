@@ -2,10 +2,10 @@
 
 use std::f64::consts::PI;
 
+use abbe::identify::candidates::library;
 use abbe::identify::plan::effects::effects;
 use abbe::identify::plan::results::EffectDetectability;
 use abbe::identify::plan::states;
-use abbe::identify::trace::library;
 use abbe::model::driver::Driver;
 use abbe::model::effect::Shape;
 use abbe::model::effect::shape::Power;

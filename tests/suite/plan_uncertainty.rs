@@ -1,8 +1,6 @@
 //! Predicted uncertainties against the scatter of simulated fits, for every topology of Table 1.1 and of Fig. 1.1 of
 //! the thesis.
 
-use std::sync::Arc;
-
 use abbe::identify::fit::fit;
 use abbe::identify::plan::states;
 use abbe::identify::problem::Problem;
@@ -84,10 +82,7 @@ fn squares(code: &str, first_seed: usize, complete_fit: bool) -> Vec<(String, f6
             &Simulation { given, noise_mm: None, draw_setups: true, seed: (first_seed + number) as u64 },
         )
         .unwrap();
-        let mut measured = plan.clone();
-        for (test, readings) in measured.tests.iter_mut().zip(drawn.readings) {
-            test.readings = Some(Arc::new(readings));
-        }
+        let measured = plan.clone().with_readings(drawn.readings);
         let mut problem = Problem::new(&measured, noise_um(0.3), 1).unwrap();
         states::fold_by_test(&mut problem);
         let found = if complete_fit {

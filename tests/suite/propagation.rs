@@ -1,7 +1,5 @@
 //! The full fit by Monte Carlo: the law of propagation for a linear model, a closed form for a nonlinear one.
 
-use std::sync::Arc;
-
 use abbe::identify::fit::{prepare, report};
 use abbe::identify::monte_carlo::MonteCarlo;
 use abbe::identify::propagation::add_monte_carlo;
@@ -26,11 +24,7 @@ fn session(contents: &str) -> Session {
 
 fn measured(plan: &Session, simulation: &Simulation) -> (Session, Vec<(String, f64, String)>) {
     let simulated = simulate(plan, simulation).unwrap();
-    let mut session = plan.clone();
-    for (test, readings) in session.tests.iter_mut().zip(simulated.readings) {
-        test.readings = Some(Arc::new(readings));
-    }
-    (session, simulated.truth)
+    (plan.clone().with_readings(simulated.readings), simulated.truth)
 }
 
 fn drawn(session: &Session, runs: u64, seed: u64) -> FitMonteCarlo {

@@ -1,8 +1,6 @@
 //! The fit of a simulated session recovers the simulated errors: exactly without noise, and within the stated
 //! uncertainty with noise.
 
-use std::sync::Arc;
-
 use abbe::identify::fit::{Fit, prepare};
 use abbe::identify::problem::Problem;
 use abbe::identify::quantity::Given;
@@ -40,11 +38,7 @@ fn given() -> Vec<Given> {
 fn measured(plan: &Session, simulation: &Simulation) -> (Session, Vec<(String, f64, String)>) {
     let simulated = simulate(plan, simulation).unwrap();
     assert!(simulated.warnings.is_empty(), "{:?}", simulated.warnings);
-    let mut session = plan.clone();
-    for (test, readings) in session.tests.iter_mut().zip(simulated.readings) {
-        test.readings = Some(Arc::new(readings));
-    }
-    (session, simulated.truth)
+    (plan.clone().with_readings(simulated.readings), simulated.truth)
 }
 
 /// Value and uncertainty of a parameter in its display unit.

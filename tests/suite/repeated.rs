@@ -1,7 +1,5 @@
 //! Repeated sessions: the scatter of their fits against the standard uncertainties of the fits.
 
-use std::sync::Arc;
-
 use abbe::identify::fit::prepare;
 use abbe::identify::quantity::Given;
 use abbe::identify::repeated::{Repeated, Scatter, Session as Fitted, compare};
@@ -34,10 +32,7 @@ fn session(plan: &Session, seed: u64, draw_setups: bool, changed: Option<&str>) 
         given.push(changed);
     }
     let simulation = Simulation { given, draw_setups, seed, ..Simulation::default() };
-    let mut measured = plan.clone();
-    for (test, readings) in measured.tests.iter_mut().zip(simulate(plan, &simulation).unwrap().readings) {
-        test.readings = Some(Arc::new(readings));
-    }
+    let measured = plan.clone().with_readings(simulate(plan, &simulation).unwrap().readings);
     let (problem, fit) = prepare(&measured, 1).unwrap();
     Fitted::new(&format!("session {seed}"), &problem, &fit)
 }

@@ -55,13 +55,10 @@ fn plan(count: usize, second_deg: f64) -> Session {
 
 /// The plan with readings of the nominal machine.
 fn unmoved(count: usize, second_deg: f64) -> Session {
-    let mut session = plan(count, second_deg);
+    let session = plan(count, second_deg);
     let simulation = Simulation { noise_mm: Some(0.0), ..Simulation::default() };
     let simulated = simulate(&session, &simulation).unwrap();
-    for (test, readings) in session.tests.iter_mut().zip(simulated.readings) {
-        test.readings = Some(Arc::new(readings));
-    }
-    session
+    session.with_readings(simulated.readings)
 }
 
 /// Sets the radius as known, so that all readings refer to the first one, as in the paper.

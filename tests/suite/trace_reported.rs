@@ -10,8 +10,8 @@ use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::problem::Problem;
 use abbe::identify::quantity::Given;
 use abbe::identify::results::EffectName;
+use abbe::identify::separating_tests::separate_aliases;
 use abbe::identify::simulate::{Simulation, simulate};
-use abbe::identify::trace::separating_tests::separate_aliases;
 use abbe::identify::trace::{TraceOptions, trace};
 use abbe::model::driver::Driver;
 use abbe::model::effect::shape::{Harmonic, Local};
@@ -36,9 +36,7 @@ fn measured(effects: Vec<Effect>, values: &[&str], declared: usize) -> Session {
         ..Simulation::default()
     };
     let simulated = simulate(&session, &simulation).unwrap();
-    for (test, readings) in session.tests.iter_mut().zip(simulated.readings) {
-        test.readings = Some(Arc::new(readings));
-    }
+    session = session.with_readings(simulated.readings);
     session.effects.truncate(declared);
     session
 }

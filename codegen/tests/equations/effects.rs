@@ -8,7 +8,9 @@ use abbe_codegen::{CodegenError, Equation, Options, Order, Source, Subject, Vari
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::driver::{Driver, DriverPart};
-use abbe_model::effect::shape::{Curve, Harmonic, Local, Periodic, Polynomial, Power, ReversalSpike, Steps, Warmup};
+use abbe_model::effect::shape::{
+    Curve, Harmonic, Local, Periodic, Polynomial, Power, ReversalSpike, Steps, Triangle, Warmup,
+};
 use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::instrument::{Station, ballbar::BallBar, socket::Socket};
 use abbe_model::scalar::Nominal;
@@ -100,6 +102,19 @@ fn smooth_shapes_by_hand() {
     let warmup = Shape::Warmup(Warmup { tau_s: 600.0 });
     near(&bases("time", warmup, here(1200.0)), &[1.0 - (-2.0_f64).exp()]);
     near(&bases("X", Shape::Lag, HERE), &[-4.0]);
+    let square = Shape::Polynomial(Polynomial { degree: 2, scale: 10.0 });
+    near(&bases("speed-squared", square, HERE), &[1.6, 2.56]);
+}
+
+/// A triangular wave is the arc sine of a sine, scaled to 1.
+#[test]
+fn triangles_by_the_arc_sine() {
+    for q in [-50.0, -7.0, 0.0, 2.9, 3.1, 8.0, 38.0_f64] {
+        let angle = TAU * q / 12.0;
+        let expected = [angle.cos(), angle.sin()].map(|wave| wave.asin() / (PI / 2.0));
+        near(&bases("X", Shape::Triangle(Triangle { period: 12.0 }), here(q)), &expected);
+    }
+    near(&bases("X", Shape::Triangle(Triangle { period: 12.0 }), here(38.0)), &[1.0 / 3.0, 2.0 / 3.0]);
 }
 
 #[test]
@@ -162,6 +177,7 @@ pub fn every_shape() -> Vec<Effect> {
     vec![
         effect("EZC", "C", Shape::Harmonic(Harmonic { order: 2.0 })),
         effect("EXC", "C", Shape::Periodic(Periodic { period: 0.3 })),
+        effect("EXC", "C", Shape::Triangle(Triangle { period: 0.7 })),
         effect("EYC", "C", polynomial(2, PI)),
         effect("EX0C", "temperature", polynomial(1, 1.0)),
         effect("EY0C", "time", Shape::Drift),
@@ -277,6 +293,8 @@ fn effects_without_a_closed_form_are_refused_by_name() {
     assert!(message.contains("EZA~A:backlash") && message.contains("`A`"), "{message}");
     let message = refused(effect("tracker.x", "time", Shape::Drift));
     assert!(message.contains("tracker.x~time:drift"), "{message}");
+    let message = refused(effect("bar", "gravity", Shape::Backlash));
+    assert!(message.contains("cannot be written: gravity exerts no moment about \"bar\"; to omit it"), "{message}");
     let twice = effect("EZC", "C", Shape::Backlash);
     let equation = Equation::of(&machine, &Bar, &[], &with(vec![twice.clone(), twice]));
     assert!(matches!(equation, Err(CodegenError::Twice { .. })));

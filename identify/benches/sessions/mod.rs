@@ -1,13 +1,11 @@
 //! Generates sessions of any size: ball-bar tests of a five-axis machine, simulated with some errors.
 
-use std::fmt::Write;
-use std::path::Path;
-use std::sync::Arc;
-
 use abbe_identify::quantity::Given;
 use abbe_identify::simulate::{Simulation, simulate};
 use abbe_model::files::{ReadOptions, session as read};
 use abbe_model::session::Session;
+use std::fmt::Write;
+use std::path::Path;
 
 /// The session of chapter 5 with about 3,616 readings and no undeclared effect.
 pub fn chapter_5() -> Session {
@@ -28,11 +26,7 @@ fn drawn(plan: Session, given: &[&str]) -> Session {
         ..Simulation::default()
     };
     let readings = simulate(&plan, &simulation).expect("a simulation").readings;
-    let mut session = plan;
-    for (test, readings) in session.tests.iter_mut().zip(readings) {
-        test.readings = Some(Arc::new(readings));
-    }
-    session
+    plan.with_readings(readings)
 }
 
 /// The tests of chapter 5, each with its own set-up, with about this many readings in total: eight errors, and seven

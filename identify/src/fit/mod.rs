@@ -9,6 +9,7 @@ mod covariance;
 mod prepare;
 mod quantities;
 mod reported;
+mod session;
 
 use std::cell::RefCell;
 
@@ -27,6 +28,7 @@ pub use prepare::{prepare, prepare_with};
 pub(crate) use quantities::{Quantity, quantities, values_at};
 pub(crate) use reported::{ids, u_of_undetermined_phase_deg};
 pub use reported::{outliers, parameters, report, unobservable};
+pub use session::SessionFit;
 
 /// The result of a fit, in internal units.
 #[derive(Clone, Debug)]

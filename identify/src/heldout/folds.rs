@@ -2,7 +2,6 @@
 
 use std::collections::BTreeSet;
 
-use abbe_model::instrument::InstrumentKind;
 use abbe_model::session::{Session, Test};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
@@ -55,8 +54,7 @@ impl Folds {
     /// The folds of a session.
     pub fn of(session: &Session, tests: &[Test], seed: u64) -> Folds {
         let readings: Vec<_> = tests.iter().filter_map(|test| test.readings.as_ref()).collect();
-        let poses = matches!(session.instrument, InstrumentKind::Tracker | InstrumentKind::Socket)
-            && readings.iter().all(|r| r.run.is_empty());
+        let poses = !session.instrument.is_two_sided() && readings.iter().all(|r| r.run.is_empty());
         if poses {
             let total: usize = readings.iter().map(|r| r.rows()).sum();
             let folds = FOLDS_OF_POSES.min(total.max(1));

@@ -3,7 +3,9 @@
 //!
 //! Structure in the residual must not be excluded. Along a run a residual is therefore compared with the medians of its
 //! neighbours on either side, not with zero (Hampel's identifier: Davies & Gather, J. Am. Stat. Assoc. 88 (1993) 782).
-//! Poses have no neighbours. A pose is an outlier if its residual is a large multiple of the median residual.
+//! In the residual of a circle's own diagnosis, which contains all structure, it is compared with zero and with both
+//! neighbours. Poses have no neighbours. A pose is an outlier if its residual is a large multiple of the median
+//! residual.
 
 use abbe_model::session::readings::Readings;
 
@@ -19,6 +21,9 @@ const OUTLIER_ALONG_RUN: f64 = 5.3;
 /// Limit for a pose, in median residual lengths: exceeded once in 10⁹ Gaussian poses of three coordinates. Unmodelled
 /// structure is bounded and stayed far below it.
 const OUTLIER_POSE: f64 = 5.0;
+
+/// Limit for a single reading in the residual of a complete model, in robust standard deviations.
+const OUTLIER_ALONE: f64 = 6.0;
 
 /// The outliers of the problem, by test and row.
 pub fn reject(problem: &Problem, fit: &Fit) -> Vec<Vec<bool>> {
@@ -38,6 +43,18 @@ pub fn reject(problem: &Problem, fit: &Fit) -> Vec<Vec<bool>> {
     parallel::map(problem.tests.len(), &|test| match &problem.tests[test].readings {
         Some(readings) => reject_along_runs(readings, &fit.residuals[test], coordinates, problem.noise.sigma_mm),
         None => Vec::new(),
+    })
+}
+
+/// The outliers in the residual of a model that contains all structure, by index: large beside both neighbours too.
+pub(crate) fn alone(residual: &[f64]) -> impl Iterator<Item = usize> {
+    let limit = OUTLIER_ALONE * robust_deviation(residual);
+    let is_small = move |place: Option<usize>, value: f64| {
+        place.and_then(|place| residual.get(place)).is_none_or(|other| other.abs() < 0.5 * value)
+    };
+    (0..residual.len()).filter(move |&i| {
+        let value = residual[i].abs();
+        value > limit && is_small(i.checked_sub(1), value) && is_small(Some(i + 1), value)
     })
 }
 

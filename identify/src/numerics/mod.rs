@@ -14,7 +14,6 @@ pub(crate) mod power;
 pub mod rank;
 pub(crate) mod reduction;
 pub(crate) mod regression;
-pub(crate) mod rigid_motion;
 pub(crate) mod solve;
 pub(crate) mod symmetric;
 pub(crate) mod tails;

@@ -2,6 +2,7 @@
 
 use faer::Mat;
 
+use super::gain::quadratic_gain;
 use super::solve::Directions;
 use super::tolerances::COLLINEAR;
 use super::triangle::Triangle;
@@ -45,6 +46,15 @@ impl Regression {
         self.residual.iter().map(|v| v * v).sum()
     }
 
+    /// The decrease of the sum of squares by further columns beside those of this regression.
+    pub fn gain(&self, columns: &[Vec<f64>], further: &[Vec<f64>]) -> f64 {
+        let products = |a: &[Vec<f64>], b: &[Vec<f64>]| Mat::from_fn(a.len(), b.len(), |i, j| dot(&a[i], &b[j]));
+        let (cross, own) = (products(columns, further), products(further, further));
+        let d = &own - cross.transpose() * (&self.inverse * &cross);
+        let g: Vec<f64> = further.iter().map(|column| dot(column, &self.residual)).collect();
+        quadratic_gain(&d, &own, &g)
+    }
+
     /// Standard uncertainty of `Σ wⱼ·βⱼ` for readings with the standard deviation `sigma`.
     pub fn u(&self, weights: &[(usize, f64)], sigma: f64) -> f64 {
         let variance: f64 =
@@ -53,50 +63,26 @@ impl Regression {
     }
 }
 
-/// An orthonormal basis of columns, for the gain from further columns.
-pub(crate) struct Orthonormal(Vec<Vec<f64>>);
-
-impl Orthonormal {
-    /// Orthonormalises columns.
-    pub fn of(columns: &[Vec<f64>]) -> Orthonormal {
-        let mut basis = Orthonormal(Vec::new());
-        for column in columns {
-            basis.push(column.clone());
-        }
-        basis
-    }
-
-    fn push(&mut self, column: Vec<f64>) -> bool {
-        let before = dot(&column, &column).sqrt();
-        let mut remainder = column;
-        // Two passes suffice (Giraud, Langou & Rozložník 2005).
-        for _ in 0..2 {
-            for q in &self.0 {
-                let along = dot(q, &remainder);
-                remainder.iter_mut().zip(q).for_each(|(r, q)| *r -= along * q);
-            }
-        }
-        let norm = dot(&remainder, &remainder).sqrt();
-        let independent = norm > COLLINEAR * before.max(f64::MIN_POSITIVE);
-        if independent {
-            remainder.iter_mut().for_each(|r| *r /= norm);
-            self.0.push(remainder);
-        }
-        independent
-    }
-
-    /// The decrease of the sum of squares of a residual, orthogonal to these columns, by further columns.
-    pub fn gain(&mut self, residual: &[f64], further: Vec<Vec<f64>>) -> f64 {
-        let kept = self.0.len();
-        for column in further {
-            self.push(column);
-        }
-        let gain = self.0[kept..].iter().map(|q| dot(q, residual).powi(2)).sum();
-        self.0.truncate(kept);
-        gain
-    }
-}
-
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The gain of further columns is the decrease of the sum of squares in a new regression with them.
+    #[test]
+    fn the_gain_of_further_columns_is_that_of_a_new_regression() {
+        let column = |k: i32| (0..20).map(|i| (0.1 * f64::from(i)).powi(k)).collect::<Vec<f64>>();
+        let y: Vec<f64> = (0..20).map(|i| (0.4 * f64::from(i)).sin()).collect();
+        let columns = vec![column(0), column(1)];
+        let regression = Regression::solve(&columns, &y).unwrap();
+        let further = [column(2), column(3)];
+        let both = Regression::solve(&[columns.clone(), further.to_vec()].concat(), &y).unwrap();
+        let decrease = regression.sum_of_squares() - both.sum_of_squares();
+        assert!((regression.gain(&columns, &further) / decrease - 1.0).abs() < 1e-9);
+        assert!(regression.gain(&columns, &columns).abs() < 1e-9);
+        assert!(Regression::solve(&[columns[0].clone(), columns[0].clone()], &y).is_none());
+    }
 }

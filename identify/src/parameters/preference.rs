@@ -20,8 +20,9 @@ impl Parameters {
     }
 }
 
-/// The order in which parameters are preferred as pivots of null-space combinations (see [`crate::numerics::rank`]). The pivot
-/// comes first in its combination. Holding the pivots at nominal makes the other parameters identifiable.
+/// The order in which parameters are preferred as pivots of null-space combinations (see
+/// [`crate::numerics::rank`]). The pivot comes first in its combination. Holding the pivots at nominal makes the other
+/// parameters identifiable.
 ///
 /// Location errors come first, coefficients of effects next, set-up quantities last. A combination thus states what one
 /// machine error is confounded with, and an error that is confounded with the set-up is stated in terms of the set-up.

@@ -19,14 +19,14 @@ use super::detectability::{POWER, SIGNIFICANCE, corrected};
 use super::linear::{Linearisation, is_of_interest};
 use super::ranking::{largest_first, smallest_first};
 use super::results::{Bias, EffectDetectability, EffectsAnalysis};
+use crate::candidates::columns::{Columns, EffectColumns, chunked};
+use crate::candidates::library::{self, Candidate};
 use crate::error::IdentifyError;
 use crate::numerics::parallel;
 use crate::numerics::power::noncentrality;
 use crate::numerics::symmetric::Symmetric;
 use crate::parameters::physical_size;
 use crate::problem::Problem;
-use crate::trace::columns::{Columns, EffectColumns, chunked};
-use crate::trace::library::{self, Candidate};
 use crate::unit::Unit;
 
 /// Share of the signal below which an effect counts as confounded.

@@ -16,6 +16,7 @@ use abbe_model::session::Prior;
 use faer::Mat;
 
 use crate::fit::Fit;
+use crate::noise::enlargement_of_mean;
 use crate::numerics::gain::ObservableSubspace;
 use crate::numerics::tails::{chi_square_quantile, chi_square_tail, normal_quantile};
 use crate::parameters::Role;
@@ -156,11 +157,10 @@ fn excess(problem: &Problem, fit: &Fit) -> f64 {
     let freedom = count.saturating_sub(free.count()).max(1) as f64;
     let ratio = (squares / freedom / problem.noise.sigma_mm.powi(2)).max(1.0);
     let poses = problem.folds.kind == crate::heldout::FoldKind::Poses;
-    if poses || pairs <= 0.0 || !problem.noise.ar_coefficients.is_empty() {
+    if poses || !problem.noise.ar_coefficients.is_empty() {
         return ratio;
     }
-    let correlation = (products / pairs).clamp(0.0, MAX_CORRELATED);
-    ratio * (1.0 + correlation) / (1.0 - correlation)
+    ratio * enlargement_of_mean(products, pairs, MAX_CORRELATED)
 }
 
 #[cfg(test)]

@@ -4,7 +4,6 @@
 //! Jiang (2014): X. Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine Tools*, PhD thesis,
 //! University of Birmingham.
 
-use abbe_model::instrument::Station;
 use abbe_model::sensitivity::TestModel;
 
 use super::abscissa::Abscissa;
@@ -68,7 +67,7 @@ pub fn sensitivities(problem: &Problem, beta: &[f64]) -> Result<Vec<TestSensitiv
         way.values = picked.iter().map(|i| way.values[run.start + i]).collect();
         let block = RowBlock { test: number, rows: run };
         let rows = problem.rows(&values, &block)?;
-        let names = names(&test.station);
+        let names = test.station.coordinate_names();
         for coordinate in 0..coordinates {
             let columns = (0..list.len())
                 .filter(|j| is_of_interest(&list[*j]))
@@ -119,13 +118,4 @@ pub fn over_poses(problem: &Problem, beta: &[f64]) -> Result<Vec<Sensitivity>, I
 
 fn sensitivity(parameter: &Parameter, values: Vec<f64>) -> Sensitivity {
     Sensitivity { id: parameter.id.clone(), unit: parameter.unit.name.clone(), values }
-}
-
-/// The names of the coordinates of a vector reading.
-fn names(station: &Station<f64>) -> [&'static str; 3] {
-    match station {
-        Station::RTest(rtest) if rtest.sensors.is_some() => ["du", "dv", "dw"],
-        Station::RTest(_) => ["dx", "dy", "dz"],
-        _ => ["x", "y", "z"],
-    }
 }

@@ -10,8 +10,9 @@ use std::collections::HashSet;
 
 use abbe_model::effect::Shape;
 
-use super::score::{Gain, INDISTINGUISHABLE, TrainedModel};
+use super::constants::INDISTINGUISHABLE;
 use super::search::{ALL, Search};
+use crate::candidates::gain::{Gain, TrainedModel};
 
 /// Least cosine between the signature of the found effect and the column space of an alias, which then reproduces at
 /// least half of the squared signature. The evidence alone does not suffice: a candidate may explain as much of a

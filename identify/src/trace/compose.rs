@@ -10,8 +10,8 @@ use abbe_model::effect::{Effect, Shape};
 use faer::Mat;
 use statrs::function::gamma::ln_gamma;
 
-use super::library::Candidate;
-use super::score::TrainedModel;
+use crate::candidates::gain::TrainedModel;
+use crate::candidates::library::Candidate;
 use crate::numerics::solve::solve_square;
 use crate::numerics::tails::ln_chi_square_tail;
 use crate::numerics::tolerances::MIN_OBSERVABLE;

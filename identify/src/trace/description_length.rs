@@ -7,10 +7,10 @@ use abbe_model::driver::Driver;
 use abbe_model::effect::Shape;
 use abbe_model::effect::shape::Steps;
 
-use super::columns::EffectColumns;
-use super::library::Candidate;
-use super::score::Gain;
 use super::search::{Search, SearchBranch, SelectedEffect};
+use crate::candidates::columns::EffectColumns;
+use crate::candidates::gain::Gain;
+use crate::candidates::library::Candidate;
 use crate::error::IdentifyError;
 use crate::numerics::parallel;
 

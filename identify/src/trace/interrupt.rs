@@ -12,7 +12,7 @@ const INCOMPLETE: &str = "incomplete";
 
 /// Asks the caller of a trace whether to continue.
 #[derive(Clone, Copy)]
-pub(super) struct Interrupt<'t>(pub &'t (dyn Fn(Progress) -> bool + Sync));
+pub(crate) struct Interrupt<'t>(pub &'t (dyn Fn(Progress) -> bool + Sync));
 
 impl Interrupt<'_> {
     /// Returns if the trace continues.
@@ -26,7 +26,7 @@ impl Interrupt<'_> {
 
 impl TraceResult {
     /// Marks a result as that of an interrupted trace: a field, the verdict, and a warning.
-    pub(super) fn mark_interrupted(&mut self) {
+    pub(crate) fn mark_interrupted(&mut self) {
         self.interrupted = true;
         self.verdict = INCOMPLETE.to_string();
         self.warnings.push(format!(

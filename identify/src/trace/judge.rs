@@ -2,12 +2,12 @@
 
 use abbe_model::effect::Effect;
 
-use super::columns::Columns;
 use super::noise_model::SCATTER;
 use super::remainder::{self, Structure};
 use super::search::Search;
 use super::start::Start;
 use super::{TraceOptions, null, null_draw_count};
+use crate::candidates::columns::Columns;
 use crate::error::IdentifyError;
 use crate::fit::{Fit, fit, prepare_with};
 use crate::noise::NoiseSource;

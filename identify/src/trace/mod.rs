@@ -13,44 +13,38 @@
 //!    (`remainder`).
 
 pub mod alias;
-pub(crate) mod columns;
 mod compose;
+mod constants;
 mod description_length;
 mod implausible;
-mod interrupt;
+pub(crate) mod interrupt;
 mod judge;
-pub mod library;
-mod moments;
 mod noise_model;
 mod null;
-mod paired;
 mod refine;
 mod remainder;
-mod result;
+pub(crate) mod result;
 mod rounds;
-mod score;
 pub mod screening;
 mod search;
-pub mod separating_tests;
 mod start;
 mod swap;
-mod tuning;
 
 use abbe_model::effect::Effect;
 use abbe_model::session::Session;
 
+use crate::candidates::columns::{Columns, EffectColumns};
+use crate::candidates::library::Candidate;
+use crate::candidates::moments::Moments;
 use crate::error::IdentifyError;
 use crate::fit::{Fit, fit, prepare};
 use crate::heldout::FoldKind;
 use crate::numerics::parallel;
 use crate::problem::Problem;
 use crate::results::TraceResult;
-use columns::{Columns, EffectColumns};
 use implausible::Contradicted;
 use interrupt::Interrupt;
 use judge::RefittedModel;
-use library::Candidate;
-use moments::Moments;
 use noise_model::estimate_noise_model;
 use rounds::{SearchRecord, search_on};
 use search::{Search, StoppingRule};

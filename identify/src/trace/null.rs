@@ -12,7 +12,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 
-use super::columns::Columns;
+use crate::candidates::columns::Columns;
 use crate::heldout::FoldKind;
 use crate::noise::{Noise, PureError};
 use crate::numerics::median;

@@ -10,9 +10,9 @@ use abbe_model::effect::shape::Steps;
 use abbe_model::effect::{Effect, Shape};
 
 use super::compose::StepTable;
-use super::library::Candidate;
-use super::score::{Gain, TrainedModel};
 use super::search::Search;
+use crate::candidates::gain::{Gain, TrainedModel};
+use crate::candidates::library::Candidate;
 use crate::numerics::parallel;
 
 /// Iterations of a line search, each reducing the interval to 0.62: on all readings, and with one fold left out.

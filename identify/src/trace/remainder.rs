@@ -12,9 +12,9 @@ use abbe_model::effect::shape::{Curve, Local, Periodic};
 use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::session::readings::Readings;
 
-use super::columns::{Columns, EffectColumns};
-use super::moments::Moments;
-use super::score::{PriorMoments, TrainedModel};
+use crate::candidates::columns::{Columns, EffectColumns};
+use crate::candidates::gain::{PriorMoments, TrainedModel};
+use crate::candidates::moments::Moments;
 use crate::error::IdentifyError;
 use crate::numerics::tails::ln_chi_square_tail;
 use crate::problem::Problem;

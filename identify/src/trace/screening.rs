@@ -5,11 +5,11 @@ use abbe_model::session::Session;
 use faer::Mat;
 
 use super::TraceOptions;
-use super::columns::{Columns, EffectColumns};
-use super::library::{self, Candidate};
-use super::moments::Moments;
-use super::score::TrainedModel;
 use super::start::Start;
+use crate::candidates::columns::{Columns, EffectColumns};
+use crate::candidates::gain::TrainedModel;
+use crate::candidates::library::{self, Candidate};
+use crate::candidates::moments::Moments;
 use crate::error::IdentifyError;
 use crate::fit::prepare;
 use crate::numerics::parallel;

@@ -5,9 +5,9 @@
 
 use faer::Mat;
 
-use super::columns::Columns;
-use super::score::PriorMoments;
 use super::search::UnwhitenedModel;
+use crate::candidates::columns::Columns;
+use crate::candidates::gain::PriorMoments;
 use crate::error::IdentifyError;
 use crate::fit::Fit;
 use crate::numerics::reduction::inverse_of_upper;

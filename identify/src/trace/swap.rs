@@ -14,10 +14,11 @@ use std::collections::HashSet;
 use abbe_model::effect::Shape;
 
 use super::compose;
-use super::library::Candidate;
+use super::constants::INDISTINGUISHABLE;
 use super::refine;
-use super::score::{INDISTINGUISHABLE, TrainedModel};
 use super::search::{ALL, Search, SearchBranch, SelectedEffect};
+use crate::candidates::gain::TrainedModel;
+use crate::candidates::library::Candidate;
 use crate::error::IdentifyError;
 
 /// Maximum number of effects whose positions and periods are tuned again after an addition.

@@ -239,7 +239,7 @@ fn every_family_of_the_library_is_on_the_page() {
     let text = std::fs::read_to_string(workspace().join("docs/reference/effects.md")).unwrap();
     let sections = sections(&text);
     let listed = &sections.iter().find(|section| section.title == "The library").unwrap().tables[0];
-    let families = abbe_identify::trace::library::families().unwrap();
+    let families = abbe_identify::candidates::library::families().unwrap();
     let names: Vec<&str> = families.iter().map(|family| family.name.as_str()).collect();
     let written: Vec<&str> = listed.rows.iter().map(|row| row[0].as_str()).collect();
     assert_eq!(names, written);

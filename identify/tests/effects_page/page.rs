@@ -1,12 +1,12 @@
 //! Parses the page: its sections with their session and tables.
 
-use std::f64::consts::PI;
+use std::collections::VecDeque;
 
-use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
-use abbe_model::driver::Driver;
-use abbe_model::effect::shape::{Curve, Harmonic, Local, Periodic, Power, ReversalSpike, Steps, Warmup};
+use abbe_model::driver::{Driver, DriverUnit};
+use abbe_model::effect::keys::{Key, KeyReader};
 use abbe_model::effect::{Component, Effect, Shape};
+use abbe_model::error::ModelError;
 
 /// A Markdown table: header and rows, with trimmed cells.
 pub struct Table {
@@ -69,45 +69,75 @@ pub fn effect(machine: &Machine, cell: &str) -> Effect {
     let Some((component, rest)) = text.split_once('~') else {
         return Effect { component: plain(text), driver: Driver::None, shape: Shape::Constant, tests: Vec::new() };
     };
+    let component = plain(component);
     let (driver, shape) = rest.split_once(':').unwrap_or_else(|| panic!("{text}"));
     let driver = Driver::parse(driver);
-    let mut words = shape.split(' ');
-    let word = words.next().unwrap();
-    let rotary = match &driver {
-        Driver::Axis(name) => {
-            let axis = machine.axis_index(name).unwrap_or_else(|| panic!("{text}"));
-            machine.axes[axis].kind == AxisKind::Rotary
-        }
-        _ => false,
-    };
-    let numbers: Vec<f64> = words.map(|word| word.parse().unwrap()).collect();
-    let inside = |number: f64| if rotary { number.to_radians() } else { number };
-    // Half of a travel of 200 mm, or of a turn.
-    let scale = match &driver {
-        Driver::Axis(_) if rotary => PI,
-        Driver::Axis(_) => 100.0,
-        _ => 1.0,
-    };
-    let shape = match (word, numbers.as_slice()) {
-        ("backlash", []) => Shape::Backlash,
-        ("lag", []) => Shape::Lag,
-        ("drift", []) => Shape::Drift,
-        ("warmup", [tau_s]) => Shape::Warmup(Warmup { tau_s: *tau_s }),
-        ("reversal-spike", [width]) => Shape::ReversalSpike(ReversalSpike { width: inside(*width) }),
-        ("periodic", [period]) => Shape::Periodic(Periodic { period: inside(*period) }),
-        ("steps", at) => Shape::Steps(Steps { at: at.iter().map(|at| inside(*at)).collect() }),
-        ("local", [centre, width]) => {
-            Shape::Local(Local { centre: inside(*centre), width: inside(*width), recurs: rotary.then_some(2.0 * PI) })
-        }
-        ("curve", [intervals]) => Shape::Curve(Curve {
-            from: if rotary { 0.0 } else { -100.0 },
-            to: if rotary { 2.0 * PI } else { 100.0 },
-            intervals: *intervals as usize,
-            closed: rotary,
-        }),
-        (word, []) if word.starts_with('h') => Shape::Harmonic(Harmonic { order: word[1..].parse().unwrap() }),
-        (word, []) if word.starts_with("power") => Shape::Power(Power { degree: word[5..].parse().unwrap(), scale }),
-        _ => panic!("{text}"),
-    };
-    Effect { component: plain(component), driver, shape, tests: Vec::new() }
+    let axis = driver.kind_of_axis(machine, component.axis(machine));
+    let (name, more) = shape.split_once(' ').unwrap_or((shape, ""));
+    let word = name.trim_end_matches(|c: char| c.is_ascii_digit());
+    let own = name[word.len()..].split_whitespace();
+    let numbers = own.chain(more.split(' ').filter(|number| !number.is_empty())).map(|number| number.parse().unwrap());
+    let (unit, default_scale) = (driver.kind().unit(axis), driver.kind().default_scale(axis));
+    let mut keys = Numbers { numbers: numbers.collect(), unit, default_scale };
+    let entry = Shape::entry_of(if word == "h" { "harmonic" } else { word }).unwrap_or_else(|| panic!("{text}"));
+    let shape = (entry.read)(&mut keys).unwrap();
+    assert!(keys.numbers.is_empty(), "{text}");
+    Effect { component, driver, shape, tests: Vec::new() }
+}
+
+/// The numbers of a shape as the page states them: without keys, in the order in which the shape reads them. Optional
+/// keys are absent, but a count is stated.
+struct Numbers {
+    numbers: VecDeque<f64>,
+    unit: DriverUnit,
+    default_scale: f64,
+}
+
+impl Numbers {
+    fn next(&mut self) -> f64 {
+        self.numbers.pop_front().expect("a number")
+    }
+
+    fn internal(&self, number: f64) -> f64 {
+        self.unit.to_internal(self.unit.file, number).unwrap()
+    }
+}
+
+impl KeyReader for Numbers {
+    fn unit(&self) -> DriverUnit {
+        self.unit
+    }
+    fn default_scale(&self) -> f64 {
+        self.default_scale
+    }
+    fn quantity(&mut self, _: &Key) -> Result<Option<f64>, ModelError> {
+        Ok(None)
+    }
+    /// A curve over a linear axis covers the travel of 200 mm.
+    fn required_quantity(&mut self, key: &Key) -> Result<f64, ModelError> {
+        Ok(match key.name {
+            "from" => -100.0,
+            "to" => 100.0,
+            _ => {
+                let number = self.next();
+                self.internal(number)
+            }
+        })
+    }
+    fn required_quantities(&mut self, _: &Key) -> Result<Vec<f64>, ModelError> {
+        let numbers = std::mem::take(&mut self.numbers);
+        Ok(numbers.into_iter().map(|number| self.internal(number)).collect())
+    }
+    fn required_positive(&mut self, _: &'static str, _: &str) -> Result<f64, ModelError> {
+        Ok(self.next())
+    }
+    fn count(&mut self, _: &'static str, _: usize, _: usize) -> Result<Option<usize>, ModelError> {
+        Ok(Some(self.next() as usize))
+    }
+    fn required_count(&mut self, _: &'static str, _: &str, _: usize, _: usize) -> Result<usize, ModelError> {
+        Ok(self.next() as usize)
+    }
+    fn flag(&mut self, _: &'static str) -> Result<Option<bool>, ModelError> {
+        Ok(None)
+    }
 }

@@ -67,6 +67,7 @@ drivers! {
     time: Time => time::Time,
     temperature: Temperature => temperature::Temperature,
     gravity: Gravity => gravity::Gravity,
+    speed_squared: SpeedSquared => speed_squared::SpeedSquared,
 }
 
 impl Driver {

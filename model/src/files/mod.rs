@@ -1,9 +1,10 @@
 //! Files of machines, sessions and readings: reading into the domain of [`session`](crate::session), and writing it.
 //!
 //! - [`toml`]: machine and session files; [`table`]: data files, one module per data format;
+//! - [`with_readings()`]: a copy of a session with other readings;
+//! - [`template`]: files of a new machine from its structural code;
 //! - [`SourceMap`]: the files and texts of a session that was read;
-//! - [`schema`]: JSON Schema of machine and session files; [`stamp`]: state of the files that were read; [`whole`]:
-//!   files written as a whole.
+//! - [`schema`]: JSON Schema of machine and session files; [`stamp`]: state of the files that were read.
 
 mod quantity;
 pub mod schema;
@@ -11,8 +12,10 @@ pub mod source_map;
 mod spelling;
 pub mod stamp;
 pub mod table;
+pub mod template;
 pub mod toml;
-pub mod whole;
+mod with_readings;
 
 pub use self::source_map::SourceMap;
 pub use self::toml::{ReadOptions, machine, session, session_with_sources, text};
+pub use self::with_readings::{Changes, with_readings};

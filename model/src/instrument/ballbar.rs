@@ -3,10 +3,18 @@
 //! The reading refers to the stated length of the bar: a bar that is `δ` longer than stated reads `L − δ`. A sensor
 //! with the gain error `k` adds `k·(L − L_bar)`.
 
-use super::{InstrumentParameter, InternalUnit, SharedBy, displaced};
+use super::column::{Column, Quantity};
+use super::kind::{MAX_MM, median};
+use super::set_up::{Balls, SetUp, SetUpForm, SetUpKey, SetUpReader};
+use super::{
+    Checked, Entry, Fault, Following, Geometry, Instrument, InstrumentKind, InstrumentParameter, InternalUnit, Reading,
+    SharedBy, Station, default_errors, displaced, point,
+};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::error::ModelError;
 use crate::frames::Point;
-use crate::scalar::Scalar;
+use crate::scalar::{Nominal, Scalar};
+use crate::session::{Prior, limits};
 
 /// Both balls, the length of the bar, the gain of the sensor.
 pub const PARAMETERS: [InstrumentParameter; 8] = [
@@ -24,6 +32,45 @@ pub const PARAMETERS: [InstrumentParameter; 8] = [
 pub const BAR: usize = 6;
 /// Index of the gain of the sensor in [`PARAMETERS`].
 pub const GAIN: usize = 7;
+
+pub(super) const ENTRY: Entry = Entry {
+    kind: InstrumentKind::BallBar,
+    word: "ballbar",
+    parameters: &PARAMETERS,
+    free: None,
+    coordinates: 1,
+    is_two_sided: true,
+    has_readings: true,
+    needs_every_axis: false,
+    default_errors: default_errors::positions_and_orientations,
+    spindle_setup: None,
+    keys: &[
+        SetUpKey::new("bar_mm", SetUpForm::Length, "ballbar: calibrated length"),
+        SetUpKey::new("bar_u_um", SetUpForm::Uncertainty, ""),
+        SetUpKey::new("workpiece_ball_mm", SetUpForm::Point, "ballbar: workpiece ball in the table frame"),
+        SetUpKey::new("workpiece_ball_u_um", SetUpForm::Uncertainties, ""),
+        SetUpKey::new("spindle_ball_mm", SetUpForm::Point, "ballbar: spindle ball in the tool frame"),
+        SetUpKey::new("spindle_ball_u_um", SetUpForm::Uncertainties, ""),
+        SetUpKey::new("bar_setup", SetUpForm::Text, "ballbar: tests with the same name share the assembled bar"),
+    ],
+    read,
+};
+
+/// The columns of a ball bar.
+const COLUMNS: [Column; 2] =
+    [Column::new("length", "mm", Quantity::Length), Column::new("deviation", "um", Quantity::Deviation)];
+
+/// Balls that are closer to each other than this coincide, mm.
+const MIN_MM: f64 = 1e-6;
+
+fn read(keys: &mut dyn SetUpReader) -> Result<SetUp, ModelError> {
+    let bar = keys.positive_length("bar_mm", "the calibrated length of the bar")?;
+    let Balls { workpiece_ball, spindle_ball, mut priors } = Balls::read(keys)?;
+    priors.extend(keys.priors("bar_u_um", 1)?);
+    priors.push(Prior::Known); // gain of the sensor
+    let station = Station::BallBar(BallBar { workpiece_ball, spindle_ball, bar });
+    Ok(SetUp { station, priors, socket: None })
+}
 
 /// A ball bar as set up for one test, lengths in mm.
 ///
@@ -50,7 +97,7 @@ pub struct BallBar<N> {
     pub bar: N,
 }
 
-impl<N: crate::scalar::Nominal> BallBar<N> {
+impl<N: Nominal> BallBar<N> {
     /// The two ball centres in R: workpiece ball, spindle ball.
     pub fn balls<S: Scalar<Nominal = N>>(
         &self,
@@ -82,5 +129,127 @@ impl<N: crate::scalar::Nominal> BallBar<N> {
             Some(gain) => length + gain * (distance - self.bar),
             None => length,
         }
+    }
+}
+
+impl<N> Geometry<N> for BallBar<N> {
+    type Over<M> = BallBar<M>;
+
+    fn map<M>(&self, to: &impl Fn(&N) -> M) -> BallBar<M> {
+        BallBar {
+            workpiece_ball: point(&self.workpiece_ball, to),
+            spindle_ball: point(&self.spindle_ball, to),
+            bar: to(&self.bar),
+        }
+    }
+    fn reading<S: Scalar<Nominal = N>>(
+        &self,
+        machine: &Machine,
+        state: &[AxisPosition<N>],
+        errors: &[BodyErrors<S>],
+        unknown: impl Fn(usize) -> Option<S>,
+    ) -> Reading<S>
+    where
+        N: Nominal,
+    {
+        Reading::length(self.read(machine, state, errors, unknown))
+    }
+    fn table_point_mm(&self) -> Option<[N; 3]>
+    where
+        N: Copy,
+    {
+        Some(self.workpiece_ball)
+    }
+    fn tool_point_mm(&self) -> [N; 3]
+    where
+        N: Copy,
+    {
+        self.spindle_ball
+    }
+}
+
+impl Instrument for BallBar<f64> {
+    fn entry(&self) -> &'static Entry {
+        &ENTRY
+    }
+    fn columns(&self) -> &'static [Column] {
+        &COLUMNS
+    }
+    fn missing(&self, has: &dyn Fn(Quantity) -> bool) -> Option<Fault> {
+        let missing = !has(Quantity::Length) && !has(Quantity::Deviation);
+        let help = "a ball bar needs `length_mm`, or `deviation_um` from `bar_mm`";
+        missing.then(|| ("with the bar readings".into(), help.into()))
+    }
+    fn shared_mm(&self, group: SharedBy) -> [f64; 3] {
+        match group {
+            SharedBy::Setup => self.workpiece_ball,
+            SharedBy::BarSetup => [self.bar, 0.0, 0.0],
+            _ => self.spindle_ball,
+        }
+    }
+    fn reference_mm(&self) -> f64 {
+        self.bar
+    }
+    fn balls_mut(&mut self) -> Option<[&mut [f64; 3]; 2]> {
+        Some([&mut self.workpiece_ball, &mut self.spindle_ball])
+    }
+    fn following(&self) -> Following {
+        Following::AtBar
+    }
+    fn invalid_length(&self) -> Option<String> {
+        limits::not_positive("bar", self.bar)
+    }
+    /// The distance between the balls is the length of the bar.
+    fn check_set_up(&self, checked: &Checked<'_>) -> Result<(), Fault> {
+        let mut deviations: Vec<f64> = Vec::with_capacity(checked.readings.rows());
+        for (row, reading) in checked.nominal(self).enumerate() {
+            let length = reading.coordinates()[0];
+            // A length of zero has no direction, so that no error changes it to first order.
+            if length < MIN_MM {
+                return Err((
+                    format!(
+                        "test \"{}\", reading {}: the two balls nominally coincide, but the bar is {:e} mm long",
+                        checked.test,
+                        row + 1,
+                        self.bar
+                    ),
+                    "check `bar_mm`, the two ball positions and the axis positions in `at` and the data".into(),
+                ));
+            }
+            deviations.push(length - self.bar);
+        }
+        let nominal = self.bar + median(&mut deviations);
+        if (nominal - self.bar).abs() <= MAX_MM {
+            return Ok(());
+        }
+        Err((
+            format!(
+                "test \"{}\": a bar of {:.4} mm cannot reach between its balls, which nominally lie {nominal:.3} mm \
+                 apart (median of {} positions)",
+                checked.test,
+                self.bar,
+                deviations.len()
+            ),
+            "possible causes are degrees read as radians (or radians as degrees), and a ball position, an axis \
+             position in `at` or an axis direction that is not as on the machine"
+                .into(),
+        ))
+    }
+    /// The readings are near the length of the bar.
+    fn check_observed(&self, test: &str, observed: &[f64]) -> Result<(), Fault> {
+        let mut deviations: Vec<f64> = observed.iter().map(|length| length - self.bar).collect();
+        let read = self.bar + median(&mut deviations);
+        if (read - self.bar).abs() <= MAX_MM {
+            return Ok(());
+        }
+        Err((
+            format!(
+                "test \"{test}\": a bar of {:.4} mm read {read:.3} mm (median of {} readings)",
+                self.bar,
+                deviations.len()
+            ),
+            "is the column a deviation from `bar_mm` rather than a length, or in another unit than its name says?"
+                .into(),
+        ))
     }
 }

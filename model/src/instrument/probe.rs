@@ -12,10 +12,18 @@
 //! lies ahead. A form deviation of `w` outwards reduces the distance by `w`. The "measured radius less the target" of
 //! the literature is `−d`.
 
-use super::{InstrumentParameter, SharedBy, displaced, pose_error};
+use super::column::{Column, Quantity};
+use super::kind::MAX_MM;
+use super::set_up::{SetUp, SetUpForm, SetUpKey, SetUpReader, Written};
+use super::{
+    Checked, Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
+    default_errors, displaced, point, pose_error,
+};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::error::ModelError;
 use crate::frames::Point;
 use crate::scalar::{Nominal, Scalar};
+use crate::session::{Prior, limits};
 
 /// The pose of the artefact on the table, its radius, its form deviation; the stylus in the tool frame.
 pub const PARAMETERS: [InstrumentParameter; 11] = [
@@ -38,6 +46,62 @@ pub const RADIUS: usize = 6;
 pub const FORM: usize = 7;
 /// Index of the first stylus coordinate in [`PARAMETERS`].
 pub const STYLUS: usize = 8;
+
+pub(super) const ENTRY: Entry = Entry {
+    kind: InstrumentKind::Probe,
+    word: "probe",
+    parameters: &PARAMETERS,
+    free: None,
+    coordinates: 1,
+    is_two_sided: true,
+    has_readings: true,
+    needs_every_axis: true,
+    default_errors: default_errors::positions_and_orientations,
+    spindle_setup: None,
+    keys: &[
+        SetUpKey::new("artefact_mm", SetUpForm::Point, "probe: a point of the cylinder's axis in the table frame"),
+        SetUpKey::new("artefact_u_um", SetUpForm::Uncertainties, ""),
+        SetUpKey::new(
+            "artefact_u_arcsec",
+            SetUpForm::Uncertainties,
+            "Standard uncertainty of the cylinder's direction, arcsec",
+        ),
+        SetUpKey::new(
+            "artefact_axis",
+            SetUpForm::Vector,
+            "probe: direction of the cylinder in the table frame; default [0, 0, 1]",
+        ),
+        SetUpKey::new("radius_mm", SetUpForm::Length, "probe: radius of the cylinder plus that of the stylus"),
+        SetUpKey::new("radius_u_um", SetUpForm::Uncertainty, ""),
+        SetUpKey::new("stylus_mm", SetUpForm::Point, "probe: centre of the stylus in the tool frame"),
+        SetUpKey::new("stylus_u_um", SetUpForm::Uncertainties, ""),
+        SetUpKey::new(
+            "direction",
+            SetUpForm::Vector,
+            "probe: probing direction in R; default: straight towards the axis",
+        ),
+    ],
+    read,
+};
+
+/// The columns of a probe.
+const COLUMNS: [Column; 2] =
+    [Column::new("distance", "mm", Quantity::Length), Column::new("deviation", "um", Quantity::Outward)];
+
+fn read(keys: &mut dyn SetUpReader) -> Result<SetUp, ModelError> {
+    let artefact = keys.point("artefact_mm", "a point of the cylinder's axis in the table frame")?;
+    let radius = keys.positive_length("radius_mm", "the radius of the cylinder plus that of the stylus")?;
+    let stylus = keys.point("stylus_mm", "the stylus' centre in the tool frame")?;
+    let axis = keys.direction("artefact_axis")?.unwrap_or([0.0, 0.0, 1.0]).map(Written::number);
+    let direction = keys.direction("direction")?.map(|direction| direction.map(Written::number));
+    let mut priors = keys.priors("artefact_u_um", 3)?;
+    priors.extend(keys.angle_priors("artefact_u_arcsec")?);
+    priors.extend(keys.priors("radius_u_um", 1)?);
+    priors.push(Prior::Known); // form deviation
+    priors.extend(keys.priors("stylus_u_um", 3)?);
+    let station = Station::Probe(Probe { artefact, axis, radius, stylus, direction });
+    Ok(SetUp { station, priors, socket: None })
+}
 
 /// A probe and a cylindrical artefact as set up for one test, lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
@@ -155,6 +219,85 @@ impl<N: Nominal> Probe<N> {
         unknown: impl Fn(usize) -> Option<S>,
     ) -> S {
         self.geometry(machine, state, errors, unknown).distance()
+    }
+}
+
+impl<N> Geometry<N> for Probe<N> {
+    type Over<M> = Probe<M>;
+
+    fn map<M>(&self, to: &impl Fn(&N) -> M) -> Probe<M> {
+        Probe {
+            artefact: point(&self.artefact, to),
+            axis: point(&self.axis, to),
+            radius: to(&self.radius),
+            stylus: point(&self.stylus, to),
+            direction: self.direction.as_ref().map(|direction| point(direction, to)),
+        }
+    }
+    fn reading<S: Scalar<Nominal = N>>(
+        &self,
+        machine: &Machine,
+        state: &[AxisPosition<N>],
+        errors: &[BodyErrors<S>],
+        unknown: impl Fn(usize) -> Option<S>,
+    ) -> Reading<S>
+    where
+        N: Nominal,
+    {
+        Reading::length(self.read(machine, state, errors, unknown))
+    }
+    fn table_point_mm(&self) -> Option<[N; 3]>
+    where
+        N: Copy,
+    {
+        Some(self.artefact)
+    }
+    fn tool_point_mm(&self) -> [N; 3]
+    where
+        N: Copy,
+    {
+        self.stylus
+    }
+}
+
+impl Instrument for Probe<f64> {
+    fn entry(&self) -> &'static Entry {
+        &ENTRY
+    }
+    fn columns(&self) -> &'static [Column] {
+        &COLUMNS
+    }
+    fn missing(&self, has: &dyn Fn(Quantity) -> bool) -> Option<Fault> {
+        let missing = !has(Quantity::Length) && !has(Quantity::Outward);
+        let help = "a probe needs `distance_mm` to the surface, or `deviation_um`, the deviation outwards";
+        missing.then(|| ("with the probe readings".into(), help.into()))
+    }
+    fn shared_mm(&self, group: SharedBy) -> [f64; 3] {
+        if group == SharedBy::Setup { self.artefact } else { self.stylus }
+    }
+    fn invalid_length(&self) -> Option<String> {
+        limits::not_positive("radius", self.radius)
+    }
+    /// The stylus is in front of the artefact and near it at every reading.
+    fn check_set_up(&self, checked: &Checked<'_>) -> Result<(), Fault> {
+        for (row, reading) in checked.nominal(self).enumerate() {
+            let distance = reading.coordinates()[0];
+            if distance.abs() <= MAX_MM {
+                continue;
+            }
+            let found = if distance.is_finite() {
+                format!("is {distance:.3} mm from the artefact's nominal surface; the limit is {MAX_MM} mm")
+            } else {
+                "misses the artefact, or is on its axis without a `direction`".into()
+            };
+            return Err((
+                format!("test \"{}\", reading {}: the stylus {found}", checked.test, row + 1),
+                "check `radius_mm` (including the stylus radius), `artefact_mm`, `stylus_mm`, `direction` and the \
+                 axis positions in `at` and the data"
+                    .into(),
+            ));
+        }
+        Ok(())
     }
 }
 

@@ -14,9 +14,16 @@
 //! Section 4: sensor outputs become machine coordinates by `R = R_φ·R_θ·R_ω` (Eqs. 1–3). The matrices above Eq. 1 are
 //! printed in a different order from the expanded equations and the text.
 
-use super::{InstrumentParameter, SharedBy, displaced};
+use super::column::{Column, Quantity};
+use super::kind::{MAX_MM, median};
+use super::set_up::{Balls, SetUp, SetUpForm, SetUpKey, SetUpReader, Written};
+use super::{
+    Checked, Entry, Fault, Following, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy,
+    Station, default_errors, displaced, point,
+};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
-use crate::frames::{Coordinate, Point, Rotation, SinCos, turn_about};
+use crate::error::ModelError;
+use crate::frames::{Coordinate, Point, Rotation, SinCos, cross, turn_about};
 use crate::scalar::{Nominal, Scalar};
 
 /// Both points, then ω₁, φ₁ and θ₁ of the nest.
@@ -34,6 +41,88 @@ pub const PARAMETERS: [InstrumentParameter; 9] = [
 
 /// Index of ω₁ in [`PARAMETERS`].
 pub const SENSOR: usize = 6;
+
+pub(super) const ENTRY: Entry = Entry {
+    kind: InstrumentKind::RTest,
+    word: "r-test",
+    parameters: &PARAMETERS,
+    free: None,
+    coordinates: 3,
+    is_two_sided: true,
+    has_readings: true,
+    needs_every_axis: true,
+    default_errors: default_errors::positions_and_orientations,
+    spindle_setup: None,
+    keys: &[
+        SetUpKey::new(
+            "setting",
+            SetUpForm::Words(&["E", "Es"]),
+            "r-test: sensors on the table (E) or in the spindle (Es)",
+        ),
+        SetUpKey::new("workpiece_ball_mm", SetUpForm::Point, "r-test: master ball or centre of the nest on the table"),
+        SetUpKey::new("workpiece_ball_u_um", SetUpForm::Uncertainties, ""),
+        SetUpKey::new("spindle_ball_mm", SetUpForm::Point, "r-test: master ball or centre of the nest in the spindle"),
+        SetUpKey::new("spindle_ball_u_um", SetUpForm::Uncertainties, ""),
+        SetUpKey::new(
+            "sensor_angles_deg",
+            SetUpForm::Vector,
+            "r-test: omega, phi, theta of the sensors; readings are then the values of the single sensors",
+        ),
+        SetUpKey::new(
+            "sensor_directions",
+            SetUpForm::Vectors,
+            "r-test: the direction of each sensor in the frame that carries them, instead of the angles",
+        ),
+        SetUpKey::new(
+            "sensor_u_arcsec",
+            SetUpForm::Uncertainties,
+            "Standard uncertainty of the sensors' orientation, arcsec",
+        ),
+    ],
+    read,
+};
+
+/// The columns of a vector in the frame that carries the sensors, and those of the single sensors.
+const VECTOR: [Column; 3] = Column::vector(["dx", "dy", "dz"], "um");
+const SENSORS: [Column; 3] = Column::vector(["du", "dv", "dw"], "um");
+
+/// Least triple product of three measuring directions. Below it, one coordinate has twenty times the noise.
+const MIN_VOLUME: f64 = 0.05;
+
+fn read(keys: &mut dyn SetUpReader) -> Result<SetUp, ModelError> {
+    let settings = "\"E\" (sensors on the table) or \"Es\" (sensors in the spindle)";
+    let setting = [Setting::Table, Setting::Spindle][keys.choice("setting", settings, &["E", "Es"])?];
+    let Balls { workpiece_ball, spindle_ball, mut priors } = Balls::read(keys)?;
+    let sensors = read_sensors(keys)?.map(|rows| rows.map(|row| row.map(Written::number)));
+    priors.extend(keys.angle_priors("sensor_u_arcsec")?);
+    let station = Station::RTest(RTest { setting, workpiece_ball, spindle_ball, sensors });
+    Ok(SetUp { station, priors, socket: None })
+}
+
+/// The measuring directions of three sensors: from ω, φ, θ, or stated; `None` if readings are in X, Y, Z.
+fn read_sensors(keys: &mut dyn SetUpReader) -> Result<Option<[[f64; 3]; 3]>, ModelError> {
+    let help = "keep one of them: either states the measuring directions of the sensors";
+    keys.not_both("sensor_angles_deg", "sensor_directions", help)?;
+    if let Some(angles) = keys.three_angles("sensor_angles_deg", "the three angles ω, φ, θ")? {
+        let orientation = Orientation::new(angles, Rotation::Exact);
+        let unit = |i: usize| Point(std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
+        return Ok(Some(std::array::from_fn(|i| orientation.to_machine(unit(i)).0)));
+    }
+    let Some([a, b, c]) = keys.three_directions("sensor_directions")? else {
+        return Ok(None);
+    };
+    let normal = cross(a, Point(b)).0;
+    let volume: f64 = (0..3).map(|i| normal[i] * c[i]).sum();
+    if volume.abs() < MIN_VOLUME {
+        let message = format!(
+            "the three `sensor_directions` lie almost in a plane (their triple product is {volume:.3}; 1 at right \
+             angles)"
+        );
+        let help = "three coordinates need three independent measuring directions; check the directions";
+        return Err(keys.fault("sensor_directions", message, help));
+    }
+    Ok(Some([a, b, c]))
+}
 
 /// The body that carries the sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -154,6 +243,131 @@ impl<N: Nominal> RTest<N> {
         };
         let [x, y, z] = vector.0;
         Point(sensors.map(|[a, b, c]| x * a + y * b + z * c))
+    }
+}
+
+impl<N> Geometry<N> for RTest<N> {
+    type Over<M> = RTest<M>;
+
+    fn map<M>(&self, to: &impl Fn(&N) -> M) -> RTest<M> {
+        RTest {
+            setting: self.setting,
+            workpiece_ball: point(&self.workpiece_ball, to),
+            spindle_ball: point(&self.spindle_ball, to),
+            sensors: self.sensors.as_ref().map(|rows| rows.each_ref().map(|row| point(row, to))),
+        }
+    }
+    fn reading<S: Scalar<Nominal = N>>(
+        &self,
+        machine: &Machine,
+        state: &[AxisPosition<N>],
+        errors: &[BodyErrors<S>],
+        unknown: impl Fn(usize) -> Option<S>,
+    ) -> Reading<S>
+    where
+        N: Nominal,
+    {
+        Reading::vector(self.read(machine, state, errors, unknown).0)
+    }
+    fn table_point_mm(&self) -> Option<[N; 3]>
+    where
+        N: Copy,
+    {
+        Some(self.workpiece_ball)
+    }
+    fn tool_point_mm(&self) -> [N; 3]
+    where
+        N: Copy,
+    {
+        self.spindle_ball
+    }
+}
+
+impl RTest<f64> {
+    fn columns_help(&self) -> &'static str {
+        if self.sensors.is_some() {
+            "the test states the sensor directions: it needs the sensor values `du_um`, `dv_um` and `dw_um`; without \
+             `sensor_angles_deg` and `sensor_directions` it needs `dx_um`, `dy_um` and `dz_um`"
+        } else {
+            "an R-test needs `dx_um`, `dy_um` and `dz_um`; the values of single sensors, `du_um`, `dv_um` and \
+             `dw_um`, need `sensor_angles_deg` or `sensor_directions` in the test"
+        }
+    }
+}
+
+impl Instrument for RTest<f64> {
+    fn entry(&self) -> &'static Entry {
+        &ENTRY
+    }
+    fn columns(&self) -> &'static [Column] {
+        if self.sensors.is_some() { &SENSORS } else { &VECTOR }
+    }
+    fn missing(&self, has: &dyn Fn(Quantity) -> bool) -> Option<Fault> {
+        let column = self.columns().iter().find(|column| !has(column.quantity))?;
+        Some((format!("`{}`", column.name(column.unit)), self.columns_help().into()))
+    }
+    fn shared_mm(&self, group: SharedBy) -> [f64; 3] {
+        if group == SharedBy::Setup { self.workpiece_ball } else { self.spindle_ball }
+    }
+    fn help_on_column(&self, stem: &str) -> Option<&'static str> {
+        let other = if self.sensors.is_some() { &VECTOR } else { &SENSORS };
+        other.iter().any(|column| column.stem == stem).then(|| self.columns_help())
+    }
+    fn coordinate_names(&self) -> [&'static str; 3] {
+        let columns = if self.sensors.is_some() { &SENSORS } else { &VECTOR };
+        columns.each_ref().map(|column| column.stem)
+    }
+    fn sensors(&self) -> SharedBy {
+        match self.setting {
+            Setting::Table => SharedBy::Setup,
+            Setting::Spindle => SharedBy::SpindleSetup,
+        }
+    }
+    fn balls_mut(&mut self) -> Option<[&mut [f64; 3]; 2]> {
+        Some([&mut self.workpiece_ball, &mut self.spindle_ball])
+    }
+    fn following(&self) -> Following {
+        Following::Touching(
+            "`offset` is the direction of a bar; an R-test has no bar and measures all three directions at once",
+            "remove it; the readings can be resolved into radial, tangential and axial components after a fit",
+        )
+    }
+    /// The master ball is nominally in the nest at every reading.
+    fn check_set_up(&self, checked: &Checked<'_>) -> Result<(), Fault> {
+        for (row, reading) in checked.nominal(self).enumerate() {
+            let apart = reading.coordinates().iter().map(|x| x * x).sum::<f64>().sqrt();
+            if apart > MAX_MM {
+                return Err((
+                    format!(
+                        "test \"{}\", reading {}: the master ball nominally lies {apart:.3} mm from the centre of \
+                         the sensors; the limit is {MAX_MM} mm",
+                        checked.test,
+                        row + 1
+                    ),
+                    "check `workpiece_ball_mm`, `spindle_ball_mm` and the axis positions in `at` and the data: the \
+                     linear axes must follow the rotary axis"
+                        .into(),
+                ));
+            }
+        }
+        Ok(())
+    }
+    /// The readings are within the range of the sensors.
+    fn check_observed(&self, test: &str, observed: &[f64]) -> Result<(), Fault> {
+        let mut sizes: Vec<f64> = observed.iter().map(|value| value.abs()).collect();
+        let read = median(&mut sizes);
+        if read <= MAX_MM {
+            return Ok(());
+        }
+        Err((
+            format!(
+                "test \"{test}\": the sensors read {read:.3} mm (median of {} values); the limit is {MAX_MM} mm",
+                sizes.len()
+            ),
+            "are the columns in another unit than their name says, or relative to another zero than the ball in the \
+             middle of the nest?"
+                .into(),
+        ))
     }
 }
 

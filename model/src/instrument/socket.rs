@@ -2,10 +2,19 @@
 //!
 //! The reading is the closure `P_s − s`, the ball in R less the socket in R; the observed value is zero.
 
-use super::{InstrumentParameter, SharedBy, displaced};
+use nalgebra::Vector3;
+
+use super::column::{Column, Quantity};
+use super::set_up::{SetUp, SetUpForm, SetUpKey, SetUpReader, Written};
+use super::{
+    Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
+    default_errors, displaced, point,
+};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::error::ModelError;
 use crate::frames::Point;
-use crate::scalar::Scalar;
+use crate::scalar::{Nominal, Scalar};
+use crate::session::Prior;
 
 /// The socket in R, then the ball in the tool frame.
 pub const PARAMETERS: [InstrumentParameter; 6] = [
@@ -17,6 +26,38 @@ pub const PARAMETERS: [InstrumentParameter; 6] = [
     InstrumentParameter::length("ball", "z", SharedBy::SpindleSetup),
 ];
 
+pub(super) const ENTRY: Entry = Entry {
+    kind: InstrumentKind::Socket,
+    word: "socket",
+    parameters: &PARAMETERS,
+    free: Some("socket"),
+    coordinates: 3,
+    is_two_sided: false,
+    has_readings: false,
+    needs_every_axis: true,
+    default_errors: default_errors::all_locations,
+    // The ball at a robot's flange stays mounted from socket to socket.
+    spindle_setup: Some("tool"),
+    keys: &[
+        SetUpKey::new("ball_mm", SetUpForm::Point, "socket: ball in the tool frame"),
+        SetUpKey::new("ball_u_um", SetUpForm::Uncertainties, ""),
+        SetUpKey::new("socket", SetUpForm::Text, "socket: the socket of all poses of the test"),
+    ],
+    read,
+};
+
+/// The column of a socket: a pose consists of axis positions only.
+const COLUMNS: [Column; 1] = [Column::new("socket", "", Quantity::Socket)];
+
+fn read(keys: &mut dyn SetUpReader) -> Result<SetUp, ModelError> {
+    let ball = keys.point("ball_mm", "the ball in the tool frame")?;
+    let mut priors = vec![Prior::Free; 3];
+    priors.extend(keys.priors("ball_u_um", 3)?);
+    let name = keys.text("socket")?;
+    let socket = [0.0; 3].map(Written::number);
+    Ok(SetUp { station: Station::Socket(Socket { ball, socket }), priors, socket: name })
+}
+
 /// A ball and its socket, mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Socket<N> {
@@ -26,7 +67,7 @@ pub struct Socket<N> {
     pub socket: [N; 3],
 }
 
-impl<N: crate::scalar::Nominal> Socket<N> {
+impl<N: Nominal> Socket<N> {
     /// The ball in R.
     pub fn ball_point<S: Scalar<Nominal = N>>(
         &self,
@@ -48,5 +89,59 @@ impl<N: crate::scalar::Nominal> Socket<N> {
     ) -> Point<S> {
         let ball = self.ball_point(machine, state, errors, &unknown);
         ball.minus(displaced(self.socket, 0, &unknown))
+    }
+}
+
+impl<N> Geometry<N> for Socket<N> {
+    type Over<M> = Socket<M>;
+
+    fn map<M>(&self, to: &impl Fn(&N) -> M) -> Socket<M> {
+        Socket { ball: point(&self.ball, to), socket: point(&self.socket, to) }
+    }
+    fn reading<S: Scalar<Nominal = N>>(
+        &self,
+        machine: &Machine,
+        state: &[AxisPosition<N>],
+        errors: &[BodyErrors<S>],
+        unknown: impl Fn(usize) -> Option<S>,
+    ) -> Reading<S>
+    where
+        N: Nominal,
+    {
+        Reading::vector(self.read(machine, state, errors, unknown).0)
+    }
+    fn table_point_mm(&self) -> Option<[N; 3]>
+    where
+        N: Copy,
+    {
+        None
+    }
+    fn tool_point_mm(&self) -> [N; 3]
+    where
+        N: Copy,
+    {
+        self.ball
+    }
+}
+
+impl Instrument for Socket<f64> {
+    fn entry(&self) -> &'static Entry {
+        &ENTRY
+    }
+    fn columns(&self) -> &'static [Column] {
+        &COLUMNS
+    }
+    fn missing(&self, has: &dyn Fn(Quantity) -> bool) -> Option<Fault> {
+        let help = "add the column, or add `socket = \"…\"` to the test if all its poses have one socket";
+        (!has(Quantity::Socket)).then(|| ("`socket`".into(), help.into()))
+    }
+    fn shared_mm(&self, _: SharedBy) -> [f64; 3] {
+        self.ball
+    }
+    /// The mean of the points.
+    fn placed(&self, points: &[Vector3<f64>], _: &[Vector3<f64>]) -> Option<Station<f64>> {
+        let mean = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
+        let socket = Socket { socket: [mean.x, mean.y, mean.z], ..self.clone() };
+        (!points.is_empty()).then_some(Station::Socket(socket))
     }
 }

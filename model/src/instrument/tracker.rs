@@ -3,10 +3,19 @@
 //! `m = B · E · P`: `P` is the target in R through the chain, `E` a small motion (the pose parameters) and `B` a fixed
 //! rigid motion. `B` keeps the estimated angles small for any orientation of the tracker.
 
-use super::{InstrumentParameter, SharedBy, displaced, pose_error};
+use nalgebra::{Matrix3, Vector3};
+
+use super::column::{Column, Quantity};
+use super::set_up::{SetUp, SetUpForm, SetUpKey, SetUpReader, Written};
+use super::{
+    Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
+    default_errors, displaced, point, pose_error,
+};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::error::ModelError;
 use crate::frames::Point;
 use crate::scalar::{Nominal, Scalar};
+use crate::session::Prior;
 
 /// The pose, then the target in the tool frame.
 pub const PARAMETERS: [InstrumentParameter; 9] = [
@@ -20,6 +29,36 @@ pub const PARAMETERS: [InstrumentParameter; 9] = [
     InstrumentParameter::length("target", "y", SharedBy::SpindleSetup),
     InstrumentParameter::length("target", "z", SharedBy::SpindleSetup),
 ];
+
+pub(super) const ENTRY: Entry = Entry {
+    kind: InstrumentKind::Tracker,
+    word: "tracker",
+    parameters: &PARAMETERS,
+    free: Some("tracker"),
+    coordinates: 3,
+    is_two_sided: false,
+    has_readings: true,
+    needs_every_axis: true,
+    default_errors: default_errors::all_locations,
+    spindle_setup: None,
+    keys: &[
+        SetUpKey::new("target_mm", SetUpForm::Point, "tracker: target in the tool frame"),
+        SetUpKey::new("target_u_um", SetUpForm::Uncertainties, ""),
+    ],
+    read,
+};
+
+/// The columns of a tracker.
+const COLUMNS: [Column; 3] = Column::vector(["px", "py", "pz"], "mm");
+
+fn read(keys: &mut dyn SetUpReader) -> Result<SetUp, ModelError> {
+    let target = keys.point("target_mm", "the target in the tool frame")?;
+    let mut priors = vec![Prior::Free; 6];
+    priors.extend(keys.priors("target_u_um", 3)?);
+    let rotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|row| row.map(Written::number));
+    let origin = [0.0; 3].map(Written::number);
+    Ok(SetUp { station: Station::Tracker(Tracker { target, rotation, origin }), priors, socket: None })
+}
 
 /// A tracker as set up for one test, lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,4 +101,87 @@ impl<N: Nominal> Tracker<N> {
             x * a + y * b + z * c + self.origin[i]
         }))
     }
+}
+
+impl<N> Geometry<N> for Tracker<N> {
+    type Over<M> = Tracker<M>;
+
+    fn map<M>(&self, to: &impl Fn(&N) -> M) -> Tracker<M> {
+        Tracker {
+            target: point(&self.target, to),
+            rotation: self.rotation.each_ref().map(|row| point(row, to)),
+            origin: point(&self.origin, to),
+        }
+    }
+    fn reading<S: Scalar<Nominal = N>>(
+        &self,
+        machine: &Machine,
+        state: &[AxisPosition<N>],
+        errors: &[BodyErrors<S>],
+        unknown: impl Fn(usize) -> Option<S>,
+    ) -> Reading<S>
+    where
+        N: Nominal,
+    {
+        Reading::vector(self.read(machine, state, errors, unknown).0)
+    }
+    fn table_point_mm(&self) -> Option<[N; 3]>
+    where
+        N: Copy,
+    {
+        None
+    }
+    fn tool_point_mm(&self) -> [N; 3]
+    where
+        N: Copy,
+    {
+        self.target
+    }
+}
+
+impl Instrument for Tracker<f64> {
+    fn entry(&self) -> &'static Entry {
+        &ENTRY
+    }
+    fn columns(&self) -> &'static [Column] {
+        &COLUMNS
+    }
+    fn missing(&self, has: &dyn Fn(Quantity) -> bool) -> Option<Fault> {
+        let column = COLUMNS.iter().find(|column| !has(column.quantity))?;
+        Some((format!("`{}`", column.name(column.unit)), "a tracker needs px_mm, py_mm and pz_mm".into()))
+    }
+    fn shared_mm(&self, group: SharedBy) -> [f64; 3] {
+        if group == SharedBy::Setup { [0.0; 3] } else { self.target }
+    }
+    fn placed(&self, points: &[Vector3<f64>], observed: &[Vector3<f64>]) -> Option<Station<f64>> {
+        let (rotation, origin) = rigid_motion(points, observed);
+        Some(Station::Tracker(Tracker {
+            target: self.target,
+            rotation: std::array::from_fn(|i| std::array::from_fn(|j| rotation[(i, j)])),
+            origin: [origin.x, origin.y, origin.z],
+        }))
+    }
+}
+
+/// The rotation and translation that map `from` onto `to` with the least sum of squares (Kabsch, Acta Cryst. A32 (1976)
+/// 922).
+fn rigid_motion(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> (Matrix3<f64>, Vector3<f64>) {
+    if from.is_empty() {
+        return (Matrix3::identity(), Vector3::zeros());
+    }
+    let count = from.len() as f64;
+    let centre_from = from.iter().sum::<Vector3<f64>>() / count;
+    let centre_to = to.iter().sum::<Vector3<f64>>() / count;
+    let covariance: Matrix3<f64> =
+        from.iter().zip(to).map(|(a, b)| (b - centre_to) * (a - centre_from).transpose()).sum();
+    let svd = covariance.svd(true, true);
+    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
+        return (Matrix3::identity(), centre_to - centre_from);
+    };
+    // The sign on the smallest singular value makes the result a rotation, not a reflection.
+    let mut signs = Matrix3::identity();
+    let least = svd.singular_values.imin();
+    signs[(least, least)] = (u * v_t).determinant().signum();
+    let rotation = u * signs * v_t;
+    (rotation, centre_to - rotation * centre_from)
 }

@@ -36,20 +36,20 @@
 
 use std::sync::Arc;
 
-use super::check::{self, Fault};
+use super::check;
 use super::columns::{Columns, axis_index, number};
 use super::expression::Length;
 use super::motion::Motion;
-use super::{Prior, Session, Test, defaults, limits, planned, setups};
+use super::{Prior, Session, Test, planned, setups};
 use crate::chain::Machine;
 use crate::error::ModelError;
-use crate::instrument::{InstrumentKind, Station};
+use crate::instrument::{Entry, Fault, InstrumentKind, Station};
 
 impl Session {
     /// A session without tests. The errors to be estimated are the defaults of the instrument; the noise is estimated.
     pub fn new(machine: Machine, instrument: InstrumentKind) -> Session {
         Session {
-            unknowns: defaults::unknowns(&machine, instrument),
+            unknowns: instrument.default_errors(&machine),
             machine: Arc::new(machine),
             constants: Vec::new(),
             instrument,
@@ -205,7 +205,7 @@ impl NewTest {
             geometry: self.station.map(|length| Length::Number(*length)),
             priors,
             setup: group(&self.setup, &self.name),
-            spindle_setup: group(&self.spindle_setup, defaults::spindle_setup(kind, &self.name)),
+            spindle_setup: group(&self.spindle_setup, kind.spindle_setup(&self.name)),
             bar_setup: group(&self.bar_setup, &self.name),
             socket: self.socket,
             motion: self.motion,
@@ -230,7 +230,9 @@ impl NewTest {
     /// The priors of the instrument's parameters, in their order.
     fn all_priors(&self) -> Result<Vec<Prior>, Fault> {
         let kind = self.station.kind();
-        let mut priors = defaults::priors(kind);
+        let Entry { parameters, free, .. } = kind.entry();
+        let prior = |thing: &'static str| if *free == Some(thing) { Prior::Free } else { Prior::Known };
+        let mut priors: Vec<Prior> = parameters.iter().map(|parameter| prior(parameter.thing)).collect();
         for (thing, prior) in &self.priors {
             if let Prior::Gaussian(u) = prior
                 && !(*u > 0.0 && u.is_finite())
@@ -264,12 +266,7 @@ fn check_station(station: &Station<f64>) -> Result<(), Fault> {
     for value in numbers.into_inner() {
         number("a coordinate of the set-up", value)?;
     }
-    let fault = match station {
-        Station::BallBar(bar) => limits::not_positive("bar", bar.bar),
-        Station::Probe(probe) => limits::not_positive("radius", probe.radius),
-        Station::RTest(_) | Station::Tracker(_) | Station::Socket(_) => None,
-    };
-    match fault {
+    match station.invalid_length() {
         None => Ok(()),
         Some(fault) => Err((fault, "state the calibrated length, mm".into())),
     }

@@ -5,10 +5,7 @@
 use super::readings::Readings;
 use super::{Test, planned, plausibility, runs};
 use crate::chain::Machine;
-use crate::instrument::InstrumentKind;
-
-/// A message and what to do.
-pub(crate) type Fault = (String, String);
+use crate::instrument::{Fault, InstrumentKind};
 
 /// Least number of readings of a test.
 pub(crate) const MIN_READINGS: usize = 2;
@@ -36,7 +33,7 @@ pub(crate) fn plan(machine: &Machine, test: &Test) -> Result<(), Fault> {
 /// Checks measured readings against the declared set-up. Returns warnings.
 pub(crate) fn readings(machine: &Machine, test: &Test, readings: &Readings) -> Result<Vec<String>, Fault> {
     plausibility::check(machine, test, readings)?;
-    plausibility::check_lengths(test, readings)?;
+    test.station.check_observed(&test.name, &readings.observed)?;
     let doubts =
         [planned::beyond_travel(machine, readings), runs::difference_from_stated(test.motion.as_ref(), readings)];
     let doubts = doubts.into_iter().flatten();
@@ -60,8 +57,7 @@ pub(crate) enum MissingPosition {
 }
 
 /// The first position that readings lack, if any. `stated` are axes whose position the test states, `read` those with a
-/// column of positions, `moved` those that move in its plan. A ball bar needs no more than the axes that move; others
-/// need every axis.
+/// column of positions, `moved` those that move in its plan. An instrument needs those, or every axis.
 pub(crate) fn missing_position(
     machine: &Machine,
     instrument: InstrumentKind,
@@ -74,7 +70,7 @@ pub(crate) fn missing_position(
         if moved.contains(&axis) {
             return Some(MissingPosition::Moved(axis));
         }
-        if instrument != InstrumentKind::BallBar {
+        if instrument.entry().needs_every_axis {
             return Some(MissingPosition::NotStated(axis));
         }
     }

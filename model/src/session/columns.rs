@@ -1,11 +1,11 @@
 //! Readings that are given in memory, as columns.
 
-use super::check::{self, Fault, MIN_READINGS, MissingPosition};
+use super::check::{self, MIN_READINGS, MissingPosition};
 use super::limits;
 use super::motion::{self, Motion};
 use super::readings::Readings;
 use crate::chain::Machine;
-use crate::instrument::InstrumentKind;
+use crate::instrument::{Fault, InstrumentKind};
 
 /// Readings as columns, all of the same length but for those that are empty.
 #[derive(Clone, Debug, Default)]
@@ -33,12 +33,10 @@ impl Columns {
         listed: &[bool],
     ) -> Result<Readings, Fault> {
         let coordinates = kind.coordinates();
-        // A socket has no reading of its own: the ball is where it is.
-        let by_axis = self.axes.first().map_or(0, |(_, column)| column.len());
-        let rows = match kind {
-            InstrumentKind::Socket => by_axis,
-            _ => self.observed.len() / coordinates,
-        };
+        // The ball in a socket is where it is.
+        let has_readings = kind.entry().has_readings;
+        let by_axis = || self.axes.first().map_or(0, |(_, column)| column.len());
+        let rows = if has_readings { self.observed.len() / coordinates } else { by_axis() };
         if rows < MIN_READINGS {
             return Err((
                 format!("{rows} readings, which is not enough for a fit"),
@@ -74,12 +72,11 @@ impl Columns {
                 ));
             }
         }
-        let observed = match kind {
-            InstrumentKind::Socket => vec![0.0; rows * coordinates],
-            _ => {
-                column_of("observed values", &self.observed, rows * coordinates)?;
-                self.observed.clone()
-            }
+        let observed = if has_readings {
+            column_of("observed values", &self.observed, rows * coordinates)?;
+            self.observed.clone()
+        } else {
+            vec![0.0; rows * coordinates]
         };
         for (what, column) in [("times", &self.time_s), ("temperatures", &self.temperature_c)] {
             if !column.is_empty() {

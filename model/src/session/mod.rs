@@ -6,7 +6,6 @@
 pub mod build;
 pub(crate) mod check;
 pub mod columns;
-pub mod defaults;
 pub mod expression;
 pub mod limits;
 pub mod motion;
@@ -24,8 +23,7 @@ use crate::chain::Machine;
 use crate::component::ErrorName;
 use crate::driver::Origin;
 use crate::effect::Effect;
-use crate::instrument::rtest::Setting;
-use crate::instrument::{InstrumentKind, SharedBy, Station};
+use crate::instrument::{Entry, InstrumentKind, SharedBy, Station};
 use readings::Readings;
 
 /// A validated session. Lengths in mm, angles in rad.
@@ -60,6 +58,14 @@ impl Session {
     /// Reference time and temperature, from which the drivers of effects count.
     pub fn origin(&self) -> Origin {
         Origin::of(self.tests.iter().filter_map(|test| test.readings.as_deref()))
+    }
+
+    /// The session with these readings, in the order of its tests.
+    pub fn with_readings(mut self, readings: impl IntoIterator<Item = Readings>) -> Session {
+        for (test, readings) in self.tests.iter_mut().zip(readings) {
+            test.readings = Some(Arc::new(readings));
+        }
+        self
     }
 }
 
@@ -100,13 +106,17 @@ impl Test {
             SharedBy::Setup => &self.setup,
             SharedBy::SpindleSetup => &self.spindle_setup,
             SharedBy::BarSetup => &self.bar_setup,
-            SharedBy::Sensors => match &self.station {
-                Station::RTest(rtest) if rtest.setting == Setting::Spindle => &self.spindle_setup,
-                _ => &self.setup,
-            },
+            SharedBy::Sensors => self.group(self.station.sensors()),
             SharedBy::Socket => self.socket.as_deref().unwrap_or(""),
             SharedBy::Session => "",
         }
+    }
+
+    /// The group of tests that share the object whose place no session knows: a tracker, a socket.
+    pub fn free_place(&self) -> Option<&str> {
+        let Entry { parameters, free, .. } = self.station.entry();
+        let parameter = parameters.iter().find(|parameter| *free == Some(parameter.thing))?;
+        Some(self.group(parameter.shared_by))
     }
 }
 

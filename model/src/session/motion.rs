@@ -1,5 +1,10 @@
 //! Motion of the axes in a planned test.
 
+use super::columns::axis_index;
+use crate::axis::AxisKind;
+use crate::chain::Machine;
+use crate::error::ModelError;
+
 /// Largest number of readings of one planned test.
 pub const MAX_READINGS: usize = 1_000_000;
 
@@ -67,6 +72,32 @@ pub enum Motion {
     },
     /// The data file contains the states.
     List,
+}
+
+/// Default feed of a linear axis or a circle, mm/s: 1000 mm/min.
+pub(crate) const DEFAULT_FEED_MM_S: f64 = 1000.0 / 60.0;
+/// Default speed of a rotary axis, rad/s: 120 °/min.
+const DEFAULT_ROTARY_SPEED_RAD_S: f64 = 2.0 / 180.0 * std::f64::consts::PI;
+
+/// The speed of an axis for which none is stated, mm/s or rad/s.
+pub(crate) fn default_speed(kind: AxisKind) -> f64 {
+    match kind {
+        AxisKind::Linear => DEFAULT_FEED_MM_S,
+        AxisKind::Rotary => DEFAULT_ROTARY_SPEED_RAD_S,
+    }
+}
+
+impl Motion {
+    /// One run of an axis forward and backward, from and to these positions with this step, mm or rad, at 1000 mm/min or
+    /// 120 °/min.
+    ///
+    /// # Errors
+    /// [`ModelError::Session`] if the machine has no axis of this name.
+    pub fn sweep(machine: &Machine, axis: &str, [from, to]: [f64; 2], step: f64) -> Result<Motion, ModelError> {
+        let axis = axis_index(machine, axis).map_err(|(message, help)| ModelError::Session { message, help })?;
+        let speed = default_speed(machine.axes[axis].kind);
+        Ok(Motion::Sweep { axis, from, to, step, speed, runs: 1, both_directions: true })
+    }
 }
 
 /// Direction of the bar while linear axes follow a rotary axis (ISO 10791-6, BK1 and BK2).

@@ -82,13 +82,10 @@ pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<
 
 /// The instrument's points of table and tool, as the ends of a bar.
 pub(super) fn bar_between_points(station: &Station<f64>) -> Option<BallBar<f64>> {
-    if let Station::BallBar(bar) = station {
-        return Some(bar.clone());
-    }
     station.table_point_mm().map(|point| BallBar {
         workpiece_ball: point,
         spindle_ball: station.tool_point_mm(),
-        bar: 0.0,
+        bar: station.reference_mm(),
     })
 }
 

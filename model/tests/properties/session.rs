@@ -125,7 +125,7 @@ proptest! {
             origin: [0.0; 3],
         });
         let data = folder.path().join("T.csv");
-        csv::write(&data, &machine, &station, &readings).unwrap();
+        std::fs::write(&data, csv::text(&machine, &station, &readings)).unwrap();
 
         let back = read(folder.path()).map_err(|fault| TestCaseError::fail(format!("{fault}\n{session}")))?;
         prop_assert_eq!(back.machine.code(), machine.code());
@@ -154,10 +154,10 @@ proptest! {
 
         // Written again, the result is equal to the byte.
         let first = fs::read(&data).unwrap();
-        csv::write(&data, &back.machine, &back.tests[0].station, found).unwrap();
+        std::fs::write(&data, csv::text(&back.machine, &back.tests[0].station, found)).unwrap();
         let again = read(folder.path()).unwrap();
         let found = again.tests[0].readings.as_ref().unwrap();
-        csv::write(&data, &again.machine, &again.tests[0].station, found).unwrap();
+        std::fs::write(&data, csv::text(&again.machine, &again.tests[0].station, found)).unwrap();
         prop_assert_eq!(first, fs::read(&data).unwrap());
     }
 

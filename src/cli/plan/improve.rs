@@ -1,19 +1,18 @@
 //! `abbe plan --improve`, `--separate`, `--range`.
 
 use abbe::identify::IdentifyError;
+use abbe::identify::candidates::library;
 use abbe::identify::plan::criterion::Goal;
 use abbe::identify::plan::improve::{ImproveOptions, Improvement, improve};
-use abbe::identify::plan::range::Shrinkage;
 use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::problem::Problem;
-use abbe::identify::results::Interval;
-use abbe::identify::trace::library;
 use abbe::model::words::counted;
 use clap::{Args, ValueEnum};
 
-use super::digits::three_digits;
 use crate::cli::failure::Failure;
-use crate::cli::table;
+use crate::cli::output;
+use crate::present::next_test as present;
+use crate::present::number::three_digits;
 
 /// The share of a range that is tried beside the whole range if gain per minute is compared.
 const HALF: f64 = 0.5;
@@ -231,7 +230,7 @@ fn add(problem: &mut Problem, id: &str) -> Result<(), IdentifyError> {
 
 /// Prints the proposed tests.
 pub fn print(found: &Improvement) {
-    let criterion = found.criterion.replace("um or arcsec", "µm or ″");
+    let criterion = present::criterion(found);
     say!(
         "{}. With the plan: {criterion} {}",
         counted(found.candidate_tests, "candidate test"),
@@ -249,8 +248,9 @@ pub fn print(found: &Improvement) {
             step.duration_min,
             if step.new_setup { " including the set-up" } else { "" }
         );
+        let point = |mm: [f64; 3]| mm.map(|x| format!("{x:.1}")).join(", ");
         say!(
-            "   workpiece ball {}, spindle ball {}, bar {} mm",
+            "   workpiece ball ({}) mm, spindle ball ({}) mm, bar {} mm",
             point(step.workpiece_ball_mm),
             point(step.spindle_ball_mm),
             step.bar_mm
@@ -259,54 +259,9 @@ pub fn print(found: &Improvement) {
             say!("   makes identifiable: {}", step.makes_identifiable.join(", "));
         }
     }
-    say!("");
-    let mut header = vec!["u of error".to_string(), "plan".to_string()];
-    header.extend((1..=found.steps.len()).map(|number| format!("with test {number}")));
-    let rows: Vec<Vec<String>> = found
-        .uncertainties_before
-        .iter()
-        .enumerate()
-        .map(|(k, before)| {
-            let mut row = vec![before.id.clone(), three_digits(before.u)];
-            row.extend(found.steps.iter().map(|step| three_digits(step.uncertainties[k].u)));
-            row
-        })
-        .collect();
-    table::print(&header.iter().map(String::as_str).collect::<Vec<_>>(), &rows);
+    output::print(&present::uncertainties(found));
     for exchange in &found.exchanged {
         say!("replaced by a further search: {exchange}");
     }
-    say!("\nBest single tests:");
-    for other in &found.alternatives {
-        say!("  {}  {} ({:.1} min)", three_digits(other.after), other.test, other.duration_min);
-    }
-}
-
-fn point(mm: [f64; 3]) -> String {
-    let cells: Vec<String> = mm.iter().map(|x| format!("{x:.1}")).collect();
-    format!("({}) mm", cells.join(", "))
-}
-
-/// Header of [`range_rows`].
-pub const RANGES: [&str; 5] = ["test", "axis", "planned", "smallest", "doubles first"];
-
-/// The smallest range of each sweep, one row per sweep.
-pub fn range_rows(ranges: &[Shrinkage]) -> Vec<Vec<String>> {
-    let row = |range: &Shrinkage| {
-        let span = |Interval { low, high }: Interval| table::quantity(&format!("{low:.0} to {high:.0}"), &range.unit);
-        vec![
-            range.test.clone(),
-            range.axis.clone(),
-            span(range.range),
-            range.minimum_range.map_or("can be omitted".into(), span),
-            range.first_to_double.clone().unwrap_or("–".into()),
-        ]
-    };
-    ranges.iter().map(row).collect()
-}
-
-/// Prints the smallest range of each sweep.
-pub fn print_ranges(ranges: &[Shrinkage]) {
-    say!("\nSmallest range of each sweep about its middle before an uncertainty doubles:");
-    table::print(&RANGES, &range_rows(ranges));
+    output::print(&present::alternatives(found));
 }

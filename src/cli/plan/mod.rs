@@ -1,11 +1,8 @@
 //! `abbe plan`: analyse identifiability and predicted uncertainty of planned tests.
 
-mod details;
-mod digits;
 pub mod improve;
 pub mod patterns;
 mod screen;
-pub mod verdict;
 
 use abbe::identify::plan::clearance::Clearance;
 use abbe::identify::plan::{self, PlanOptions};
@@ -19,7 +16,7 @@ use clap::Args;
 use super::failure::Failure;
 use super::message::print_warnings;
 use super::report::ReportArguments;
-use super::{CommonArguments, SessionArguments, json, read_session};
+use super::{CommonArguments, SessionArguments, output, read_session};
 
 /// `abbe plan SESSION`
 #[derive(Args)]
@@ -120,15 +117,12 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
         screen::print(&analysis, &arguments.session, improvable, arguments.all);
     }
     print_warnings(&analysis.warnings);
-    if let Some(path) = &arguments.common.json {
-        json::write_of_session(path, &sources, arguments.common.seed, &analysis)?;
-    }
+    arguments.common.write_json(&sources, &analysis)?;
     if arguments.report.asked() {
         let (complete, noise) = plan::prepared(&session, &options)?;
         let problem = plan::states::problem_by_test(&complete, noise)?;
-        let document = crate::report::plan::document(&problem, &analysis)?;
-        let method = crate::report::plan::method(&analysis);
-        arguments.report.write(&document, &method, (&session, &sources), arguments.common.seed)?;
+        let document = crate::present::report::plan::document(&problem, &analysis)?;
+        arguments.report.write(&document, (&session, &sources), arguments.common.seed)?;
     }
     Ok(())
 }
@@ -163,16 +157,13 @@ fn next_test(
     };
     let ranges = if arguments.range { plan::range::shrinkages(&problem)? } else { Vec::new() };
     if arguments.range && tables {
-        improve::print_ranges(&ranges);
+        output::print(&crate::present::next_test::ranges(&ranges));
     }
     let found = NextTest { improvement, ranges };
-    if let Some(path) = &arguments.common.json {
-        json::write_of_session(path, sources, arguments.common.seed, &found)?;
-    }
+    arguments.common.write_json(sources, &found)?;
     if arguments.report.asked() {
-        let document = crate::report::next_test::document(&problem, found.improvement.as_ref(), &found.ranges);
-        let method = crate::report::next_test::method();
-        arguments.report.write(&document, &method, (session, sources), arguments.common.seed)?;
+        let document = crate::present::report::next_test::document(&problem, found.improvement.as_ref(), &found.ranges);
+        arguments.report.write(&document, (session, sources), arguments.common.seed)?;
     }
     Ok(())
 }

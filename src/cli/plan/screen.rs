@@ -1,24 +1,24 @@
 //! The first screen of `abbe plan`: identifiability, predicted uncertainties, what is confounded, what to do next, the
 //! verdict.
 
-use abbe::identify::plan::results::{EffectsAnalysis, ErrorAnalysis, PlanAnalysis};
+use abbe::identify::plan::results::{EffectsAnalysis, PlanAnalysis};
 use abbe::model::words::counted;
 
-use super::details;
-use super::digits::three_digits;
-use super::verdict::verdict;
 use crate::cli::screen::{self, Step, command};
-use crate::cli::{SessionArguments, table};
+use crate::cli::{SessionArguments, output};
+use crate::present::number::{micrometres, with_symbols};
+use crate::present::plan::verdict::verdict;
+use crate::present::plan::{self as present, effects};
 
-/// Prints the analysis of a plan. With `all`, no list is folded and the tables of [`details`] are printed.
+/// Prints the analysis of a plan. With `all`, no list is folded and the tables of [`details()`] are printed.
 pub fn print(analysis: &PlanAnalysis, session: &SessionArguments, improvable: bool, all: bool) {
     header(analysis);
-    errors(&analysis.errors);
+    output::print(&present::uncertainties(&analysis.errors));
     unidentifiable(analysis, all);
     if all {
-        details::print(analysis);
+        details(analysis);
     } else if let Some(found) = &analysis.effects {
-        effects(found);
+        effects_in_short(found);
     }
     screen::print_next(&next(analysis, session, improvable, all));
     say!("\nVerdict: {}", verdict(analysis).join("\n  "));
@@ -38,39 +38,8 @@ fn header(analysis: &PlanAnalysis) {
         counted(analysis.readings, "reading"),
         counted(analysis.tests.len(), "test"),
         counted(analysis.setup_count, "set-up"),
-        table::micrometres(analysis.noise_um)
+        micrometres(analysis.noise_um)
     );
-}
-
-fn errors(errors: &[ErrorAnalysis]) {
-    say!(
-        "\nPredicted standard uncertainty u and expanded uncertainty U = 2u; parts of u from noise and from the set-up;"
-    );
-    say!("conditional u (all other errors known); the largest contribution to the variance:");
-    let optional = |u: Option<f64>| u.map_or("–".to_string(), three_digits);
-    let rows: Vec<Vec<String>> = errors
-        .iter()
-        .map(|error| {
-            let part = |noise: bool| {
-                let parts = error.budget.iter().filter(|part| (part.source == "noise") == noise);
-                let part = parts.map(|part| part.u.powi(2)).sum::<f64>().sqrt();
-                error.u.map(|_| part)
-            };
-            let largest = error.budget.first().filter(|_| error.u.is_some());
-            vec![
-                error.id.clone(),
-                error.u.map_or("not identifiable".to_string(), three_digits),
-                optional(error.u.map(|u| 2.0 * u)),
-                table::unit(&error.unit),
-                optional(part(true)),
-                optional(part(false)),
-                optional(error.conditional_u),
-                largest.map_or(String::new(), |part| format!("{} {:.0} %", part.source, part.share * 100.0)),
-            ]
-        })
-        .collect();
-    let header = ["error", "u", "U", "unit", "noise", "set-up", "conditional", "largest contribution"];
-    table::print_aligned(&header, &rows, &[0, 3, 7]);
 }
 
 fn unidentifiable(analysis: &PlanAnalysis, all: bool) {
@@ -83,25 +52,58 @@ fn unidentifiable(analysis: &PlanAnalysis, all: bool) {
     let null_space = analysis.unidentifiable.iter();
     list(
         "Confounded: null-space directions, which leave every reading unchanged:",
-        null_space.map(|item| table::with_symbols(&item.why)).collect(),
+        null_space.map(|item| with_symbols(&item.why)).collect(),
     );
     let by_setup = analysis.determined_by_prior.iter();
     list(
         "Determined by the set-up priors only, because the readings alone do not separate them:",
-        by_setup.map(|item| table::with_symbols(&item.why)).collect(),
+        by_setup.map(|item| with_symbols(&item.why)).collect(),
     );
     let near = analysis.nearly_collinear.iter();
-    list("Nearly collinear:", near.map(|item| table::with_symbols(&item.why)).collect());
+    list("Nearly collinear:", near.map(|item| with_symbols(&item.why)).collect());
+}
+
+/// The tables that the first screen folds.
+fn details(analysis: &PlanAnalysis) {
+    output::print(&present::sensitivity(&analysis.errors));
+    output::print(&present::budgets(&analysis.errors));
+    let plots = present::small_plots(analysis);
+    if !plots.is_empty() {
+        say!("\nSensitivity along the first run of each test, each row to its own scale, zero at half height:");
+        plots.iter().for_each(output::print);
+    }
+    match present::correlation(analysis) {
+        Some(table) => output::print(&table),
+        None => say!("\nThe correlation matrix of {} errors is in the JSON.", analysis.correlation.ids.len()),
+    }
+    output::print(&present::indices(&analysis.indices));
+    if !analysis.leave_one_out.is_empty() {
+        say!("\nContribution of each test:");
+        analysis.leave_one_out.iter().for_each(|item| say!("  {}", item.why));
+    }
+    if let Some(found) = &analysis.effects {
+        let counts = effects::counts(found);
+        say!(
+            "\nUndeclared effects: of {} screened, {} are detectable, {} are confounded and {} change no reading of these tests.",
+            found.effects.len(),
+            counts.detectable,
+            counts.confounded,
+            counts.without_signal
+        );
+        output::print(&effects::detectable(found));
+        output::print(&effects::confounded(found));
+        output::print(&effects::by_error(found));
+    }
 }
 
 /// How many undeclared effects the tests detect.
-fn effects(found: &EffectsAnalysis) {
-    let count = |verdict: fn(&str) -> bool| found.effects.iter().filter(|effect| verdict(&effect.verdict)).count();
+fn effects_in_short(found: &EffectsAnalysis) {
+    let counts = effects::counts(found);
     say!(
         "\nUndeclared effects: of {} screened, {} are detectable and {} are confounded with the errors; --all lists them",
         found.effects.len(),
-        count(|verdict| verdict == "detectable"),
-        count(|verdict| verdict.starts_with("confounded"))
+        counts.detectable,
+        counts.confounded
     );
 }
 

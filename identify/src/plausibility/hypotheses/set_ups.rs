@@ -33,13 +33,8 @@ pub(super) fn balls(session: &Session) -> Vec<Hypothesis> {
                 let mut changed = session.clone();
                 let mut stated_mm = None;
                 for test in changed.tests.iter_mut().filter(|test| members.contains(&group(test))) {
-                    let ball = match &mut test.station {
-                        Station::BallBar(bar) if of_workpiece => &mut bar.workpiece_ball,
-                        Station::BallBar(bar) => &mut bar.spindle_ball,
-                        Station::RTest(rtest) if of_workpiece => &mut rtest.workpiece_ball,
-                        Station::RTest(rtest) => &mut rtest.spindle_ball,
-                        Station::Probe(_) | Station::Tracker(_) | Station::Socket(_) => continue,
-                    };
+                    let Some([workpiece, spindle]) = test.station.balls_mut() else { continue };
+                    let ball = if of_workpiece { workpiece } else { spindle };
                     if ball[i].abs() > ZERO_MM {
                         stated_mm = stated_mm.or(Some(ball[i]));
                         ball[i] = -ball[i];
@@ -67,10 +62,7 @@ pub(super) fn balls(session: &Session) -> Vec<Hypothesis> {
 pub(super) fn readings(session: &Session) -> Vec<Hypothesis> {
     let mut list = Vec::new();
     let reversed = with_readings(session, |test, _, observed| {
-        let twice_mm = match &test.station {
-            Station::BallBar(bar) => 2.0 * bar.bar,
-            _ => 0.0,
-        };
+        let twice_mm = 2.0 * test.station.reference_mm();
         observed.iter_mut().for_each(|value| *value = twice_mm - *value);
     });
     list.push(Hypothesis::new(

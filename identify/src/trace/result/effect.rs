@@ -6,11 +6,11 @@ use abbe_model::effect::shape::Curve;
 use abbe_model::effect::{Effect, Shape};
 
 use super::{HeldOut, Moves, TraceFindings, alias_shifts};
+use crate::candidates::library::Family;
 use crate::fit::Fit;
 use crate::parameters::Role;
 use crate::problem::Problem;
 use crate::results::{CurvePoint, EffectName, EffectResult, ParameterResult, ShapeParameter};
-use crate::trace::library::Family;
 use abbe_model::effect::description::{explanations, meaning};
 
 /// The name of an effect in results.

@@ -8,10 +8,10 @@ mod verdict;
 use abbe_model::effect::Effect;
 
 use super::alias::{self, Alias, CompetingEffect};
-use super::library;
 use super::remainder::Structure;
 use super::search::Search;
 use super::start::Start;
+use crate::candidates::library;
 use crate::error::IdentifyError;
 use crate::fit::{self, Fit};
 use crate::heldout::{mislabelled_runs, rms_mm};
@@ -21,7 +21,7 @@ use crate::problem::Problem;
 use crate::results::{
     ChangedParameter, EffectResult, ModelResult, ParameterResult, TraceResult, phases_follow_amplitudes,
 };
-pub(super) use effect::effect_name;
+pub(crate) use effect::effect_name;
 pub(super) use unsearched::unsearched;
 use verdict::{not_examined, verdict};
 

@@ -3,8 +3,8 @@
 use abbe_model::chain::Machine;
 
 use super::{HeldOut, effect_name};
+use crate::heldout::paired::HeldOutDecrease;
 use crate::results::RejectedCandidate;
-use crate::trace::paired::HeldOutDecrease;
 use crate::trace::search::Search;
 
 /// Candidates that score better than the null distribution of the search and did not lower the held-out error by more

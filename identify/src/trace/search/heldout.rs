@@ -4,11 +4,11 @@
 use faer::Mat;
 
 use super::{ALL, Search, SearchBranch, SelectedEffect};
+use crate::candidates::gain::TrainedModel;
+use crate::candidates::moments::grow;
 use crate::error::IdentifyError;
+use crate::heldout::paired::{HeldOutDecrease, Units};
 use crate::numerics::parallel;
-use crate::trace::moments::grow;
-use crate::trace::paired::{HeldOutDecrease, Units};
-use crate::trace::score::TrainedModel;
 
 /// The unwhitened base and residual, divided by the noise standard deviation. Held-out errors refer to these.
 pub struct UnwhitenedModel {

@@ -12,12 +12,13 @@ mod pool;
 
 use std::ops::Range;
 
-use super::columns::{Columns, EffectColumns};
 use super::compose::StepTable;
+use super::constants::INDISTINGUISHABLE;
 use super::interrupt::Interrupt;
-use super::library::Candidate;
-use super::moments::Moments;
-use super::score::{Gain, INDISTINGUISHABLE, PriorMoments, TrainedModel};
+use crate::candidates::columns::{Columns, EffectColumns};
+use crate::candidates::gain::{Gain, PriorMoments, TrainedModel};
+use crate::candidates::library::Candidate;
+use crate::candidates::moments::Moments;
 use crate::error::IdentifyError;
 use heldout::HeldOutState;
 pub use heldout::{RejectedByHeldOut, UnwhitenedModel};

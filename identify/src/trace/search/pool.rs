@@ -1,13 +1,13 @@
 //! The candidates that a search may add: the library's detectable effects, and the effects that it has tuned itself.
 
 use super::{Search, TrainedModel};
+use crate::candidates::columns::EffectColumns;
+use crate::candidates::gain::Gain;
+use crate::candidates::library::Candidate;
 use crate::error::IdentifyError;
 use crate::numerics::parallel;
-use crate::trace::columns::EffectColumns;
 use crate::trace::compose::{self, StepTable};
-use crate::trace::library::Candidate;
 use crate::trace::refine;
-use crate::trace::score::Gain;
 
 /// Least detectability of a searched effect. An effect of the largest plausible size has to change the readings by this
 /// many standard deviations in total, beyond what the model absorbs.

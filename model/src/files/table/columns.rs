@@ -9,7 +9,7 @@ use super::row::Row;
 use crate::error::{Location, ModelError};
 use crate::files::quantity::{self, Unit};
 use crate::files::spelling::suggestion;
-use crate::instrument::InstrumentKind;
+use crate::instrument::column::Quantity;
 
 /// The content of a column.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,11 +18,8 @@ pub(super) enum Role {
     Run,
     Temperature,
     Axis(usize, Unit),
-    Length(Unit),
-    Deviation(Unit),
-    /// Against the probing direction: the distance by which the surface lies beyond the target.
-    Outward(Unit),
-    Coordinate(usize, Unit),
+    /// A column of the instrument's readings.
+    Reading(Quantity, Unit),
     Socket,
 }
 
@@ -43,57 +40,29 @@ impl Role {
             "time_s" => return Some(Role::Time),
             "run" => return Some(Role::Run),
             "temperature_c" => return Some(Role::Temperature),
-            "socket" if request.instrument() == InstrumentKind::Socket => return Some(Role::Socket),
             _ => {}
+        }
+        let own = request.test.station.columns();
+        if own.iter().any(|column| column.unit.is_empty() && column.stem == name) {
+            return Some(Role::Socket);
         }
         if let Some((axis, unit)) = quantity::axis_position(request.machine, name) {
             return Some(Role::Axis(axis, unit));
         }
         let (what, unit) = name.rsplit_once('_')?;
         let unit = Unit::of_length(unit)?;
-        match (request.instrument(), what) {
-            (InstrumentKind::BallBar, "length") => Some(Role::Length(unit)),
-            (InstrumentKind::BallBar, "deviation") => Some(Role::Deviation(unit)),
-            (InstrumentKind::Probe, "distance") => Some(Role::Length(unit)),
-            (InstrumentKind::Probe, "deviation") => Some(Role::Outward(unit)),
-            (InstrumentKind::Tracker, "px") => Some(Role::Coordinate(0, unit)),
-            (InstrumentKind::Tracker, "py") => Some(Role::Coordinate(1, unit)),
-            (InstrumentKind::Tracker, "pz") => Some(Role::Coordinate(2, unit)),
-            (InstrumentKind::RTest, name) => {
-                let place = r_test_columns(request.sensors()).iter().position(|own| *own == name)?;
-                Some(Role::Coordinate(place, unit))
-            }
-            _ => None,
-        }
+        let column = own.iter().find(|column| !column.unit.is_empty() && column.stem == what)?;
+        Some(Role::Reading(column.quantity, unit))
     }
 
     /// Whether two columns contain the same quantity.
     fn same_as(self, other: Role) -> bool {
         match (self, other) {
             (Role::Axis(a, _), Role::Axis(b, _)) => a == b,
-            (Role::Coordinate(a, _), Role::Coordinate(b, _)) => a == b,
-            (
-                Role::Length(_) | Role::Deviation(_) | Role::Outward(_),
-                Role::Length(_) | Role::Deviation(_) | Role::Outward(_),
-            ) => true,
+            (Role::Reading(Quantity::Coordinate(a), _), Role::Reading(Quantity::Coordinate(b), _)) => a == b,
+            (Role::Reading(..), Role::Reading(..)) => true,
             _ => self == other,
         }
-    }
-}
-
-/// The names of an R-test's columns before their unit: the values of the single sensors, or the vector in the frame
-/// that carries them.
-pub(crate) fn r_test_columns(sensors: bool) -> [&'static str; 3] {
-    if sensors { ["du", "dv", "dw"] } else { ["dx", "dy", "dz"] }
-}
-
-/// The required columns of an R-test, for data with columns of the other kind.
-pub(super) fn r_test_help(request: &Request<'_>) -> &'static str {
-    if request.sensors() {
-        "the test states the sensor directions: it needs the sensor values `du_um`, `dv_um` and `dw_um`; without `sensor_angles_deg` and `sensor_directions` it needs `dx_um`, `dy_um` and `dz_um`"
-    } else {
-        "an R-test needs `dx_um`, `dy_um` and `dz_um`; the values of single sensors, `du_um`, `dv_um` and `dw_um`, need \
-         `sensor_angles_deg` or `sensor_directions` in the test"
     }
 }
 
@@ -105,15 +74,7 @@ pub(super) fn known(request: &Request<'_>) -> Vec<String> {
         known.push(format!("{}_{unit}", axis.name.to_lowercase()));
     }
     known.push("temperature_c".into());
-    let own: &[&str] = match request.instrument() {
-        InstrumentKind::BallBar => &["length_mm", "deviation_um"],
-        InstrumentKind::Tracker => &["px_mm", "py_mm", "pz_mm"],
-        InstrumentKind::Socket => &["socket"],
-        InstrumentKind::Probe => &["distance_mm", "deviation_um"],
-        InstrumentKind::RTest if request.sensors() => &["du_um", "dv_um", "dw_um"],
-        InstrumentKind::RTest => &["dx_um", "dy_um", "dz_um"],
-    };
-    known.extend(own.iter().map(|name| name.to_string()));
+    known.extend(request.test.station.columns().iter().map(|column| column.name(column.unit)));
     known
 }
 
@@ -190,8 +151,8 @@ fn unknown_column_help(request: &Request<'_>, name: &str, header: &[String], kno
         return NO_HEADER.into();
     }
     let id_stem = name.rsplit_once('_').map_or(name, |(id_stem, _)| id_stem);
-    if request.instrument() == InstrumentKind::RTest && r_test_columns(!request.sensors()).contains(&id_stem) {
-        return r_test_help(request).into();
+    if let Some(help) = request.test.station.help_on_column(id_stem) {
+        return help.into();
     }
     format!(
         "{}known here: {}; a file with other names needs [columns], own name = foreign name",

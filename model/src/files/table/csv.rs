@@ -5,15 +5,14 @@
 
 use std::path::Path;
 
-use super::columns::r_test_columns;
 use super::format::{Content, DataFormat, Rows, Table};
 use super::lines::Lines;
 use super::request::Request;
 use super::row::Row;
 use crate::chain::Machine;
 use crate::error::ModelError;
-use crate::files::whole;
 use crate::instrument::Station;
+use crate::instrument::column::{Column, Quantity};
 use crate::session::readings::Readings;
 
 /// The format. It reads every file that is of no other format.
@@ -85,17 +84,9 @@ impl Rows for CsvRows {
     }
 }
 
-/// Writes readings as a CSV file with our column names, atomically.
+/// Readings as the text of a CSV file with our column names.
 ///
 /// Numbers have up to twelve decimals of mm, degree or s, so that the rounding is far below any resolution.
-///
-/// # Errors
-/// If the file cannot be written; the previous file then remains.
-pub fn write(path: &Path, machine: &Machine, station: &Station<f64>, readings: &Readings) -> Result<(), ModelError> {
-    whole::write(path, &text(machine, station, readings))
-}
-
-/// The text of [`write()`].
 pub fn text(machine: &Machine, station: &Station<f64>, readings: &Readings) -> String {
     let mut header = Vec::new();
     if !readings.time_s.is_empty() {
@@ -110,16 +101,8 @@ pub fn text(machine: &Machine, station: &Station<f64>, readings: &Readings) -> S
     if !readings.temperature_c.is_empty() {
         header.push("temperature_c".into());
     }
-    match station {
-        Station::BallBar(_) => header.push("length_mm".into()),
-        Station::Tracker(_) => header.extend(["px_mm", "py_mm", "pz_mm"].map(String::from)),
-        // A pose of a socket consists of axis positions only.
-        Station::Socket(_) => {}
-        Station::Probe(_) => header.push("distance_mm".into()),
-        Station::RTest(rtest) => {
-            header.extend(r_test_columns(rtest.sensors.is_some()).map(|name| format!("{name}_mm")));
-        }
-    }
+    let is_reading = |column: &&Column| matches!(column.quantity, Quantity::Length | Quantity::Coordinate(_));
+    header.extend(station.columns().iter().filter(is_reading).map(|column| column.name("mm")));
     let mut text = header.join(",");
     text.push('\n');
     for row in 0..readings.rows() {
@@ -136,7 +119,7 @@ pub fn text(machine: &Machine, station: &Station<f64>, readings: &Readings) -> S
         if let Some(temperature) = readings.temperature_c.get(row) {
             cells.push(decimal(*temperature));
         }
-        if !matches!(station, Station::Socket(_)) {
+        if station.entry().has_readings {
             let start = row * readings.coordinates;
             for k in start..start + readings.coordinates {
                 cells.push(readings.observed.get(k).map_or(String::new(), |mm| decimal(*mm)));

@@ -9,6 +9,7 @@ use super::request::{Format, Request};
 use super::row::Row;
 use super::{duplicates, required};
 use crate::error::{Location, ModelError};
+use crate::instrument::column::Quantity;
 use crate::session::check;
 use crate::session::readings::{Origin, Readings};
 
@@ -172,10 +173,16 @@ impl<'a> ReadingColumns<'a> {
                         *last = unit.to_internal(value);
                     }
                 }
-                Role::Length(unit) => observed[0] = unit.to_internal(value),
-                Role::Deviation(unit) => observed[0] = self.request.bar_mm() + unit.to_internal(value),
-                Role::Outward(unit) => observed[0] = -unit.to_internal(value),
-                Role::Coordinate(i, unit) => observed[i] = unit.to_internal(value),
+                Role::Reading(quantity, unit) => {
+                    let value = unit.to_internal(value);
+                    match quantity {
+                        Quantity::Length => observed[0] = value,
+                        Quantity::Deviation => observed[0] = self.request.bar_mm() + value,
+                        Quantity::Outward => observed[0] = -value,
+                        Quantity::Coordinate(i) => observed[i] = value,
+                        Quantity::Socket => {}
+                    }
+                }
                 Role::Socket => {}
             }
         }

@@ -4,8 +4,8 @@ use encoding_rs::Encoding;
 
 use crate::chain::Machine;
 use crate::error::Location;
-use crate::instrument::{InstrumentKind, Station};
-use crate::session::{Test, motion, plausibility};
+use crate::instrument::InstrumentKind;
+use crate::session::{Test, motion};
 
 /// The layout of the rows of a file.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,14 +80,9 @@ impl Request<'_> {
         self.test.station.kind()
     }
 
-    /// Whether the sensors of an R-test are read singly instead of as X, Y, Z.
-    pub fn sensors(&self) -> bool {
-        matches!(&self.test.station, Station::RTest(rtest) if rtest.sensors.is_some())
-    }
-
     /// The reference length of deviations, mm.
     pub fn bar_mm(&self) -> f64 {
-        plausibility::bar_mm(&self.test.station)
+        self.test.station.reference_mm()
     }
 
     /// Axes that move in the planned test.

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use super::columns::{Column, Role, known, listed, r_test_columns, r_test_help};
+use super::columns::{Column, Role, known, listed};
 use super::request::Request;
 use crate::error::{Location, ModelError};
-use crate::instrument::InstrumentKind;
+use crate::instrument::column::Quantity;
 use crate::session::check::{self, MissingPosition};
 
 /// Returns an error if one of them is missing.
@@ -28,45 +28,12 @@ pub(super) fn required(
             help: Some(help),
         })
     };
-    match request.instrument() {
-        InstrumentKind::BallBar => {
-            if !has(&|role| matches!(role, Role::Length(_) | Role::Deviation(_))) {
-                return missing(
-                    "with the bar readings".into(),
-                    "a ball bar needs `length_mm`, or `deviation_um` from `bar_mm`".into(),
-                );
-            }
-        }
-        InstrumentKind::Probe => {
-            if !has(&|role| matches!(role, Role::Length(_) | Role::Outward(_))) {
-                return missing(
-                    "with the probe readings".into(),
-                    "a probe needs `distance_mm` to the surface, or `deviation_um`, the deviation outwards".into(),
-                );
-            }
-        }
-        InstrumentKind::Tracker => {
-            for (index, name) in ["px_mm", "py_mm", "pz_mm"].into_iter().enumerate() {
-                if !has(&|role| matches!(role, Role::Coordinate(i, _) if i == index)) {
-                    return missing(format!("`{name}`"), "a tracker needs px_mm, py_mm and pz_mm".into());
-                }
-            }
-        }
-        InstrumentKind::RTest => {
-            for (index, name) in r_test_columns(request.sensors()).into_iter().enumerate() {
-                if !has(&|role| matches!(role, Role::Coordinate(i, _) if i == index)) {
-                    return missing(format!("`{name}_um`"), r_test_help(request).into());
-                }
-            }
-        }
-        InstrumentKind::Socket => {
-            if request.test.socket.is_none() && !has(&|role| role == Role::Socket) {
-                return missing(
-                    "`socket`".into(),
-                    "add the column, or add `socket = \"…\"` to the test if all its poses have one socket".into(),
-                );
-            }
-        }
+    let reads = |quantity: Quantity| match quantity {
+        Quantity::Socket => request.test.socket.is_some() || has(&|role| role == Role::Socket),
+        quantity => has(&|role| matches!(role, Role::Reading(own, _) if own == quantity)),
+    };
+    if let Some((what, help)) = request.test.station.missing(&reads) {
+        return missing(what, help);
     }
     let missed = check::missing_position(
         request.machine,

@@ -146,6 +146,11 @@ impl<'a> Table<'a> {
         Some(self.entries.remove(index?))
     }
 
+    /// The location of a key that has not been taken, if present.
+    pub fn key_span(&self, key: &str) -> Option<Range<usize>> {
+        self.entries.iter().find(|entry| entry.key == key).map(|entry| entry.key_span.clone())
+    }
+
     /// The value of a required key; `expected` names the expected value.
     pub fn require(&mut self, key: &'static str, expected: &str) -> Result<Value<'a>, ModelError> {
         match self.take(key) {

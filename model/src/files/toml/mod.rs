@@ -91,15 +91,14 @@ impl Context<'_> {
         Ok((length, number))
     }
 
-    /// Three lengths.
-    fn point(&self, value: Value<'_>) -> Result<([Length; 3], [f64; 3]), ModelError> {
+    /// Three lengths, mm.
+    fn point_mm(&self, value: Value<'_>) -> Result<[f64; 3], ModelError> {
         let items = value.three("a list of three lengths")?;
-        let mut lengths = [const { Length::Number(0.0) }; 3];
-        let mut numbers = [0.0; 3];
-        for (i, item) in items.iter().enumerate() {
-            (lengths[i], numbers[i]) = self.length(item)?;
+        let mut point_mm = [0.0; 3];
+        for (coordinate, item) in point_mm.iter_mut().zip(&items) {
+            (_, *coordinate) = self.length(item)?;
         }
-        Ok((lengths, numbers))
+        Ok(point_mm)
     }
 }
 
@@ -269,8 +268,12 @@ fn about(root: &mut Table<'_>) -> Result<Vec<(String, String)>, ModelError> {
         .collect()
 }
 
-/// The valid values of `kind` of an instrument.
-const KINDS: &str = "\"ballbar\", \"r-test\", \"probe\", \"tracker\" or \"socket\"";
+/// The valid values of `kind` of an instrument, in words.
+fn kinds() -> String {
+    let words: Vec<String> = InstrumentKind::ALL.iter().map(|kind| format!("\"{}\"", kind.word())).collect();
+    let (last, others) = words.split_last().expect("an instrument");
+    format!("{} or {last}", others.join(", "))
+}
 
 struct Instrument {
     kind: InstrumentKind,
@@ -282,10 +285,10 @@ impl Instrument {
     fn read(root: &mut Table<'_>) -> Result<Instrument, ModelError> {
         let value = root.require("instrument", "[instrument] with `kind = \"ballbar\"`")?;
         let mut table = value.table("[instrument]".into())?;
-        let value = table.require("kind", KINDS)?;
+        let value = table.require("kind", &kinds())?;
         let word = value.text()?;
-        let Some(kind) = InstrumentKind::ALL.into_iter().find(|kind| kind.word() == word) else {
-            return Err(value.unexpected(KINDS));
+        let Some(kind) = InstrumentKind::of_word(&word) else {
+            return Err(value.unexpected(&kinds()));
         };
         let mut not_negative = |key: &'static str| -> Result<Option<f64>, ModelError> {
             let Some(value) = table.take(key) else {

@@ -4,13 +4,10 @@ use super::{Context, quantity};
 use crate::axis::AxisKind;
 use crate::error::ModelError;
 use crate::files::toml::document::{Table, Value};
-use crate::instrument::Station;
-use crate::session::motion::{FollowOffset, MAX_READINGS, Motion, programmed_over_path_feed};
-
-/// Default feed of a linear axis or a circle, mm/s: 1000 mm/min.
-const DEFAULT_FEED_MM_S: f64 = 1000.0 / 60.0;
-/// Default speed of a rotary axis, rad/s: 120 °/min.
-const DEFAULT_ROTARY_SPEED_RAD_S: f64 = 2.0 / 180.0 * std::f64::consts::PI;
+use crate::instrument::{Following, Station};
+use crate::session::motion::{
+    DEFAULT_FEED_MM_S, FollowOffset, MAX_READINGS, Motion, default_speed, programmed_over_path_feed,
+};
 
 /// Reads `sweep = { axis, from_…, to_…, step_…, feed_…, runs, both_directions }`.
 pub(super) fn sweep(context: &Context<'_>, value: Value<'_>, station: &Station<f64>) -> Result<Motion, ModelError> {
@@ -65,7 +62,7 @@ fn circle(context: &Context<'_>, mut table: Table<'_>) -> Result<Motion, ModelEr
         return Err(radius_value.error(format!("`radius_mm` is {radius}; it must be greater than 0"), None));
     }
     let centre = match table.take("centre_mm") {
-        Some(value) => context.point(value)?.1,
+        Some(value) => context.point_mm(value)?,
         None => [0.0; 3],
     };
     let range = StepRange::read(&mut table, AxisKind::Rotary, false)?;
@@ -103,8 +100,8 @@ fn follow(context: &Context<'_>, mut table: Table<'_>, station: &Station<f64>) -
             table.error(format!("axis `{name}` is linear; a path of kind \"follow\" needs a rotary axis"), None)
         );
     }
-    let offset = match station {
-        Station::BallBar(_) => {
+    let offset = match station.following() {
+        Following::AtBar => {
             let offset = table.require("offset", "\"radial\", \"tangential\" or \"axial\"")?;
             match offset.text()?.as_str() {
                 "radial" => FollowOffset::Radial,
@@ -113,18 +110,13 @@ fn follow(context: &Context<'_>, mut table: Table<'_>, station: &Station<f64>) -
                 _ => return Err(offset.unexpected("\"radial\", \"tangential\" or \"axial\"")),
             }
         }
-        Station::RTest(_) => {
+        Following::Touching(message, help) => {
             if let Some(offset) = table.take("offset") {
-                return Err(offset.source.error(
-                    offset.key_span.clone(),
-                    "`offset` is the direction of a bar; an R-test has no bar and measures all three directions at once",
-                    Some("remove it; the readings can be resolved into radial, tangential and axial components after a fit".into()),
-                ));
+                return Err(offset.source.error(offset.key_span.clone(), message, Some(help.into())));
             }
             FollowOffset::Touching
         }
-        // The points have no fixed distance.
-        _ => FollowOffset::None,
+        Following::Apart => FollowOffset::None,
     };
     let range = StepRange::read(&mut table, kind, false)?;
     let speed = match table.take("programmed_feed_mm_min") {
@@ -228,11 +220,10 @@ fn speed(context: &Context<'_>, table: &mut Table<'_>, axis: usize, station: &St
     let (mm, deg) = (table.take("feed_mm_min"), table.take("feed_deg_min"));
     match (context.machine.axes[axis].kind, mm, deg) {
         (_, Some(_), Some(deg)) => Err(deg.error("both `feed_mm_min` and `feed_deg_min`", None)),
+        (kind, None, None) => Ok(default_speed(kind)),
         (AxisKind::Linear, Some(feed), None) => Ok(feed.positive()? / 60.0),
-        (AxisKind::Linear, None, None) => Ok(DEFAULT_FEED_MM_S),
         (AxisKind::Linear, None, Some(deg)) => Err(deg.error("`feed_deg_min` for a linear axis", None)),
         (AxisKind::Rotary, None, Some(deg)) => Ok(deg.positive()?.to_radians() / 60.0),
-        (AxisKind::Rotary, None, None) => Ok(DEFAULT_ROTARY_SPEED_RAD_S),
         (AxisKind::Rotary, Some(feed), None) => {
             let feed_mm_s = feed.positive()? / 60.0;
             Ok(feed_mm_s / radius_on_axis(context, axis, station, &feed)?)

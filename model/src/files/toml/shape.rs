@@ -1,7 +1,7 @@
 //! Reader of the keys of a shape, with the location of each in the file.
 //!
-//! Numbers in the unit of the driver have a suffix: `_mm` for a linear axis, `_deg` (or `_rad`) for a rotary one, `_s`
-//! for time, `_c` for temperature, `_m` for the gravity moment of a unit weight.
+//! Numbers in the unit of the driver have a suffix: `_mm` for a linear axis, `_deg` (or `_rad`) for a rotary one; each
+//! driver states its own.
 
 use crate::driver::{DriverUnit, unit_suffixes};
 use crate::effect::keys::{Key, KeyReader};

@@ -3,7 +3,7 @@
 use super::quantity::MICROMETRE;
 use crate::error::ModelError;
 use crate::files::toml::document::Table;
-use crate::instrument::InstrumentKind;
+use crate::instrument::{InstrumentKind, SharedBy};
 use crate::session::{SocketDistance, Test};
 
 /// `[[socket_distance]] between = ["0", "1"], mm = 50.0, u_um = 100`; without `u_um` the distance is exact.
@@ -16,7 +16,7 @@ pub(super) fn socket_distances(
     let Some(value) = root.take("socket_distance") else {
         return Ok(Vec::new());
     };
-    if kind != InstrumentKind::Socket {
+    if !kind.shares(SharedBy::Socket) {
         let message = format!("[[socket_distance]] in a session whose instrument is a {}", kind.word());
         return Err(value.source.error(value.key_span.clone(), message, None));
     }

@@ -3,17 +3,17 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::station::{self, SetUp};
-use super::{Context, Declared, Found, data_folder, format, movement, quantity};
+use super::{Context, Declared, Found, data_folder, format, movement, quantity, station};
 use crate::axis::AxisKind;
 use crate::error::ModelError;
 use crate::files::table::{self, request::Request};
 use crate::files::toml::document::{Table, Value};
-use crate::instrument::InstrumentKind;
+use crate::instrument::SharedBy;
+use crate::instrument::set_up::SetUp;
 use crate::session::expression::Length;
 use crate::session::motion::Motion;
 use crate::session::planned;
-use crate::session::{Test, check, defaults};
+use crate::session::{Test, check};
 
 /// The name of a test, which must be unique.
 pub(super) fn name(table: &mut Table<'_>, declared: &[Declared]) -> Result<String, ModelError> {
@@ -32,17 +32,16 @@ pub(super) fn tests(
     mut table: Table<'_>,
     found: &mut Found,
 ) -> Result<Vec<Test>, ModelError> {
-    let SetUp { station, geometry, priors, socket } = station::set_up(context, &mut table)?;
+    let SetUp { station: written, priors, socket } = station::set_up(context, &mut table)?;
+    let (station, geometry) = (written.map(|length| length.mm), written.map(|length| length.length.clone()));
     let mut group = |key: &'static str, default: &str| match table.take(key) {
         Some(value) => value.text(),
         None => Ok(default.to_string()),
     };
     let setup = group("setup", name)?;
-    let spindle_setup = group("spindle_setup", defaults::spindle_setup(context.instrument, name))?;
-    let bar_setup = match context.instrument {
-        InstrumentKind::BallBar => group("bar_setup", name)?,
-        _ => name.to_string(),
-    };
+    let spindle_setup = group("spindle_setup", context.instrument.spindle_setup(name))?;
+    let has_bar = context.instrument.shares(SharedBy::BarSetup);
+    let bar_setup = if has_bar { group("bar_setup", name)? } else { name.to_string() };
     let HeldPositions { mut at, written: at_written, listed } = at(context, &mut table)?;
     let format = match table.take("format") {
         Some(value) => format::format(value.table(format!("[test.format] of \"{name}\""))?)?,

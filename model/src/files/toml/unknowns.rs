@@ -7,7 +7,6 @@ use crate::error::ModelError;
 use crate::files::toml::document::{Table, Value};
 use crate::instrument::InstrumentKind;
 use crate::pattern;
-use crate::session::defaults;
 
 /// The errors to be estimated: those stated, or the defaults of the instrument.
 pub(super) fn unknowns(
@@ -25,7 +24,7 @@ pub(super) fn unknowns(
         }
     };
     let Some(value) = stated else {
-        return Ok(defaults::unknowns(machine, kind));
+        return Ok(kind.default_errors(machine));
     };
     let mut unknowns: Vec<ErrorName> = Vec::new();
     // A pattern may include errors that are named already; each error is estimated once.

@@ -19,6 +19,7 @@ use super::format::{Content, DataFormat, WholeReadings, has_extension};
 use super::number::number;
 use super::request::{ForeignColumn, Request};
 use crate::error::{Location, ModelError};
+use crate::instrument::column::Quantity;
 use crate::session::motion::Motion;
 use crate::session::readings::{Origin, Readings};
 use crate::session::trajectory;
@@ -96,8 +97,8 @@ fn read(file: &Path, request: &Request<'_>) -> Result<WholeReadings, ModelError>
                 column.push(*at);
             }
             readings.observed.push(match role {
-                Role::Deviation(unit) => request.bar_mm() + unit.to_internal(value),
-                Role::Length(unit) => unit.to_internal(value),
+                Role::Reading(Quantity::Deviation, unit) => request.bar_mm() + unit.to_internal(value),
+                Role::Reading(Quantity::Length, unit) => unit.to_internal(value),
                 _ => value,
             });
             line.push(run.line);
@@ -135,7 +136,7 @@ fn value_role(file: &Path, request: &Request<'_>) -> Result<Role, ModelError> {
         return Err(fault(other.location.clone(), message));
     }
     match Role::of(&entry.own, request) {
-        Some(role @ (Role::Deviation(_) | Role::Length(_))) => Ok(role),
+        Some(role @ Role::Reading(Quantity::Deviation | Quantity::Length, _)) => Ok(role),
         _ => Err(fault(entry.location.clone(), format!("READINGS cannot be `{}`", entry.own))),
     }
 }

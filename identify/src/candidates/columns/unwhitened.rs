@@ -1,0 +1,73 @@
+//! Unwhitened rows of the readings that are not rejected as outliers, block after block.
+
+use faer::Mat;
+
+use super::{Columns, EffectColumns};
+use crate::error::IdentifyError;
+use crate::heldout::FoldKind;
+use crate::heldout::paired::Units;
+use crate::problem::RowBlock;
+
+impl Columns<'_> {
+    /// The rows of effects for the accepted readings, in mm, unwhitened, block after block.
+    pub fn unwhitened_rows(&self, column_sets: &[&EffectColumns]) -> Mat<f64> {
+        let blocks = self.blocks.iter().map(|block| self.block_rows(column_sets, block));
+        self.unwhitened(blocks.collect())
+    }
+
+    /// The unwhitened rows of `[J | r]` at given parameter values, block after block.
+    ///
+    /// # Errors
+    /// If the model cannot be evaluated.
+    pub fn unwhitened_model_rows(&self, beta: &[f64]) -> Result<Mat<f64>, IdentifyError> {
+        let values = self.problem.slot_values(beta);
+        let blocks = self.blocks.iter().map(|block| self.problem.rows(&values, block));
+        Ok(self.unwhitened(blocks.collect::<Result<_, _>>()?))
+    }
+
+    /// The fold of each row of [`Columns::unwhitened_rows`].
+    pub fn unwhitened_folds(&self) -> Vec<usize> {
+        let coordinates = self.problem.coordinates();
+        let fold =
+            |block: &RowBlock, i: usize| self.problem.folds.of_row[block.test][block.rows.start + i / coordinates];
+        self.blocks.iter().flat_map(|block| self.counting(block).into_iter().map(move |i| fold(block, i))).collect()
+    }
+
+    /// The independent units over which held-out errors are paired: the poses if folds consist of poses, otherwise the
+    /// folds (runs or blocks), each of which belongs to one test. The rows are those of [`Columns::unwhitened_rows`].
+    pub fn unwhitened_units(&self) -> Units {
+        let coordinates = self.problem.coordinates();
+        let rows = self.blocks.iter().flat_map(|block| {
+            let reading = move |i: usize| (block.test, block.rows.start + i / coordinates);
+            self.counting(block).into_iter().map(reading)
+        });
+        if self.problem.folds.kind == FoldKind::Poses {
+            return Units::of(rows.map(|(test, row)| (0, (test, row))));
+        }
+        let fold = |test: usize, row: usize| self.problem.folds.of_row[test][row];
+        Units::of(rows.map(|(test, row)| (test, (fold(test, row), 0)))).divided()
+    }
+
+    /// The scalar rows of a block whose readings are accepted.
+    fn counting(&self, block: &RowBlock) -> Vec<usize> {
+        let coordinates = self.problem.coordinates();
+        let rejected = &self.problem.rejected[block.test];
+        (0..block.rows.len() * coordinates).filter(|i| !rejected[block.rows.start + i / coordinates]).collect()
+    }
+
+    /// The accepted rows of all blocks, one block below another.
+    fn unwhitened(&self, blocks: Vec<Mat<f64>>) -> Mat<f64> {
+        let counting: Vec<Vec<usize>> = self.blocks.iter().map(|block| self.counting(block)).collect();
+        let mut rows = Mat::zeros(counting.iter().map(Vec::len).sum(), blocks.first().map_or(0, Mat::ncols));
+        let mut start = 0;
+        for (block, counting) in blocks.iter().zip(&counting) {
+            for (k, i) in counting.iter().enumerate() {
+                for j in 0..block.ncols() {
+                    rows[(start + k, j)] = block[(*i, j)];
+                }
+            }
+            start += counting.len();
+        }
+        rows
+    }
+}

@@ -1,0 +1,48 @@
+//! Estimated errors as compensation tables of controls, as far as their formats are publicly documented.
+//!
+//! - [`curves`]: the errors of a fit as functions of the position; `range`: where they were observed;
+//! - `linuxcnc`, `heidenhain`, `beckhoff`: one file per format; `position`: errors as changes of an axis position;
+//! - [`CONTROLS`]: the registry of formats.
+
+mod beckhoff;
+mod control;
+pub mod curves;
+mod heidenhain;
+mod linuxcnc;
+mod position;
+mod range;
+mod uncertainty;
+
+use abbe_model::chain::Machine;
+
+pub use self::control::{Control, FileText};
+pub use self::curves::Compensation;
+pub use self::uncertainty::PointUncertainty;
+
+/// All formats, in the order in which they are listed.
+pub const CONTROLS: &[Control] = &[linuxcnc::CONTROL, heidenhain::CONTROL, beckhoff::CONTROL];
+
+/// Maximum number of points of a table: LinuxCNC reads 256 triplets per joint, Heidenhain 256 points per table.
+pub const MAX_POINTS: usize = 256;
+
+/// The tables of a control.
+pub struct Tables {
+    /// The files; none if the format can hold no error of the fit.
+    pub files: Vec<FileText>,
+    /// The standard uncertainty of each point of each curve.
+    pub uncertainties: Vec<PointUncertainty>,
+    /// Identified errors that the files do not hold, with the reason.
+    pub left_out: Vec<String>,
+}
+
+/// The tables of the identified errors with a number of points, at least 2, over the range of each curve.
+pub fn tables(machine: &Machine, compensation: &Compensation, control: &Control, points: usize) -> Tables {
+    let mut left_out = compensation.left_out.clone();
+    if !control.holds_locations {
+        left_out.extend(compensation.locations.iter().map(|(name, _)| {
+            format!("{name}: a location error belongs in the kinematics of the control, not in this table")
+        }));
+    }
+    let files = (control.files)(machine, compensation, points, &mut left_out);
+    Tables { files, uncertainties: uncertainty::of_curves(machine, compensation, points), left_out }
+}

@@ -1,0 +1,67 @@
+//! A copy of a session with other readings: the files of a folder that can be read as a session.
+
+use super::source_map::SourceMap;
+use super::table::csv;
+use super::toml::{rewrite, write};
+use crate::error::ModelError;
+use crate::session::Session;
+use crate::session::readings::Readings;
+
+/// What the copy changes beside the readings.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Changes {
+    /// The noise to state, µm; `None` keeps the session's.
+    pub noise_um: Option<f64>,
+    /// Whether the declared effects are omitted.
+    pub hide_effects: bool,
+}
+
+/// The names and texts of the files: one data file per test, the machine if it has a file of its own, and
+/// `session.toml` as the last.
+///
+/// # Errors
+/// If the text of the session cannot be rewritten.
+pub fn with_readings(
+    (session, sources): (&Session, &SourceMap),
+    readings: &[Readings],
+    changes: Changes,
+) -> Result<Vec<(String, String)>, ModelError> {
+    let file = sources.file.as_path();
+    let mut files = Vec::new();
+    let mut data: Vec<(String, String)> = Vec::new();
+    for (test, readings) in session.tests.iter().zip(readings) {
+        let name = data_name(&test.name, &data);
+        let text = csv::text(&session.machine, &test.station, readings);
+        data.push((test.name.clone(), name.clone()));
+        files.push((name, text));
+    }
+    if let Some(machine) = &sources.machine_text {
+        files.push(("machine.toml".into(), machine.clone()));
+    }
+    let mut text = write::with_data(&sources.text, file, &data)?;
+    text = rewrite::with_machine_file(&text, file, "machine.toml")?;
+    if let Some(noise_um) = changes.noise_um {
+        text = rewrite::with_noise(&text, file, noise_um)?;
+    }
+    // The data files have the standard columns, whatever the columns of the original.
+    text = rewrite::without_tables(&text, &["format", "columns"]);
+    if changes.hide_effects {
+        text = rewrite::without_tables(&text, &["effect"]);
+    }
+    files.push(("session.toml".into(), text));
+    Ok(files)
+}
+
+/// A portable file name for the data of a test, different from those of other tests.
+fn data_name(test: &str, taken: &[(String, String)]) -> String {
+    let plain: String =
+        test.chars().map(|c| if c.is_alphanumeric() || matches!(c, '-' | '_' | '.') { c } else { '-' }).collect();
+    let plain = plain.trim_start_matches('.');
+    let mut name = format!("{plain}.csv");
+    let mut number = 2;
+    while taken.iter().any(|(_, other)| other.eq_ignore_ascii_case(&name)) {
+        name = format!("{plain}-{number}.csv");
+        number += 1;
+    }
+    name
+}

@@ -1,0 +1,181 @@
+//! What an instrument consists of: each file of this folder holds one and implements these traits.
+
+use nalgebra::Vector3;
+
+use super::column::{Column, Quantity};
+use super::set_up::{SetUp, SetUpKey, SetUpReader};
+use super::{InstrumentKind, InstrumentParameter, Reading, SharedBy, Station};
+use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::component::ErrorName;
+use crate::error::ModelError;
+use crate::scalar::{Nominal, Scalar};
+use crate::session::readings::Readings;
+
+/// An instrument in the registry: what is known of it without a set-up.
+pub struct Entry {
+    /// The kind.
+    pub kind: InstrumentKind,
+    /// The word in files.
+    pub word: &'static str,
+    /// Its parameters in the order of its slots.
+    pub parameters: &'static [InstrumentParameter],
+    /// The object that stands at a place that no session knows: its parameters have no prior by default. All others are
+    /// known exactly.
+    pub free: Option<&'static str>,
+    /// Number of scalar coordinates of a reading.
+    pub coordinates: usize,
+    /// Whether a reading connects a point of the table and a point of the tool, so that errors of both sides affect it.
+    pub is_two_sided: bool,
+    /// Whether it has readings of its own; otherwise the positions of the axes are all that is read.
+    pub has_readings: bool,
+    /// Whether data must give the position of every axis. Otherwise the axes that move are enough.
+    pub needs_every_axis: bool,
+    /// The errors to be estimated if a session states none.
+    pub default_errors: fn(&Machine) -> Vec<ErrorName>,
+    /// The name that all tests share for the mounted object in the tool frame if a session states none; `None`: it is
+    /// mounted for each test.
+    pub spindle_setup: Option<&'static str>,
+    /// The keys of a test that only some instruments have.
+    pub keys: &'static [SetUpKey],
+    /// Reads the set-up of a test.
+    pub read: fn(&mut dyn SetUpReader) -> Result<SetUp, ModelError>,
+}
+
+/// The nominal geometry of an instrument over an open number.
+pub trait Geometry<N> {
+    /// The same over another number.
+    type Over<M>;
+    /// Converts every nominal coordinate: expressions to numbers or symbols.
+    fn map<M>(&self, to: &impl Fn(&N) -> M) -> Self::Over<M>;
+    /// The reading; see [`Station::read`].
+    fn reading<S: Scalar<Nominal = N>>(
+        &self,
+        machine: &Machine,
+        state: &[AxisPosition<N>],
+        errors: &[BodyErrors<S>],
+        unknown: impl Fn(usize) -> Option<S>,
+    ) -> Reading<S>
+    where
+        N: Nominal;
+    /// The instrument's point in the table frame, mm, if it has one.
+    fn table_point_mm(&self) -> Option<[N; 3]>
+    where
+        N: Copy;
+    /// The instrument's point in the tool frame, mm.
+    fn tool_point_mm(&self) -> [N; 3]
+    where
+        N: Copy;
+}
+
+/// How the tool point follows the instrument's point of the table on a path of kind `follow`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Following {
+    /// At the length of a bar, whose direction the path states.
+    AtBar,
+    /// The two points coincide: a path that states a direction is refused with this message and help.
+    Touching(&'static str, &'static str),
+    /// At no fixed distance.
+    Apart,
+}
+
+/// A message and what to do.
+pub type Fault = (String, String);
+
+/// The readings of a test, for the check of a set-up.
+#[derive(Clone, Copy)]
+pub struct Checked<'a> {
+    /// The machine.
+    pub machine: &'a Machine,
+    /// The name of the test.
+    pub test: &'a str,
+    /// Its readings.
+    pub readings: &'a Readings,
+}
+
+impl Checked<'_> {
+    /// The nominal reading of every row, mm.
+    pub(super) fn nominal<G: Geometry<f64>>(&self, geometry: &G) -> impl Iterator<Item = Reading<f64>> {
+        let none = vec![BodyErrors::<f64>::NONE; self.machine.axes.len()];
+        let mut state = Vec::new();
+        (0..self.readings.rows()).map(move |row| {
+            self.readings.state(self.machine, row, &mut state);
+            geometry.reading::<f64>(self.machine, &state, &none, |_| None)
+        })
+    }
+}
+
+/// Everything that is particular to one instrument as set up for a test, except its reading: see [`Geometry`].
+pub trait Instrument {
+    /// Its entry in the registry.
+    fn entry(&self) -> &'static Entry;
+    /// The columns of its readings in data files.
+    fn columns(&self) -> &'static [Column];
+    /// What data lack: the columns and what to do. `has` says whether there is a column of a quantity.
+    fn missing(&self, has: &dyn Fn(Quantity) -> bool) -> Option<Fault>;
+    /// Nominal position of the object that a group of tests shares, mm.
+    fn shared_mm(&self, group: SharedBy) -> [f64; 3];
+
+    /// What to do with a column of this name, without its unit, that the instrument has in another set-up.
+    fn help_on_column(&self, stem: &str) -> Option<&'static str> {
+        let _ = stem;
+        None
+    }
+    /// The names of the coordinates of a vector reading in results.
+    fn coordinate_names(&self) -> [&'static str; 3] {
+        ["x", "y", "z"]
+    }
+    /// The length to which deviations refer, mm; 0 without one.
+    fn reference_mm(&self) -> f64 {
+        0.0
+    }
+    /// The mount of the sensors.
+    fn sensors(&self) -> SharedBy {
+        SharedBy::Setup
+    }
+    /// How its points move on a path of kind `follow`.
+    fn following(&self) -> Following {
+        Following::Apart
+    }
+    /// The same at the place that agrees best with the readings, for an object whose place no session knows: `points`
+    /// are nominal positions of the tool point in R, `observed` the readings there, mm.
+    fn placed(&self, points: &[Vector3<f64>], observed: &[Vector3<f64>]) -> Option<Station<f64>> {
+        let _ = (points, observed);
+        None
+    }
+    /// The points on the table and in the spindle, if the set-up states two balls.
+    fn balls_mut(&mut self) -> Option<[&mut [f64; 3]; 2]> {
+        None
+    }
+    /// What is wrong with the lengths of the set-up.
+    fn invalid_length(&self) -> Option<String> {
+        None
+    }
+    /// Checks that the instrument nominally fits at the positions of the readings.
+    ///
+    /// # Errors
+    /// If it does not.
+    fn check_set_up(&self, checked: &Checked<'_>) -> Result<(), Fault> {
+        let _ = checked;
+        Ok(())
+    }
+    /// Checks that the observed values are in the range of the instrument.
+    ///
+    /// # Errors
+    /// If they are not.
+    fn check_observed(&self, test: &str, observed: &[f64]) -> Result<(), Fault> {
+        let _ = (test, observed);
+        Ok(())
+    }
+}
+
+/// The sensor range is one to two millimetres for a ball bar and a few for an R-test. A larger deviation is not an
+/// error of the machine, mm.
+pub(super) const MAX_MM: f64 = 5.0;
+
+pub(super) fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}

@@ -1,0 +1,71 @@
+//! Parameters of an instrument: what a fit may estimate of its set-up.
+
+/// The tests that share an instrument parameter: those that use the same mounted object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum SharedBy {
+    /// Tests with the same `setup`: the mounted workpiece ball.
+    Setup,
+    /// Tests with the same `spindle_setup`: the mounted spindle ball.
+    SpindleSetup,
+    /// Tests with the same `bar_setup`: the assembled bar.
+    BarSetup,
+    /// Tests with the same mount of an R-test's sensors: the same `setup` if they are on the table, the same
+    /// `spindle_setup` if they are in the spindle.
+    Sensors,
+    /// Tests with the same `socket`.
+    Socket,
+    /// All tests of the session.
+    Session,
+}
+
+/// One parameter of an instrument.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InstrumentParameter {
+    /// The object: `workpiece_ball`, `spindle_ball`, `bar`, `tracker`, `target`, `socket`, `ball`, `artefact`,
+    /// `radius`, `form`, `stylus`, `sensor`, `gain`.
+    pub thing: &'static str,
+    /// Its coordinate, `x` … `c`, `omega`, `phi`, `theta`, or empty.
+    pub coordinate: &'static str,
+    /// The internal unit.
+    pub unit: InternalUnit,
+    /// The tests that share it.
+    pub shared_by: SharedBy,
+}
+
+impl InstrumentParameter {
+    pub(super) const fn new(
+        thing: &'static str,
+        coordinate: &'static str,
+        unit: InternalUnit,
+        shared_by: SharedBy,
+    ) -> InstrumentParameter {
+        InstrumentParameter { thing, coordinate, unit, shared_by }
+    }
+
+    pub(super) const fn length(
+        thing: &'static str,
+        coordinate: &'static str,
+        shared_by: SharedBy,
+    ) -> InstrumentParameter {
+        InstrumentParameter::new(thing, coordinate, InternalUnit::Millimetre, shared_by)
+    }
+
+    pub(super) const fn angle(
+        thing: &'static str,
+        coordinate: &'static str,
+        shared_by: SharedBy,
+    ) -> InstrumentParameter {
+        InstrumentParameter::new(thing, coordinate, InternalUnit::Radian, shared_by)
+    }
+}
+
+/// Internal unit of a quantity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum InternalUnit {
+    /// mm; displayed in µm.
+    Millimetre,
+    /// rad; displayed in arcsec.
+    Radian,
+    /// Dimensionless; displayed in µm/m.
+    Ratio,
+}

@@ -1,0 +1,113 @@
+//! Ball-bar figures of ISO 230-4 and their diagnosis.
+//!
+//! ISO 230-4:2022 uses the terms circular and radial *error*. The edition of 2005 used *deviation*, and the symbols are
+//! from there. The hysteresis is from the edition of 1996.
+
+use abbe::identify::circular::{CircularTest, Diagnosis};
+
+use super::number::{micrometres, unit};
+use super::table::{Cell, Table, cells};
+
+/// The test and its path.
+pub fn heading(test: &CircularTest) -> String {
+    let radius = test.radius_mm.map_or(String::new(), |radius| format!(", radius {radius:.1} mm"));
+    let feed = test.feed_mm_min.map_or(String::new(), |feed| format!(", {feed:.0} mm/min"));
+    let arc = if test.arc_deg < 359.0 { format!(", {:.0}°", test.arc_deg) } else { String::new() };
+    format!("{}: circular path of {}{radius}{feed}{arc}", test.test, test.axes)
+}
+
+fn figure(um: Option<f64>) -> Cell {
+    Cell::or_dash(um.map(|um| Cell::fixed(um, 2)))
+}
+
+/// The figures of both directions together and the largest fault, one row per test.
+pub fn summary(tests: &[CircularTest]) -> Table {
+    let rows = tests.iter().map(|test| {
+        let arc =
+            if test.arc_deg < 359.0 { format!("{}, {:.0}°", test.axes, test.arc_deg) } else { test.axes.clone() };
+        let fault = test
+            .diagnosis
+            .first()
+            .map_or(String::new(), |fault| format!("{} {}, {:.0} %", fault.fault, fault.axes, fault.share_percent));
+        cells![
+            &test.test,
+            arc,
+            figure(test.bidirectional_circular_deviation_um),
+            figure(test.mean_bidirectional_radial_deviation_um),
+            figure(test.hysteresis_um),
+            fault
+        ]
+    });
+    let columns = ["test", "path of", ">G(b), µm", ">D, µm", ">H, µm", "largest fault"];
+    let count = if tests.iter().any(|test| !test.diagnosis.is_empty()) { columns.len() } else { columns.len() - 1 };
+    Table::new(columns, rows).first_columns(count)
+}
+
+/// All tables of a test: each direction, both together, the diagnosis.
+pub fn tables(test: &CircularTest) -> Vec<Table> {
+    let mut tables = vec![directions(test), both(test), faults(test)];
+    tables.retain(|table| !table.rows.is_empty());
+    tables
+}
+
+/// One row per direction of the path.
+fn directions(test: &CircularTest) -> Table {
+    let rows = test.directions.iter().map(|direction| {
+        cells![
+            &direction.direction,
+            direction.runs.to_string(),
+            figure(Some(direction.circular_deviation_um)),
+            figure(Some(direction.radial_deviation_max_um)),
+            figure(Some(direction.radial_deviation_min_um)),
+        ]
+    });
+    let columns = [
+        "direction",
+        ">runs",
+        ">circular error (G), µm",
+        ">maximum radial error (F max), µm",
+        ">minimum radial error (F min), µm",
+    ];
+    Table::new(columns, rows)
+}
+
+/// The figures of both directions together that the test has.
+fn both(test: &CircularTest) -> Table {
+    let figures = [
+        ("bidirectional circular error (G(b))", test.bidirectional_circular_deviation_um),
+        ("mean bidirectional radial error (D)", test.mean_bidirectional_radial_deviation_um),
+        ("circular hysteresis (H, edition of 1996)", test.hysteresis_um),
+    ];
+    let rows = figures.into_iter().filter_map(|(name, um)| Some(cells![name, Cell::fixed(um?, 2)]));
+    Table::new(["both directions", ">µm"], rows)
+}
+
+/// One row per figure of a fault; the first row of a fault has its share.
+fn faults(test: &CircularTest) -> Table {
+    let columns = ["fault", ">value", ">u", "unit", ">share", ">on the path"];
+    let mut table = Table::new(columns, test.diagnosis.iter().flat_map(fault_rows));
+    if let (Some(rms), false) = (test.diagnosis_rms_um, test.diagnosis.is_empty()) {
+        table.notes.push(format!("residual of the diagnosis: {} rms", micrometres(rms)));
+    }
+    table
+}
+
+fn fault_rows(fault: &Diagnosis) -> Vec<Vec<Cell>> {
+    let mut rows = Vec::new();
+    for value in &fault.values {
+        let [number, u] =
+            if value.u > 0.0 { Cell::estimate(value.value, value.u) } else { [Cell::fixed(value.value, 3), "".into()] };
+        // The name of a figure at one end of an axis begins with the axis.
+        let name = if value.id.starts_with(&fault.axes) {
+            format!("{} {}", fault.fault, value.id)
+        } else {
+            format!("{} {} {}", fault.fault, fault.axes, value.id.replace('_', " "))
+        };
+        let mut row = cells![name, number, u, unit(&value.unit)];
+        if rows.is_empty() {
+            row.extend(cells![format!("{:.0} %", fault.share_percent), format!("{:.2} µm", fault.circularity_um)]);
+        }
+        rows.push(row);
+    }
+    rows
+}

@@ -1,0 +1,150 @@
+//! The result of a fit: goodness of fit, both propagations of uncertainty, all figures for a spreadsheet.
+
+use abbe::identify::circular::CircularTest;
+use abbe::identify::results::{FitMonteCarlo, FitResult, ParameterResult, Verdict};
+use abbe::model::words::counted;
+
+use super::number::{fixed, micrometres, places, unit};
+use super::table::{Cell, Column, Table, cells, numbers, words};
+
+/// χ²/ν below which the noise is said to be overstated.
+const MIN_RATIO: f64 = 0.5;
+
+/// Whether the residual agrees with the noise.
+pub fn agreement(result: &FitResult) -> String {
+    let ratio = result.chi_square / result.degrees_of_freedom.max(1) as f64;
+    let figures = format!("χ²/ν = {ratio:.2}, ν = {}", result.degrees_of_freedom);
+    if result.noise_source == "residual" {
+        "no statement: no noise is stated and no reading repeats, so the residual is taken for noise".to_string()
+    } else if result.u_enlargement > 1.0 {
+        format!("the residual exceeds the noise ({figures}): the model lacks an effect")
+    } else if ratio < MIN_RATIO {
+        format!("the residual is smaller than the noise ({figures}): the noise is overstated")
+    } else {
+        format!("the residual agrees with the noise ({figures})")
+    }
+}
+
+/// `identifiable` of `count` parameters, and the rank.
+pub fn rank(identifiable: usize, count: usize, rank: usize) -> String {
+    format!("{identifiable} of {} identifiable (numerical rank {rank})", counted(count, "parameter"))
+}
+
+/// The noise and its source in words. A residual is not called noise.
+pub fn noise(noise_um: f64, source: &str) -> String {
+    let figure = micrometres(noise_um);
+    match source {
+        "residual" => format!("residual of the declared model {figure} (no noise stated, no repeats)"),
+        other => format!("noise {figure} ({other})"),
+    }
+}
+
+/// Both propagations side by side, with the quoted interval, of the parameters that are to be shown.
+pub fn propagations(drawn: &FitMonteCarlo, is_shown: impl Fn(&str) -> bool) -> Table {
+    let rows = drawn.parameters.iter().filter(|parameter| is_shown(&parameter.id)).map(|parameter| {
+        let [value, gum_u] = Cell::estimate(parameter.value, parameter.gum_u);
+        let u = Cell::fixed(parameter.u, places(parameter.u));
+        let (quoted, source) = match parameter.verdict {
+            Verdict::Agree => (&parameter.gum_interval, "GUM"),
+            Verdict::Differ => (&parameter.symmetric_interval, "Monte Carlo"),
+            Verdict::Undecided => (&parameter.symmetric_interval, "Monte Carlo (too few runs to compare)"),
+        };
+        let [low, high] = [quoted.low, quoted.high].map(|end| fixed(end, places(parameter.u)));
+        cells![&parameter.id, value, gum_u, u, format!("{low} to {high}"), unit(&parameter.unit), source]
+    });
+    let interval = numbers(format!("{} %", drawn.coverage_probability * 100.0));
+    let mut columns = ["parameter", ">value", ">u GUM", ">u MC", "unit", "quoted"].map(Column::from).to_vec();
+    columns.insert(4, interval);
+    Table::new(columns, rows)
+        .titled("Estimates with standard uncertainty u by GUM and by Monte Carlo, and the quoted coverage interval")
+}
+
+/// The parameters whose propagations agree.
+pub fn agreement_of_propagations(drawn: &FitMonteCarlo) -> String {
+    let count = |verdict: Verdict| drawn.parameters.iter().filter(|p| p.verdict == verdict).count();
+    format!(
+        "Monte Carlo, {}, seed {}: {} of {} agree with the GUM within the tolerance of JCGM 101, 8.1; {} differ",
+        counted(drawn.runs, "run"),
+        drawn.seed,
+        count(Verdict::Agree),
+        counted(drawn.parameters.len(), "parameter"),
+        count(Verdict::Differ)
+    )
+}
+
+/// Every figure of a result with all its digits, one row per figure.
+pub struct Figures(Table);
+
+impl Default for Figures {
+    fn default() -> Figures {
+        let headings = ["section", "id", "meaning", "value", "u", "unit"];
+        Figures(Table::new(headings.map(words), []))
+    }
+}
+
+impl Figures {
+    /// The figures of a fit.
+    pub fn of_fit(result: &FitResult) -> Table {
+        let mut figures = Figures::default();
+        figures.figure("residual", "rms", "", result.rms_um, "um");
+        figures.figure("residual", "held out", "", result.heldout_rms_um, "um");
+        figures.parameters("parameters", &result.parameters);
+        result.circular.iter().for_each(|test| figures.circular(test));
+        figures.0
+    }
+
+    /// The table.
+    pub fn table(self) -> Table {
+        self.0
+    }
+
+    /// A row that is no number.
+    pub fn statement(&mut self, section: &str, id: &str, meaning: &str) {
+        self.0.rows.push(cells![section, id, meaning, "", "", ""]);
+    }
+
+    /// A figure without uncertainty.
+    pub fn figure(&mut self, section: &str, id: &str, meaning: &str, value: f64, unit: &str) {
+        self.0.rows.push(cells![section, id, meaning, Cell::exact(value), "", unit]);
+    }
+
+    /// Parameters with their uncertainties.
+    pub fn parameters(&mut self, section: &str, parameters: &[ParameterResult]) {
+        self.0.rows.extend(
+            parameters
+                .iter()
+                .map(|p| cells![section, &p.id, &p.meaning, Cell::exact(p.value), Cell::exact(p.u), &p.unit]),
+        );
+    }
+
+    fn circular(&mut self, test: &CircularTest) {
+        let section = format!("circle {}", test.test);
+        for direction in &test.directions {
+            let of = |figure: &str| format!("{figure}({}{})", test.axes, direction.direction);
+            for (id, meaning, value) in [
+                (of("G"), "circular deviation", direction.circular_deviation_um),
+                (of("Fmax"), "radial deviation, greatest", direction.radial_deviation_max_um),
+                (of("Fmin"), "radial deviation, least", direction.radial_deviation_min_um),
+            ] {
+                self.figure(&section, &id, meaning, value, "um");
+            }
+        }
+        for (id, meaning, value) in [
+            ("G(b)", "bidirectional circular deviation", test.bidirectional_circular_deviation_um),
+            ("D", "mean bidirectional radial deviation", test.mean_bidirectional_radial_deviation_um),
+            ("H", "circular hysteresis", test.hysteresis_um),
+        ] {
+            if let Some(value) = value {
+                self.figure(&section, id, meaning, value, "um");
+            }
+        }
+        for fault in &test.diagnosis {
+            let meaning = format!("{} of {}, {:.1} % of the path", fault.fault, fault.axes, fault.share_percent);
+            self.0.rows.extend(fault.values.iter().map(|value| {
+                let u = if value.u > 0.0 { Cell::exact(value.u) } else { "".into() };
+                let id = format!("{} {}", fault.fault, value.id);
+                cells![&section, id, &meaning, Cell::exact(value.value), u, &value.unit]
+            }));
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! Numbers and units as people read them: digits by the uncertainty, symbols of units.
+
+use abbe::identify::results::ShapeParameter;
+
+/// A number with decimal places. A number that rounds to zero has no sign.
+pub fn fixed(value: f64, places: usize) -> String {
+    let rounded = format!("{value:.places$}");
+    let unsigned = rounded.strip_prefix('-').filter(|digits| digits.bytes().all(|digit| matches!(digit, b'0' | b'.')));
+    unsigned.map_or_else(|| rounded.clone(), str::to_string)
+}
+
+/// Decimal places of a value with this standard uncertainty: two digits of the uncertainty (JCGM 100, 7.2.6).
+pub fn places(u: f64) -> usize {
+    if !u.is_finite() || u <= 0.0 {
+        return 4;
+    }
+    (1.0 - u.log10().floor()).clamp(0.0, 12.0) as usize
+}
+
+/// A value and its uncertainty, rounded to the same place.
+pub fn value_and_u(value: f64, u: f64) -> (String, String) {
+    let places = places(u);
+    (fixed(value, places), format!("{u:.places$}"))
+}
+
+/// A number with three digits; `∞` for what is not finite.
+pub fn three_digits(value: f64) -> String {
+    if !value.is_finite() {
+        return "∞".to_string();
+    }
+    if value == 0.0 {
+        return "0".to_string();
+    }
+    // The digits of the rounded number: 0.9999 and 1.0001 are both 1.00.
+    let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
+    let places = (2.0 - rounded.abs().max(1e-9).log10().floor()).clamp(0.0, 5.0) as usize;
+    format!("{value:.places$}")
+}
+
+/// A residual or a noise figure in µm.
+pub fn micrometres(value_um: f64) -> String {
+    let places = if value_um >= 100.0 { 1 } else { 3 };
+    format!("{value_um:.places$} µm")
+}
+
+/// A unit, or a text with units, with its symbols: `um` becomes µm, `arcsec` becomes ″, `deg` becomes °.
+pub fn unit(text: &str) -> String {
+    let symbol = |word: &str| match word {
+        "um" => "µm".to_string(),
+        "arcsec" => "″".to_string(),
+        "deg" => "°".to_string(),
+        other => other.to_string(),
+    };
+    text.split_inclusive(|c: char| !c.is_alphanumeric())
+        .map(|part| match part.char_indices().last() {
+            Some((end, last)) if !last.is_alphanumeric() => symbol(&part[..end]) + &part[end..],
+            _ => symbol(part),
+        })
+        .collect::<String>()
+        .replace("^2", "²")
+        .replace("^3", "³")
+}
+
+/// Distinct units in the order of their first appearance.
+pub fn units<'n>(names: impl Iterator<Item = &'n str>) -> Vec<&'n str> {
+    let mut distinct: Vec<&str> = Vec::new();
+    for name in names {
+        if !distinct.contains(&name) {
+            distinct.push(name);
+        }
+    }
+    distinct
+}
+
+/// A number with the symbol of its unit: `1.2 µm`, `3.4″`.
+pub fn quantity(number: &str, unit_name: &str) -> String {
+    let unit = unit(unit_name);
+    let space = if matches!(unit.as_str(), "″" | "°" | "") { "" } else { " " };
+    format!("{number}{space}{unit}")
+}
+
+/// A sentence of a result with the symbols of its units.
+pub fn with_symbols(sentence: &str) -> String {
+    sentence.replace(" arcsec", "″").replace(" um", " µm")
+}
+
+/// A number or the positions of an effect's shape, to four digits: `period 13.78 mm`, `at -84.72, -40.72 mm`.
+pub fn shape_number(number: &ShapeParameter) -> String {
+    let to_four_digits = |value: &f64| {
+        let magnitude = value.abs().max(1e-3).log10().floor() as i32;
+        format!("{value:.*}", (3 - magnitude).clamp(0, 4) as usize)
+    };
+    let values: Vec<String> = number.values.iter().map(to_four_digits).collect();
+    format!("{} {}", number.name, quantity(&values.join(", "), &number.unit))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_have_the_places_of_their_uncertainty() {
+        for (value, u, shown) in [
+            (35.312, 0.0213, ("35.312", "0.021")),
+            (-35.38, 2.04, ("-35.4", "2.0")),
+            (-0.04, 1.0, ("0.0", "1.0")),
+            (-0.06, 1.0, ("-0.1", "1.0")),
+            (-0.4, 20.0, ("0", "20")),
+            (-1e-9, 0.0, ("0.0000", "0.0000")),
+        ] {
+            let (value, u) = value_and_u(value, u);
+            assert_eq!((value.as_str(), u.as_str()), shown);
+        }
+    }
+
+    #[test]
+    fn numbers_that_rounding_parts_are_printed_alike() {
+        for (value, printed) in [
+            (1.0 - 1e-12, "1.00"),
+            (1.0 + 1e-12, "1.00"),
+            (-9.996, "-10.0"),
+            (0.099_96, "0.100"),
+            (0.0994, "0.0994"),
+            (1234.0, "1234"),
+            (1e-12, "0.00000"),
+        ] {
+            assert_eq!(three_digits(value), printed, "{value}");
+        }
+    }
+
+    #[test]
+    fn units_have_their_symbols() {
+        assert_eq!(unit("um"), "µm");
+        assert_eq!(unit("arcsec/um"), "″/µm");
+        assert_eq!(unit("deg/mm^2"), "°/mm²");
+        assert_eq!(unit("minimum, um or arcsec"), "minimum, µm or ″");
+    }
+}

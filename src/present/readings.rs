@@ -1,0 +1,88 @@
+//! Every reading of a session with its residual, for spreadsheets.
+
+use abbe::identify::IdentifyError;
+use abbe::identify::directions::{DirectionFrame, views};
+use abbe::identify::fit::Fit;
+use abbe::identify::problem::Problem;
+use abbe::model::session::readings::Readings;
+
+use super::table::{Cell, Column, Table, cells, numbers, words};
+
+/// Names of the directions of an R-test.
+const DIRECTIONS: [&str; 9] = ["dx", "dy", "dz", "x_wise", "y_wise", "z_wise", "radial", "tangential", "axial"];
+
+/// The first cells of a row: the test and the run.
+fn start(test: &str, readings: &Readings, row: usize) -> Vec<Cell> {
+    cells![test, readings.run.get(row).map_or(String::new(), i64::to_string)]
+}
+
+/// The positions of all axes in a row.
+fn positions<'r>(problem: &'r Problem, readings: &'r Readings, row: usize) -> impl Iterator<Item = Cell> + 'r {
+    let at = problem.session.machine.axes.iter().zip(&readings.positions);
+    at.map(move |(axis, column)| Cell::fixed(axis.kind.to_display(column[row]), 6))
+}
+
+/// Columns of the positions of all axes.
+fn axes<'r>(problem: &'r Problem) -> impl Iterator<Item = Column> + 'r {
+    problem.session.machine.axes.iter().map(|axis| numbers(axis.column("")))
+}
+
+/// Reading, residual in µm and over the noise standard deviation, and whether the reading counts or is an outlier.
+pub fn residuals(problem: &Problem, fit: &Fit) -> Table {
+    let coordinates = problem.coordinates();
+    let labels: &[&str] = if coordinates == 3 { &["_x", "_y", "_z"] } else { &[""] };
+    let mut columns: Vec<Column> = ["test", "run", "line"].map(words).into();
+    columns.extend(axes(problem));
+    columns.extend(labels.iter().map(|label| numbers(format!("reading{label}_mm"))));
+    columns.extend(labels.iter().map(|label| numbers(format!("residual{label}_um"))));
+    columns.extend(labels.iter().map(|label| numbers(format!("standardised_residual{label}"))));
+    columns.push(words("counts"));
+    let mut rows = Vec::new();
+    for (number, test) in problem.tests.iter().enumerate() {
+        let Some(readings) = &test.readings else { continue };
+        for row in 0..readings.rows() {
+            let own = row * coordinates..(row + 1) * coordinates;
+            let mut cells = start(&test.name, readings, row);
+            cells.push(readings.line(row).map_or(String::new(), |line| line.to_string()).into());
+            cells.extend(positions(problem, readings, row));
+            let observed = own.clone().map(|k| readings.observed.get(k));
+            cells.extend(observed.map(|mm| mm.map_or("".into(), |mm| Cell::fixed(*mm, 6))));
+            let residuals = &fit.residuals[number][own];
+            cells.extend(residuals.iter().map(|mm| Cell::fixed(mm * 1e3, 4)));
+            cells.extend(residuals.iter().map(|mm| Cell::fixed(mm / problem.noise.sigma_mm, 4)));
+            cells.push(if problem.rejected[number][row] { "outlier" } else { "yes" }.into());
+            rows.push(cells);
+        }
+    }
+    Table::new(columns, rows)
+}
+
+/// Readings and residuals of an R-test by direction.
+///
+/// # Errors
+/// If the session is of another instrument.
+pub fn by_direction(problem: &Problem, fit: &Fit) -> Result<Table, IdentifyError> {
+    let mut columns: Vec<Column> = ["test", "run"].map(words).into();
+    columns.extend(axes(problem));
+    columns.extend(DIRECTIONS.map(|name| numbers(format!("{name}_um"))));
+    columns.extend(DIRECTIONS.map(|name| numbers(format!("residual_{name}_um"))));
+    let mut rows = Vec::new();
+    for (test, viewed) in problem.tests.iter().zip(views(problem, fit)?) {
+        let Some(readings) = &test.readings else { continue };
+        rows.extend(viewed.iter().enumerate().map(|(row, viewed)| {
+            let mut cells = start(&test.name, readings, row);
+            cells.extend(positions(problem, readings, row));
+            cells.extend(micrometres(&viewed.reading));
+            cells.extend(micrometres(&viewed.residual));
+            cells
+        }));
+    }
+    Ok(Table::new(columns, rows))
+}
+
+/// The cells of one direction frame. Radial, tangential and axial cells are empty unless exactly one rotary axis moves.
+fn micrometres(view: &DirectionFrame) -> Vec<Cell> {
+    let along = view.sensors.iter().chain(&view.wise).map(Some);
+    let about = (0..3).map(|k| view.turning.as_ref().map(|turning| &turning[k]));
+    along.chain(about).map(|mm| mm.map_or("".into(), |mm| Cell::fixed(mm * 1e3, 4))).collect()
+}

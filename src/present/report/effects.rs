@@ -1,0 +1,275 @@
+//! Effects that a trace has found, each beside its competing explanations.
+
+use abbe::identify::results::{EffectName, EffectResult, SeparatingTestResult, TraceResult};
+use abbe::identify::trace::TraceOutcome;
+use abbe::identify::trace::alias::CompetingEffect;
+use abbe::model::words::counted;
+use maud::{Markup, html};
+
+use super::document::Document;
+use crate::present::effect::name;
+use crate::present::figure::bars::{self, Fill};
+use crate::present::figure::lines::{ACROSS, Lines, Mark, Series, UP, span};
+use crate::present::figure::scale::{Scale, coordinate, polyline};
+use crate::present::figure::{Plot, shortened};
+use crate::present::html::{capitalised, integer, list, with_minus_signs};
+use crate::present::number::{micrometres, shape_number, unit, value_and_u};
+use crate::present::{trace as present, uniqueness};
+
+/// Maximum number of effects that are shown unfolded.
+const MAX_OPEN: usize = 4;
+/// Maximum number of effects with a plot of their competing explanations.
+const MAX_RANKED: usize = 12;
+/// Number of additions up to which the points of the convergence plot have names.
+const MAX_NAMED: usize = 8;
+
+/// Found effects, rejected candidates, remaining structure and convergence of the search.
+pub fn section(document: &mut Document, trace: &TraceOutcome) -> Markup {
+    let result = &trace.result;
+    let blocks: Vec<Markup> = result
+        .effects
+        .iter()
+        .enumerate()
+        .map(|(number, effect)| {
+            let competing = trace.competing_effects.get(number).filter(|_| number < MAX_RANKED);
+            let id = trace.effects.get(number).map(|effect| effect.id()).unwrap_or_default();
+            block(document, result, effect, competing.map(|all| (all.as_slice(), id.as_str())))
+        })
+        .collect();
+    let convergence = (!trace.steps.is_empty()).then(|| convergence(trace));
+    let shown = document.show(convergence);
+    html! {
+        @if result.effects.is_empty() { p { "The search added no effect." } }
+        @for (number, (block, effect)) in blocks.iter().zip(&result.effects).enumerate() {
+            @if number < MAX_OPEN {
+                h3 { (heading(number, effect)) }
+                (block)
+            } @else {
+                details { summary { (heading(number, effect)) } (block) }
+            }
+        }
+        @if !result.rejected_candidates.is_empty() {
+            h3 { "Rejected candidates" }
+            (list(present::rejected(result)))
+        }
+        @if let Some(remainder) = present::remainder(result) {
+            h3 { "Remaining structure" }
+            p { (remainder) "." }
+        }
+        (shown)
+    }
+}
+
+fn heading(number: usize, effect: &EffectResult) -> String {
+    format!("{}. {}", number + 1, effect.name.meaning)
+}
+
+/// An effect: its values on the left, its competing explanations on the right.
+fn block(
+    document: &mut Document,
+    result: &TraceResult,
+    effect: &EffectResult,
+    competing: Option<(&[CompetingEffect], &str)>,
+) -> Markup {
+    let curve = (!effect.curve.is_empty()).then(|| curve(effect));
+    let ranking = competing.map(|(effects, id)| ranking(effects, id));
+    let (left, right): (Vec<Plot>, Vec<Plot>) = if effect.unique {
+        (curve.into_iter().collect(), ranking.into_iter().collect())
+    } else {
+        (curve.into_iter().chain(ranking).collect(), Vec::new())
+    };
+    let [left, right] = [document.show(left), document.show(right)];
+    html! {
+        div class="halves" {
+            div {
+                dl {
+                    dt { "Effect" } dd { (name(&effect.name)) }
+                    dt { "Estimate" } dd { (estimate(effect)) }
+                    dt { "Explains" } dd { (micrometres(effect.rms_gain_um)) " rms (p ≤ " (format!("{:.3}", effect.p_value)) ")" }
+                    dt { "Held-out rms" } dd { (micrometres(effect.heldout_rms_um)) " with this effect" }
+                    dt { "Family" } dd { (effect.family) }
+                }
+                (left)
+            }
+            div {
+                (alternatives(effect, result.candidates_detectable))
+                (right)
+            }
+        }
+    }
+}
+
+/// Coefficients with their standard uncertainties, and chosen numbers of the shape.
+fn estimate(effect: &EffectResult) -> String {
+    if !effect.curve.is_empty() {
+        return "nonparametric curve, see the plot".to_string();
+    }
+    let values = effect.parameters.iter().map(|parameter| {
+        let (value, u) = value_and_u(parameter.value, parameter.u);
+        // The text after the last dot is the coefficient, unless the component contains the dot:
+        // `spindle_ball.y~time:drift`.
+        let coefficient = parameter.id.rsplit_once('.').map_or("", |(_, coefficient)| coefficient);
+        let coefficient = if coefficient.contains('~') { "" } else { coefficient };
+        let separator = if coefficient.ends_with(|c: char| c.is_ascii_digit()) { ":" } else { "" };
+        with_minus_signs(format!("{coefficient}{separator} {value} ± {u} {}", unit(&parameter.unit)).trim())
+    });
+    let numbers = effect.shape_parameters.iter().map(|number| with_minus_signs(&shape_number(number)));
+    values.chain(numbers).collect::<Vec<_>>().join(", ")
+}
+
+/// Explanations that the readings do not separate, with the separation from each that further tests achieve.
+fn alternatives(effect: &EffectResult, screened: usize) -> Markup {
+    if effect.unique {
+        return html! {
+            h4 { "Unique explanation" }
+            p { "No other of the " (integer(screened)) " candidates explains the residual as well in place of this effect." }
+        };
+    }
+    let tests = &effect.separating_tests;
+    html! {
+        h4 { (capitalised(&uniqueness::standing(effect, screened))) }
+        div class="scroll" {
+            table {
+                thead {
+                    tr {
+                        th class="word-column" { "explanation" }
+                        @for number in 1..=tests.len() { th class="word-column" { "with test " (number) } }
+                    }
+                }
+                tbody {
+                    (explanation(&effect.name, &vec!["selected".to_string(); tests.len()]))
+                    @for alias in &effect.aliases {
+                        (explanation(alias, &tests.iter().map(|test| separation(alias, test)).collect::<Vec<_>>()))
+                    }
+                }
+            }
+        }
+        @if tests.is_empty() {
+            p { "No proposed test separates these explanations." }
+        } @else {
+            @for (number, test) in tests.iter().enumerate() {
+                p { b { "Test " (number + 1) ": " } (test.test) " (" (format!("{:.0}", test.duration_min)) " min)." }
+            }
+            p class="note" {
+                "Separation from the selected effect in standard deviations: by the present readings → with the test. A test separates from 3 σ on."
+            }
+        }
+    }
+}
+
+/// A row of the table of explanations: the effect, and what each test achieves.
+fn explanation(effect: &EffectName, outcomes: &[String]) -> Markup {
+    html! {
+        tr {
+            td class="word-column long" { (effect.meaning) br; span class="note" { (name(effect)) } }
+            @for outcome in outcomes { td class="word-column" { (outcome) } }
+        }
+    }
+}
+
+/// Separation of the selected effect from an alternative by a test.
+fn separation(alias: &EffectName, test: &SeparatingTestResult) -> String {
+    let found = test.alternatives.iter().find(|alternative| &alternative.name == alias);
+    found.map_or("separated before".to_string(), |alternative| {
+        let sign = if alternative.separated { "✓" } else { "✗ not separated:" };
+        format!("{sign} {:.1} → {:.1} σ", alternative.before_sigma, alternative.after_sigma)
+    })
+}
+
+/// Nonparametric curve with a band of ± 2 u.
+fn curve(effect: &EffectResult) -> Plot {
+    let line = |multiple: f64| {
+        let points = effect.curve.iter();
+        points.map(|p| (p.at, p.value + multiple * p.u)).collect::<Vec<_>>()
+    };
+    let [low, high] = span(effect.curve.iter().map(|p| p.at));
+    let [minimum, maximum] = span(effect.curve.iter().flat_map(|p| [p.value - 2.0 * p.u, p.value + 2.0 * p.u]));
+    let series = [("after", 0.0), ("found-line", 2.0), ("found-line", -2.0)];
+    Lines {
+        name: format!("curve-{}-{}", effect.name.component, effect.name.driver),
+        title: format!("{} over {}", effect.name.component, effect.name.driver),
+        caption: "The curve excludes the components that are collinear with location errors.".to_string(),
+        x: (Scale::over(low, high, ACROSS, 8), format!("{}, {}", effect.name.driver, unit(&effect.curve_at_unit))),
+        y: (
+            Scale::rounded(minimum.min(0.0), maximum.max(0.0), UP, 6),
+            format!("{}, {}", effect.name.component, unit(&effect.curve_unit)),
+        ),
+        series: series
+            .iter()
+            .map(|(class, multiple)| Series { class, source: None, mark: Mark::Line, points: line(*multiple) })
+            .collect(),
+        legend: vec![("after", "curve".into()), ("found-line", "± 2 u".into())],
+        over: html! {},
+    }
+    .plot()
+}
+
+/// Held-out error after each addition of the search.
+fn convergence(trace: &TraceOutcome) -> Plot {
+    let before = trace.result.before.heldout_rms_um;
+    let mut points = vec![(0.0, before)];
+    points.extend(trace.steps.iter().enumerate().map(|(k, step)| (k as f64 + 1.0, step.heldout_rms_um)));
+    let maximum = points.iter().map(|p| p.1).fold(0.0, f64::max);
+    let steps = trace.steps.len() as f64;
+    let is_named = trace.steps.len() <= MAX_NAMED;
+    // Names need space to the right of the last point.
+    let width = if is_named { 1.5 * steps } else { steps + 0.5 };
+    let x = Scale::over(0.0, width, ACROSS, 10);
+    let x = Scale { step: x.step.max(1.0), ..x };
+    let y = Scale::rounded(0.0, maximum * 1.05, UP, 5);
+    let over = html! {
+        @for (number, step) in trace.steps.iter().enumerate() {
+            @let (left, top) = (x.at(number as f64 + 1.0), y.at(step.heldout_rms_um));
+            circle class="dot-after" cx=(coordinate(left)) cy=(coordinate(top)) r="3.4" {
+                title { (step.id) ": " (micrometres(step.heldout_rms_um)) ", " (counted(step.effects, "effect")) }
+            }
+            @if is_named {
+                text class="small" x=(coordinate(left + 6.0)) y=(coordinate(top - 7.0)) { (shortened(&step.id, 26)) }
+            }
+        }
+        @let noise = y.at(trace.result.noise_um);
+        @if trace.result.noise_um < maximum {
+            path class="found-line" d=(polyline([(ACROSS[0], noise), (ACROSS[1], noise)])) {}
+        }
+    };
+    let mut legend = vec![("after", "held-out rms".to_string())];
+    if trace.result.noise_um < maximum {
+        legend.push(("found-line", "noise of a reading".to_string()));
+    }
+    Lines {
+        name: "convergence".to_string(),
+        title: "Convergence of the search".to_string(),
+        caption: "Held-out error after each addition. Later steps can exchange an added effect.".to_string(),
+        x: (x, "additions".to_string()),
+        y: (y, "held-out rms, µm".to_string()),
+        series: vec![Series { class: "after", source: None, mark: Mark::Line, points }],
+        legend,
+        over,
+    }
+    .plot()
+}
+
+/// Evidence of the competing explanations of an effect.
+fn ranking(competing: &[CompetingEffect], id: &str) -> Plot {
+    let rows: Vec<(String, f64, Fill)> = competing
+        .iter()
+        .map(|effect| {
+            let fill = if effect.named {
+                Fill::Named
+            } else if effect.alias {
+                Fill::Alias
+            } else {
+                Fill::Other
+            };
+            (effect.id.clone(), effect.evidence, fill)
+        })
+        .collect();
+    bars::bars(
+        format!("ranking-{id}"),
+        format!("Competing explanations of {id}"),
+        "Evidence together with the rest of the model: −ln P minus the complexity penalty.".to_string(),
+        "evidence, −ln P",
+        &rows,
+        &[("key-named", "selected"), ("key-alias", "indistinguishable"), ("key-other", "rejected")],
+    )
+}
