@@ -1,8 +1,8 @@
 //! Linear algebra and statistics that know no machine, no session and no effect.
 //!
 //! The rows of a least-squares problem become one [`triangle`]. Solutions, covariances, rank and null space follow from
-//! its singular values ([`solve`]) and from nothing else. Symmetric products have their own decomposition
-//! ([`symmetric`]). Every share below which a number counts as zero stands in [`tolerances`].
+//! its singular values (`solve`) and from nothing else. Symmetric products have their own decomposition
+//! (`symmetric`). Every share below which a number counts as zero stands in `tolerances`.
 
 pub mod circle;
 pub(crate) mod gain;

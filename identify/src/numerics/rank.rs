@@ -5,7 +5,7 @@
 //! is not identifiable, because even a gross error along it is below the noise. No floating-point tolerance is
 //! involved: exact null directions of a nominal geometry have singular values of 10⁻¹⁰ and lower.
 //!
-//! The null space is reported in reduced row echelon form ([`super::null_space`]), in an order of preference of the
+//! The null space is reported in reduced row echelon form (`null_space`), in an order of preference of the
 //! parameters that follows from their identifiers.
 
 use faer::Mat;
