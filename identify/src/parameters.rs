@@ -5,7 +5,7 @@ mod preference;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use abbe_model::driver::{DriverInput, Origin};
+use abbe_model::driver::{DriverInput, Reference};
 use abbe_model::effect::{Component, Effect};
 use abbe_model::instrument::InternalUnit;
 use abbe_model::sensitivity::{SlotValues, TestModel};
@@ -190,7 +190,7 @@ impl Parameters {
         session: &Session,
         tests: &[Test],
         models: &[TestModel],
-        origin: &Origin,
+        reference: &Reference,
         effect: &Effect,
     ) -> Result<(), IdentifyError> {
         let size = match effect.component.unit(session.instrument.unknowns()) {
@@ -225,7 +225,7 @@ impl Parameters {
                 machine: &session.machine,
                 model,
                 readings,
-                origin,
+                reference,
                 component_axis: effect.component.axis(&session.machine),
             };
             let samples = driver.samples(&input).ok_or_else(|| IdentifyError::MissingDriver {

@@ -22,7 +22,7 @@ use crate::noise::Noise;
 use crate::numerics::parallel;
 use crate::numerics::triangle::BLOCK_ROWS;
 use crate::parameters::{Parameters, TestParameters};
-use abbe_model::driver::Origin;
+use abbe_model::driver::Reference;
 
 /// A session with readings, its parameters, and the weights of its readings.
 #[derive(Clone)]
@@ -36,7 +36,7 @@ pub struct Problem {
     /// The parameters.
     pub parameters: Parameters,
     /// Reference time and temperature of the session.
-    pub origin: Origin,
+    pub reference: Reference,
     /// The noise of a reading.
     pub noise: Noise,
     /// Excluded outliers, by test and row.
@@ -77,13 +77,22 @@ impl Problem {
                 Some(TestModel::new(Arc::clone(&session.machine), station, readings))
             })
             .collect();
-        let origin = session.origin();
+        let reference = session.reference();
         let parameters = Parameters::declared(session, &tests, &models)?;
         let rejected = models.iter().map(|model| vec![false; model.rows()]).collect();
         let folds = Folds::of(session, &tests, seed);
         let session = Arc::new(session.clone());
-        let mut problem =
-            Problem { session, tests, models, parameters, origin, noise, rejected, folds, test_parameters: Vec::new() };
+        let mut problem = Problem {
+            session,
+            tests,
+            models,
+            parameters,
+            reference,
+            noise,
+            rejected,
+            folds,
+            test_parameters: Vec::new(),
+        };
         problem.update_test_parameters();
         for effect in &problem.session.clone().effects {
             problem.add_effect(effect)?;
@@ -96,7 +105,7 @@ impl Problem {
     /// # Errors
     /// See [`Parameters::add_effect`].
     pub fn add_effect(&mut self, effect: &Effect) -> Result<(), IdentifyError> {
-        self.parameters.add_effect(&self.session, &self.tests, &self.models, &self.origin, effect)?;
+        self.parameters.add_effect(&self.session, &self.tests, &self.models, &self.reference, effect)?;
         self.update_test_parameters();
         Ok(())
     }

@@ -104,9 +104,9 @@ pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated,
         })
         .collect();
     let mut parameters = Parameters::declared(&open, tests, &models)?;
-    let origin = open.origin();
+    let reference = open.reference();
     for effect in &session.effects {
-        parameters.add_effect(&open, tests, &models, &origin, effect)?;
+        parameters.add_effect(&open, tests, &models, &reference, effect)?;
     }
 
     let mut beta = vec![0.0; parameters.list.len()];

@@ -124,6 +124,17 @@ impl Machine {
         self.axes.iter().position(|axis| axis.name == name)
     }
 
+    /// The index of an axis, or a message that lists the axes, and what to do.
+    pub(crate) fn named_axis(&self, name: &str) -> Result<usize, (String, String)> {
+        self.axis_index(name).ok_or_else(|| {
+            let names: Vec<&str> = self.axes.iter().map(|axis| axis.name.as_str()).collect();
+            (
+                format!("the machine \"{}\" has no axis `{name}`", self.name),
+                format!("its axes are {}", names.join(", ")),
+            )
+        })
+    }
+
     /// Number of error slots of the machine: [`ERRORS_PER_AXIS`] per axis, in the order of [`Machine::axes`].
     pub fn error_slots(&self) -> usize {
         self.axes.len() * ERRORS_PER_AXIS

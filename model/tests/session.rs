@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use abbe_model::chain::BodyErrors;
-use abbe_model::driver::{Driver, DriverInput, Origin};
+use abbe_model::driver::{Driver, DriverInput, Reference};
 use abbe_model::effect::shape::{Curve, Harmonic, Local, Periodic, Polynomial, Power, ReversalSpike, Steps, Warmup};
 use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::files::table::csv;
@@ -127,7 +127,7 @@ fn the_square_of_the_speed_follows_from_the_columns() {
             machine: &session.machine,
             model: &TestModel::new(session.machine.clone(), session.tests[0].station.clone(), readings),
             readings,
-            origin: &Origin::default(),
+            reference: &Reference::default(),
             component_axis: session.machine.axis_index(axis),
         };
         Driver::parse("speed-squared").kind().samples(&input)

@@ -59,7 +59,7 @@ impl Sampling {
                 }
             }
             let last = readings.time_s.iter().copied().fold(0.0, f64::max);
-            sampling.duration_s = sampling.duration_s.max(last - problem.origin.time_s);
+            sampling.duration_s = sampling.duration_s.max(last - problem.reference.time_s);
         }
         for axis in 0..axes {
             sampling.moves[axis] = sampling.high[axis] - sampling.low[axis] > 1e-6;

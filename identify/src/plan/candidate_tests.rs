@@ -81,7 +81,7 @@ fn finished(session: &Session, variations: &TestVariations, draft: Draft) -> Opt
     let moving_s = readings.time_s.last().copied().unwrap_or(0.0);
     readings.time_s.iter_mut().for_each(|time| *time += start + variations.test_min * 60.0);
     if session.tests.iter().any(|test| test.readings.as_ref().is_some_and(|r| !r.temperature_c.is_empty())) {
-        let mean = session.origin().temperature_c;
+        let mean = session.reference().temperature_c;
         readings.temperature_c = vec![mean; readings.rows()];
     }
     test.readings = Some(Arc::new(readings));

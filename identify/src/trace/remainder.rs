@@ -60,7 +60,7 @@ fn detectors(problem: &Problem, columns: &Columns<'_>) -> Vec<Detector> {
                 of_test.over_axis(&machine.axes[axis], low, high);
             }
         }
-        of_test.over_time(problem.origin.time_s);
+        of_test.over_time(problem.reference.time_s);
         detectors.extend(of_test.detectors);
     }
     detectors

@@ -3,7 +3,7 @@
 use super::quantity::DriverQuantity;
 use super::sample::{DriverPart, DriverSample};
 use super::unit::DriverUnit;
-use super::{Driver, Origin};
+use super::{Driver, Reference};
 use crate::axis::AxisKind;
 use crate::chain::{AxisPosition, Machine};
 use crate::scalar::Nominal;
@@ -30,7 +30,7 @@ pub struct DriverInput<'a> {
     /// The readings of the test.
     pub readings: &'a Readings,
     /// Reference time and temperature of the session.
-    pub origin: &'a Origin,
+    pub reference: &'a Reference,
     /// The axis of the effect's component, if it has one.
     pub component_axis: Option<usize>,
 }

@@ -3,15 +3,16 @@
 //! A driver gives its values in a test in numbers, for a fit, and in symbols, for a printed equation.
 
 mod kind;
-mod origin;
 mod quantity;
+mod reference;
 mod sample;
 mod unit;
 
 pub use kind::{DriverFault, DriverInput, DriverKind, Entry, Recorded, SymbolInput, Symbols};
-pub use origin::Origin;
 pub use quantity::DriverQuantity;
+pub use reference::Reference;
 pub use sample::{DriverPart, DriverSample};
+pub use time::SECONDS_PER_HOUR;
 pub use unit::DriverUnit;
 
 use std::fmt;

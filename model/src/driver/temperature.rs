@@ -22,7 +22,7 @@ impl DriverKind for Temperature {
     }
     fn samples(&self, input: &DriverInput<'_>) -> Option<Vec<DriverSample<f64>>> {
         let temperature_c = &input.readings.temperature_c;
-        let sample = |t: &f64| DriverSample::plain(t - input.origin.temperature_c, 0.0);
+        let sample = |t: &f64| DriverSample::plain(t - input.reference.temperature_c, 0.0);
         (!temperature_c.is_empty()).then(|| temperature_c.iter().map(sample).collect())
     }
     fn phrase(&self) -> String {

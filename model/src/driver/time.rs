@@ -12,7 +12,8 @@ use crate::scalar::Nominal;
 pub(super) struct Time;
 
 const SECOND: DriverUnit = DriverUnit::new("s", "s", "s", " s");
-const SECONDS_PER_HOUR: f64 = 3600.0;
+/// Seconds per hour.
+pub const SECONDS_PER_HOUR: f64 = 3600.0;
 
 pub(super) const ENTRY: Entry = Entry { word: Some("time"), driver: |_| Driver::Time, units: &[SECOND] };
 
@@ -22,7 +23,7 @@ impl DriverKind for Time {
     }
     fn samples(&self, input: &DriverInput<'_>) -> Option<Vec<DriverSample<f64>>> {
         let time_s = &input.readings.time_s;
-        let sample = |t: &f64| DriverSample::plain(t - input.origin.time_s, 1.0);
+        let sample = |t: &f64| DriverSample::plain(t - input.reference.time_s, 1.0);
         (!time_s.is_empty()).then(|| time_s.iter().map(sample).collect())
     }
     fn phrase(&self) -> String {

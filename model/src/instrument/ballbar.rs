@@ -76,15 +76,18 @@ fn read(keys: &mut dyn SetUpReader) -> Result<SetUp, ModelError> {
 ///
 /// ```
 /// use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
+/// use abbe_model::instrument::Station;
 /// use abbe_model::instrument::ballbar::{BAR, BallBar};
 ///
 /// let machine = Machine::from_code("wbXYZt")?;
 /// let state: Vec<_> = machine.axes.iter().map(|axis| AxisPosition::new(axis.kind, 0.0)).collect();
 /// let none = vec![BodyErrors::<f64>::NONE; 3];
 /// let bar = BallBar { workpiece_ball: [0.0; 3], spindle_ball: [60.0, 0.0, 80.0], bar: 100.0 };
-/// assert_eq!(bar.read(&machine, &state, &none, |_| None), 100.0);
+/// let station = Station::BallBar(bar);
+/// assert_eq!(station.read(&machine, &state, &none, |_| None).coordinates(), [100.0]);
 /// // A bar that is 2 µm longer than stated reads 2 µm less.
-/// assert_eq!(bar.read(&machine, &state, &none, |unknown| (unknown == BAR).then_some(0.002)), 99.998);
+/// let longer = |unknown| (unknown == BAR).then_some(0.002);
+/// assert_eq!(station.read(&machine, &state, &none, longer).coordinates(), [99.998]);
 /// # Ok::<(), abbe_model::ModelError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -110,26 +113,6 @@ impl<N: Nominal> BallBar<N> {
         let spindle = displaced(self.spindle_ball, 3, unknown);
         (machine.workpiece_point(state, errors, workpiece), machine.tool_point(state, errors, spindle))
     }
-
-    /// The reading, mm.
-    pub fn read<S: Scalar<Nominal = N>>(
-        &self,
-        machine: &Machine,
-        state: &[AxisPosition<N>],
-        errors: &[BodyErrors<S>],
-        unknown: impl Fn(usize) -> Option<S>,
-    ) -> S {
-        let (workpiece, spindle) = self.balls(machine, state, errors, &unknown);
-        let distance = workpiece.minus(spindle).norm();
-        let length = match unknown(BAR) {
-            Some(bar) => distance - bar,
-            None => distance,
-        };
-        match unknown(GAIN) {
-            Some(gain) => length + gain * (distance - self.bar),
-            None => length,
-        }
-    }
 }
 
 impl<N> Geometry<N> for BallBar<N> {
@@ -142,6 +125,7 @@ impl<N> Geometry<N> for BallBar<N> {
             bar: to(&self.bar),
         }
     }
+    /// The reading, mm.
     fn reading<S: Scalar<Nominal = N>>(
         &self,
         machine: &Machine,
@@ -152,26 +136,26 @@ impl<N> Geometry<N> for BallBar<N> {
     where
         N: Nominal,
     {
-        Reading::length(self.read(machine, state, errors, unknown))
+        let (workpiece, spindle) = self.balls(machine, state, errors, &unknown);
+        let distance = workpiece.minus(spindle).norm();
+        let length = match unknown(BAR) {
+            Some(bar) => distance - bar,
+            None => distance,
+        };
+        Reading::length(match unknown(GAIN) {
+            Some(gain) => length + gain * (distance - self.bar),
+            None => length,
+        })
     }
-    fn table_point_mm(&self) -> Option<[N; 3]>
-    where
-        N: Copy,
-    {
-        Some(self.workpiece_ball)
+    fn table_point_mm(&self) -> Option<&[N; 3]> {
+        Some(&self.workpiece_ball)
     }
-    fn tool_point_mm(&self) -> [N; 3]
-    where
-        N: Copy,
-    {
-        self.spindle_ball
+    fn tool_point_mm(&self) -> &[N; 3] {
+        &self.spindle_ball
     }
 }
 
 impl Instrument for BallBar<f64> {
-    fn entry(&self) -> &'static Entry {
-        &ENTRY
-    }
     fn columns(&self) -> &'static [Column] {
         &COLUMNS
     }
@@ -179,13 +163,6 @@ impl Instrument for BallBar<f64> {
         let missing = !has(Quantity::Length) && !has(Quantity::Deviation);
         let help = "a ball bar needs `length_mm`, or `deviation_um` from `bar_mm`";
         missing.then(|| ("with the bar readings".into(), help.into()))
-    }
-    fn shared_mm(&self, group: SharedBy) -> [f64; 3] {
-        match group {
-            SharedBy::Setup => self.workpiece_ball,
-            SharedBy::BarSetup => [self.bar, 0.0, 0.0],
-            _ => self.spindle_ball,
-        }
     }
     fn reference_mm(&self) -> f64 {
         self.bar

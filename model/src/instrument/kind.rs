@@ -58,13 +58,9 @@ pub trait Geometry<N> {
     where
         N: Nominal;
     /// The instrument's point in the table frame, mm, if it has one.
-    fn table_point_mm(&self) -> Option<[N; 3]>
-    where
-        N: Copy;
+    fn table_point_mm(&self) -> Option<&[N; 3]>;
     /// The instrument's point in the tool frame, mm.
-    fn tool_point_mm(&self) -> [N; 3]
-    where
-        N: Copy;
+    fn tool_point_mm(&self) -> &[N; 3];
 }
 
 /// How the tool point follows the instrument's point of the table on a path of kind `follow`.
@@ -106,14 +102,10 @@ impl Checked<'_> {
 
 /// Everything that is particular to one instrument as set up for a test, except its reading: see [`Geometry`].
 pub trait Instrument {
-    /// Its entry in the registry.
-    fn entry(&self) -> &'static Entry;
     /// The columns of its readings in data files.
     fn columns(&self) -> &'static [Column];
     /// What data lack: the columns and what to do. `has` says whether there is a column of a quantity.
     fn missing(&self, has: &dyn Fn(Quantity) -> bool) -> Option<Fault>;
-    /// Nominal position of the object that a group of tests shares, mm.
-    fn shared_mm(&self, group: SharedBy) -> [f64; 3];
 
     /// What to do with a column of this name, without its unit, that the instrument has in another set-up.
     fn help_on_column(&self, stem: &str) -> Option<&'static str> {

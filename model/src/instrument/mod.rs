@@ -84,7 +84,7 @@ macro_rules! instruments {
                 N: Copy,
             {
                 match self {
-                    $(Station::$kind(geometry) => geometry.table_point_mm(),)+
+                    $(Station::$kind(geometry) => geometry.table_point_mm().copied(),)+
                 }
             }
 
@@ -94,7 +94,7 @@ macro_rules! instruments {
                 N: Copy,
             {
                 match self {
-                    $(Station::$kind(geometry) => geometry.tool_point_mm(),)+
+                    $(Station::$kind(geometry) => *geometry.tool_point_mm(),)+
                 }
             }
         }
@@ -171,6 +171,17 @@ impl InstrumentKind {
     /// The name shared by tests with the same mounted object in the tool frame if `test` states none.
     pub fn spindle_setup(self, test: &str) -> &str {
         self.entry().spindle_setup.unwrap_or(test)
+    }
+}
+
+impl Station<f64> {
+    /// Nominal position of the object that a group of tests shares, mm.
+    pub fn shared_mm(&self, group: SharedBy) -> [f64; 3] {
+        match group {
+            SharedBy::Setup => self.table_point_mm().unwrap_or([0.0; 3]),
+            SharedBy::BarSetup => [self.reference_mm(), 0.0, 0.0],
+            _ => self.tool_point_mm(),
+        }
     }
 }
 

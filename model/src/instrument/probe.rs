@@ -209,17 +209,6 @@ impl<N: Nominal> Probe<N> {
             step_length,
         }
     }
-
-    /// The reading: the signed distance to the surface, mm. NaN if the line misses the artefact.
-    pub fn read<S: Scalar<Nominal = N>>(
-        &self,
-        machine: &Machine,
-        state: &[AxisPosition<N>],
-        errors: &[BodyErrors<S>],
-        unknown: impl Fn(usize) -> Option<S>,
-    ) -> S {
-        self.geometry(machine, state, errors, unknown).distance()
-    }
 }
 
 impl<N> Geometry<N> for Probe<N> {
@@ -234,6 +223,7 @@ impl<N> Geometry<N> for Probe<N> {
             direction: self.direction.as_ref().map(|direction| point(direction, to)),
         }
     }
+    /// The reading: the signed distance to the surface, mm. NaN if the line misses the artefact.
     fn reading<S: Scalar<Nominal = N>>(
         &self,
         machine: &Machine,
@@ -244,26 +234,17 @@ impl<N> Geometry<N> for Probe<N> {
     where
         N: Nominal,
     {
-        Reading::length(self.read(machine, state, errors, unknown))
+        Reading::length(self.geometry(machine, state, errors, unknown).distance())
     }
-    fn table_point_mm(&self) -> Option<[N; 3]>
-    where
-        N: Copy,
-    {
-        Some(self.artefact)
+    fn table_point_mm(&self) -> Option<&[N; 3]> {
+        Some(&self.artefact)
     }
-    fn tool_point_mm(&self) -> [N; 3]
-    where
-        N: Copy,
-    {
-        self.stylus
+    fn tool_point_mm(&self) -> &[N; 3] {
+        &self.stylus
     }
 }
 
 impl Instrument for Probe<f64> {
-    fn entry(&self) -> &'static Entry {
-        &ENTRY
-    }
     fn columns(&self) -> &'static [Column] {
         &COLUMNS
     }
@@ -271,9 +252,6 @@ impl Instrument for Probe<f64> {
         let missing = !has(Quantity::Length) && !has(Quantity::Outward);
         let help = "a probe needs `distance_mm` to the surface, or `deviation_um`, the deviation outwards";
         missing.then(|| ("with the probe readings".into(), help.into()))
-    }
-    fn shared_mm(&self, group: SharedBy) -> [f64; 3] {
-        if group == SharedBy::Setup { self.artefact } else { self.stylus }
     }
     fn invalid_length(&self) -> Option<String> {
         limits::not_positive("radius", self.radius)

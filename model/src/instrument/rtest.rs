@@ -223,27 +223,6 @@ impl<N: Nominal> RTest<N> {
             }
         }
     }
-
-    /// The reading: the three sensor values, or the vector in the carrying frame, mm.
-    pub fn read<S: Scalar<Nominal = N>>(
-        &self,
-        machine: &Machine,
-        state: &[AxisPosition<N>],
-        errors: &[BodyErrors<S>],
-        unknown: impl Fn(usize) -> Option<S>,
-    ) -> Point<S> {
-        let mut vector = self.difference(machine, state, errors, &unknown);
-        let carried = (SENSOR..SENSOR + 3).any(|index| unknown(index).is_some());
-        if carried {
-            let angles = std::array::from_fn(|i| unknown(SENSOR + i).unwrap_or_else(|| S::constant(0.0)));
-            vector = Orientation::new(angles, machine.rotation).to_sensors(vector);
-        }
-        let Some(sensors) = &self.sensors else {
-            return vector;
-        };
-        let [x, y, z] = vector.0;
-        Point(sensors.map(|[a, b, c]| x * a + y * b + z * c))
-    }
 }
 
 impl<N> Geometry<N> for RTest<N> {
@@ -257,6 +236,7 @@ impl<N> Geometry<N> for RTest<N> {
             sensors: self.sensors.as_ref().map(|rows| rows.each_ref().map(|row| point(row, to))),
         }
     }
+    /// The reading: the three sensor values, or the vector in the carrying frame, mm.
     fn reading<S: Scalar<Nominal = N>>(
         &self,
         machine: &Machine,
@@ -267,19 +247,23 @@ impl<N> Geometry<N> for RTest<N> {
     where
         N: Nominal,
     {
-        Reading::vector(self.read(machine, state, errors, unknown).0)
+        let mut vector = self.difference(machine, state, errors, &unknown);
+        let carried = (SENSOR..SENSOR + 3).any(|index| unknown(index).is_some());
+        if carried {
+            let angles = std::array::from_fn(|i| unknown(SENSOR + i).unwrap_or_else(|| S::constant(0.0)));
+            vector = Orientation::new(angles, machine.rotation).to_sensors(vector);
+        }
+        let Some(sensors) = &self.sensors else {
+            return Reading::vector(vector.0);
+        };
+        let [x, y, z] = vector.0;
+        Reading::vector(sensors.map(|[a, b, c]| x * a + y * b + z * c))
     }
-    fn table_point_mm(&self) -> Option<[N; 3]>
-    where
-        N: Copy,
-    {
-        Some(self.workpiece_ball)
+    fn table_point_mm(&self) -> Option<&[N; 3]> {
+        Some(&self.workpiece_ball)
     }
-    fn tool_point_mm(&self) -> [N; 3]
-    where
-        N: Copy,
-    {
-        self.spindle_ball
+    fn tool_point_mm(&self) -> &[N; 3] {
+        &self.spindle_ball
     }
 }
 
@@ -296,18 +280,12 @@ impl RTest<f64> {
 }
 
 impl Instrument for RTest<f64> {
-    fn entry(&self) -> &'static Entry {
-        &ENTRY
-    }
     fn columns(&self) -> &'static [Column] {
         if self.sensors.is_some() { &SENSORS } else { &VECTOR }
     }
     fn missing(&self, has: &dyn Fn(Quantity) -> bool) -> Option<Fault> {
         let column = self.columns().iter().find(|column| !has(column.quantity))?;
         Some((format!("`{}`", column.name(column.unit)), self.columns_help().into()))
-    }
-    fn shared_mm(&self, group: SharedBy) -> [f64; 3] {
-        if group == SharedBy::Setup { self.workpiece_ball } else { self.spindle_ball }
     }
     fn help_on_column(&self, stem: &str) -> Option<&'static str> {
         let other = if self.sensors.is_some() { &VECTOR } else { &SENSORS };
@@ -375,6 +353,10 @@ impl Instrument for RTest<f64> {
 mod tests {
     use super::*;
 
+    fn three(reading: Reading<f64>) -> [f64; 3] {
+        std::array::from_fn(|i| reading.coordinates()[i])
+    }
+
     /// Each sensor angle transforms the reading by the transpose of its own matrix above, and by nothing else.
     #[test]
     fn sensor_orientation_errors_rotate_the_reading() {
@@ -404,9 +386,9 @@ mod tests {
                 let far = (0..3).any(|i| (found[i] - expected[i]).abs() > 1e-15);
                 assert!(!far, "angle {index}: {found:?}, not {expected:?}");
             };
-            near(vectors.read(&machine, &[], &[], askew).0, turned);
+            near(three(vectors.reading(&machine, &[], &[], askew)), turned);
             let counted = directions.map(|direction| (0..3).map(|i| direction[i] * turned[i]).sum());
-            near(counts.read(&machine, &[], &[], askew).0, counted);
+            near(three(counts.reading(&machine, &[], &[], askew)), counted);
         }
     }
 }

@@ -12,7 +12,6 @@ use super::{
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::error::ModelError;
-use crate::frames::Point;
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
 
@@ -67,37 +66,13 @@ pub struct Socket<N> {
     pub socket: [N; 3],
 }
 
-impl<N: Nominal> Socket<N> {
-    /// The ball in R.
-    pub fn ball_point<S: Scalar<Nominal = N>>(
-        &self,
-        machine: &Machine,
-        state: &[AxisPosition<N>],
-        errors: &[BodyErrors<S>],
-        unknown: &impl Fn(usize) -> Option<S>,
-    ) -> Point<S> {
-        machine.tool_point(state, errors, displaced(self.ball, 3, unknown))
-    }
-
-    /// The closure: ball less socket, mm.
-    pub fn read<S: Scalar<Nominal = N>>(
-        &self,
-        machine: &Machine,
-        state: &[AxisPosition<N>],
-        errors: &[BodyErrors<S>],
-        unknown: impl Fn(usize) -> Option<S>,
-    ) -> Point<S> {
-        let ball = self.ball_point(machine, state, errors, &unknown);
-        ball.minus(displaced(self.socket, 0, &unknown))
-    }
-}
-
 impl<N> Geometry<N> for Socket<N> {
     type Over<M> = Socket<M>;
 
     fn map<M>(&self, to: &impl Fn(&N) -> M) -> Socket<M> {
         Socket { ball: point(&self.ball, to), socket: point(&self.socket, to) }
     }
+    /// The closure: ball less socket, mm.
     fn reading<S: Scalar<Nominal = N>>(
         &self,
         machine: &Machine,
@@ -108,35 +83,24 @@ impl<N> Geometry<N> for Socket<N> {
     where
         N: Nominal,
     {
-        Reading::vector(self.read(machine, state, errors, unknown).0)
+        let ball = machine.tool_point(state, errors, displaced(self.ball, 3, &unknown));
+        Reading::vector(ball.minus(displaced(self.socket, 0, &unknown)).0)
     }
-    fn table_point_mm(&self) -> Option<[N; 3]>
-    where
-        N: Copy,
-    {
+    fn table_point_mm(&self) -> Option<&[N; 3]> {
         None
     }
-    fn tool_point_mm(&self) -> [N; 3]
-    where
-        N: Copy,
-    {
-        self.ball
+    fn tool_point_mm(&self) -> &[N; 3] {
+        &self.ball
     }
 }
 
 impl Instrument for Socket<f64> {
-    fn entry(&self) -> &'static Entry {
-        &ENTRY
-    }
     fn columns(&self) -> &'static [Column] {
         &COLUMNS
     }
     fn missing(&self, has: &dyn Fn(Quantity) -> bool) -> Option<Fault> {
         let help = "add the column, or add `socket = \"…\"` to the test if all its poses have one socket";
         (!has(Quantity::Socket)).then(|| ("`socket`".into(), help.into()))
-    }
-    fn shared_mm(&self, _: SharedBy) -> [f64; 3] {
-        self.ball
     }
     /// The mean of the points.
     fn placed(&self, points: &[Vector3<f64>], _: &[Vector3<f64>]) -> Option<Station<f64>> {

@@ -13,7 +13,6 @@ use super::{
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::error::ModelError;
-use crate::frames::Point;
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
 
@@ -71,38 +70,6 @@ pub struct Tracker<N> {
     pub origin: [N; 3],
 }
 
-impl<N: Nominal> Tracker<N> {
-    /// The target in R.
-    pub fn target_point<S: Scalar<Nominal = N>>(
-        &self,
-        machine: &Machine,
-        state: &[AxisPosition<N>],
-        errors: &[BodyErrors<S>],
-        unknown: &impl Fn(usize) -> Option<S>,
-    ) -> Point<S> {
-        machine.tool_point(state, errors, displaced(self.target, 6, unknown))
-    }
-
-    /// The reading: three coordinates in the tracker's frame, mm.
-    pub fn read<S: Scalar<Nominal = N>>(
-        &self,
-        machine: &Machine,
-        state: &[AxisPosition<N>],
-        errors: &[BodyErrors<S>],
-        unknown: impl Fn(usize) -> Option<S>,
-    ) -> Point<S> {
-        let mut point = self.target_point(machine, state, errors, &unknown);
-        if let Some(pose) = pose_error(&unknown) {
-            point = pose.push(point);
-        }
-        let [x, y, z] = point.0;
-        Point(std::array::from_fn(|i| {
-            let [a, b, c] = self.rotation[i];
-            x * a + y * b + z * c + self.origin[i]
-        }))
-    }
-}
-
 impl<N> Geometry<N> for Tracker<N> {
     type Over<M> = Tracker<M>;
 
@@ -113,6 +80,7 @@ impl<N> Geometry<N> for Tracker<N> {
             origin: point(&self.origin, to),
         }
     }
+    /// The reading: three coordinates in the tracker's frame, mm.
     fn reading<S: Scalar<Nominal = N>>(
         &self,
         machine: &Machine,
@@ -123,35 +91,31 @@ impl<N> Geometry<N> for Tracker<N> {
     where
         N: Nominal,
     {
-        Reading::vector(self.read(machine, state, errors, unknown).0)
+        let mut point = machine.tool_point(state, errors, displaced(self.target, 6, &unknown));
+        if let Some(pose) = pose_error(&unknown) {
+            point = pose.push(point);
+        }
+        let [x, y, z] = point.0;
+        Reading::vector(std::array::from_fn(|i| {
+            let [a, b, c] = self.rotation[i];
+            x * a + y * b + z * c + self.origin[i]
+        }))
     }
-    fn table_point_mm(&self) -> Option<[N; 3]>
-    where
-        N: Copy,
-    {
+    fn table_point_mm(&self) -> Option<&[N; 3]> {
         None
     }
-    fn tool_point_mm(&self) -> [N; 3]
-    where
-        N: Copy,
-    {
-        self.target
+    fn tool_point_mm(&self) -> &[N; 3] {
+        &self.target
     }
 }
 
 impl Instrument for Tracker<f64> {
-    fn entry(&self) -> &'static Entry {
-        &ENTRY
-    }
     fn columns(&self) -> &'static [Column] {
         &COLUMNS
     }
     fn missing(&self, has: &dyn Fn(Quantity) -> bool) -> Option<Fault> {
         let column = COLUMNS.iter().find(|column| !has(column.quantity))?;
         Some((format!("`{}`", column.name(column.unit)), "a tracker needs px_mm, py_mm and pz_mm".into()))
-    }
-    fn shared_mm(&self, group: SharedBy) -> [f64; 3] {
-        if group == SharedBy::Setup { [0.0; 3] } else { self.target }
     }
     fn placed(&self, points: &[Vector3<f64>], observed: &[Vector3<f64>]) -> Option<Station<f64>> {
         let (rotation, origin) = rigid_motion(points, observed);

@@ -37,7 +37,7 @@
 use std::sync::Arc;
 
 use super::check;
-use super::columns::{Columns, axis_index, number};
+use super::columns::{Columns, number};
 use super::expression::Length;
 use super::motion::Motion;
 use super::{Prior, Session, Test, planned, setups};
@@ -180,7 +180,7 @@ impl NewTest {
         let mut at = vec![0.0; machine.axes.len()];
         let mut listed = vec![false; machine.axes.len()];
         for (name, position) in &self.at {
-            let axis = axis_index(machine, name).map_err(|(message, help)| (named(message), help))?;
+            let axis = machine.named_axis(name).map_err(|(message, help)| (named(message), help))?;
             number(&format!("the position of {name}"), *position).map_err(|(message, help)| (named(message), help))?;
             at[axis] = *position;
             listed[axis] = true;

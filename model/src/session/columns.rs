@@ -46,7 +46,7 @@ impl Columns {
         let mut positions: Vec<Vec<f64>> = at.iter().map(|&position| vec![position; rows]).collect();
         let mut read = vec![false; at.len()];
         for (name, column) in &self.axes {
-            let axis = axis_index(machine, name)?;
+            let axis = machine.named_axis(name)?;
             if read[axis] {
                 return Err((format!("two columns of axis {name}"), "keep one of them".into()));
             }
@@ -101,14 +101,6 @@ impl Columns {
             observed,
         })
     }
-}
-
-/// The axis of this name.
-pub(super) fn axis_index(machine: &Machine, name: &str) -> Result<usize, Fault> {
-    machine.axis_index(name).ok_or_else(|| {
-        let names: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
-        (format!("the machine \"{}\" has no axis `{name}`", machine.name), format!("its axes are {}", names.join(", ")))
-    })
 }
 
 /// Checks a column.

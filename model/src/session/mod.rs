@@ -21,7 +21,7 @@ use std::sync::Arc;
 
 use crate::chain::Machine;
 use crate::component::ErrorName;
-use crate::driver::Origin;
+use crate::driver::Reference;
 use crate::effect::Effect;
 use crate::instrument::{Entry, InstrumentKind, SharedBy, Station};
 use readings::Readings;
@@ -56,8 +56,8 @@ pub struct Session {
 
 impl Session {
     /// Reference time and temperature, from which the drivers of effects count.
-    pub fn origin(&self) -> Origin {
-        Origin::of(self.tests.iter().filter_map(|test| test.readings.as_deref()))
+    pub fn reference(&self) -> Reference {
+        Reference::of(self.tests.iter().filter_map(|test| test.readings.as_deref()))
     }
 
     /// The session with these readings, in the order of its tests.
@@ -114,7 +114,7 @@ impl Test {
 
     /// The group of tests that share the object whose place no session knows: a tracker, a socket.
     pub fn free_place(&self) -> Option<&str> {
-        let Entry { parameters, free, .. } = self.station.entry();
+        let Entry { parameters, free, .. } = self.station.kind().entry();
         let parameter = parameters.iter().find(|parameter| *free == Some(parameter.thing))?;
         Some(self.group(parameter.shared_by))
     }

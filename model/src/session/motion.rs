@@ -1,6 +1,5 @@
 //! Motion of the axes in a planned test.
 
-use super::columns::axis_index;
 use crate::axis::AxisKind;
 use crate::chain::Machine;
 use crate::error::ModelError;
@@ -94,7 +93,7 @@ impl Motion {
     /// # Errors
     /// [`ModelError::Session`] if the machine has no axis of this name.
     pub fn sweep(machine: &Machine, axis: &str, [from, to]: [f64; 2], step: f64) -> Result<Motion, ModelError> {
-        let axis = axis_index(machine, axis).map_err(|(message, help)| ModelError::Session { message, help })?;
+        let axis = machine.named_axis(axis).map_err(|(message, help)| ModelError::Session { message, help })?;
         let speed = default_speed(machine.axes[axis].kind);
         Ok(Motion::Sweep { axis, from, to, step, speed, runs: 1, both_directions: true })
     }

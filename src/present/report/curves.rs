@@ -85,7 +85,7 @@ pub fn over_time(session: &SessionPlots<'_>) -> Plot {
     for (test, view) in session.problem.tests.iter().zip(&session.series.tests) {
         let Some(readings) = &test.readings else { continue };
         let time = if has_time {
-            let minutes = |t: &f64| (t - session.problem.origin.time_s) / 60.0;
+            let minutes = |t: &f64| (t - session.problem.reference.time_s) / 60.0;
             readings.time_s.iter().map(minutes).collect()
         } else {
             (preceding..preceding + readings.rows()).map(|row| row as f64 + 1.0).collect()

@@ -118,7 +118,7 @@ impl Columns<'_> {
                 machine: &self.problem.session.machine,
                 model: &self.problem.models[test],
                 readings,
-                origin: &self.problem.origin,
+                reference: &self.problem.reference,
                 component_axis: axis,
             };
             kind.samples(&input).map(Arc::new)

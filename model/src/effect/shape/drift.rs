@@ -3,13 +3,12 @@
 use super::kind::{Basis, Entry, Follows, Per, ShapeFault, ShapeKind};
 use super::words::EffectWords;
 use super::{DriverSample, KeyWriter, Shape};
+use crate::driver::SECONDS_PER_HOUR;
 use crate::scalar::Nominal;
 
 /// Linear in time; the coefficient is the change per hour.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drift;
-
-const SECONDS_PER_HOUR: f64 = 3600.0;
 
 pub(super) const ENTRY: Entry = Entry {
     word: "drift",

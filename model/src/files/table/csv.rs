@@ -119,7 +119,7 @@ pub fn text(machine: &Machine, station: &Station<f64>, readings: &Readings) -> S
         if let Some(temperature) = readings.temperature_c.get(row) {
             cells.push(decimal(*temperature));
         }
-        if station.entry().has_readings {
+        if station.kind().entry().has_readings {
             let start = row * readings.coordinates;
             for k in start..start + readings.coordinates {
                 cells.push(readings.observed.get(k).map_or(String::new(), |mm| decimal(*mm)));
