@@ -11,35 +11,23 @@ pub fn noncentrality(freedom: usize, significance: f64, wanted: f64) -> f64 {
     if freedom == 0 {
         return f64::INFINITY;
     }
-    let critical = critical_value(freedom, significance);
-    let (mut low, mut high) = (0.0, 1.0);
-    while power(freedom, critical, high) < wanted {
-        (low, high) = (high, 2.0 * high);
-    }
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if power(freedom, critical, middle) < wanted {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    high
+    // On the upper tail, which keeps its relative precision where it is small.
+    let critical = least(|x| chi_square_tail(x, freedom as f64) <= significance);
+    least(|noncentrality| power(freedom, critical, noncentrality) >= wanted)
 }
 
-/// The value that χ² exceeds with this probability, by bisection on the upper tail, which keeps its relative precision
-/// where it is small.
-fn critical_value(freedom: usize, significance: f64) -> f64 {
+/// The least positive number from which on a condition holds, by bisection.
+fn least(holds: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
-    while chi_square_tail(high, freedom as f64) > significance {
+    while !holds(high) {
         (low, high) = (high, 2.0 * high);
     }
     for _ in 0..80 {
         let middle = 0.5 * (low + high);
-        if chi_square_tail(middle, freedom as f64) > significance {
-            low = middle;
-        } else {
+        if holds(middle) {
             high = middle;
+        } else {
+            low = middle;
         }
     }
     high
