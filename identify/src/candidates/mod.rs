@@ -1,11 +1,9 @@
 //! Candidate effects: the members of the library that a session permits, their columns in the readings, and their gain
 //! in addition to a model. A plan and a trace use them.
 
-pub(crate) mod chi_square_tail;
 pub(crate) mod columns;
 pub(crate) mod gain;
 pub mod library;
 pub(crate) mod moments;
-pub(crate) mod observable;
 mod sampling;
 pub(crate) mod tuned;

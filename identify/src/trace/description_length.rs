@@ -6,13 +6,13 @@
 use abbe_model::driver::Driver;
 use abbe_model::effect::Shape;
 use abbe_model::effect::shape::Steps;
-use rayon::prelude::*;
 
 use super::search::{Search, SearchBranch, SelectedEffect};
 use crate::candidates::columns::EffectColumns;
 use crate::candidates::gain::Gain;
 use crate::candidates::library::Candidate;
 use crate::error::IdentifyError;
+use crate::numerics::parallel;
 
 /// Numbers of intervals of the nonparametric curves.
 const INTERVALS: [usize; 3] = [8, 16, 32];
@@ -211,12 +211,10 @@ impl Search<'_> {
         let variance = self.variance(&without);
         let choice = self.choice();
         let of_group = self.evidence_of(group, rest, folds)? - self.description_length(group);
-        let best = pool
-            .par_iter()
-            .filter(|c| !group.contains(c))
-            .map(|c| (*c, self.score(*c, &without.gain(*c), variance) - choice))
-            .filter(|(_, one)| *one > of_group)
-            .max_by(|a, b| a.1.total_cmp(&b.1));
-        Ok(best.map(|(c, _)| c))
+        let others: Vec<usize> = pool.iter().copied().filter(|c| !group.contains(c)).collect();
+        let scores =
+            parallel::map(others.len(), &|k| self.score(others[k], &without.gain(others[k]), variance) - choice);
+        let better = others.into_iter().zip(scores).filter(|(_, one)| *one > of_group);
+        Ok(better.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(c, _)| c))
     }
 }

@@ -1,7 +1,7 @@
 //! Find the unmodelled effect behind the residual of a fitted model.
 //!
 //! 1. The noise standard deviation and autocorrelation follow from repeats ([`crate::noise`]). Outliers are excluded by
-//!    name ([`crate::outliers`]).
+//!    name ([`crate::noise::outliers`]).
 //! 2. The basis columns of the library's effects ([`library`](crate::candidates::library)) are computed for the session
 //!    (`columns`). Their products with the model, the residual and the null draws are computed once (`moments`).
 //! 3. The search (`search`) adds, removes and exchanges effects. Its p-values come from the same search on readings
@@ -39,6 +39,7 @@ use crate::candidates::moments::Moments;
 use crate::error::IdentifyError;
 use crate::fit::{Fit, fit, prepare};
 use crate::heldout::FoldKind;
+use crate::numerics::parallel;
 use crate::problem::Problem;
 use crate::results::TraceResult;
 use implausible::Contradicted;
@@ -238,7 +239,7 @@ fn trace_or_interrupted<'a>(
         let draws = null(null::SINGLE);
         remainder::structure(problem, &columns, model, &start.residual, draws, &prior)
     };
-    let (draws, structure_before) = rayon::join(|| null(null::BLOCK), || (!poses).then(structure_before));
+    let (draws, structure_before) = parallel::both(|| null(null::BLOCK), || (!poses).then(structure_before));
 
     let structure_before = structure_before.transpose()?;
     interrupt.check()?;

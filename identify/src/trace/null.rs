@@ -15,7 +15,7 @@ use rand_pcg::Pcg64;
 use crate::candidates::columns::Columns;
 use crate::heldout::FoldKind;
 use crate::noise::{Noise, PureError};
-use crate::outliers::median;
+use crate::numerics::median;
 use crate::problem::Problem;
 
 /// Readings per block for the search. A block keeps intermittent structure, so that the search does not accept it as an

@@ -8,12 +8,12 @@ use std::ops::Range;
 
 use abbe_model::effect::shape::Steps;
 use abbe_model::effect::{Effect, Shape};
-use rayon::prelude::*;
 
 use super::compose::StepTable;
 use super::search::Search;
 use crate::candidates::gain::{Gain, TrainedModel};
 use crate::candidates::library::Candidate;
+use crate::numerics::parallel;
 
 /// Iterations of a line search, each reducing the interval to 0.62: on all readings, and with one fold left out.
 const STEPS: usize = 12;
@@ -63,14 +63,13 @@ pub fn refined(
         nearest.into_values().filter(|(_, evidence)| *evidence >= MIN_EVIDENCE_SHARE * best).collect();
     near.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     near.truncate(most);
-    let mut fresh: Vec<Candidate> = near
-        .into_par_iter()
-        .filter_map(|(candidate, _)| {
-            let original = &search.candidates[candidate];
-            let effect = refine(search, model, original, gains[candidate].gain)?;
-            Some(Candidate { effect, ..original.clone() })
-        })
-        .collect();
+    let refined = parallel::map(near.len(), &|k| {
+        let candidate = near[k].0;
+        let original = &search.candidates[candidate];
+        let effect = refine(search, model, original, gains[candidate].gain)?;
+        Some(Candidate { effect, ..original.clone() })
+    });
+    let mut fresh: Vec<Candidate> = refined.into_iter().flatten().collect();
     fresh.extend(moved(search, model, composed, best, most));
     fresh.retain(|candidate| {
         let is_same = |present: usize| {
@@ -93,17 +92,16 @@ fn moved(
     let mut nearest: Vec<&StepTable> = composed.iter().filter(|c| c.evidence >= MIN_EVIDENCE_SHARE * best).collect();
     nearest.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
     nearest.truncate(most);
-    nearest
-        .into_par_iter()
-        .filter_map(|composed| {
-            let (effect, gain) = moved_steps(search, model, &composed.candidate);
-            let gain = Gain { gain, freedom: effect.shape.coefficients() + effect.shape.numbers() };
-            let evidence = search.evidence(&gain, variance);
-            let near = evidence >= best - MAX_EVIDENCE_DEFICIT
-                || evidence - composed.candidate.cost >= MIN_EVIDENCE_SHARE * best;
-            near.then(|| Candidate { effect, ..composed.candidate.clone() })
-        })
-        .collect()
+    let moved = parallel::map(nearest.len(), &|k| {
+        let composed = nearest[k];
+        let (effect, gain) = moved_steps(search, model, &composed.candidate);
+        let gain = Gain { gain, freedom: effect.shape.coefficients() + effect.shape.numbers() };
+        let evidence = search.evidence(&gain, variance);
+        let near =
+            evidence >= best - MAX_EVIDENCE_DEFICIT || evidence - composed.candidate.cost >= MIN_EVIDENCE_SHARE * best;
+        near.then(|| Candidate { effect, ..composed.candidate.clone() })
+    });
+    moved.into_iter().flatten().collect()
 }
 
 /// Tunes the shape numbers of an effect for the largest gain. `None` if the gain does not increase.

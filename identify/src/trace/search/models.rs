@@ -6,11 +6,11 @@ use std::ops::Range;
 use abbe_model::effect::Effect;
 
 use super::{ALL, Search};
-use crate::candidates::chi_square_tail::ln_chi_square_tail;
 use crate::candidates::columns::EffectColumns;
 use crate::candidates::gain::{Gain, TrainedModel};
 use crate::candidates::tuned::TunedEffect;
 use crate::error::IdentifyError;
+use crate::numerics::tails::ln_chi_square_tail;
 
 impl Search<'_> {
     /// The range of a candidate's columns in the base. Empty if the candidate was never added.

@@ -1,12 +1,11 @@
 //! The candidates that a search may add: the library's detectable effects, and the effects that it has tuned itself.
 
-use rayon::prelude::*;
-
 use super::{Search, TrainedModel};
 use crate::candidates::columns::EffectColumns;
 use crate::candidates::gain::Gain;
 use crate::candidates::library::Candidate;
 use crate::error::IdentifyError;
+use crate::numerics::parallel;
 use crate::trace::compose::{self, StepTable};
 use crate::trace::refine;
 
@@ -18,18 +17,13 @@ impl Search<'_> {
     /// For each candidate whether it is undetectable at its largest plausible size.
     pub(super) fn undetectable_candidates(&self) -> Result<Vec<bool>, IdentifyError> {
         let model = self.model_without(None)?;
-        let candidates = 0..self.candidates.len();
-        let undetectable = candidates
-            .into_par_iter()
-            .map(|candidate| {
-                let (d, _, _) = model.projected(candidate);
-                let effect = &self.candidates[candidate].effect;
-                let plausible = self.columns.plausible(effect, &self.column_sets[candidate]);
-                let largest = (0..d.nrows()).map(|k| d[(k, k)]).fold(0.0, f64::max);
-                plausible * largest.max(0.0).sqrt() < MIN_PLAUSIBLE_SIGMA
-            })
-            .collect();
-        Ok(undetectable)
+        Ok(parallel::map(self.candidates.len(), &|candidate| {
+            let (d, _, _) = model.projected(candidate);
+            let effect = &self.candidates[candidate].effect;
+            let plausible = self.columns.plausible(effect, &self.column_sets[candidate]);
+            let largest = (0..d.nrows()).map(|k| d[(k, k)]).fold(0.0, f64::max);
+            plausible * largest.max(0.0).sqrt() < MIN_PLAUSIBLE_SIGMA
+        }))
     }
 
     /// Whether a branch with some training folds may add a candidate now.
@@ -51,11 +45,13 @@ impl Search<'_> {
     /// The step tables from the library's dictionaries for addition to a model.
     pub(super) fn step_tables(&self, model: &TrainedModel<'_>) -> Vec<StepTable> {
         let variance = self.variance(model);
-        (0..self.candidates.len())
-            .into_par_iter()
-            .filter(|candidate| self.candidates[*candidate].dictionary)
-            .filter_map(|candidate| compose::best_step_table(model, candidate, &self.candidates[candidate], variance))
-            .collect()
+        let dictionaries: Vec<usize> =
+            (0..self.candidates.len()).filter(|candidate| self.candidates[*candidate].dictionary).collect();
+        let best = |k: usize| {
+            let candidate = dictionaries[k];
+            compose::best_step_table(model, candidate, &self.candidates[candidate], variance)
+        };
+        parallel::map(dictionaries.len(), &best).into_iter().flatten().collect()
     }
 
     /// Adds the candidates near the best, with their shape numbers tuned in addition to some candidates on some folds.
