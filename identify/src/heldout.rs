@@ -10,11 +10,14 @@ pub(crate) mod folds;
 pub(crate) mod paired;
 
 use faer::Mat;
-use rayon::prelude::*;
 
 use crate::error::IdentifyError;
+use crate::numerics::parallel;
+use crate::numerics::solve::Directions;
+use crate::numerics::symmetric::Symmetric;
+use crate::numerics::tolerances::MIN_UPDATE_SHARE;
+use crate::numerics::triangle::Triangle;
 use crate::problem::Problem;
-use crate::triangle::Triangle;
 pub use folds::{FoldKind, Folds, mislabelled_runs};
 
 /// Held-out residuals.
@@ -53,24 +56,21 @@ pub fn held_out(
     whole: &Triangle,
     basis: &Mat<f64>,
 ) -> Result<HeldOut, IdentifyError> {
-    let all = Directions::of(whole, basis)?;
-    let steps: Vec<Vec<f64>> = (0..triangles.len())
-        .into_par_iter()
-        .map(|fold| match all.step_without(&triangles[fold])? {
-            Some(step) => Ok(step),
-            None => {
-                let mut rest = problem.prior_triangle(beta);
-                let others = triangles.iter().enumerate();
-                others.filter(|(other, _)| *other != fold).for_each(|(_, triangle)| rest.merge(triangle));
-                step_without(&rest, beta, basis)
-            }
-        })
-        .collect::<Result<_, IdentifyError>>()?;
+    let all = WhitenedDirections::of(whole, basis)?;
+    let steps = parallel::map(triangles.len(), &|fold| match all.step_without(&triangles[fold])? {
+        Some(step) => Ok(step),
+        None => {
+            let others = triangles.iter().enumerate().filter(|(other, _)| *other != fold);
+            step_without(&problem.prior_triangle(beta).merged(others.map(|(_, triangle)| triangle)), beta, basis)
+        }
+    });
+    let steps: Vec<Vec<f64>> = steps.into_iter().collect::<Result<_, IdentifyError>>()?;
     let values = problem.slot_values(beta);
     let coordinates = problem.coordinates();
     let mut residuals: Vec<Vec<f64>> = vec![Vec::new(); problem.models.len()];
     let blocks = problem.blocks();
-    let predicted = blocks.par_iter().map(|block| {
+    let predicted = parallel::map(blocks.len(), &|number| {
+        let block = &blocks[number];
         let of_test = problem.own_parameters(block.test);
         let rows = problem.own_rows(&values[block.test], block)?;
         let mut residual = rows.col(of_test.len()).to_owned();
@@ -80,47 +80,40 @@ pub fn held_out(
                 *residual -= column[i] * steps[fold_of[i / coordinates]][*parameter];
             }
         }
-        Ok(residual)
+        Ok::<_, IdentifyError>(residual)
     });
     // Blocks are in the order of the rows.
-    for (block, residual) in blocks.iter().zip(predicted.collect::<Result<Vec<_>, IdentifyError>>()?) {
-        residuals[block.test].extend(residual.iter());
+    for (block, residual) in blocks.iter().zip(predicted) {
+        residuals[block.test].extend(residual?.iter());
     }
     Ok(HeldOut { rms_mm: rms_mm(problem, &residuals), residuals })
 }
 
-/// Least share of the information on a direction that the other folds must hold for the update formula.
-const MIN_SHARE: f64 = 1e-6;
-
 /// The identifiable directions, scaled so that the normal matrix of all readings is the identity.
-struct Directions {
+struct WhitenedDirections {
     /// `W`: parameters × rank.
     scaled_basis: Mat<f64>,
     /// `y`: the remaining step of the fit of all readings.
     step: Mat<f64>,
+    /// Whether the readings contain information on every direction.
+    complete: bool,
 }
 
-impl Directions {
-    fn of(whole: &Triangle, basis: &Mat<f64>) -> Result<Directions, IdentifyError> {
+impl WhitenedDirections {
+    fn of(whole: &Triangle, basis: &Mat<f64>) -> Result<WhitenedDirections, IdentifyError> {
         let (r, c, _) = whole.parts();
-        let rank = basis.ncols();
-        if rank == 0 {
-            return Ok(Directions { scaled_basis: Mat::zeros(basis.nrows(), 0), step: Mat::zeros(0, 1) });
-        }
-        let svd = (&r * basis).thin_svd().map_err(|_| IdentifyError::Decomposition)?;
-        let singular = svd.S().column_vector();
-        let mut scaled_basis = basis * svd.V();
-        for (k, mut column) in scaled_basis.col_iter_mut().enumerate() {
-            // A direction without information becomes infinite here; the folds are then solved again.
-            column *= faer::Scale(1.0 / singular[k]);
-        }
+        let directions = Directions::of((&r * basis).as_ref())?;
         let right = Mat::from_fn(c.len(), 1, |i, _| c[i]);
-        Ok(Directions { step: svd.U().transpose() * right, scaled_basis })
+        Ok(WhitenedDirections {
+            scaled_basis: basis * directions.inverse_root(),
+            step: directions.left().transpose() * right,
+            complete: directions.numerical_rank() == basis.ncols(),
+        })
     }
 
     /// The step to the fit without a fold; `None` if the other folds barely determine a direction.
     fn step_without(&self, fold: &Triangle) -> Result<Option<Vec<f64>>, IdentifyError> {
-        if !self.scaled_basis.is_all_finite() {
+        if !self.complete {
             return Ok(None);
         }
         let rows = fold.rows();
@@ -132,16 +125,15 @@ impl Directions {
         let t = rows.subcols(0, parameters) * &self.scaled_basis;
         let residual_step = &self.step - t.transpose() * rows.subcols(parameters, 1);
         let leverage = &t * t.transpose();
-        let eigen = leverage.self_adjoint_eigen(faer::Side::Lower).map_err(|_| IdentifyError::Decomposition)?;
-        let shares: Vec<f64> = eigen.S().column_vector().iter().map(|share| 1.0 - share).collect();
-        if shares.iter().any(|share| *share < MIN_SHARE) {
+        let Symmetric { values, vectors } = Symmetric::of(leverage.as_ref())?;
+        if values.iter().any(|share| 1.0 - share < MIN_UPDATE_SHARE) {
             return Ok(None);
         }
-        let mut along = eigen.U().transpose() * (&t * &residual_step);
-        for (k, share) in shares.iter().enumerate() {
-            along[(k, 0)] /= share;
+        let mut along = vectors.transpose() * (&t * &residual_step);
+        for (k, share) in values.iter().enumerate() {
+            along[(k, 0)] /= 1.0 - share;
         }
-        let step = &self.scaled_basis * (residual_step + t.transpose() * (eigen.U() * along));
+        let step = &self.scaled_basis * (residual_step + t.transpose() * (vectors * along));
         Ok(Some(step.col(0).iter().copied().collect()))
     }
 }
@@ -150,27 +142,11 @@ impl Directions {
 /// direction that the remaining readings do not determine returns to its nominal value.
 fn step_without(rest: &Triangle, beta: &[f64], basis: &Mat<f64>) -> Result<Vec<f64>, IdentifyError> {
     let (r, c, _) = rest.parts();
-    let (n, rank) = (basis.nrows(), basis.ncols());
-    if rank == 0 {
-        return Ok(vec![0.0; n]);
-    }
+    let n = beta.len();
     let absolute: Vec<f64> = (0..n).map(|i| c[i] + (i..n).map(|j| r[(i, j)] * beta[j]).sum::<f64>()).collect();
-    let reduced = &r * basis;
-    let svd = reduced.svd().map_err(|_| IdentifyError::Decomposition)?;
-    let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
-    let negligible = singular[0] * 1e-12;
-    let mut step: Vec<f64> = beta.iter().map(|value| -value).collect();
-    for k in 0..rank {
-        if singular[k] <= negligible {
-            continue;
-        }
-        let along = (0..n).map(|i| svd.U()[(i, k)] * absolute[i]).sum::<f64>() / singular[k];
-        for j in 0..n {
-            let direction: f64 = (0..rank).map(|l| basis[(j, l)] * svd.V()[(l, k)]).sum();
-            step[j] += along * direction;
-        }
-    }
-    Ok(step)
+    let solution = Directions::of((&r * basis).as_ref())?.solve(&absolute, 0.0);
+    let value = |j: usize| -> f64 { solution.iter().enumerate().map(|(k, z)| basis[(j, k)] * z).sum() };
+    Ok((0..n).map(|j| value(j) - beta[j]).collect())
 }
 
 #[cfg(test)]
@@ -195,17 +171,15 @@ mod tests {
         let basis = basis.qr().compute_thin_Q();
         let folds: Vec<Triangle> = (0..5).map(|_| simulated(9, parameters, &mut random)).collect();
         let merged = |folds: &[Triangle], but: usize| {
-            let mut whole = Triangle::new(parameters);
             let others = folds.iter().enumerate().filter(|(fold, _)| *fold != but);
-            others.for_each(|(_, fold)| whole.merge(fold));
-            whole
+            Triangle::new(parameters).merged(others.map(|(_, fold)| fold))
         };
-        let end = Directions::of(&merged(&folds, usize::MAX), &basis).unwrap();
+        let end = WhitenedDirections::of(&merged(&folds, usize::MAX), &basis).unwrap();
         let step: Vec<f64> = (&end.scaled_basis * &end.step).col(0).iter().copied().collect();
         let moved: Vec<Triangle> = folds.iter().map(|fold| fold.after(&step)).collect();
         // At the solution, where the remaining step is zero, and before it.
         for (folds, beta) in [(moved, step), (folds, vec![0.0; parameters])] {
-            let all = Directions::of(&merged(&folds, usize::MAX), &basis).unwrap();
+            let all = WhitenedDirections::of(&merged(&folds, usize::MAX), &basis).unwrap();
             for (number, fold) in folds.iter().enumerate() {
                 let updated = all.step_without(fold).unwrap().unwrap();
                 let solved = step_without(&merged(&folds, number), &beta, &basis).unwrap();
@@ -226,7 +200,7 @@ mod tests {
         let single_fold = simulated(9, parameters, &mut random);
         let mut whole = others.clone();
         whole.merge(&single_fold);
-        let all = Directions::of(&whole, &Mat::identity(parameters, parameters)).unwrap();
+        let all = WhitenedDirections::of(&whole, &Mat::identity(parameters, parameters)).unwrap();
         assert!(all.step_without(&single_fold).unwrap().is_none());
         assert!(all.step_without(&others).unwrap().is_some());
     }

@@ -1,7 +1,7 @@
 //! Identification: estimates of geometric errors with standard uncertainties, and the search for unmodelled effects in
 //! the residual.
 //!
-//! - [`least_squares`], [`triangle`], [`rank`]: numerical core, independent of any machine;
+//! - [`numerics`]: linear algebra and statistics, independent of any machine;
 //! - [`parameters`], [`problem`]: a session as a least-squares problem;
 //! - [`fit`]: parameter estimation; [`heldout`]: cross-validation; [`noise`]: noise standard deviation and
 //!   autocorrelation;
@@ -46,7 +46,6 @@
 //! ```
 
 pub mod candidates;
-pub mod circle;
 pub mod circular;
 pub mod compensation;
 pub mod directions;
@@ -54,20 +53,17 @@ pub mod error;
 pub mod fit;
 pub mod geometric;
 pub mod heldout;
-pub mod least_squares;
 pub mod monte_carlo;
 pub mod noise;
-pub mod outliers;
+pub mod numerics;
 pub mod parameter_description;
 pub mod parameters;
 pub mod patterns;
 pub mod plan;
 pub mod plausibility;
-mod preference;
 pub mod problem;
 pub mod propagation;
 pub mod quantity;
-pub mod rank;
 pub mod repeated;
 pub mod results;
 pub mod self_calibration;
@@ -76,7 +72,6 @@ pub mod series;
 pub mod simulate;
 pub mod start;
 pub mod trace;
-pub mod triangle;
 pub mod unit;
 pub mod volumetric;
 

@@ -7,7 +7,8 @@
 
 use rand_distr::{Distribution as _, StandardNormal};
 use rand_pcg::Pcg64;
-use rayon::prelude::*;
+
+use crate::numerics::parallel;
 
 /// A function from input quantities to output quantities.
 pub trait Function: Sync {
@@ -210,21 +211,18 @@ fn draw(function: &impl Function, draws: &Draws<'_>, stream: u128, runs: u64, mu
 pub fn propagate<F: Function>(function: &F, draws: &Draws<'_>) -> Vec<Distribution> {
     let empty = pilot(function, draws);
     let blocks = draws.runs.div_ceil(F::BLOCK);
-    let lanes: Vec<Vec<Histogram>> = (0..LANES.min(blocks))
-        .into_par_iter()
-        .map(|lane| {
-            let mut counts = empty.clone();
-            for block in (lane..blocks).step_by(LANES as usize) {
-                let runs = F::BLOCK.min(draws.runs - block * F::BLOCK);
-                draw(function, draws, u128::from(block), runs, |outputs| {
-                    for (count, value) in counts.iter_mut().zip(outputs) {
-                        count.add(*value);
-                    }
-                });
-            }
-            counts
-        })
-        .collect();
+    let lanes = parallel::map(LANES.min(blocks) as usize, &|lane| {
+        let mut counts = empty.clone();
+        for block in (lane as u64..blocks).step_by(LANES as usize) {
+            let runs = F::BLOCK.min(draws.runs - block * F::BLOCK);
+            draw(function, draws, u128::from(block), runs, |outputs| {
+                for (count, value) in counts.iter_mut().zip(outputs) {
+                    count.add(*value);
+                }
+            });
+        }
+        counts
+    });
     let mut counts = empty;
     for lane in &lanes {
         for (count, other) in counts.iter_mut().zip(lane) {
@@ -236,17 +234,15 @@ pub fn propagate<F: Function>(function: &F, draws: &Draws<'_>) -> Vec<Distributi
 
 /// Empty histograms with ranges from the pilot runs.
 fn pilot<F: Function>(function: &F, draws: &Draws<'_>) -> Vec<Histogram> {
-    let blocks: Vec<Vec<f64>> = (0..F::PILOT.div_ceil(F::BLOCK))
-        .into_par_iter()
-        .map(|block| {
-            let runs = F::BLOCK.min(F::PILOT - block * F::BLOCK);
-            let mut drawn = Vec::with_capacity(runs as usize * function.outputs());
-            draw(function, draws, PILOT_STREAM + u128::from(block), runs, |outputs| {
-                drawn.extend_from_slice(outputs);
-            });
-            drawn
-        })
-        .collect();
+    let blocks = parallel::map(F::PILOT.div_ceil(F::BLOCK) as usize, &|block| {
+        let block = block as u64;
+        let runs = F::BLOCK.min(F::PILOT - block * F::BLOCK);
+        let mut drawn = Vec::with_capacity(runs as usize * function.outputs());
+        draw(function, draws, PILOT_STREAM + u128::from(block), runs, |outputs| {
+            drawn.extend_from_slice(outputs);
+        });
+        drawn
+    });
     let values = (0..function.outputs()).map(|output| {
         let runs = blocks.iter().flat_map(|drawn| drawn.chunks_exact(function.outputs()));
         let column = runs.map(|outputs| outputs[output]);

@@ -1,5 +1,7 @@
 //! The parameters of a session, and the components of the readings that each parameter affects.
 
+mod preference;
+
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -11,6 +13,7 @@ use abbe_model::session::{Prior, Session, Test};
 
 use crate::error::IdentifyError;
 use crate::unit::Unit;
+pub(crate) use preference::pivot_preference;
 
 /// The kind of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

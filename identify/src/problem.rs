@@ -4,24 +4,24 @@
 //! rows of `[J | r]`. The rows are whitened along the run and absorbed into the triangular factor of their test and
 //! fold. That factor has one column for each parameter of the test.
 
-use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
+mod factors;
+mod priors;
+mod whitening;
+
 use std::ops::Range;
 use std::sync::Arc;
 
 use abbe_model::effect::Effect;
-use abbe_model::instrument::Station;
 use abbe_model::sensitivity::{SlotValues, TestModel};
-use abbe_model::session::{Prior, Session, Test};
+use abbe_model::session::{Session, Test};
 use faer::Mat;
-use num_dual::DualNum;
-use rayon::prelude::*;
 
 use crate::error::IdentifyError;
 use crate::heldout::folds::Folds;
 use crate::noise::Noise;
+use crate::numerics::parallel;
+use crate::numerics::triangle::BLOCK_ROWS;
 use crate::parameters::{Parameters, TestParameters};
-use crate::triangle::{BLOCK_ROWS, Triangle};
 use abbe_model::driver::Reference;
 
 /// A session with readings, its parameters, and the weights of its readings.
@@ -56,14 +56,8 @@ pub struct RowBlock {
     pub rows: Range<usize>,
 }
 
-/// Triangular factors over the parameters of each test, by test and fold.
-type FactorsByTestAndFold = BTreeMap<(usize, usize), Triangle>;
-
 /// Mean number of readings below which runs are evaluated together.
 const SHORT_RUN: usize = 8;
-/// Number of blocks that one parallel task evaluates.
-const BLOCKS_PER_SEGMENT: usize = 16;
-
 impl Problem {
     /// The problem of a session with its declared parameters and effects.
     ///
@@ -245,224 +239,30 @@ impl Problem {
         }
     }
 
-    /// The scalar rows of a block that remain after whitening. A row is dropped if its reading, or one within the
-    /// filter's order before it, is an outlier.
-    pub fn kept_rows(&self, block: &RowBlock) -> Vec<usize> {
-        let coordinates = self.coordinates();
-        let rejected = &self.rejected[block.test];
-        if !rejected[block.rows.clone()].contains(&true) {
-            return (0..block.rows.len() * coordinates).collect();
-        }
-        (0..block.rows.len() * coordinates)
-            .filter(|i| {
-                let row = block.rows.start + i / coordinates;
-                let reach = self.noise.ar_coefficients.len().min(i / coordinates);
-                (row - reach..=row).all(|row| !rejected[row])
-            })
-            .collect()
-    }
-
-    /// Whitens rows along a run, `(x_t − Σ a_k x_{t−k})/σ_innovation`, and drops outliers. Returns the remaining rows
-    /// and the fold of each.
-    pub fn whiten(&self, rows: &Mat<f64>, block: &RowBlock) -> (Mat<f64>, Vec<usize>) {
-        let kept = self.kept_rows(block);
-        let folds = self.folds_of(&kept, block).collect();
-        (self.whitened(rows.clone(), &kept), folds)
-    }
-
-    /// The fold of each of the given scalar rows of a block.
-    pub fn folds_of(&self, rows: &[usize], block: &RowBlock) -> impl Iterator<Item = usize> {
-        let fold_of = &self.folds.of_row[block.test][block.rows.clone()];
-        let coordinates = self.coordinates();
-        rows.iter().map(move |i| fold_of[i / coordinates])
-    }
-
-    /// The rows of [`Problem::whiten`] for known remaining rows.
-    pub fn whitened(&self, mut rows: Mat<f64>, kept: &[usize]) -> Mat<f64> {
-        let coordinates = self.coordinates();
-        let ar_coefficients = &self.noise.ar_coefficients;
-        let innovation = 1.0 / self.noise.innovation_mm();
-        let marginal = 1.0 / self.noise.sigma_mm;
-        if ar_coefficients.is_empty() && kept.len() == rows.nrows() {
-            rows *= faer::Scale(innovation);
-            return rows;
-        }
-        let mut white = Mat::zeros(kept.len(), rows.ncols());
-        for (mut white, column) in white.col_iter_mut().zip(rows.col_iter()) {
-            for (k, &i) in kept.iter().enumerate() {
-                white[k] = if i / coordinates < ar_coefficients.len() {
-                    column[i] * marginal
-                } else {
-                    let lags = ar_coefficients.iter().enumerate();
-                    let past: f64 = lags.map(|(lag, a)| a * column[i - (lag + 1) * coordinates]).sum();
-                    (column[i] - past) * innovation
-                };
-            }
-        }
-        white
-    }
-
-    /// The triangular factor of each fold at the parameters `beta`, in internal units of the parameters.
-    ///
-    /// # Errors
-    /// If the model yields a number that is not finite.
-    pub fn triangles(&self, beta: &[f64]) -> Result<Vec<Triangle>, IdentifyError> {
-        let values = self.slot_values(beta);
-        // Segments have a fixed length, so that the sums do not depend on the number of threads.
-        let segments: Vec<FactorsByTestAndFold> = (self.blocks().par_chunks(BLOCKS_PER_SEGMENT))
-            .map(|blocks| self.factors_of_blocks(&values, blocks))
-            .collect::<Result<_, IdentifyError>>()?;
-        let mut factors = FactorsByTestAndFold::new();
-        for ((test, fold), triangle) in segments.into_iter().flatten() {
-            match factors.entry((test, fold)) {
-                Entry::Vacant(entry) => {
-                    entry.insert(triangle);
-                }
-                Entry::Occupied(mut sum) => sum.get_mut().merge(&triangle),
-            }
-        }
-        let count = self.parameters.list.len();
-        let mut triangles = vec![Triangle::new(count); self.folds.count];
-        for ((test, fold), triangle) in factors {
-            triangles[fold].merge(&triangle.over_columns(&self.test_parameters[test].parameters, count));
-        }
-        Ok(triangles)
-    }
-
-    /// The triangular factors of some blocks over the parameters of their tests, by test and fold.
-    fn factors_of_blocks(
-        &self,
-        values: &[SlotValues],
-        blocks: &[RowBlock],
-    ) -> Result<FactorsByTestAndFold, IdentifyError> {
-        let mut factors = FactorsByTestAndFold::new();
-        for block in blocks {
-            let rows = self.own_rows(&values[block.test], block)?;
-            let kept = self.kept_rows(block);
-            let folds: Vec<usize> = self.folds_of(&kept, block).collect();
-            let white = self.whitened(rows, &kept);
-            let mut present = folds.clone();
-            present.dedup();
-            present.sort_unstable();
-            present.dedup();
-            for fold in &present {
-                let triangle = factors
-                    .entry((block.test, *fold))
-                    .or_insert_with(|| Triangle::new(self.test_parameters[block.test].parameters.len()));
-                if present.len() == 1 {
-                    triangle.absorb(white.as_ref());
-                } else {
-                    let chosen: Vec<usize> = (0..folds.len()).filter(|i| folds[*i] == *fold).collect();
-                    triangle.absorb(Mat::from_fn(chosen.len(), white.ncols(), |i, j| white[(chosen[i], j)]).as_ref());
-                }
-            }
-        }
-        Ok(factors)
-    }
-
-    /// Number of prior observations: the rows of [`Problem::prior_triangle`].
-    pub fn prior_rows(&self) -> usize {
-        let gaussian = |prior: &Prior| matches!(prior, Prior::Gaussian(_));
-        let list = &self.parameters.list;
-        let distances = self.session.socket_distances.iter();
-        let stated = distances.filter(|distance| {
-            let mut ends = distance.between.iter();
-            ends.all(|name| self.socket(name).is_some())
-        });
-        list.iter().filter(|parameter| gaussian(&parameter.prior)).count() + stated.count()
-    }
-
-    /// The triangular factor of the priors: Gaussian priors and distances between sockets.
-    pub fn prior_triangle(&self, beta: &[f64]) -> Triangle {
-        self.prior_triangle_about(beta, |_| 0.0, |_| 0.0)
-    }
-
-    /// As [`Problem::prior_triangle`], with other prior means: `centre` for each parameter with a Gaussian prior, and
-    /// an offset in mm `longer` for each distance between sockets.
-    pub fn prior_triangle_about(
-        &self,
-        beta: &[f64],
-        centre: impl Fn(usize) -> f64,
-        longer: impl Fn(usize) -> f64,
-    ) -> Triangle {
-        let count = self.parameters.list.len();
-        let mut rows: Vec<Vec<f64>> = Vec::new();
-        for (j, parameter) in self.parameters.list.iter().enumerate() {
-            if let Prior::Gaussian(u) = parameter.prior {
-                let mut row = vec![0.0; count + 1];
-                row[j] = 1.0 / u;
-                row[count] = (centre(j) - beta[j]) / u;
-                rows.push(row);
-            }
-        }
-        for (number, distance) in self.session.socket_distances.iter().enumerate() {
-            let ends: Vec<Option<([usize; 3], [f64; 3])>> =
-                distance.between.iter().map(|name| self.socket(name)).collect();
-            let [Some((a, nominal_a)), Some((b, nominal_b))] = ends[..] else {
-                continue;
-            };
-            let coordinate = |k: usize, parameter: usize, nominal: f64| {
-                let mut seed = nalgebra::SVector::<f64, 6>::zeros();
-                seed[k] = 1.0;
-                num_dual::DualSVec64::<6>::new(nominal + beta[parameter], num_dual::Derivative::some(seed))
-            };
-            let square = (0..3)
-                .map(|i| (coordinate(i, a[i], nominal_a[i]) - coordinate(i + 3, b[i], nominal_b[i])).powi(2))
-                .fold(num_dual::DualSVec64::<6>::from(0.0), |sum, term| sum + term);
-            let length = square.sqrt();
-            let gradient = length.eps.unwrap_generic(nalgebra::Const::<6>, nalgebra::Const::<1>);
-            let mut row = vec![0.0; count + 1];
-            for i in 0..3 {
-                row[a[i]] += gradient[i] / distance.u_mm;
-                row[b[i]] += gradient[i + 3] / distance.u_mm;
-            }
-            row[count] = (distance.distance_mm + longer(number) - length.re) / distance.u_mm;
-            rows.push(row);
-        }
-        let mut triangle = Triangle::new(count);
-        triangle.absorb(Mat::from_fn(rows.len(), count + 1, |i, j| rows[i][j]).as_ref());
-        triangle
-    }
-
-    /// The parameters of a socket and its nominal position.
-    fn socket(&self, name: &str) -> Option<([usize; 3], [f64; 3])> {
-        let test = self.tests.iter().position(|test| test.socket.as_deref() == Some(name))?;
-        let Station::Socket(station) = self.models[test].station() else {
-            return None;
-        };
-        let mut indices = [0; 3];
-        for (index, coordinate) in indices.iter_mut().zip(["x", "y", "z"]) {
-            let id = format!("socket.{coordinate}[{name}]");
-            *index = self.parameters.list.iter().position(|parameter| parameter.id == id)?;
-        }
-        Some((indices, station.socket))
-    }
-
     /// Residuals observed − model of every test, mm, outliers included.
     pub fn residuals(&self, beta: &[f64]) -> Vec<Vec<f64>> {
         let values = self.slot_values(beta);
-        (self.models.par_iter().zip(&self.tests).zip(&values))
-            .map(|((model, test), values)| {
-                let mut residuals = model.readings_mm(values);
-                let observed = test.readings.iter().flat_map(|readings| &readings.observed);
-                residuals.iter_mut().zip(observed).for_each(|(value, observed)| *value = observed - *value);
-                residuals
-            })
-            .collect()
+        parallel::map(self.models.len(), &|test| {
+            let mut residuals = self.models[test].readings_mm(&values[test]);
+            let observed = self.tests[test].readings.iter().flat_map(|readings| &readings.observed);
+            residuals.iter_mut().zip(observed).for_each(|(value, observed)| *value = observed - *value);
+            residuals
+        })
     }
 
     /// Sum of squares of whitened residuals and priors.
     pub fn sum_of_squares(&self, beta: &[f64]) -> f64 {
         let residuals = self.residuals(beta);
         let coordinates = self.coordinates();
-        let squares = self.blocks().into_par_iter().map(|block| {
+        let blocks = self.blocks();
+        let squares = parallel::map(blocks.len(), &|k| {
+            let block = &blocks[k];
             let residual = &residuals[block.test][block.rows.start * coordinates..block.rows.end * coordinates];
             let column = Mat::from_fn(residual.len(), 1, |i, _| residual[i]);
-            let (white, _) = self.whiten(&column, &block);
+            let (white, _) = self.whiten(&column, block);
             white.col(0).iter().map(|value| value * value).sum::<f64>()
         });
-        let readings: f64 = squares.collect::<Vec<f64>>().iter().sum();
-        let zero_step = vec![0.0; beta.len()];
-        readings + self.prior_triangle(beta).sum_of_squares_after(&zero_step)
+        let readings: f64 = squares.iter().sum();
+        readings + self.prior_triangle(beta).sum_of_squares()
     }
 }

@@ -9,246 +9,20 @@
 //! validation of that law. With `u = c·10^l`, `c` of one significant digit, the ends of the two coverage intervals may
 //! differ by `δ = ½·10^l`.
 
-use faer::Mat;
-use statrs::distribution::{Continuous, ContinuousCDF, Normal};
+mod refit;
 
-use abbe_model::session::Prior;
+use statrs::distribution::{Continuous, Normal};
+
 use abbe_model::words::counted;
 
 use crate::error::IdentifyError;
 use crate::fit;
-use crate::fit::{Fit, Quantity, in_directions, parameter_covariance, quantities, values_at};
-use crate::least_squares::{LeastSquares, Scaling, minimise};
-use crate::monte_carlo::{self, Distribution, Draws, Function, MonteCarlo};
-use crate::problem::{Problem, RowBlock};
+use crate::fit::Fit;
+use crate::monte_carlo::{self, Distribution, Draws, MonteCarlo};
+use crate::numerics::tails::normal_quantile;
+use crate::problem::Problem;
 use crate::results::{DrawnParameter, FitMonteCarlo, FitResult, Verdict, phases_follow_amplitudes};
-use crate::triangle::{BLOCK_ROWS, Triangle};
-
-/// Number of steps with the curvature of the original fit. After these the simulated session is fitted with its own
-/// curvature.
-const MAX_SHARED_STEPS: usize = 8;
-/// Expected decrease of the sum of squares below which the iteration ends: a hundredth of a standard uncertainty.
-const MIN_DECREASE: f64 = 1e-4;
-
-/// The function from the deviations of the inputs to the reported quantities.
-struct Refit<'p> {
-    problem: &'p Problem,
-    fit: &'p Fit,
-    blocks: Vec<RowBlock>,
-    /// Index among the inputs of each test's first reading.
-    starts: Vec<usize>,
-    /// Index among the inputs of each parameter with a Gaussian prior.
-    priors: Vec<Option<usize>>,
-    /// Index among the inputs of the first distance between sockets.
-    distances: usize,
-    quantities: Vec<Quantity>,
-    /// The solution of the fit, in identifiable coordinates.
-    end: Vec<f64>,
-    /// `(NᵀJᵀV⁻¹J N)⁻¹` at the solution.
-    inverse: Mat<f64>,
-    /// Standard uncertainty of each input.
-    u: Vec<f64>,
-}
-
-impl<'p, 'a> Refit<'p> {
-    fn new(problem: &'p Problem, fit: &'p Fit) -> Result<Self, IdentifyError> {
-        // The factor on uncertainties applies here as in the fit.
-        let enlarged = fit.u_enlargement;
-        let mut u = Vec::new();
-        let mut starts = Vec::new();
-        for residuals in &fit.residuals {
-            starts.push(u.len());
-            u.resize(u.len() + residuals.len(), problem.noise.sigma_mm * enlarged);
-        }
-        let mut priors = Vec::new();
-        for parameter in &problem.parameters.list {
-            priors.push(match parameter.prior {
-                Prior::Gaussian(prior) => {
-                    u.push(prior * enlarged);
-                    Some(u.len() - 1)
-                }
-                Prior::Known | Prior::Free => None,
-            });
-        }
-        let distances = u.len();
-        let stated = &problem.session.socket_distances;
-        u.extend(stated.iter().map(|distance| distance.u_mm * enlarged));
-        let size: Vec<f64> = problem.parameters.list.iter().map(|p| p.size).collect();
-        let mut whole = problem.prior_triangle(&fit.beta);
-        fit.triangles.iter().for_each(|triangle| whole.merge(triangle));
-        let rank = fit.rank.identifiable_basis.ncols();
-        let reduced = in_directions(&whole, &fit.rank.identifiable_basis);
-        Ok(Refit {
-            problem,
-            fit,
-            blocks: problem.blocks(),
-            starts,
-            priors,
-            distances,
-            quantities: quantities(problem, &fit.rank),
-            end: fit.rank.coordinates(&fit.beta, &size),
-            inverse: parameter_covariance(&reduced, &Mat::identity(rank, rank))?,
-            u,
-        })
-    }
-
-    fn beta(&self, z: &[f64]) -> Vec<f64> {
-        let basis = &self.fit.rank.identifiable_basis;
-        (0..basis.nrows()).map(|j| (0..z.len()).map(|k| basis[(j, k)] * z[k]).sum()).collect()
-    }
-
-    /// The identifiable coordinates with the best fit to the inputs.
-    fn fitted(&self, deviations: &[f64]) -> Result<Vec<f64>, IdentifyError> {
-        let drawn = SimulatedFit { refit: self, deviations };
-        let mut z = self.end.clone();
-        for _ in 0..MAX_SHARED_STEPS {
-            let Ok(descent) = drawn.descent(&z) else { break };
-            let step: Vec<f64> =
-                (0..z.len()).map(|i| (0..z.len()).map(|k| self.inverse[(i, k)] * descent[k]).sum()).collect();
-            let fall: f64 = step.iter().zip(&descent).map(|(s, d)| s * d).sum();
-            z.iter_mut().zip(&step).for_each(|(z, step)| *z += step);
-            if fall < MIN_DECREASE {
-                return Ok(z);
-            }
-            if !fall.is_finite() {
-                break;
-            }
-        }
-        // Too nonlinear for the curvature of the original fit.
-        let scale = Scaling::Physical(vec![1.0; self.end.len()]);
-        Ok(minimise(&drawn, &self.end, &scale)?.x)
-    }
-}
-
-impl Function for Refit<'_> {
-    type Scratch = ();
-    const BLOCK: u64 = 32;
-    const PILOT: u64 = 512;
-
-    fn inputs(&self) -> usize {
-        self.u.len()
-    }
-
-    fn outputs(&self) -> usize {
-        let of = |quantity: &Quantity| match quantity {
-            Quantity::Parameter(_) => 1,
-            Quantity::Harmonic(_) => 2,
-        };
-        self.quantities.iter().map(of).sum()
-    }
-
-    fn evaluate(&self, inputs: &[f64], outputs: &mut [f64], (): &mut ()) {
-        let Ok(z) = self.fitted(inputs) else {
-            outputs.fill(f64::NAN);
-            return;
-        };
-        let mut outputs = outputs.iter_mut();
-        let put = |value: f64| {
-            if let Some(output) = outputs.next() {
-                *output = value;
-            }
-        };
-        values_at(self.problem, self.fit, &self.quantities, &self.beta(&z), put);
-    }
-}
-
-/// One simulated session as a least-squares problem in the identifiable directions.
-struct SimulatedFit<'r, 'p> {
-    refit: &'r Refit<'p>,
-    deviations: &'r [f64],
-}
-
-impl SimulatedFit<'_, '_> {
-    fn prior_triangle(&self, beta: &[f64]) -> Triangle {
-        let refit = self.refit;
-        let centre = |j: usize| refit.priors[j].map_or(0.0, |place| self.deviations[place]);
-        let longer = |number: usize| self.deviations[refit.distances + number];
-        refit.problem.prior_triangle_about(beta, centre, longer)
-    }
-
-    /// Passes on the parameters of every block's test, and the whitened rows `[J | r]` over these parameters.
-    fn rows(&self, beta: &[f64], mut take: impl FnMut(&[usize], Mat<f64>)) -> Result<(), IdentifyError> {
-        let problem = self.refit.problem;
-        let values = problem.slot_values(beta);
-        let coordinates = problem.coordinates();
-        for block in &self.refit.blocks {
-            let mut rows = problem.own_rows(&values[block.test], block)?;
-            let last = rows.ncols() - 1;
-            let start = self.refit.starts[block.test] + block.rows.start * coordinates;
-            for i in 0..rows.nrows() {
-                rows[(i, last)] += self.deviations[start + i];
-            }
-            take(problem.own_parameters(block.test), problem.whiten(&rows, block).0);
-        }
-        Ok(())
-    }
-
-    /// `Nᵀ Jᵀ V⁻¹ r`: the negative gradient of half the sum of squares.
-    fn descent(&self, z: &[f64]) -> Result<Vec<f64>, IdentifyError> {
-        let beta = self.refit.beta(z);
-        let count = beta.len();
-        let mut whole = vec![0.0; count];
-        let mut add = |own: &[usize], rows: &Mat<f64>| {
-            let residual = rows.col(own.len());
-            for (j, column) in own.iter().zip(rows.col_iter()) {
-                whole[*j] += column.transpose() * residual;
-            }
-        };
-        let (r, c, _) = self.prior_triangle(&beta).parts();
-        let all: Vec<usize> = (0..count).collect();
-        let known = Mat::from_fn(count, count + 1, |i, j| if j == count { c[i] } else { r[(i, j)] });
-        add(&all, &known);
-        self.rows(&beta, |own, rows| add(own, &rows))?;
-        let basis = &self.refit.fit.rank.identifiable_basis;
-        Ok((0..basis.ncols()).map(|k| (0..count).map(|j| basis[(j, k)] * whole[j]).sum()).collect())
-    }
-}
-
-impl LeastSquares for SimulatedFit<'_, '_> {
-    fn parameters(&self) -> usize {
-        self.refit.end.len()
-    }
-
-    fn linearise(&self, z: &[f64]) -> Result<Triangle, IdentifyError> {
-        let beta = self.refit.beta(z);
-        let mut whole = self.prior_triangle(&beta);
-        self.rows(&beta, |own, rows| {
-            let mut narrow = Triangle::new(own.len());
-            for start in (0..rows.nrows()).step_by(BLOCK_ROWS) {
-                let count = BLOCK_ROWS.min(rows.nrows() - start);
-                narrow.absorb(rows.subrows(start, count));
-            }
-            whole.merge(&narrow.over_columns(own, beta.len()));
-        })?;
-        Ok(in_directions(&whole, &self.refit.fit.rank.identifiable_basis))
-    }
-
-    fn sum_of_squares(&self, z: &[f64]) -> f64 {
-        let refit = self.refit;
-        let beta = refit.beta(z);
-        let problem = refit.problem;
-        let coordinates = problem.coordinates();
-        let values = problem.slot_values(&beta);
-        let mut sum = 0.0;
-        for ((test, model), values) in problem.models.iter().enumerate().zip(&values) {
-            let Some(readings) = &problem.tests[test].readings else {
-                continue;
-            };
-            let start = refit.starts[test];
-            let read = model.readings_mm(values);
-            let residual: Vec<f64> =
-                (0..read.len()).map(|i| readings.observed[i] + self.deviations[start + i] - read[i]).collect();
-            for block in refit.blocks.iter().filter(|block| block.test == test) {
-                let first = block.rows.start * coordinates;
-                let column = Mat::from_fn(block.rows.len() * coordinates, 1, |i, _| residual[first + i]);
-                let (white, _) = problem.whiten(&column, block);
-                sum += (0..white.nrows()).map(|i| white[(i, 0)].powi(2)).sum::<f64>();
-            }
-        }
-        let zero_step = vec![0.0; beta.len()];
-        sum + self.prior_triangle(&beta).sum_of_squares_after(&zero_step)
-    }
-}
+use refit::Refit;
 
 /// Runs the Monte Carlo and adds it to the result. Parameters for which the two methods disagree report the `u` of the
 /// Monte Carlo.
@@ -310,15 +84,14 @@ pub fn add_monte_carlo(
 
 /// Law of propagation and Monte Carlo for one parameter.
 fn compared(id: &str, value: f64, gum_u: f64, unit: &str, drawn: &Distribution, draws: &MonteCarlo) -> DrawnParameter {
-    let normal = Normal::standard();
     let tail = (1.0 - draws.coverage) / 2.0;
-    let factor = -normal.inverse_cdf(tail);
+    let factor = normal_quantile(tail);
     let gum_interval = [value - factor * gum_u, value + factor * gum_u];
     let endpoint_differences = [0, 1].map(|end| (drawn.symmetric[end] - gum_interval[end]).abs());
     let tolerance = tolerance(gum_u);
     // Standard deviation of a quantile: √(q(1 − q)/M) over the density there, with a Gaussian density.
     let share = (tail * (1.0 - tail) / draws.runs as f64).sqrt();
-    let endpoint_u = drawn.u * share / normal.pdf(factor);
+    let endpoint_u = drawn.u * share / Normal::standard().pdf(factor);
     let worst = endpoint_differences[0].max(endpoint_differences[1]);
     let verdict = if worst - 2.0 * endpoint_u > tolerance {
         Verdict::Differ
@@ -362,46 +135,4 @@ pub fn tolerance(u: f64) -> f64 {
     let power = if (u / 10.0_f64.powi(power)).round() >= 10.0 { power + 1 } else { power };
     // Dividing by a whole power of ten keeps decimals exact.
     if power < 0 { 0.5 / 10.0_f64.powi(-power) } else { 0.5 * 10.0_f64.powi(power) }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::path::Path;
-
-    use abbe_model::files::{self, ReadOptions};
-
-    use super::*;
-    use crate::fit::prepare;
-
-    /// Three computations for one simulated session agree: the sum of squares of its rows, that of its residuals, and
-    /// its gradient against differences.
-    #[test]
-    fn sum_of_squares_and_gradient_of_a_simulated_session_agree() {
-        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-        let session = files::session(&file, &ReadOptions::default()).unwrap();
-        let (problem, fit) = prepare(&session, 1).unwrap();
-        let refit = Refit::new(&problem, &fit).unwrap();
-        // Deviations of one standard uncertainty with alternating signs.
-        let signs = [1.0, -1.0, 1.0, 1.0, -1.0].iter().cycle();
-        let deviations: Vec<f64> = refit.u.iter().zip(signs).map(|(u, sign)| u * sign).collect();
-        let drawn = SimulatedFit { refit: &refit, deviations: &deviations };
-        let z = drawn.refit.end.clone();
-        let zero_step = vec![0.0; z.len()];
-        let whole = drawn.linearise(&z).unwrap().sum_of_squares_after(&zero_step);
-        let of_residuals = drawn.sum_of_squares(&z);
-        assert!(of_residuals > 0.5 * problem.readings() as f64, "{of_residuals}");
-        assert!((of_residuals / whole - 1.0).abs() < 1e-9, "{of_residuals} and {whole}");
-        let descent = drawn.descent(&z).unwrap();
-        for k in 0..z.len() {
-            let by = 1e-2 * refit.inverse[(k, k)].sqrt();
-            let at = |by: f64| {
-                let mut moved = z.clone();
-                moved[k] += by;
-                drawn.sum_of_squares(&moved)
-            };
-            let slope = (at(by) - at(-by)) / (2.0 * by);
-            let scale = refit.inverse[(k, k)].sqrt();
-            assert!((slope + 2.0 * descent[k]).abs() * scale < 1e-4, "{k}: {slope} {}", descent[k]);
-        }
-    }
 }

@@ -14,10 +14,10 @@ use std::collections::BTreeSet;
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
 use crate::error::IdentifyError;
 use crate::fit::{Fit, parameters};
+use crate::numerics::tails::{chi_square_tails, normal_tail};
 use crate::parameters::Role;
 use crate::problem::Problem;
 use crate::results::ParameterResult;
@@ -209,8 +209,7 @@ fn over_sessions(parameter: &ParameterResult, values: &[(f64, f64)], significanc
     let u_type_b = (values.iter().map(|(_, u)| u * u).sum::<f64>() / count).sqrt();
     let ratio = (u_type_b > 0.0).then(|| s / u_type_b);
     let chi_square = ratio.map(|ratio| free * ratio * ratio);
-    let law = ChiSquared::new(free).ok();
-    let tails = law.zip(chi_square).map(|(law, found)| [law.cdf(found), law.sf(found)]);
+    let tails = chi_square.and_then(|found| chi_square_tails(found, free));
     let p_value = tails.map(|[below, above]| (2.0 * below.min(above)).min(1.0));
     let scatter = match (p_value, tails) {
         (Some(p), Some([below, above])) if p < significance => {
@@ -240,7 +239,6 @@ fn over_sessions(parameter: &ParameterResult, values: &[(f64, f64)], significanc
 /// The values that deviate from the mean of the others, the most significant removed first: index, deviation, its
 /// standard uncertainty, its probability.
 fn deviating_from_others(values: &[(f64, f64)], significance: f64) -> Vec<(usize, f64, f64, f64)> {
-    let normal = Normal::standard();
     let mut remaining: Vec<usize> = (0..values.len()).collect();
     let mut found = Vec::new();
     while remaining.len() > 2 {
@@ -254,7 +252,7 @@ fn deviating_from_others(values: &[(f64, f64)], significance: f64) -> Vec<(usize
         };
         let most_significant = remaining.iter().map(off).max_by(|a, b| (a.1 / a.2).abs().total_cmp(&(b.1 / b.2).abs()));
         let Some((k, by, u)) = most_significant else { break };
-        let p_value = 2.0 * normal.sf((by / u).abs());
+        let p_value = 2.0 * normal_tail((by / u).abs());
         // Zero uncertainties give no probability.
         if p_value.is_nan() || p_value >= significance {
             break;

@@ -3,10 +3,10 @@
 
 use std::sync::Arc;
 
-use abbe::identify::circle;
 use abbe::identify::fit::prepare;
 use abbe::identify::geometric::{Estimator, Method, compare};
 use abbe::identify::noise::{Noise, NoiseSource};
+use abbe::identify::numerics::circle;
 use abbe::identify::problem::Problem;
 use abbe::model::files::{self, ReadOptions};
 use abbe::model::instrument::Station;

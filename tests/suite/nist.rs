@@ -1,8 +1,8 @@
 //! Certified nonlinear regressions of the NIST StRD, solved by the Gauss–Newton iteration that fits machines.
 
 use abbe::identify::IdentifyError;
-use abbe::identify::least_squares::{LeastSquares, Scaling, minimise};
-use abbe::identify::triangle::Triangle;
+use abbe::identify::numerics::least_squares::{LeastSquares, Scaling, minimise};
+use abbe::identify::numerics::triangle::Triangle;
 use nalgebra::{Const, SVector};
 use num_dual::{Derivative, DualNum, DualSVec64};
 

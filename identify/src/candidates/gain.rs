@@ -7,12 +7,13 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use super::chi_square_tail::{ln_chi_square_tail, most_evidence};
 use super::moments::{FoldMoments, Moments};
-use super::observable::{ObservableSubspace, pseudo_inverse};
 use crate::error::IdentifyError;
+use crate::numerics::gain::ObservableSubspace;
+use crate::numerics::parallel;
+use crate::numerics::symmetric::pseudo_inverse;
+use crate::numerics::tails::{ln_chi_square_tail, most_evidence};
 use faer::{Mat, MatRef};
-use rayon::prelude::*;
 
 /// A model over the base: its base columns and its training folds.
 pub struct TrainedModel<'m> {
@@ -133,7 +134,7 @@ impl<'m> TrainedModel<'m> {
                 base_y[i] += sign * part.base_y[*bi];
             }
         }
-        let inverse = pseudo_inverse(&gram)?;
+        let inverse = pseudo_inverse(gram.as_ref())?;
         let coefficients = (0..m).map(|i| (0..m).map(|j| inverse[(i, j)] * base_y[j]).sum()).collect();
         Ok(TrainedModel { moments, base, folds, inverse, all: None, parts, base_y, coefficients })
     }
@@ -216,7 +217,8 @@ impl<'m> TrainedModel<'m> {
 
     /// The gains of all candidates. `known` are those of the first candidates with the same model.
     pub fn remaining_gains(&self, mut known: Vec<Gain>) -> Vec<Gain> {
-        known.par_extend((known.len()..self.moments.count.len()).into_par_iter().map(|candidate| self.gain(candidate)));
+        let first = known.len();
+        known.extend(parallel::map(self.moments.count.len() - first, &|k| self.gain(first + k)));
         known
     }
 
@@ -224,38 +226,36 @@ impl<'m> TrainedModel<'m> {
     pub fn null_best(&self, costs: &[f64], variance: f64) -> Vec<f64> {
         let draws = self.moments.null_cross.nrows();
         let h = Mat::from_fn(draws, self.base.len(), |d, i| self.moments.null_base[(self.base[i], d)]);
-        let per_chunk: Vec<Vec<f64>> = (0..costs.len())
-            .collect::<Vec<_>>()
-            .par_chunks(64)
-            .map(|chunk| {
-                let mut best = vec![f64::NEG_INFINITY; draws];
-                let mut g = Vec::new();
-                for &candidate in chunk.iter().filter(|candidate| costs[**candidate].is_finite()) {
-                    let beside = self.beside(candidate);
-                    let (d, _, own) = self.projected_with(candidate, &beside);
-                    let inverse = ObservableSubspace::of(&d, &own);
-                    let freedom = self.freedom(candidate, inverse.freedom);
-                    if freedom == 0 {
+        const AT_ONCE: usize = 64;
+        let per_chunk: Vec<Vec<f64>> = parallel::map(costs.len().div_ceil(AT_ONCE), &|chunk| {
+            let mut best = vec![f64::NEG_INFINITY; draws];
+            let mut g = Vec::new();
+            let of_chunk = chunk * AT_ONCE..((chunk + 1) * AT_ONCE).min(costs.len());
+            for candidate in of_chunk.filter(|candidate| costs[*candidate].is_finite()) {
+                let beside = self.beside(candidate);
+                let (d, _, own) = self.projected_with(candidate, &beside);
+                let inverse = ObservableSubspace::of(&d, &own);
+                let freedom = self.freedom(candidate, inverse.freedom);
+                if freedom == 0 {
+                    continue;
+                }
+                let (first, count) = (self.moments.first[candidate], self.moments.count[candidate]);
+                let modelled = &h * beside.all_solved();
+                for draw in 0..draws {
+                    g.clear();
+                    let left = |k: usize| self.moments.null_cross[(draw, first + k)] - modelled[(draw, k)];
+                    g.extend((0..count).map(left));
+                    let gain = inverse.quadratic(&g) / variance;
+                    // The tail is computed only if it can exceed the best score.
+                    if most_evidence(gain, freedom) - costs[candidate] <= best[draw] {
                         continue;
                     }
-                    let (first, count) = (self.moments.first[candidate], self.moments.count[candidate]);
-                    let modelled = &h * beside.all_solved();
-                    for draw in 0..draws {
-                        g.clear();
-                        let left = |k: usize| self.moments.null_cross[(draw, first + k)] - modelled[(draw, k)];
-                        g.extend((0..count).map(left));
-                        let gain = inverse.quadratic(&g) / variance;
-                        // The tail is computed only if it can exceed the best score.
-                        if most_evidence(gain, freedom) - costs[candidate] <= best[draw] {
-                            continue;
-                        }
-                        let score = -ln_chi_square_tail(gain, freedom) - costs[candidate];
-                        best[draw] = best[draw].max(score);
-                    }
+                    let score = -ln_chi_square_tail(gain, freedom) - costs[candidate];
+                    best[draw] = best[draw].max(score);
                 }
-                best
-            })
-            .collect();
+            }
+            best
+        });
         let mut best = vec![f64::NEG_INFINITY; draws];
         for chunk in per_chunk {
             best.iter_mut().zip(chunk).for_each(|(b, c)| *b = b.max(c));

@@ -2,12 +2,10 @@
 //! in addition to a model. A plan and a trace use them.
 
 pub(crate) mod candidate;
-pub(crate) mod chi_square_tail;
 pub(crate) mod columns;
 pub(crate) mod gain;
 pub mod library;
 pub(crate) mod moments;
-pub(crate) mod observable;
 mod sampling;
 pub(crate) mod step_table;
 pub(crate) mod tuned;

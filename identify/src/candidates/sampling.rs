@@ -55,7 +55,7 @@ impl Sampling {
                 if !readings.run.is_empty() && column.len() > 1 {
                     let mut steps: Vec<f64> =
                         column.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 1e-9).collect();
-                    sampling.step[axis] = sampling.step[axis].max(crate::outliers::median(&mut steps));
+                    sampling.step[axis] = sampling.step[axis].max(crate::numerics::median(&mut steps));
                 }
             }
             let last = readings.time_s.iter().copied().fold(0.0, f64::max);

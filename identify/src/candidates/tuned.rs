@@ -9,7 +9,7 @@ use faer::Mat;
 use super::columns::{Columns, EffectColumns};
 use super::gain::TrainedModel;
 use super::moments::{Moments, transposed_product};
-use super::observable::quadratic_gain;
+use crate::numerics::gain::quadratic_gain;
 
 /// The columns of an effect and their products over the training folds of a model.
 pub struct TunedEffect {

@@ -15,16 +15,15 @@
 
 use abbe_model::chain::Machine;
 
-use super::fault::{Fault, columns, variance_and_correlation};
+use super::fault::{Fault, columns, variance_and_enlargement};
 use super::path::{MovingAxes, Path};
-use super::regression::Regression;
 use super::results::{CircularTest, Diagnosis};
 use super::search::{cyclic, is_separable, is_third_order, spikes, third_order};
 use super::terms::PathRows;
+use crate::noise::outliers;
+use crate::numerics::regression::Regression;
 use crate::results::ParameterResult;
 
-/// Limit for a single outlier, in robust standard deviations.
-const OUTLIER_SIGMA: f64 = 6.0;
 /// Least arc for a diagnosis.
 const MIN_ARC_DEG: f64 = 180.0;
 /// Arc of a full circle.
@@ -84,20 +83,11 @@ impl Decomposition {
 pub(super) fn reject_outliers(machine: &Machine, path: &Path) -> Option<Vec<bool>> {
     let model = Decomposition::of(machine, path).ok()?;
     let residual = &model.regression.residual;
-    let mut sizes: Vec<f64> = residual.iter().map(|r| r.abs()).collect();
-    sizes.sort_by(f64::total_cmp);
-    // The median of |x| for a normal distribution is 0.6745 σ.
-    let limit = OUTLIER_SIGMA * sizes[sizes.len() / 2] / 0.6745;
-    let mut outliers = path.left_out.clone();
-    for (i, value) in residual.iter().enumerate() {
-        let neighbours = [i.checked_sub(1), Some(i + 1)];
-        let alone =
-            neighbours.into_iter().filter_map(|j| residual.get(j?)).all(|other| other.abs() < 0.5 * value.abs());
-        if value.abs() > limit && alone {
-            outliers[model.rows.row[i]] = true;
-        }
+    let mut left_out = path.left_out.clone();
+    for i in outliers::alone(residual) {
+        left_out[model.rows.row[i]] = true;
     }
-    Some(outliers)
+    Some(left_out)
 }
 
 /// Adds the diagnosis and its limitations to a result.
@@ -188,8 +178,8 @@ fn standard(path: &Path, rows: &PathRows, names: &[String; 2], radius_mm: f64) -
 
 /// The standard deviation for the uncertainties, mm.
 fn scatter(rows: &PathRows, regression: &Regression, noise_mm: f64) -> f64 {
-    let (variance, r) = variance_and_correlation(rows, regression);
-    (variance.max(noise_mm * noise_mm) * (1.0 + r) / (1.0 - r)).sqrt()
+    let (variance, enlargement) = variance_and_enlargement(rows, regression);
+    (variance.max(noise_mm * noise_mm) * enlargement).sqrt()
 }
 
 fn report(rows: &PathRows, faults: &[Fault], regression: &Regression, sigma: f64, result: &mut CircularTest) {

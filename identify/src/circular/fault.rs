@@ -1,7 +1,8 @@
 //! A fault as columns of a regression, and the values that follow from its coefficients.
 
-use super::regression::Regression;
 use super::terms::PathRows;
+use crate::noise::enlargement_of_mean;
+use crate::numerics::regression::Regression;
 use crate::results::ParameterResult;
 
 /// A value of a fault: its name, a weight per column, and the conversion from internal units (mm) to its unit.
@@ -48,12 +49,14 @@ pub(super) fn columns(rows: &PathRows, faults: &[Fault]) -> Vec<Vec<f64>> {
     columns
 }
 
-/// Variance of the residual, and the correlation of neighbouring residuals.
-pub(super) fn variance_and_correlation(rows: &PathRows, regression: &Regression) -> (f64, f64) {
+/// Largest correlation of neighbouring residuals.
+const MAX_CORRELATION: f64 = 0.99;
+
+/// Variance of the residual, and the factor on it for the correlation of neighbours.
+pub(super) fn variance_and_enlargement(rows: &PathRows, regression: &Regression) -> (f64, f64) {
     let residual = &regression.residual;
     let sum = regression.sum_of_squares();
     let neighbours: f64 = (1..residual.len()).filter(|i| rows.follows[*i]).map(|i| residual[i] * residual[i - 1]).sum();
     let freedom = residual.len().saturating_sub(regression.beta.len()).max(1);
-    let correlation = if sum > 0.0 { (neighbours / sum).clamp(0.0, 0.99) } else { 0.0 };
-    (sum / freedom as f64, correlation)
+    (sum / freedom as f64, enlargement_of_mean(neighbours, sum, MAX_CORRELATION))
 }

@@ -15,7 +15,7 @@ use abbe_model::session::Test;
 
 use super::path::{MovingAxes, Path};
 use super::results::{CircularTest, DirectionFigures};
-use crate::circle;
+use crate::numerics::circle;
 
 /// A path in polar form: angle, deviation of the length from nominal, nominal length.
 struct PolarPath(Vec<[f64; 3]>);

@@ -9,7 +9,6 @@ mod diagnosis;
 mod fault;
 mod figures;
 mod path;
-mod regression;
 mod results;
 mod search;
 mod terms;

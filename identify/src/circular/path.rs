@@ -11,7 +11,7 @@ use abbe_model::instrument::{InstrumentKind, Station};
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::Test;
 
-use crate::circle;
+use crate::numerics::circle;
 
 /// Least number of readings of a run.
 const MIN_READINGS: usize = 8;

@@ -3,12 +3,11 @@
 //! A fault is significant if `P(χ² ≥ gain / s²)` times the number of candidates is below one in a thousand. `s²` is the
 //! variance of the residual, enlarged for the correlation of neighbours.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF};
-
-use super::fault::{Fault, columns, variance_and_correlation};
+use super::fault::{Fault, columns, variance_and_enlargement};
 use super::path::Path;
-use super::regression::{Orthonormal, Regression};
 use super::terms::PathRows;
+use crate::numerics::regression::Regression;
+use crate::numerics::tails::chi_square_tail;
 use crate::results::ParameterResult;
 
 /// Significance level of a spike or cyclic error.
@@ -49,14 +48,13 @@ pub(super) fn is_separable(rows: &PathRows, faults: &[Fault], fault: &Fault, reg
 
 /// The variance of the gain test: that of the residual, enlarged for the correlation of neighbours.
 fn gain_variance(rows: &PathRows, regression: &Regression) -> f64 {
-    let (variance, r) = variance_and_correlation(rows, regression);
-    variance.max(MIN_MM * MIN_MM) * (1.0 + r) / (1.0 - r)
+    let (variance, enlargement) = variance_and_enlargement(rows, regression);
+    variance.max(MIN_MM * MIN_MM) * enlargement
 }
 
 /// Whether a gain of this many columns is significant after this many candidates.
 fn is_significant(gain: f64, variance: f64, columns: usize, candidates: usize) -> bool {
-    let chance = ChiSquared::new(columns as f64).map_or(1.0, |chi| chi.sf(gain / variance));
-    variance > 0.0 && chance * candidates as f64 <= SIGNIFICANCE
+    variance > 0.0 && chi_square_tail(gain / variance, columns as f64) * candidates as f64 <= SIGNIFICANCE
 }
 
 /// The reversal spikes of each axis, at the width with the largest gain.
@@ -67,7 +65,7 @@ pub(super) fn spikes(
     faults: &[Fault],
     regression: &Regression,
 ) -> Vec<Fault> {
-    let mut basis = Orthonormal::of(&columns(rows, faults));
+    let present = columns(rows, faults);
     let variance = gain_variance(rows, regression);
     let step = path.arc() / (rows.count() as f64 / path.runs.len() as f64);
     let mut found = Vec::new();
@@ -76,7 +74,7 @@ pub(super) fn spikes(
         let best = tried
             .into_iter()
             .filter(|width| *width >= 0.5 * step)
-            .map(|width| (basis.gain(&regression.residual, rows.spikes(axis, width).to_vec()), width))
+            .map(|width| (regression.gain(&present, &rows.spikes(axis, width)), width))
             .max_by(|a, b| a.0.total_cmp(&b.0));
         let Some((gain, width)) = best else { continue };
         if !is_significant(gain, variance, 2, 2 * tried.len()) {
@@ -94,7 +92,7 @@ pub(super) fn spikes(
 
 /// The cyclic error of each axis, at the pitch with the largest gain.
 pub(super) fn cyclic(rows: &PathRows, names: &[String; 2], faults: &[Fault], regression: &Regression) -> Vec<Fault> {
-    let mut basis = Orthonormal::of(&columns(rows, faults));
+    let present = columns(rows, faults);
     let variance = gain_variance(rows, regression);
     let mut found = Vec::new();
     for axis in 0..2 {
@@ -107,10 +105,10 @@ pub(super) fn cyclic(rows: &PathRows, names: &[String; 2], faults: &[Fault], reg
         let tried = (((fastest - slowest) * 4.0).max(0.0) as usize).min(1000);
         let best = (0..tried)
             .map(|k| travel / (slowest + k as f64 / 4.0))
-            .map(|pitch| (basis.gain(&regression.residual, rows.cyclic(axis, pitch).to_vec()), pitch))
+            .map(|pitch| (regression.gain(&present, &rows.cyclic(axis, pitch)), pitch))
             .max_by(|a, b| a.0.total_cmp(&b.0));
         let Some((gain, pitch)) = best else { continue };
-        if variance <= 0.0 || (-0.5 * gain / variance).exp() * (2 * tried) as f64 > SIGNIFICANCE {
+        if !is_significant(gain, variance, 2, 2 * tried) {
             continue;
         }
         // A significant cyclic error has a separate amplitude for each direction of travel.

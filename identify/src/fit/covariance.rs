@@ -4,8 +4,8 @@ use faer::Mat;
 
 use super::Fit;
 use super::quantities::{Quantity, quantities};
+use crate::numerics::rank::Rank;
 use crate::problem::Problem;
-use crate::rank::Rank;
 use crate::results::{Covariance, NullSpace, ParameterResult};
 
 /// Covariance of the reported parameters by the law of propagation of uncertainty, in their order and units. It has the

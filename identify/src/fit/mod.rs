@@ -14,15 +14,14 @@ mod session;
 use std::cell::RefCell;
 
 use faer::Mat;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::error::IdentifyError;
 use crate::heldout::{HeldOut, held_out};
-use crate::least_squares::{LeastSquares, Scaling, minimise};
-use crate::preference::pivot_preference;
+use crate::numerics::least_squares::{LeastSquares, Scaling, minimise};
+use crate::numerics::rank::Rank;
+use crate::numerics::tails::chi_square_tail;
+use crate::numerics::triangle::Triangle;
 use crate::problem::Problem;
-use crate::rank::Rank;
-use crate::triangle::Triangle;
 
 pub(crate) use covariance::{null_space, of_parameters as covariance_of_parameters};
 pub use prepare::{prepare, prepare_with};
@@ -85,35 +84,12 @@ impl LeastSquares for IdentifiableDirections<'_> {
             self.last.replace((beta, triangles));
         }
         let (beta, triangles) = &*self.last.borrow();
-        Ok(in_directions(&whole(self.problem, beta, triangles), self.basis))
+        Ok(self.problem.prior_triangle(beta).merged(triangles).in_directions(self.basis))
     }
 
     fn sum_of_squares(&self, z: &[f64]) -> f64 {
         self.problem.sum_of_squares(&self.beta(z))
     }
-}
-
-/// The triangular factor of all readings and priors.
-pub(crate) fn whole(problem: &Problem, beta: &[f64], triangles: &[Triangle]) -> Triangle {
-    let mut whole = problem.prior_triangle(beta);
-    triangles.iter().for_each(|triangle| whole.merge(triangle));
-    whole
-}
-
-/// The triangular factor of `[J·N | r]` from that of `[J | r]`.
-pub fn in_directions(triangle: &Triangle, basis: &Mat<f64>) -> Triangle {
-    let (r, c, rest) = triangle.parts();
-    let (n, rank) = (basis.nrows(), basis.ncols());
-    let reduced = &r * basis;
-    let rows = Mat::from_fn(n + 1, rank + 1, |i, j| match (i == n, j == rank) {
-        (true, true) => rest.sqrt(),
-        (true, false) => 0.0,
-        (false, true) => c[i],
-        (false, false) => reduced[(i, j)],
-    });
-    let mut result = Triangle::new(rank);
-    result.absorb(rows.as_ref());
-    result
 }
 
 /// Fits a problem, starting from the nominal machine or from given parameters.
@@ -140,18 +116,18 @@ pub(crate) struct Minimum {
 /// If the model cannot be evaluated, or the iterations do not converge.
 pub(crate) fn minimum(problem: &Problem, start: Option<&[f64]>) -> Result<Minimum, IdentifyError> {
     let parameter_count = problem.parameters.list.len();
-    let size: Vec<f64> = problem.parameters.list.iter().map(|parameter| parameter.size).collect();
     let nominal = vec![0.0; parameter_count];
     let triangles = problem.triangles(&nominal)?;
-    let preference = pivot_preference(&problem.parameters.list);
-    let rank = Rank::decide(whole(problem, &nominal, &triangles).parts().0.as_ref(), &size, &preference)?;
+    let rank = problem.parameters.rank(&problem.prior_triangle(&nominal).merged(&triangles))?;
     let restricted =
         IdentifiableDirections { problem, basis: &rank.identifiable_basis, last: RefCell::new((nominal, triangles)) };
     let mut end = None;
     if rank.identifiable_basis.ncols() > 0 {
         let scale = Scaling::Physical(vec![1.0; rank.identifiable_basis.ncols()]);
-        let from =
-            start.map_or_else(|| vec![0.0; rank.identifiable_basis.ncols()], |beta| rank.coordinates(beta, &size));
+        let from = start.map_or_else(
+            || vec![0.0; rank.identifiable_basis.ncols()],
+            |beta| rank.coordinates(beta, &problem.parameters.sizes()),
+        );
         end = Some(restricted.beta(&minimise(&restricted, &from, &scale)?.x));
     }
     let (last, triangles) = restricted.last.into_inner();
@@ -165,12 +141,11 @@ pub(crate) fn minimum(problem: &Problem, start: Option<&[f64]>) -> Result<Minimu
 /// Computes covariance, residuals, cross-validation and χ² at the solution.
 fn finish(problem: &Problem, minimum: Minimum) -> Result<Fit, IdentifyError> {
     let Minimum { beta, triangles, rank } = minimum;
-    let whole = whole(problem, &beta, &triangles);
-    let covariance = parameter_covariance(&whole, &rank.identifiable_basis)?;
+    let whole = problem.prior_triangle(&beta).merged(&triangles);
+    let covariance = whole.covariance(&rank.identifiable_basis)?;
     let residuals = problem.residuals(&beta);
     let held_out = held_out(problem, &beta, &triangles, &whole, &rank.identifiable_basis)?;
-    let zero = vec![0.0; beta.len()];
-    let chi_square: f64 = whole.sum_of_squares_after(&zero);
+    let chi_square = whole.sum_of_squares();
     // Each prior counts as an observation in χ².
     let degrees_of_freedom = (problem.readings() * problem.coordinates() + problem.prior_rows())
         .saturating_sub(rank.identifiable_basis.ncols())
@@ -192,8 +167,7 @@ fn finish(problem: &Problem, minimum: Minimum) -> Result<Fit, IdentifyError> {
 
 /// Factor on the standard uncertainties: the Birge ratio `√(χ²/ν)` if it is significantly above 1, else 1.
 pub(crate) fn u_enlargement(chi_square: f64, free: f64) -> f64 {
-    let significance = ChiSquared::new(free).map(|law| law.sf(chi_square)).unwrap_or(1.0);
-    if significance < BIRGE_SIGNIFICANCE { (chi_square / free).sqrt().max(1.0) } else { 1.0 }
+    if chi_square_tail(chi_square, free) < BIRGE_SIGNIFICANCE { (chi_square / free).sqrt().max(1.0) } else { 1.0 }
 }
 
 /// The warning about enlarged uncertainties, if they are enlarged.
@@ -205,27 +179,4 @@ pub(crate) fn enlargement_warning(enlargement: f64) -> Option<String> {
             enlargement.powi(2)
         )
     })
-}
-
-/// `N (NᵀRᵀRN)⁻¹ Nᵀ`.
-pub(crate) fn parameter_covariance(triangle: &Triangle, basis: &Mat<f64>) -> Result<Mat<f64>, IdentifyError> {
-    let n = basis.nrows();
-    if basis.ncols() == 0 {
-        return Ok(Mat::zeros(n, n));
-    }
-    let (r, _, _) = triangle.parts();
-    let reduced = &r * basis;
-    let svd = reduced.svd().map_err(|_| IdentifyError::Decomposition)?;
-    let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
-    let negligible = singular[0] * 1e-14;
-    let spread = basis * svd.V();
-    let scaled =
-        Mat::from_fn(
-            n,
-            singular.len(),
-            |i, k| {
-                if singular[k] > negligible { spread[(i, k)] / singular[k] } else { 0.0 }
-            },
-        );
-    Ok(&scaled * scaled.transpose())
 }

@@ -8,12 +8,12 @@ use faer::Mat;
 use super::Fit;
 use crate::error::IdentifyError;
 use crate::heldout::rms_mm;
+use crate::noise::outliers;
 use crate::noise::{Noise, NoiseSource, PureError};
-use crate::outliers;
+use crate::numerics::triangle::Triangle;
 use crate::parameters::Role;
 use crate::plausibility;
 use crate::problem::Problem;
-use crate::triangle::Triangle;
 
 /// Start value of the noise standard deviation if neither session nor repeats give one: 1 µm.
 const START_NOISE_MM: f64 = 1e-3;
@@ -79,20 +79,14 @@ pub fn prepare_with<'a>(session: &'a Session, effects: &[Effect], seed: u64) -> 
 fn nominal_residual_mm(problem: &Problem) -> Result<f64, IdentifyError> {
     let list = &problem.parameters.list;
     let nominal = vec![0.0; list.len()];
-    let mut whole = Triangle::new(list.len());
-    for triangle in problem.triangles(&nominal)? {
-        whole.merge(&triangle);
-    }
-    let (r, c, rest) = whole.parts();
+    let (r, c, rest) = Triangle::new(list.len()).merged(&problem.triangles(&nominal)?).parts();
     let setups: Vec<usize> = (0..list.len()).filter(|j| list[*j].role == Role::Setup).collect();
     let rows = Mat::from_fn(list.len(), setups.len() + 1, |i, j| match setups.get(j) {
         Some(setup) => r[(i, *setup)],
         None => c[i],
     });
-    let mut setup_factor = Triangle::new(setups.len());
-    setup_factor.absorb(rows.as_ref());
     let count = (problem.readings() * problem.coordinates()) as f64;
-    let sum_of_squares = setup_factor.parts().2 + rest;
+    let sum_of_squares = Triangle::of(rows).parts().2 + rest;
     Ok((sum_of_squares / count.max(1.0)).sqrt() * problem.noise.sigma_mm)
 }
 

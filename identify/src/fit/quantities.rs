@@ -1,9 +1,9 @@
 //! The quantities that a fit reports: identifiable parameters, and amplitude and phase of harmonics.
 
 use super::Fit;
+use crate::numerics::rank::Rank;
 use crate::parameters::Role;
 use crate::problem::Problem;
-use crate::rank::Rank;
 
 /// A reported quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

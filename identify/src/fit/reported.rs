@@ -7,10 +7,10 @@ use super::{Fit, covariance, enlargement_warning};
 use crate::circular;
 use crate::heldout::{mislabelled_runs, rms_mm};
 use crate::noise;
+use crate::numerics::rank::Rank;
 use crate::parameter_description::parameter_meaning;
 use crate::plausibility;
 use crate::problem::Problem;
-use crate::rank::Rank;
 use crate::results::{FitResult, Outlier, ParameterResult, Unobservable, phases_follow_amplitudes};
 
 /// The fit in its reported form.

@@ -22,7 +22,7 @@ use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::sensitivity::TestModel;
 use num_dual::{Derivative, DualNum, DualSVec64};
 
-use crate::circle;
+use crate::numerics::circle;
 
 /// Tolerance of other axes' nominal motion and of directions, mm or rad.
 const MOTION_TOLERANCE: f64 = 1e-6;

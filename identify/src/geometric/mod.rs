@@ -23,6 +23,8 @@ pub use centre::{Centre, CircleGeometry};
 pub use compare::{CentreResult, Comparison, ComparisonRow, compare};
 
 use crate::error::IdentifyError;
+use crate::numerics::solve::Directions;
+use crate::numerics::tolerances::COLLINEAR;
 use crate::parameters::Role;
 use crate::problem::{Problem, RowBlock};
 use abbe_model::session::Prior;
@@ -115,12 +117,11 @@ impl Estimator {
             // An angle moves a centre by its lever. The physical sizes make radians times 100 mm comparable with mm.
             sensitivities[(i, errors[k])] * problem.parameters.list[errors[k]].size
         });
-        let svd = of_errors.svd().map_err(|_| IdentifyError::Decomposition)?;
-        let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
-        let rank = singular.iter().filter(|s| **s > 1e-6 * singular[0]).count();
+        let directions = Directions::of(of_errors.as_ref())?;
+        let rank = directions.rank(COLLINEAR);
         if rank < errors.len() {
             let confounded: Vec<&str> = (0..errors.len())
-                .filter(|k| (rank..errors.len()).any(|j| svd.V()[(*k, j)].abs() > 1e-3))
+                .filter(|k| (rank..errors.len()).any(|j| directions.right()[(*k, j)].abs() > 1e-3))
                 .map(|k| problem.parameters.list[errors[k]].id.as_str())
                 .collect();
             return Err(refuse(format!(
@@ -129,9 +130,9 @@ impl Estimator {
                 confounded.join(", ")
             )));
         }
+        let inverse = directions.pseudo_inverse();
         let inverse = Mat::from_fn(errors.len(), sensitivities.nrows(), |k, i| {
-            let sum: f64 = (0..errors.len()).map(|j| svd.V()[(k, j)] * svd.U()[(i, j)] / singular[j]).sum();
-            sum * problem.parameters.list[errors[k]].size
+            inverse[(k, i)] * problem.parameters.list[errors[k]].size
         });
         Ok(Estimator { method, tests, geometries, errors, sensitivities, inverse })
     }

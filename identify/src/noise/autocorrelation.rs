@@ -121,6 +121,13 @@ pub struct Autocorrelation {
     pub inflation: f64,
 }
 
+/// Factor on the variance of a mean if neighbouring values are correlated: `(1 + r)/(1 − r)`. `r` is the sum of the
+/// products of neighbours over the sum of their squares, from 0 to `most`.
+pub(crate) fn enlargement_of_mean(products: f64, squares: f64, most: f64) -> f64 {
+    let correlation = if squares > 0.0 { (products / squares).clamp(0.0, most) } else { 0.0 };
+    (1.0 + correlation) / (1.0 - correlation)
+}
+
 /// Coefficients from autocovariances (Durbin–Levinson). The last coefficient of each order is its partial
 /// autocorrelation.
 fn autoregression(covariance: &[f64; MAX_ORDER + 1], most: usize, insignificant: f64) -> Vec<f64> {

@@ -11,6 +11,7 @@
 //! deviations.
 
 mod autocorrelation;
+pub mod outliers;
 mod stated;
 mod trends;
 mod waves;
@@ -19,6 +20,7 @@ use abbe_model::session::Test;
 use abbe_model::session::readings::Readings;
 
 pub use autocorrelation::Autocorrelation;
+pub(crate) use autocorrelation::enlargement_of_mean;
 pub use stated::stated_against_repeats;
 use trends::Trends;
 

@@ -1,8 +1,7 @@
 //! Comparison of the stated noise with the noise of repeats.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF};
-
 use super::PureError;
+use crate::numerics::tails::chi_square_tails;
 use crate::problem::Problem;
 
 /// Ratio beyond which stated noise and noise of repeats disagree.
@@ -19,8 +18,8 @@ pub fn stated_against_repeats(problem: &Problem, residuals: &[Vec<f64>]) -> Opti
     let resolution_mm = problem.session.resolution_mm.unwrap_or(0.0) / 12.0_f64.sqrt();
     let ratio = sigma_mm.max(resolution_mm) / stated_mm;
     let freedom = pure.freedom as f64;
-    let below = ChiSquared::new(freedom).ok()?.cdf(freedom * ratio * ratio);
-    let by_chance = below.min(1.0 - below) > DISAGREEMENT_P / 2.0;
+    let [below, above] = chi_square_tails(freedom * ratio * ratio, freedom)?;
+    let by_chance = below.min(above) > DISAGREEMENT_P / 2.0;
     (!by_chance && !(1.0 / DISAGREEMENT_RATIO..=DISAGREEMENT_RATIO).contains(&ratio)).then(|| {
         format!(
             "the session states a noise of {} µm, and the repeatability is {:.3} µm ({} degrees of freedom): the uncertainties of a fit follow from \

@@ -11,7 +11,7 @@ use statrs::function::gamma::gamma_ur;
 
 use super::trends::MIN_RUN;
 use super::{Autocorrelation, PureError};
-use crate::outliers::median;
+use crate::numerics::median;
 
 /// Half cycles along a run at which the candidate bands begin, and the widths of the bands in half cycles.
 const FIRST: std::ops::RangeInclusive<usize> = 2..=40;

@@ -14,7 +14,7 @@
 
 use faer::Mat;
 
-use super::linear::{Linearisation, is_of_interest, marginal, prior_u};
+use super::linear::{Linearisation, is_of_interest, prior_u};
 use super::ranking::largest_first;
 use super::results::{Contribution, CorrelatedWith};
 use crate::error::IdentifyError;
@@ -46,7 +46,7 @@ pub fn budget(problem: &Problem, linear: &Linearisation, error: usize) -> Vec<Co
 
 /// `‖R·Cov·e‖²`, with `R` the triangular factor of the readings alone.
 fn noise_variance(linear: &Linearisation, error: usize) -> f64 {
-    let (r, _, _) = linear.readings.parts();
+    let r = linear.readings.r();
     let n = r.ncols();
     (0..n).map(|i| (i..n).map(|j| r[(i, j)] * linear.covariance[(j, error)]).sum::<f64>().powi(2)).sum()
 }
@@ -82,6 +82,6 @@ pub fn correlation(covariance: &Mat<f64>, i: usize, j: usize) -> f64 {
 /// # Errors
 /// If the decomposition fails.
 pub fn conditional_u(linear: &Linearisation, of_interest: &[usize]) -> Result<Vec<f64>, IdentifyError> {
-    let r = marginal(linear.whole.parts().0.as_ref(), of_interest, &linear.size)?;
+    let r = linear.marginal(of_interest)?;
     Ok((0..of_interest.len()).map(|j| 1.0 / (0..=j).map(|i| r[(i, j)].powi(2)).sum::<f64>().sqrt()).collect())
 }

@@ -1,16 +1,15 @@
 //! The information of every candidate test, evaluated once.
 
-use rayon::prelude::*;
-
 use super::candidate_tests::CandidateTest;
 use super::information::{Root, SharedParameters, sum};
-use super::linear::{Linearisation, merged};
+use super::linear::Linearisation;
 use super::ranking::smallest_first;
 use super::test_variations::TestVariations;
 use crate::error::IdentifyError;
+use crate::numerics::parallel;
+use crate::numerics::triangle::Triangle;
 use crate::parameters::{Parameter, Role};
 use crate::problem::Problem;
-use crate::triangle::Triangle;
 
 /// The information of every candidate test on the shared parameters.
 pub struct PreparedCandidates {
@@ -49,10 +48,8 @@ impl PreparedCandidates {
         let shared = SharedParameters::of(problem, &kept, targets);
         let linear = Linearisation::of(problem, beta)?;
         let base = shared.root_of(problem, &linear)?;
-        let ready: Vec<Vec<CandidateInformation>> = tests
-            .into_par_iter()
-            .map(|candidate| ready(problem, &shared, candidate, variations))
-            .collect::<Result<_, IdentifyError>>()?;
+        let ready = parallel::map(tests.len(), &|k| ready(problem, &shared, &tests[k], variations));
+        let ready: Vec<Vec<CandidateInformation>> = ready.into_iter().collect::<Result<_, IdentifyError>>()?;
         Ok(PreparedCandidates { shared, base, candidates: ready.into_iter().flatten().collect() })
     }
 
@@ -70,7 +67,7 @@ impl PreparedCandidates {
 
     /// A figure of the information with each candidate test added.
     pub fn figures<T: Send>(&self, root: &Root, figure: &(impl Fn(&Root) -> T + Sync)) -> Vec<T> {
-        (0..self.candidates.len()).into_par_iter().map(|candidate| figure(&self.added(root, candidate))).collect()
+        parallel::map(self.candidates.len(), &|candidate| figure(&self.added(root, candidate)))
     }
 
     /// The candidate test with the smallest figure, and the figures of all. Of equal tests the first counts. Mounted
@@ -99,7 +96,7 @@ fn may_be_shared(problem: &Problem, parameter: &Parameter) -> bool {
 fn ready(
     problem: &Problem,
     shared: &SharedParameters,
-    candidate: CandidateTest,
+    candidate: &CandidateTest,
     variations: &TestVariations,
 ) -> Result<Vec<CandidateInformation>, IdentifyError> {
     let mut session = abbe_model::session::Session::clone(&problem.session);
@@ -114,8 +111,7 @@ fn ready(
         alone.add_effect(effect)?;
     }
     let nominal = vec![0.0; alone.parameters.list.len()];
-    let triangle = merged(Triangle::new(nominal.len()), alone.triangles(&nominal)?.iter());
-    let r = triangle.parts().0;
+    let r = Triangle::new(nominal.len()).merged(&alone.triangles(&nominal)?).r();
     let mut ready = Vec::new();
     let last = problem.tests.last().filter(|last| {
         variations.keep_spindle_ball && last.station.tool_point_mm() == candidate.test.station.tool_point_mm()
@@ -133,6 +129,6 @@ fn ready(
         ready.push(CandidateInformation { test: candidate, root });
     }
     let root = shared.root_of_test(&alone, r.as_ref(), str::to_string);
-    ready.insert(0, CandidateInformation { test: candidate, root });
+    ready.insert(0, CandidateInformation { test: candidate.clone(), root });
     Ok(ready)
 }

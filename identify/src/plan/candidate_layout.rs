@@ -18,6 +18,7 @@ const MIN_RADIUS_MM: f64 = 10.0;
 const MIN_FOLLOWING_MM: f64 = 49.0;
 
 /// A candidate test without its states.
+#[derive(Clone)]
 pub(super) struct Draft {
     /// The test without its states.
     pub test: Test,

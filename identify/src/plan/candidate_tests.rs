@@ -11,12 +11,12 @@ use std::sync::Arc;
 use abbe_model::axis::AxisKind;
 use abbe_model::instrument::Station;
 use abbe_model::session::{Session, Test};
-use rayon::prelude::*;
 
 use super::candidate_layout::{Draft, drafts};
 use super::states;
 use super::test_variations::TestVariations;
 use crate::error::IdentifyError;
+use crate::numerics::parallel;
 use crate::parameters::Role;
 use crate::problem::Problem;
 
@@ -55,8 +55,8 @@ pub fn candidate_tests(session: &Session, variations: &TestVariations) -> Result
         ));
     };
     let drafts = drafts(session, variations, last);
-    let tests: Vec<CandidateTest> =
-        drafts.into_par_iter().filter_map(|draft| finished(session, variations, draft)).collect();
+    let finished = parallel::map(drafts.len(), &|k| finished(session, variations, drafts[k].clone()));
+    let tests: Vec<CandidateTest> = finished.into_iter().flatten().collect();
     if tests.is_empty() {
         return Err(IdentifyError::Request(
             "no candidate test is feasible on this machine: no bar reaches, or the travel is too short".to_string(),

@@ -4,6 +4,7 @@ use faer::Mat;
 
 use super::information::{Root, SharedParameters};
 use super::linear::is_of_interest;
+use crate::numerics::solve::Directions;
 use crate::parameters::{Parameter, Role};
 use crate::problem::Problem;
 
@@ -57,10 +58,7 @@ pub fn separation(shared: &SharedParameters, root: &Root, coefficients: &[f64]) 
     }
     let one = 1.0 / shared.display_per_internal[first];
     let square = Mat::from_fn(shared.targets, shared.targets, |i, j| block[(i, j)] * one);
-    match square.svd() {
-        Ok(svd) => svd.S().column_vector().iter().copied().fold(f64::INFINITY, f64::min),
-        Err(_) => 0.0,
-    }
+    Directions::of(square.as_ref()).map_or(0.0, |found| found.singular_values.last().copied().unwrap_or(f64::INFINITY))
 }
 
 /// A figure as it is reported. Larger separations are better.

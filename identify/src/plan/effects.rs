@@ -14,16 +14,17 @@ use std::collections::{BTreeMap, HashMap};
 use abbe_model::effect::shape::Harmonic;
 use abbe_model::effect::{Effect, Shape};
 use faer::{Mat, MatRef};
-use nalgebra::DMatrix;
-use rayon::prelude::*;
 
-use super::detectability::{POWER, SIGNIFICANCE, corrected, noncentrality};
+use super::detectability::{POWER, SIGNIFICANCE, corrected};
 use super::linear::{Linearisation, is_of_interest};
 use super::ranking::{largest_first, smallest_first};
 use super::results::{Bias, EffectDetectability, EffectsAnalysis};
 use crate::candidates::columns::{Columns, EffectColumns, chunked};
 use crate::candidates::library::{self, LibraryEffect};
 use crate::error::IdentifyError;
+use crate::numerics::parallel;
+use crate::numerics::power::noncentrality;
+use crate::numerics::symmetric::Symmetric;
 use crate::parameters::physical_size;
 use crate::problem::Problem;
 use crate::unit::Unit;
@@ -67,36 +68,36 @@ pub fn effects(problem: &Problem) -> Result<EffectsAnalysis, IdentifyError> {
         .unzip();
     let significance_corrected = corrected(searched);
     let thresholds: Vec<[f64; 2]> = (0..=MAX_COEFFICIENTS)
-        .map(|k| [noncentrality(k.max(1), SIGNIFICANCE), noncentrality(k.max(1), significance_corrected)])
+        .map(|k| [SIGNIFICANCE, significance_corrected].map(|level| noncentrality(k.max(1), level, POWER)))
         .collect();
     let chunks = chunked(&column_sets.iter().collect::<Vec<_>>());
-    let judged: Vec<Vec<EffectDetectability>> = chunks
-        .into_par_iter()
-        .map(|chunk| {
-            let chosen: Vec<&EffectColumns> = column_sets[chunk.clone()].iter().collect();
-            let width: usize = chosen.iter().map(|column_set| column_set.count).sum();
-            let mut block = Mat::zeros(columns.rows(), width);
-            columns.fill(&chosen, block.as_mut());
-            let cross = model.as_ref().subcols(0, nominal.len()).transpose() * &block;
-            let moved = &linear.covariance * &cross;
-            let mut start = 0;
-            chunk
-                .map(|index| {
-                    let count = column_sets[index].count;
-                    let range = start..start + count;
-                    start = range.end;
-                    let name = &families[candidates[index].family].name;
-                    let products = EffectProjection {
-                        own: block.subcols(range.start, count),
-                        cross: cross.subcols(range.start, count),
-                        moved: moved.subcols(range.start, count),
-                    };
-                    let greatest = column_sets[index].greatest();
-                    judge(problem, &candidates[index], name, &products, greatest, &thresholds[count])
-                })
-                .collect()
-        })
-        .collect();
+    let judged: Vec<Vec<EffectDetectability>> = parallel::map(chunks.len(), &|number| {
+        let chunk = chunks[number].clone();
+        let chosen: Vec<&EffectColumns> = column_sets[chunk.clone()].iter().collect();
+        let width: usize = chosen.iter().map(|column_set| column_set.count).sum();
+        let mut block = Mat::zeros(columns.rows(), width);
+        columns.fill(&chosen, block.as_mut());
+        let cross = model.as_ref().subcols(0, nominal.len()).transpose() * &block;
+        let moved = &linear.covariance * &cross;
+        let mut start = 0;
+        chunk
+            .map(|index| {
+                let count = column_sets[index].count;
+                let range = start..start + count;
+                start = range.end;
+                let name = &families[candidates[index].family].name;
+                let products = EffectProjection {
+                    own: block.subcols(range.start, count),
+                    cross: cross.subcols(range.start, count),
+                    moved: moved.subcols(range.start, count),
+                };
+                let greatest = column_sets[index].greatest();
+                judge(problem, &candidates[index], name, &products, greatest, &thresholds[count])
+            })
+            .collect()
+    })
+    .into_iter()
+    .collect::<Result<_, IdentifyError>>()?;
     Ok(EffectsAnalysis {
         significance_level: SIGNIFICANCE,
         power: POWER,
@@ -138,7 +139,7 @@ fn judge(
     products: &EffectProjection<'_>,
     greatest: f64,
     threshold: &[f64; 2],
-) -> EffectDetectability {
+) -> Result<EffectDetectability, IdentifyError> {
     let session = &problem.session;
     let effect = &candidate.effect;
     let unit = Unit::of_effect(session, effect, 0);
@@ -149,25 +150,21 @@ fn judge(
         Some(inside) => physical_size(inside),
         None => 0.1,
     };
-    let own = gram(products.own, products.own);
-    let left = &own - gram(products.cross, products.moved);
-    let symmetric = 0.5 * (&left + left.transpose());
-    let eigen = symmetric.symmetric_eigen();
-    let worst = eigen.eigenvalues.imin();
-    let weakest = eigen.eigenvalues[worst].max(0.0);
-    let strongest = eigen.eigenvalues.max().max(0.0);
+    let own = products.own.transpose() * products.own;
+    let left = &own - products.cross.transpose() * products.moved;
+    let decomposed = Symmetric::of(left.as_ref())?;
+    let [weakest, strongest] = decomposed.extremes().map(|value| value.max(0.0));
     // Of several equally weak phases, the one with the least surviving share counts, so that rounding does not decide.
-    let equally_weak: Vec<usize> =
-        (0..eigen.eigenvalues.len()).filter(|k| eigen.eigenvalues[*k] <= weakest + EQUAL_WITHIN * strongest).collect();
-    let phases = eigen.eigenvectors.select_columns(&equally_weak);
-    let whole = (phases.transpose() * &own * &phases).symmetric_eigen().eigenvalues.max();
+    let equally_weak = decomposed.values.iter().filter(|value| **value <= weakest + EQUAL_WITHIN * strongest).count();
+    let phases = decomposed.vectors.subcols(0, equally_weak);
+    let [_, whole] = Symmetric::of((phases.transpose() * &own * phases).as_ref())?.extremes();
     let surviving_share = if whole > 0.0 { (weakest / whole).clamp(0.0, 1.0) } else { 0.0 };
     let amplitude = |threshold: f64| {
         let amplitude = (threshold / weakest).sqrt();
         (amplitude <= size).then_some(amplitude * unit.display_per_internal)
     };
     let detectable = amplitude(threshold[0]);
-    let largest_own = own.clone().symmetric_eigen().eigenvalues.max();
+    let [_, largest_own] = Symmetric::of(own.as_ref())?.extremes();
     let confounded = surviving_share < CONFOUNDED_BELOW || detectable.is_none();
     let verdict = if largest_own * size * size < 1.0 {
         "no signal"
@@ -178,7 +175,7 @@ fn judge(
     } else {
         "confounded"
     };
-    EffectDetectability {
+    Ok(EffectDetectability {
         id: effect.id(),
         family: family.to_string(),
         unit: unit.name.clone(),
@@ -187,13 +184,7 @@ fn judge(
         residual_share: surviving_share,
         verdict: verdict.to_string(),
         biases: biases(problem, products.moved, &unit),
-    }
-}
-
-/// `AᵀB`.
-fn gram(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
-    let product = a.transpose() * b;
-    DMatrix::from_fn(product.nrows(), product.ncols(), |i, j| product[(i, j)])
+    })
 }
 
 fn biases(problem: &Problem, moved: MatRef<'_, f64>, unit: &Unit) -> Vec<Bias> {

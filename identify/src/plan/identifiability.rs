@@ -3,13 +3,15 @@
 
 use faer::Mat;
 
-use super::linear::{Linearisation, is_of_interest, marginal};
+use super::linear::{Linearisation, is_of_interest};
 use super::ranking::smallest_first;
 use super::results::{DeterminedByPrior, NearDependency};
 use crate::error::IdentifyError;
+use crate::numerics::null_space::{combinations, echelon};
+use crate::numerics::rank::Rank;
+use crate::numerics::solve::Directions;
 use crate::parameters::{Parameter, Role};
 use crate::problem::Problem;
-use crate::rank::{Rank, combinations};
 use crate::results::Unobservable;
 
 /// Coefficients below this value, relative to the largest, are rounding errors.
@@ -130,8 +132,8 @@ fn in_display_units(problem: &Problem, row: &[f64], pivot: usize) -> Vec<(String
 /// If the decomposition fails.
 pub fn determined_by_prior(problem: &Problem, linear: &Linearisation) -> Result<Vec<DeterminedByPrior>, IdentifyError> {
     let list = &problem.parameters.list;
-    let r = linear.readings.parts().0;
-    let alone = Rank::decide(r.as_ref(), &linear.size, &linear.preference)?;
+    let r = linear.readings.r();
+    let alone = Rank::decide(&linear.readings, &linear.size, &linear.preference)?;
     let (errors, setups): (Vec<usize>, Vec<usize>) =
         (linear.preference.iter()).partition(|j| is_of_interest(&list[**j]));
     let order = [errors, setups].concat();
@@ -203,24 +205,23 @@ pub fn nearly_collinear(
 ) -> Result<Vec<NearDependency>, IdentifyError> {
     let list = &problem.parameters.list;
     let identifiable: Vec<usize> = of_interest.iter().copied().filter(|j| linear.rank.is_identifiable(*j)).collect();
-    let r = marginal(linear.whole.parts().0.as_ref(), &identifiable, &linear.size)?;
+    let r = linear.marginal(&identifiable)?;
     let n = identifiable.len();
     let norm: Vec<f64> =
         (0..n).map(|j| (0..n).map(|i| r[(i, j)].powi(2)).sum::<f64>().sqrt().max(f64::MIN_POSITIVE)).collect();
     let unit = Mat::from_fn(n, n, |i, j| r[(i, j)] / norm[j]);
-    let svd = unit.svd().map_err(|_| IdentifyError::Decomposition)?;
-    let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
+    let decomposed = Directions::of(unit.as_ref())?;
+    let singular = &decomposed.singular_values;
     // Equal singular values share a subspace, and the decomposition returns an arbitrary basis of it. The reduced basis
     // is unique.
+    let order: Vec<usize> = (0..n).collect();
     let mut directions: Vec<(f64, Vec<f64>)> = Vec::new();
     let mut first = 0;
     while first < n {
-        let equal = (first..n).take_while(|k| smallest_first(singular[first], singular[*k]).is_eq());
-        let equal: Vec<usize> = equal.collect();
-        let rows = equal.iter().map(|k| (0..n).map(|j| svd.V()[(j, *k)]).collect()).collect();
-        let condition_index = singular[0] / singular[first];
-        directions.extend(reduced(rows).into_iter().map(|row| (condition_index, row)));
-        first += equal.len().max(1);
+        let equal = (first..n).take_while(|k| smallest_first(singular[first], singular[*k]).is_eq()).count().max(1);
+        let (rows, _) = echelon(decomposed.right().subcols(first, equal), &order, NEGLIGIBLE);
+        directions.extend(rows.into_iter().map(|row| (singular[0] / singular[first], row)));
+        first += equal;
     }
     let mut found = Vec::new();
     for (condition_index, direction) in directions {
@@ -246,48 +247,4 @@ pub fn nearly_collinear(
         found.push(NearDependency { condition_index, combination, why });
     }
     Ok(found)
-}
-
-/// The reduced row echelon form of independent rows, with pivots in column order.
-fn reduced(mut rows: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
-    let width = rows.first().map_or(0, Vec::len);
-    let mut done = 0;
-    for column in 0..width {
-        let pivot = (done..rows.len())
-            .filter(|row| rows[*row][column].abs() > NEGLIGIBLE)
-            .min_by(|a, b| smallest_first(-rows[*a][column].abs(), -rows[*b][column].abs()));
-        let Some(pivot) = pivot else { continue };
-        rows.swap(done, pivot);
-        let leading = rows[done][column];
-        rows[done].iter_mut().for_each(|value| *value /= leading);
-        let pivot_row = rows[done].clone();
-        for (row, other) in rows.iter_mut().enumerate() {
-            if row != done {
-                let factor = other[column];
-                subtract(other, factor, &pivot_row);
-            }
-        }
-        done += 1;
-    }
-    rows
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn all_bases_of_a_subspace_reduce_to_the_same_rows() {
-        let plane = [[1.0, 0.0, 2.0, -1.0], [0.0, 1.0, 0.5, 3.0]];
-        for turn in 0..16 {
-            let (sin, cos) = (0.3 + f64::from(turn)).sin_cos();
-            let mixed = |a: f64, b: f64| (0..4).map(|j| a * plane[0][j] + b * plane[1][j]).collect();
-            let rows = reduced(vec![mixed(cos, sin), mixed(-sin, cos)]);
-            for (row, expected) in rows.iter().zip(plane) {
-                for (value, expected) in row.iter().zip(expected) {
-                    assert!((value - expected).abs() < 1e-12, "{turn}: {rows:?}");
-                }
-            }
-        }
-    }
 }

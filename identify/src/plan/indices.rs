@@ -10,9 +10,10 @@
 
 use faer::{Mat, MatRef};
 
-use super::linear::{Linearisation, marginal};
+use super::linear::Linearisation;
 use super::results::Indices;
 use crate::error::IdentifyError;
+use crate::numerics::solve::Directions;
 
 /// The indices of a plan.
 ///
@@ -30,7 +31,7 @@ pub fn indices(
     if m == 0 {
         return Ok(Indices { error_count: errors, condition_number: f64::INFINITY, ..Indices::default() });
     }
-    let r = marginal(linear.whole.parts().0.as_ref(), &identifiable, &linear.size)?;
+    let r = linear.marginal(&identifiable)?;
     let size: Vec<f64> = identifiable.iter().map(|j| linear.size[*j]).collect();
     Ok(Indices { error_count: errors, g_efficiency, ..of_triangle(r.as_ref(), &size, readings)? })
 }
@@ -40,12 +41,12 @@ pub fn indices(
 fn of_triangle(r: MatRef<'_, f64>, size: &[f64], readings: usize) -> Result<Indices, IdentifyError> {
     let m = size.len();
     let scaled = Mat::from_fn(m, m, |i, j| r[(i, j)] * size[j]);
-    let sigma = singular_values(scaled.as_ref())?;
+    let sigma = Directions::of(scaled.as_ref())?.singular_values;
     let (first, last) = (sigma[0], sigma[m - 1]);
     let mean_log = sigma.iter().map(|s| s.ln()).sum::<f64>() / m as f64;
     let norm: Vec<f64> = (0..m).map(|j| (0..m).map(|i| r[(i, j)].powi(2)).sum::<f64>().sqrt()).collect();
     let unit = Mat::from_fn(m, m, |i, j| r[(i, j)] / norm[j]);
-    let lambda: Vec<f64> = singular_values(unit.as_ref())?.iter().map(|s| s * s).collect();
+    let lambda: Vec<f64> = Directions::of(unit.as_ref())?.singular_values.iter().map(|s| s * s).collect();
     let count = m as f64;
     Ok(Indices {
         identifiable_count: m,
@@ -60,11 +61,6 @@ fn of_triangle(r: MatRef<'_, f64>, size: &[f64], readings: usize) -> Result<Indi
         e_efficiency: lambda.last().copied().unwrap_or(0.0),
         ..Indices::default()
     })
-}
-
-fn singular_values(matrix: MatRef<'_, f64>) -> Result<Vec<f64>, IdentifyError> {
-    let svd = matrix.thin_svd().map_err(|_| IdentifyError::Decomposition)?;
-    Ok(svd.S().column_vector().iter().copied().collect())
 }
 
 #[cfg(test)]

@@ -9,10 +9,11 @@ use std::collections::HashMap;
 use abbe_model::session::Prior;
 use faer::{Mat, MatRef};
 
-use super::linear::{Linearisation, marginal};
+use super::linear::Linearisation;
 use crate::error::IdentifyError;
+use crate::numerics::reduction::inverse_of_upper;
+use crate::numerics::triangle::upper;
 use crate::problem::Problem;
-use crate::triangle::upper;
 
 /// The parameters that tests share, in column order. The target parameters are last.
 #[derive(Clone, Debug)]
@@ -68,7 +69,7 @@ impl SharedParameters {
             .map(|id| index.get(id.as_str()).copied())
             .collect::<Option<Vec<usize>>>()
             .ok_or_else(|| IdentifyError::Request("a parameter does not belong to this plan".to_string()))?;
-        let root = marginal(linear.whole.parts().0.as_ref(), &columns, &linear.size)?;
+        let root = linear.marginal(&columns)?;
         Ok(self.regularised(&root))
     }
 
@@ -121,7 +122,7 @@ impl SharedParameters {
     /// Standard uncertainties of the target parameters, display units.
     pub fn uncertainties(&self, root: &Root) -> Vec<f64> {
         let block = self.criterion_block(root);
-        let inverse = inverted(block);
+        let inverse = inverse_of_upper(block);
         let first = self.ids.len() - self.targets;
         (0..self.targets)
             .map(|i| {
@@ -138,18 +139,4 @@ pub fn sum(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Root {
     let stacked =
         Mat::from_fn(a.nrows() + b.nrows(), k, |i, j| if i < a.nrows() { a[(i, j)] } else { b[(i - a.nrows(), j)] });
     upper(stacked)
-}
-
-/// The inverse of an upper triangular matrix. A zero pivot yields infinity.
-fn inverted(r: MatRef<'_, f64>) -> Mat<f64> {
-    let n = r.ncols();
-    let mut inverse = Mat::zeros(n, n);
-    for j in 0..n {
-        inverse[(j, j)] = 1.0 / r[(j, j)];
-        for i in (0..j).rev() {
-            let sum: f64 = (i + 1..=j).map(|l| r[(i, l)] * inverse[(l, j)]).sum();
-            inverse[(i, j)] = -sum / r[(i, i)];
-        }
-    }
-    inverse
 }

@@ -4,11 +4,9 @@ use faer::Mat;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::linear::{Linearisation, is_of_interest, merged};
+use super::linear::{Linearisation, is_of_interest};
 use crate::error::IdentifyError;
-use crate::fit;
 use crate::problem::Problem;
-use crate::rank::Rank;
 use crate::results::Interval;
 
 /// How far a sweep can shrink.
@@ -49,10 +47,8 @@ pub fn shrinkages(problem: &Problem) -> Result<Vec<Shrinkage>, IdentifyError> {
         let Some((axis, low, high)) = swept(problem, test) else {
             continue;
         };
-        let rest = merged(
-            linear.prior.clone(),
-            linear.tests.iter().enumerate().filter(|(other, _)| *other != test).map(|(_, triangle)| triangle),
-        );
+        let others = linear.tests.iter().enumerate().filter(|(other, _)| *other != test);
+        let rest = linear.prior.clone().merged(others.map(|(_, triangle)| triangle));
         let rows = whitened(problem, test, axis)?;
         // The largest ratio of uncertainties at a share of the range, and its parameter.
         let worst = |share: f64| -> Result<(f64, usize), IdentifyError> {
@@ -63,8 +59,7 @@ pub fn shrinkages(problem: &Problem) -> Result<Vec<Shrinkage>, IdentifyError> {
                     (0..positions.len()).filter(|i| (positions[*i] - middle).abs() <= half).collect();
                 whole.absorb(Mat::from_fn(kept.len(), white.ncols(), |i, j| white[(kept[i], j)]).as_ref());
             }
-            let rank = Rank::decide(whole.parts().0.as_ref(), &linear.size, &linear.preference)?;
-            let covariance = fit::parameter_covariance(&whole, &rank.identifiable_basis)?;
+            let (rank, covariance) = linear.with(&whole)?;
             let ratios = of_interest.iter().map(|&j| {
                 let ratio = (covariance[(j, j)] / linear.covariance[(j, j)]).sqrt();
                 (if rank.is_identifiable(j) { ratio } else { f64::INFINITY }, j)

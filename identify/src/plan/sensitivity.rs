@@ -2,10 +2,10 @@
 //! the readings.
 
 use faer::Mat;
-use rayon::prelude::*;
 
 use super::results::{Curve, Sensitivity};
 use crate::error::IdentifyError;
+use crate::numerics::parallel;
 use crate::problem::{Problem, RowBlock};
 
 /// Maximum number of points of a curve.
@@ -39,14 +39,12 @@ struct BlockSensitivity {
 pub fn sensitivities(problem: &Problem, beta: &[f64], covariance: &Mat<f64>) -> Result<Sensitivities, IdentifyError> {
     let values = problem.slot_values(beta);
     let parameters = beta.len();
-    let parts: Vec<BlockSensitivity> = problem
-        .blocks()
-        .par_iter()
-        .map(|block| {
-            let rows = problem.rows(&values, block)?;
-            Ok(of_block(problem, block, &rows, parameters, covariance))
-        })
-        .collect::<Result<_, IdentifyError>>()?;
+    let blocks = problem.blocks();
+    let parts = parallel::map(blocks.len(), &|k| {
+        let rows = problem.rows(&values, &blocks[k])?;
+        Ok(of_block(problem, &blocks[k], &rows, parameters, covariance))
+    });
+    let parts: Vec<BlockSensitivity> = parts.into_iter().collect::<Result<_, IdentifyError>>()?;
     let tests = problem.tests.len();
     let mut summary = vec![(0.0_f64, 0_usize, 0.0_f64); parameters];
     let mut curves = vec![vec![Vec::new(); tests]; parameters];

@@ -17,9 +17,9 @@ use super::ranking::{rounded, smallest_first};
 use super::states;
 use super::test_variations::TestVariations;
 use crate::error::IdentifyError;
+use crate::numerics::triangle::upper;
 use crate::parameters::Role;
 use crate::problem::Problem;
-use crate::triangle::upper;
 
 /// Relative gain below which a test adds no information.
 const MIN_GAIN: f64 = 1e-6;

@@ -6,12 +6,12 @@ use abbe_model::instrument::Station;
 use abbe_model::session::Session;
 use abbe_model::session::readings::Readings;
 use nalgebra::Vector3;
-use rayon::prelude::*;
 
 use super::hypotheses::{Hypothesis, lengths, units, with_readings};
 use super::quick_fit::{thinned, trial};
 use super::results::{Suggestion, SuggestionKind};
 use crate::noise::{Noise, NoiseSource};
+use crate::numerics::parallel;
 use crate::problem::Problem;
 use crate::start::nominal_points;
 
@@ -69,13 +69,10 @@ pub(super) fn suggestions(problem: &Problem) -> Vec<Suggestion> {
     nominal.unknowns.clear();
     nominal.effects.clear();
     let base_mm = trial(&nominal, &noise).map_or(f64::INFINITY, |found| found.rms_mm);
-    let mut tried: Vec<(f64, Hypothesis)> = of_poses(&nominal)
-        .into_par_iter()
-        .filter_map(|hypothesis| {
-            let rms_mm = trial(&hypothesis.session, &noise)?.rms_mm;
-            Some((rms_mm, hypothesis))
-        })
-        .collect();
+    let hypotheses = of_poses(&nominal);
+    let found = parallel::map(hypotheses.len(), &|k| trial(&hypotheses[k].session, &noise));
+    let mut tried: Vec<(f64, Hypothesis)> =
+        found.into_iter().zip(hypotheses).filter_map(|(found, hypothesis)| Some((found?.rms_mm, hypothesis))).collect();
     // Readings that are scaled leave a residual that is scaled with them: compare shares of the spread.
     let share = |rms_mm: f64, session: &Session| {
         let spread = Problem::new(session, noise.clone(), 1).ok().and_then(|problem| spread_mm2(&problem));

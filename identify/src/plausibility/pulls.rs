@@ -13,10 +13,12 @@
 //! excess of their χ² times `(1 + ρ)/(1 − ρ)`.
 
 use abbe_model::session::Prior;
-use faer::{Mat, Side};
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+use faer::Mat;
 
 use crate::fit::Fit;
+use crate::noise::enlargement_of_mean;
+use crate::numerics::gain::ObservableSubspace;
+use crate::numerics::tails::{chi_square_quantile, chi_square_tail, normal_quantile};
 use crate::parameters::Role;
 use crate::problem::Problem;
 
@@ -27,6 +29,8 @@ const SIGNIFICANCE: f64 = 1e-4;
 const MIN_SHARE: f64 = 0.1;
 /// More set-up parameters than this are tested one by one only.
 const MAX_TESTED_JOINTLY: usize = 200;
+/// Least share of the stated variance by which the estimates scatter along a direction that the readings determine.
+const DETERMINED: f64 = 0.5;
 /// Largest autocorrelation that is attributed to noise.
 const MAX_CORRELATED: f64 = 0.95;
 
@@ -89,7 +93,13 @@ impl Pulls {
                 })
             })
             .collect();
-        let (together, freedom) = if count <= MAX_TESTED_JOINTLY { together(&covariance, &moved) } else { (0.0, 0) };
+        // χ² in those directions along which the readings, not the priors, decide where the estimates lie.
+        let (together, freedom) = if count <= MAX_TESTED_JOINTLY {
+            let determined = ObservableSubspace::above(covariance.as_ref(), DETERMINED);
+            (determined.quadratic(&moved), determined.freedom)
+        } else {
+            (0.0, 0)
+        };
         Pulls { limit: limit(each.len()), each, together, freedom }
     }
 
@@ -102,16 +112,13 @@ impl Pulls {
 
     /// Whether all set-up parameters together contradict their statements.
     pub fn contradicted_together(&self) -> bool {
-        let law = ChiSquared::new(self.freedom as f64);
-        self.freedom > 0 && law.is_ok_and(|law| law.sf(self.together) < SIGNIFICANCE)
+        chi_square_tail(self.together, self.freedom as f64) < SIGNIFICANCE
     }
 
     /// By how much χ² of the set-up parameters exceeds its least value with the probability `SIGNIFICANCE` if their
     /// statements are right.
     pub fn allowed(&self) -> f64 {
-        let law = ChiSquared::new(self.freedom as f64);
-        let together = law.map_or(0.0, |law| law.inverse_cdf(1.0 - SIGNIFICANCE));
-        together.max(limit(self.each.len()).powi(2))
+        chi_square_quantile(SIGNIFICANCE, self.freedom as f64).max(limit(self.each.len()).powi(2))
     }
 
     /// The largest pull, absolute; 0 of none.
@@ -122,26 +129,7 @@ impl Pulls {
 
 /// The absolute pull that one of so many exceeds with the probability [`SIGNIFICANCE`].
 fn limit(count: usize) -> f64 {
-    let tail = SIGNIFICANCE / (2.0 * count.max(1) as f64);
-    -Normal::standard().inverse_cdf(tail)
-}
-
-/// χ² of estimates (in stated uncertainties) in those directions along which the readings, not the priors, decide where
-/// they lie; and how many these are.
-fn together(covariance: &Mat<f64>, moved: &[f64]) -> (f64, usize) {
-    let Ok(decomposed) = covariance.self_adjoint_eigen(Side::Lower) else {
-        return (0.0, 0);
-    };
-    let (vectors, values) = (decomposed.U(), decomposed.S().column_vector());
-    let (mut sum, mut freedom) = (0.0, 0);
-    for k in 0..moved.len() {
-        if values[k] > 0.5 {
-            let along: f64 = moved.iter().enumerate().map(|(i, value)| vectors[(i, k)] * value).sum();
-            sum += along * along / values[k];
-            freedom += 1;
-        }
-    }
-    (sum, freedom)
+    normal_quantile(SIGNIFICANCE / (2.0 * count.max(1) as f64))
 }
 
 /// By how much the noise of an average exceeds what the fit assumes: the readings' own χ² over their degrees of
@@ -169,11 +157,10 @@ fn excess(problem: &Problem, fit: &Fit) -> f64 {
     let freedom = count.saturating_sub(free.count()).max(1) as f64;
     let ratio = (squares / freedom / problem.noise.sigma_mm.powi(2)).max(1.0);
     let poses = problem.folds.kind == crate::heldout::FoldKind::Poses;
-    if poses || pairs <= 0.0 || !problem.noise.ar_coefficients.is_empty() {
+    if poses || !problem.noise.ar_coefficients.is_empty() {
         return ratio;
     }
-    let correlation = (products / pairs).clamp(0.0, MAX_CORRELATED);
-    ratio * (1.0 + correlation) / (1.0 - correlation)
+    ratio * enlargement_of_mean(products, pairs, MAX_CORRELATED)
 }
 
 #[cfg(test)]

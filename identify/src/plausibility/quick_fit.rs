@@ -7,12 +7,10 @@ use std::sync::Arc;
 
 use abbe_model::session::{Prior, Session};
 
-use crate::fit::{minimum, whole};
+use crate::fit::minimum;
 use crate::heldout::rms_mm;
 use crate::noise::Noise;
-use crate::preference::pivot_preference;
 use crate::problem::Problem;
-use crate::rank::Rank;
 
 /// The result of a quick fit.
 #[derive(Clone, Debug)]
@@ -40,12 +38,10 @@ pub(super) fn trial(session: &Session, noise: &Noise) -> Option<Trial> {
     let problem = Problem::new(session, noise.clone(), 1).ok()?;
     let list = &problem.parameters.list;
     let found = minimum(&problem, None).ok()?;
-    let nothing = vec![0.0; list.len()];
-    let of_priors = problem.prior_triangle(&found.beta).sum_of_squares_after(&nothing);
+    let prior = problem.prior_triangle(&found.beta);
+    let of_priors = prior.sum_of_squares();
     let chi_square = problem.sum_of_squares(&found.beta);
-    let whole = whole(&problem, &found.beta, &found.triangles);
-    let size: Vec<f64> = list.iter().map(|parameter| parameter.size).collect();
-    let rank = Rank::decide(whole.parts().0.as_ref(), &size, &pivot_preference(list)).ok()?;
+    let rank = problem.parameters.rank(&prior.merged(&found.triangles)).ok()?;
     let determined: f64 = rank.singular_values.iter().map(|s| (1.0 + s * s).ln()).sum();
     let priors: f64 = (list.iter())
         .map(|parameter| match parameter.prior {

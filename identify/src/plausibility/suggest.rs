@@ -2,12 +2,12 @@
 //! the evidence decides their order.
 
 use abbe_model::session::Session;
-use rayon::prelude::*;
 
 use super::hypotheses::{self, Hypothesis};
 use super::quick_fit::{Trial, thinned, trial};
 use super::results::{Conflict, Suggestion, SuggestionKind};
 use crate::noise::{Noise, NoiseSource};
+use crate::numerics::parallel;
 use crate::problem::Problem;
 
 /// Number of readings that are refitted with each mistake.
@@ -80,10 +80,8 @@ fn trials(stated: &Session, list: Vec<Hypothesis>, sigma_mm: f64) -> (Trial, Vec
         rms_mm: f64::INFINITY,
         cost: 0.0,
     });
-    let tried = (list.into_par_iter())
-        .filter_map(|hypothesis| trial(&hypothesis.session, &noise).map(|found| (hypothesis, found)))
-        .collect();
-    (base, tried)
+    let found = parallel::map(list.len(), &|k| trial(&list[k].session, &noise));
+    (base, list.into_iter().zip(found).filter_map(|(hypothesis, found)| Some((hypothesis, found?))).collect())
 }
 
 /// Whether a mistake is about something whose parameters the readings contradict.

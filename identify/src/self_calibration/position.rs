@@ -13,7 +13,7 @@
 
 use num_dual::{Dual64, DualNum};
 
-use crate::circle;
+use crate::numerics::circle;
 
 /// Estimates of the axis position: by the circle and by the rotation.
 #[derive(Clone, Copy, Debug)]

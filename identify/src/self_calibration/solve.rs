@@ -5,8 +5,10 @@ use faer::Mat;
 use super::boundary::Reduction;
 use super::equations::{Equations, Reference};
 use crate::error::IdentifyError;
-use crate::rank::Rank;
-use crate::triangle::Triangle;
+use crate::numerics::rank::Rank;
+use crate::numerics::solve::Directions;
+use crate::numerics::tolerances::COLLINEAR;
+use crate::numerics::triangle::Triangle;
 
 /// Values of the functions, mm, and their linear dependence on the readings.
 #[derive(Clone, Debug)]
@@ -66,12 +68,11 @@ pub fn solve(
         let entry = if j == parameters { inputs[i] } else { rows[i][j] };
         entry / u_inputs_mm[i]
     });
-    let mut triangle = Triangle::new(parameters);
-    triangle.absorb(white.as_ref());
+    let triangle = Triangle::of(white);
     // The parameters are in the order of their functions and angles.
     let preference: Vec<usize> = (0..parameters).collect();
-    let rank = Rank::decide(triangle.parts().0.as_ref(), &vec![1.0; parameters], &preference)?;
-    let of_free = crate::fit::parameter_covariance(&triangle, &rank.identifiable_basis)?;
+    let rank = Rank::decide(&triangle, &vec![1.0; parameters], &preference)?;
+    let of_free = triangle.covariance(&rank.identifiable_basis)?;
 
     let outputs = columns + usize::from(radius);
     let spread = Mat::from_fn(outputs, parameters, |i, k| match (i < columns, k < free) {
@@ -116,10 +117,5 @@ pub fn solve(
 pub fn rank_before(equations: &Equations) -> Result<usize, IdentifyError> {
     let rows = &equations.rows;
     let matrix = Mat::from_fn(rows.len(), equations.columns(), |i, j| rows[i][j]);
-    let svd = matrix.svd().map_err(|_| IdentifyError::Decomposition)?;
-    let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
-    let largest = singular.first().copied().unwrap_or(0.0);
-    // Coefficients are sines and cosines: singular values of dependent columns are at rounding level, others at a
-    // hundredth or more.
-    Ok(singular.iter().filter(|s| **s > 1e-9 * largest).count())
+    Ok(Directions::of(matrix.as_ref())?.rank(COLLINEAR))
 }

@@ -6,7 +6,7 @@ use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::session::readings::Readings;
 
-use crate::circle;
+use crate::numerics::circle;
 
 /// Tolerance of equal positions: mm or rad.
 const POSITION_TOLERANCE: f64 = 1e-6;

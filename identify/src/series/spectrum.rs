@@ -6,10 +6,10 @@
 
 use abbe_model::axis::AxisKind;
 use faer::Mat;
-use faer::prelude::Solve;
-use rayon::prelude::*;
 
 use super::SessionSeries;
+use crate::numerics::parallel;
+use crate::numerics::solve::solve_square;
 use crate::problem::Problem;
 
 /// The highest order. Higher orders are seldom geometric errors.
@@ -30,19 +30,17 @@ pub struct Spectrum {
 
 /// The amplitude of each order from 1 in values over an angle in degrees; `coordinates` values per reading.
 pub fn amplitudes(angle_deg: &[f64], values: &[f64], coordinates: usize) -> Vec<f64> {
-    (1..=HIGHEST_ORDER)
-        .into_par_iter()
-        .map(|order| {
-            let basis: Vec<[f64; 3]> = angle_deg
-                .iter()
-                .map(|angle| {
-                    let (sin, cos) = (order as f64 * angle.to_radians()).sin_cos();
-                    [1.0, cos, sin]
-                })
-                .collect();
-            explained(&basis, values, coordinates)
-        })
-        .collect()
+    parallel::map(HIGHEST_ORDER, &|place| {
+        let order = place + 1;
+        let basis: Vec<[f64; 3]> = angle_deg
+            .iter()
+            .map(|angle| {
+                let (sin, cos) = (order as f64 * angle.to_radians()).sin_cos();
+                [1.0, cos, sin]
+            })
+            .collect();
+        explained(&basis, values, coordinates)
+    })
 }
 
 fn explained(basis: &[[f64; 3]], values: &[f64], coordinates: usize) -> f64 {
@@ -55,7 +53,7 @@ fn explained(basis: &[[f64; 3]], values: &[f64], coordinates: usize) -> f64 {
     let sides = Mat::from_fn(3, coordinates, |i, c| {
         basis.iter().zip(values.chunks(coordinates)).map(|(row, reading)| row[i] * reading[c]).sum::<f64>()
     });
-    let solution = gram.partial_piv_lu().solve(&sides);
+    let solution = solve_square(gram.as_ref(), sides.as_ref());
     let sum: f64 = (0..coordinates)
         .map(|c| {
             let all: f64 = (0..3).map(|i| sides[(i, c)] * solution[(i, c)]).sum();

@@ -1,7 +1,7 @@
 //! Find the unmodelled effect behind the residual of a fitted model.
 //!
 //! 1. The noise standard deviation and autocorrelation follow from repeats ([`crate::noise`]). Outliers are excluded by
-//!    name ([`crate::outliers`]).
+//!    name ([`crate::noise::outliers`]).
 //! 2. The columns of the library's effects ([`crate::candidates`]) are computed for the session. Their products with the
 //!    model, the residual and the null draws are computed once.
 //! 3. The search (`search`) adds, removes, exchanges and merges effects (`moves`). Its p-values come from the same search
@@ -35,6 +35,7 @@ use crate::candidates::columns::{Columns, EffectColumns};
 use crate::candidates::moments::Moments;
 use crate::error::IdentifyError;
 use crate::fit::{Fit, fit, prepare};
+use crate::numerics::parallel;
 use crate::problem::Problem;
 use crate::results::TraceResult;
 use constants::{BLOCK, SINGLE};
@@ -236,7 +237,7 @@ fn trace_or_interrupted(
         let draws = null(SINGLE);
         remainder::structure(problem, &columns, model, &start.residual, draws, &prior)
     };
-    let (draws, structure_before) = rayon::join(|| null(BLOCK), || policy.tests_structure.then(structure_before));
+    let (draws, structure_before) = parallel::both(|| null(BLOCK), || policy.tests_structure.then(structure_before));
 
     let structure_before = structure_before.transpose()?;
     interrupt.check()?;

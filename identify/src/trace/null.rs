@@ -16,7 +16,7 @@ use super::constants::{MAX_AR_SUM, MIN_POOL, SMOOTHING};
 use super::policy::{NullSource, Policy};
 use crate::candidates::columns::Columns;
 use crate::noise::{Noise, PureError};
-use crate::outliers::median;
+use crate::numerics::median;
 use crate::problem::Problem;
 
 /// Null draws (whitened rows in fold order × draws), in blocks of `block` readings.

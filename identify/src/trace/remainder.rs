@@ -13,11 +13,11 @@ use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::session::readings::Readings;
 
 use super::constants::STRUCTURED;
-use crate::candidates::chi_square_tail::ln_chi_square_tail;
 use crate::candidates::columns::{Columns, EffectColumns};
 use crate::candidates::gain::{PriorMoments, TrainedModel};
 use crate::candidates::moments::Moments;
 use crate::error::IdentifyError;
+use crate::numerics::tails::ln_chi_square_tail;
 use crate::problem::Problem;
 
 /// Structure in a residual.

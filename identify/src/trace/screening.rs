@@ -3,7 +3,6 @@
 
 use abbe_model::session::Session;
 use faer::Mat;
-use rayon::prelude::*;
 
 use super::TraceOptions;
 use super::start::Start;
@@ -14,6 +13,7 @@ use crate::candidates::library::{self, LibraryEffect};
 use crate::candidates::moments::Moments;
 use crate::error::IdentifyError;
 use crate::fit::prepare;
+use crate::numerics::parallel;
 use crate::problem::Problem;
 
 /// An effect of the library, screened for a session.
@@ -74,13 +74,9 @@ pub(super) fn searched_candidates(
     if candidates.is_empty() && all > 0 {
         return Err(IdentifyError::EverythingLeftOut);
     }
-    Ok(candidates
-        .into_par_iter()
-        .filter_map(|candidate| {
-            let column_set = columns.effect_columns(&candidate.effect)?;
-            Some(Candidate::of(candidate, column_set))
-        })
-        .collect())
+    let column_sets = parallel::map(candidates.len(), &|k| columns.effect_columns(&candidates[k].effect));
+    let found = candidates.into_iter().zip(column_sets);
+    Ok(found.filter_map(|(member, columns)| Some(Candidate::of(member, columns?))).collect())
 }
 
 /// A warning for each exclusion that matches no candidate.

@@ -9,9 +9,9 @@ use super::state::UnwhitenedModel;
 use crate::candidates::columns::Columns;
 use crate::candidates::gain::PriorMoments;
 use crate::error::IdentifyError;
-use crate::fit::{Fit, in_directions};
+use crate::fit::Fit;
+use crate::numerics::reduction::inverse_of_upper;
 use crate::problem::Problem;
-use crate::triangle::Triangle;
 
 /// The fitted model for the search: orthonormal columns and residual, whitened, in fold order.
 pub(super) struct Start {
@@ -34,11 +34,8 @@ impl Start {
         let rows = columns.model_rows(&fit.beta)?;
         let residual = (0..rows.nrows()).map(|i| rows[(i, parameters)]).collect();
         let prior = problem.prior_triangle(&fit.beta);
-        let mut whole = Triangle::new(parameters);
-        whole.merge(&prior);
-        fit.triangles.iter().for_each(|triangle| whole.merge(triangle));
-        let (r, _, _) = in_directions(&whole, basis).parts();
-        let inverse = inverse_of_triangle(&r);
+        let r = prior.clone().merged(&fit.triangles).in_directions(basis).r();
+        let inverse = inverse_of_upper(r.as_ref());
         let to_parameters = basis * &inverse;
         let model = rows.as_ref().subcols(0, parameters) * &to_parameters;
         let (of_prior, prior_residual, _) = prior.parts();
@@ -79,18 +76,4 @@ impl Start {
                 .collect(),
         }
     }
-}
-
-/// The inverse of an upper triangular matrix by back substitution.
-fn inverse_of_triangle(r: &Mat<f64>) -> Mat<f64> {
-    let n = r.nrows();
-    let mut inverse = Mat::zeros(n, n);
-    for column in 0..n {
-        for i in (0..=column).rev() {
-            let unit = if i == column { 1.0 } else { 0.0 };
-            let sum: f64 = (i + 1..=column).map(|k| r[(i, k)] * inverse[(k, column)]).sum();
-            inverse[(i, column)] = if r[(i, i)] != 0.0 { (unit - sum) / r[(i, i)] } else { 0.0 };
-        }
-    }
-    inverse
 }

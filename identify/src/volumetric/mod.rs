@@ -17,13 +17,16 @@ use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, BodyErrors, ERRORS_PER_AXIS, Machine};
 use abbe_model::frames::Point;
 use abbe_model::session::limits::LARGEST;
-use nalgebra::{DMatrix, DVector, Vector3};
-use rayon::prelude::*;
+use faer::Mat;
+use nalgebra::Vector3;
 
 pub use functions::{ErrorFunction, Form};
 pub use results::{AxisShare, Coordinates, MapPosition, Size, Summary};
 
 use crate::error::IdentifyError;
+use crate::numerics::parallel;
+use crate::numerics::solve::Directions;
+use crate::numerics::tolerances::COLLINEAR;
 
 /// Maximum number of points of a map.
 pub const MAX_POINTS: usize = 1_000_000;
@@ -127,25 +130,21 @@ impl MachineWithErrors<'_> {
                 self.point(&moved, false, None) - wanted
             })
             .collect();
-        let jacobian = DMatrix::from_fn(3, linear.len(), |i, j| columns[j][i]);
-        let spans = |inverse: &DMatrix<f64>| (&jacobian * inverse - DMatrix::identity(3, 3)).norm() < 1e-6;
-        let inverse = match linear.len() {
-            0 => None,
-            _ => jacobian.clone().pseudo_inverse(1e-9).ok().filter(spans),
-        };
-        let Some(inverse) = inverse else {
+        let jacobian = Mat::from_fn(3, linear.len(), |i, j| columns[j][i]);
+        let directions = Directions::of(jacobian.as_ref())?;
+        if directions.rank(COLLINEAR) < 3 {
             return Err(IdentifyError::Request(format!(
                 "compensation: the {} linear axes of the machine do not span the space",
                 linear.len()
             )));
-        };
+        }
         let mut commands = positions.to_vec();
         for _ in 0..MAX_STEPS {
             let residual = self.point(&commands, true, None) - wanted;
             if residual.norm() <= CONVERGENCE_MM {
                 return Ok(Compensated { positions: commands, error_mm: residual.into() });
             }
-            let step = &inverse * DVector::from_column_slice(residual.as_slice());
+            let step = directions.solve(residual.as_slice(), 0.0);
             for (axis, change) in linear.iter().zip(step.iter()) {
                 commands[*axis] -= change;
             }
@@ -169,33 +168,29 @@ pub fn map(
     let Some(total) = total.filter(|total| *total > 0 && *total <= MAX_POINTS) else {
         return Err(IdentifyError::Request(format!("a map needs 1 to {MAX_POINTS} points")));
     };
-    let points: Vec<(VolumetricPoint, Vec<f64>)> = (0..total)
-        .into_par_iter()
-        .map(|number| {
-            let mut rest = number;
-            let mut positions = vec![0.0; grid.len()];
-            for (axis, values) in grid.iter().enumerate().rev() {
-                positions[axis] = values[rest % values.len()];
-                rest /= values.len();
-            }
-            let mut point = machine_with_errors.error_at(&positions);
-            if !point.error_mm.iter().all(|error| error.abs() <= LARGEST) {
-                return Err(IdentifyError::Request(format!(
-                    "the errors displace the tool by {:e} mm at {}; polynomials grow fast beyond their scale",
-                    norm(point.error_mm),
-                    machine_with_errors.position_text(&positions)
-                )));
-            }
-            if compensate {
-                point.compensated = Some(machine_with_errors.compensate(&positions)?);
-            }
-            let by_axis = (0..grid.len()).map(|axis| norm(machine_with_errors.of_axis(&positions, axis))).collect();
-            Ok((point, by_axis))
-        })
-        // With several failures, the first one in grid order is reported, independent of threads.
-        .collect::<Vec<Result<_, IdentifyError>>>()
-        .into_iter()
-        .collect::<Result<_, _>>()?;
+    let points = parallel::map(total, &|number| {
+        let mut rest = number;
+        let mut positions = vec![0.0; grid.len()];
+        for (axis, values) in grid.iter().enumerate().rev() {
+            positions[axis] = values[rest % values.len()];
+            rest /= values.len();
+        }
+        let mut point = machine_with_errors.error_at(&positions);
+        if !point.error_mm.iter().all(|error| error.abs() <= LARGEST) {
+            return Err(IdentifyError::Request(format!(
+                "the errors displace the tool by {:e} mm at {}; polynomials grow fast beyond their scale",
+                norm(point.error_mm),
+                machine_with_errors.position_text(&positions)
+            )));
+        }
+        if compensate {
+            point.compensated = Some(machine_with_errors.compensate(&positions)?);
+        }
+        let by_axis = (0..grid.len()).map(|axis| norm(machine_with_errors.of_axis(&positions, axis))).collect();
+        Ok((point, by_axis))
+    });
+    // With several failures, the first one in grid order is reported.
+    let points: Vec<(VolumetricPoint, Vec<f64>)> = points.into_iter().collect::<Result<_, IdentifyError>>()?;
     let machine = machine_with_errors.machine;
     let largest = points.iter().max_by(|(a, _), (b, _)| norm(a.error_mm).total_cmp(&norm(b.error_mm)));
     let outside = |axis: usize, q: f64| match machine.axes[axis].kind {

@@ -13,9 +13,9 @@ use std::sync::{Arc, Mutex};
 use abbe_model::driver::DriverSample;
 use abbe_model::sensitivity::Sensitivities;
 use faer::{Mat, MatMut};
-use rayon::prelude::*;
 
 use crate::error::IdentifyError;
+use crate::numerics::parallel;
 use crate::problem::{Problem, RowBlock};
 use basis::TermTarget;
 pub use basis::{EffectColumns, chunked};
@@ -253,13 +253,11 @@ fn sensitivities(problem: &Problem, beta: &[f64]) -> Vec<Sensitivities> {
                 .map(move |k| (test, k * ROWS_AT_ONCE..((k + 1) * ROWS_AT_ONCE).min(rows)))
         })
         .collect();
-    let parts: Vec<Sensitivities> = pieces
-        .par_iter()
-        .map(|(test, rows)| {
-            let model = &problem.models[*test];
-            model.sensitivities(&values[*test], &model.effective_slots(), rows.clone())
-        })
-        .collect();
+    let parts = parallel::map(pieces.len(), &|k| {
+        let (test, rows) = &pieces[k];
+        let model = &problem.models[*test];
+        model.sensitivities(&values[*test], &model.effective_slots(), rows.clone())
+    });
     let mut tests: Vec<Sensitivities> = Vec::new();
     for ((test, _), part) in pieces.iter().zip(parts) {
         match tests.get_mut(*test) {

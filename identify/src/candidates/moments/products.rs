@@ -4,10 +4,10 @@ use std::ops::Range;
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
-use rayon::prelude::*;
 
 use super::transposed_product;
 use crate::candidates::columns::{Columns, EffectColumns, chunked};
+use crate::numerics::parallel;
 
 /// Maximum number of stored column entries: 320 MB.
 const MAX_STORED: usize = 40_000_000;
@@ -41,23 +41,22 @@ pub(super) fn multiply(
             (candidates.start + chunk.start..candidates.start + chunk.end, room)
         })
         .collect();
-    let computed: Option<Vec<(CandidateChunk, CandidateProducts)>> = chunks
-        .into_par_iter()
-        .map(|(candidates, room)| {
-            if !go_on() {
-                return None;
-            }
-            let column_sets = &column_sets[candidates.clone()];
-            let all = filled(columns, column_sets);
-            let products = CandidateProducts {
-                side: cross_by_fold(columns, column_sets, side.as_ref(), all.as_ref()),
-                own: gram_by_fold(columns, column_sets, all.as_ref()),
-                null: null_product(columns, column_sets, null, all.as_ref()),
-            };
-            let stored = room.then_some(all);
-            Some((CandidateChunk { candidates, stored }, products))
-        })
-        .collect();
+    let computed = parallel::map(chunks.len(), &|k| {
+        let (candidates, room) = chunks[k].clone();
+        if !go_on() {
+            return None;
+        }
+        let column_sets = &column_sets[candidates.clone()];
+        let all = filled(columns, column_sets);
+        let products = CandidateProducts {
+            side: cross_by_fold(columns, column_sets, side.as_ref(), all.as_ref()),
+            own: gram_by_fold(columns, column_sets, all.as_ref()),
+            null: null_product(columns, column_sets, null, all.as_ref()),
+        };
+        let stored = room.then_some(all);
+        Some((CandidateChunk { candidates, stored }, products))
+    });
+    let computed: Option<Vec<(CandidateChunk, CandidateProducts)>> = computed.into_iter().collect();
     let (chunks, products): (Vec<CandidateChunk>, Vec<CandidateProducts>) = computed?.into_iter().unzip();
     let products = CandidateProducts::joined(products, columns.fold_rows.len(), side.ncols(), null.ncols());
     Some((chunks, products))
@@ -70,15 +69,13 @@ pub(super) fn with_side(
     column_sets: &[&EffectColumns],
     side: MatRef<'_, f64>,
 ) -> Vec<Mat<f64>> {
-    let parts: Vec<Vec<Mat<f64>>> = chunks
-        .par_iter()
-        .map(|chunk| {
-            let column_sets = &column_sets[chunk.candidates.clone()];
-            let recomputed = chunk.stored.is_none().then(|| filled(columns, column_sets));
-            let all = chunk.stored.as_ref().or(recomputed.as_ref());
-            all.map_or_else(Vec::new, |all| cross_by_fold(columns, column_sets, side, all.as_ref()))
-        })
-        .collect();
+    let parts = parallel::map(chunks.len(), &|k| {
+        let chunk = &chunks[k];
+        let column_sets = &column_sets[chunk.candidates.clone()];
+        let recomputed = chunk.stored.is_none().then(|| filled(columns, column_sets));
+        let all = chunk.stored.as_ref().or(recomputed.as_ref());
+        all.map_or_else(Vec::new, |all| cross_by_fold(columns, column_sets, side, all.as_ref()))
+    });
     joined_by_fold(&parts, columns.fold_rows.len(), side.ncols())
 }
 
@@ -116,7 +113,7 @@ impl CandidateProducts {
 /// Joins the products of chunks side by side, for each fold.
 fn joined_by_fold(parts: &[Vec<Mat<f64>>], folds: usize, rows: usize) -> Vec<Mat<f64>> {
     let of_fold = |fold: usize| joined(rows, parts.iter().filter_map(|part| part.get(fold)));
-    (0..folds).into_par_iter().map(of_fold).collect()
+    parallel::map(folds, &of_fold)
 }
 
 /// Joins matrices with the same number of rows side by side.

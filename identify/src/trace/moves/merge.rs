@@ -1,9 +1,8 @@
 //! Merges effects that follow one axis into one effect.
 
-use rayon::prelude::*;
-
 use super::{Move, Proposal};
 use crate::error::IdentifyError;
+use crate::numerics::parallel;
 use crate::trace::state::{SearchBranch, SearchState, SelectedEffect};
 
 /// Merges several effects that follow one axis, or all of them but one, into one effect, if it explains as much with a
@@ -58,11 +57,9 @@ fn merged(search: &mut SearchState<'_>, branch: usize, group: &[usize]) -> Resul
     let without = search.model_of(&rest, &folds)?;
     let variance = search.variance(&without);
     let present = search.objective(group, &rest, &folds)?;
-    let best = pool
-        .par_iter()
-        .map(|c| (*c, search.score(*c, &without.gain(*c), variance) - search.choice()))
-        .filter(|(_, one)| *one > present)
-        .max_by(|a, b| a.1.total_cmp(&b.1));
+    let one = |k: usize| search.score(pool[k], &without.gain(pool[k]), variance) - search.choice();
+    let values = parallel::map(pool.len(), &one);
+    let best = pool.iter().copied().zip(values).max_by(|a, b| a.1.total_cmp(&b.1));
     let p_value = grouped.iter().map(|selected| selected.p_value).fold(1.0, f64::min);
     Ok(best.map(|(candidate, one)| {
         selected.push(SelectedEffect { candidate, p_value });

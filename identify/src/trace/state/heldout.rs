@@ -2,13 +2,13 @@
 //! accepted only if this error decreases by more than the standard error of the decrease.
 
 use faer::Mat;
-use rayon::prelude::*;
 
 use super::{ALL, SearchBranch, SearchState, SelectedEffect};
 use crate::candidates::gain::TrainedModel;
 use crate::candidates::moments::grow;
 use crate::error::IdentifyError;
 use crate::heldout::paired::{HeldOutDecrease, Units};
+use crate::numerics::parallel;
 
 /// The unwhitened base and residual, divided by the noise standard deviation. Held-out errors refer to these.
 pub struct UnwhitenedModel {
@@ -77,10 +77,11 @@ impl SearchState<'_> {
     /// Sums of squares of held-out residuals over the noise variance, by unit. The model of the search that excludes a
     /// fold predicts it.
     fn held_out_by_unit(&self) -> Result<Vec<f64>, IdentifyError> {
-        let models: Vec<TrainedModel<'_>> = self.selection.branches[ALL + 1..]
-            .par_iter()
-            .map(|branch| self.projection_of(&branch.chosen(), &branch.folds))
-            .collect::<Result<_, _>>()?;
+        let branches = &self.selection.branches[ALL + 1..];
+        let models: Vec<TrainedModel<'_>> =
+            parallel::map(branches.len(), &|k| self.projection_of(&branches[k].chosen(), &branches[k].folds))
+                .into_iter()
+                .collect::<Result<_, _>>()?;
         let predicted = |model: &TrainedModel<'_>, row: usize| -> f64 {
             let along = model.base.iter().zip(&model.coefficients);
             along.map(|(column, c)| self.unwhitened.base[(row, *column)] * c).sum()

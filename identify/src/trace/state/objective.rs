@@ -6,10 +6,10 @@
 //! compared with the best of readings without structure, the null distribution accounts for the choice.
 
 use super::{ALL, SearchState};
-use crate::candidates::chi_square_tail::ln_chi_square_tail;
 use crate::candidates::gain::{Gain, TrainedModel};
 use crate::candidates::step_table::StepTable;
 use crate::error::IdentifyError;
+use crate::numerics::tails::ln_chi_square_tail;
 use crate::trace::constants::{EQUIVALENT, INDISTINGUISHABLE};
 
 impl SearchState<'_> {

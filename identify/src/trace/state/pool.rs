@@ -1,8 +1,5 @@
 //! The candidates that a search may add: the library's detectable effects, and the effects that it has tuned itself.
 
-use abbe_model::driver::Driver;
-use rayon::prelude::*;
-
 use super::SearchState;
 use super::tuning::Tuned;
 use crate::candidates::candidate::Candidate;
@@ -10,21 +7,20 @@ use crate::candidates::columns::EffectColumns;
 use crate::candidates::gain::TrainedModel;
 use crate::candidates::step_table::{StepTable, best_step_table};
 use crate::error::IdentifyError;
+use crate::numerics::parallel;
 use crate::trace::constants::MIN_PLAUSIBLE_SIGMA;
+use abbe_model::driver::Driver;
 
 impl SearchState<'_> {
     /// Judges for each candidate whether it is detectable at its largest plausible size.
     pub(super) fn judge_detectability(&mut self) -> Result<(), IdentifyError> {
         let model = self.model_without(None)?;
-        let detectable: Vec<bool> = (0..self.candidates.len())
-            .into_par_iter()
-            .map(|candidate| {
-                let (d, _, _) = model.projected(candidate);
-                let plausible = self.columns.plausible(self.effect(candidate), &self.candidates[candidate].columns);
-                let largest = (0..d.nrows()).map(|k| d[(k, k)]).fold(0.0, f64::max);
-                plausible * largest.max(0.0).sqrt() >= MIN_PLAUSIBLE_SIGMA
-            })
-            .collect();
+        let detectable: Vec<bool> = parallel::map(self.candidates.len(), &|candidate| {
+            let (d, _, _) = model.projected(candidate);
+            let plausible = self.columns.plausible(self.effect(candidate), &self.candidates[candidate].columns);
+            let largest = (0..d.nrows()).map(|k| d[(k, k)]).fold(0.0, f64::max);
+            plausible * largest.max(0.0).sqrt() >= MIN_PLAUSIBLE_SIGMA
+        });
         self.detectable_effects = detectable.iter().filter(|detectable| **detectable).count();
         self.candidates
             .iter_mut()
@@ -76,11 +72,10 @@ impl SearchState<'_> {
     /// The step tables from the library's dictionaries for addition to a model.
     pub fn step_tables(&self, model: &TrainedModel<'_>) -> Vec<StepTable> {
         let variance = self.variance(model);
-        (0..self.candidates.len())
-            .into_par_iter()
-            .filter(|candidate| self.candidates[*candidate].dictionary)
-            .filter_map(|candidate| best_step_table(model, candidate, &self.candidates[candidate], variance))
-            .collect()
+        let dictionaries: Vec<usize> =
+            (0..self.candidates.len()).filter(|candidate| self.candidates[*candidate].dictionary).collect();
+        let best = |k: usize| best_step_table(model, dictionaries[k], &self.candidates[dictionaries[k]], variance);
+        parallel::map(dictionaries.len(), &best).into_iter().flatten().collect()
     }
 
     /// Adds a tuned effect in addition to the candidate that it was tuned from, for the folds on which it was tuned.

@@ -7,13 +7,13 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use abbe_model::effect::Effect;
-use rayon::prelude::*;
 
 use super::SearchState;
 use crate::candidates::candidate::Candidate;
 use crate::candidates::gain::{Gain, TrainedModel};
 use crate::candidates::step_table::{StepTable, best_step_table};
 use crate::error::IdentifyError;
+use crate::numerics::parallel;
 use crate::trace::constants::{MAX_EVIDENCE_DEFICIT, MIN_EVIDENCE_SHARE};
 
 /// An effect with tuned numbers or positions.
@@ -75,8 +75,8 @@ impl SearchState<'_> {
             nearest.into_values().filter(|(_, evidence)| *evidence >= MIN_EVIDENCE_SHARE * best).collect();
         near.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         near.truncate(most);
-        let tuned = |(candidate, _): (usize, f64)| self.with_best_numbers(model, candidate, gains[candidate].gain);
-        let mut fresh: Vec<Tuned> = near.into_par_iter().filter_map(tuned).collect();
+        let tuned = |k: usize| self.with_best_numbers(model, near[k].0, gains[near[k].0].gain);
+        let mut fresh: Vec<Tuned> = parallel::map(near.len(), &tuned).into_iter().flatten().collect();
         fresh.extend(self.step_tables_near_best(model, best, most));
         fresh.retain(|tuned| {
             let present = |c: usize| *self.effect(c) == tuned.effect && self.may_be_used(c, &model.folds);
@@ -92,14 +92,15 @@ impl SearchState<'_> {
         nearest.retain(|table| table.evidence >= MIN_EVIDENCE_SHARE * best);
         nearest.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
         nearest.truncate(most);
-        let moved = |table: StepTable| {
-            let (effect, gain) = self.with_best_positions(model, &table);
+        let moved = |k: usize| {
+            let table = &nearest[k];
+            let (effect, gain) = self.with_best_positions(model, table);
             let gain = Gain { gain, freedom: effect.shape.coefficients() + effect.shape.numbers() };
             let evidence = self.evidence(&gain, variance);
             let near = evidence >= best - MAX_EVIDENCE_DEFICIT || evidence - table.cost >= MIN_EVIDENCE_SHARE * best;
-            near.then(|| Tuned { effect, ..Tuned::of(table) })
+            near.then(|| Tuned { effect, ..Tuned::of(table.clone()) })
         };
-        nearest.into_par_iter().filter_map(moved).collect()
+        parallel::map(nearest.len(), &moved).into_iter().flatten().collect()
     }
 
     /// Adds an effect with the shape numbers or positions that are best beside others. Returns its index: the effect

@@ -1,9 +1,28 @@
-//! The order of preference of the pivots of null-space combinations.
+//! The rank over the parameters of a session, and the order of preference of the pivots of its null space.
 
-use crate::parameters::{Parameter, Role};
+use super::{Parameter, Parameters, Role};
+use crate::error::IdentifyError;
+use crate::numerics::rank::Rank;
+use crate::numerics::triangle::Triangle;
 
-/// The order in which parameters are preferred as pivots of null-space combinations (see [`crate::rank`]). The pivot
-/// comes first in its combination. Holding the pivots at nominal makes the other parameters identifiable.
+impl Parameters {
+    /// The physical size of every parameter, internal units.
+    pub fn sizes(&self) -> Vec<f64> {
+        self.list.iter().map(|parameter| parameter.size).collect()
+    }
+
+    /// The rank of a whitened factor over these parameters.
+    ///
+    /// # Errors
+    /// If the factor has entries that are not finite.
+    pub fn rank(&self, triangle: &Triangle) -> Result<Rank, IdentifyError> {
+        Rank::decide(triangle, &self.sizes(), &pivot_preference(&self.list))
+    }
+}
+
+/// The order in which parameters are preferred as pivots of null-space combinations (see
+/// [`crate::numerics::rank`]). The pivot comes first in its combination. Holding the pivots at nominal makes the other
+/// parameters identifiable.
 ///
 /// Location errors come first, coefficients of effects next, set-up quantities last. A combination thus states what one
 /// machine error is confounded with, and an error that is confounded with the set-up is stated in terms of the set-up.

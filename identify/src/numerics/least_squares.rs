@@ -6,8 +6,9 @@
 
 use faer::Mat;
 
+use super::solve::Directions;
+use super::triangle::Triangle;
 use crate::error::IdentifyError;
-use crate::triangle::Triangle;
 
 /// A problem `min ‖r(x)‖²`.
 pub trait LeastSquares {
@@ -60,10 +61,9 @@ pub fn minimise(
     scaling: &Scaling,
 ) -> Result<LeastSquaresSolution, IdentifyError> {
     let n = problem.parameters();
-    let zero_step = vec![0.0; n];
     let mut x = start.to_vec();
     let mut triangle = problem.linearise(&x)?;
-    let mut current = triangle.sum_of_squares_after(&zero_step);
+    let mut current = triangle.sum_of_squares();
     let mut scale = match scaling {
         Scaling::Physical(sizes) => sizes.clone(),
         Scaling::Columns => vec![f64::INFINITY; n],
@@ -83,31 +83,16 @@ pub fn minimise(
             }
         }
         let scaled = Mat::from_fn(n, n, |i, j| r[(i, j)] * scale[j]);
-        let svd = scaled.svd().map_err(|_| IdentifyError::Decomposition)?;
-        let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
-        let projected: Vec<f64> = (0..n).map(|k| (0..n).map(|i| svd.U()[(i, k)] * c[i]).sum::<f64>()).collect();
-        let largest = singular.first().copied().unwrap_or(0.0);
-        let negligible = largest * 1e-14;
-        let step_with = |damping: f64| -> Vec<f64> {
-            let mut step = vec![0.0; n];
-            for k in 0..n {
-                if singular[k] <= negligible {
-                    continue;
-                }
-                let gain = singular[k] * projected[k] / (singular[k] * singular[k] + damping);
-                for j in 0..n {
-                    step[j] += svd.V()[(j, k)] * gain * scale[j];
-                }
-            }
-            step
-        };
+        let directions = Directions::of(scaled.as_ref())?;
+        let largest = directions.singular_values.first().copied().unwrap_or(0.0);
         // A step is accepted if the sum of squares falls. Near the minimum the decrease is below rounding and the size
         // of the step decides.
         let mut accepted = false;
         let mut converged = false;
         let mut next = None;
         for attempt in 0..60 {
-            let step = step_with(damping);
+            let mut step = directions.solve(&c, damping);
+            step.iter_mut().zip(&scale).for_each(|(step, scale)| *step *= scale);
             let trial: Vec<f64> = x.iter().zip(&step).map(|(a, b)| a + b).collect();
             let relative = step
                 .iter()
@@ -123,7 +108,7 @@ pub fn minimise(
                 let triangle = triangle.after(&step);
                 return Ok(LeastSquaresSolution {
                     x: trial,
-                    sum_of_squares: triangle.sum_of_squares_after(&zero_step),
+                    sum_of_squares: triangle.sum_of_squares(),
                     triangle,
                     iterations: iteration,
                 });
@@ -131,7 +116,7 @@ pub fn minimise(
             // The first attempt is nearly always accepted, so it is linearised at once.
             let sum = if attempt == 0 {
                 next = problem.linearise(&trial).ok();
-                next.as_ref().map_or(f64::NAN, |next| next.sum_of_squares_after(&zero_step))
+                next.as_ref().map_or(f64::NAN, |next| next.sum_of_squares())
             } else {
                 next = None;
                 problem.sum_of_squares(&trial)

@@ -3,13 +3,15 @@
 //!
 //! Structure in the residual must not be excluded. Along a run a residual is therefore compared with the medians of its
 //! neighbours on either side, not with zero (Hampel's identifier: Davies & Gather, J. Am. Stat. Assoc. 88 (1993) 782).
-//! Poses have no neighbours. A pose is an outlier if its residual is a large multiple of the median residual.
+//! In the residual of a circle's own diagnosis, which contains all structure, it is compared with zero and with both
+//! neighbours. Poses have no neighbours. A pose is an outlier if its residual is a large multiple of the median
+//! residual.
 
 use abbe_model::session::readings::Readings;
-use rayon::prelude::*;
 
 use crate::fit::Fit;
 use crate::heldout::FoldKind;
+use crate::numerics::{median, parallel, robust_deviation};
 use crate::problem::Problem;
 
 /// Number of neighbours on either side in the median.
@@ -19,6 +21,9 @@ const OUTLIER_ALONG_RUN: f64 = 5.3;
 /// Limit for a pose, in median residual lengths: exceeded once in 10⁹ Gaussian poses of three coordinates. Unmodelled
 /// structure is bounded and stayed far below it.
 const OUTLIER_POSE: f64 = 5.0;
+
+/// Limit for a single reading in the residual of a complete model, in robust standard deviations.
+const OUTLIER_ALONE: f64 = 6.0;
 
 /// The outliers of the problem, by test and row.
 pub fn reject(problem: &Problem, fit: &Fit) -> Vec<Vec<bool>> {
@@ -35,15 +40,22 @@ pub fn reject(problem: &Problem, fit: &Fit) -> Vec<Vec<bool>> {
         let limit = OUTLIER_POSE * median(&mut all);
         return lengths.iter().map(|test| test.iter().map(|length| *length > limit).collect()).collect();
     }
-    problem
-        .tests
-        .par_iter()
-        .zip(&fit.residuals)
-        .map(|(test, residual)| match &test.readings {
-            Some(readings) => reject_along_runs(readings, residual, coordinates, problem.noise.sigma_mm),
-            None => Vec::new(),
-        })
-        .collect()
+    parallel::map(problem.tests.len(), &|test| match &problem.tests[test].readings {
+        Some(readings) => reject_along_runs(readings, &fit.residuals[test], coordinates, problem.noise.sigma_mm),
+        None => Vec::new(),
+    })
+}
+
+/// The outliers in the residual of a model that contains all structure, by index: large beside both neighbours too.
+pub(crate) fn alone(residual: &[f64]) -> impl Iterator<Item = usize> {
+    let limit = OUTLIER_ALONE * robust_deviation(residual);
+    let is_small = move |place: Option<usize>, value: f64| {
+        place.and_then(|place| residual.get(place)).is_none_or(|other| other.abs() < 0.5 * value)
+    };
+    (0..residual.len()).filter(move |&i| {
+        let value = residual[i].abs();
+        value > limit && is_small(i.checked_sub(1), value) && is_small(Some(i + 1), value)
+    })
 }
 
 fn reject_along_runs(readings: &Readings, residual: &[f64], coordinates: usize, sigma_mm: f64) -> Vec<bool> {
@@ -75,9 +87,7 @@ fn reject_along_runs(readings: &Readings, residual: &[f64], coordinates: usize, 
                 };
                 deviations.push(deviation);
             }
-            let mut sizes: Vec<f64> = deviations.iter().map(|d| d.abs()).collect();
-            // 1.4826 is the ratio of standard deviation to median absolute deviation of a Gaussian.
-            let spread = (1.4826 * median(&mut sizes)).max(sigma_mm);
+            let spread = robust_deviation(&deviations).max(sigma_mm);
             for (row, deviation) in run.clone().zip(&deviations) {
                 reject[row] |= deviation.abs() > OUTLIER_ALONG_RUN * spread;
             }
@@ -91,16 +101,6 @@ fn median_of_five([a, b, c, d, e]: [f64; NEIGHBOURS]) -> f64 {
     let low = a.min(b).max(c.min(d));
     let high = a.max(b).min(c.max(d));
     low.min(high).max(low.max(high).min(e))
-}
-
-/// The median; reorders the values. 0 for no values.
-pub fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    let (_, value, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
-    *value
 }
 
 #[cfg(test)]

@@ -1,87 +1,12 @@
-//! Numerical rank of the readings against their noise, and the null space in canonical form.
+//! The canonical form of a null space: combinations of parameters in reduced row echelon form.
 //!
-//! The whitened Jacobian is in physical units (1 mm, 0.01 rad). A singular value `s` then means: a change by the
-//! physical size along its direction changes the readings by `s` standard deviations in total. A direction with `s < 1`
-//! is not identifiable, because even a gross error along it is below the noise. No floating-point tolerance is
-//! involved: exact null directions of a nominal geometry have singular values of 10⁻¹⁰ and lower.
-//!
-//! The null space is reported in reduced row echelon form (`echelon`). The form depends on the space and on a fixed
-//! order of preference of the parameters only, not on the basis from the decomposition. The order of preference
-//! ([`Rank::decide`]) follows from identifiers. Neither rounding nor the order of declarations in a session affects it.
+//! The form depends on the space and on a fixed order of preference of the parameters only, not on the basis from the
+//! decomposition. Neither rounding nor the order of declarations in a session affects it.
 
-use faer::prelude::Solve;
 use faer::{Mat, MatRef};
 
-use crate::error::IdentifyError;
-
-/// Singular value, in standard deviations per physical size, below which a direction is not identifiable.
-pub const MIN_IDENTIFIABLE: f64 = 1.0;
-
-/// The identifiable and the null directions of a problem.
-#[derive(Clone, Debug)]
-pub struct Rank {
-    /// Singular values in descending order, standard deviations per physical size.
-    pub singular_values: Vec<f64>,
-    /// A basis of the identifiable space: parameters × rank, in internal units (mm, rad). Each column is one physical
-    /// size long.
-    pub identifiable_basis: Mat<f64>,
-    /// Null-space combinations in scaled parameters, in reduced row echelon form. Each row is one combination, with 1
-    /// at its pivot and 0 at the pivots of the other rows.
-    pub null_combinations: Vec<Vec<f64>>,
-    /// The pivot of each row, in the order of preference.
-    pub pivots: Vec<usize>,
-    /// Orthonormal basis of the null space, in scaled parameters: parameters × (parameters − rank).
-    pub null_space: Mat<f64>,
-}
-
-impl Rank {
-    /// Decides the rank from `R` (whitened, priors included) and the physical size of each parameter. `preference`
-    /// lists every parameter once, the preferred pivots of null-space combinations first: see `pivot_preference`.
-    ///
-    /// # Errors
-    /// If `R` has entries that are not finite.
-    pub fn decide(r: MatRef<'_, f64>, size: &[f64], preference: &[usize]) -> Result<Rank, IdentifyError> {
-        let n = size.len();
-        if n == 0 {
-            return Ok(Rank {
-                singular_values: Vec::new(),
-                identifiable_basis: Mat::zeros(0, 0),
-                null_combinations: Vec::new(),
-                pivots: Vec::new(),
-                null_space: Mat::zeros(0, 0),
-            });
-        }
-        let scaled = Mat::from_fn(n, n, |i, j| r[(i, j)] * size[j]);
-        let svd = scaled.svd().map_err(|_| IdentifyError::Decomposition)?;
-        let singular_values: Vec<f64> = svd.S().column_vector().iter().copied().collect();
-        let rounding = singular_values[0] * 1e-13 * n as f64;
-        let rank = singular_values.iter().filter(|s| **s >= MIN_IDENTIFIABLE && **s > rounding).count();
-        let v = svd.V();
-        let null_space = Mat::from_fn(n, n - rank, |j, k| v[(j, rank + k)]);
-        let (null_combinations, pivots) = combinations(null_space.as_ref(), scaled.as_ref(), preference, MIN_PIVOT);
-        // At full rank the basis is that of the parameters themselves.
-        let identifiable_basis = if rank == n {
-            Mat::from_fn(n, n, |i, j| if i == j { size[i] } else { 0.0 })
-        } else {
-            Mat::from_fn(n, rank, |i, k| v[(i, k)] * size[i])
-        };
-        Ok(Rank { singular_values, identifiable_basis, null_combinations, pivots, null_space })
-    }
-
-    /// Coordinates of parameters in the identifiable basis, by least squares; null-space parts are dropped. `size` as
-    /// in [`Rank::decide`]. Internal units.
-    pub fn coordinates(&self, beta: &[f64], size: &[f64]) -> Vec<f64> {
-        // The columns of the basis over `size` are orthonormal.
-        (0..self.identifiable_basis.ncols())
-            .map(|k| (0..beta.len()).map(|j| self.identifiable_basis[(j, k)] / size[j] * (beta[j] / size[j])).sum())
-            .collect()
-    }
-
-    /// Whether a parameter takes part in no null-space combination.
-    pub fn is_identifiable(&self, parameter: usize) -> bool {
-        self.null_combinations.iter().all(|row| row[parameter] == 0.0)
-    }
-}
+use super::solve::solve_square;
+use super::tolerances::{MIN_IDENTIFIABLE, ROUNDING_OF_COMBINATIONS};
 
 /// The combinations of a null space in canonical form (see [`echelon`]), without coefficients that are due to noise,
 /// and the pivot of each. `scaled` is the whitened triangular factor in scaled parameters.
@@ -133,9 +58,6 @@ pub fn magnitude(value: f64) -> i64 {
 /// Coefficients below this share of the largest coefficient of the combination may be pruned.
 const MAX_PRUNED_SHARE: f64 = 0.02;
 
-/// Coefficients below this share of the largest coefficient of the combination are rounding errors.
-const ROUNDING_SHARE: f64 = 1e-5;
-
 /// A parameter is a pivot if its part in the remaining null space is at least this share of the largest such part. The
 /// share is large enough for a stable elimination. It is no ratio of round lengths, so that parts of a geometry in
 /// round numbers are not equal to it and rounding cannot decide.
@@ -158,7 +80,7 @@ pub fn echelon(space: MatRef<'_, f64>, preference: &[usize], least: f64) -> (Vec
         let free = |j: &usize| !pivots.contains(j);
         let largest = (0..n).filter(free).map(length).fold(0.0, f64::max);
         let next = preference.iter().copied().filter(free).find(|j| length(*j) >= least * largest);
-        let Some(pivot) = next.filter(|_| largest > ROUNDING_SHARE) else {
+        let Some(pivot) = next.filter(|_| largest > ROUNDING_OF_COMBINATIONS) else {
             break;
         };
         let along = length(pivot);
@@ -177,15 +99,14 @@ pub fn echelon(space: MatRef<'_, f64>, preference: &[usize], least: f64) -> (Vec
         return (Vec::new(), Vec::new());
     }
     let at_pivots = Mat::from_fn(count, dimension, |i, k| space[(pivots[i], k)]);
-    let inverse = at_pivots.partial_piv_lu().solve(Mat::<f64>::identity(count, count));
-    let form = space * inverse;
+    let form = space * solve_square(at_pivots.as_ref(), Mat::identity(count, count).as_ref());
     let rows = (0..count)
         .map(|i| {
             let largest = (0..n).fold(0.0_f64, |most, j| most.max(form[(j, i)].abs()));
             (0..n)
                 .map(|j| match pivots.iter().position(|pivot| *pivot == j) {
                     Some(place) => f64::from(u8::from(place == i)),
-                    None if form[(j, i)].abs() < ROUNDING_SHARE * largest => 0.0,
+                    None if form[(j, i)].abs() < ROUNDING_OF_COMBINATIONS * largest => 0.0,
                     None => form[(j, i)],
                 })
                 .collect()
@@ -259,47 +180,6 @@ mod tests {
                         assert!((value - wanted).abs() < 1e-8, "{row:?} {wanted:?}");
                         assert_eq!(*value == 0.0, *wanted == 0.0, "{row:?}");
                     }
-                }
-            }
-        }
-    }
-
-    /// Readings of nine parameters with rank 5. The null space is the same, name by name, for every order of
-    /// declaration and with rounding errors of 10⁻¹¹ in every entry.
-    #[test]
-    fn the_null_space_is_independent_of_the_order_of_declarations() {
-        const N: usize = 9;
-        let entry = |i: usize, j: usize| [1.0, -1.0, 2.0, 0.0, 0.5][(3 * i + 2 * j + i * j) % 5] * 1e4;
-        let order = |turn: usize| (0..N).map(move |j| (4 * j + turn) % N).collect::<Vec<usize>>();
-        let decide = |turn: usize| {
-            let order = order(turn);
-            let r = Mat::from_fn(N, N, |i, j| {
-                let exact = if i < 5 { entry(i, order[j]) } else { 0.0 };
-                exact * (1.0 + 1e-15 * ((5 * i + 3 * j + turn) % 7) as f64)
-            });
-            // Preferred by name: parameter 0 first.
-            let mut preference: Vec<usize> = (0..N).collect();
-            preference.sort_by_key(|j| order[*j]);
-            let rank = Rank::decide(r.as_ref(), &[1.0; N], &preference).unwrap();
-            let rows: Vec<Vec<f64>> = (rank.null_combinations.iter())
-                .map(|row| {
-                    let mut by_name = vec![0.0; N];
-                    order.iter().zip(row).for_each(|(name, value)| by_name[*name] = *value);
-                    by_name
-                })
-                .collect();
-            let pivots: Vec<usize> = rank.pivots.iter().map(|pivot| order[*pivot]).collect();
-            (rows, pivots)
-        };
-        let (rows, pivots) = decide(0);
-        assert!(pivots.is_sorted() && !pivots.is_empty(), "{pivots:?}");
-        for turn in 1..N {
-            let (others, of_others) = decide(turn);
-            assert_eq!(of_others, pivots);
-            for (row, other) in rows.iter().zip(&others) {
-                for (a, b) in row.iter().zip(other) {
-                    assert!((a - b).abs() < 1e-9, "{row:?} {other:?}");
-                    assert_eq!(*a == 0.0, *b == 0.0);
                 }
             }
         }

@@ -1,6 +1,34 @@
-//! The logarithm of the tail of the χ² distribution. At real effect sizes the tail itself underflows.
+//! Tails and quantiles of the χ² and the normal distribution.
+//!
+//! At real effect sizes the tail of χ² underflows, so that a search compares its logarithm.
 
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 use statrs::function::gamma::{gamma_ur, ln_gamma};
+
+/// `P(χ² > x)` for so many degrees of freedom; 1 for none.
+pub fn chi_square_tail(x: f64, freedom: f64) -> f64 {
+    ChiSquared::new(freedom).map_or(1.0, |law| law.sf(x))
+}
+
+/// `P(χ² < x)` and `P(χ² > x)`; `None` for no degrees of freedom.
+pub fn chi_square_tails(x: f64, freedom: f64) -> Option<[f64; 2]> {
+    ChiSquared::new(freedom).ok().map(|law| [law.cdf(x), law.sf(x)])
+}
+
+/// The value that χ² exceeds with a probability; 0 for no degrees of freedom.
+pub fn chi_square_quantile(probability: f64, freedom: f64) -> f64 {
+    ChiSquared::new(freedom).map_or(0.0, |law| law.inverse_cdf(1.0 - probability))
+}
+
+/// The probability that a standard normal variable exceeds a value.
+pub fn normal_tail(x: f64) -> f64 {
+    Normal::standard().sf(x)
+}
+
+/// The value that a standard normal variable exceeds with a probability.
+pub fn normal_quantile(probability: f64) -> f64 {
+    -Normal::standard().inverse_cdf(probability)
+}
 
 /// `ln P(χ²ₖ > x)`.
 pub fn ln_chi_square_tail(x: f64, k: usize) -> f64 {
@@ -38,7 +66,7 @@ pub fn ln_chi_square_tail(x: f64, k: usize) -> f64 {
 
 /// An upper bound of `−ln P(χ²ₖ > x)` that is fast to compute. For two degrees of freedom the tail is `e^(−x/2)`, for
 /// more it is larger, and for one it is at least `√(2/π) √x/(1 + x) e^(−x/2)`.
-pub(crate) fn most_evidence(x: f64, k: usize) -> f64 {
+pub fn most_evidence(x: f64, k: usize) -> f64 {
     if k == 1 && x > 0.0 {
         0.5 * x + ((1.0 + x) / x.sqrt()).ln() + 0.5 * std::f64::consts::FRAC_PI_2.ln()
     } else {

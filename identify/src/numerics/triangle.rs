@@ -27,6 +27,13 @@ impl Triangle {
         Triangle { columns, factor: Mat::zeros(0, columns + 1) }
     }
 
+    /// The factor of some rows of `[J | r]`.
+    pub fn of(rows: Mat<f64>) -> Self {
+        let mut triangle = Triangle::new(rows.ncols() - 1);
+        triangle.absorb(rows.as_ref());
+        triangle
+    }
+
     /// Number of parameters.
     pub fn columns(&self) -> usize {
         self.columns
@@ -57,16 +64,20 @@ impl Triangle {
         self.absorb(other.factor.as_ref());
     }
 
-    /// The same rows over more parameters. `places` gives the index of each of these parameters among all; the rows do
+    /// This factor with others merged into it.
+    pub fn merged<'t>(mut self, others: impl IntoIterator<Item = &'t Triangle>) -> Triangle {
+        others.into_iter().for_each(|triangle| self.merge(triangle));
+        self
+    }
+
+    /// The same rows over more parameters. `indices` gives the index of each of these parameters among all; the rows do
     /// not depend on the others.
     pub fn over_columns(&self, indices: &[usize], columns: usize) -> Triangle {
         let mut wide = Mat::zeros(self.factor.nrows(), columns + 1);
         for (index, column) in indices.iter().chain([&columns]).zip(self.factor.col_iter()) {
             wide.col_mut(*index).copy_from(column);
         }
-        let mut triangle = Triangle::new(columns);
-        triangle.absorb(wide.as_ref());
-        triangle
+        Triangle::of(wide)
     }
 
     /// The upper-triangular form, from which `R`, `c`, `ρ` can be read.
@@ -89,6 +100,11 @@ impl Triangle {
         (r, c, reduced[(n, n)] * reduced[(n, n)])
     }
 
+    /// `R`: parameters × parameters.
+    pub fn r(&self) -> Mat<f64> {
+        self.parts().0
+    }
+
     /// The factor after a step `δ` with negligible nonlinearity: `[R c−Rδ; 0 ρ]`.
     pub fn after(&self, step: &[f64]) -> Triangle {
         let mut moved = self.clone();
@@ -99,14 +115,9 @@ impl Triangle {
         moved
     }
 
-    /// The sum of squares of the rows after a step `δ`.
-    pub fn sum_of_squares_after(&self, step: &[f64]) -> f64 {
-        (0..self.factor.nrows())
-            .map(|i| {
-                let predicted: f64 = (0..self.columns).map(|j| self.factor[(i, j)] * step[j]).sum();
-                (self.factor[(i, self.columns)] - predicted).powi(2)
-            })
-            .sum()
+    /// The sum of squares of the residuals.
+    pub fn sum_of_squares(&self) -> f64 {
+        self.factor.col(self.columns).iter().map(|residual| residual * residual).sum()
     }
 }
 

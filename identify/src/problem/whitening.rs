@@ -1,0 +1,64 @@
+//! Whitening of rows along a run, without outliers.
+
+use faer::Mat;
+
+use super::{Problem, RowBlock};
+
+impl Problem {
+    /// The scalar rows of a block that remain after whitening. A row is dropped if its reading, or one within the
+    /// filter's order before it, is an outlier.
+    pub fn kept_rows(&self, block: &RowBlock) -> Vec<usize> {
+        let coordinates = self.coordinates();
+        let rejected = &self.rejected[block.test];
+        if !rejected[block.rows.clone()].contains(&true) {
+            return (0..block.rows.len() * coordinates).collect();
+        }
+        (0..block.rows.len() * coordinates)
+            .filter(|i| {
+                let row = block.rows.start + i / coordinates;
+                let reach = self.noise.ar_coefficients.len().min(i / coordinates);
+                (row - reach..=row).all(|row| !rejected[row])
+            })
+            .collect()
+    }
+
+    /// Whitens rows along a run, `(x_t − Σ a_k x_{t−k})/σ_innovation`, and drops outliers. Returns the remaining rows
+    /// and the fold of each.
+    pub fn whiten(&self, rows: &Mat<f64>, block: &RowBlock) -> (Mat<f64>, Vec<usize>) {
+        let kept = self.kept_rows(block);
+        let folds = self.folds_of(&kept, block).collect();
+        (self.whitened(rows.clone(), &kept), folds)
+    }
+
+    /// The fold of each of the given scalar rows of a block.
+    pub fn folds_of(&self, rows: &[usize], block: &RowBlock) -> impl Iterator<Item = usize> {
+        let fold_of = &self.folds.of_row[block.test][block.rows.clone()];
+        let coordinates = self.coordinates();
+        rows.iter().map(move |i| fold_of[i / coordinates])
+    }
+
+    /// The rows of [`Problem::whiten`] for known remaining rows.
+    pub fn whitened(&self, mut rows: Mat<f64>, kept: &[usize]) -> Mat<f64> {
+        let coordinates = self.coordinates();
+        let ar_coefficients = &self.noise.ar_coefficients;
+        let innovation = 1.0 / self.noise.innovation_mm();
+        let marginal = 1.0 / self.noise.sigma_mm;
+        if ar_coefficients.is_empty() && kept.len() == rows.nrows() {
+            rows *= faer::Scale(innovation);
+            return rows;
+        }
+        let mut white = Mat::zeros(kept.len(), rows.ncols());
+        for (mut white, column) in white.col_iter_mut().zip(rows.col_iter()) {
+            for (k, &i) in kept.iter().enumerate() {
+                white[k] = if i / coordinates < ar_coefficients.len() {
+                    column[i] * marginal
+                } else {
+                    let lags = ar_coefficients.iter().enumerate();
+                    let past: f64 = lags.map(|(lag, a)| a * column[i - (lag + 1) * coordinates]).sum();
+                    (column[i] - past) * innovation
+                };
+            }
+        }
+        white
+    }
+}
