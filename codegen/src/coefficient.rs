@@ -118,10 +118,10 @@ fn unit_of_component(
         Component::Axis(name) if machine.axis_index(&name.axis).is_none() => {
             Err(CodegenError::no_axis(machine, effect.id(), &name.axis))
         }
-        Component::Instrument { .. } if unit.is_none() => Err(CodegenError::NoSuchParameter {
+        Component::Instrument { .. } | Component::Reading(_) if unit.is_none() => Err(CodegenError::NoSuchParameter {
             parameter: format!("`{}` of the effect `{}`", effect.component, effect.id()),
         }),
-        Component::Axis(_) | Component::Instrument { .. } | Component::TriggerDelay => Ok(unit),
+        _ => Ok(unit),
     }
 }
 

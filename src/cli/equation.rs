@@ -181,7 +181,7 @@ impl EquationParameters {
                         Failure::Other(format!("`{name}` is a parameter of another instrument; {has}"))
                     })?);
                 }
-                Some(Component::TriggerDelay) | None => {
+                Some(Component::TriggerDelay | Component::Reading(_)) | None => {
                     return Err(Failure::Other(format!(
                         "`{name}` is no parameter of an equation; errors have names of ISO 230-1, as EX0C or EZC, or of the literature, as e_x0c"
                     )));

@@ -1,9 +1,11 @@
 //! Candidate effects: the members of the library that a session permits, their columns in the readings, and their gain
 //! in addition to a model. A plan and a trace use them.
 
+pub(crate) mod candidate;
 pub(crate) mod columns;
 pub(crate) mod gain;
 pub mod library;
 pub(crate) mod moments;
 mod sampling;
+pub(crate) mod step_table;
 pub(crate) mod tuned;

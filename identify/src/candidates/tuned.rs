@@ -43,7 +43,7 @@ impl TunedEffect {
             own: Mat::zeros(column_set.count, column_set.count),
             with_y: Mat::zeros(column_set.count, 1),
         };
-        for stretch in columns.moved_stretches(std::slice::from_ref(column_set), model.folds.iter().copied()) {
+        for stretch in columns.moved_stretches(&[column_set], model.folds.iter().copied()) {
             let (start, count) = (stretch.start, stretch.len());
             let fresh = rows.as_ref().subrows(start, count);
             let present = moments.base_columns().subrows(start, count);

@@ -20,7 +20,7 @@ use super::linear::{Linearisation, is_of_interest};
 use super::ranking::{largest_first, smallest_first};
 use super::results::{Bias, EffectDetectability, EffectsAnalysis};
 use crate::candidates::columns::{Columns, EffectColumns, chunked};
-use crate::candidates::library::{self, Candidate};
+use crate::candidates::library::{self, LibraryEffect};
 use crate::error::IdentifyError;
 use crate::numerics::parallel;
 use crate::numerics::power::noncentrality;
@@ -61,7 +61,7 @@ pub fn effects(problem: &Problem) -> Result<EffectsAnalysis, IdentifyError> {
     let all = library::candidates(problem)?;
     let searched = all.len();
     let mut periods: HashMap<String, usize> = HashMap::new();
-    let (candidates, column_sets): (Vec<Candidate>, Vec<EffectColumns>) = all
+    let (candidates, column_sets): (Vec<LibraryEffect>, Vec<EffectColumns>) = all
         .into_iter()
         .filter(|candidate| is_screened(&candidate.effect, &mut periods))
         .filter_map(|candidate| columns.effect_columns(&candidate.effect).map(|column_set| (candidate, column_set)))
@@ -70,7 +70,7 @@ pub fn effects(problem: &Problem) -> Result<EffectsAnalysis, IdentifyError> {
     let thresholds: Vec<[f64; 2]> = (0..=MAX_COEFFICIENTS)
         .map(|k| [SIGNIFICANCE, significance_corrected].map(|level| noncentrality(k.max(1), level, POWER)))
         .collect();
-    let chunks = chunked(&column_sets);
+    let chunks = chunked(&column_sets.iter().collect::<Vec<_>>());
     let judged: Vec<Vec<EffectDetectability>> = parallel::map(chunks.len(), &|number| {
         let chunk = chunks[number].clone();
         let chosen: Vec<&EffectColumns> = column_sets[chunk.clone()].iter().collect();
@@ -134,7 +134,7 @@ const EQUAL_WITHIN: f64 = 1e-6;
 
 fn judge(
     problem: &Problem,
-    candidate: &Candidate,
+    candidate: &LibraryEffect,
     family: &str,
     products: &EffectProjection<'_>,
     greatest: f64,
@@ -214,7 +214,10 @@ fn biases(problem: &Problem, moved: MatRef<'_, f64>, unit: &Unit) -> Vec<Bias> {
 
 /// One result for each effect, or for all members of a grid (periods, centres, time constants, high orders): the member
 /// that is hardest to detect.
-fn grouped(judged: impl Iterator<Item = EffectDetectability>, candidates: &[Candidate]) -> Vec<EffectDetectability> {
+fn grouped(
+    judged: impl Iterator<Item = EffectDetectability>,
+    candidates: &[LibraryEffect],
+) -> Vec<EffectDetectability> {
     let mut order: Vec<String> = Vec::new();
     let mut groups: HashMap<String, EffectDetectability> = HashMap::new();
     for (entry, candidate) in judged.zip(candidates) {

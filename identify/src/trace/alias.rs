@@ -10,14 +10,9 @@ use std::collections::HashSet;
 
 use abbe_model::effect::Shape;
 
-use super::constants::INDISTINGUISHABLE;
-use super::search::{ALL, Search};
+use super::constants::{INDISTINGUISHABLE, MAX_COMPETING, MIN_COSINE};
+use super::state::{ALL, SearchState};
 use crate::candidates::gain::{Gain, TrainedModel};
-
-/// Least cosine between the signature of the found effect and the column space of an alias, which then reproduces at
-/// least half of the squared signature. The evidence alone does not suffice: a candidate may explain as much of a
-/// different structure.
-const MIN_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// An alias of a selected effect.
 #[derive(Clone, Debug)]
@@ -44,16 +39,13 @@ pub struct CompetingEffect {
     pub alias: bool,
 }
 
-/// Maximum number of competing explanations.
-const MAX_COMPETING: usize = 16;
-
 /// Rounds to six decimals. Lists are sorted by this value, so that rounding errors decide no tie.
 fn to_six_decimals(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }
 
 /// The order of two equally good candidates: by description length, then by identifier, then by index.
-fn simplest_first(search: &Search<'_>, a: usize, b: usize) -> Ordering {
+fn simplest_first(search: &SearchState<'_>, a: usize, b: usize) -> Ordering {
     let [first, second] = [a, b].map(|candidate| &search.candidates[candidate]);
     first
         .description_length()
@@ -65,16 +57,15 @@ fn simplest_first(search: &Search<'_>, a: usize, b: usize) -> Ordering {
 /// The competing explanations of the `k`-th selected effect, best first: that effect, its aliases, and rejected
 /// candidates.
 fn competing_effects(
-    search: &Search<'_>,
+    search: &SearchState<'_>,
     k: usize,
     gains: &[Gain],
     variance: f64,
     aliases: &[Alias],
 ) -> Vec<CompetingEffect> {
     let selected = search.selected()[k].candidate;
-    let named = search.candidates[selected].effect.id();
-    let alias_ids: HashSet<String> =
-        aliases.iter().map(|alias| search.candidates[alias.candidate].effect.id()).collect();
+    let named = search.effect(selected).id();
+    let alias_ids: HashSet<String> = aliases.iter().map(|alias| search.effect(alias.candidate).id()).collect();
     let others: Vec<usize> = search.selected().iter().map(|t| t.candidate).collect();
     let mut ranked: Vec<(f64, usize)> = gains
         .iter()
@@ -83,7 +74,7 @@ fn competing_effects(
             gain.freedom > 0
                 && (*candidate == selected || !others.contains(candidate))
                 && !search.candidates[*candidate].last_resort
-                && search.may_be_added(*candidate, &search.branches[ALL].folds)
+                && search.may_be_added(*candidate, &search.selection.branches[ALL].folds)
         })
         .map(|(candidate, gain)| {
             let evidence = search.evidence_for(candidate, gain, variance);
@@ -93,7 +84,7 @@ fn competing_effects(
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| simplest_first(search, a.1, b.1)));
     let mut competing_effects: Vec<CompetingEffect> = Vec::new();
     for (evidence, candidate) in ranked {
-        let id = search.candidates[candidate].effect.id();
+        let id = search.effect(candidate).id();
         if competing_effects.iter().any(|rival| rival.id == id) {
             continue;
         }
@@ -108,7 +99,7 @@ fn competing_effects(
 /// The aliases of the `k`-th selected effect, nearest first, and its competing explanations. `model` is the model
 /// without that effect.
 pub(super) fn aliases(
-    search: &Search<'_>,
+    search: &SearchState<'_>,
     k: usize,
     model: &TrainedModel<'_>,
     variance: f64,
@@ -123,7 +114,7 @@ pub(super) fn aliases(
     // column.
     let no_more_said = |candidate: usize| {
         columns(candidate) <= columns(selected.candidate)
-            || matches!(search.candidates[candidate].effect.shape, Shape::Harmonic { .. })
+            || matches!(search.effect(candidate).shape, Shape::Harmonic { .. })
     };
     let (_, coefficients) = model.with_candidate(selected.candidate);
     // Base columns are the candidate's columns at unit length. The signature is their linear combination.
@@ -160,9 +151,9 @@ pub(super) fn aliases(
     });
     // The nearest candidate represents all candidates with its identifier. Candidates with the found effect's own
     // identifier are excluded.
-    let named = search.candidates[selected.candidate].effect.id();
+    let named = search.effect(selected.candidate).id();
     let mut ids = HashSet::from([named]);
-    aliases.retain(|alias| ids.insert(search.candidates[alias.candidate].effect.id()));
+    aliases.retain(|alias| ids.insert(search.effect(alias.candidate).id()));
     let competing_effects = competing_effects(search, k, &gains, variance, &aliases);
     (aliases, competing_effects)
 }

@@ -1,4 +1,74 @@
-//! The constants of the search.
+//! The constants of the search, with their provenance. `docs/development/search.md` shows them in one table.
 
 /// Difference in `−ln P` below which two candidates are confounded. It corresponds to 2 σ for one column.
 pub const INDISTINGUISHABLE: f64 = 2.0;
+/// Relative difference of scores below which two candidates count as equivalent.
+pub const EQUIVALENT: f64 = 1e-6;
+/// Least detectability of a searched effect. An effect of the largest plausible size has to change the readings by this
+/// many standard deviations in total, beyond what the model absorbs.
+pub const MIN_PLAUSIBLE_SIGMA: f64 = 3.0;
+/// Significance level of the test of the remaining structure.
+pub const STRUCTURED: f64 = 0.01;
+/// Share of the structure's excess over noise that may remain for the found effects to count as the explanation.
+pub const EXPLAINED_SHARE: f64 = 0.5;
+/// Sampling scatter of an estimated AR coefficient, and relative scatter of an estimated noise standard deviation.
+pub const SCATTER: f64 = 0.02;
+
+/// Consecutive additions that may fail to lower the held-out error before they are withdrawn. Of two effects that
+/// partly cancel each other, the first alone explains little.
+pub const MAX_REJECTED_IN_A_ROW: usize = 2;
+/// Up to this number of effects, exchanges are tried after each addition. Beyond it they are tried after every
+/// [`SWAP_EVERY`]-th: each exchange trains one model per effect, and with many effects the gain is small.
+pub const SWAP_EVERY_ROUND_UP_TO: usize = 14;
+/// See [`SWAP_EVERY_ROUND_UP_TO`].
+pub const SWAP_EVERY: usize = 8;
+/// Maximum number of selected effects for which sets of effects are compared.
+pub const MAX_COMPARED: usize = 3;
+
+/// Share of the best evidence that a candidate needs on the grid to be tuned. A local feature between two grid points
+/// loses a third of its evidence.
+pub const MIN_EVIDENCE_SHARE: f64 = 0.5;
+/// Evidence by which a step table may fall short of the best and still be reported as an alternative.
+pub const MAX_EVIDENCE_DEFICIT: f64 = 4.0;
+/// Numbers of intervals of the nonparametric curves that effects along one axis are compared with.
+pub const INTERVALS: [usize; 3] = [8, 16, 32];
+
+/// Least cosine between the signature of the found effect and the column space of an alias, which then reproduces at
+/// least half of the squared signature. The evidence alone does not suffice: a candidate may explain as much of a
+/// different structure.
+pub const MIN_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// Maximum number of competing explanations of a found effect.
+pub const MAX_COMPETING: usize = 16;
+
+/// Readings per block of a null draw for the search. A block keeps intermittent structure, so that the search does not
+/// accept it as an effect.
+pub const BLOCK: usize = 20;
+/// Readings per block of a null draw for the test of the remaining structure. Single readings leave only noise with the
+/// estimated autocorrelation.
+pub const SINGLE: usize = 1;
+/// Largest sum of the AR coefficients of a draw.
+pub const MAX_AR_SUM: f64 = 0.98;
+/// Least number of deviations to draw from. With fewer, Gaussian noise is drawn.
+pub const MIN_POOL: usize = 200;
+/// Readings on either side of the running median that removes structure from a residual without repeats.
+pub const SMOOTHING: usize = 7;
+
+/// How many candidates the steps of a branch try.
+#[derive(Clone, Copy, Debug)]
+pub struct Effort {
+    /// Iterations of a line search, each reducing the interval to 0.62.
+    pub line_search: usize,
+    /// Maximum number of candidates that are tuned at a time.
+    pub tuned: usize,
+    /// Candidates tried together with an effect that is tuned again.
+    pub tried: usize,
+    /// Candidates tried as the first of a pair in place of two effects.
+    pub first_of_two: usize,
+    /// Candidates tried as the first of a pair in place of one effect.
+    pub first_of_one: usize,
+}
+
+/// Effort of the branch on all readings.
+pub const ON_ALL: Effort = Effort { line_search: 12, tuned: 10, tried: 6, first_of_two: 32, first_of_one: 8 };
+/// Effort of a branch without one fold. It only predicts that fold, and needs no best name.
+pub const ON_FOLDS: Effort = Effort { line_search: 6, tuned: 2, tried: 2, first_of_two: 8, first_of_one: 8 };

@@ -45,7 +45,7 @@ impl TraceResult {
     }
 }
 
-impl<'a> TraceOutcome {
+impl TraceOutcome {
     /// A trace that was interrupted before its search began. It contains the declared model only.
     pub(super) fn unsearched(problem: Problem, fit: Fit) -> TraceOutcome {
         let mut result = unsearched(&problem, &fit);

@@ -2,10 +2,10 @@
 
 use abbe_model::effect::Effect;
 
-use super::noise_model::SCATTER;
+use super::constants::{SCATTER, SINGLE};
 use super::remainder::{self, Structure};
-use super::search::Search;
 use super::start::Start;
+use super::state::SearchState;
 use super::{TraceOptions, null, null_draw_count};
 use crate::candidates::columns::Columns;
 use crate::error::IdentifyError;
@@ -28,7 +28,7 @@ impl RefittedModel {
     pub fn of(
         problem: &Problem,
         before_fit: &Fit,
-        search: &Search<'_>,
+        search: &SearchState<'_>,
         options: &TraceOptions,
         structure_before: Option<&Structure>,
     ) -> Result<RefittedModel, IdentifyError> {
@@ -54,20 +54,20 @@ impl RefittedModel {
 
     /// Whether this model has the effects that the search selects now, in the same order. Exchanges keep the number of
     /// effects, so the number alone does not decide.
-    pub fn is_of(&self, search: &Search<'_>) -> bool {
+    pub fn is_of(&self, search: &SearchState<'_>) -> bool {
         self.effects.iter().eq(selected_effects(search))
     }
 
-    /// Whether the residual was tested and has significant structure.
+    /// Whether the residual may have significant structure. An untested residual may.
     pub fn is_structured(&self) -> bool {
-        self.structure.as_ref().is_some_and(Structure::is_significant)
+        self.structure.as_ref().is_none_or(Structure::is_significant)
     }
 }
 
 /// The effects that a search has selected, in its order.
-fn selected_effects<'s>(search: &'s Search<'_>) -> impl Iterator<Item = &'s Effect> {
+fn selected_effects<'s>(search: &'s SearchState<'_>) -> impl Iterator<Item = &'s Effect> {
     let selected = search.selected().iter();
-    selected.map(|selected| &search.candidates[selected.candidate].effect)
+    selected.map(|selected| search.effect(selected.candidate))
 }
 
 /// Whether the search used a noise model from repeats along runs that differs from that of a fit: autocorrelated, or
@@ -83,7 +83,7 @@ fn remaining_structure(problem: &Problem, fit: &Fit, options: &TraceOptions) -> 
     let columns = Columns::new(problem, &fit.beta);
     let start = Start::of(problem, &columns, fit)?;
     let (count, seed) = (null_draw_count(options), options.seed.wrapping_add(1));
-    let draws = null::draws(problem, &columns, &fit.residuals, &start.residual, count, null::SINGLE, seed);
+    let draws = null::draws(problem, &columns, &fit.residuals, &start.residual, count, SINGLE, seed);
     let prior = start.prior();
     remainder::structure(problem, &columns, start.model, &start.residual, draws, &prior)
 }

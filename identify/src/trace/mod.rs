@@ -2,53 +2,51 @@
 //!
 //! 1. The noise standard deviation and autocorrelation follow from repeats ([`crate::noise`]). Outliers are excluded by
 //!    name ([`crate::noise::outliers`]).
-//! 2. The basis columns of the library's effects ([`library`](crate::candidates::library)) are computed for the session
-//!    (`columns`). Their products with the model, the residual and the null draws are computed once (`moments`).
-//! 3. The search (`search`) adds, removes and exchanges effects. Its p-values come from the same search on readings
-//!    without structure (`null`). An effect is accepted if its p-value is below the significance level and the held-out
-//!    error decreases by more than the standard error of the decrease. That standard error follows from paired
-//!    differences over runs, blocks or poses (`paired`).
+//! 2. The columns of the library's effects ([`crate::candidates`]) are computed for the session. Their products with the
+//!    model, the residual and the null draws are computed once.
+//! 3. The search (`search`) adds, removes, exchanges and merges effects (`moves`). Its p-values come from the same search
+//!    on readings without structure (`null`). An effect is accepted if its p-value is below the significance level and
+//!    the held-out error decreases by more than the standard error of the decrease. That standard error follows from
+//!    paired differences over runs, blocks or poses.
 //! 4. All parameters are refitted together (`judge`). The result (`result`) states the held-out error before and after.
 //! 5. For each effect the trace lists its aliases ([`alias`]). It tests the residual for remaining structure
 //!    (`remainder`).
 
 pub mod alias;
-mod compose;
 mod constants;
-mod description_length;
 mod implausible;
 pub(crate) mod interrupt;
 mod judge;
+mod moves;
 mod noise_model;
 mod null;
-mod refine;
+mod policy;
 mod remainder;
 pub(crate) mod result;
-mod rounds;
 pub mod screening;
 mod search;
 mod start;
-mod swap;
+mod state;
 
 use abbe_model::effect::Effect;
 use abbe_model::session::Session;
 
 use crate::candidates::columns::{Columns, EffectColumns};
-use crate::candidates::library::Candidate;
 use crate::candidates::moments::Moments;
 use crate::error::IdentifyError;
 use crate::fit::{Fit, fit, prepare};
-use crate::heldout::FoldKind;
 use crate::numerics::parallel;
 use crate::problem::Problem;
 use crate::results::TraceResult;
+use constants::{BLOCK, SINGLE};
 use implausible::Contradicted;
 use interrupt::Interrupt;
 use judge::RefittedModel;
 use noise_model::estimate_noise_model;
-use rounds::{SearchRecord, search_on};
-use search::{Search, StoppingRule};
+use policy::{Policy, SIGNIFICANCE};
+use search::{SearchRecord, search_and_refit};
 use start::Start;
+use state::SearchState;
 
 /// Options of a trace.
 #[derive(Clone, Debug)]
@@ -77,7 +75,7 @@ impl Default for TraceOptions {
             only: Vec::new(),
             exclude: Vec::new(),
             draws: 199,
-            significance: 0.005,
+            significance: SIGNIFICANCE,
         }
     }
 }
@@ -96,11 +94,6 @@ pub enum Progress {
     /// No new event. Reported often, so that the caller can stop the trace soon.
     Working,
 }
-
-/// Maximum number of effects for readings along runs. A larger number indicates a different cause.
-const MAX_ALONG_RUNS: usize = 12;
-/// Maximum number of effects for independent poses.
-const MAX_OF_POSES: usize = 200;
 
 /// One addition of the search.
 #[derive(Clone, Debug, PartialEq)]
@@ -143,8 +136,8 @@ pub struct TraceOutcome {
 ///
 /// # Errors
 /// If the session cannot be fitted.
-pub fn trace<'a>(
-    session: &'a Session,
+pub fn trace(
+    session: &Session,
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<TraceOutcome, IdentifyError> {
@@ -171,7 +164,7 @@ pub fn trace<'a>(
 
 /// Searches with the noise model estimated from repeats. Searches once more if the found effects change that noise
 /// model.
-fn with_noise_of_repeats<'a>(
+fn with_noise_of_repeats(
     mut problem: Problem,
     mut before_fit: Fit,
     options: &TraceOptions,
@@ -202,7 +195,7 @@ fn with_noise_of_repeats<'a>(
 }
 
 /// Traces with a given noise model. The null distribution is drawn from the repeats in the residuals `pure`.
-fn trace_with<'a>(
+fn trace_with(
     problem: Problem,
     before_fit: Fit,
     pure: &[Vec<f64>],
@@ -217,7 +210,7 @@ fn trace_with<'a>(
 
 /// Traces with a given noise model, and returns [`IdentifyError::Interrupted`] if it was interrupted before the search
 /// began.
-fn trace_or_interrupted<'a>(
+fn trace_or_interrupted(
     problem: &Problem,
     before_fit: &Fit,
     pure: &[Vec<f64>],
@@ -226,7 +219,12 @@ fn trace_or_interrupted<'a>(
 ) -> Result<TraceOutcome, IdentifyError> {
     let interrupt = Interrupt(progress);
     interrupt.check()?;
-    let poses = problem.folds.kind == FoldKind::Poses;
+    let policy = Policy::of(problem);
+    let policy = Policy {
+        significance: options.significance,
+        max_effects: options.max_effects.unwrap_or(policy.max_effects),
+        ..policy
+    };
     let columns = Columns::new(problem, &before_fit.beta);
     let start = Start::of(problem, &columns, before_fit)?;
     interrupt.check()?;
@@ -236,10 +234,10 @@ fn trace_or_interrupted<'a>(
     };
     let structure_before = || {
         let (model, prior) = (start.model.clone(), start.prior());
-        let draws = null(null::SINGLE);
+        let draws = null(SINGLE);
         remainder::structure(problem, &columns, model, &start.residual, draws, &prior)
     };
-    let (draws, structure_before) = parallel::both(|| null(null::BLOCK), || (!poses).then(structure_before));
+    let (draws, structure_before) = parallel::both(|| null(BLOCK), || policy.tests_structure.then(structure_before));
 
     let structure_before = structure_before.transpose()?;
     interrupt.check()?;
@@ -247,20 +245,14 @@ fn trace_or_interrupted<'a>(
     let searched = screening::searched_candidates(problem, &columns, options)?;
     let candidate_count = searched.len();
     progress(Progress::Screening(candidate_count));
-    let (reserve, searched): (Vec<_>, Vec<_>) = searched.into_iter().partition(|(candidate, _)| candidate.last_resort);
-    let (candidates, column_sets): (Vec<Candidate>, Vec<EffectColumns>) = searched.into_iter().unzip();
+    let (reserve, candidates): (Vec<_>, Vec<_>) = searched.into_iter().partition(|candidate| candidate.last_resort);
+    let column_sets: Vec<&EffectColumns> = candidates.iter().map(|candidate| &candidate.columns).collect();
     let (model, prior) = (start.model.clone(), start.prior());
     let go_on = || interrupt.check().is_ok();
     let moments = Moments::new(&columns, &column_sets, model, &start.residual, draws, &go_on)
         .ok_or(IdentifyError::Interrupted)?;
-    let max_effects = if poses { MAX_OF_POSES } else { MAX_ALONG_RUNS };
-    let stop = StoppingRule {
-        significance: options.significance,
-        max_effects: options.max_effects.unwrap_or(max_effects),
-        in_residual_variance: poses,
-    };
     let unwhitened = start.unwhitened(&columns, &before_fit.beta, problem.noise.sigma_mm)?;
-    let mut search = Search::new(&columns, candidates, column_sets, moments, prior, unwhitened, stop)?;
+    let mut search = SearchState::new(&columns, candidates, moments, prior, unwhitened, policy)?;
     search.reserve = reserve;
     search.interrupt = Some(interrupt);
     let gains = search.model_without(None)?.gains();
@@ -268,7 +260,7 @@ fn trace_or_interrupted<'a>(
 
     let mut record = SearchRecord { steps: Vec::new(), noise_um: problem.noise.sigma_mm * 1e3, progress };
     let structure_before = structure_before.as_ref();
-    let judge = |search: &Search<'_>| RefittedModel::of(problem, before_fit, search, options, structure_before);
+    let judge = |search: &SearchState<'_>| RefittedModel::of(problem, before_fit, search, options, structure_before);
     let found = match search_and_refit(&mut search, &mut record, judge) {
         Err(IdentifyError::Interrupted) => {
             search.roll_back();
@@ -295,7 +287,7 @@ fn trace_or_interrupted<'a>(
         structure_before,
         structure_after: structure_after.as_ref(),
         last_p_value: ended.unwrap_or(1.0),
-        stopped_early: ended.is_none() || search.selected().len() >= stop.max_effects,
+        stopped_early: ended.is_none() || search.selected().len() >= policy.max_effects,
         interrupted,
         candidates: candidate_count,
         candidates_seen: observable,
@@ -314,39 +306,6 @@ fn trace_or_interrupted<'a>(
         steps: record.steps,
         result: reported.result,
     })
-}
-
-/// Searches and refits. If significant structure remains, the search continues with nonparametric curves. Effects that
-/// explain nothing are withdrawn. Returns the p-value at which the search ended ([`search_on`]) and the refitted model.
-///
-/// # Errors
-/// [`IdentifyError::Interrupted`] if the caller stopped the trace.
-fn search_and_refit<'a>(
-    search: &mut Search<'_>,
-    record: &mut SearchRecord<'_>,
-    judge: impl Fn(&Search<'_>) -> Result<RefittedModel, IdentifyError>,
-) -> Result<(f64, RefittedModel), IdentifyError> {
-    let mut ended = search_on(search, record)?;
-    (record.progress)(Progress::Judging);
-    let mut judged = judge(search)?;
-    // For poses the residual always has structure, so the structure test cannot decide.
-    let poses = search.stop.in_residual_variance;
-    if (poses || judged.is_structured()) && search.selected().len() < search.stop.max_effects {
-        search.add_reserve_candidates();
-        search.last_resort = true;
-        ended = search_on(search, record)?;
-        if !judged.is_of(search) {
-            judged = judge(search)?;
-        }
-    }
-    if !poses {
-        search.withdraw(judged.is_structured())?;
-        search.withdraw_all_unless_better()?;
-        if !judged.is_of(search) {
-            judged = judge(search)?;
-        }
-    }
-    Ok((ended, judged))
 }
 
 /// The number of null draws: the requested number, but at least as many as the significance level needs.

@@ -1,16 +1,14 @@
 //! Estimates the noise model of a trace from repeats: standard deviation and autocorrelation.
 
-use crate::heldout::FoldKind;
+use super::constants::SCATTER;
+use super::policy::Policy;
 use crate::noise::{NoiseSource, PureError};
 use crate::problem::Problem;
-
-/// Sampling scatter of an estimated AR coefficient, and relative scatter of an estimated noise standard deviation.
-pub(super) const SCATTER: f64 = 0.02;
 
 /// Sets the noise standard deviation and autocorrelation from repeats, if there are enough. Returns whether this
 /// changed them by more than their sampling scatter.
 pub(super) fn estimate_noise_model(problem: &mut Problem, residuals: &[Vec<f64>]) -> bool {
-    if problem.folds.kind == FoldKind::Poses {
+    if !Policy::of(problem).noise_of_repeats {
         return false;
     }
     let kept = |test: usize, row: usize| !problem.rejected[test][row];

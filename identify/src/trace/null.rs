@@ -12,24 +12,12 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 
+use super::constants::{MAX_AR_SUM, MIN_POOL, SMOOTHING};
+use super::policy::{NullSource, Policy};
 use crate::candidates::columns::Columns;
-use crate::heldout::FoldKind;
 use crate::noise::{Noise, PureError};
 use crate::numerics::median;
 use crate::problem::Problem;
-
-/// Readings per block for the search. A block keeps intermittent structure, so that the search does not accept it as an
-/// effect.
-pub const BLOCK: usize = 20;
-/// Readings per block for the test of the remaining structure. Single readings leave only noise with the estimated
-/// autocorrelation.
-pub const SINGLE: usize = 1;
-/// Largest sum of the AR coefficients of a draw.
-const MAX_AR_SUM: f64 = 0.98;
-/// Least number of deviations to draw from. With fewer, Gaussian noise is drawn.
-const MIN_POOL: usize = 200;
-/// Readings on either side of the running median that removes structure from a residual without repeats.
-const SMOOTHING: usize = 7;
 
 /// Null draws (whitened rows in fold order × draws), in blocks of `block` readings.
 pub fn draws(
@@ -42,7 +30,7 @@ pub fn draws(
     seed: u64,
 ) -> Mat<f64> {
     let mut generator = Pcg64::seed_from_u64(seed ^ 0x6e75_6c6c);
-    if problem.folds.kind == FoldKind::Poses {
+    if Policy::of(problem).null == NullSource::SignFlips {
         return sign_flipped(columns, whitened, count, &mut generator);
     }
     let pool = pool(problem, residuals);

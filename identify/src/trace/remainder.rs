@@ -12,6 +12,7 @@ use abbe_model::effect::shape::{Curve, Local, Periodic};
 use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::session::readings::Readings;
 
+use super::constants::STRUCTURED;
 use crate::candidates::columns::{Columns, EffectColumns};
 use crate::candidates::gain::{PriorMoments, TrainedModel};
 use crate::candidates::moments::Moments;
@@ -31,9 +32,6 @@ pub struct Structure {
     pub description: String,
 }
 
-/// Significance level of the structure test.
-const STRUCTURED: f64 = 0.01;
-
 impl Structure {
     /// Whether the structure is significant.
     pub fn is_significant(&self) -> bool {
@@ -50,9 +48,9 @@ struct Detector {
 fn detectors(problem: &Problem, columns: &Columns<'_>) -> Vec<Detector> {
     let machine = &problem.session.machine;
     let mut detectors = Vec::new();
-    for (number, test) in problem.tests.iter().enumerate() {
+    for test in &problem.tests {
         let Some(readings) = &test.readings else { continue };
-        let mut of_test = TestResidual { columns, number, name: &test.name, readings, detectors: Vec::new() };
+        let mut of_test = TestResidual { columns, name: &test.name, readings, detectors: Vec::new() };
         for (axis, column) in readings.positions.iter().enumerate() {
             let low = column.iter().copied().fold(f64::INFINITY, f64::min);
             let high = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -69,7 +67,6 @@ fn detectors(problem: &Problem, columns: &Columns<'_>) -> Vec<Detector> {
 /// Collects the detectors of one test.
 struct TestResidual<'t, 'p> {
     columns: &'t Columns<'p>,
-    number: usize,
     name: &'t str,
     readings: &'t Readings,
     detectors: Vec<Detector>,
@@ -91,13 +88,13 @@ impl TestResidual<'_, '_> {
         description: String,
     ) {
         let effect = Effect {
-            component: Component::TriggerDelay,
+            component: Component::Reading(self.name.to_string()),
             driver: driver.clone(),
             shape,
-            tests: vec![self.name.to_string()],
+            tests: Vec::new(),
         };
         for coordinate in 0..self.readings.coordinates {
-            let column_set = self.columns.reading_columns(&effect, self.number, coordinate, by_direction, rows);
+            let column_set = self.columns.reading_columns(&effect, coordinate, by_direction, rows);
             let description = if self.readings.coordinates == 3 {
                 format!("{description} in {}", ["x", "y", "z"][coordinate])
             } else {
@@ -207,7 +204,7 @@ pub fn structure(
             description: "no detector applies to these readings".to_string(),
         });
     }
-    let column_sets: Vec<EffectColumns> = detectors.iter().map(|detector| detector.column_set.clone()).collect();
+    let column_sets: Vec<&EffectColumns> = detectors.iter().map(|detector| &detector.column_set).collect();
     let rank = model.ncols();
     let moments =
         Moments::new(columns, &column_sets, model, residual, null, &|| true).ok_or(IdentifyError::Interrupted)?;

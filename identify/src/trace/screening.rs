@@ -6,9 +6,10 @@ use faer::Mat;
 
 use super::TraceOptions;
 use super::start::Start;
+use crate::candidates::candidate::Candidate;
 use crate::candidates::columns::{Columns, EffectColumns};
 use crate::candidates::gain::TrainedModel;
-use crate::candidates::library::{self, Candidate};
+use crate::candidates::library::{self, LibraryEffect};
 use crate::candidates::moments::Moments;
 use crate::error::IdentifyError;
 use crate::fit::prepare;
@@ -36,15 +37,15 @@ pub fn screened_effects(session: &Session, options: &TraceOptions) -> Result<Vec
     let start = Start::of(&problem, &columns, &fit)?;
     let prior = start.prior();
     let searched = searched_candidates(&problem, &columns, options)?;
-    let (candidates, column_sets): (Vec<Candidate>, Vec<EffectColumns>) = searched.into_iter().unzip();
+    let column_sets: Vec<&EffectColumns> = searched.iter().map(|candidate| &candidate.columns).collect();
     let none = Mat::zeros(columns.rows(), 0);
     let moments = Moments::new(&columns, &column_sets, start.model, &start.residual, none, &|| true)
         .ok_or(IdentifyError::Interrupted)?;
     let rank = moments.base();
     let folds = (0..columns.fold_rows.len()).collect();
     let trained = TrainedModel::new(&moments, &prior, (0..rank).collect(), folds)?;
-    Ok(candidates
-        .into_iter()
+    Ok(searched
+        .iter()
         .zip(trained.gains())
         .map(|(candidate, gain)| ScreenedEffect {
             id: candidate.effect.id(),
@@ -63,7 +64,7 @@ pub(super) fn searched_candidates(
     problem: &Problem,
     columns: &Columns<'_>,
     options: &TraceOptions,
-) -> Result<Vec<(Candidate, EffectColumns)>, IdentifyError> {
+) -> Result<Vec<Candidate>, IdentifyError> {
     let mut candidates = library::candidates(problem)?;
     if let Some(text) = matching_no_candidate(&candidates, &options.only).next() {
         return Err(IdentifyError::NotInTheLibrary { text: text.clone() });
@@ -74,7 +75,11 @@ pub(super) fn searched_candidates(
         return Err(IdentifyError::EverythingLeftOut);
     }
     let column_sets = parallel::map(candidates.len(), &|k| columns.effect_columns(&candidates[k].effect));
-    Ok(candidates.into_iter().zip(column_sets).filter_map(|(candidate, found)| Some((candidate, found?))).collect())
+    Ok(candidates
+        .into_iter()
+        .zip(column_sets)
+        .filter_map(|(candidate, found)| Some(Candidate::of(candidate, found?)))
+        .collect())
 }
 
 /// A warning for each exclusion that matches no candidate.
@@ -86,7 +91,7 @@ pub(super) fn unused_exclusions(problem: &Problem, options: &TraceOptions) -> Re
 }
 
 /// The texts that occur in no candidate's identifier.
-fn matching_no_candidate<'t>(candidates: &[Candidate], texts: &'t [String]) -> impl Iterator<Item = &'t String> {
+fn matching_no_candidate<'t>(candidates: &[LibraryEffect], texts: &'t [String]) -> impl Iterator<Item = &'t String> {
     let ids: Vec<String> = candidates.iter().map(|candidate| candidate.effect.id()).collect();
     texts.iter().filter(move |text| !ids.iter().any(|id| id.contains(text.as_str())))
 }

@@ -5,7 +5,7 @@
 
 use faer::Mat;
 
-use super::search::UnwhitenedModel;
+use super::state::UnwhitenedModel;
 use crate::candidates::columns::Columns;
 use crate::candidates::gain::PriorMoments;
 use crate::error::IdentifyError;

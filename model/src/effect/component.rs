@@ -22,6 +22,9 @@ pub enum Component {
     /// A delay between the axis positions and the reading, in seconds: every moving axis has an error of its speed
     /// times the delay.
     TriggerDelay,
+    /// An additive term of the readings of the test of this name, without a cause in the machine. Searches use it to
+    /// compare effects with what the readings show. No file declares it, and no parameter of a fit is one.
+    Reading(String),
 }
 
 impl Component {
@@ -58,13 +61,14 @@ impl Component {
         parameters.iter().position(own)
     }
 
-    /// The internal unit; `None` for a delay, and for a parameter that the instrument does not have.
+    /// The internal unit; `None` for a delay, for a term of the readings, and for a parameter that the instrument does not
+    /// have.
     pub fn unit(&self, parameters: &[InstrumentParameter]) -> Option<InternalUnit> {
         match self {
             Component::Axis(name) if name.freedom.is_angle() => Some(InternalUnit::Radian),
             Component::Axis(_) => Some(InternalUnit::Millimetre),
             Component::Instrument { .. } => self.place(parameters).map(|place| parameters[place].unit),
-            Component::TriggerDelay => None,
+            Component::TriggerDelay | Component::Reading(_) => None,
         }
     }
 
@@ -93,6 +97,7 @@ impl Component {
                 }
                 slots
             }
+            Component::Reading(_) => Vec::new(),
         }
     }
 
@@ -120,6 +125,7 @@ impl fmt::Display for Component {
             Component::Instrument { thing, coordinate } if coordinate.is_empty() => formatter.write_str(thing),
             Component::Instrument { thing, coordinate } => write!(formatter, "{thing}.{coordinate}"),
             Component::TriggerDelay => formatter.write_str("trigger"),
+            Component::Reading(test) => write!(formatter, "reading[{test}]"),
         }
     }
 }

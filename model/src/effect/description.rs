@@ -114,7 +114,7 @@ impl EffectTerms<'_> {
                 "radius" | "form" => "artefact".to_string(),
                 thing => thing.replace('_', " "),
             },
-            Component::TriggerDelay => "readings".to_string(),
+            Component::TriggerDelay | Component::Reading(_) => "readings".to_string(),
         }
     }
 
@@ -133,6 +133,7 @@ impl EffectTerms<'_> {
                 (_, angle) => format!("angle {angle}"),
             },
             Component::TriggerDelay => "delay behind the positions".to_string(),
+            Component::Reading(test) => format!("additive term in {test}"),
         }
     }
 

@@ -126,16 +126,20 @@ impl Columns<'_> {
         Some((name, samples))
     }
 
-    /// Places a shape on one coordinate of the readings of one test, without a component. `by_direction` changes its
-    /// sign with the direction of travel. `rows` confines it. `None` if the data lack its driver.
+    /// The columns of a term on one coordinate of the readings of a test ([`Component::Reading`]). `by_direction` changes
+    /// its sign with the direction of travel. `rows` confines it. `None` if the session has no such test, or the data
+    /// lack its driver.
     pub fn reading_columns(
         &self,
         effect: &Effect,
-        test: usize,
         coordinate: usize,
         by_direction: bool,
         rows: Option<&Range<usize>>,
     ) -> Option<EffectColumns> {
+        let Component::Reading(name) = &effect.component else {
+            return None;
+        };
+        let test = self.problem.tests.iter().position(|test| test.name == *name)?;
         let (_, samples) = self.driver_samples(test, &effect.driver, None)?;
         let basis = Arc::new(effect.shape.columns(&samples));
         let factor = (by_direction || rows.is_some()).then(|| {
@@ -159,7 +163,7 @@ impl Columns<'_> {
             return Vec::new();
         };
         let mut column_sets = Vec::new();
-        for (number, test) in self.problem.tests.iter().enumerate() {
+        for test in &self.problem.tests {
             let Some(readings) = &test.readings else { continue };
             let column = &readings.positions[axis];
             let low = column.iter().copied().fold(f64::INFINITY, f64::min);
@@ -169,13 +173,13 @@ impl Columns<'_> {
                 continue;
             }
             let effect = Effect {
-                component: Component::TriggerDelay,
+                component: Component::Reading(test.name.clone()),
                 driver: driver.clone(),
                 shape: Shape::Curve(Curve { from: low, to: high, intervals, closed: false }),
-                tests: vec![test.name.clone()],
+                tests: Vec::new(),
             };
             for coordinate in 0..self.problem.coordinates() {
-                let column_set = self.reading_columns(&effect, number, coordinate, false, None);
+                let column_set = self.reading_columns(&effect, coordinate, false, None);
                 column_sets.extend(column_set.map(|column_set| (effect.clone(), column_set)));
             }
         }
@@ -203,7 +207,7 @@ impl Columns<'_> {
 const CHUNK_COLUMNS: usize = 48;
 
 /// Groups consecutive effects whose columns are computed together: as many as fit into a chunk, and at least one.
-pub fn chunked(column_sets: &[EffectColumns]) -> Vec<Range<usize>> {
+pub fn chunked(column_sets: &[&EffectColumns]) -> Vec<Range<usize>> {
     let mut chunks = Vec::new();
     let (mut start, mut width) = (0, 0);
     for (index, column_set) in column_sets.iter().enumerate() {
@@ -244,7 +248,8 @@ mod tests {
             counts.iter().map(of_count).collect()
         };
         let ends = |counts: &[usize]| -> Vec<usize> {
-            let chunks = chunked(&column_sets(counts));
+            let column_sets = column_sets(counts);
+            let chunks = chunked(&column_sets.iter().collect::<Vec<_>>());
             let starts: Vec<usize> = chunks.iter().map(|chunk| chunk.start).collect();
             let ends: Vec<usize> = chunks.iter().map(|chunk| chunk.end).collect();
             assert!(starts.iter().zip([0].iter().chain(&ends)).all(|(start, end)| start == end));

@@ -49,7 +49,7 @@ pub struct Columns<'p> {
 type SharedColumns = Arc<Vec<Vec<f64>>>;
 type SharedSamples = Option<Arc<Vec<DriverSample<f64>>>>;
 
-impl<'p, 'a> Columns<'p> {
+impl<'p> Columns<'p> {
     /// Computes the sensitivities at the parameter values of a fit.
     pub fn new(problem: &'p Problem, beta: &[f64]) -> Columns<'p> {
         let sensitivities = sensitivities(problem, beta);
@@ -146,7 +146,7 @@ impl<'p, 'a> Columns<'p> {
     }
 
     /// For each fold the rows in which any of the effects acts. Empty if none acts in the fold.
-    pub fn moved_rows(&self, column_sets: &[EffectColumns]) -> Vec<Range<usize>> {
+    pub fn moved_rows(&self, column_sets: &[&EffectColumns]) -> Vec<Range<usize>> {
         let moved = |test: &usize| column_sets.iter().any(|column_set| column_set.acts_in(*test));
         let folds = self.fold_rows.iter().zip(&self.fold_tests);
         folds.map(|(rows, tests)| if tests.iter().any(moved) { rows.clone() } else { rows.start..rows.start }).collect()
@@ -155,7 +155,7 @@ impl<'p, 'a> Columns<'p> {
     /// The stretches of rows of some folds in which any of the effects acts.
     pub fn moved_stretches(
         &self,
-        column_sets: &[EffectColumns],
+        column_sets: &[&EffectColumns],
         folds: impl IntoIterator<Item = usize>,
     ) -> Vec<Range<usize>> {
         let moved = self.moved_rows(column_sets);

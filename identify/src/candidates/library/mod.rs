@@ -5,7 +5,6 @@ mod shapes;
 use abbe_model::axis::AxisKind;
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
 use abbe_model::driver::{Driver, Recorded};
-use abbe_model::effect::shape::Steps;
 use abbe_model::effect::{Component, Effect, Shape};
 use serde::Deserialize;
 
@@ -57,44 +56,21 @@ struct Library {
     family: Vec<Family>,
 }
 
-/// A candidate effect.
+/// A member of the library for a session.
 #[derive(Clone, Debug)]
-pub struct Candidate {
+pub struct LibraryEffect {
     /// The effect.
     pub effect: Effect,
     /// Index of its family.
     pub family: usize,
     /// Cost in the score in addition to its degrees of freedom, in natural-logarithm units.
     pub cost: f64,
-    /// Selection penalty: the reduction of the evidence for the selection of several positions. 0 for an effect of the
-    /// library.
-    pub selection_penalty: f64,
     /// Whether it is searched only if no simpler candidate is significant and structure remains.
     pub last_resort: bool,
-    /// Whether it is a dictionary of positions for `compose` and not an effect itself.
+    /// Whether it is a dictionary of positions for step tables and not an effect itself.
     pub dictionary: bool,
-    /// Spacing of the library's members in the first tunable shape number, in the driver's unit; 0 if there is none.
+    /// Spacing of the members in the first tunable shape number, in the driver's unit; 0 if there is none.
     pub grid: f64,
-}
-
-impl Candidate {
-    /// A curve without a component. It serves for comparison with effects and is not searched itself.
-    pub fn test_curve(effect: Effect) -> Candidate {
-        Candidate {
-            effect,
-            family: usize::MAX,
-            cost: 0.0,
-            selection_penalty: 0.0,
-            last_resort: false,
-            dictionary: true,
-            grid: 0.0,
-        }
-    }
-
-    /// Description length. The simplest candidate has the shortest description.
-    pub fn description_length(&self) -> f64 {
-        self.cost + self.selection_penalty
-    }
 }
 
 /// The families of the library.
@@ -119,7 +95,7 @@ pub fn families() -> Result<Vec<Family>, IdentifyError> {
 ///
 /// # Errors
 /// See [`families`].
-pub fn candidates(problem: &Problem) -> Result<Vec<Candidate>, IdentifyError> {
+pub fn candidates(problem: &Problem) -> Result<Vec<LibraryEffect>, IdentifyError> {
     let sampling = Sampling::of(problem);
     let families = families()?;
     let mut candidates = Vec::new();
@@ -131,16 +107,8 @@ pub fn candidates(problem: &Problem) -> Result<Vec<Candidate>, IdentifyError> {
                     let cost = family.simplicity + extra + tilt_cost(problem, &component);
                     let last_resort = family.last_resort;
                     let grid = grid(problem, &sampling, &effect);
-                    let dictionary = matches!(&effect.shape, Shape::Steps(Steps { at }) if at.len() > 1);
-                    candidates.push(Candidate {
-                        effect,
-                        family: number,
-                        cost,
-                        selection_penalty: 0.0,
-                        last_resort,
-                        dictionary,
-                        grid,
-                    });
+                    let dictionary = effect.shape.positions().len() > 1;
+                    candidates.push(LibraryEffect { effect, family: number, cost, last_resort, dictionary, grid });
                 }
             }
         }
@@ -155,7 +123,7 @@ pub fn candidates(problem: &Problem) -> Result<Vec<Candidate>, IdentifyError> {
     Ok(candidates)
 }
 
-/// See [`Candidate::grid`].
+/// See [`LibraryEffect::grid`].
 fn grid(problem: &Problem, sampling: &Sampling, effect: &Effect) -> f64 {
     let axis = effect.driver.axis(&problem.session.machine);
     effect.shape.spacing(axis.map_or(0.0, |axis| sampling.span(axis)))

@@ -119,7 +119,7 @@ impl Moments {
     /// if `go_on` returns `false`.
     pub fn new(
         columns: &Columns<'_>,
-        column_sets: &[EffectColumns],
+        column_sets: &[&EffectColumns],
         model: Mat<f64>,
         residual: &[f64],
         null: Mat<f64>,
@@ -176,10 +176,10 @@ impl Moments {
     pub fn add_to_base(
         &mut self,
         columns: &Columns<'_>,
-        column_sets: &[EffectColumns],
+        column_sets: &[&EffectColumns],
         candidates: &[usize],
     ) -> Vec<Range<usize>> {
-        let chosen: Vec<&EffectColumns> = candidates.iter().map(|candidate| &column_sets[*candidate]).collect();
+        let chosen: Vec<&EffectColumns> = candidates.iter().map(|candidate| column_sets[*candidate]).collect();
         let added: usize = chosen.iter().map(|column_set| column_set.count).sum();
         let (rows, old) = (columns.rows(), self.base());
         let mut places = Vec::new();
@@ -211,7 +211,7 @@ impl Moments {
     }
 
     /// Computes the products of those effects in `column_sets` that are not yet candidates.
-    pub fn append(&mut self, columns: &Columns<'_>, column_sets: &[EffectColumns]) {
+    pub fn append(&mut self, columns: &Columns<'_>, column_sets: &[&EffectColumns]) {
         let rank = self.base();
         let side = beside(&self.base_columns, &self.residual);
         let candidates = self.count.len()..column_sets.len();

@@ -23,7 +23,7 @@ pub(super) struct CandidateChunk {
 /// returns `false`.
 pub(super) fn multiply(
     columns: &Columns<'_>,
-    column_sets: &[EffectColumns],
+    column_sets: &[&EffectColumns],
     candidates: Range<usize>,
     present: &[CandidateChunk],
     (side, null): (&Mat<f64>, &Mat<f64>),
@@ -66,7 +66,7 @@ pub(super) fn multiply(
 pub(super) fn with_side(
     chunks: &[CandidateChunk],
     columns: &Columns<'_>,
-    column_sets: &[EffectColumns],
+    column_sets: &[&EffectColumns],
     side: MatRef<'_, f64>,
 ) -> Vec<Mat<f64>> {
     let parts = parallel::map(chunks.len(), &|k| {
@@ -79,11 +79,10 @@ pub(super) fn with_side(
     joined_by_fold(&parts, columns.fold_rows.len(), side.ncols())
 }
 
-fn filled(columns: &Columns<'_>, column_sets: &[EffectColumns]) -> Mat<f64> {
-    let chosen: Vec<&EffectColumns> = column_sets.iter().collect();
-    let width: usize = chosen.iter().map(|column_set| column_set.count).sum();
+fn filled(columns: &Columns<'_>, column_sets: &[&EffectColumns]) -> Mat<f64> {
+    let width: usize = column_sets.iter().map(|column_set| column_set.count).sum();
     let mut chunk = Mat::zeros(columns.rows(), width);
-    columns.fill(&chosen, chunk.as_mut());
+    columns.fill(column_sets, chunk.as_mut());
     chunk
 }
 
@@ -132,7 +131,7 @@ fn joined<'p>(rows: usize, parts: impl Iterator<Item = &'p Mat<f64>> + Clone) ->
 /// fold.
 fn cross_by_fold(
     columns: &Columns<'_>,
-    column_sets: &[EffectColumns],
+    column_sets: &[&EffectColumns],
     side: MatRef<'_, f64>,
     all: MatRef<'_, f64>,
 ) -> Vec<Mat<f64>> {
@@ -146,13 +145,13 @@ fn cross_by_fold(
 }
 
 /// For each fold each candidate's product with itself.
-fn gram_by_fold(columns: &Columns<'_>, column_sets: &[EffectColumns], all: MatRef<'_, f64>) -> Vec<Vec<Mat<f64>>> {
+fn gram_by_fold(columns: &Columns<'_>, column_sets: &[&EffectColumns], all: MatRef<'_, f64>) -> Vec<Vec<Mat<f64>>> {
     let moved = columns.moved_rows(column_sets).into_iter();
     moved
         .map(|rows| {
             let part = all.subrows(rows.start, rows.len());
             let mut start = 0;
-            let own = |column_set: &EffectColumns| {
+            let own = |column_set: &&EffectColumns| {
                 let of = part.subcols(start, column_set.count);
                 start += column_set.count;
                 transposed_product(of, of)
@@ -165,7 +164,7 @@ fn gram_by_fold(columns: &Columns<'_>, column_sets: &[EffectColumns], all: MatRe
 /// Null draws with candidates, over all folds in which any of them acts.
 fn null_product(
     columns: &Columns<'_>,
-    column_sets: &[EffectColumns],
+    column_sets: &[&EffectColumns],
     null: &Mat<f64>,
     all: MatRef<'_, f64>,
 ) -> Mat<f64> {

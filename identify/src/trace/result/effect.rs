@@ -2,8 +2,7 @@
 
 use abbe_model::chain::Machine;
 use abbe_model::driver::DriverSample;
-use abbe_model::effect::shape::Curve;
-use abbe_model::effect::{Effect, Shape};
+use abbe_model::effect::Effect;
 
 use super::{HeldOut, Moves, TraceFindings, alias_shifts};
 use crate::candidates::library::Family;
@@ -94,7 +93,7 @@ fn curve_of(problem: &Problem, fit: &Fit, number: usize, moves: &Moves) -> Vec<C
     let Some(effect) = problem.parameters.effects.get(number) else {
         return Vec::new();
     };
-    let Shape::Curve(Curve { from, to, .. }) = effect.shape else {
+    let Some([from, to]) = effect.shape.curve_ends() else {
         return Vec::new();
     };
     let places: Vec<usize> = (0..problem.parameters.list.len())
@@ -130,7 +129,7 @@ fn curve_of(problem: &Problem, fit: &Fit, number: usize, moves: &Moves) -> Vec<C
 
 /// Units of the positions and values of a curve; empty for other shapes.
 fn curve_units(problem: &Problem, effect: &Effect) -> (String, String) {
-    if !matches!(effect.shape, Shape::Curve { .. }) {
+    if effect.shape.curve_ends().is_none() {
         return (String::new(), String::new());
     }
     (
@@ -155,7 +154,8 @@ mod tests {
     use std::path::Path;
 
     use abbe_model::driver::Driver;
-    use abbe_model::effect::Component;
+    use abbe_model::effect::shape::Curve;
+    use abbe_model::effect::{Component, Shape};
     use abbe_model::files::{self, ReadOptions};
 
     use super::*;

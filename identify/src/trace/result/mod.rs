@@ -9,8 +9,8 @@ use abbe_model::effect::Effect;
 
 use super::alias::{self, Alias, CompetingEffect};
 use super::remainder::Structure;
-use super::search::Search;
 use super::start::Start;
+use super::state::SearchState;
 use crate::candidates::library;
 use crate::error::IdentifyError;
 use crate::fit::{self, Fit};
@@ -31,7 +31,7 @@ pub(super) struct TraceFindings<'f> {
     pub before_fit: &'f Fit,
     pub after: &'f Problem,
     pub after_fit: &'f Fit,
-    pub search: &'f Search<'f>,
+    pub search: &'f SearchState<'f>,
     pub start: &'f Start,
     pub structure_before: Option<&'f Structure>,
     pub structure_after: Option<&'f Structure>,
@@ -68,7 +68,7 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
         let (aliases, of_effect) = alias::aliases(search, k, &model, variance);
         competing_effects.push(of_effect);
         let named = model.with_candidate(taken.candidate).0;
-        let effect_of = |alias: &Alias| search.candidates[alias.candidate].effect.clone();
+        let effect_of = |alias: &Alias| search.effect(alias.candidate).clone();
         alias_effects.push(aliases.iter().map(effect_of).collect());
         let in_its_place = |alias: &Alias| moves_by(findings, k, &alias.model_coefficients, &named);
         moves.push(aliases.iter().map(in_its_place).collect::<Vec<_>>());
@@ -143,10 +143,14 @@ struct HeldOut<'s> {
 }
 
 impl<'s> HeldOut<'s> {
-    fn of(search: &'s Search<'_>, before_um: f64) -> HeldOut<'s> {
+    fn of(search: &'s SearchState<'_>, before_um: f64) -> HeldOut<'s> {
         let rows = search.columns.rows().max(1) as f64;
-        let first = search.held_out.first().copied().unwrap_or(1.0);
-        HeldOut { sums: &search.held_out, rows, scale_um: before_um / (first / rows).sqrt().max(f64::MIN_POSITIVE) }
+        let first = search.selection.held_out.first().copied().unwrap_or(1.0);
+        HeldOut {
+            sums: &search.selection.held_out,
+            rows,
+            scale_um: before_um / (first / rows).sqrt().max(f64::MIN_POSITIVE),
+        }
     }
 
     /// With this number of effects.
@@ -163,7 +167,7 @@ impl<'s> HeldOut<'s> {
 /// Variance for the comparison of aliases, relative to that of the noise. For poses it is that of the remaining
 /// residual.
 fn residual_variance(findings: &TraceFindings<'_>) -> f64 {
-    if !findings.search.stop.in_residual_variance {
+    if !findings.search.policy.in_residual_variance {
         return 1.0;
     }
     let residuals = findings.after_fit.residuals.iter().flatten();

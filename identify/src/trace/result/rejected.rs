@@ -5,15 +5,19 @@ use abbe_model::chain::Machine;
 use super::{HeldOut, effect_name};
 use crate::heldout::paired::HeldOutDecrease;
 use crate::results::RejectedCandidate;
-use crate::trace::search::Search;
+use crate::trace::state::SearchState;
 
 /// Candidates that score better than the null distribution of the search and did not lower the held-out error by more
 /// than the standard error of the fall.
-pub(super) fn candidates(machine: &Machine, search: &Search<'_>, held_out: &HeldOut<'_>) -> Vec<RejectedCandidate> {
+pub(super) fn candidates(
+    machine: &Machine,
+    search: &SearchState<'_>,
+    held_out: &HeldOut<'_>,
+) -> Vec<RejectedCandidate> {
     let rejected = search.rejected.iter().map(|rejected| {
         let (heldout_decrease_um, u_heldout_decrease_um) = held_out.decrease_um(rejected.decrease);
         RejectedCandidate {
-            name: effect_name(machine, &search.candidates[rejected.selected.candidate].effect),
+            name: effect_name(machine, search.effect(rejected.selected.candidate)),
             p_value: rejected.selected.p_value,
             heldout_decrease_um,
             u_heldout_decrease_um,

@@ -2,9 +2,7 @@
 
 use super::TraceFindings;
 use crate::results::{EffectResult, Remainder};
-
-/// Share of the structure's excess over noise that may remain for the found effects to count as the explanation.
-const EXPLAINED_SHARE: f64 = 0.5;
+use crate::trace::constants::EXPLAINED_SHARE;
 
 /// The verdict, and the residual of the model with the found effects.
 pub(super) fn verdict(findings: &TraceFindings<'_>, effects: &[EffectResult]) -> (String, Remainder) {

@@ -104,6 +104,9 @@ impl ShapeKind for Curve {
         let margin = 0.1 * (self.to - self.from);
         Some([self.from - margin, self.to + margin])
     }
+    fn curve_ends(&self) -> Option<[f64; 2]> {
+        Some([self.from, self.to])
+    }
 }
 
 impl Basis for Curve {

@@ -169,6 +169,18 @@ pub trait ShapeKind {
     fn set_number(&mut self, which: usize, value: f64) {
         let _ = (which, value);
     }
+    /// The positions of which a search selects some, one coefficient each; empty for other shapes.
+    fn positions(&self) -> &[f64] {
+        &[]
+    }
+    /// Sets these positions.
+    fn set_positions(&mut self, positions: Vec<f64>) {
+        let _ = positions;
+    }
+    /// The ends of a nonparametric curve; `None` for other shapes.
+    fn curve_ends(&self) -> Option<[f64; 2]> {
+        None
+    }
 }
 
 /// The basis functions of a shape over an open scalar: numbers for a fit, symbols for a printed equation. Numbers

@@ -101,6 +101,16 @@ impl Shape {
         changed
     }
 
+    /// The same shape with other positions ([`ShapeKind::positions`]).
+    #[must_use]
+    pub fn with_positions(&self, positions: Vec<f64>) -> Shape {
+        let mut changed = self.clone();
+        if let Some(kind) = changed.kind_mut() {
+            kind.set_positions(positions);
+        }
+        changed
+    }
+
     /// The basis functions over the rows of a test: one column per coefficient.
     pub fn columns(&self, samples: &[DriverSample<f64>]) -> Vec<Vec<f64>> {
         let count = self.coefficients();

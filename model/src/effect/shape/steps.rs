@@ -84,6 +84,12 @@ impl ShapeKind for Steps {
     fn spacing(&self, span: f64) -> f64 {
         span / POSITIONS as f64
     }
+    fn positions(&self) -> &[f64] {
+        &self.at
+    }
+    fn set_positions(&mut self, positions: Vec<f64>) {
+        self.at = positions;
+    }
 }
 
 impl Basis for Steps {

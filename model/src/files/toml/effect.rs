@@ -72,7 +72,7 @@ fn component(context: &Context<'_>, table: &mut Table<'_>) -> Result<Component, 
             Ok(Component::Instrument { thing, coordinate })
         }
         Some(Component::TriggerDelay) => Ok(Component::TriggerDelay),
-        None => {
+        Some(Component::Reading(_)) | None => {
             let help = format!(
                 "errors of axes according to ISO 230-1, such as EZC or EX0C; parameters of the instrument: {}; or trigger",
                 instrument()

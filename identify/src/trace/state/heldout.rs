@@ -3,7 +3,7 @@
 
 use faer::Mat;
 
-use super::{ALL, Search, SearchBranch, SelectedEffect};
+use super::{ALL, SearchBranch, SearchState, SelectedEffect};
 use crate::candidates::gain::TrainedModel;
 use crate::candidates::moments::grow;
 use crate::error::IdentifyError;
@@ -36,20 +36,31 @@ impl UnwhitenedModel {
     }
 }
 
-/// The selected effects of all searches and their held-out error.
-#[derive(Clone, Debug, Default)]
-pub struct HeldOutState {
-    /// The branches of the search.
-    branches: Vec<SearchBranch>,
-    /// [`Search::held_out`].
-    held_out: Vec<f64>,
-    /// Sums of squares of held-out residuals over the variance of the noise, by unit.
+/// The selected effects of every branch and their held-out error.
+#[derive(Clone, Debug)]
+pub struct Selection {
+    /// The branch on all readings, then one for each fold.
+    pub branches: Vec<SearchBranch>,
+    /// Sum of squares of held-out residuals over the noise variance, for each number of effects.
+    pub held_out: Vec<f64>,
+    /// Sums of squares of held-out residuals over the noise variance, by unit.
     units: Vec<f64>,
 }
 
-impl HeldOutState {
-    fn effects(&self) -> &[SelectedEffect] {
-        self.branches.first().map_or(&[], |all| &all.selected)
+impl Selection {
+    /// No effects. The held-out error is not known yet.
+    pub(super) fn none(folds: usize) -> Selection {
+        let without = |left_out: Option<usize>| SearchBranch {
+            folds: (0..folds).filter(|fold| Some(*fold) != left_out).collect(),
+            selected: Vec::new(),
+        };
+        let branches = std::iter::once(None).chain((0..folds).map(Some)).map(without).collect();
+        Selection { branches, held_out: Vec::new(), units: Vec::new() }
+    }
+
+    /// The selected effects of the branch on all readings.
+    pub fn effects(&self) -> &[SelectedEffect] {
+        &self.branches[ALL].selected
     }
 }
 
@@ -62,11 +73,11 @@ pub struct RejectedByHeldOut {
     pub decrease: HeldOutDecrease,
 }
 
-impl Search<'_> {
+impl SearchState<'_> {
     /// Sums of squares of held-out residuals over the noise variance, by unit. The model of the search that excludes a
     /// fold predicts it.
     fn held_out_by_unit(&self) -> Result<Vec<f64>, IdentifyError> {
-        let branches = &self.branches[ALL + 1..];
+        let branches = &self.selection.branches[ALL + 1..];
         let models: Vec<TrainedModel<'_>> =
             parallel::map(branches.len(), &|k| self.projection_of(&branches[k].chosen(), &branches[k].folds))
                 .into_iter()
@@ -82,95 +93,73 @@ impl Search<'_> {
     }
 
     /// Sum of squares of held-out residuals over the noise variance.
-    pub(super) fn held_out_now(&self) -> Result<f64, IdentifyError> {
+    pub fn held_out_now(&self) -> Result<f64, IdentifyError> {
         Ok(self.held_out_by_unit()?.iter().sum())
     }
 
     /// Records the held-out error for the present number of effects.
-    pub(in crate::trace) fn note_held_out(&mut self) -> Result<(), IdentifyError> {
-        self.units_now = self.held_out_by_unit()?;
-        let held_out = self.units_now.iter().sum();
+    pub fn note_held_out(&mut self) -> Result<(), IdentifyError> {
+        self.selection.units = self.held_out_by_unit()?;
+        let held_out = self.selection.units.iter().sum();
         let selected = self.selected().len();
-        self.held_out.truncate(selected);
-        self.held_out.resize(selected + 1, held_out);
+        self.selection.held_out.truncate(selected);
+        self.selection.held_out.resize(selected + 1, held_out);
         Ok(())
-    }
-
-    /// The present state of the searches.
-    pub(super) fn state(&self) -> HeldOutState {
-        HeldOutState { branches: self.branches.clone(), held_out: self.held_out.clone(), units: self.units_now.clone() }
     }
 
     /// Accepts the selected effects if the held-out error permits it. With more effects than are accepted, it has to
     /// decrease by more than the standard error. With as many or fewer, it must not increase by more than the standard
     /// error. Returns whether all selected effects are accepted.
-    pub(in crate::trace) fn accept(&mut self) -> bool {
-        let decrease = self.decrease_since_accepted();
+    pub fn accept(&mut self) -> bool {
+        let decrease = self.decrease_since(&self.accepted);
         let added = self.selected().len() > self.accepted.effects().len();
         let accepted =
             if added { decrease.is_significant() } else { !decrease.is_increase() && self.lowers_heldout_error() };
         if accepted {
-            self.accepted = self.state();
-            let accepted: Vec<usize> = self.branches[ALL].chosen();
+            self.accepted = self.selection.clone();
+            let accepted = self.accepted.branches[ALL].chosen();
             self.rejected.retain(|rejected| !accepted.contains(&rejected.selected.candidate));
         }
         accepted
     }
 
-    /// The decrease of the held-out error since the last acceptance.
-    pub(in crate::trace) fn decrease_since_accepted(&self) -> HeldOutDecrease {
-        self.unwhitened.units.decrease(&self.accepted.units, &self.units_now)
-    }
-
-    /// The decrease of the held-out error since the declared model.
-    pub(in crate::trace) fn decrease_since_declared(&self) -> HeldOutDecrease {
-        self.unwhitened.units.decrease(&self.declared_units, &self.units_now)
+    /// The decrease of the held-out error since another selection.
+    fn decrease_since(&self, earlier: &Selection) -> HeldOutDecrease {
+        self.unwhitened.units.decrease(&earlier.units, &self.selection.units)
     }
 
     /// Whether nothing is selected, or the held-out error is below that of the declared model by more than the standard
     /// error of the decrease.
     fn lowers_heldout_error(&self) -> bool {
-        self.selected().is_empty() || self.decrease_since_declared().is_significant()
+        self.selected().is_empty() || self.decrease_since(&self.declared).is_significant()
     }
 
     /// Withdraws the effects added since the last acceptance, and records them as rejected.
-    pub(in crate::trace) fn withdraw_rejected(&mut self) {
-        let decrease = self.decrease_since_accepted();
-        let accepted: Vec<usize> = self.accepted.effects().iter().map(|selected| selected.candidate).collect();
-        for selected in self.branches[ALL].selected.clone() {
+    pub fn withdraw_rejected(&mut self) {
+        let decrease = self.decrease_since(&self.accepted);
+        let accepted = self.accepted.branches[ALL].chosen();
+        for selected in self.selected().to_vec() {
             let known = self.rejected.iter().any(|u| u.selected.candidate == selected.candidate);
             if !accepted.contains(&selected.candidate) && !known {
                 self.rejected.push(RejectedByHeldOut { selected, decrease });
             }
         }
-        self.restore();
+        self.selection = self.accepted.clone();
     }
 
     /// Restores the accepted effects after an interruption within a round. The search is not interrupted again.
-    pub(in crate::trace) fn roll_back(&mut self) {
-        self.restore();
+    pub fn roll_back(&mut self) {
+        self.selection = self.accepted.clone();
         self.interrupt = None;
-    }
-
-    fn restore(&mut self) {
-        let HeldOutState { branches, held_out, units } = self.accepted.clone();
-        self.branches = branches;
-        self.held_out = held_out;
-        self.units_now = units;
     }
 
     /// Withdraws all effects if together they do not lower the held-out error of the declared model by more than the
     /// standard error of the decrease.
-    pub(in crate::trace) fn withdraw_all_unless_better(&mut self) -> Result<(), IdentifyError> {
+    pub fn withdraw_all_unless_better(&mut self) {
         if !self.lowers_heldout_error() {
-            self.accepted = HeldOutState::default();
-            self.accepted.branches = self.branches.clone();
-            self.accepted.branches.iter_mut().for_each(|branch| branch.selected.clear());
-            self.accepted.held_out = self.held_out[..1].to_vec();
-            self.accepted.units = self.declared_units.clone();
+            self.accepted = self.declared.clone();
             self.withdraw_rejected();
         }
-        self.accepted = self.state();
-        Ok(())
+        self.accepted = self.selection.clone();
     }
 }

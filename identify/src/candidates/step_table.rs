@@ -5,14 +5,13 @@
 //! evidence of `n` selected out of `m` positions is reduced by `ln C(m, n)`, the logarithm of the number of possible
 //! selections. By the union bound this penalty keeps the significance level of the search.
 
-use abbe_model::effect::shape::Steps;
-use abbe_model::effect::{Effect, Shape};
+use abbe_model::effect::Effect;
 use faer::Mat;
+use faer::prelude::Solve;
 use statrs::function::gamma::ln_gamma;
 
-use crate::candidates::gain::TrainedModel;
-use crate::candidates::library::Candidate;
-use crate::numerics::solve::solve_square;
+use super::candidate::Candidate;
+use super::gain::TrainedModel;
 use crate::numerics::tails::ln_chi_square_tail;
 use crate::numerics::tolerances::MIN_OBSERVABLE;
 
@@ -24,8 +23,14 @@ const MAX_SWEEPS: usize = 4;
 /// An effect with several step positions.
 #[derive(Clone, Debug)]
 pub struct StepTable {
-    /// The effect as a candidate, with its selection penalty.
-    pub candidate: Candidate,
+    /// Index of its dictionary among the candidates.
+    pub dictionary: usize,
+    /// The effect.
+    pub effect: Effect,
+    /// Penalty for the selection of its positions.
+    pub selection_penalty: f64,
+    /// Cost of its dictionary.
+    pub cost: f64,
     /// `−ln P` of its gain, less the selection penalty.
     pub evidence: f64,
 }
@@ -33,7 +38,7 @@ pub struct StepTable {
 impl StepTable {
     /// Evidence less cost: the criterion of comparison.
     pub fn score(&self) -> f64 {
-        self.evidence - self.candidate.cost
+        self.evidence - self.cost
     }
 }
 
@@ -45,9 +50,10 @@ pub fn best_step_table(
     dictionary: &Candidate,
     variance: f64,
 ) -> Option<StepTable> {
-    let Shape::Steps(Steps { at }) = &dictionary.effect.shape else {
+    let at = dictionary.effect.shape.positions();
+    if at.is_empty() {
         return None;
-    };
+    }
     let (d, g, own) = model.projected(number);
     let subset = Subset { d: &d, g: &g, own: &own };
     let mut chosen: Vec<usize> = Vec::new();
@@ -67,9 +73,10 @@ pub fn best_step_table(
         if best.as_ref().is_none_or(|best| evidence - dictionary.cost > best.score()) {
             let mut positions: Vec<f64> = chosen.iter().map(|k| at[*k]).collect();
             positions.sort_by(f64::total_cmp);
-            let effect = Effect { shape: Shape::Steps(Steps { at: positions }), ..dictionary.effect.clone() };
-            let candidate = Candidate { effect, selection_penalty, dictionary: false, ..dictionary.clone() };
-            best = Some(StepTable { candidate, evidence });
+            let effect =
+                Effect { shape: dictionary.effect.shape.with_positions(positions), ..dictionary.effect.clone() };
+            let cost = dictionary.cost;
+            best = Some(StepTable { dictionary: number, effect, selection_penalty, cost, evidence });
         }
     }
     best
@@ -99,7 +106,7 @@ impl Subset<'_> {
         } else {
             let block = Mat::from_fn(n, n, |i, j| self.d[(chosen[i], chosen[j])]);
             let right = Mat::from_fn(n, m + 1, |i, j| if j < m { self.d[(chosen[i], j)] } else { self.g[chosen[i]] });
-            solve_square(block.as_ref(), right.as_ref())
+            block.partial_piv_lu().solve(&right)
         };
         let mut best: Option<(usize, f64)> = None;
         for j in (0..m).filter(|j| !chosen.contains(j)) {
@@ -149,7 +156,7 @@ impl Subset<'_> {
         }
         let block = Mat::from_fn(n, n, |i, j| self.d[(chosen[i], chosen[j])]);
         let right = Mat::from_fn(n, 1, |i, _| self.g[chosen[i]]);
-        let solved = solve_square(block.as_ref(), right.as_ref());
+        let solved = block.partial_piv_lu().solve(&right);
         (0..n).map(|i| solved[(i, 0)] * right[(i, 0)]).sum()
     }
 }

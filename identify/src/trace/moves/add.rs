@@ -1,0 +1,40 @@
+//! Adds the best candidate.
+
+use super::{Move, Proposal};
+use crate::error::IdentifyError;
+use crate::trace::state::{ALL, SearchBranch, SearchState, SelectedEffect};
+
+/// Adds to each branch its best candidate. On all readings it is the candidate with the shortest description among
+/// those confounded with the best. With one fold left out, prediction matters and not the name, so it is the best.
+pub struct Add {
+    /// The p-value of the best candidate on all readings.
+    pub p_value: f64,
+    /// The score that a candidate has to reach with one fold left out. On all readings the p-value decides.
+    pub threshold: f64,
+}
+
+impl Move for Add {
+    fn try_on(&self, search: &mut SearchState<'_>, branch: usize) -> Result<bool, IdentifyError> {
+        let SearchBranch { folds, mut selected } = search.selection.branches[branch].clone();
+        let chosen = search.selection.branches[branch].chosen();
+        let known = search.tune_near_best(&chosen, &folds)?;
+        let (candidate, score) = {
+            let model = search.model_of(&chosen, &folds)?;
+            let gains = model.remaining_gains(known);
+            let Some((best, score)) = search.best_of(&model, &gains, &chosen) else {
+                return Ok(false);
+            };
+            match branch {
+                ALL => (search.simplest_confounded(&model, &gains, best, &chosen), score),
+                _ => (best, score),
+            }
+        };
+        selected.push(SelectedEffect { candidate, p_value: self.p_value });
+        let margin = if branch == ALL { f64::NEG_INFINITY } else { self.threshold };
+        Ok(Proposal { selected, increase: score, margin }.accept(search, branch))
+    }
+
+    fn follows_all_readings(&self) -> bool {
+        true
+    }
+}

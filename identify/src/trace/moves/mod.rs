@@ -1,0 +1,116 @@
+//! The moves of the search. A move proposes other effects for one branch. One rule accepts or rejects every proposal.
+//!
+//! The objective of a group of effects `G` beside the other selected effects `R` is
+//!
+//! ```text
+//! J(G | R) = −ln P(χ²) − Σ (cost + penalty + ln n)
+//! ```
+//!
+//! with the joint gain of the group as `χ²` and the number `n` of detectable effects in the library. A proposal is
+//! accepted if `J` increases by more than the margin of the move:
+//!
+//! | move | replaces | margin |
+//! |---|---|---|
+//! | [`add`] | nothing by one effect | the best score of readings without structure; it stands for `ln n` |
+//! | [`remove`] | one effect by nothing | the same, negative |
+//! | [`swap`] | one effect by another | the confounding margin |
+//! | [`refine`] | all by a set with an effect tuned again | the confounding margin |
+//! | [`pair`] | all by a set with two other effects | the confounding margin |
+//! | [`merge`] | effects that follow one axis by one effect | 0 |
+//! | [`withdraw`] | effects that follow one axis by nothing | the objective of curves of the tests |
+
+pub mod add;
+mod comparison;
+pub mod merge;
+pub mod pair;
+pub mod refine;
+pub mod remove;
+pub mod swap;
+pub mod withdraw;
+
+use super::policy::MoveName;
+use super::state::{ALL, SearchState, SelectedEffect};
+use crate::error::IdentifyError;
+
+/// A move of the search.
+pub trait Move {
+    /// Tries the move on one branch. Returns whether its selected effects changed.
+    ///
+    /// # Errors
+    /// If products are not finite, or [`IdentifyError::Interrupted`] if the caller stopped the trace.
+    fn try_on(&self, search: &mut SearchState<'_>, branch: usize) -> Result<bool, IdentifyError>;
+
+    /// Whether the branches without a fold are tried only if the branch on all readings changed.
+    fn follows_all_readings(&self) -> bool {
+        false
+    }
+
+    /// Whether the move is tried with this number of selected effects.
+    fn is_due(&self, selected: usize) -> bool {
+        let _ = selected;
+        true
+    }
+}
+
+/// Other selected effects for a branch.
+pub struct Proposal {
+    /// The selected effects.
+    pub selected: Vec<SelectedEffect>,
+    /// Increase of the objective.
+    pub increase: f64,
+    /// What the increase has to exceed.
+    pub margin: f64,
+}
+
+impl Proposal {
+    /// The rule of acceptance: selects the proposed effects if the objective increases by more than the margin. Returns
+    /// whether it does.
+    fn accept(self, search: &mut SearchState<'_>, branch: usize) -> bool {
+        if self.increase <= self.margin {
+            return false;
+        }
+        let chosen: Vec<usize> = self.selected.iter().map(|selected| selected.candidate).collect();
+        search.add_to_base(&chosen);
+        search.selection.branches[branch].selected = self.selected;
+        true
+    }
+}
+
+/// The move of a name.
+pub fn named(name: MoveName) -> &'static dyn Move {
+    match name {
+        MoveName::Swap => &swap::Swap,
+        MoveName::Merge => &merge::Merge,
+        MoveName::Refine => &refine::Refine,
+        MoveName::Pair => &pair::Pair,
+    }
+}
+
+/// Tries a move on every branch. Returns whether the branch on all readings changed.
+///
+/// # Errors
+/// See [`Move::try_on`].
+pub fn on_every_branch(tried: &dyn Move, search: &mut SearchState<'_>) -> Result<bool, IdentifyError> {
+    let all = tried.try_on(search, ALL)?;
+    if all || !tried.follows_all_readings() {
+        for branch in ALL + 1..search.selection.branches.len() {
+            tried.try_on(search, branch)?;
+        }
+    }
+    Ok(all)
+}
+
+/// Tries a move on every branch if it is due, and records the held-out error. Returns whether the branch on all
+/// readings changed.
+///
+/// # Errors
+/// See [`Move::try_on`].
+pub fn run(name: MoveName, search: &mut SearchState<'_>) -> Result<bool, IdentifyError> {
+    let tried = named(name);
+    if !tried.is_due(search.selected().len()) {
+        return Ok(false);
+    }
+    let changed = on_every_branch(tried, search)?;
+    search.note_held_out()?;
+    Ok(changed)
+}

@@ -1,0 +1,94 @@
+//! The policies of the search: one for readings along runs, one for independent poses.
+
+use crate::heldout::FoldKind;
+use crate::problem::Problem;
+
+/// Where the null draws come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NullSource {
+    /// Blocks of the deviations of repeats along runs.
+    Repeats,
+    /// The residual with a random sign for each pose.
+    SignFlips,
+}
+
+/// A move of the search by its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MoveName {
+    /// [`super::moves::swap`].
+    Swap,
+    /// [`super::moves::merge`].
+    Merge,
+    /// [`super::moves::refine`].
+    Refine,
+    /// [`super::moves::pair`].
+    Pair,
+}
+
+/// The numbers and choices that differ between kinds of readings.
+#[derive(Clone, Copy, Debug)]
+pub struct Policy {
+    /// Probability that the search accepts an effect on readings without structure.
+    pub significance: f64,
+    /// Maximum number of effects. A larger number indicates a different cause.
+    pub max_effects: usize,
+    /// Where the null draws come from.
+    pub null: NullSource,
+    /// Whether repeats determine noise standard deviation and autocorrelation.
+    pub noise_of_repeats: bool,
+    /// Whether the residual is tested for structure. For poses the residual always has structure, so that the test
+    /// cannot decide.
+    pub tests_structure: bool,
+    /// Whether gains are divided by the residual variance instead of the noise variance.
+    pub in_residual_variance: bool,
+    /// Whether every addition has to lower the held-out error. P-values are unreliable for poses.
+    pub every_addition_lowers_heldout: bool,
+    /// Number of selected effects from which a swap no longer tunes positions and periods again.
+    pub swap_tunes_below: usize,
+    /// The moves after each addition, in order.
+    pub after_addition: &'static [MoveName],
+    /// The moves when no addition is significant, until one of them changes the selected effects.
+    pub without_addition: &'static [MoveName],
+    /// Whether effects that explain nothing are withdrawn at the end.
+    pub withdraws: bool,
+}
+
+/// The significance level if the caller states none.
+pub const SIGNIFICANCE: f64 = 0.005;
+
+/// The policy for readings along runs.
+const RUNS: Policy = Policy {
+    significance: SIGNIFICANCE,
+    max_effects: 12,
+    null: NullSource::Repeats,
+    noise_of_repeats: true,
+    tests_structure: true,
+    in_residual_variance: false,
+    every_addition_lowers_heldout: false,
+    swap_tunes_below: 5,
+    after_addition: &[MoveName::Swap, MoveName::Merge],
+    without_addition: &[MoveName::Refine, MoveName::Pair],
+    withdraws: true,
+};
+
+/// The policy for independent poses.
+const POSES: Policy = Policy {
+    significance: SIGNIFICANCE,
+    max_effects: 200,
+    null: NullSource::SignFlips,
+    noise_of_repeats: false,
+    tests_structure: false,
+    in_residual_variance: true,
+    every_addition_lowers_heldout: true,
+    swap_tunes_below: 0,
+    after_addition: &[MoveName::Swap],
+    without_addition: &[],
+    withdraws: false,
+};
+
+impl Policy {
+    /// The policy for the readings of a problem.
+    pub fn of(problem: &Problem) -> Policy {
+        if problem.folds.kind == FoldKind::Poses { POSES } else { RUNS }
+    }
+}

@@ -1,0 +1,121 @@
+//! The candidates that a search may add: the library's detectable effects, and the effects that it has tuned itself.
+
+use abbe_model::driver::Driver;
+
+use super::SearchState;
+use super::tuning::Tuned;
+use crate::candidates::candidate::Candidate;
+use crate::candidates::columns::EffectColumns;
+use crate::candidates::gain::TrainedModel;
+use crate::candidates::step_table::{StepTable, best_step_table};
+use crate::error::IdentifyError;
+use crate::numerics::parallel;
+use crate::trace::constants::MIN_PLAUSIBLE_SIGMA;
+
+impl SearchState<'_> {
+    /// Judges for each candidate whether it is detectable at its largest plausible size.
+    pub(super) fn judge_detectability(&mut self) -> Result<(), IdentifyError> {
+        let model = self.model_without(None)?;
+        let detectable = parallel::map(self.candidates.len(), &|candidate| {
+            let (d, _, _) = model.projected(candidate);
+            let plausible = self.columns.plausible(self.effect(candidate), &self.candidates[candidate].columns);
+            let largest = (0..d.nrows()).map(|k| d[(k, k)]).fold(0.0, f64::max);
+            plausible * largest.max(0.0).sqrt() >= MIN_PLAUSIBLE_SIGMA
+        });
+        self.detectable_effects = detectable.iter().filter(|detectable| **detectable).count();
+        self.candidates
+            .iter_mut()
+            .zip(detectable)
+            .for_each(|(candidate, detectable)| candidate.detectable = detectable);
+        Ok(())
+    }
+
+    /// Whether a branch with some training folds may add a candidate now.
+    pub fn may_be_added(&self, candidate: usize, folds: &[usize]) -> bool {
+        let Candidate { detectable, dictionary, last_resort, .. } = self.candidates[candidate];
+        detectable && !dictionary && (!last_resort || self.last_resort) && self.may_be_used(candidate, folds)
+    }
+
+    /// Whether a candidate is an effect of the library or was tuned on exactly these folds.
+    pub fn may_be_used(&self, candidate: usize, folds: &[usize]) -> bool {
+        let tuned_on = &self.candidates[candidate].tuned_on;
+        tuned_on.is_empty() || tuned_on == folds
+    }
+
+    /// Whether a candidate has shape numbers or positions that the search tunes.
+    pub fn is_tunable(&self, candidate: usize) -> bool {
+        self.moments.numbers[candidate] > 0 || !self.effect(candidate).shape.positions().is_empty()
+    }
+
+    /// Whether one of some candidates is a table of more than two steps.
+    pub fn is_composed(&self, group: &[usize]) -> bool {
+        group.iter().any(|c| self.effect(*c).shape.positions().len() > 2)
+    }
+
+    /// The axes that the selected effects of a branch follow, each once.
+    pub fn axes_followed(&self, branch: usize) -> Vec<Driver> {
+        let mut drivers: Vec<Driver> = Vec::new();
+        for candidate in self.selection.branches[branch].chosen() {
+            let driver = &self.effect(candidate).driver;
+            if matches!(driver, Driver::Axis(_)) && !drivers.contains(driver) {
+                drivers.push(driver.clone());
+            }
+        }
+        drivers
+    }
+
+    /// Divides the selected effects of a branch into those that follow a driver and the others.
+    pub fn following(&self, driver: &Driver, branch: usize) -> (Vec<usize>, Vec<usize>) {
+        let chosen = self.selection.branches[branch].chosen();
+        chosen.into_iter().partition(|candidate| self.effect(*candidate).driver == *driver)
+    }
+
+    /// The step tables from the library's dictionaries for addition to a model.
+    pub fn step_tables(&self, model: &TrainedModel<'_>) -> Vec<StepTable> {
+        let variance = self.variance(model);
+        let dictionaries: Vec<usize> =
+            (0..self.candidates.len()).filter(|candidate| self.candidates[*candidate].dictionary).collect();
+        let best = |k: usize| best_step_table(model, dictionaries[k], &self.candidates[dictionaries[k]], variance);
+        parallel::map(dictionaries.len(), &best).into_iter().flatten().collect()
+    }
+
+    /// Adds a tuned effect in addition to the candidate that it was tuned from, for the folds on which it was tuned.
+    /// Returns its index, or `None` if the data lack its driver.
+    pub(super) fn add_tuned(&mut self, tuned: Tuned, folds: &[usize]) -> Option<usize> {
+        let Tuned { original, effect, selection_penalty } = tuned;
+        let columns = self.columns.effect_columns(&effect)?;
+        let (tuned_on, original) = (folds.to_vec(), self.candidates[original].clone());
+        let (dictionary, detectable) = (false, true);
+        self.append([Candidate { effect, columns, selection_penalty, tuned_on, dictionary, detectable, ..original }]);
+        Some(self.candidates.len() - 1)
+    }
+
+    /// Adds candidates and computes their products.
+    fn append(&mut self, fresh: impl IntoIterator<Item = Candidate>) {
+        let present = self.candidates.len();
+        self.candidates.extend(fresh);
+        if self.candidates.len() > present {
+            let column_sets: Vec<&EffectColumns> = self.candidates.iter().map(|candidate| &candidate.columns).collect();
+            self.moments.append(self.columns, &column_sets);
+        }
+    }
+
+    /// Computes the products of the candidates of last resort, and adds them to the candidates.
+    pub fn add_reserve_candidates(&mut self) {
+        let reserve = std::mem::take(&mut self.reserve);
+        self.append(reserve);
+    }
+
+    /// Curves over an axis, one for each test, without a component. Their columns are computed at the first call.
+    pub fn test_curves(&mut self, driver: &Driver, intervals: usize) -> Vec<usize> {
+        let fresh = self.columns.curves_of_tests(driver, intervals);
+        let present: Vec<usize> =
+            (0..self.candidates.len()).filter(|c| fresh.iter().any(|(effect, _)| effect == self.effect(*c))).collect();
+        if !present.is_empty() {
+            return present;
+        }
+        let first = self.candidates.len();
+        self.append(fresh.into_iter().map(|(effect, columns)| Candidate::test_curve(effect, columns)));
+        (first..self.candidates.len()).collect()
+    }
+}
