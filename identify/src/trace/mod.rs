@@ -2,8 +2,8 @@
 //!
 //! 1. The noise standard deviation and autocorrelation follow from repeats ([`crate::noise`]). Outliers are excluded by
 //!    name ([`crate::noise::outliers`]).
-//! 2. The basis columns of the library's effects ([`library`]) are computed for the session (`columns`). Their products
-//!    with the model, the residual and the null draws are computed once (`moments`).
+//! 2. The basis columns of the library's effects ([`library`](crate::candidates::library)) are computed for the session
+//!    (`columns`). Their products with the model, the residual and the null draws are computed once (`moments`).
 //! 3. The search (`search`) adds, removes and exchanges effects. Its p-values come from the same search on readings
 //!    without structure (`null`). An effect is accepted if its p-value is below the significance level and the held-out
 //!    error decreases by more than the standard error of the decrease. That standard error follows from paired
