@@ -101,7 +101,7 @@ pub fn analyse_problem(problem: &Problem, travel_mm: f64) -> Result<PlanAnalysis
             }
         })
         .collect();
-    let mut setups: Vec<&str> = problem.tests.iter().map(|test| mounted(test)).collect();
+    let mut setups: Vec<&str> = problem.tests.iter().map(mounted).collect();
     setups.sort_unstable();
     setups.dedup();
     let tests: Vec<TestSummary> = (0..problem.tests.len()).map(|test| summary(problem, test)).collect();
