@@ -7,11 +7,11 @@
 
 use abbe_model::effect::Effect;
 use faer::Mat;
-use faer::prelude::Solve;
 use statrs::function::gamma::ln_gamma;
 
 use super::candidate::Candidate;
 use super::gain::TrainedModel;
+use crate::numerics::solve::solve_square;
 use crate::numerics::tails::ln_chi_square_tail;
 use crate::numerics::tolerances::MIN_OBSERVABLE;
 
@@ -106,7 +106,7 @@ impl Subset<'_> {
         } else {
             let block = Mat::from_fn(n, n, |i, j| self.d[(chosen[i], chosen[j])]);
             let right = Mat::from_fn(n, m + 1, |i, j| if j < m { self.d[(chosen[i], j)] } else { self.g[chosen[i]] });
-            block.partial_piv_lu().solve(&right)
+            solve_square(block.as_ref(), right.as_ref())
         };
         let mut best: Option<(usize, f64)> = None;
         for j in (0..m).filter(|j| !chosen.contains(j)) {
@@ -156,7 +156,7 @@ impl Subset<'_> {
         }
         let block = Mat::from_fn(n, n, |i, j| self.d[(chosen[i], chosen[j])]);
         let right = Mat::from_fn(n, 1, |i, _| self.g[chosen[i]]);
-        let solved = block.partial_piv_lu().solve(&right);
+        let solved = solve_square(block.as_ref(), right.as_ref());
         (0..n).map(|i| solved[(i, 0)] * right[(i, 0)]).sum()
     }
 }

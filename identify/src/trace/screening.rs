@@ -75,11 +75,8 @@ pub(super) fn searched_candidates(
         return Err(IdentifyError::EverythingLeftOut);
     }
     let column_sets = parallel::map(candidates.len(), &|k| columns.effect_columns(&candidates[k].effect));
-    Ok(candidates
-        .into_iter()
-        .zip(column_sets)
-        .filter_map(|(candidate, found)| Some(Candidate::of(candidate, found?)))
-        .collect())
+    let found = candidates.into_iter().zip(column_sets);
+    Ok(found.filter_map(|(member, columns)| Some(Candidate::of(member, columns?))).collect())
 }
 
 /// A warning for each exclusion that matches no candidate.

@@ -238,7 +238,35 @@ fn cached<K: std::hash::Hash + Eq, V: Clone>(store: &Mutex<HashMap<K, V>>, key: 
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
+    use abbe_model::files::{self, ReadOptions};
+
     use super::*;
+    use crate::fit::prepare;
+
+    /// A constant term is 1 in the readings of its test and 0 in all others. No fit has it as a parameter.
+    #[test]
+    fn a_term_of_the_readings_acts_in_its_test_alone() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let session = files::session(&file, &ReadOptions::default()).unwrap();
+        let (mut problem, fit) = prepare(&session, 1).unwrap();
+        let effect = Effect {
+            component: Component::Reading(problem.tests[1].name.clone()),
+            driver: Driver::None,
+            shape: Shape::Constant,
+            tests: Vec::new(),
+        };
+        let columns = Columns::new(&problem, &fit.beta);
+        let term = columns.reading_columns(&effect, 0, false, None).unwrap();
+        let rows = columns.unwhitened_rows(&[&term]);
+        let kept = |test: usize| problem.rejected[test].iter().filter(|rejected| !**rejected).count();
+        assert_eq!(rows.nrows(), (0..problem.tests.len()).map(kept).sum::<usize>());
+        let own = kept(0)..kept(0) + kept(1);
+        assert!((0..rows.nrows()).all(|i| rows[(i, 0)] == f64::from(u8::from(own.contains(&i)))));
+        drop(columns);
+        assert!(problem.add_effect(&effect).is_err());
+    }
 
     /// Chunks are full, and each effect is in exactly one. The chunk size bounds the memory of a screening.
     #[test]

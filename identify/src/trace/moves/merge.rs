@@ -57,10 +57,9 @@ fn merged(search: &mut SearchState<'_>, branch: usize, group: &[usize]) -> Resul
     let without = search.model_of(&rest, &folds)?;
     let variance = search.variance(&without);
     let present = search.objective(group, &rest, &folds)?;
-    let score = |k: usize| search.score(pool[k], &without.gain(pool[k]), variance) - search.choice();
-    let scores = parallel::map(pool.len(), &score);
-    let better = pool.iter().copied().zip(scores).filter(|(_, one)| *one > present);
-    let best = better.max_by(|a, b| a.1.total_cmp(&b.1));
+    let one = |k: usize| search.score(pool[k], &without.gain(pool[k]), variance) - search.choice();
+    let values = parallel::map(pool.len(), &one);
+    let best = pool.iter().copied().zip(values).max_by(|a, b| a.1.total_cmp(&b.1));
     let p_value = grouped.iter().map(|selected| selected.p_value).fold(1.0, f64::min);
     Ok(best.map(|(candidate, one)| {
         selected.push(SelectedEffect { candidate, p_value });

@@ -66,13 +66,13 @@ impl Proposal {
     /// The rule of acceptance: selects the proposed effects if the objective increases by more than the margin. Returns
     /// whether it does.
     fn accept(self, search: &mut SearchState<'_>, branch: usize) -> bool {
-        if self.increase <= self.margin {
-            return false;
+        let accepted = self.increase > self.margin;
+        if accepted {
+            let chosen: Vec<usize> = self.selected.iter().map(|selected| selected.candidate).collect();
+            search.add_to_base(&chosen);
+            search.selection.branches[branch].selected = self.selected;
         }
-        let chosen: Vec<usize> = self.selected.iter().map(|selected| selected.candidate).collect();
-        search.add_to_base(&chosen);
-        search.selection.branches[branch].selected = self.selected;
-        true
+        accepted
     }
 }
 

@@ -1,7 +1,5 @@
 //! The candidates that a search may add: the library's detectable effects, and the effects that it has tuned itself.
 
-use abbe_model::driver::Driver;
-
 use super::SearchState;
 use super::tuning::Tuned;
 use crate::candidates::candidate::Candidate;
@@ -11,12 +9,13 @@ use crate::candidates::step_table::{StepTable, best_step_table};
 use crate::error::IdentifyError;
 use crate::numerics::parallel;
 use crate::trace::constants::MIN_PLAUSIBLE_SIGMA;
+use abbe_model::driver::Driver;
 
 impl SearchState<'_> {
     /// Judges for each candidate whether it is detectable at its largest plausible size.
     pub(super) fn judge_detectability(&mut self) -> Result<(), IdentifyError> {
         let model = self.model_without(None)?;
-        let detectable = parallel::map(self.candidates.len(), &|candidate| {
+        let detectable: Vec<bool> = parallel::map(self.candidates.len(), &|candidate| {
             let (d, _, _) = model.projected(candidate);
             let plausible = self.columns.plausible(self.effect(candidate), &self.candidates[candidate].columns);
             let largest = (0..d.nrows()).map(|k| d[(k, k)]).fold(0.0, f64::max);
