@@ -6,7 +6,8 @@ use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, Machine};
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
 use abbe_model::frames::Point;
-use abbe_model::instrument::{Station, ballbar::BallBar};
+use abbe_model::instrument::Station;
+use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::scalar::Nominal;
 use num_dual::{Derivative, DualSVec64};
 use rand::RngExt;
@@ -142,7 +143,7 @@ fn case(what: What, machine: &Machine, errors: &[ErrorName], random: &mut impl r
             What::Bar => {
                 let l = |i: usize| lengths[i];
                 let bar = BallBar { workpiece_ball: [l(0), l(1), l(2)], spindle_ball: [l(3), l(4), l(5)], bar: 100.0 };
-                vec![bar.read(machine, &state, &bodies, |_| None)]
+                Station::BallBar(bar).read(machine, &state, &bodies, |_| None).coordinates().to_vec()
             }
             What::Volumetric => {
                 let none = machine.body_errors::<Pack>(|_| false, |_| Pack::from_re(0.0));
