@@ -2,12 +2,12 @@
 //!
 //! 1. The noise standard deviation and autocorrelation follow from repeats ([`crate::noise`]). Outliers are excluded by
 //!    name ([`crate::noise::outliers`]).
-//! 2. The columns of the library's effects ([`crate::candidates`]) are computed for the session. Their products with the
-//!    model, the residual and the null draws are computed once.
-//! 3. The search (`search`) adds, removes, exchanges and merges effects (`moves`). Its p-values come from the same search
-//!    on readings without structure (`null`). An effect is accepted if its p-value is below the significance level and
-//!    the held-out error decreases by more than the standard error of the decrease. That standard error follows from
-//!    paired differences over runs, blocks or poses.
+//! 2. The columns of the library's effects ([`crate::candidates`]) are computed for the session. Their products with
+//!    the model, the residual and the null draws are computed once.
+//! 3. The search (`search`) adds, removes, exchanges and merges effects (`moves`). Its p-values come from the same
+//!    search on readings without structure (`null`). An effect is accepted if its p-value is below the significance
+//!    level and the held-out error decreases by more than the standard error of the decrease. That standard error
+//!    follows from paired differences over runs, blocks or poses.
 //! 4. All parameters are refitted together (`judge`). The result (`result`) states the held-out error before and after.
 //! 5. For each effect the trace lists its aliases ([`alias`]). It tests the residual for remaining structure
 //!    (`remainder`).

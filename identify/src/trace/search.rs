@@ -1,7 +1,7 @@
 //! The search. Each round projects out the present model, scores every candidate, and adds the best. Moves then remove
-//! effects that are no longer significant, exchange effects for better ones and merge them. The search ends when the best
-//! remaining candidate is no better than the best on readings without structure and no move finds a better set, or when
-//! additions do not lower the held-out error.
+//! effects that are no longer significant, exchange effects for better ones and merge them. The search ends when the
+//! best remaining candidate is no better than the best on readings without structure and no move finds a better set, or
+//! when additions do not lower the held-out error.
 
 use super::constants::MAX_REJECTED_IN_A_ROW;
 use super::judge::RefittedModel;
@@ -52,8 +52,8 @@ enum Round {
 /// error. Returns the p-value at which the search ended ([`search_on`]) and the refitted model.
 ///
 /// # Errors
-/// [`IdentifyError::Interrupted`] if the caller stopped the trace. [`SearchState::roll_back`] then restores the accepted
-/// effects.
+/// [`IdentifyError::Interrupted`] if the caller stopped the trace. [`SearchState::roll_back`] then restores the
+/// accepted effects.
 pub(super) fn search_and_refit(
     search: &mut SearchState<'_>,
     record: &mut SearchRecord<'_>,

@@ -61,8 +61,8 @@ impl Component {
         parameters.iter().position(own)
     }
 
-    /// The internal unit; `None` for a delay, for a term of the readings, and for a parameter that the instrument does not
-    /// have.
+    /// The internal unit; `None` for a delay, for a term of the readings, and for a parameter that the instrument does
+    /// not have.
     pub fn unit(&self, parameters: &[InstrumentParameter]) -> Option<InternalUnit> {
         match self {
             Component::Axis(name) if name.freedom.is_angle() => Some(InternalUnit::Radian),

@@ -126,9 +126,9 @@ impl Columns<'_> {
         Some((name, samples))
     }
 
-    /// The columns of a term on one coordinate of the readings of a test ([`Component::Reading`]). `by_direction` changes
-    /// its sign with the direction of travel. `rows` confines it. `None` if the session has no such test, or the data
-    /// lack its driver.
+    /// The columns of a term on one coordinate of the readings of a test ([`Component::Reading`]). `by_direction`
+    /// changes its sign with the direction of travel. `rows` confines it. `None` if the session has no such test, or
+    /// the data lack its driver.
     pub fn reading_columns(
         &self,
         effect: &Effect,

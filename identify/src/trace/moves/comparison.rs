@@ -39,8 +39,8 @@ impl SetComparison {
         }))
     }
 
-    /// Compares the set of some effects and one more. Each of the effects `added` has to be significant against readings
-    /// without structure.
+    /// Compares the set of some effects and one more. Each of the effects `added` has to be significant against
+    /// readings without structure.
     pub fn compare(
         &mut self,
         search: &mut SearchState<'_>,
@@ -64,8 +64,8 @@ impl SetComparison {
         Ok(())
     }
 
-    /// Selects the best set, if one is better than the selected set. The largest p-value of the replaced effects applies
-    /// to all of the set.
+    /// Selects the best set, if one is better than the selected set. The largest p-value of the replaced effects
+    /// applies to all of the set.
     pub fn accept(self, search: &mut SearchState<'_>) -> bool {
         let (set, value) = self.best;
         if set.is_empty() {

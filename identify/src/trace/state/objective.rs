@@ -132,8 +132,8 @@ impl SearchState<'_> {
         first
     }
 
-    /// The candidates with a positive score beside some effects, restricted to those that `accepts` accepts, best first.
-    /// Of equivalent candidates one is kept. `accepts` is called in order of decreasing score.
+    /// The candidates with a positive score beside some effects, restricted to those that `accepts` accepts, best
+    /// first. Of equivalent candidates one is kept. `accepts` is called in order of decreasing score.
     pub fn ranked(
         &self,
         base: &[usize],
