@@ -25,6 +25,7 @@ use crate::error::IdentifyError;
 use crate::numerics::parallel;
 use crate::numerics::power::noncentrality;
 use crate::numerics::symmetric::Symmetric;
+use crate::numerics::tolerances::ROUNDING_OF_SQUARES;
 use crate::parameters::physical_size;
 use crate::problem::Problem;
 use crate::unit::Unit;
@@ -129,6 +130,8 @@ struct EffectProjection<'m> {
     moved: MatRef<'m, f64>,
 }
 
+/// The verdict on an effect that moves no reading.
+const NO_SIGNAL: &str = "no signal";
 /// Phases whose information differs by less than this share of the largest count as equally weak.
 const EQUAL_WITHIN: f64 = 1e-6;
 
@@ -158,16 +161,19 @@ fn judge(
     let equally_weak = decomposed.values.iter().filter(|value| **value <= weakest + EQUAL_WITHIN * strongest).count();
     let phases = decomposed.vectors.subcols(0, equally_weak);
     let [_, whole] = Symmetric::of((phases.transpose() * &own * phases).as_ref())?.extremes();
-    let surviving_share = if whole > 0.0 { (weakest / whole).clamp(0.0, 1.0) } else { 0.0 };
+    let [_, largest_own] = Symmetric::of(own.as_ref())?.extremes();
+    let has_signal = largest_own * size * size >= 1.0;
+    // Without a signal the share would be a quotient of rounding errors.
+    let share = if has_signal && whole > 0.0 { (weakest / whole).clamp(0.0, 1.0) } else { 0.0 };
+    let surviving_share = if share > ROUNDING_OF_SQUARES { share } else { 0.0 };
     let amplitude = |threshold: f64| {
         let amplitude = (threshold / weakest).sqrt();
         (amplitude <= size).then_some(amplitude * unit.display_per_internal)
     };
     let detectable = amplitude(threshold[0]);
-    let [_, largest_own] = Symmetric::of(own.as_ref())?.extremes();
     let confounded = surviving_share < CONFOUNDED_BELOW || detectable.is_none();
-    let verdict = if largest_own * size * size < 1.0 {
-        "no signal"
+    let verdict = if !has_signal {
+        NO_SIGNAL
     } else if !confounded {
         "detectable"
     } else if strongest > CONFOUNDED_BELOW * largest_own {
@@ -231,10 +237,11 @@ fn grouped(
         match groups.get_mut(&key) {
             Some(present) => {
                 // Of members with equal amplitudes, or without detectable amplitude, the one with the least surviving
-                // share counts, so that neither rounding nor order decides.
+                // share counts, and of these the one without a signal, so that neither rounding nor order decides.
                 let needed = |entry: &EffectDetectability| entry.detectable_amplitude_screened.unwrap_or(f64::INFINITY);
                 let harder = smallest_first(needed(present), needed(&entry))
-                    .then_with(|| smallest_first(entry.residual_share, present.residual_share));
+                    .then_with(|| smallest_first(entry.residual_share, present.residual_share))
+                    .then_with(|| (present.verdict == NO_SIGNAL).cmp(&(entry.verdict == NO_SIGNAL)));
                 if harder.is_lt() {
                     *present = EffectDetectability { id: key, ..entry };
                 }
