@@ -18,7 +18,8 @@ use crate::numerics::symmetric::Symmetric;
 use crate::numerics::tolerances::MIN_UPDATE_SHARE;
 use crate::numerics::triangle::Triangle;
 use crate::problem::Problem;
-pub use folds::{FoldKind, Folds, mislabelled_runs};
+pub(crate) use folds::mislabelled_runs;
+pub use folds::{FoldKind, Folds};
 
 /// Held-out residuals.
 #[derive(Clone, Debug)]

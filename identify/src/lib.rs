@@ -10,8 +10,8 @@
 //!   uncertainty;
 //! - [`compensation`]: identified error motions as functions of the axis position;
 //! - [`circular`]: ball-bar characteristics of ISO 230-4 and the diagnosis of circular tests;
-//! - [`trace`]: search for the unmodelled effect behind the residual; [`parameter_description`]: parameters
-//!   in words;
+//! - [`candidates`]: the effects that a plan and a trace examine; [`trace`]: search for the unmodelled effect behind the
+//!   residual;
 //! - [`plan`]: identifiability and expected uncertainty of a plan, before any measurement;
 //! - [`directions`]: readings and residuals of an R-test by direction;
 //! - [`simulate`]: simulated readings; [`patterns`]: the pattern of each single error in a test; [`quantity`]: values
@@ -56,7 +56,7 @@ pub mod heldout;
 pub mod monte_carlo;
 pub mod noise;
 pub mod numerics;
-pub mod parameter_description;
+pub(crate) mod parameter_description;
 pub mod parameters;
 pub mod patterns;
 pub mod plan;
@@ -70,7 +70,7 @@ pub mod self_calibration;
 pub mod separating_tests;
 pub mod series;
 pub mod simulate;
-pub mod start;
+mod start;
 pub mod trace;
 pub mod unit;
 pub mod volumetric;

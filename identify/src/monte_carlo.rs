@@ -208,7 +208,7 @@ fn draw(function: &impl Function, draws: &Draws<'_>, stream: u128, runs: u64, mu
 }
 
 /// The distribution of every output.
-pub fn propagate<F: Function>(function: &F, draws: &Draws<'_>) -> Vec<Distribution> {
+pub(crate) fn propagate<F: Function>(function: &F, draws: &Draws<'_>) -> Vec<Distribution> {
     let empty = pilot(function, draws);
     let blocks = draws.runs.div_ceil(F::BLOCK);
     let lanes = parallel::map(LANES.min(blocks) as usize, &|lane| {

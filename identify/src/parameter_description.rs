@@ -11,7 +11,7 @@ use crate::problem::Problem;
 use abbe_model::effect::description::{component_meaning, meaning};
 
 /// The description of a location error or an error motion; empty if the name is not an error of ISO 230-1.
-pub fn error_meaning(machine: &Machine, id: &str) -> String {
+pub(crate) fn error_meaning(machine: &Machine, id: &str) -> String {
     let Some(name) = ErrorName::parse(id) else {
         return String::new();
     };
@@ -41,7 +41,7 @@ fn squareness_reference(machine: &Machine, name: &ErrorName) -> Option<String> {
 
 /// The description of a set-up parameter: `A100: bar length`, `P1: workpiece ball, shift in X`. Empty if the identifier
 /// is not a set-up parameter.
-pub fn setup_meaning(machine: &Machine, id: &str) -> String {
+pub(crate) fn setup_meaning(machine: &Machine, id: &str) -> String {
     let (quantity, group) = match id.strip_suffix(']').and_then(|id| id.split_once('[')) {
         Some((quantity, group)) => (quantity, Some(group)),
         None => (id, None),
@@ -60,7 +60,7 @@ pub fn setup_meaning(machine: &Machine, id: &str) -> String {
 }
 
 /// The description of a coefficient: the effect, then the coefficient if the effect has several.
-pub fn coefficient_meaning(machine: &Machine, effect: &Effect, coefficient: &str) -> String {
+pub(crate) fn coefficient_meaning(machine: &Machine, effect: &Effect, coefficient: &str) -> String {
     let effect = meaning(machine, effect);
     match coefficient {
         "" => effect.to_string(),

@@ -103,7 +103,7 @@ pub struct Parameters {
 }
 
 /// The physical size of a component.
-pub fn physical_size(unit: InternalUnit) -> f64 {
+pub(crate) fn physical_size(unit: InternalUnit) -> f64 {
     match unit {
         InternalUnit::Millimetre => 1.0,
         InternalUnit::Radian => 0.01,

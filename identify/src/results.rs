@@ -13,7 +13,7 @@ use crate::circular::CircularTest;
 use crate::plausibility::Plausibility;
 pub use monte_carlo::{DrawnParameter, FitMonteCarlo, Verdict};
 pub(crate) use parameter::phases_follow_amplitudes;
-pub use parameter::{COVERAGE_FACTOR, Combination, Covariance, Interval, NullSpace, ParameterResult, Unobservable};
+pub use parameter::{Combination, Covariance, Interval, NullSpace, ParameterResult, Unobservable};
 pub use trace::{
     AlternativeResult, ChangedParameter, CurvePoint, EffectName, EffectResult, ModelResult, RejectedCandidate,
     Remainder, SeparatingTestResult, SeparationResult, ShapeParameter, TraceResult,

@@ -177,7 +177,7 @@ pub fn cross<S: Scalar>(a: [S; 3], b: Point<S>) -> Point<S> {
 
 /// `ω × d` with a nominal direction; zeros of `d` are skipped.
 #[inline(always)]
-pub fn cross_nominal<S: Scalar>(omega: [S; 3], direction: [f64; 3]) -> Point<S> {
+pub(crate) fn cross_nominal<S: Scalar>(omega: [S; 3], direction: [f64; 3]) -> Point<S> {
     let term = |plus: (S, f64), minus: (S, f64)| {
         let scaled = |(s, d): (S, f64)| (d != 0.0).then(|| s * S::Nominal::constant(d));
         match (scaled(plus), scaled(minus)) {
@@ -204,7 +204,7 @@ pub fn turn_about<S: Scalar>(axis: Coordinate, turn: SinCos<S>, point: Point<S>)
 
 /// A rotation about a coordinate axis by a nominal angle.
 #[inline(always)]
-pub fn turn_about_nominal<S: Scalar>(axis: Coordinate, turn: SinCos<S::Nominal>, point: Point<S>) -> Point<S> {
+pub(crate) fn turn_about_nominal<S: Scalar>(axis: Coordinate, turn: SinCos<S::Nominal>, point: Point<S>) -> Point<S> {
     let (first, second) = axis.others();
     let (u, v) = (point.0[first], point.0[second]);
     let mut turned = point;

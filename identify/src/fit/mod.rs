@@ -24,7 +24,8 @@ use crate::numerics::triangle::Triangle;
 use crate::problem::Problem;
 
 pub(crate) use covariance::{null_space, of_parameters as covariance_of_parameters};
-pub use prepare::{prepare, prepare_with};
+pub use prepare::prepare;
+pub(crate) use prepare::prepare_with;
 pub(crate) use quantities::{Quantity, quantities, values_at};
 pub(crate) use reported::{ids, u_of_undetermined_phase_deg};
 pub use reported::{outliers, parameters, report, unobservable};

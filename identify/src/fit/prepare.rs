@@ -37,7 +37,7 @@ pub fn prepare(session: &Session, seed: u64) -> Result<(Problem, Fit), IdentifyE
 ///
 /// # Errors
 /// See [`prepare`].
-pub fn prepare_with(session: &Session, effects: &[Effect], seed: u64) -> Result<(Problem, Fit), IdentifyError> {
+pub(crate) fn prepare_with(session: &Session, effects: &[Effect], seed: u64) -> Result<(Problem, Fit), IdentifyError> {
     let stated = session.noise_mm.filter(|sigma| *sigma > 0.0);
     let floor = session.resolution_mm.unwrap_or(0.0) / 12.0_f64.sqrt();
     let first = match stated {

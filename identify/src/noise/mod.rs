@@ -21,7 +21,7 @@ use abbe_model::session::readings::Readings;
 
 pub use autocorrelation::Autocorrelation;
 pub(crate) use autocorrelation::enlargement_of_mean;
-pub use stated::stated_against_repeats;
+pub(crate) use stated::stated_against_repeats;
 use trends::Trends;
 
 /// The noise of one scalar reading.

@@ -19,7 +19,7 @@ pub struct Triangle {
 }
 
 /// Number of rows to absorb at once: enough for blocked QR, few enough for the cache.
-pub const BLOCK_ROWS: usize = 1024;
+pub(crate) const BLOCK_ROWS: usize = 1024;
 
 impl Triangle {
     /// The factor of no rows, for the given number of parameters.

@@ -33,7 +33,7 @@ impl Default for PlanOptions {
 }
 
 /// Travel of a ball bar's sensor in either direction.
-pub const BAR_TRAVEL_MM: f64 = 1.0;
+pub(crate) const BAR_TRAVEL_MM: f64 = 1.0;
 /// Variance ratio below which the loss of a test is not reported.
 const MIN_REPORTED_RATIO: f64 = 1.5;
 
@@ -75,7 +75,7 @@ pub fn prepared(session: &Session, options: &PlanOptions) -> Result<(Session, No
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn analyse_problem(problem: &Problem, travel_mm: f64) -> Result<PlanAnalysis, IdentifyError> {
+fn analyse_problem(problem: &Problem, travel_mm: f64) -> Result<PlanAnalysis, IdentifyError> {
     let list = &problem.parameters.list;
     let nominal = vec![0.0; list.len()];
     let linear = Linearisation::of(problem, &nominal)?;

@@ -1,9 +1,9 @@
 //! The probabilities at which an effect counts as detectable by a plan.
 
 /// Probability of a false alarm.
-pub const SIGNIFICANCE: f64 = 0.01;
+pub(crate) const SIGNIFICANCE: f64 = 0.01;
 /// Probability of detecting an effect that is present.
-pub const POWER: f64 = 0.95;
+pub(crate) const POWER: f64 = 0.95;
 
 /// The significance of one of `tests` tests if `SIGNIFICANCE` is that of all together (Šidák, J. Am. Stat. Assoc. 62
 /// (1967) 626). Similar candidates count as one test each, so that the true significance is smaller.

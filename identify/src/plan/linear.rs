@@ -86,12 +86,12 @@ impl Linearisation {
 
 /// Whether a parameter is a target of the plan: an error of the machine or a coefficient of a declared effect, not a
 /// set-up quantity.
-pub fn is_of_interest(parameter: &Parameter) -> bool {
+pub(crate) fn is_of_interest(parameter: &Parameter) -> bool {
     parameter.role != Role::Setup
 }
 
 /// The prior standard uncertainty of a set-up quantity, internal unit.
-pub fn prior_u(parameter: &Parameter) -> Option<f64> {
+pub(crate) fn prior_u(parameter: &Parameter) -> Option<f64> {
     match parameter.prior {
         Prior::Gaussian(u) => Some(u),
         Prior::Known | Prior::Free => None,

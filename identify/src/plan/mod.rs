@@ -5,25 +5,25 @@
 //!
 //! - [`analyse`]: uncertainties, budgets, identifiability, indices, and the contribution of each test;
 //! - [`effects`]: detectability and bias of undeclared effects;
-//! - [`test_variations`], [`candidate_tests`], [`candidate_information`], [`information`], [`criterion`],
-//!   [`mod@improve`], [`separate`]: the next test; [`mod@range`]: how far a sweep can shrink;
+//! - [`test_variations`], [`candidate_tests`], [`criterion`], [`mod@improve`], [`separate`]: the next test;
+//!   [`mod@range`]: how far a sweep can shrink;
 //! - [`states`], [`linear`], [`sensitivity`], [`budget`], [`identifiability`], [`indices`]: the parts of the analysis;
 //! - [`results`]: the results, as they are written to JSON.
 
 mod analysis;
 mod ball_positions;
 pub mod budget;
-pub mod candidate_information;
+pub(crate) mod candidate_information;
 mod candidate_layout;
 pub mod candidate_tests;
 pub mod clearance;
 pub mod criterion;
-pub mod detectability;
+pub(crate) mod detectability;
 pub mod effects;
 pub mod identifiability;
 pub mod improve;
 pub mod indices;
-pub mod information;
+pub(crate) mod information;
 pub mod linear;
 pub mod range;
 mod ranking;
@@ -34,5 +34,5 @@ pub mod states;
 mod sweep;
 pub mod test_variations;
 
-pub use analysis::{BAR_TRAVEL_MM, PlanOptions, analyse, analyse_problem, prepared};
+pub use analysis::{PlanOptions, analyse, prepared};
 pub use separate::{SeparatingTest, SeparationAnalysis, separating_tests, separation};

@@ -26,7 +26,7 @@ const MIN_GAIN: f64 = 1e-6;
 /// Share of the best separation that a shorter test must reach to be preferred.
 const EQUIVALENT_SHARE: f64 = 0.9;
 /// Standard deviations from which two effects count as separated.
-pub const SEPARATED_SIGMA: f64 = 3.0;
+pub(crate) const SEPARATED_SIGMA: f64 = 3.0;
 /// Maximum number of proposed tests.
 const MAX_TESTS: usize = 3;
 

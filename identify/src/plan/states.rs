@@ -69,13 +69,13 @@ pub fn fold_by_test(problem: &mut Problem) {
 
 /// Assumed noise of a reading if neither the session nor its data determine it: 1 µm, the accuracy that makers of ball
 /// bars state.
-pub const ASSUMED_NOISE_MM: f64 = 1e-3;
+pub(crate) const ASSUMED_NOISE_MM: f64 = 1e-3;
 
 /// The noise model of a plan: that of the session, that of its data, or [`ASSUMED_NOISE_MM`].
 ///
 /// # Errors
 /// If the data cannot be fitted.
-pub fn noise_of(session: &Session) -> Result<Noise, IdentifyError> {
+pub(crate) fn noise_of(session: &Session) -> Result<Noise, IdentifyError> {
     if let Some(sigma) = session.noise_mm.filter(|sigma| *sigma > 0.0) {
         return Ok(Noise::white(sigma, NoiseSource::Stated));
     }

@@ -48,7 +48,7 @@ impl Default for TestVariations {
             both_directions: vec![true],
             follow: true,
             keep_spindle_ball: true,
-            reach_mm: super::BAR_TRAVEL_MM,
+            reach_mm: super::analysis::BAR_TRAVEL_MM,
             setup_min: 5.0,
             test_min: 1.0,
             thin: 1,

@@ -132,7 +132,7 @@ pub fn warnings(plausibility: &Plausibility) -> Vec<String> {
 }
 
 /// The mistakes that may explain the conflicts, in one sentence; those of one kind share a clause.
-pub fn in_words(suggestions: &[Suggestion]) -> Option<String> {
+pub(crate) fn in_words(suggestions: &[Suggestion]) -> Option<String> {
     let mut kinds: Vec<SuggestionKind> = Vec::new();
     for suggestion in suggestions {
         if !kinds.contains(&suggestion.kind) {

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 
 /// Coverage factor of the expanded uncertainty `U = k u` (JCGM 100, 6.2).
-pub const COVERAGE_FACTOR: f64 = 2.0;
+const COVERAGE_FACTOR: f64 = 2.0;
 
 /// A value with its standard uncertainty.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]

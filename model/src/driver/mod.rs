@@ -118,7 +118,7 @@ impl fmt::Display for Driver {
 }
 
 /// Suffixes of the keys of all drivers' numbers, each once, in the order of the registry.
-pub fn unit_suffixes() -> Vec<&'static str> {
+pub(crate) fn unit_suffixes() -> Vec<&'static str> {
     let mut suffixes = Vec::new();
     for suffix in DRIVERS.iter().flat_map(|entry| entry.units).flat_map(|unit| unit.suffixes()) {
         if !suffixes.contains(&suffix) {

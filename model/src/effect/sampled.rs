@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 /// Readings per cycle of the shortest wave in the library. The sampling theorem requires two.
-pub const READINGS_PER_CYCLE: f64 = 2.4;
+pub(crate) const READINGS_PER_CYCLE: f64 = 2.4;
 
 /// The sampling of a driver in a session, for the grid of a shape.
 #[derive(Clone, Debug, Default)]

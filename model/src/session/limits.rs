@@ -14,11 +14,11 @@ pub fn too_large(number: f64) -> Option<String> {
 }
 
 /// The fault of a standard deviation or step in µm that is neither zero nor at least [`MIN_UM`].
-pub fn too_small_um(number: f64) -> Option<String> {
+pub(crate) fn too_small_um(number: f64) -> Option<String> {
     (number > 0.0 && number < MIN_UM).then(|| format!("{number:e} µm; the least value other than 0 is {MIN_UM:e} µm"))
 }
 
 /// The fault of a length with this name that is not above zero.
-pub fn not_positive(name: &str, number: f64) -> Option<String> {
+pub(crate) fn not_positive(name: &str, number: f64) -> Option<String> {
     (number <= 0.0).then(|| format!("`{name}` is {number}; it must be greater than 0"))
 }
