@@ -168,13 +168,15 @@ impl Histogram {
         let tail = (1.0 - coverage) / 2.0;
         let symmetric = [quantile(tail), quantile(1.0 - tail)];
         // The density is equal at both ends of the shortest interval. The search varies the probability of the lower
-        // tail.
+        // tail. Of intervals of equal length, as a symmetric distribution has them, the lowest counts: rounding must not
+        // decide.
         const TAIL_STEPS: usize = 400;
+        const EQUAL_LENGTH: f64 = 1e-9;
         let mut shortest = symmetric;
         for slide in 0..=TAIL_STEPS {
             let share = 2.0 * tail * slide as f64 / TAIL_STEPS as f64;
             let interval = [quantile(share), quantile(share + coverage)];
-            if interval[1] - interval[0] < shortest[1] - shortest[0] {
+            if interval[1] - interval[0] < (shortest[1] - shortest[0]) * (1.0 - EQUAL_LENGTH) {
                 shortest = interval;
             }
         }
