@@ -48,6 +48,7 @@
 pub mod candidates;
 pub mod circular;
 pub mod compensation;
+pub mod correction;
 pub mod directions;
 pub mod error;
 pub mod fit;
