@@ -17,6 +17,7 @@
 //! - [`simulate`]: simulated readings; [`patterns`]: the pattern of each single error in a test; [`quantity`]: values
 //!   with units;
 //! - [`series`]: the columns of a session, reading by reading, for plots;
+//! - [`model_file`]: the identified model as a value and as a file;
 //! - [`results`]: the reported results, in the form of the JSON output.
 //!
 //! The example fits a bundled session as declared, then traces it. Beside noise of 0.3 µm the readings contain one
@@ -54,6 +55,7 @@ pub mod error;
 pub mod fit;
 pub mod geometric;
 pub mod heldout;
+pub mod model_file;
 pub mod monte_carlo;
 pub mod noise;
 pub mod numerics;

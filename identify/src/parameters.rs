@@ -13,7 +13,7 @@ use abbe_model::session::{Prior, Session, Test};
 
 use crate::error::IdentifyError;
 use crate::unit::Unit;
-pub(crate) use preference::pivot_preference;
+pub(crate) use preference::{natural, pivot_preference};
 
 /// The kind of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
