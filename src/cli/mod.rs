@@ -5,6 +5,7 @@ macro_rules! say {
     ($($text:tt)*) => { $crate::cli::output::line(format_args!($($text)*)) };
 }
 
+mod compensate;
 mod compensation;
 mod equation;
 mod failure;
@@ -84,6 +85,9 @@ enum Command {
     /// Print the equation of the volumetric error, or map and compensate it over the workspace.
     #[command(after_help = equation::VOLUMETRIC_HELP)]
     Volumetric(equation::VolumetricArguments),
+    /// Correct commanded positions or poses with an identified model.
+    #[command(after_help = compensate::HELP)]
+    Compensate(compensate::CompensateArguments),
     /// Estimate errors from readings, with uncertainties.
     #[command(after_help = fit::HELP)]
     Fit(fit::FitArguments),
@@ -171,6 +175,7 @@ pub fn run() -> ExitCode {
     let outcome = match command {
         Command::Equation(arguments) => equation::run(&arguments),
         Command::Volumetric(arguments) => equation::run_volumetric(&arguments, quiet),
+        Command::Compensate(arguments) => compensate::run(&arguments, quiet),
         Command::Fit(arguments) => fit::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),
         Command::New(arguments) => new::run(&arguments, quiet),
@@ -250,11 +255,12 @@ mod tests {
                     "simulate" => &["SESSION", "--out", "DIR"],
                     "volumetric" => &["MACHINE"],
                     "new" => &["DIR"],
+                    "compensate" => &["MODEL", "FILE", "--out", "OUT"],
                     _ => &["SESSION"],
                 };
                 let is_given = |name: &str| example.split(' ').any(|word| word == name);
                 let required = match required {
-                    [positional, name, _] if is_given(name) => std::slice::from_ref(positional),
+                    [positional @ .., name, _] if is_given(name) => positional,
                     all => all,
                 };
                 let words = ["abbe", command.get_name()].into_iter();

@@ -1,5 +1,6 @@
 //! `abbe schema`: what the files hold, as JSON Schema.
 
+use abbe::identify::correction::stream;
 use abbe::identify::geometric::Comparison;
 use abbe::identify::plan::results::PlanAnalysis;
 use abbe::identify::repeated::Repeated;
@@ -51,6 +52,8 @@ enum Subject {
     Simulate,
     /// `abbe volumetric --map --json`
     Map,
+    /// `abbe compensate --json`
+    Compensate,
 }
 
 /// `abbe schema SUBJECT`
@@ -76,6 +79,7 @@ pub fn run(arguments: &SchemaArguments) -> Result<(), Failure> {
         Subject::Patterns => of::<plan::patterns::PatternSizes>(),
         Subject::Simulate => of::<simulate::SimulationResult>(),
         Subject::Map => of::<Summary>(),
+        Subject::Compensate => of::<stream::Summary>(),
     };
     let text = serde_json::to_string_pretty(&schema)
         .map_err(|error| Failure::Other(format!("the schema cannot be written: {error}")))?;

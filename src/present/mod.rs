@@ -9,6 +9,7 @@
 //! - [`report`]: the pages of `--report`.
 
 pub mod circular;
+pub mod compensate;
 pub mod compensation;
 pub mod confounded;
 pub mod csv;

@@ -3,16 +3,17 @@
 use std::sync::Arc;
 
 use abbe_model::chain::Machine;
+use abbe_model::component::ErrorName;
 use abbe_model::driver::{DriverInput, DriverSample, Reference};
-use abbe_model::effect::{Component, Effect};
+use abbe_model::effect::Effect;
 use abbe_model::instrument::Station;
+use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
 
 use crate::error::IdentifyError;
-use crate::fit::Fit;
+use crate::model_file::IdentifiedModel;
 use crate::parameters::Role;
-use crate::problem::Problem;
 
 /// The errors at positions near the commanded ones, by slot of the machine, mm or rad.
 pub type ErrorsNear<'a> = Box<dyn Fn(&Readings) -> Result<SlotValues, IdentifyError> + 'a>;
@@ -52,36 +53,33 @@ pub struct EstimatedErrors {
 }
 
 impl EstimatedErrors {
-    /// The errors that a fit estimates. Effects that are confined to tests or act on the instrument are no errors of the
-    /// machine: their identifiers are the second result.
-    pub fn of_fit(problem: &Problem, fit: &Fit) -> (EstimatedErrors, Vec<String>) {
-        let machine = Arc::clone(&problem.session.machine);
+    /// The errors of a model: those that belong to the machine. Gravity acts at the load points, in the tool frame and in
+    /// the table frame.
+    pub fn of_model(model: &IdentifiedModel, tool_mm: [f64; 3], table_mm: [f64; 3]) -> EstimatedErrors {
+        let machine = Arc::new(model.machine.clone());
         let mut constant = vec![0.0; machine.error_slots()];
-        let mut coefficients: Vec<Vec<f64>> =
-            problem.parameters.effects.iter().map(|effect| vec![0.0; effect.shape.coefficients()]).collect();
-        for (parameter, value) in problem.parameters.list.iter().zip(&fit.beta) {
+        let coefficients = |effect: &Effect| vec![0.0; effect.shape.coefficients()];
+        let mut coefficients: Vec<Vec<f64>> = model.effects.iter().map(coefficients).collect();
+        for parameter in &model.parameters {
             match parameter.role {
                 Role::Error => {
-                    let name = abbe_model::component::ErrorName::parse(&parameter.id);
+                    let name = ErrorName::parse(&parameter.id);
                     if let Some(slot) = name.and_then(|name| machine.error_slot(&name)) {
-                        constant[slot] = *value;
+                        constant[slot] = parameter.value;
                     }
                 }
-                Role::Coefficient { effect, coefficient } => coefficients[effect][coefficient] = *value,
+                Role::Coefficient { effect, coefficient } => coefficients[effect][coefficient] = parameter.value,
                 Role::Setup => {}
             }
         }
-        let (mut effects, mut left_out) = (Vec::new(), Vec::new());
-        for (effect, coefficients) in problem.parameters.effects.iter().zip(coefficients) {
-            let of_machine = matches!(effect.component, Component::Axis(_) | Component::TriggerDelay);
-            if of_machine && effect.tests.is_empty() {
-                effects.push(EstimatedEffect { effect: effect.clone(), coefficients });
-            } else {
-                left_out.push(effect.id());
-            }
-        }
-        let station = problem.models[0].station().clone();
-        (EstimatedErrors { machine, station, reference: problem.reference.clone(), constant, effects }, left_out)
+        let effects = model.carried_effects().map(|index| EstimatedEffect {
+            effect: model.effects[index].clone(),
+            coefficients: coefficients[index].clone(),
+        });
+        let effects = effects.collect();
+        // A reading that connects both load points is affected by all errors.
+        let station = Station::BallBar(BallBar { workpiece_ball: table_mm, spindle_ball: tool_mm, bar: 1.0 });
+        EstimatedErrors { machine, station, reference: model.reference, constant, effects }
     }
 
     fn samples(

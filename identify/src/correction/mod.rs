@@ -311,3 +311,6 @@ impl Row {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

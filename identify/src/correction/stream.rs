@@ -7,6 +7,7 @@ use abbe_model::files::commands::{Block, CommandFile, PoseColumns};
 use abbe_model::session::readings::Readings;
 use csv::StringRecord;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::pose::{Aim, Pose};
@@ -32,7 +33,7 @@ pub enum Output {
 }
 
 /// What became of the rows of a file.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Summary {
     /// Number of rows.
     pub rows: usize,
@@ -51,7 +52,7 @@ pub struct Summary {
 }
 
 /// Number of rows in a state.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct StateCount {
     /// The state.
     pub state: &'static str,
@@ -60,7 +61,7 @@ pub struct StateCount {
 }
 
 /// A row that is not simply corrected.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct MarkedRow {
     /// Its line in the file, from 1.
     pub line: u64,

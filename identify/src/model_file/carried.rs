@@ -16,6 +16,7 @@ use abbe_model::session::readings::Readings;
 use abbe_model::session::{Prior, Session, Test};
 
 use super::IdentifiedModel;
+use crate::correction::{EstimatedErrors, MachineErrors};
 use crate::error::IdentifyError;
 use crate::parameters::{Parameters, Role, SlotContribution};
 
@@ -79,7 +80,7 @@ impl IdentifiedModel {
     /// # Errors
     /// If the states lack what an effect follows: time, temperature.
     pub fn contributions(&self, states: &States) -> Result<Vec<SlotContribution>, IdentifyError> {
-        let (parameters, _) = self.at_states(states)?;
+        let parameters = self.at_states(states)?;
         Ok(parameters.contributions.into_iter().flatten().collect())
     }
 
@@ -88,14 +89,13 @@ impl IdentifiedModel {
     /// # Errors
     /// As [`IdentifiedModel::contributions`].
     pub fn errors_at(&self, states: &States) -> Result<SlotValues, IdentifyError> {
-        let (parameters, model) = self.at_states(states)?;
-        let values: Vec<f64> = self.carried_parameters().iter().map(|j| self.parameters[*j].value).collect();
-        let mut values = parameters.slot_values(&[model], &values);
-        Ok(values.pop().unwrap_or_default())
+        let errors = EstimatedErrors::of_model(self, states.tool_mm, states.table_mm);
+        let near = errors.along(&states.readings)?;
+        near(&states.readings)
     }
 
     /// The parameters of the machine over some states, without set-up quantities.
-    fn at_states(&self, states: &States) -> Result<(Parameters, TestModel), IdentifyError> {
+    fn at_states(&self, states: &States) -> Result<Parameters, IdentifyError> {
         // A reading that connects both load points is affected by all errors.
         let bar = BallBar { workpiece_ball: states.table_mm, spindle_ball: states.tool_mm, bar: 1.0 };
         let station = Station::BallBar(bar);
@@ -121,7 +121,6 @@ impl IdentifiedModel {
         for effect in &session.effects {
             parameters.add_effect(&session, &tests, &models, &self.reference, effect)?;
         }
-        let [model] = models.try_into().map_err(|_| IdentifyError::NoReadings)?;
-        Ok((parameters, model))
+        Ok(parameters)
     }
 }

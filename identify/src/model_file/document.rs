@@ -41,6 +41,10 @@ pub struct Document {
     pub fit: FitQuality,
     /// The range of every axis and driver that the readings covered.
     pub ranges: Vec<Range>,
+    /// The instrument's point in the tool frame at the first test.
+    pub tool_mm: [f64; 3],
+    /// The instrument's point in the table frame there; 0 for instruments without one.
+    pub table_mm: [f64; 3],
     /// Reference values from which drivers count.
     pub reference: Reference,
 }

@@ -89,6 +89,11 @@ pub struct IdentifiedModel {
     pub quality: Quality,
     /// The range of every axis and driver.
     pub ranges: Vec<DriverRange>,
+    /// The instrument's point in the tool frame at the first test, mm: the load point of gravity, and the tool point if
+    /// no other is stated.
+    pub tool_mm: [f64; 3],
+    /// The instrument's point in the table frame there, mm; 0 for instruments without one.
+    pub table_mm: [f64; 3],
     /// Reference time and temperature, from which drivers count.
     pub reference: Reference,
     /// Where the model comes from.

@@ -52,6 +52,8 @@ impl IdentifiedModel {
                 u_enlargement: fit.u_enlargement,
             },
             ranges: range::of_problem(problem, &problem.parameters.effects),
+            tool_mm: problem.models[0].station().tool_point_mm(),
+            table_mm: problem.models[0].station().table_point_mm().unwrap_or_default(),
             reference: problem.reference,
             provenance,
         })

@@ -158,6 +158,8 @@ impl File<'_> {
                 heldout_rms_mm: document.fit.heldout_rms_um * 1e-3,
                 u_enlargement: document.fit.u_enlargement,
             },
+            tool_mm: document.tool_mm,
+            table_mm: document.table_mm,
             reference: Reference { time_s: document.reference.time_s, temperature_c: document.reference.temperature_c },
             machine,
             instrument,

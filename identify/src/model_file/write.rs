@@ -66,6 +66,8 @@ impl IdentifiedModel {
                 u_enlargement: self.quality.u_enlargement,
             },
             ranges: self.ranges.iter().map(|range| self.range(range)).collect(),
+            tool_mm: self.tool_mm,
+            table_mm: self.table_mm,
             reference: document::Reference {
                 time_s: self.reference.time_s,
                 temperature_c: self.reference.temperature_c,
