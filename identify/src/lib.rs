@@ -18,6 +18,7 @@
 //!   with units;
 //! - [`series`]: the columns of a session, reading by reading, for plots;
 //! - [`model_file`]: the identified model as a value and as a file;
+//! - [`validate`](mod@validate): a model against readings that it never saw;
 //! - [`results`]: the reported results, in the form of the JSON output.
 //!
 //! The example fits a bundled session as declared, then traces it. Beside noise of 0.3 µm the readings contain one
@@ -76,6 +77,7 @@ pub mod simulate;
 mod start;
 pub mod trace;
 pub mod unit;
+pub mod validate;
 pub mod volumetric;
 
 pub use error::IdentifyError;

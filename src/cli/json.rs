@@ -4,6 +4,7 @@
 use std::any::TypeId;
 use std::path::Path;
 
+use abbe::identify::model_file::{self, Provenance};
 use abbe::model::files::SourceMap;
 use clap::{Arg, ArgAction, ArgMatches, CommandFactory};
 use schemars::JsonSchema;
@@ -99,6 +100,25 @@ fn unreadable(file: &Path, fault: &str) -> Failure {
     Failure::Other(format!("{}: cannot be read again for its checksum in the JSON document: {fault}", file.display()))
 }
 
+/// Where a model comes from: this command and the files of its session.
+///
+/// # Errors
+/// If a file has changed since it was read.
+pub fn provenance(sources: &SourceMap, seed: u64) -> Result<Provenance, Failure> {
+    let (command, options) = command_line();
+    let session = Origin::of_session(sources)?.session;
+    let inputs = session.iter().flat_map(|session| &session.inputs);
+    let inputs = inputs.map(|input| model_file::InputFile { file: input.file.clone(), sha256: input.sha256.clone() });
+    Ok(Provenance {
+        tool_version: env!("CARGO_PKG_VERSION").to_string(),
+        command,
+        options,
+        seed,
+        inputs: inputs.collect(),
+        session: session.as_ref().map_or(String::new(), |session| session.file.clone()),
+    })
+}
+
 /// The document of a command: what it was, and its result.
 #[derive(Serialize, JsonSchema)]
 pub struct Document<'r, T> {
@@ -112,7 +132,7 @@ pub struct Document<'r, T> {
     /// The session, with checksums of all files that were read.
     #[serde(skip_serializing_if = "Option::is_none")]
     session: Option<SessionFile>,
-    /// The input files of a command without a session.
+    /// The input files beside those of a session.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     inputs: Vec<InputFile>,
     /// Seed of all random numbers.

@@ -21,11 +21,13 @@ mod output;
 mod plan;
 mod repeated;
 mod report;
+mod save;
 mod schema;
 mod screen;
 mod self_calibration;
 mod simulate;
 mod trace;
+mod validate;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -112,6 +114,9 @@ enum Command {
     /// Find the unmodelled effect behind the residual.
     #[command(after_help = trace::HELP)]
     Trace(trace::TraceArguments),
+    /// Test a saved model on readings that it never saw.
+    #[command(after_help = validate::HELP)]
+    Validate(validate::ValidateArguments),
 }
 
 /// Arguments of every command that reads a session.
@@ -188,6 +193,7 @@ pub fn run() -> ExitCode {
         Command::Schema(arguments) => schema::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Trace(arguments) => trace::run(&arguments),
+        Command::Validate(arguments) => validate::run(&arguments),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -256,6 +262,7 @@ mod tests {
                     "volumetric" => &["MACHINE"],
                     "new" => &["DIR"],
                     "compensate" => &["MODEL", "FILE", "--out", "OUT"],
+                    "validate" => &["MODEL", "SESSION"],
                     _ => &["SESSION"],
                 };
                 let is_given = |name: &str| example.split(' ').any(|word| word == name);

@@ -2,12 +2,13 @@
 //!
 //! - [`table`]: a table as data; [`number`]: digits and units; [`figure`]: plots;
 //! - printers: [`terminal`], [`csv`], [`html`];
-//! - one file per result: [`fit`], [`trace`], [`plan`], [`next_test`], [`method`], [`repeated`], [`self_calibration`],
+//! - one file per result: [`fit`], [`base`], [`trace`], [`validate`], [`plan`], [`next_test`], [`method`], [`repeated`], [`self_calibration`],
 //!   [`simulation`], [`patterns`], [`volumetric`], [`compensation`];
 //! - parts of several results: [`parameters`], [`confounded`], [`circular`], [`plausibility`], [`effect`],
 //!   [`uniqueness`], [`readings`];
 //! - [`report`]: the pages of `--report`.
 
+pub mod base;
 pub mod circular;
 pub mod compensate;
 pub mod compensation;
@@ -33,4 +34,5 @@ pub mod table;
 pub mod terminal;
 pub mod trace;
 pub mod uniqueness;
+pub mod validate;
 pub mod volumetric;

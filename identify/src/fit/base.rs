@@ -27,8 +27,10 @@ use crate::error::IdentifyError;
 use crate::numerics::null_space::{MIN_PIVOT, echelon};
 use crate::numerics::solve::Directions;
 use crate::numerics::triangle::Triangle;
+use crate::parameter_description::parameter_meaning;
 use crate::parameters::{Parameter, Role, natural};
 use crate::problem::Problem;
+use crate::results::{BaseResult, ParameterResult};
 
 /// Which parameters are held at nominal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,6 +79,9 @@ pub struct BaseParameters {
     pub covariance: Mat<f64>,
     /// Number of directions that stay at nominal as combinations: the readings determine them by less than their noise.
     pub held_combinations: usize,
+    /// The directions that the readings determine by less than their noise, or not at all, at `beta`: orthonormal, in
+    /// scaled parameters, parameters × directions.
+    pub null_space: Mat<f64>,
     /// Largest difference of a predicted reading from that of the fit, mm.
     pub prediction_change_mm: f64,
 }
@@ -94,7 +99,9 @@ pub fn base_parameters(problem: &Problem, fit: &Fit, gauge: Gauge) -> Result<Bas
     let list = &problem.parameters.list;
     let sizes = problem.parameters.sizes();
     let preference = gauge.preference(&problem.session.machine, list);
-    let exact = exact_null_space(problem, fit)?;
+    let at_solution = directions_at(problem, &fit.beta, &fit.triangles)?;
+    let exact_rank = at_solution.numerical_rank();
+    let exact = at_solution.right().subcols(exact_rank, list.len() - exact_rank).to_owned();
     let (combinations, mut held) = echelon(exact.as_ref(), &preference, MIN_PIVOT);
     if held.len() < exact.ncols() {
         return Err(IdentifyError::Request(
@@ -124,18 +131,41 @@ pub fn base_parameters(problem: &Problem, fit: &Fit, gauge: Gauge) -> Result<Bas
         }
     }
     let held_combinations = fit.rank.null_space.ncols().saturating_sub(exact.ncols());
-    Ok(BaseParameters { held, beta, covariance, held_combinations, prediction_change_mm })
+    // The least determined directions depend on the place in the null space.
+    let at_base = directions_at(problem, &beta, &problem.triangles(&beta)?)?;
+    let identifiable = fit.rank.identifiable_basis.ncols().min(exact_rank);
+    let null_space = at_base.right().subcols(identifiable, list.len() - identifiable).to_owned();
+    Ok(BaseParameters { held, beta, covariance, held_combinations, null_space, prediction_change_mm })
 }
 
-/// The directions that change no reading at all, in scaled parameters: those whose singular value at the solution is a
-/// rounding error. A direction that is null at the nominal machine only changes readings at the solution.
-fn exact_null_space(problem: &Problem, fit: &Fit) -> Result<Mat<f64>, IdentifyError> {
+/// The base parameters of a fit under [`Gauge::OwnDirection`], in display units.
+///
+/// # Errors
+/// As [`base_parameters`].
+pub fn report(problem: &Problem, fit: &Fit) -> Result<BaseResult, IdentifyError> {
+    let base = base_parameters(problem, fit, Gauge::OwnDirection)?;
+    let list = &problem.parameters.list;
+    let kept = (0..list.len()).filter(|j| !base.held.contains(j)).map(|j| {
+        let display = list[j].unit.display_per_internal;
+        let u = base.covariance[(j, j)].max(0.0).sqrt() * display;
+        ParameterResult::new(&list[j].id, base.beta[j] * display, u, &list[j].unit.name)
+            .with_meaning(parameter_meaning(problem, j, None))
+    });
+    Ok(BaseResult {
+        parameters: kept.collect(),
+        held_at_nominal: base.held.iter().map(|j| list[*j].id.clone()).collect(),
+        combinations_at_nominal: base.held_combinations,
+        prediction_change_um: base.prediction_change_mm * 1e3,
+    })
+}
+
+/// The directions of the scaled parameters at a point, the best determined first. Those whose singular value is a
+/// rounding error change no reading at all. A direction that is null at the nominal machine only changes readings at
+/// the solution.
+fn directions_at(problem: &Problem, beta: &[f64], triangles: &[Triangle]) -> Result<Directions, IdentifyError> {
     let sizes = problem.parameters.sizes();
-    let r = problem.prior_triangle(&fit.beta).merged(&fit.triangles).r();
-    let scaled = Mat::from_fn(r.nrows(), sizes.len(), |i, j| r[(i, j)] * sizes[j]);
-    let directions = Directions::of(scaled.as_ref())?;
-    let rank = directions.numerical_rank();
-    Ok(directions.right().subcols(rank, sizes.len() - rank).to_owned())
+    let r = problem.prior_triangle(beta).merged(triangles).r();
+    Directions::of(Mat::from_fn(r.nrows(), sizes.len(), |i, j| r[(i, j)] * sizes[j]).as_ref())
 }
 
 /// Moves the parameters that are not held until the predictions are those of the fit. Returns the largest remaining

@@ -56,7 +56,7 @@ pub(crate) fn prepare_with(session: &Session, effects: &[Effect], seed: u64) -> 
     // Noise and outliers depend on the residuals, and the residuals on the fit. The returned fit always uses the
     // returned noise.
     for _ in 0..MAX_ROUNDS {
-        let rejected = outliers::reject(&problem, &fit);
+        let rejected = outliers::reject(&problem, &fit.residuals);
         let unchanged = rejected == problem.rejected;
         problem.rejected = rejected;
         let noise = match stated {

@@ -52,6 +52,7 @@ pub fn report(problem: &Problem, fit: &Fit) -> FitResult {
         plausibility,
         warnings,
         about: problem.session.about.iter().cloned().collect(),
+        base: None,
         monte_carlo: None,
     }
 }

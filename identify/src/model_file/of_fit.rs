@@ -33,7 +33,7 @@ impl IdentifiedModel {
             prior: parameter.prior,
             size: parameter.size,
         });
-        let null_directions = fit.rank.null_space.col_iter();
+        let null_directions = base.null_space.col_iter();
         Ok(IdentifiedModel {
             machine: problem.session.machine.as_ref().clone(),
             instrument: problem.session.instrument,

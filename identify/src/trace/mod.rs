@@ -18,7 +18,7 @@ mod implausible;
 pub(crate) mod interrupt;
 mod judge;
 mod moves;
-mod noise_model;
+pub(crate) mod noise_model;
 mod null;
 mod policy;
 mod remainder;

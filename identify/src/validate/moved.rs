@@ -1,0 +1,101 @@
+//! The parameters of the machine that have changed since the model was saved.
+//!
+//! A change `δ` of parameter `i` adds `J̃·eᵢ·δ` to the residual, whose covariance is `V = I + J̃·C·J̃ᵀ`. Generalised least
+//! squares gives, with the information `S = J̃ᵀJ̃` of the session and its gradient `g = J̃ᵀr`,
+//!
+//! ```text
+//! P = S·(I + C·S)⁻¹,   y = (I + S·C)⁻¹·g,   δ̂ = yᵢ/Pᵢᵢ,   u² = s²/Pᵢᵢ
+//! ```
+//!
+//! `s²` is the variance of the residual that no parameter of the model can explain, at least 1. Changes are added one
+//! by one, the most significant first, as long as the next one is significant at the level over all parameters
+//! (Bonferroni).
+
+use faer::Mat;
+
+use super::known::{KnownErrors, Linearised};
+use super::results::MovedParameter;
+use crate::error::IdentifyError;
+use crate::numerics::solve::solve_square;
+use crate::numerics::symmetric::pseudo_inverse;
+use crate::numerics::tails::normal_tail;
+
+/// Probability that a change is stated of a machine that has not changed.
+const SIGNIFICANCE: f64 = 0.01;
+/// Least share of a parameter's information that must remain beside the selected ones.
+const LEAST_SHARE: f64 = 1e-6;
+
+/// The changed parameters, the most significant first.
+///
+/// # Errors
+/// If the factor has entries that are not finite.
+pub(super) fn moved(known: &KnownErrors<'_>, at: &Linearised) -> Result<Vec<MovedParameter>, IdentifyError> {
+    let (r, c, rest) = at.machine.parts();
+    let count = c.len();
+    let information = r.transpose() * &r;
+    let gradient = r.transpose() * Mat::from_fn(count, 1, |i, _| c[i]);
+    let v = Mat::<f64>::identity(count, count) + &information * &at.covariance;
+    let p = solve_square(v.as_ref(), information.as_ref());
+    let y = solve_square(v.as_ref(), gradient.as_ref());
+    let variance = (rest / at.freedom.saturating_sub(count).max(1) as f64).max(1.0);
+    let candidates: Vec<usize> = (0..count).filter(|i| !known.model.parameters[known.carried[*i]].held).collect();
+    let mut selected: Vec<usize> = Vec::new();
+    while let Some((next, z)) = best(&p, &y, &selected, &candidates)? {
+        if two_sided(z / variance.sqrt(), candidates.len()) >= SIGNIFICANCE {
+            break;
+        }
+        selected.push(next);
+    }
+    let inverse = inverse_at(&p, &selected)?;
+    let change = |k: usize| -> f64 { (0..selected.len()).map(|l| inverse[(k, l)] * y[(selected[l], 0)]).sum() };
+    let mut moved: Vec<MovedParameter> = selected
+        .iter()
+        .enumerate()
+        .map(|(k, i)| {
+            let parameter = &known.model.parameters[known.carried[*i]];
+            let display = parameter.unit.display_per_internal;
+            let (value, u) = (change(k), (inverse[(k, k)] * variance).sqrt());
+            MovedParameter {
+                id: parameter.id.clone(),
+                value: value * display,
+                u: u * display,
+                unit: parameter.unit.name.clone(),
+                p_value: two_sided(value / u, candidates.len()),
+            }
+        })
+        .collect();
+    moved.sort_by(|a, b| (b.value / b.u).abs().total_cmp(&(a.value / a.u).abs()));
+    Ok(moved)
+}
+
+/// The probability of a larger standard normal value by chance, in one of `count` tests.
+fn two_sided(z: f64, count: usize) -> f64 {
+    (2.0 * normal_tail(z.abs()) * count as f64).min(1.0)
+}
+
+/// The most significant change beside the selected ones, and its value over its uncertainty.
+fn best(
+    p: &Mat<f64>,
+    y: &Mat<f64>,
+    selected: &[usize],
+    candidates: &[usize],
+) -> Result<Option<(usize, f64)>, IdentifyError> {
+    let inverse = inverse_at(p, selected)?;
+    let found = candidates.iter().filter(|i| !selected.contains(i)).filter_map(|&i| {
+        let shares = |k: usize| -> f64 { (0..selected.len()).map(|l| inverse[(k, l)] * p[(selected[l], i)]).sum() };
+        let (mut information, mut gradient) = (p[(i, i)], y[(i, 0)]);
+        for (k, j) in selected.iter().enumerate() {
+            information -= shares(k) * p[(*j, i)];
+            gradient -= shares(k) * y[(*j, 0)];
+        }
+        let is_separable = information > LEAST_SHARE * p[(i, i)] && information > 0.0;
+        is_separable.then(|| (i, gradient / information.sqrt()))
+    });
+    Ok(found.max_by(|(_, a), (_, b)| a.abs().total_cmp(&b.abs())))
+}
+
+/// The inverse of `P` over the selected parameters.
+fn inverse_at(p: &Mat<f64>, selected: &[usize]) -> Result<Mat<f64>, IdentifyError> {
+    let part = |i: usize, j: usize| 0.5 * (p[(selected[i], selected[j])] + p[(selected[j], selected[i])]);
+    pseudo_inverse(Mat::from_fn(selected.len(), selected.len(), part).as_ref())
+}
