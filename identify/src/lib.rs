@@ -49,6 +49,7 @@
 
 pub mod candidates;
 pub mod circular;
+pub mod compare;
 pub mod compensation;
 pub mod correction;
 pub mod directions;

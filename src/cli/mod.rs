@@ -5,6 +5,7 @@ macro_rules! say {
     ($($text:tt)*) => { $crate::cli::output::line(format_args!($($text)*)) };
 }
 
+mod compare;
 mod compensate;
 mod compensation;
 mod equation;
@@ -87,6 +88,9 @@ enum Command {
     /// Print the equation of the volumetric error, or map and compensate it over the workspace.
     #[command(after_help = equation::VOLUMETRIC_HELP)]
     Volumetric(equation::VolumetricArguments),
+    /// State the differences between sessions or models of one machine, with their significance.
+    #[command(after_help = compare::HELP)]
+    Compare(compare::CompareArguments),
     /// Correct commanded positions or poses with an identified model.
     #[command(after_help = compensate::HELP)]
     Compensate(compensate::CompensateArguments),
@@ -180,6 +184,7 @@ pub fn run() -> ExitCode {
     let outcome = match command {
         Command::Equation(arguments) => equation::run(&arguments),
         Command::Volumetric(arguments) => equation::run_volumetric(&arguments, quiet),
+        Command::Compare(arguments) => compare::run(&arguments),
         Command::Compensate(arguments) => compensate::run(&arguments, quiet),
         Command::Fit(arguments) => fit::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),
@@ -261,6 +266,7 @@ mod tests {
                     "simulate" => &["SESSION", "--out", "DIR"],
                     "volumetric" => &["MACHINE"],
                     "new" => &["DIR"],
+                    "compare" => &["A", "B"],
                     "compensate" => &["MODEL", "FILE", "--out", "OUT"],
                     "validate" => &["MODEL", "SESSION"],
                     _ => &["SESSION"],

@@ -58,6 +58,8 @@ enum Subject {
     Simulate,
     /// `abbe volumetric --map --json`
     Map,
+    /// `abbe compare --json`
+    Compare,
     /// `abbe compensate --json`
     Compensate,
 }
@@ -87,6 +89,7 @@ pub fn run(arguments: &SchemaArguments) -> Result<(), Failure> {
         Subject::Patterns => of::<plan::patterns::PatternSizes>(),
         Subject::Simulate => of::<simulate::SimulationResult>(),
         Subject::Map => of::<Summary>(),
+        Subject::Compare => of::<abbe::identify::compare::results::Comparison>(),
         Subject::Compensate => of::<stream::Summary>(),
     };
     let text = serde_json::to_string_pretty(&schema)

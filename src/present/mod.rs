@@ -10,6 +10,7 @@
 
 pub mod base;
 pub mod circular;
+pub mod compare;
 pub mod compensate;
 pub mod compensation;
 pub mod confounded;

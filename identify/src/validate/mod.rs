@@ -13,7 +13,7 @@
 //! - `verdict`: the rule; [`results`]: the result as it is reported.
 
 mod known;
-mod machine;
+pub(crate) mod machine;
 mod moved;
 mod prediction;
 pub mod results;
