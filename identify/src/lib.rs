@@ -54,6 +54,7 @@ pub mod compensation;
 pub mod correction;
 pub mod directions;
 pub mod error;
+pub mod export;
 pub mod fit;
 pub mod geometric;
 pub mod heldout;

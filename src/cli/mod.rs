@@ -9,6 +9,7 @@ mod compare;
 mod compensate;
 mod compensation;
 mod equation;
+mod export;
 mod failure;
 mod fit;
 mod folder;
@@ -94,6 +95,9 @@ enum Command {
     /// Correct commanded positions or poses with an identified model.
     #[command(after_help = compensate::HELP)]
     Compensate(compensate::CompensateArguments),
+    /// Export the calibrated machine: URDF, Denavit-Hartenberg parameters, kinematic parameters of controls.
+    #[command(after_help = export::HELP)]
+    Export(export::ExportArguments),
     /// Estimate errors from readings, with uncertainties.
     #[command(after_help = fit::HELP)]
     Fit(fit::FitArguments),
@@ -186,6 +190,7 @@ pub fn run() -> ExitCode {
         Command::Volumetric(arguments) => equation::run_volumetric(&arguments, quiet),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Compensate(arguments) => compensate::run(&arguments, quiet),
+        Command::Export(arguments) => export::run(&arguments, quiet),
         Command::Fit(arguments) => fit::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),
         Command::New(arguments) => new::run(&arguments, quiet),
@@ -266,6 +271,8 @@ mod tests {
                     "simulate" => &["SESSION", "--out", "DIR"],
                     "volumetric" => &["MACHINE"],
                     "new" => &["DIR"],
+                    "export" if example.contains("--as") => &["MODEL", "--out", "OUT"],
+                    "export" => &["MODEL", "--as", "urdf", "--out", "OUT"],
                     "compare" => &["A", "B"],
                     "compensate" => &["MODEL", "FILE", "--out", "OUT"],
                     "validate" => &["MODEL", "SESSION"],

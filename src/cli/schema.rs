@@ -58,6 +58,8 @@ enum Subject {
     Simulate,
     /// `abbe volumetric --map --json`
     Map,
+    /// `abbe export --json`
+    Export,
     /// `abbe compare --json`
     Compare,
     /// `abbe compensate --json`
@@ -90,6 +92,7 @@ pub fn run(arguments: &SchemaArguments) -> Result<(), Failure> {
         Subject::Simulate => of::<simulate::SimulationResult>(),
         Subject::Map => of::<Summary>(),
         Subject::Compare => of::<abbe::identify::compare::results::Comparison>(),
+        Subject::Export => of::<super::export::ExportResult>(),
         Subject::Compensate => of::<stream::Summary>(),
     };
     let text = serde_json::to_string_pretty(&schema)

@@ -16,6 +16,7 @@ pub mod compensation;
 pub mod confounded;
 pub mod csv;
 pub mod effect;
+pub mod export;
 pub mod figure;
 pub mod fit;
 pub mod html;
