@@ -72,6 +72,11 @@ impl Series {
         Series { label: label.into(), class, mark, points, names: Vec::new(), source: None, test: None }
     }
 
+    /// Index of the traversal, if the script of the page redraws it.
+    pub(super) fn traversal(&self) -> Option<usize> {
+        self.source.map(|(traversal, _)| traversal)
+    }
+
     /// The points that have a name.
     fn named(&self) -> impl Iterator<Item = (&(f64, f64), &Name)> {
         self.points.iter().skip(self.points.len() - self.names.len()).zip(&self.names)
@@ -133,7 +138,7 @@ impl Series {
                     }
                 }
             } @else {
-                path class=(self.classes()) data-run=[self.source.map(|s| s.0)] data-column=[self.source.map(|s| s.1)]
+                path class=(self.classes()) data-run=[self.traversal()] data-column=[self.source.map(|s| s.1)]
                     d=(self.path(x, y)) {}
                 @for ((left, top), dot) in self.named() {
                     @let (left, top) = (x.at(*left), y.at(*top));
@@ -196,17 +201,33 @@ impl Lines {
     pub fn new(x: Axis, y: Axis, series: Vec<Series>) -> Lines {
         Lines { x, y, series, live: None }
     }
+}
 
-    /// Entries of the legend: CSS classes and label, in the order of the first series of each.
-    fn entries(&self) -> Vec<(String, String)> {
-        let mut entries: Vec<(String, String)> = Vec::new();
-        for entry in self.series.iter().map(|series| (series.key(), series.label.clone())) {
-            if !entry.1.is_empty() && !entries.contains(&entry) {
-                entries.push(entry);
-            }
+/// Entries of the legend: CSS classes and label, in the order of the first series of each.
+pub(super) fn entries(series: &[Series]) -> Vec<(String, String)> {
+    let mut entries: Vec<(String, String)> = Vec::new();
+    for entry in series.iter().map(|series| (series.key(), series.label.clone())) {
+        if !entry.1.is_empty() && !entries.contains(&entry) {
+            entries.push(entry);
         }
-        entries
     }
+    entries
+}
+
+/// The points of all series, one row each.
+pub(super) fn table(series: &[Series], x: &Quantity, y: &Quantity) -> Table {
+    let rows = series.iter().flat_map(|series| {
+        let names = series.points.iter().map(|_| "").skip(series.names.len());
+        let names = names.chain(series.names.iter().map(|name| name.text.as_str()));
+        series.points.iter().zip(names).map(|((x, y), name)| {
+            let test = series.test.as_ref().map_or("", |(_, name)| name);
+            let traversal = series.traversal().map_or(String::new(), |traversal| (traversal + 1).to_string());
+            cells![test, &series.label, traversal, Cell::exact(*x), Cell::exact(*y), name]
+        })
+    });
+    let [x, y] = [x, y].map(|quantity| numbers(quantity.heading()));
+    let columns = [words("test"), words("series"), numbers("traversal"), x, y, words("name")];
+    Table::new(columns, rows).without_empty_columns()
 }
 
 /// Draws the frame, the grid, the tick labels and the labels of the axes.
@@ -230,7 +251,7 @@ fn frame(x: &Placed, y: &Placed, [x_label, y_label]: [String; 2]) -> Markup {
 impl Kind for Lines {
     fn drawing(&self) -> Drawing {
         let (x, y) = (self.x.scale.between(ACROSS), self.y.scale.between(UP));
-        let entries = self.entries();
+        let entries = entries(&self.series);
         let (keys, bottom) = if entries.is_empty() {
             (html! {}, HEIGHT - 6.0)
         } else {
@@ -253,19 +274,7 @@ impl Kind for Lines {
         Drawing { size: [WIDTH, bottom + 10.0], inner, interaction }
     }
 
-    /// One row per point.
     fn table(&self) -> Table {
-        let rows = self.series.iter().flat_map(|series| {
-            let names = series.points.iter().map(|_| "").skip(series.names.len());
-            let names = names.chain(series.names.iter().map(|name| name.text.as_str()));
-            series.points.iter().zip(names).map(|((x, y), name)| {
-                let test = series.test.as_ref().map_or("", |(_, name)| name);
-                let traversal = series.source.map_or(String::new(), |(traversal, _)| (traversal + 1).to_string());
-                cells![test, &series.label, traversal, Cell::exact(*x), Cell::exact(*y), name]
-            })
-        });
-        let [x, y] = [&self.x, &self.y].map(|axis| numbers(axis.quantity.heading()));
-        let columns = [words("test"), words("series"), numbers("traversal"), x, y, words("name")];
-        Table::new(columns, rows).without_empty_columns()
+        table(&self.series, &self.x.quantity, &self.y.quantity)
     }
 }

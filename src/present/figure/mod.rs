@@ -16,7 +16,10 @@ pub mod scale;
 pub mod svg;
 
 use super::number;
-use super::table::Table;
+use super::table::{Cell, Column, Table};
+
+/// Most words of a column that the figure in words names.
+const MAX_LISTED: usize = 12;
 
 /// A figure with its title and caption.
 #[derive(Clone, Debug)]
@@ -80,6 +83,31 @@ impl Figure {
     pub fn table(&self) -> Table {
         self.kind().table()
     }
+
+    /// The figure in words, for readers who cannot see it: its title, and what each column of its data spans.
+    pub fn alternative(&self) -> String {
+        let table = self.table();
+        let spans = table.columns.iter().enumerate().map(|(column, Column { heading, .. })| {
+            let numbers = table.rows.iter().filter_map(|row| match row.get(column) {
+                Some(Cell::Number(value, _)) => Some(*value),
+                _ => None,
+            });
+            let name = number::unit(&heading.replace('_', " "));
+            match scale::span(numbers) {
+                [low, high] if low <= high => {
+                    format!("{name} {} to {}", number::three_digits(low), number::three_digits(high))
+                }
+                _ => {
+                    let texts = table.rows.iter().filter_map(|row| row.get(column)).map(ToString::to_string);
+                    let texts: Vec<String> = texts.filter(|text| !text.is_empty()).collect();
+                    let distinct = number::units(texts.iter().map(String::as_str));
+                    let more = if distinct.len() > MAX_LISTED { ", …" } else { "" };
+                    format!("{name} {}{more}", distinct[..distinct.len().min(MAX_LISTED)].join(", "))
+                }
+            }
+        });
+        format!("{}: {}", self.title, spans.collect::<Vec<_>>().join("; "))
+    }
 }
 
 /// What a number is, with its unit as in results: `residual` in `um`. Either may be empty.
@@ -119,4 +147,32 @@ pub fn file_name(text: &str) -> String {
         if c.is_ascii_alphanumeric() || "-_.+".contains(c) { c } else { '-' }
     };
     text.chars().map(plain).take(80).collect::<String>().trim_matches('.').to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::lines::{Axis, Lines, Mark, Series};
+    use super::scale::Scale;
+    use super::*;
+
+    #[test]
+    fn a_figure_has_a_table_with_units_and_words_that_span_it() {
+        let scale = Scale::over([0.0, 1.0], 5);
+        let axes =
+            [Axis::new("C", "deg", scale), Axis::new("length of the residual, of \"all\"", "um per arcsec", scale)];
+        assert_eq!(axes.each_ref().map(|axis| axis.quantity.label())[0], "C, °");
+        assert_eq!(Quantity::new("", "").heading(), "value");
+        let [x, y] = axes;
+        let series = ["before", "after"]
+            .map(|label| Series::new(label, "before", Mark::Stems(0.2), vec![(-90.0, 0.125), (45.0, -1.0 / 3.0)]));
+        let figure = Figure::new("a/b", "Title", "", Chart::Lines(Lines::new(x, y, series.to_vec())));
+        assert_eq!(figure.name, "a-b");
+        let text = String::from_utf8(crate::present::csv::text(&figure.table()).unwrap()).unwrap();
+        let rows: Vec<&str> = text.lines().collect();
+        assert_eq!(rows[0], "series,C_deg,length_of_the_residual_um_per_arcsec");
+        assert_eq!(rows[1..3], ["before,-90,0.125", "before,45,-0.3333333333333333"]);
+        assert_eq!(rows.len(), 5);
+        let wanted = "Title: series before, after; C ° -90.0 to 45.0; length of the residual µm per ″ -0.333 to 0.125";
+        assert_eq!(figure.alternative(), wanted);
+    }
 }

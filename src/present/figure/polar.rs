@@ -3,10 +3,11 @@
 use maud::{Markup, html};
 use serde_json::json;
 
+use super::lines::{self, Series};
 use super::scale::{coordinate, polyline, round_up, text};
 use super::svg::{Drawing, WIDTH, legend, shortened};
 use super::{Kind, Quantity};
-use crate::present::table::{Cell, Column, Table, cells, numbers, words};
+use crate::present::table::Table;
 
 /// Divisions on either side of the nominal circle.
 pub const DIVISIONS: f64 = 4.0;
@@ -17,28 +18,17 @@ const PER_ROW: usize = 3;
 /// Largest angle of a chord, °. Longer gaps are subdivided, so that the line follows the circle.
 const CHORD_DEG: f64 = 4.0;
 
-/// One traversal.
-#[derive(Clone, Debug)]
-pub struct Traversal {
-    /// CSS class: `forward`, `backward` or `plain`.
-    pub class: &'static str,
-    /// Index among the traversals of its test. Only a chart that the script of the page redraws has one.
-    pub index: Option<usize>,
-    /// Angle (°) and deviation (µm).
-    pub points: Vec<(f64, f64)>,
-}
-
 /// Deviations about a nominal circle.
 #[derive(Clone, Debug)]
 pub struct Polar {
-    /// The axis whose angle is shown.
-    pub axis: String,
-    /// What is magnified: `deviation`, `residual`.
-    pub quantity: &'static str,
+    /// The angle.
+    pub angle: Quantity,
+    /// What is magnified.
+    pub deviation: Quantity,
     /// Scale, µm per division.
     pub division_um: f64,
-    /// Traversals.
-    pub traversals: Vec<Traversal>,
+    /// Traversals: angle (°) and deviation (µm).
+    pub series: Vec<Series>,
     /// Index of the test and data column of the readings behind it.
     pub live: (usize, &'static str),
 }
@@ -46,14 +36,14 @@ pub struct Polar {
 /// Several deviations about nominal circles at one scale.
 #[derive(Clone, Debug)]
 pub struct Panels {
-    /// The axis whose angle is shown.
-    pub axis: String,
-    /// What is magnified: `deviation`.
-    pub quantity: &'static str,
+    /// The angle.
+    pub angle: Quantity,
+    /// What is magnified.
+    pub deviation: Quantity,
     /// Scale, µm per division.
     pub division_um: f64,
-    /// Panels: cause, its size, and angle (°) and deviation (µm).
-    pub panels: Vec<(String, &'static str, Vec<(f64, f64)>)>,
+    /// One panel each, with its label: angle (°) and deviation (µm).
+    pub series: Vec<Series>,
 }
 
 /// The scale, µm per division, at which all values lie within the circles.
@@ -96,7 +86,7 @@ impl Circles {
     }
 
     /// Draws circles, spokes, traversals and symbols.
-    fn drawing(self, traversals: &[Traversal]) -> Markup {
+    fn drawing(self, series: &[Series]) -> Markup {
         let centre = self.side / 2.0;
         html! {
             @for k in (-4..=4).filter(|k| *k != 0) {
@@ -112,16 +102,16 @@ impl Circles {
                 }
             }
             circle class="nominal" cx=(centre) cy=(centre) r=(coordinate(self.nominal())) {}
-            @for traversal in traversals {
-                @let path = joined_along_arcs(&traversal.points).into_iter().map(|point| self.point(point));
-                path class=(format!("run {}", traversal.class)) data-run=[traversal.index] d=(polyline(path)) {}
+            @for series in series {
+                @let path = joined_along_arcs(&series.points).into_iter().map(|point| self.point(point));
+                path class=(format!("run {}", series.class)) data-run=[series.traversal()] d=(polyline(path)) {}
             }
-            @for traversal in traversals.iter().filter(|_| self.detailed) {
-                @if let (Some(first), Some(last)) = (traversal.points.first(), traversal.points.last()) {
+            @for series in series.iter().filter(|_| self.detailed) {
+                @if let (Some(first), Some(last)) = (series.points.first(), series.points.last()) {
                     @let (first, last) = (self.point(*first), self.point(*last));
-                    circle class="start" data-run=[traversal.index] cx=(coordinate(first.0)) cy=(coordinate(first.1))
+                    circle class="start" data-run=[series.traversal()] cx=(coordinate(first.0)) cy=(coordinate(first.1))
                         r="4" {}
-                    rect class="end" data-run=[traversal.index] x=(coordinate(last.0 - 3.0))
+                    rect class="end" data-run=[series.traversal()] x=(coordinate(last.0 - 3.0))
                         y=(coordinate(last.1 - 3.0)) width="6" height="6" {}
                 }
             }
@@ -155,20 +145,15 @@ fn label_class(spoke: i32) -> &'static str {
 impl Kind for Polar {
     fn drawing(&self) -> Drawing {
         let circles = Circles { side: SIDE, detailed: true, division_um: self.division_um };
-        let runs = [("forward", "forward"), ("backward", "backward"), ("plain", "readings")];
-        let is_there = |class: &str| self.traversals.iter().any(|traversal| traversal.class == class);
-        let entries: Vec<(&str, String)> = runs
-            .into_iter()
-            .filter(|(class, _)| is_there(class))
-            .chain([("nominal", "nominal"), ("key-start", "start"), ("key-end", "end")])
-            .map(|(class, label)| (class, label.to_string()))
-            .collect();
+        let mut entries = lines::entries(&self.series);
+        let symbols = [("nominal", "nominal"), ("key-start", "start"), ("key-end", "end")];
+        entries.extend(symbols.map(|(class, label)| (class.to_string(), label.to_string())));
         let (keys, bottom) = legend(&entries, 10.0, SIDE + 32.0, SIDE - 20.0);
         let um = self.division_um;
         let inner = html! {
-            (circles.drawing(&self.traversals))
+            (circles.drawing(&self.series))
             text x="10" y=(SIDE + 12.0) {
-                tspan class="division" { (text(um, um)) } " µm per division; angle of " (self.axis)
+                tspan class="division" { (text(um, um)) } " µm per division; angle of " (self.angle.name)
             }
             (keys)
         };
@@ -179,24 +164,9 @@ impl Kind for Polar {
         Drawing { size: [SIDE, bottom + 10.0], inner, interaction: Some(interaction.to_string()) }
     }
 
-    /// One row per point.
     fn table(&self) -> Table {
-        let rows = self.traversals.iter().enumerate().flat_map(|(number, traversal)| {
-            let point = move |(angle, um): &(f64, f64)| {
-                cells![traversal.class, (number + 1).to_string(), Cell::exact(*angle), Cell::exact(*um)]
-            };
-            traversal.points.iter().map(point)
-        });
-        Table::new([words("direction"), numbers("traversal"), angle(&self.axis), micrometres(self.quantity)], rows)
+        lines::table(&self.series, &self.angle, &self.deviation)
     }
-}
-
-fn angle(axis: &str) -> Column {
-    numbers(Quantity::new(axis, "deg").heading())
-}
-
-fn micrometres(quantity: &str) -> Column {
-    numbers(Quantity::new(quantity, "um").heading())
 }
 
 impl Kind for Panels {
@@ -205,23 +175,19 @@ impl Kind for Panels {
         let circles = Circles { side, detailed: false, division_um: self.division_um };
         let row_height = side + 22.0;
         let inner = html! {
-            @for (number, (cause, size, points)) in self.panels.iter().enumerate() {
+            @for (number, series) in self.series.iter().enumerate() {
                 @let (x, y) = ((number % PER_ROW) as f64 * side, (number / PER_ROW) as f64 * row_height);
                 g transform=(format!("translate({x} {y})")) {
-                    (circles.drawing(&[Traversal { class: "forward", index: None, points: points.clone() }]))
-                    text class="middle" x=(side / 2.0) y=(side + 8.0) { (shortened(cause, 18)) " = " (size) }
+                    (circles.drawing(std::slice::from_ref(series)))
+                    text class="middle" x=(side / 2.0) y=(side + 8.0) { (shortened(&series.label, 26)) }
                 }
             }
         };
-        let rows = self.panels.len().div_ceil(PER_ROW).max(1);
+        let rows = self.series.len().div_ceil(PER_ROW).max(1);
         Drawing::new([WIDTH, row_height * rows as f64 + 6.0], inner)
     }
 
-    /// One row per point.
     fn table(&self) -> Table {
-        let rows = self.panels.iter().flat_map(|(cause, size, points)| {
-            points.iter().map(move |(angle, um)| cells![cause, *size, Cell::exact(*angle), Cell::exact(*um)])
-        });
-        Table::new([words("cause"), words("size"), angle(&self.axis), micrometres(self.quantity)], rows)
+        lines::table(&self.series, &self.angle, &self.deviation)
     }
 }

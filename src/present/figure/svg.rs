@@ -39,7 +39,7 @@ pub fn element(figure: &Figure) -> (f64, Markup) {
         figure class=[(width >= WIDTH).then_some("wide")] style=(format!("--width:{width}")) {
             figcaption { b { (figure.title) } " " (figure.caption) }
             svg xmlns="http://www.w3.org/2000/svg" class="plot" viewBox=(format!("0 0 {width} {height}"))
-                role="img" aria-label=(figure.title) data-interaction=[interaction] {
+                role="img" aria-label=(figure.alternative()) data-interaction=[interaction] {
                 (inner)
             }
         }

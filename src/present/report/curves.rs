@@ -244,17 +244,17 @@ fn polar_sensitivities(test: &TestSensitivities, columns: &[Sensitivity], um: f6
     let panel = |column: &Sensitivity| {
         let (amount, label) = amount(&column.unit)?;
         let points = test.way.values.iter().zip(&column.values).map(|(angle, value)| (*angle, value * amount));
-        Some((column.id.clone(), label, points.collect()))
+        Some(Series::new(format!("{} = {label}", column.id), "forward", Mark::Line, points.collect()))
     };
     Figure::new(
         format!("patterns-{}", test.test),
         format!("{}: deviation caused by single errors", test.test),
         format!("{} µm per division, first order. Errors without influence on the test are omitted.", text(um, um)),
         Chart::Panels(Panels {
-            axis: test.way.name.clone(),
-            quantity: "deviation",
+            angle: Quantity::new(&test.way.name, "deg"),
+            deviation: Quantity::new("deviation", "um"),
             division_um: um,
-            panels: columns.iter().filter_map(panel).collect(),
+            series: columns.iter().filter_map(panel).collect(),
         }),
     )
 }

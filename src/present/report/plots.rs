@@ -6,9 +6,9 @@ use abbe::identify::series::{SessionSeries, TestSeries, is_round, lengths};
 use super::abscissae::{PlotAxis, axes_of};
 use super::decimate;
 use crate::present::figure::lines::{Axis, Lines, Live, Mark, Series};
-use crate::present::figure::polar::{DIVISIONS, Polar, Traversal, division_um};
+use crate::present::figure::polar::{DIVISIONS, Polar, division_um};
 use crate::present::figure::scale::{Scale, round_up, span};
-use crate::present::figure::{Chart, Figure};
+use crate::present::figure::{Chart, Figure, Quantity};
 
 /// Intervals of a traversal in which the minimum and the maximum are kept.
 const TRAVERSAL_INTERVALS: usize = 360;
@@ -146,18 +146,20 @@ impl<'d> SessionPlots<'d> {
     fn polar(&self, number: usize, column: Column, name: &str, title: String, um: Option<f64>) -> Figure {
         let test = &self.series.tests[number];
         let values = column.of(test);
-        let traversals = test.stretches.iter().enumerate().map(|(k, stretch)| Traversal {
-            class: class_of(stretch.forward),
-            index: Some(k),
-            points: self.points(number, k, &test.way.values, values),
+        let series = test.stretches.iter().enumerate().map(|(k, stretch)| {
+            let class = class_of(stretch.forward);
+            let label = if stretch.forward.is_some() { class } else { "readings" };
+            let points = self.points(number, k, &test.way.values, values);
+            Series { source: Some((k, column.name())), ..Series::new(label, class, Mark::Line, points) }
         });
-        let traversals: Vec<Traversal> = traversals.collect();
-        let drawn_um = traversals.iter().flat_map(|traversal| &traversal.points).map(|(_, um)| *um);
+        let series: Vec<Series> = series.collect();
+        let drawn_um = series.iter().flat_map(|series| &series.points).map(|(_, um)| *um);
+        let quantity = if column == Column::Deviation { "deviation" } else { "residual" };
         let polar = Polar {
-            axis: test.way.name.clone(),
-            quantity: if column == Column::Deviation { "deviation" } else { "residual" },
+            angle: Quantity::new(&test.way.name, "deg"),
+            deviation: Quantity::new(quantity, "um"),
             division_um: um.unwrap_or_else(|| division_um(drawn_um)),
-            traversals,
+            series,
             live: (number, column.name()),
         };
         let name = format!("{name}-{}", test.name);
