@@ -153,7 +153,7 @@ pub fn legend<S: AsRef<str>>(entries: &[(S, String)], x: f64, y: f64, width: f64
             @if class.starts_with("key-") {
                 (key(class, *left + 9.0, *baseline - 4.0))
             } @else if class.contains("dots") {
-                path class=(class) d=(scale::dots([(left + 2.0, baseline - 4.0), (left + 9.0, baseline - 4.0), (left + 16.0, baseline - 4.0)])) {}
+                path class=(class) d=(scale::dots([2.0, 9.0, 16.0].map(|x| (left + x, baseline - 4.0)))) {}
             } @else {
                 path class=(class) d=(format!("M{left} {}h18", baseline - 4.0)) {}
             }

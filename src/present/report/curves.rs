@@ -213,13 +213,10 @@ fn pose_sensitivities(found: &[Sensitivity]) -> Vec<Figure> {
             rows.sort_by(|a, b| b.1.total_cmp(&a.1));
             let omitted = rows.len().saturating_sub(MAX);
             rows.truncate(MAX);
-            let caption = match omitted {
-                0 => "RMS over all poses of the displacement of a reading per unit of the error.".to_string(),
-                omitted => format!(
-                    "RMS over all poses of the displacement of a reading per unit of the error. {} with smaller sensitivity omitted.",
-                    counted(omitted, "error")
-                ),
-            };
+            let mut caption = "RMS over all poses of the displacement of a reading per unit of the error.".to_string();
+            if omitted > 0 {
+                caption.push_str(&format!(" {} with smaller sensitivity omitted.", counted(omitted, "error")));
+            }
             let quantity = Quantity::new("", format!("um per {name}"));
             Figure::new(
                 format!("sensitivity-{}", name.replace('/', "-per-")),
