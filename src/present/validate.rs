@@ -10,17 +10,18 @@ use super::table::{Cell, Table, cells};
 
 /// The verdict in a sentence.
 pub fn sentence(result: &ValidationResult) -> String {
-    let moved = match result.moved.len() {
-        0 => String::new(),
-        count => format!("; {} moved", counted(count, "parameter")),
+    let cause = match result.moved.len() {
+        0 => "the residual is larger than predicted".to_string(),
+        1 => "1 parameter has moved".to_string(),
+        count => format!("{} have moved", counted(count, "parameter")),
     };
     match result.verdict.as_str() {
         "holds" => "the model predicts the readings within noise and its uncertainty".to_string(),
         "holds-in-range" => {
             "the model predicts the readings inside the range of its data, not those outside it".to_string()
         }
-        "degraded" => format!("the residual is larger than predicted, but smaller than without the model{moved}"),
-        _ => format!("the model is no better than the machine without its effects{moved}"),
+        "degraded" => format!("{cause}; the model is still better than the location errors alone"),
+        _ => format!("{cause}, and the model is no better than the location errors alone"),
     }
 }
 
@@ -47,13 +48,16 @@ pub fn readings(result: &ValidationResult) -> String {
 pub fn residuals(result: &ValidationResult) -> Table {
     let length = |rms: &RmsResult| rms.rms_3d_um.map_or("–".to_string(), micrometres);
     let percent = |share: f64| format!("{:.1} %", 100.0 * share);
-    let row = |name: &str, rms: &RmsResult| cells![name, micrometres(rms.rms_um), length(rms), "–", "–", "–"];
+    let row = |name: &str, rms: &RmsResult| {
+        cells![name, micrometres(rms.rms_um), length(rms), Cell::fixed(rms.noise_ratio, 3), "–", "–", "–"]
+    };
     let model = &result.model;
     let predicted = |rms: &RmsResult, predicted_um: f64, ratio: f64, coverage: f64, name: &str| {
         cells![
             name,
             micrometres(rms.rms_um),
             length(rms),
+            Cell::fixed(rms.noise_ratio, 3),
             micrometres(predicted_um),
             Cell::fixed(ratio, 3),
             percent(coverage)
@@ -70,7 +74,12 @@ pub fn residuals(result: &ValidationResult) -> Table {
     }));
     let three = model.rms.rms_3d_um.is_some();
     let mut table =
-        Table::new(["machine", ">rms", ">3-vector", ">predicted rms", ">found/predicted", ">in 95 %"], rows);
+        Table::new(["machine", ">rms", ">3-vector", ">of noise", ">predicted rms", ">of predicted", ">in 95 %"], rows);
+    table.notes.push(
+        "of noise: √(χ²/ν) of the residual over the noise and of the set-up over its priors. of predicted: the same with \
+         the uncertainty of the model."
+            .into(),
+    );
     if !three {
         table.columns.remove(2);
         table.rows.iter_mut().for_each(|row| drop(row.remove(2)));

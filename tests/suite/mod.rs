@@ -59,6 +59,7 @@ mod tour;
 mod trace;
 mod trace_reported;
 mod unknowns;
+mod validate_command;
 mod volumetric;
 
 use std::path::{Path, PathBuf};

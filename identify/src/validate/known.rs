@@ -27,6 +27,8 @@ pub(super) struct Rms {
     pub scalar_mm: f64,
     /// Number of coordinates of a reading.
     pub coordinates: usize,
+    /// `√(χ²/ν)` of the whitened residual and of the set-up about its priors.
+    pub noise_ratio: f64,
 }
 
 /// A session whose errors of the machine are known and whose set-up is estimated.
@@ -182,6 +184,15 @@ impl<'m> KnownErrors<'m> {
             }
             beta = minimum(&problem, None)?.beta;
         }
+        if self.model.noise.source == NoiseSource::Residual {
+            // The model's own residual contains what the model lacks, and so does the residual here.
+            let lacking = self.model.quality.heldout_rms_mm;
+            if problem.noise.sigma_mm < lacking {
+                problem.noise = Noise::white(lacking, NoiseSource::Residual);
+                self.noise_source = "model";
+                beta = minimum(&problem, None)?.beta;
+            }
+        }
         self.set_up.noise = problem.noise.clone();
         self.set_up.rejected.clone_from(&problem.rejected);
         self.full.noise = problem.noise;
@@ -202,8 +213,15 @@ impl<'m> KnownErrors<'m> {
 
     /// Rms and residuals at known errors and an estimated set-up.
     pub fn rms(&self, values: &[f64], beta: &[f64]) -> (Rms, Vec<Vec<f64>>) {
-        let residuals = self.problem(values).residuals(beta);
-        let rms = Rms { scalar_mm: rms_mm(&self.set_up, &residuals), coordinates: self.set_up.coordinates() };
+        let problem = self.problem(values);
+        let residuals = problem.residuals(beta);
+        let observations = whitened_readings(&problem) + problem.prior_rows();
+        let freedom = observations.saturating_sub(beta.len()).max(1) as f64;
+        let rms = Rms {
+            scalar_mm: rms_mm(&self.set_up, &residuals),
+            coordinates: self.set_up.coordinates(),
+            noise_ratio: (problem.sum_of_squares(beta) / freedom).sqrt(),
+        };
         (rms, residuals)
     }
 
@@ -239,7 +257,7 @@ impl<'m> KnownErrors<'m> {
         let triangle = self.full.prior_triangle(&beta).merged(&self.full.triangles(&beta)?);
         let sizes = self.full.parameters.sizes();
         let machine = triangle.eliminated(&self.columns, &sizes)?;
-        let whitened: usize = self.full.blocks().iter().map(|block| self.full.kept_rows(block).len()).sum();
+        let whitened = whitened_readings(&self.full);
         let rank = self.rank_of_set_up(&triangle, &sizes)?;
         let count = self.carried.len();
         let directions = &self.model.null_directions;
@@ -278,16 +296,24 @@ impl<'m> KnownErrors<'m> {
         Ok(estimate.collect())
     }
 
-    /// A warning if the session has no noise of its own.
+    /// A warning if the noise is not that of the session.
     pub fn noise_warning(&self) -> Option<String> {
         (self.noise_source == "model").then(|| {
             format!(
-                "the session states no noise and repeats no reading: the model's {} of {:.2} µm counts as noise",
-                if self.model.noise.source == NoiseSource::Residual { "held-out rms" } else { "noise" },
+                "the model's {} of {:.2} µm counts as noise",
+                match self.model.noise.source {
+                    NoiseSource::Residual => "held-out rms, which contains what the model lacks,",
+                    _ => "noise",
+                },
                 self.set_up.noise.sigma_mm * 1e3
             )
         })
     }
+}
+
+/// Number of scalar readings after whitening.
+fn whitened_readings(problem: &Problem) -> usize {
+    problem.blocks().iter().map(|block| problem.kept_rows(block).len()).sum()
 }
 
 /// The noise before repeats are examined, and its source.

@@ -27,7 +27,7 @@ use crate::parameters::Role;
 use known::KnownErrors;
 use prediction::Prediction;
 pub use results::ValidationResult;
-use results::{InRangeResult, ModelResult, RmsResult, WithoutResult};
+use results::{InRangeResult, RmsResult, ValidatedModel, WithoutResult};
 use verdict::{Evidence, verdict};
 
 /// A validated model: what plots and tables need beside the result.
@@ -119,7 +119,7 @@ pub fn validate(model: &IdentifiedModel, session: &Session) -> Result<Validation
     let evidence = Evidence {
         all: all.is_consistent(),
         in_range: in_range.as_ref().map(|(_, judged, _)| judged.is_consistent()),
-        better_than_reference: compared.0.scalar_mm < compared.1.scalar_mm,
+        better_than_reference: compared.0.noise_ratio < compared.1.noise_ratio,
     };
     warnings.extend(known.noise_warning());
     let prediction = &all.prediction;
@@ -133,7 +133,7 @@ pub fn validate(model: &IdentifiedModel, session: &Session) -> Result<Validation
         noise_source: known.noise_source.to_string(),
         nominal: RmsResult::of(&nominal),
         locations: RmsResult::of(&locations),
-        model: ModelResult {
+        model: ValidatedModel {
             rms: RmsResult::of(&rms),
             predicted_rms_um: prediction.rms_mm * 1e3,
             residual_ratio: prediction.ratio(),
@@ -192,3 +192,6 @@ impl Judged {
 fn is_set_up(role: Role) -> bool {
     role == Role::Setup
 }
+
+#[cfg(test)]
+mod tests;

@@ -32,40 +32,70 @@ const LEAST_SHARE: f64 = 1e-6;
 pub(super) fn moved(known: &KnownErrors<'_>, at: &Linearised) -> Result<Vec<MovedParameter>, IdentifyError> {
     let (r, c, rest) = at.machine.parts();
     let count = c.len();
+    // Parameters in units of their physical size: angles and lengths have entries of a similar magnitude.
+    let size = |i: usize| known.model.parameters[known.carried[i]].size;
+    let r = Mat::from_fn(r.nrows(), count, |i, j| r[(i, j)] * size(j));
+    let covariance = Mat::from_fn(count, count, |i, j| at.covariance[(i, j)] / (size(i) * size(j)));
     let information = r.transpose() * &r;
     let gradient = r.transpose() * Mat::from_fn(count, 1, |i, _| c[i]);
-    let v = Mat::<f64>::identity(count, count) + &information * &at.covariance;
+    let v = Mat::<f64>::identity(count, count) + &information * &covariance;
     let p = solve_square(v.as_ref(), information.as_ref());
     let y = solve_square(v.as_ref(), gradient.as_ref());
     let variance = (rest / at.freedom.saturating_sub(count).max(1) as f64).max(1.0);
     let candidates: Vec<usize> = (0..count).filter(|i| !known.model.parameters[known.carried[*i]].held).collect();
+    let is_significant = |z: f64| two_sided(z / variance.sqrt(), candidates.len()) < SIGNIFICANCE;
     let mut selected: Vec<usize> = Vec::new();
     while let Some((next, z)) = best(&p, &y, &selected, &candidates)? {
-        if two_sided(z / variance.sqrt(), candidates.len()) >= SIGNIFICANCE {
+        if !is_significant(z) {
             break;
         }
         selected.push(next);
     }
-    let inverse = inverse_at(&p, &selected)?;
-    let change = |k: usize| -> f64 { (0..selected.len()).map(|l| inverse[(k, l)] * y[(selected[l], 0)]).sum() };
+    // A change that later ones explain is withdrawn.
+    let mut changes = changes_of(&p, &y, &selected)?;
+    while let Some(k) = (0..selected.len()).min_by(|a, b| changes[*a].z().total_cmp(&changes[*b].z())) {
+        if is_significant(changes[k].z()) {
+            break;
+        }
+        selected.remove(k);
+        changes = changes_of(&p, &y, &selected)?;
+    }
     let mut moved: Vec<MovedParameter> = selected
         .iter()
-        .enumerate()
-        .map(|(k, i)| {
+        .zip(&changes)
+        .map(|(i, change)| {
             let parameter = &known.model.parameters[known.carried[*i]];
-            let display = parameter.unit.display_per_internal;
-            let (value, u) = (change(k), (inverse[(k, k)] * variance).sqrt());
+            let display = parameter.unit.display_per_internal * parameter.size;
             MovedParameter {
                 id: parameter.id.clone(),
-                value: value * display,
-                u: u * display,
+                value: change.value * display,
+                u: change.u * variance.sqrt() * display,
                 unit: parameter.unit.name.clone(),
-                p_value: two_sided(value / u, candidates.len()),
+                p_value: two_sided(change.z() / variance.sqrt(), candidates.len()),
             }
         })
         .collect();
     moved.sort_by(|a, b| (b.value / b.u).abs().total_cmp(&(a.value / a.u).abs()));
     Ok(moved)
+}
+
+/// A change in units of the physical size, and its standard uncertainty for a residual variance of 1.
+struct Change {
+    value: f64,
+    u: f64,
+}
+
+impl Change {
+    fn z(&self) -> f64 {
+        (self.value / self.u).abs()
+    }
+}
+
+/// The changes of the selected parameters, estimated together.
+fn changes_of(p: &Mat<f64>, y: &Mat<f64>, selected: &[usize]) -> Result<Vec<Change>, IdentifyError> {
+    let inverse = inverse_at(p, selected)?;
+    let value = |k: usize| -> f64 { (0..selected.len()).map(|l| inverse[(k, l)] * y[(selected[l], 0)]).sum() };
+    Ok((0..selected.len()).map(|k| Change { value: value(k), u: inverse[(k, k)].sqrt() }).collect())
 }
 
 /// The probability of a larger standard normal value by chance, in one of `count` tests.
@@ -88,14 +118,18 @@ fn best(
             information -= shares(k) * p[(*j, i)];
             gradient -= shares(k) * y[(*j, 0)];
         }
+        // Beside collinear parameters nothing of its own remains.
         let is_separable = information > LEAST_SHARE * p[(i, i)] && information > 0.0;
         is_separable.then(|| (i, gradient / information.sqrt()))
     });
     Ok(found.max_by(|(_, a), (_, b)| a.abs().total_cmp(&b.abs())))
 }
 
-/// The inverse of `P` over the selected parameters.
+/// The inverse of `P` over the selected parameters, by way of a matrix with ones on its diagonal.
 fn inverse_at(p: &Mat<f64>, selected: &[usize]) -> Result<Mat<f64>, IdentifyError> {
+    let root = |i: usize| p[(selected[i], selected[i])].sqrt();
     let part = |i: usize, j: usize| 0.5 * (p[(selected[i], selected[j])] + p[(selected[j], selected[i])]);
-    pseudo_inverse(Mat::from_fn(selected.len(), selected.len(), part).as_ref())
+    let count = selected.len();
+    let inverse = pseudo_inverse(Mat::from_fn(count, count, |i, j| part(i, j) / (root(i) * root(j))).as_ref())?;
+    Ok(Mat::from_fn(count, count, |i, j| inverse[(i, j)] / (root(i) * root(j))))
 }

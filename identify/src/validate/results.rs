@@ -21,15 +21,15 @@ pub struct ValidationResult {
     pub outliers: usize,
     /// Standard deviation of one scalar reading, µm.
     pub noise_um: f64,
-    /// Source of `noise_um`: `repeats` or `stated` by the session, or `model`: the noise of the model's readings, or
-    /// its held-out rms if they have neither.
+    /// Source of `noise_um`: `repeats` or `stated` by the session, or `model`: the noise of the model's readings where
+    /// the session has neither; the model's held-out rms where the model's readings have neither.
     pub noise_source: String,
     /// The machine without errors.
     pub nominal: RmsResult,
     /// Location errors as the model's readings give them without any effect.
     pub locations: RmsResult,
     /// The whole model.
-    pub model: ModelResult,
+    pub model: ValidatedModel,
     /// The model without each effect.
     pub without: Vec<WithoutResult>,
     /// Parameters that have changed, the most significant first: inside the range, if some readings are.
@@ -48,18 +48,22 @@ pub struct RmsResult {
     /// Length of the residual vector, µm, for instruments with three coordinates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_3d_um: Option<f64>,
+    /// `√(χ²/ν)` of the residual over the noise and of the set-up over its priors; 1 if noise alone remains. It also
+    /// shows errors of the machine that the set-up absorbs.
+    pub noise_ratio: f64,
 }
 
 impl RmsResult {
     pub(super) fn of(rms: &Rms) -> RmsResult {
         let rms_um = rms.scalar_mm * 1e3;
-        RmsResult { rms_um, rms_3d_um: (rms.coordinates == 3).then(|| rms_um * 3.0_f64.sqrt()) }
+        let rms_3d_um = (rms.coordinates == 3).then(|| rms_um * 3.0_f64.sqrt());
+        RmsResult { rms_um, rms_3d_um, noise_ratio: rms.noise_ratio }
     }
 }
 
 /// The whole model.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct ModelResult {
+pub struct ValidatedModel {
     /// Residual.
     #[serde(flatten)]
     pub rms: RmsResult,

@@ -21,7 +21,7 @@ pub(super) struct Evidence {
     pub all: bool,
     /// Whether those inside the range are; `None` if all or none are inside.
     pub in_range: Option<bool>,
-    /// Whether the rms of the model is below that of the location errors alone.
+    /// Whether residual and set-up are smaller over noise and priors than with the location errors alone.
     pub better_than_reference: bool,
 }
 
