@@ -25,6 +25,7 @@ mod kill;
 mod limits;
 mod measured;
 mod messages;
+mod model_commands;
 mod new;
 mod nist;
 mod one_answer;

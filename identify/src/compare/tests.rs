@@ -118,6 +118,7 @@ fn differences_do_not_depend_on_the_gauge() {
         compare(&[Named { name: "A".into(), model: &a }, Named { name: "B".into(), model: &b }], &options).unwrap();
     for difference in &reference.differences {
         let other = again.differences.iter().find(|other| other.id == difference.id).unwrap();
-        assert!((difference.value - other.value).abs() < 1e-6 * difference.u.max(1.0), "{difference:?} {other:?}");
+        // The null directions of the two sessions differ in second order of the errors.
+        assert!((difference.value - other.value).abs() < 1e-3 * difference.u, "{difference:?} {other:?}");
     }
 }
