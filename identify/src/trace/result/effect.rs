@@ -4,7 +4,7 @@ use abbe_model::chain::Machine;
 use abbe_model::driver::DriverSample;
 use abbe_model::effect::Effect;
 
-use super::super::prediction::Predictions;
+use super::prediction::Predictions;
 use super::{HeldOut, Moves, TraceFindings, alias_shifts};
 use crate::candidates::library::Family;
 use crate::fit::Fit;

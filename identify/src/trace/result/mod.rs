@@ -1,6 +1,7 @@
 //! Results of a finished search.
 
 mod effect;
+mod prediction;
 mod rejected;
 mod unsearched;
 mod verdict;
@@ -8,7 +9,6 @@ mod verdict;
 use abbe_model::effect::Effect;
 
 use super::alias::{self, Alias, CompetingEffect};
-use super::prediction;
 use super::remainder::Structure;
 use super::start::Start;
 use super::state::SearchState;
