@@ -86,7 +86,7 @@ fn the_right_component_predicts_a_left_out_radius_and_its_alias_does_not() {
 /// left-out radius worse.
 #[test]
 fn an_alias_that_predicts_a_left_out_radius_worse_comes_after_those_that_predict_it() {
-    let only = ["EZC~C:h2", "EAC~C:h1", "EBC~C:h1", "workpiece_ball.z~C:h2"].map(String::from).to_vec();
+    let only = ["EZC~C:h2", "EAC~C:h1", "EBC~C:h1"].map(String::from).to_vec();
     let options = TraceOptions { only, ..TraceOptions::default() };
     let result = trace(&measured(0.07), &options, &|_| true).unwrap().result;
     let [effect] = result.effects.as_slice() else { panic!("{:?}", result.effects) };
