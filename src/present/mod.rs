@@ -4,8 +4,8 @@
 //! - printers: [`terminal`], [`csv`], [`html`];
 //! - one file per result: [`fit`], [`base`], [`trace`], [`validate`], [`plan`], [`next_test`], [`method`], [`repeated`], [`self_calibration`],
 //!   [`simulation`], [`patterns`], [`volumetric`], [`compensation`];
-//! - parts of several results: [`parameters`], [`confounded`], [`circular`], [`plausibility`], [`effect`],
-//!   [`uniqueness`], [`readings`];
+//! - parts of several results: [`parameters`], [`confounded`], [`cross_validation`], [`circular`], [`plausibility`],
+//!   [`effect`], [`uniqueness`], [`readings`];
 //! - [`report`]: the pages of `--report`.
 
 pub mod base;
@@ -14,6 +14,7 @@ pub mod compare;
 pub mod compensate;
 pub mod compensation;
 pub mod confounded;
+pub mod cross_validation;
 pub mod csv;
 pub mod effect;
 pub mod export;

@@ -9,7 +9,6 @@
 
 use abbe_model::session::readings::Readings;
 
-use crate::heldout::FoldKind;
 use crate::numerics::{median, parallel, robust_deviation};
 use crate::problem::Problem;
 
@@ -27,7 +26,7 @@ const OUTLIER_ALONE: f64 = 6.0;
 /// The outliers of the problem, by test and row, from the residuals of a fit, mm.
 pub fn reject(problem: &Problem, residuals: &[Vec<f64>]) -> Vec<Vec<bool>> {
     let coordinates = problem.coordinates();
-    if problem.folds.kind == FoldKind::Poses {
+    if problem.folds.kind.is_poses() {
         let lengths: Vec<Vec<f64>> = residuals
             .iter()
             .map(|residual| {

@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 
 use super::Outlier;
+use super::cross_validation::CrossValidation;
 use super::parameter::{Covariance, NullSpace, ParameterResult, Unobservable};
 use crate::plausibility::Plausibility;
 
@@ -22,6 +23,9 @@ pub struct ModelResult {
     /// Rms length of the residual vector over held-out readings, µm, for instruments with three coordinates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub heldout_rms_3d_um: Option<f64>,
+    /// Held-out errors by what is held out.
+    #[serde(flatten)]
+    pub cross_validation: CrossValidation,
     /// Standard deviation of one scalar reading from which the uncertainties follow, µm. Where the source is
     /// `residual`, that of this model.
     pub noise_um: f64,
@@ -126,8 +130,15 @@ pub struct EffectResult {
     /// All of these explanations in words, by part of the machine:
     /// `C table: axial motion twice per turn, or tilt about X once per turn`.
     pub explanations: String,
-    /// The competing explanations, nearest first.
+    /// The competing explanations, nearest first. Those that predict left-out tests clearly worse come last.
     pub aliases: Vec<EffectName>,
+    /// Rms of the left-out tests that this effect predicts, µm, for an effect with aliases.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub left_out_test_rms_um: Option<f64>,
+    /// The same with each of `aliases` in its place, µm; `null` if the other tests do not identify the alias for all of
+    /// these tests.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub aliases_left_out_test_rms_um: Vec<Option<f64>>,
     /// The first of `separating_tests`.
     pub separated_by: Option<String>,
     /// Separation of the effect from the nearest alias that this test separates.

@@ -9,8 +9,8 @@
 //!    level and the held-out error decreases by more than the standard error of the decrease. That standard error
 //!    follows from paired differences over runs, blocks or poses.
 //! 4. All parameters are refitted together (`judge`). The result (`result`) states the held-out error before and after.
-//! 5. For each effect the trace lists its aliases ([`alias`]). It tests the residual for remaining structure
-//!    (`remainder`).
+//! 5. For each effect the trace lists its aliases ([`alias`]), in an order that left-out tests decide. It tests the
+//!    residual for remaining structure (`remainder`).
 
 pub mod alias;
 mod constants;
@@ -118,7 +118,7 @@ pub struct TraceOutcome {
     pub after_fit: Fit,
     /// The found effects.
     pub effects: Vec<Effect>,
-    /// For each found effect its aliases, nearest first.
+    /// For each found effect its aliases, nearest first. Those that predict left-out tests clearly worse come last.
     pub alias_effects: Vec<Vec<Effect>>,
     /// For each found effect the competing explanations, best first.
     pub competing_effects: Vec<Vec<alias::CompetingEffect>>,
@@ -145,7 +145,7 @@ pub fn trace(
     let (problem, fitted) = prepare(session, options.seed)?;
     let contradicted = Contradicted::of(&problem, &fitted)?;
     if contradicted.forbids_search() {
-        return Ok(contradicted.outcome_without_search(problem, fitted));
+        return contradicted.outcome_without_search(problem, fitted);
     }
     if let Some((problem_freed, fit_freed)) = &contradicted.freed {
         let mut found = with_noise_of_repeats(problem_freed.clone(), fit_freed.clone(), options, progress)?;
@@ -203,7 +203,7 @@ fn trace_with(
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<TraceOutcome, IdentifyError> {
     match trace_or_interrupted(&problem, &before_fit, pure, options, progress) {
-        Err(IdentifyError::Interrupted) => Ok(TraceOutcome::unsearched(problem, before_fit)),
+        Err(IdentifyError::Interrupted) => TraceOutcome::unsearched(problem, before_fit),
         traced => traced,
     }
 }
