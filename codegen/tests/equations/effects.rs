@@ -28,12 +28,7 @@ impl Source for Ball {
 }
 
 pub fn effect(component: &str, driver: &str, shape: Shape) -> Effect {
-    Effect {
-        component: Component::parse(component).expect("a component"),
-        driver: Driver::parse(driver),
-        shape,
-        tests: Vec::new(),
-    }
+    Effect::new(Component::parse(component).expect("a component"), Driver::parse(driver), shape)
 }
 
 fn with(effects: Vec<Effect>) -> Options {

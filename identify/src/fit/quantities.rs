@@ -79,12 +79,11 @@ mod tests {
         let session = files::session(&file, &ReadOptions::default()).unwrap();
         let (mut problem, _) = prepare(&session, 1).unwrap();
         problem
-            .add_effect(&Effect {
-                component: Component::parse("EZC").unwrap(),
-                driver: Driver::parse("C"),
-                shape: Shape::Harmonic(Harmonic { order: 3.0 }),
-                tests: Vec::new(),
-            })
+            .add_effect(&Effect::new(
+                Component::parse("EZC").unwrap(),
+                Driver::parse("C"),
+                Shape::Harmonic(Harmonic { order: 3.0 }),
+            ))
             .unwrap();
         let mut fit = fit(&problem, None).unwrap();
         let quantities = quantities(&problem, &fit.rank);

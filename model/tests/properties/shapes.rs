@@ -109,12 +109,11 @@ proptest! {
 
 #[test]
 fn an_effect_acts_in_the_tests_that_it_is_confined_to() {
-    let mut effect = Effect {
-        component: Component::parse("EZC").expect("a component"),
-        driver: Driver::parse("C"),
-        shape: Shape::Harmonic(Harmonic { order: 1.0 }),
-        tests: Vec::new(),
-    };
+    let mut effect = Effect::new(
+        Component::parse("EZC").expect("a component"),
+        Driver::parse("C"),
+        Shape::Harmonic(Harmonic { order: 1.0 }),
+    );
     assert!(effect.acts_in("one") && effect.acts_in("two"));
     effect.tests.push("one".into());
     assert!(effect.acts_in("one") && !effect.acts_in("two"));

@@ -168,12 +168,11 @@ mod tests {
         let (mut problem, _) = prepare(&session, 1).unwrap();
         let turn = 360_f64.to_radians();
         problem
-            .add_effect(&Effect {
-                component: Component::parse("EZC").unwrap(),
-                driver: Driver::parse("C"),
-                shape: Shape::Curve(Curve { from: 0.0, to: turn, intervals: 6, closed: false }),
-                tests: Vec::new(),
-            })
+            .add_effect(&Effect::new(
+                Component::parse("EZC").unwrap(),
+                Driver::parse("C"),
+                Shape::Curve(Curve { from: 0.0, to: turn, intervals: 6, closed: false }),
+            ))
             .unwrap();
         let mut fit = fit(&problem, None).unwrap();
         let number = problem.parameters.effects.len() - 1;

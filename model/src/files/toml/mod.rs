@@ -6,6 +6,7 @@ mod effect;
 mod format;
 mod machine;
 mod movement;
+mod prior;
 pub mod rewrite;
 mod shape;
 mod sockets;
