@@ -52,7 +52,7 @@ fn monte_carlo(criterion: &mut Criterion) {
     let draws = MonteCarlo { runs: 1_000, seed: 1, coverage: 0.95 };
     group.bench_function("a thousand draws of the fit of chapter 5", |bencher| {
         bencher.iter(|| {
-            let mut result = report(&problem, &found);
+            let mut result = report(&problem, &found).unwrap();
             add_monte_carlo(&problem, &found, black_box(&draws), &mut result).expect("draws");
             black_box(result)
         });

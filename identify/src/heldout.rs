@@ -1,12 +1,15 @@
 //! Cross-validation: the residual of readings that the fit did not use.
 //!
-//! A fold is one run, or a contiguous block where there are no runs, or a seeded set of independent poses. The fit of
-//! the other folds does not use the held-out fold. Let `A` be the normal matrix of all readings and `W` such that
+//! A fold is one run, or a contiguous block where there are no runs, or a block of joint space among independent poses.
+//! The fit of the other folds does not use the held-out fold. Let `A` be the normal matrix of all readings and `W` such that
 //! `WᵀAW = I`. Let `T = J·W` for the fold's rows `[J | r]`, and `y` the remaining step in these directions. The step to
 //! the fit of the other folds is `W(I − TᵀT)⁻¹(y − Tᵀr)`, with a matrix no larger than the number of the fold's rows
 //! (Woodbury). If the other folds barely determine a direction, their triangular factors are merged and solved again.
 
+pub(crate) mod figures;
 pub(crate) mod folds;
+mod joint_space;
+pub(crate) mod left_out_test;
 pub(crate) mod paired;
 
 use faer::Mat;
@@ -66,6 +69,13 @@ pub fn held_out(
         }
     });
     let steps: Vec<Vec<f64>> = steps.into_iter().collect::<Result<_, IdentifyError>>()?;
+    let residuals = predicted(problem, beta, &steps)?;
+    Ok(HeldOut { rms_mm: rms_mm(problem, &residuals), residuals })
+}
+
+/// The residuals of every test, mm, outliers included: each fold under the model linearised at `beta`, after the fold's
+/// step.
+fn predicted(problem: &Problem, beta: &[f64], steps: &[Vec<f64>]) -> Result<Vec<Vec<f64>>, IdentifyError> {
     let values = problem.slot_values(beta);
     let coordinates = problem.coordinates();
     let mut residuals: Vec<Vec<f64>> = vec![Vec::new(); problem.models.len()];
@@ -87,7 +97,7 @@ pub fn held_out(
     for (block, residual) in blocks.iter().zip(predicted) {
         residuals[block.test].extend(residual?.iter());
     }
-    Ok(HeldOut { rms_mm: rms_mm(problem, &residuals), residuals })
+    Ok(residuals)
 }
 
 /// The identifiable directions, scaled so that the normal matrix of all readings is the identity.

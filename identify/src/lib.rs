@@ -33,7 +33,7 @@
 //! let session = files::session(&file, &ReadOptions::default())?;
 //!
 //! let (problem, found) = fit::prepare(&session, 1)?;
-//! let declared = fit::report(&problem, &found);
+//! let declared = fit::report(&problem, &found)?;
 //! assert!((declared.rms_um - 0.548).abs() < 0.001);
 //!
 //! let options = TraceOptions { only: vec!["EZC".into()], draws: 99, ..TraceOptions::default() };

@@ -115,6 +115,21 @@ impl Problem {
             self.parameters.contributions.iter().map(|contributions| TestParameters::of(contributions)).collect();
     }
 
+    /// The same problem with one fold for each test.
+    pub(crate) fn folded_by_test(&self) -> Problem {
+        self.with_folds(Folds::by_test(&self.models))
+    }
+
+    /// The same problem with other folds.
+    pub(crate) fn with_folds(&self, folds: Folds) -> Problem {
+        Problem { folds, ..self.clone() }
+    }
+
+    /// Number of scalar readings of a test that are not excluded.
+    pub(crate) fn scalars_of(&self, test: usize) -> usize {
+        self.rejected[test].iter().filter(|rejected| !**rejected).count() * self.coordinates()
+    }
+
     /// Number of readings that are not excluded.
     pub fn readings(&self) -> usize {
         self.rejected.iter().flatten().filter(|rejected| !**rejected).count()

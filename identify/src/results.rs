@@ -1,5 +1,6 @@
 //! What `fit` and `trace` report, as JSON has it. Units stand in the names, or beside the value.
 
+mod cross_validation;
 mod monte_carlo;
 mod parameter;
 mod trace;
@@ -11,6 +12,7 @@ use serde::Serialize;
 
 use crate::circular::CircularTest;
 use crate::plausibility::Plausibility;
+pub use cross_validation::{CrossValidation, TestNotLeftOut};
 pub use monte_carlo::{DrawnParameter, FitMonteCarlo, Verdict};
 pub(crate) use parameter::phases_follow_amplitudes;
 pub use parameter::{Combination, Covariance, Interval, NullSpace, ParameterResult, Unobservable};
@@ -46,7 +48,7 @@ pub struct FitResult {
     pub readings: usize,
     /// Rms of the residual over scalar readings, µm.
     pub rms_um: f64,
-    /// Rms of the residual over held-out scalar readings (cross-validation), µm.
+    /// Rms of the residual over held-out scalar readings (cross-validation), µm. `heldout_by` states what is held out.
     pub heldout_rms_um: f64,
     /// Rms length of the residual vector, µm, for instruments with three coordinates.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -56,6 +58,9 @@ pub struct FitResult {
     pub heldout_rms_3d_um: Option<f64>,
     /// What each fold of the cross-validation holds out.
     pub heldout_by: String,
+    /// Held-out errors by what is held out.
+    #[serde(flatten)]
+    pub cross_validation: CrossValidation,
     /// Numerical rank: number of independent combinations of the parameters that are identifiable.
     pub rank: usize,
     /// Number of parameters, set-up parameters included.

@@ -156,7 +156,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.residuals {
         output::write_whole(path, &output::csv(&readings::residuals(&problem, &fit))?)?;
     }
-    let mut result = abbe::identify::fit::report(&problem, &fit);
+    let mut result = abbe::identify::fit::report(&problem, &fit)?;
     if let Some(draws) = &draws {
         abbe::identify::propagation::add_monte_carlo(&problem, &fit, draws, &mut result)?;
     }

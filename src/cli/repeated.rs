@@ -32,7 +32,7 @@ pub fn run(
             origin.add(Origin::of_session(&sources)?);
         }
         let (problem, fit) = abbe::identify::fit::prepare(&session, common.seed)?;
-        let report = abbe::identify::fit::report(&problem, &fit);
+        let report = abbe::identify::fit::report(&problem, &fit)?;
         let named: Vec<String> =
             report.warnings.iter().map(|warning| format!("{}: {warning}", path.display())).collect();
         message::print_warnings(&named);

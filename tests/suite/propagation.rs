@@ -29,7 +29,7 @@ fn measured(plan: &Session, simulation: &Simulation) -> (Session, Vec<(String, f
 
 fn drawn(session: &Session, runs: u64, seed: u64) -> FitMonteCarlo {
     let (problem, fit) = prepare(session, 1).unwrap();
-    let mut result = report(&problem, &fit);
+    let mut result = report(&problem, &fit).unwrap();
     let draws = MonteCarlo { runs, seed, coverage: 0.95 };
     add_monte_carlo(&problem, &fit, &draws, &mut result).unwrap();
     let drawn = result.monte_carlo.unwrap();

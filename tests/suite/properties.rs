@@ -132,7 +132,7 @@ fn test(number: usize, station: Station<f64>, readings: Readings, axes: usize) -
 /// The result of a fit, in display units, without the outlier test.
 fn fitted(session: &Session) -> FitResult {
     let (problem, fit) = prepare(session, 1).unwrap();
-    let result = report(&problem, &fit);
+    let result = report(&problem, &fit).unwrap();
     assert!(result.outliers.is_empty());
     result
 }

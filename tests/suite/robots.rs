@@ -19,7 +19,7 @@ pub fn session_on_public_data(test: &str, name: &str, path: &str) -> Option<Sess
 
 fn fitted(session: &Session) -> FitResult {
     let (problem, fit) = prepare(session, 1).unwrap();
-    report(&problem, &fit)
+    report(&problem, &fit).unwrap()
 }
 
 #[test]

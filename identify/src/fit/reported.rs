@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use super::quantities::{Quantity, quantities};
 use super::{Fit, covariance, enlargement_warning};
 use crate::circular;
+use crate::error::IdentifyError;
+use crate::heldout::figures::cross_validation;
 use crate::heldout::{mislabelled_runs, rms_mm};
 use crate::noise;
 use crate::numerics::rank::Rank;
@@ -14,7 +16,10 @@ use crate::problem::Problem;
 use crate::results::{FitResult, Outlier, ParameterResult, Unobservable, phases_follow_amplitudes};
 
 /// The fit in its reported form.
-pub fn report(problem: &Problem, fit: &Fit) -> FitResult {
+///
+/// # Errors
+/// If the model cannot be evaluated for the cross-validation.
+pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> {
     let three = problem.coordinates() == 3;
     let rms = rms_mm(problem, &fit.residuals);
     let held = fit.held_out.rms_mm;
@@ -26,7 +31,7 @@ pub fn report(problem: &Problem, fit: &Fit) -> FitResult {
     warnings.extend(mislabelled_runs(&problem.tests));
     warnings.extend(enlargement_warning(fit.u_enlargement));
     let parameters = parameters(problem, fit);
-    FitResult {
+    Ok(FitResult {
         noise_um: problem.noise.sigma_mm * 1e3,
         noise_source: problem.noise.source.word().to_string(),
         noise_ar_coefficients: problem.noise.ar_coefficients.clone(),
@@ -36,6 +41,7 @@ pub fn report(problem: &Problem, fit: &Fit) -> FitResult {
         rms_3d_um: in_3d(rms),
         heldout_rms_3d_um: in_3d(held),
         heldout_by: problem.folds.kind.words().to_string(),
+        cross_validation: cross_validation(problem, fit, held, problem)?,
         rank: fit.rank.identifiable_basis.ncols(),
         parameter_count: fit.beta.len(),
         chi_square: fit.chi_square,
@@ -53,7 +59,7 @@ pub fn report(problem: &Problem, fit: &Fit) -> FitResult {
         warnings,
         about: problem.session.about.iter().cloned().collect(),
         monte_carlo: None,
-    }
+    })
 }
 
 /// The identifiable parameters, in display units. A harmonic has amplitude and phase of

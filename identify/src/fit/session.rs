@@ -25,7 +25,7 @@ impl SessionFit {
     /// If the session has no readings, or the iterations do not converge.
     pub fn of(session: &Session, seed: u64) -> Result<SessionFit, IdentifyError> {
         let (problem, fit) = prepare(session, seed)?;
-        let result = report(&problem, &fit);
+        let result = report(&problem, &fit)?;
         Ok(SessionFit { problem, fit, result })
     }
 

@@ -1,10 +1,18 @@
 //! The folds of cross-validation: runs, groups of runs, blocks, or sets of poses.
+//!
+//! Independent poses have two sets of folds. Blocks of joint space ([`super::joint_space`]) test whether the model
+//! predicts poses outside the range of those that it was fitted to. They decide. Random folds test interpolation.
 
 use std::collections::BTreeSet;
 
+use abbe_model::chain::Machine;
+use abbe_model::sensitivity::TestModel;
+use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
+
+use super::joint_space;
 
 /// The kind of folds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,8 +23,11 @@ pub enum FoldKind {
     RunGroups,
     /// Five contiguous blocks of each test.
     Blocks,
-    /// Ten seeded folds of poses.
-    Poses,
+    /// Ten blocks of joint space, or fewer if there are few poses.
+    PoseBlocks,
+    /// Ten seeded random folds of poses. They decide only if all poses have the same axis positions, or if there are
+    /// too few for blocks.
+    RandomPoses,
 }
 
 impl FoldKind {
@@ -26,8 +37,14 @@ impl FoldKind {
             FoldKind::Runs => "one run at a time",
             FoldKind::RunGroups => "one group of consecutive runs of a test at a time",
             FoldKind::Blocks => "one of five contiguous blocks of each test at a time",
-            FoldKind::Poses => "one of ten seeded folds of poses at a time",
+            FoldKind::PoseBlocks => "one block of joint space at a time",
+            FoldKind::RandomPoses => "one random fold of poses at a time",
         }
+    }
+
+    /// Whether the readings are independent poses.
+    pub fn is_poses(self) -> bool {
+        matches!(self, FoldKind::PoseBlocks | FoldKind::RandomPoses)
     }
 }
 
@@ -40,10 +57,13 @@ pub struct Folds {
     pub count: usize,
     /// The fold of each row of each test.
     pub of_row: Vec<Vec<usize>>,
+    /// For blocks of joint space, the random folds that test interpolation.
+    pub interpolation: Option<Box<Folds>>,
 }
 
 const BLOCKS_PER_TEST: usize = 5;
-const FOLDS_OF_POSES: usize = 10;
+/// Number of random folds of poses.
+const RANDOM_FOLDS: usize = 10;
 /// Maximum number of folds of single runs. More folds cost time without better estimates. If the run column changes at
 /// every reading, each reading would be a fold.
 const MAX_FOLDS_OF_RUNS: usize = 64;
@@ -53,27 +73,10 @@ const FOLDS_OF_MANY_RUNS: usize = 32;
 impl Folds {
     /// The folds of a session.
     pub fn of(session: &Session, tests: &[Test], seed: u64) -> Folds {
-        let readings: Vec<_> = tests.iter().filter_map(|test| test.readings.as_ref()).collect();
+        let readings: Vec<&Readings> = tests.iter().filter_map(|test| test.readings.as_deref()).collect();
         let poses = !session.instrument.is_two_sided() && readings.iter().all(|r| r.run.is_empty());
         if poses {
-            let total: usize = readings.iter().map(|r| r.rows()).sum();
-            let folds = FOLDS_OF_POSES.min(total.max(1));
-            let mut order: Vec<usize> = (0..total).collect();
-            order.shuffle(&mut rand_pcg::Pcg64::seed_from_u64(seed));
-            let mut fold_of = vec![0; total];
-            for (place, row) in order.into_iter().enumerate() {
-                fold_of[row] = place % folds;
-            }
-            let mut start = 0;
-            let of_row = readings
-                .iter()
-                .map(|r| {
-                    let rows = fold_of[start..start + r.rows()].to_vec();
-                    start += r.rows();
-                    rows
-                })
-                .collect();
-            return Folds { kind: FoldKind::Poses, count: folds, of_row };
+            return Folds::of_poses(&session.machine, &readings, seed);
         }
         let runs: Vec<_> = readings.iter().map(|r| r.runs()).collect();
         let kind = if runs.iter().any(|runs| runs.len() < 2) {
@@ -109,7 +112,49 @@ impl Folds {
                 rows
             })
             .collect();
-        Folds { kind, count, of_row }
+        Folds { kind, count, of_row, interpolation: None }
+    }
+
+    /// One fold for each test.
+    pub(crate) fn by_test(models: &[TestModel]) -> Folds {
+        Folds {
+            kind: FoldKind::Runs,
+            count: models.len(),
+            of_row: models.iter().enumerate().map(|(test, model)| vec![test; model.rows()]).collect(),
+            interpolation: None,
+        }
+    }
+
+    /// The folds of independent poses.
+    fn of_poses(machine: &Machine, readings: &[&Readings], seed: u64) -> Folds {
+        let total: usize = readings.iter().map(|r| r.rows()).sum();
+        let mut order: Vec<usize> = (0..total).collect();
+        order.shuffle(&mut rand_pcg::Pcg64::seed_from_u64(seed));
+        let mut fold_of = vec![0; total];
+        for (place, row) in order.into_iter().enumerate() {
+            fold_of[row] = place % RANDOM_FOLDS;
+        }
+        let random = Folds::over_tests(FoldKind::RandomPoses, readings, &fold_of);
+        match joint_space::blocks(machine, readings, seed) {
+            Some(blocks) => Folds {
+                interpolation: Some(Box::new(random)),
+                ..Folds::over_tests(FoldKind::PoseBlocks, readings, &blocks)
+            },
+            None => random,
+        }
+    }
+
+    /// The folds of the rows of all tests, one test after the other.
+    fn over_tests(kind: FoldKind, readings: &[&Readings], fold_of: &[usize]) -> Folds {
+        let mut rest = fold_of;
+        let of_test = |r: &&Readings| {
+            let (rows, others) = rest.split_at(r.rows());
+            rest = others;
+            rows.to_vec()
+        };
+        let of_row = readings.iter().map(of_test).collect();
+        let count = fold_of.iter().max().map_or(1, |last| last + 1);
+        Folds { kind, count, of_row, interpolation: None }
     }
 }
 

@@ -10,7 +10,6 @@
 use abbe_model::session::readings::Readings;
 
 use crate::fit::Fit;
-use crate::heldout::FoldKind;
 use crate::numerics::{median, parallel, robust_deviation};
 use crate::problem::Problem;
 
@@ -28,7 +27,7 @@ const OUTLIER_ALONE: f64 = 6.0;
 /// The outliers of the problem, by test and row.
 pub fn reject(problem: &Problem, fit: &Fit) -> Vec<Vec<bool>> {
     let coordinates = problem.coordinates();
-    if problem.folds.kind == FoldKind::Poses {
+    if problem.folds.kind.is_poses() {
         let lengths: Vec<Vec<f64>> = fit
             .residuals
             .iter()

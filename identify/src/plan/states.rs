@@ -7,7 +7,7 @@ use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test, motion, planned};
 
 use crate::error::IdentifyError;
-use crate::heldout::{FoldKind, Folds};
+use crate::heldout::Folds;
 use crate::noise::{Noise, NoiseSource};
 use crate::problem::Problem;
 
@@ -60,11 +60,7 @@ pub fn problem_by_test(session: &Session, noise: Noise) -> Result<Problem, Ident
 
 /// Makes the folds of a problem its tests.
 pub fn fold_by_test(problem: &mut Problem) {
-    problem.folds = Folds {
-        kind: FoldKind::Runs,
-        count: problem.models.len(),
-        of_row: problem.models.iter().enumerate().map(|(test, model)| vec![test; model.rows()]).collect(),
-    };
+    problem.folds = Folds::by_test(&problem.models);
 }
 
 /// Assumed noise of a reading if neither the session nor its data determine it: 1 µm, the accuracy that makers of ball

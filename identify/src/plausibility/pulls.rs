@@ -156,7 +156,7 @@ fn excess(problem: &Problem, fit: &Fit) -> f64 {
     let free = (0..problem.parameters.list.len()).filter(|j| problem.parameters.list[*j].prior == Prior::Free);
     let freedom = count.saturating_sub(free.count()).max(1) as f64;
     let ratio = (squares / freedom / problem.noise.sigma_mm.powi(2)).max(1.0);
-    let poses = problem.folds.kind == crate::heldout::FoldKind::Poses;
+    let poses = problem.folds.kind.is_poses();
     if poses || !problem.noise.ar_coefficients.is_empty() {
         return ratio;
     }

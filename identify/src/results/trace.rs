@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 
 use super::Outlier;
+use super::cross_validation::CrossValidation;
 use super::parameter::{Covariance, NullSpace, ParameterResult, Unobservable};
 use crate::plausibility::Plausibility;
 
@@ -22,6 +23,9 @@ pub struct ModelResult {
     /// Rms length of the residual vector over held-out readings, µm, for instruments with three coordinates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub heldout_rms_3d_um: Option<f64>,
+    /// Held-out errors by what is held out.
+    #[serde(flatten)]
+    pub cross_validation: CrossValidation,
     /// Standard deviation of one scalar reading from which the uncertainties follow, µm. Where the source is
     /// `residual`, that of this model.
     pub noise_um: f64,

@@ -18,7 +18,7 @@ use abbe_model::instrument::InstrumentKind;
 
 use crate::error::IdentifyError;
 use crate::fit::Fit;
-use crate::heldout::{FoldKind, rms_mm};
+use crate::heldout::rms_mm;
 use crate::parameters::Role;
 use crate::problem::Problem;
 use abscissa::{Abscissa, PathSegment};
@@ -144,7 +144,7 @@ pub fn views(problem: &Problem, fit: &Fit, before_mm: Option<&[Vec<f64>]>) -> Re
             None => deviation_um.clone(),
         };
         let way = Abscissa::of(&problem.session.machine, readings);
-        let poses = problem.folds.kind == FoldKind::Poses;
+        let poses = problem.folds.kind.is_poses();
         tests.push(TestSeries {
             name: test.name.clone(),
             stretches: way.stretches(readings, poses),

@@ -76,7 +76,7 @@ impl Contradicted {
     }
 
     /// The trace that ends before its search.
-    pub fn outcome_without_search(&self, problem: Problem, fit: Fit) -> TraceOutcome {
+    pub fn outcome_without_search(&self, problem: Problem, fit: Fit) -> Result<TraceOutcome, IdentifyError> {
         let mut result = TraceResult {
             verdict: "unexplained".to_string(),
             remainder: Remainder {
@@ -85,9 +85,9 @@ impl Contradicted {
                 place: Some("every test: the readings contradict the session; no effect was searched for".to_string()),
             },
             residual_before: "the readings contradict the session".to_string(),
-            ..unsearched(&problem, &fit)
+            ..unsearched(&problem, &fit)?
         };
         self.add_warnings(&mut result);
-        TraceOutcome::of_declared(problem, fit, result)
+        Ok(TraceOutcome::of_declared(problem, fit, result))
     }
 }

@@ -47,10 +47,10 @@ impl TraceResult {
 
 impl TraceOutcome {
     /// A trace that was interrupted before its search began. It contains the declared model only.
-    pub(super) fn unsearched(problem: Problem, fit: Fit) -> TraceOutcome {
-        let mut result = unsearched(&problem, &fit);
+    pub(super) fn unsearched(problem: Problem, fit: Fit) -> Result<TraceOutcome, IdentifyError> {
+        let mut result = unsearched(&problem, &fit)?;
         result.mark_interrupted();
-        TraceOutcome::of_declared(problem, fit, result)
+        Ok(TraceOutcome::of_declared(problem, fit, result))
     }
 
     /// A trace that contains the declared model only, with its result.

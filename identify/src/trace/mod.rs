@@ -145,7 +145,7 @@ pub fn trace(
     let (problem, fitted) = prepare(session, options.seed)?;
     let contradicted = Contradicted::of(&problem, &fitted)?;
     if contradicted.forbids_search() {
-        return Ok(contradicted.outcome_without_search(problem, fitted));
+        return contradicted.outcome_without_search(problem, fitted);
     }
     if let Some((problem_freed, fit_freed)) = &contradicted.freed {
         let mut found = with_noise_of_repeats(problem_freed.clone(), fit_freed.clone(), options, progress)?;
@@ -203,7 +203,7 @@ fn trace_with(
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<TraceOutcome, IdentifyError> {
     match trace_or_interrupted(&problem, &before_fit, pure, options, progress) {
-        Err(IdentifyError::Interrupted) => Ok(TraceOutcome::unsearched(problem, before_fit)),
+        Err(IdentifyError::Interrupted) => TraceOutcome::unsearched(problem, before_fit),
         traced => traced,
     }
 }

@@ -1,6 +1,5 @@
 //! The policies of the search: one for readings along runs, one for independent poses.
 
-use crate::heldout::FoldKind;
 use crate::problem::Problem;
 
 /// Where the null draws come from.
@@ -89,6 +88,6 @@ const POSES: Policy = Policy {
 impl Policy {
     /// The policy for the readings of a problem.
     pub fn of(problem: &Problem) -> Policy {
-        if problem.folds.kind == FoldKind::Poses { POSES } else { RUNS }
+        if problem.folds.kind.is_poses() { POSES } else { RUNS }
     }
 }

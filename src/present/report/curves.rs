@@ -1,7 +1,6 @@
 //! Plots of derived quantities: histogram and time series of the residual, spectra, and sensitivities to single errors.
 
 use abbe::identify::IdentifyError;
-use abbe::identify::heldout::FoldKind;
 use abbe::identify::problem::Problem;
 use abbe::identify::series::lengths;
 use abbe::identify::series::sensitivities::{self as sensitivity, Sensitivity, TestSensitivities};
@@ -201,7 +200,7 @@ pub fn spectrum_plot(spectrum: &Spectrum, maximum: f64, effects: &[Effect]) -> P
 /// If the model cannot be evaluated.
 pub fn sensitivities(document: &mut Document, problem: &Problem, beta: &[f64]) -> Result<Markup, IdentifyError> {
     const DIVISION_UM: f64 = 5.0;
-    if problem.folds.kind == FoldKind::Poses {
+    if problem.folds.kind.is_poses() {
         let plots = pose_sensitivities(&sensitivity::over_poses(problem, beta)?);
         return Ok(document.show(plots));
     }

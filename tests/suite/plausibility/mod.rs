@@ -210,6 +210,6 @@ fn a_conflict_is_told_everywhere() {
 fn a_correct_session_says_nothing_of_conflicts() {
     let session = session(10.0, Mistake::None, WHITE, 900);
     let (problem, fit) = prepare(&session, 1).unwrap();
-    let json = serde_json::to_value(report(&problem, &fit)).unwrap();
+    let json = serde_json::to_value(report(&problem, &fit).unwrap()).unwrap();
     assert!(json.get("conflicts").is_none() && json.get("suggestions").is_none(), "{json:#}");
 }

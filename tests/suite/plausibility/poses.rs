@@ -34,7 +34,7 @@ fn ur10(test: &str, change: impl Fn(String) -> String) -> Option<Session> {
 }
 
 fn fitted(session: &Session) -> Result<FitResult, IdentifyError> {
-    prepare(session, 1).map(|(problem, fit)| report(&problem, &fit))
+    prepare(session, 1).map(|(problem, fit)| report(&problem, &fit).unwrap())
 }
 
 #[test]

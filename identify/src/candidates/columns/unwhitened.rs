@@ -33,19 +33,23 @@ impl Columns<'_> {
         self.blocks.iter().flat_map(|block| self.counting(block).into_iter().map(move |i| fold(block, i))).collect()
     }
 
-    /// The independent units over which held-out errors are paired: the poses if folds consist of poses, otherwise the
-    /// folds (runs or blocks), each of which belongs to one test. The rows are those of [`Columns::unwhitened_rows`].
+    /// The independent units over which held-out errors are paired. Along runs they are the folds (runs or blocks), each
+    /// of which belongs to one test. Among poses they are the blocks of joint space, because one fit predicts a whole
+    /// block, or the poses if folds are random. The rows are those of [`Columns::unwhitened_rows`].
     pub fn unwhitened_units(&self) -> Units {
         let coordinates = self.problem.coordinates();
         let rows = self.blocks.iter().flat_map(|block| {
             let reading = move |i: usize| (block.test, block.rows.start + i / coordinates);
             self.counting(block).into_iter().map(reading)
         });
-        if self.problem.folds.kind == FoldKind::Poses {
-            return Units::of(rows.map(|(test, row)| (0, (test, row))));
-        }
         let fold = |test: usize, row: usize| self.problem.folds.of_row[test][row];
-        Units::of(rows.map(|(test, row)| (test, (fold(test, row), 0)))).divided()
+        match self.problem.folds.kind {
+            FoldKind::RandomPoses => Units::of(rows.map(|(test, row)| (0, (test, row)))),
+            FoldKind::PoseBlocks => Units::of(rows.map(|(test, row)| (0, (fold(test, row), 0)))).divided(),
+            FoldKind::Runs | FoldKind::RunGroups | FoldKind::Blocks => {
+                Units::of(rows.map(|(test, row)| (test, (fold(test, row), 0)))).divided()
+            }
+        }
     }
 
     /// The scalar rows of a block whose readings are accepted.

@@ -14,6 +14,7 @@ use super::state::SearchState;
 use crate::candidates::library;
 use crate::error::IdentifyError;
 use crate::fit::{self, Fit};
+use crate::heldout::figures::cross_validation;
 use crate::heldout::{mislabelled_runs, rms_mm};
 use crate::noise;
 use crate::plausibility::Plausibility;
@@ -54,9 +55,9 @@ pub(super) struct ReportedEffect {
 /// The result, and for each effect its aliases and the best competing effects.
 pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, IdentifyError> {
     let TraceFindings { before, before_fit, after, after_fit, search, .. } = findings;
-    let before_result = before_result(findings);
+    let before_result = before_result(findings)?;
     let held_out = HeldOut::of(search, before_result.heldout_rms_um);
-    let mut after_result = model_result(after, after_fit, held_out.last_um() * 1e-3);
+    let mut after_result = model_result(after, after_fit, held_out.last_um() * 1e-3)?;
 
     let mut alias_effects: Vec<Vec<Effect>> = Vec::new();
     let mut competing_effects = Vec::new();
@@ -178,25 +179,34 @@ fn residual_variance(findings: &TraceFindings<'_>) -> f64 {
 }
 
 /// The declared model, on the readings that are not excluded after the search.
-fn before_result(findings: &TraceFindings<'_>) -> ModelResult {
+fn before_result(findings: &TraceFindings<'_>) -> Result<ModelResult, IdentifyError> {
     let (before, fit, after) = (findings.before, findings.before_fit, findings.after);
-    let result = model_result(before, fit, fit.held_out.rms_mm);
+    let result = model_result(before, fit, fit.held_out.rms_mm)?;
     if before.rejected == after.rejected {
-        return result;
+        return Ok(result);
     }
     let [rms_um, heldout_rms_um] =
         [&fit.residuals, &fit.held_out.residuals].map(|residuals| rms_mm(after, residuals) * 1e3);
     let in_3d = |rms: f64| result.rms_3d_um.map(|_| rms * 3.0_f64.sqrt());
-    ModelResult { rms_um, heldout_rms_um, rms_3d_um: in_3d(rms_um), heldout_rms_3d_um: in_3d(heldout_rms_um), ..result }
+    let cross_validation = cross_validation(before, fit, heldout_rms_um * 1e-3, after)?;
+    Ok(ModelResult {
+        rms_um,
+        heldout_rms_um,
+        rms_3d_um: in_3d(rms_um),
+        heldout_rms_3d_um: in_3d(heldout_rms_um),
+        cross_validation,
+        ..result
+    })
 }
 
-pub(super) fn model_result(problem: &Problem, fit: &Fit, held_out_mm: f64) -> ModelResult {
+pub(super) fn model_result(problem: &Problem, fit: &Fit, held_out_mm: f64) -> Result<ModelResult, IdentifyError> {
     let three = problem.coordinates() == 3;
     let rms = rms_mm(problem, &fit.residuals) * 1e3;
     let held = held_out_mm * 1e3;
     let in_3d = |rms: f64| three.then(|| rms * 3.0_f64.sqrt());
     let parameters = fit::parameters(problem, fit);
-    ModelResult {
+    Ok(ModelResult {
+        cross_validation: cross_validation(problem, fit, held_out_mm, problem)?,
         rms_um: rms,
         heldout_rms_um: held,
         rms_3d_um: in_3d(rms),
@@ -209,7 +219,7 @@ pub(super) fn model_result(problem: &Problem, fit: &Fit, held_out_mm: f64) -> Mo
         identifiable: fit::ids(&parameters),
         covariance: fit::covariance_of_parameters(problem, fit, &parameters),
         parameters,
-    }
+    })
 }
 
 /// Changes of the parameters after the search, internal units: by found effect, by alias that replaces it, by

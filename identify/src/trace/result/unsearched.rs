@@ -1,6 +1,7 @@
 //! Result of a trace without a search: that of the declared model.
 
 use super::{model_result, not_examined};
+use crate::error::IdentifyError;
 use crate::fit::{self, Fit};
 use crate::noise;
 use crate::plausibility::Plausibility;
@@ -8,12 +9,12 @@ use crate::problem::Problem;
 use crate::results::TraceResult;
 
 /// The declared model alone, without a verdict.
-pub(in crate::trace) fn unsearched(problem: &Problem, fit: &Fit) -> TraceResult {
-    let declared = model_result(problem, fit, fit.held_out.rms_mm);
+pub(in crate::trace) fn unsearched(problem: &Problem, fit: &Fit) -> Result<TraceResult, IdentifyError> {
+    let declared = model_result(problem, fit, fit.held_out.rms_mm)?;
     let remainder = not_examined();
     let mut warnings = problem.session.warnings.clone();
     warnings.extend(noise::stated_against_repeats(problem, &fit.residuals));
-    TraceResult {
+    Ok(TraceResult {
         verdict: String::new(),
         interrupted: false,
         unique: true,
@@ -37,5 +38,5 @@ pub(in crate::trace) fn unsearched(problem: &Problem, fit: &Fit) -> TraceResult 
         about: problem.session.about.iter().cloned().collect(),
         plausibility: Plausibility::default(),
         warnings,
-    }
+    })
 }

@@ -1,0 +1,182 @@
+//! Blocks of joint space: k-means of the axis positions of poses.
+//!
+//! Poses of a dense grid have neighbours in every direction. A model that holds out single poses only interpolates
+//! between them. A model that holds out a block of joint space has to predict a region that it never saw.
+//!
+//! The coordinates of a pose are `cos q` and `sin q` of each rotary axis, and `2 (q − q_mid)/range` of each linear
+//! axis. Lloyd's algorithm (S. P. Lloyd, Least squares quantization in PCM, IEEE Trans. Inf. Theory 28, 1982, 129–137)
+//! minimises the sum of squared distances to the centres. Its start is k-means++ (D. Arthur, S. Vassilvitskii,
+//! k-means++: the advantages of careful seeding, SODA 2007, 1027–1035). Of several seeded starts the best result holds.
+
+use abbe_model::axis::AxisKind;
+use abbe_model::chain::Machine;
+use abbe_model::session::readings::Readings;
+use rand::seq::index;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+/// Largest number of blocks.
+const BLOCKS: usize = 10;
+/// Least mean number of poses per block.
+const POSES_PER_BLOCK: usize = 3;
+/// Number of starts.
+const STARTS: usize = 4;
+/// Maximum number of iterations of a start.
+const MAX_ITERATIONS: usize = 100;
+/// Maximum number of poses from which the centres follow. Further poses only join the nearest centre.
+const MAX_SAMPLE: usize = 4000;
+
+/// The block of each pose, over all tests, numbered in the order of the poses. `None` if there are too few poses, or if
+/// all have the same axis positions.
+pub(super) fn blocks(machine: &Machine, readings: &[&Readings], seed: u64) -> Option<Vec<usize>> {
+    let points = coordinates(machine, readings);
+    let count = BLOCKS.min(points.len() / POSES_PER_BLOCK);
+    if count < 2 {
+        return None;
+    }
+    let mut random = Pcg64::seed_from_u64(seed);
+    let sample: Vec<&Point> = if points.len() <= MAX_SAMPLE {
+        points.iter().collect()
+    } else {
+        let mut chosen = index::sample(&mut random, points.len(), MAX_SAMPLE).into_vec();
+        chosen.sort_unstable();
+        chosen.into_iter().map(|k| &points[k]).collect()
+    };
+    let mut best: Option<(f64, Vec<Point>)> = None;
+    for _ in 0..STARTS {
+        let found = lloyd(&sample, plus_plus(&sample, count, &mut random));
+        if best.as_ref().is_none_or(|(least, _)| found.0 < *least) {
+            best = Some(found);
+        }
+    }
+    let (_, centres) = best?;
+    let blocks = numbered(points.iter().map(|point| nearest(point, &centres).0));
+    blocks.contains(&1).then_some(blocks)
+}
+
+/// The coordinates of a pose.
+type Point = Vec<f64>;
+
+/// The coordinates of every pose.
+fn coordinates(machine: &Machine, readings: &[&Readings]) -> Vec<Point> {
+    let mut points = vec![Point::new(); readings.iter().map(|r| r.rows()).sum()];
+    for (number, axis) in machine.axes.iter().enumerate() {
+        let positions = || readings.iter().flat_map(move |r| r.positions[number].iter().copied());
+        let least = positions().fold(f64::INFINITY, f64::min);
+        let most = positions().fold(f64::NEG_INFINITY, f64::max);
+        for (point, position) in points.iter_mut().zip(positions()) {
+            match axis.kind {
+                AxisKind::Rotary => point.extend([position.cos(), position.sin()]),
+                AxisKind::Linear if most > least => point.push((2.0 * position - least - most) / (most - least)),
+                AxisKind::Linear => {}
+            }
+        }
+    }
+    points
+}
+
+fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum()
+}
+
+/// The index of the nearest centre, and the squared distance to it.
+fn nearest(point: &[f64], centres: &[Point]) -> (usize, f64) {
+    let distances = centres.iter().map(|centre| squared_distance(point, centre)).enumerate();
+    distances.fold((0, f64::INFINITY), |best, next| if next.1 < best.1 { next } else { best })
+}
+
+/// Start centres: each is drawn with a probability proportional to the squared distance to the nearest centre so far.
+fn plus_plus(points: &[&Point], count: usize, random: &mut Pcg64) -> Vec<Point> {
+    let mut centres = vec![points[random.random_range(0..points.len())].clone()];
+    let mut distances = vec![f64::INFINITY; points.len()];
+    while centres.len() < count {
+        if let Some(last) = centres.last() {
+            for (distance, point) in distances.iter_mut().zip(points) {
+                *distance = distance.min(squared_distance(point, last));
+            }
+        }
+        let total: f64 = distances.iter().sum();
+        if total <= 0.0 {
+            break;
+        }
+        let mut rest = random.random_range(0.0..total);
+        let passed = distances.iter().position(|distance| {
+            rest -= distance;
+            rest < 0.0
+        });
+        let farthest = || (0..points.len()).max_by(|a, b| distances[*a].total_cmp(&distances[*b])).unwrap_or(0);
+        centres.push(points[passed.unwrap_or_else(farthest)].clone());
+    }
+    centres
+}
+
+/// Moves the centres to the means of their points until no point changes its centre. Returns the sum of squared
+/// distances and the centres.
+fn lloyd(points: &[&Point], mut centres: Vec<Point>) -> (f64, Vec<Point>) {
+    let mut of_point = Vec::new();
+    let mut sum = 0.0;
+    for _ in 0..MAX_ITERATIONS {
+        let found: Vec<(usize, f64)> = points.iter().map(|point| nearest(point, &centres)).collect();
+        sum = found.iter().map(|(_, distance)| distance).sum();
+        let next: Vec<usize> = found.into_iter().map(|(centre, _)| centre).collect();
+        if next == of_point {
+            break;
+        }
+        of_point = next;
+        for (number, centre) in centres.iter_mut().enumerate() {
+            let own = || points.iter().zip(&of_point).filter(|(_, k)| **k == number).map(|(point, _)| point);
+            // A centre without points remains where it is.
+            let count = own().count();
+            if count > 0 {
+                for (k, coordinate) in centre.iter_mut().enumerate() {
+                    *coordinate = own().map(|point| point[k]).sum::<f64>() / count as f64;
+                }
+            }
+        }
+    }
+    (sum, centres)
+}
+
+/// Numbers the blocks in the order of their first pose. Centres without poses have no number.
+fn numbered(blocks: impl Iterator<Item = usize>) -> Vec<usize> {
+    let mut numbers: Vec<usize> = Vec::new();
+    let number = |block: usize| match numbers.iter().position(|known| *known == block) {
+        Some(number) => number,
+        None => {
+            numbers.push(block);
+            numbers.len() - 1
+        }
+    };
+    blocks.map(number).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three groups of points far from each other: k-means finds them from any start, and each start ends at the same
+    /// sum of squares, which follows from the offsets within the groups.
+    #[test]
+    fn separate_groups_are_found() {
+        let offsets = [[0.0, 0.1], [0.1, 0.0], [0.0, -0.1], [-0.1, 0.0]];
+        let groups = [[0.0, 0.0], [5.0, 0.0], [0.0, 7.0]];
+        let points: Vec<Point> =
+            (offsets.iter()).flat_map(|by| groups.iter().map(|at| vec![at[0] + by[0], at[1] + by[1]])).collect();
+        let points: Vec<&Point> = points.iter().collect();
+        for seed in 0..8 {
+            let mut random = Pcg64::seed_from_u64(seed);
+            let (sum, centres) = lloyd(&points, plus_plus(&points, 3, &mut random));
+            assert!((sum - 12.0 * 0.01).abs() < 1e-12, "{sum}");
+            let blocks = numbered(points.iter().map(|point| nearest(point, &centres).0));
+            assert_eq!(blocks, [0, 1, 2].repeat(4));
+        }
+    }
+
+    #[test]
+    fn points_at_one_place_have_one_centre() {
+        let point = vec![0.3, 0.4];
+        let points = vec![&point; 9];
+        let centres = plus_plus(&points, 3, &mut Pcg64::seed_from_u64(1));
+        assert_eq!(centres.len(), 1);
+    }
+}
