@@ -44,7 +44,7 @@ impl<'p> Refit<'p> {
         let mut starts = Vec::new();
         for residuals in &fit.residuals {
             starts.push(u.len());
-            u.resize(u.len() + residuals.len(), problem.noise.sigma_mm * enlarged);
+            u.resize(u.len() + residuals.len(), problem.noise.likelihood_mm() * enlarged);
         }
         let mut priors = Vec::new();
         for parameter in &problem.parameters.list {

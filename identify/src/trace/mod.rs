@@ -14,6 +14,7 @@
 
 pub mod alias;
 mod constants;
+mod families;
 mod implausible;
 pub(crate) mod interrupt;
 mod judge;
