@@ -1,9 +1,10 @@
 //! The result of a fit: goodness of fit, both propagations of uncertainty, all figures for a spreadsheet.
 
 use abbe::identify::circular::CircularTest;
-use abbe::identify::results::{FitMonteCarlo, FitResult, ParameterResult, Verdict};
+use abbe::identify::results::{CrossValidation, FitMonteCarlo, FitResult, ParameterResult, Verdict};
 use abbe::model::words::counted;
 
+use super::cross_validation;
 use super::number::{fixed, micrometres, places, unit};
 use super::table::{Cell, Column, Table, cells, numbers, words};
 
@@ -87,10 +88,18 @@ impl Figures {
     pub fn of_fit(result: &FitResult) -> Table {
         let mut figures = Figures::default();
         figures.figure("residual", "rms", "", result.rms_um, "um");
-        figures.figure("residual", "held out", "", result.heldout_rms_um, "um");
+        figures.held_out("residual", result.heldout_rms_um, &result.cross_validation);
         figures.parameters("parameters", &result.parameters);
         result.circular.iter().for_each(|test| figures.circular(test));
         figures.0
+    }
+
+    /// The deciding held-out error, and those by what is held out.
+    pub fn held_out(&mut self, section: &str, rms_um: f64, model: &CrossValidation) {
+        self.figure(section, "held out", "", rms_um, "um");
+        for figure in cross_validation::figures(model) {
+            self.figure(section, figure.name, "", figure.rms_um, "um");
+        }
     }
 
     /// The table.

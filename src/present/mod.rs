@@ -4,13 +4,14 @@
 //! - printers: [`terminal`], [`csv`], [`html`];
 //! - one file per result: [`fit`], [`trace`], [`plan`], [`next_test`], [`method`], [`repeated`], [`self_calibration`],
 //!   [`simulation`], [`patterns`], [`volumetric`], [`compensation`];
-//! - parts of several results: [`parameters`], [`confounded`], [`circular`], [`plausibility`], [`effect`],
+//! - parts of several results: [`parameters`], [`confounded`], [`cross_validation`], [`circular`], [`plausibility`], [`effect`],
 //!   [`uniqueness`], [`readings`];
 //! - [`report`]: the pages of `--report`.
 
 pub mod circular;
 pub mod compensation;
 pub mod confounded;
+pub mod cross_validation;
 pub mod csv;
 pub mod effect;
 pub mod figure;

@@ -2,6 +2,7 @@
 
 use abbe::identify::results::{ModelResult, TraceResult};
 
+use super::cross_validation;
 use super::effect::name;
 use super::fit::{Figures, noise as noise_in_words, rank};
 use super::number::{micrometres, quantity, value_and_u};
@@ -44,6 +45,8 @@ pub fn before_and_after(result: &TraceResult) -> Table {
     columns.push("");
     let mut table = Table::new(columns, [row("before", &result.before), row("after", &result.after)]);
     table.notes.push(format!("held out: leaving out {}", result.heldout_by));
+    let (before, after) = (&result.before.cross_validation, &result.after.cross_validation);
+    table.notes.extend(cross_validation::sentences(after, Some(before)));
     table
 }
 
@@ -84,7 +87,7 @@ pub fn figures(result: &TraceResult) -> Table {
     }
     for (name, model) in [("before", &result.before), ("after", &result.after)] {
         figures.figure(name, "rms", "", model.rms_um, "um");
-        figures.figure(name, "held out", "", model.heldout_rms_um, "um");
+        figures.held_out(name, model.heldout_rms_um, &model.cross_validation);
         figures.parameters(name, &model.parameters);
     }
     for (index, effect) in result.effects.iter().enumerate() {

@@ -130,8 +130,15 @@ pub struct EffectResult {
     /// All of these explanations in words, by part of the machine:
     /// `C table: axial motion twice per turn, or tilt about X once per turn`.
     pub explanations: String,
-    /// The competing explanations, nearest first.
+    /// The competing explanations, nearest first. Those that predict left-out tests clearly worse come last.
     pub aliases: Vec<EffectName>,
+    /// Rms of the left-out tests that this effect predicts, µm, for an effect with aliases.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub left_out_test_rms_um: Option<f64>,
+    /// The same with each of `aliases` in its place, µm; `null` if the other tests do not identify the alias for all of
+    /// these tests.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub aliases_left_out_test_rms_um: Vec<Option<f64>>,
     /// The first of `separating_tests`.
     pub separated_by: Option<String>,
     /// Separation of the effect from the nearest alias that this test separates.

@@ -45,6 +45,9 @@ pub const MIN_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Maximum number of competing explanations of a found effect.
 pub const MAX_COMPETING: usize = 16;
 
+/// Maximum number of aliases of a found effect that predict left-out tests, the nearest first.
+pub const MAX_PREDICTING: usize = 24;
+
 /// Readings per block of a null draw for the search. A block keeps intermittent structure, so that the search does not
 /// accept it as an effect.
 pub const BLOCK: usize = 20;

@@ -9,7 +9,8 @@
 //!    level and the held-out error decreases by more than the standard error of the decrease. That standard error
 //!    follows from paired differences over runs, blocks or poses.
 //! 4. All parameters are refitted together (`judge`). The result (`result`) states the held-out error before and after.
-//! 5. For each effect the trace lists its aliases ([`alias`]). It tests the residual for remaining structure
+//! 5. For each effect the trace lists its aliases ([`alias`]), in an order that left-out tests decide (`prediction`).
+//!    It tests the residual for remaining structure
 //!    (`remainder`).
 
 pub mod alias;
@@ -22,6 +23,7 @@ mod moves;
 mod noise_model;
 mod null;
 mod policy;
+mod prediction;
 mod remainder;
 pub(crate) mod result;
 pub mod screening;
@@ -119,7 +121,7 @@ pub struct TraceOutcome {
     pub after_fit: Fit,
     /// The found effects.
     pub effects: Vec<Effect>,
-    /// For each found effect its aliases, nearest first.
+    /// For each found effect its aliases, nearest first. Those that predict left-out tests clearly worse come last.
     pub alias_effects: Vec<Vec<Effect>>,
     /// For each found effect the competing explanations, best first.
     pub competing_effects: Vec<Vec<alias::CompetingEffect>>,

@@ -9,6 +9,7 @@ use abbe::model::words::counted;
 
 use crate::cli::screen::{self, Step, command};
 use crate::cli::{SessionArguments, output};
+use crate::present::cross_validation;
 use crate::present::fit as present;
 use crate::present::number::micrometres;
 use crate::present::parameters::Estimates;
@@ -40,6 +41,9 @@ fn quality(result: &FitResult) {
     );
     if let (Some(rms), Some(held)) = (result.rms_3d_um, result.heldout_rms_3d_um) {
         say!("length of the 3-vector: residual {} rms, held out {} rms", micrometres(rms), micrometres(held));
+    }
+    for sentence in cross_validation::sentences(&result.cross_validation, None) {
+        say!("{sentence}");
     }
     say!("{}", present::rank(result.identifiable.len(), result.parameter_count, result.rank));
 }

@@ -1,7 +1,7 @@
 //! The first screen of `abbe trace`: verdict and uniqueness, the residual before and after, the effects with their
 //! aliases, the next measurement.
 
-use abbe::identify::results::{EffectResult, TraceResult};
+use abbe::identify::results::{EffectName, EffectResult, TraceResult};
 use abbe::identify::trace::TraceOutcome;
 use abbe::model::words::counted;
 
@@ -68,7 +68,16 @@ fn print_effect(number: usize, effect: &EffectResult, screened: usize, all: bool
     say!("   explains {} rms; p ≤ {:.3}", micrometres(effect.rms_gain_um), effect.p_value);
     say!("   {}", uniqueness::standing(effect, screened));
     let aliases = effect.aliases.iter();
-    let aliases: Vec<String> = aliases.map(|alias| format!("or {}  ({})", alias.meaning, name(alias))).collect();
+    let line = |(place, alias): (usize, &EffectName)| {
+        let predicted = uniqueness::worse_prediction(effect, place);
+        format!(
+            "or {}  ({}){}",
+            alias.meaning,
+            name(alias),
+            predicted.map_or(String::new(), |words| format!("; {words}"))
+        )
+    };
+    let aliases: Vec<String> = aliases.enumerate().map(line).collect();
     screen::list(&aliases, "     ", all);
 }
 

@@ -133,13 +133,15 @@ fn alternatives(effect: &EffectResult, screened: usize) -> Markup {
                 thead {
                     tr {
                         th class="word-column" { "explanation" }
+                        @if effect.left_out_test_rms_um.is_some() { th class="word-column" { "left-out test" } }
                         @for number in 1..=tests.len() { th class="word-column" { "with test " (number) } }
                     }
                 }
                 tbody {
-                    (explanation(&effect.name, &vec!["selected".to_string(); tests.len()]))
-                    @for alias in &effect.aliases {
-                        (explanation(alias, &tests.iter().map(|test| separation(alias, test)).collect::<Vec<_>>()))
+                    (explanation(&effect.name, &with_prediction(effect, None, vec!["selected".to_string(); tests.len()])))
+                    @for (place, alias) in effect.aliases.iter().enumerate() {
+                        @let separations = tests.iter().map(|test| separation(alias, test)).collect();
+                        (explanation(alias, &with_prediction(effect, Some(place), separations)))
                     }
                 }
             }
@@ -155,6 +157,18 @@ fn alternatives(effect: &EffectResult, screened: usize) -> Markup {
             }
         }
     }
+}
+
+/// The cells of an explanation: the rms of the left-out tests that it predicts, if any can be left out, and `cells`.
+fn with_prediction(effect: &EffectResult, alias: Option<usize>, mut cells: Vec<String>) -> Vec<String> {
+    if effect.left_out_test_rms_um.is_some() {
+        let um = match alias {
+            Some(place) => effect.aliases_left_out_test_rms_um.get(place).copied().flatten(),
+            None => effect.left_out_test_rms_um,
+        };
+        cells.insert(0, um.map_or("–".to_string(), micrometres));
+    }
+    cells
 }
 
 /// A row of the table of explanations: the effect, and what each test achieves.

@@ -97,6 +97,7 @@ fn figures(problem: &Problem, result: &FitResult) -> Vec<KeyFigure> {
         degrees_of_freedom: result.degrees_of_freedom,
         heldout_rms_um: result.heldout_rms_um,
         heldout_rms_3d_um: result.heldout_rms_3d_um,
+        cross_validation: &result.cross_validation,
         rank: result.rank,
         parameters: result.parameter_count,
         noise_um: result.noise_um,

@@ -1,9 +1,11 @@
 //! Key figures of the summary: agreement of residual and noise, held-out error, rank and readings.
 
 use abbe::identify::problem::Problem;
+use abbe::identify::results::CrossValidation;
 use abbe::model::words::counted;
 
 use super::document::KeyFigure;
+use crate::present::cross_validation;
 use crate::present::html::integer;
 use crate::present::number::micrometres;
 
@@ -17,6 +19,8 @@ pub struct Quality<'r> {
     pub heldout_rms_um: f64,
     /// Held-out RMS length of the residual vector, µm.
     pub heldout_rms_3d_um: Option<f64>,
+    /// Held-out errors by what is held out.
+    pub cross_validation: &'r CrossValidation,
     /// Numerical rank.
     pub rank: usize,
     /// Number of parameters.
@@ -75,6 +79,9 @@ pub fn held_out(model: &Quality<'_>, before: Option<&Quality<'_>>) -> KeyFigure 
         Some(before) => format!("before: {}; {noise}", figure(before)),
         None => noise,
     };
+    let of_before = before.map(|before| before.cross_validation);
+    let others = cross_validation::sentences(model.cross_validation, of_before);
+    let note = std::iter::once(note).chain(others).collect::<Vec<String>>().join("; ");
     KeyFigure::new("Held-out rms", figure(model), note)
 }
 

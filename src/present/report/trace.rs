@@ -108,12 +108,13 @@ pub fn document(trace: &TraceOutcome) -> Result<Document, IdentifyError> {
 }
 
 /// Quality of a model of a trace.
-fn quality<'r>(result: &'r TraceResult, model: &ModelResult) -> Quality<'r> {
+fn quality<'r>(result: &'r TraceResult, model: &'r ModelResult) -> Quality<'r> {
     Quality {
         chi_square: model.chi_square,
         degrees_of_freedom: model.degrees_of_freedom,
         heldout_rms_um: model.heldout_rms_um,
         heldout_rms_3d_um: model.heldout_rms_3d_um,
+        cross_validation: &model.cross_validation,
         rank: model.rank,
         parameters: model.parameter_count,
         noise_um: model.noise_um,

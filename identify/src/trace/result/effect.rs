@@ -4,6 +4,7 @@ use abbe_model::chain::Machine;
 use abbe_model::driver::DriverSample;
 use abbe_model::effect::Effect;
 
+use super::super::prediction::Predictions;
 use super::{HeldOut, Moves, TraceFindings, alias_shifts};
 use crate::candidates::library::Family;
 use crate::fit::Fit;
@@ -36,6 +37,8 @@ pub(super) struct Found<'f> {
     pub rms_gain_um: f64,
     /// The effects with which it is confounded.
     pub alias_effects: &'f [Effect],
+    /// The left-out tests that the effect and its aliases predict.
+    pub predicted: &'f Predictions,
 }
 
 /// The results of a found effect.
@@ -68,6 +71,11 @@ pub(super) fn result(
         explanation_count: meanings.len(),
         explanations: explanations(&meanings),
         aliases: (found.alias_effects.iter()).map(|effect| effect_name(machine, effect)).collect(),
+        left_out_test_rms_um: found.predicted.found_um,
+        aliases_left_out_test_rms_um: match found.predicted.found_um {
+            Some(_) => found.predicted.aliases_um.clone(),
+            None => Vec::new(),
+        },
         separated_by: None,
         separation: None,
         separating_tests: Vec::new(),

@@ -8,6 +8,7 @@ mod verdict;
 use abbe_model::effect::Effect;
 
 use super::alias::{self, Alias, CompetingEffect};
+use super::prediction;
 use super::remainder::Structure;
 use super::start::Start;
 use super::state::SearchState;
@@ -63,10 +64,12 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
     let mut competing_effects = Vec::new();
     let mut gains = Vec::new();
     let mut moves = Vec::new();
+    let mut predicted = Vec::new();
     let variance = residual_variance(findings);
     for (k, taken) in search.selected().iter().enumerate() {
         let model = search.model_without(Some(k))?;
-        let (aliases, of_effect) = alias::aliases(search, k, &model, variance);
+        let (mut aliases, of_effect) = alias::aliases(search, k, &model, variance);
+        predicted.push(prediction::predictions(findings, k, &mut aliases)?);
         competing_effects.push(of_effect);
         let named = model.with_candidate(taken.candidate).0;
         let effect_of = |alias: &Alias| search.effect(alias.candidate).clone();
@@ -86,6 +89,7 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
                 moves: &moves,
                 rms_gain_um: (gains[k] / held_out.rows).sqrt() * before.noise.sigma_mm * 1e3,
                 alias_effects: &alias_effects[k],
+                predicted: &predicted[k],
             };
             effect::result(findings, &families, &held_out, &reported)
         })

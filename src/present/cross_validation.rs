@@ -1,0 +1,82 @@
+//! Held-out errors by what is held out, in words: interpolation and extrapolation of poses, left-out tests.
+
+use abbe::identify::results::CrossValidation;
+
+use super::number::micrometres;
+
+/// Maximum number of tests that a sentence names.
+const MAX_NAMED: usize = 4;
+
+/// A held-out error with its name: rms over scalar readings, and rms length of the vector, µm.
+pub struct HeldOutFigure {
+    /// What it tests.
+    pub name: &'static str,
+    /// Over scalar readings.
+    pub rms_um: f64,
+    /// Of the vector, for instruments with three coordinates.
+    pub rms_3d_um: Option<f64>,
+}
+
+impl HeldOutFigure {
+    /// The figure with its unit: `0.305 µm`, or `254 µm (vector 440 µm)`.
+    pub fn in_words(&self) -> String {
+        match self.rms_3d_um {
+            Some(length) => format!("{} (vector {})", micrometres(self.rms_um), micrometres(length)),
+            None => micrometres(self.rms_um),
+        }
+    }
+}
+
+/// The held-out errors of a model that it has.
+pub fn figures(model: &CrossValidation) -> Vec<HeldOutFigure> {
+    let all = [
+        ("extrapolation", model.extrapolation_rms_um, model.extrapolation_rms_3d_um),
+        ("interpolation", model.interpolation_rms_um, model.interpolation_rms_3d_um),
+        ("left-out run", model.left_out_run_rms_um, model.left_out_run_rms_3d_um),
+        ("left-out test", model.left_out_test_rms_um, model.left_out_test_rms_3d_um),
+    ];
+    let present = all
+        .into_iter()
+        .filter_map(|(name, rms_um, rms_3d_um)| Some(HeldOutFigure { name, rms_um: rms_um?, rms_3d_um }));
+    present.collect()
+}
+
+/// The held-out errors that do not decide, one sentence each, compared with those of a first model if there is one.
+pub fn sentences(model: &CrossValidation, before: Option<&CrossValidation>) -> Vec<String> {
+    let earlier = before.map(figures).unwrap_or_default();
+    let mut sentences = Vec::new();
+    for figure in figures(model) {
+        let value = match earlier.iter().find(|one| one.name == figure.name) {
+            Some(before) => format!("before {}, after {}", before.in_words(), figure.in_words()),
+            None => figure.in_words(),
+        };
+        match figure.name {
+            "interpolation" if model.extrapolation_rms_um.is_some() => {
+                sentences.push(format!(
+                    "held-out blocks test extrapolation, and decide; interpolation, over random poses: {value}"
+                ));
+            }
+            "left-out test" => {
+                let tests = named(model.left_out_tests.clone());
+                sentences.push(format!("left-out test: {value} ({tests}, each predicted by the other tests)"));
+            }
+            _ => {}
+        }
+    }
+    if !model.tests_not_left_out.is_empty() {
+        let tests = model.tests_not_left_out.iter();
+        let tests = tests.map(|test| format!("{} (needs {})", test.test, test.parameters.join(", ")));
+        sentences.push(format!("not predicted by the other tests: {}", named(tests.collect())));
+    }
+    sentences
+}
+
+/// The first names, and the number of the others.
+fn named(mut names: Vec<String>) -> String {
+    let others = names.len().saturating_sub(MAX_NAMED);
+    if others > 1 {
+        names.truncate(MAX_NAMED);
+        names.push(format!("{others} others"));
+    }
+    names.join(", ")
+}
