@@ -194,14 +194,22 @@ impl FoldEquations {
 
     /// The same equations with some of the families only; the coefficients of the others are zero.
     pub fn with_families(&self, kept: &[usize]) -> FoldEquations {
-        let dropped: Vec<usize> = (0..self.equations.families.len()).filter(|f| !kept.contains(f)).collect();
-        let absent: Vec<usize> = dropped.iter().flat_map(|f| self.equations.families[*f].iter().copied()).collect();
+        let families = &self.equations.families;
+        let dropped = (0..families.len()).filter(|family| !kept.contains(family));
+        let absent: Vec<usize> = dropped.flat_map(|family| families[family].iter().copied()).collect();
         let present: Vec<usize> = (0..self.sizes.len()).filter(|j| !absent.contains(j)).collect();
+        self.with_parameters(&present)
+    }
+
+    /// The same equations with some of the parameters only, in ascending order; the others stay at the point of the
+    /// linearisation. Families without parameters are dropped.
+    pub fn with_parameters(&self, present: &[usize]) -> FoldEquations {
         let place = |j: &usize| present.binary_search(j).ok();
         let square =
             |matrix: &Mat<f64>| Mat::from_fn(present.len(), present.len(), |i, j| matrix[(present[i], present[j])]);
         let some = |values: &[f64]| -> Vec<f64> { present.iter().map(|j| values[*j]).collect() };
         let own = &self.equations;
+        let families = own.families.iter().map(|family| family.iter().filter_map(place).collect::<Vec<usize>>());
         FoldEquations {
             equations: NormalEquations {
                 gram: square(&own.gram),
@@ -209,7 +217,7 @@ impl FoldEquations {
                 square: own.square,
                 prior: square(&own.prior),
                 prior_projection: some(&own.prior_projection),
-                families: kept.iter().map(|f| own.families[*f].iter().filter_map(place).collect()).collect(),
+                families: families.filter(|family| !family.is_empty()).collect(),
             },
             folds: (self.folds.iter())
                 .map(|fold| FoldRows {
@@ -225,6 +233,33 @@ impl FoldEquations {
             sizes: some(&self.sizes),
             origin: some(&self.origin),
         }
+    }
+
+    /// The model with the present scales and the present noise of the problem that the equations are of.
+    ///
+    /// # Errors
+    /// If the equations are not positive definite.
+    pub fn at_present(&self, problem: &Problem) -> Result<Scales, IdentifyError> {
+        let families = families(&problem.parameters);
+        let precision =
+            |(family, own): (&Family, &Vec<usize>)| match problem.parameters.list[family.parameters[0]].prior {
+                Prior::Gaussian(scale) => (self.sizes[own[0]] / scale).powi(2),
+                Prior::Free | Prior::Known => START_PRECISION,
+            };
+        let precisions: Vec<f64> = families.iter().zip(&self.equations.families).map(precision).collect();
+        // Rows whitened with the present noise have the unit variance.
+        let inflation = problem.noise.inflation;
+        let posterior = self.equations.posterior(1.0, &precisions)?;
+        let of_folds = self.held_out(1.0, &precisions)?;
+        let held_out = of_folds.into_iter().map(|(square, _)| square).collect();
+        Ok(Scales { precisions, variance: 1.0 / inflation, inflation, posterior, held_out })
+    }
+
+    /// For each fold, the sum of squares of its residual under the model without it, and the sum of its variances from
+    /// the parameters.
+    fn held_out(&self, variance: f64, precisions: &[f64]) -> Result<Vec<(f64, f64)>, IdentifyError> {
+        let of_folds = parallel::map(self.folds.len(), &|k| self.without(k, variance, precisions));
+        of_folds.into_iter().collect()
     }
 
     /// Number of scalar readings.
@@ -303,8 +338,7 @@ impl FoldEquations {
             }
             variance = next;
         };
-        let of_folds = parallel::map(self.folds.len(), &|k| self.without(k, inflation * variance, &precisions));
-        let of_folds: Vec<(f64, f64)> = of_folds.into_iter().collect::<Result<_, IdentifyError>>()?;
+        let of_folds = self.held_out(inflation * variance, &precisions)?;
         let calibrated: f64 = (self.folds.iter().zip(&of_folds))
             .map(|(fold, (square, predicted))| {
                 let expected = fold.readings * variance + predicted;

@@ -235,4 +235,48 @@ mod tests {
             }
         }
     }
+
+    /// Two families beside two parameters with a fixed prior. The maximum is that of `scipy.optimize.minimize`
+    /// (Nelder–Mead) over the density of `y` with the covariance `v I + J D Jᵀ`, in NumPy, to 10⁻⁶.
+    #[test]
+    fn the_scales_of_two_families_are_those_of_scipy() {
+        let (rows, variance) = (60, 0.1);
+        let column = |i: usize, j: usize| -> f64 {
+            let t = (i * 37 % rows) as f64 / rows as f64 * std::f64::consts::TAU * 0.7;
+            match j {
+                0 => 1.0,
+                1 => t,
+                2..12 => {
+                    let (sin, cos) = ((j / 2) as f64 * t).sin_cos();
+                    if j % 2 == 0 { cos } else { sin }
+                }
+                12 => ((i * 11 % 17) as f64 - 8.0) / 8.0,
+                _ => ((i * 7 % 13) as f64 - 6.0) / 6.0,
+            }
+        };
+        let b = [3.0, -1.0, 0.5, -0.2, 0.1, 0.3, -0.4, 0.05, 0.2, 0.1, -0.15, 0.25, 1.5, -2.0];
+        let jacobian = Mat::from_fn(rows, b.len(), column);
+        let y = Mat::from_fn(rows, 1, |i, _| {
+            let model: f64 = (0..b.len()).map(|j| column(i, j) * b[j]).sum();
+            model + ((i * 29 % 23) as f64 - 11.0) / 11.0 * 0.5
+        });
+        let projection = jacobian.transpose() * &y;
+        let equations = NormalEquations {
+            gram: jacobian.transpose() * &jacobian,
+            projection: (0..b.len()).map(|j| projection[(j, 0)]).collect(),
+            square: y.squared_norm_l2(),
+            prior: Mat::from_fn(b.len(), b.len(), |i, j| if i == j && i < 2 { 0.01 } else { 0.0 }),
+            prior_projection: vec![0.0; b.len()],
+            families: vec![(2..12).collect(), vec![12, 13]],
+        };
+        for start in [[1e-4, 1e6], [1.0, 1.0], [1e5, 1e-5]] {
+            let (precisions, posterior) = equations.maximise(variance, &start).unwrap();
+            for (precision, expected) in precisions.iter().zip([2.567_905, -1.116_190]) {
+                assert!((precision.ln() - expected).abs() < 5e-3, "{start:?}: {precisions:?}");
+            }
+            for (effective, expected) in posterior.effective.iter().zip([6.956_811, 1.996_027]) {
+                assert!((effective - expected).abs() < 5e-3, "{effective} {expected}");
+            }
+        }
+    }
 }

@@ -114,7 +114,7 @@ impl Function for Refit<'_> {
 
     fn outputs(&self) -> usize {
         let of = |quantity: &Quantity| match quantity {
-            Quantity::Parameter(_) => 1,
+            Quantity::Parameter(_) | Quantity::Rms(..) => 1,
             Quantity::Harmonic(_) => 2,
         };
         self.quantities.iter().map(of).sum()

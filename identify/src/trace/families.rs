@@ -31,6 +31,8 @@ pub(super) struct AcceptedFamilies {
     pub fit: Fit,
     /// The effects, in the order of the parameters.
     pub effects: Vec<AcceptedEffect>,
+    /// Number of effects in the proposed groups.
+    pub proposed: usize,
 }
 
 /// An effect of an accepted family.
@@ -38,7 +40,7 @@ pub(super) struct AcceptedFamilies {
 pub(super) struct AcceptedEffect {
     pub effect: Effect,
     /// What its group is, in words.
-    pub group: &'static str,
+    pub group: String,
     /// Probability of at least the decrease of the held-out error by its group, if the group has no effect.
     pub p_value: f64,
     /// Held-out rms with its group and those before it, mm.
@@ -182,7 +184,7 @@ fn finish(
                 with.add_effect(effect)?;
                 effects.push(AcceptedEffect {
                     effect: effect.clone(),
-                    group: group.name,
+                    group: group.name.to_string(),
                     p_value: accepted[order].decrease.p_value(),
                     heldout_rms_mm: after[order],
                 });
@@ -192,5 +194,6 @@ fn finish(
     let equations = equations.with_families(&chosen);
     let start = beta[..with.parameters.list.len().min(beta.len())].to_vec();
     let (problem, fit) = with_families(with, start, Some((equations, scales)))?;
-    Ok(AcceptedFamilies { problem, fit, effects })
+    let proposed = groups.iter().map(|group| group.effects.len()).sum();
+    Ok(AcceptedFamilies { problem, fit, effects, proposed })
 }

@@ -85,6 +85,7 @@ fn block(
                 dl {
                     dt { "Effect" } dd { (name(&effect.name)) }
                     dt { "Estimate" } dd { (estimate(effect)) }
+                    @if let Some(prior) = &effect.prior { dt { "Prior" } dd { (present::prior(prior)) } }
                     dt { "Explains" } dd { (micrometres(effect.rms_gain_um)) " rms (p ≤ " (format!("{:.3}", effect.p_value)) ")" }
                     dt { "Held-out rms" } dd { (micrometres(effect.heldout_rms_um)) " with this effect" }
                     dt { "Family" } dd { (effect.family) }
@@ -101,7 +102,7 @@ fn block(
 
 /// Coefficients with their standard uncertainties, and chosen numbers of the shape.
 fn estimate(effect: &EffectResult) -> String {
-    if !effect.curve.is_empty() {
+    if !effect.curve.is_empty() && effect.prior.is_none() {
         return "nonparametric curve, see the plot".to_string();
     }
     let values = effect.parameters.iter().map(|parameter| {
@@ -119,6 +120,11 @@ fn estimate(effect: &EffectResult) -> String {
 
 /// Explanations that the readings do not separate, with the separation from each that further tests achieve.
 fn alternatives(effect: &EffectResult, screened: usize) -> Markup {
+    if effect.prior.is_some() {
+        return html! {
+            h4 { (capitalised(&uniqueness::standing(effect, screened))) }
+        };
+    }
     if effect.unique {
         return html! {
             h4 { "Unique explanation" }
@@ -199,10 +205,18 @@ fn curve(effect: &EffectResult) -> Plot {
     let [low, high] = span(effect.curve.iter().map(|p| p.at));
     let [minimum, maximum] = span(effect.curve.iter().flat_map(|p| [p.value - 2.0 * p.u, p.value + 2.0 * p.u]));
     let series = [("after", 0.0), ("found-line", 2.0), ("found-line", -2.0)];
+    // A point for each value of the driver without a reading nearby.
+    let extrapolated: Vec<(f64, f64)> =
+        effect.curve.iter().filter(|p| p.extrapolated).map(|p| (p.at, p.value)).collect();
+    let caption = if extrapolated.is_empty() {
+        "The curve excludes the components that are collinear with location errors."
+    } else {
+        "The curve excludes the components that are collinear with location errors. Points: no reading lies nearby; the prior determines the curve."
+    };
     Lines {
         name: format!("curve-{}-{}", effect.name.component, effect.name.driver),
         title: format!("{} over {}", effect.name.component, effect.name.driver),
-        caption: "The curve excludes the components that are collinear with location errors.".to_string(),
+        caption: caption.to_string(),
         x: (Scale::over(low, high, ACROSS, 8), format!("{}, {}", effect.name.driver, unit(&effect.curve_at_unit))),
         y: (
             Scale::rounded(minimum.min(0.0), maximum.max(0.0), UP, 6),
@@ -211,6 +225,12 @@ fn curve(effect: &EffectResult) -> Plot {
         series: series
             .iter()
             .map(|(class, multiple)| Series { class, source: None, mark: Mark::Line, points: line(*multiple) })
+            .chain((!extrapolated.is_empty()).then_some(Series {
+                class: "dot-before",
+                source: None,
+                mark: Mark::Dots,
+                points: extrapolated,
+            }))
             .collect(),
         legend: vec![("after", "curve".into()), ("found-line", "± 2 u".into())],
         over: html! {},
