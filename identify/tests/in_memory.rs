@@ -40,7 +40,7 @@ fn the_offset_of_an_axis_is_found_in_readings_in_memory() {
     let test = NewTest::new("C100", Station::BallBar(bar));
     session.add_test(test.at("Z", 75.0).readings(columns)).unwrap();
     let (problem, found) = fit::prepare(&session, 1).unwrap();
-    let report = fit::report(&problem, &found);
+    let report = fit::report(&problem, &found).unwrap();
     assert_eq!(report.readings, 360);
     for (name, expected) in ["EX0C", "EY0C"].into_iter().zip(OFFSET) {
         let parameter = report.parameters.iter().find(|parameter| parameter.id == name).unwrap();

@@ -22,6 +22,7 @@ mod json_document;
 mod json_page;
 mod kept;
 mod kill;
+mod left_out_test;
 mod limits;
 mod measured;
 mod messages;

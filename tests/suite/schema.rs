@@ -240,6 +240,10 @@ fn results_hold_and_have_the_fields_of_the_design() {
                 "noise_source",
                 "noise_ar_coefficients",
                 "heldout_by",
+                "left_out_run_rms_um",
+                "left_out_test_rms_um",
+                "left_out_tests",
+                "tests_not_left_out",
                 "rank",
                 "parameter_count",
                 "chi_square",
@@ -296,7 +300,19 @@ fn results_hold_and_have_the_fields_of_the_design() {
         has_exactly(
             &trace[model],
             &["rms_um", "heldout_rms_um", "parameters"],
-            &["noise_um", "rank", "parameter_count", "chi_square", "degrees_of_freedom", "identifiable", "covariance"],
+            &[
+                "left_out_run_rms_um",
+                "left_out_test_rms_um",
+                "left_out_tests",
+                "tests_not_left_out",
+                "noise_um",
+                "rank",
+                "parameter_count",
+                "chi_square",
+                "degrees_of_freedom",
+                "identifiable",
+                "covariance",
+            ],
         );
     }
     let effect = &trace["effects"][0];
@@ -306,6 +322,8 @@ fn results_hold_and_have_the_fields_of_the_design() {
         &[
             "family",
             "heldout_rms_um",
+            "left_out_test_rms_um",
+            "aliases_left_out_test_rms_um",
             "separation",
             "meaning",
             "unique",

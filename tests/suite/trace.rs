@@ -171,6 +171,12 @@ fn the_bundled_session_is_explained_at_the_command_line() {
     assert!((traced - fitted).abs() < 1e-6, "{traced} {fitted}");
 }
 
+/// Rms length of the vector with the effects over held-out blocks of joint space and over random poses, mm.
+fn held_out(result: &TraceResult) -> [f64; 2] {
+    let model = &result.after.cross_validation;
+    [model.extrapolation_rms_3d_um, model.interpolation_rms_3d_um].map(|um| um.unwrap() * 1e-3)
+}
+
 #[test]
 fn ur10_has_the_seventeenth_harmonic_of_its_second_joint_first() {
     let name = "ur10_has_the_seventeenth_harmonic_of_its_second_joint_first";
@@ -182,9 +188,9 @@ fn ur10_has_the_seventeenth_harmonic_of_its_second_joint_first() {
     let first = &result.effects[0].name;
     assert_eq!((first.component.as_str(), first.shape.as_str()), ("EBJ2", "harmonic"), "{first:?}");
     assert!((first.order.unwrap() - 17.0).abs() <= 1.0, "{first:?}");
-    let held_out = result.after.heldout_rms_3d_um.unwrap() * 1e-3;
-    println!("UR10 with {} effects: {held_out:.4} mm held out", result.effects.len());
-    assert!(held_out <= 0.25, "{held_out}");
+    let [extrapolation, interpolation] = held_out(&result);
+    println!("UR10 with {} effects: {extrapolation:.4} mm, {interpolation:.4} mm", result.effects.len());
+    assert!(extrapolation <= 0.33 && interpolation <= 0.25, "{extrapolation} {interpolation}");
 }
 
 #[test]
@@ -196,7 +202,7 @@ fn kuka_has_a_compliance_under_gravity_and_no_harmonics() {
     let result = traced(&session, &TraceOptions::default());
     assert!(result.effects.iter().any(|effect| effect.name.driver == "gravity"));
     assert!(result.effects.iter().all(|effect| effect.name.shape != "harmonic"));
-    let held_out = result.after.heldout_rms_3d_um.unwrap() * 1e-3;
-    println!("KUKA with {} effects: {held_out:.4} mm held out", result.effects.len());
-    assert!(held_out <= 0.185, "{held_out}");
+    let [extrapolation, interpolation] = held_out(&result);
+    println!("KUKA with {} effects: {extrapolation:.4} mm, {interpolation:.4} mm", result.effects.len());
+    assert!(extrapolation <= 0.24 && interpolation <= 0.185, "{extrapolation} {interpolation}");
 }

@@ -210,3 +210,91 @@ impl LeftOut<'_> {
         Ok(Err(named.map(|(_, j)| j).collect()))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use abbe_model::files::{self, ReadOptions};
+
+    use super::*;
+    use crate::fit::prepare;
+    use crate::numerics::solve::Directions;
+
+    /// Least squares of least norm over dense rows `[J | r]`, for the chosen columns scaled by their size.
+    fn solved(rows: &Mat<f64>, columns: &[usize], size: &[f64]) -> Vec<f64> {
+        let scaled = Mat::from_fn(rows.nrows(), columns.len(), |i, k| rows[(i, columns[k])] * size[columns[k]]);
+        let right: Vec<f64> = (0..rows.nrows()).map(|i| rows[(i, size.len())]).collect();
+        let solution = Directions::of(scaled.as_ref()).unwrap().solve(&right, 0.0);
+        solution.iter().zip(columns).map(|(step, j)| step * size[*j]).collect()
+    }
+
+    /// Rows of a test and priors, one below another: those of `tests`, and the priors on the columns in `prior_of`.
+    fn dense(problem: &Problem, beta: &[f64], tests: &[usize], prior_of: &[usize]) -> Mat<f64> {
+        let values = problem.slot_values(beta);
+        let mut parts: Vec<Mat<f64>> = Vec::new();
+        for block in problem.blocks().iter().filter(|block| tests.contains(&block.test)) {
+            let kept = problem.kept_rows(block);
+            parts.push(problem.whitened(problem.rows(&values, block).unwrap(), &kept));
+        }
+        let width = beta.len() + 1;
+        for j in prior_of {
+            if let abbe_model::session::Prior::Gaussian(u) = problem.parameters.list[*j].prior {
+                let entry = |k: usize| {
+                    if k == *j {
+                        1.0 / u
+                    } else if k + 1 == width {
+                        -beta[*j] / u
+                    } else {
+                        0.0
+                    }
+                };
+                parts.push(Mat::from_fn(1, width, |_, k| entry(k)));
+            }
+        }
+        let rows = parts.iter().map(Mat::nrows).sum();
+        let mut all = Mat::zeros(rows, width);
+        let mut start = 0;
+        for part in &parts {
+            all.get_mut(start..start + part.nrows(), ..).copy_from(part);
+            start += part.nrows();
+        }
+        all
+    }
+
+    /// The residual of each left-out test equals that of two dense least-squares problems: the model from the rows of
+    /// the other tests and all priors, then the set-up of the left-out test from its rows and priors.
+    #[test]
+    fn the_residuals_equal_those_of_two_dense_problems() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let session = files::session(&file, &ReadOptions::default()).unwrap();
+        let (problem, fit) = prepare(&session, 1).unwrap();
+        let found = left_out_tests(&problem, &fit.beta).unwrap();
+        let (size, count) = (problem.parameters.sizes(), fit.beta.len());
+        let all: Vec<usize> = (0..count).collect();
+        let mut judged = 0;
+        for test in (0..problem.models.len()).filter(|test| found.residuals[*test].is_some()) {
+            let others: Vec<usize> = (0..problem.models.len()).filter(|other| *other != test).collect();
+            let mut step = solved(&dense(&problem, &fit.beta, &others, &all), &all, &size);
+            let own = own_setup(&problem, test);
+            own.iter().for_each(|j| step[*j] = 0.0);
+            let mut rows = dense(&problem, &fit.beta, &[test], &own);
+            for i in 0..rows.nrows() {
+                rows[(i, count)] -= (0..count).map(|j| rows[(i, j)] * step[j]).sum::<f64>();
+            }
+            solved(&rows, &own, &size).iter().zip(&own).for_each(|(value, j)| step[*j] = *value);
+            let values = problem.slot_values(&fit.beta);
+            let blocks = problem.blocks();
+            let expected = blocks.iter().filter(|block| block.test == test).flat_map(|block| {
+                let rows = problem.rows(&values, block).unwrap();
+                let residual = |i: usize| rows[(i, count)] - (0..count).map(|j| rows[(i, j)] * step[j]).sum::<f64>();
+                (0..rows.nrows()).map(residual).collect::<Vec<f64>>()
+            });
+            for (found, expected) in found.residuals[test].as_ref().unwrap().iter().zip(expected) {
+                assert!((found - expected).abs() < 1e-8, "{found} {expected}");
+            }
+            judged += 1;
+        }
+        assert_eq!((judged, found.not_left_out.len()), (2, 2));
+    }
+}
