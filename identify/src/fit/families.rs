@@ -88,6 +88,8 @@ pub(crate) struct FoldEquations {
     readings: f64,
     /// Variance of a reading in units of the whitening, if it does not follow from the residual.
     variance: Option<f64>,
+    /// Index of each parameter among those of the problem.
+    parameters: Vec<usize>,
     /// Size of each parameter.
     sizes: Vec<f64>,
     /// For each parameter, the value that its coordinate refers to: 0 for a coefficient of a family, else the point of
@@ -124,6 +126,16 @@ impl Scales {
         self.held_out.iter().sum()
     }
 
+    /// Decrease of the penalised sum of squares of the tempered likelihood by the parameters.
+    pub fn explained(&self) -> f64 {
+        self.posterior.explained
+    }
+
+    /// Effective number of parameters of each family.
+    pub fn effective(&self) -> &[f64] {
+        &self.posterior.effective
+    }
+
     /// The decrease of the held-out error from another model of the same readings, by folds.
     pub fn decrease_from(&self, other: &Scales) -> HeldOutDecrease {
         Units::of((0..self.held_out.len()).map(|fold| (0, fold))).decrease(&other.held_out, &self.held_out)
@@ -139,7 +151,7 @@ impl FoldEquations {
         let mut sizes = problem.parameters.sizes();
         let mut origin = beta.to_vec();
         for family in &families {
-            let common = family.parameters.iter().map(|j| sizes[*j]).fold(0.0, f64::max);
+            let common = family.parameters.iter().map(|j| sizes[*j]).fold(f64::INFINITY, f64::min);
             for j in &family.parameters {
                 sizes[*j] = common;
                 origin[*j] = 0.0;
@@ -187,6 +199,7 @@ impl FoldEquations {
             folds,
             readings: readings.iter().sum(),
             variance: (noise.source != NoiseSource::Residual).then_some(1.0 / noise.inflation),
+            parameters: (0..count).collect(),
             sizes,
             origin,
         }
@@ -230,9 +243,38 @@ impl FoldEquations {
                 .collect(),
             readings: self.readings,
             variance: self.variance,
+            parameters: present.iter().map(|j| self.parameters[*j]).collect(),
             sizes: some(&self.sizes),
             origin: some(&self.origin),
         }
+    }
+
+    /// Effective number of parameters among some parameters of one family, by index among those of the problem.
+    pub fn effective_among(&self, scales: &Scales, parameters: &[usize]) -> f64 {
+        let effective = |j: &usize| {
+            let place = self.parameters.binary_search(j).ok()?;
+            let family = self.equations.families.iter().position(|family| family.contains(&place))?;
+            Some((1.0 - scales.precisions[family] * scales.posterior.covariance[(place, place)]).max(0.0))
+        };
+        parameters.iter().filter_map(effective).sum()
+    }
+
+    /// The equations without some parameters, by index among those of the problem, and the model at the same scales.
+    ///
+    /// # Errors
+    /// If the equations are not positive definite.
+    pub fn without_parameters(
+        &self,
+        scales: &Scales,
+        dropped: &[usize],
+    ) -> Result<(FoldEquations, Scales), IdentifyError> {
+        let present: Vec<usize> = (0..self.sizes.len()).filter(|k| !dropped.contains(&self.parameters[*k])).collect();
+        let remains = |family: &[usize]| family.iter().any(|k| present.binary_search(k).is_ok());
+        let families = self.equations.families.iter().zip(&scales.precisions);
+        let precisions = families.filter(|(family, _)| remains(family)).map(|(_, precision)| *precision).collect();
+        let equations = self.with_parameters(&present);
+        let scales = equations.model(precisions, scales.variance, scales.inflation)?;
+        Ok((equations, scales))
     }
 
     /// The model with the present scales and the present noise of the problem that the equations are of.
@@ -248,11 +290,15 @@ impl FoldEquations {
             };
         let precisions: Vec<f64> = families.iter().zip(&self.equations.families).map(precision).collect();
         // Rows whitened with the present noise have the unit variance.
-        let inflation = problem.noise.inflation;
-        let posterior = self.equations.posterior(1.0, &precisions)?;
-        let of_folds = self.held_out(1.0, &precisions)?;
+        self.model(precisions, 1.0 / problem.noise.inflation, problem.noise.inflation)
+    }
+
+    /// The model with given scales, variance and inflation.
+    fn model(&self, precisions: Vec<f64>, variance: f64, inflation: f64) -> Result<Scales, IdentifyError> {
+        let posterior = self.equations.posterior(inflation * variance, &precisions)?;
+        let of_folds = self.held_out(inflation * variance, &precisions)?;
         let held_out = of_folds.into_iter().map(|(square, _)| square).collect();
-        Ok(Scales { precisions, variance: 1.0 / inflation, inflation, posterior, held_out })
+        Ok(Scales { precisions, variance, inflation, posterior, held_out })
     }
 
     /// For each fold, the sum of squares of its residual under the model without it, and the sum of its variances from
@@ -267,13 +313,13 @@ impl FoldEquations {
         self.readings
     }
 
-    /// The families that the readings determine: those with at least `least` effective parameters at the scale and the
-    /// inflation from which the estimation starts.
+    /// The families that the readings determine: those with at least `least` effective parameters at a wide scale and
+    /// the inflation from which the estimation starts.
     ///
     /// # Errors
     /// If the equations are not positive definite.
     pub fn with_effect(&self, least: f64) -> Result<Vec<usize>, IdentifyError> {
-        let start = vec![START_PRECISION; self.equations.families.len()];
+        let start = vec![WIDE_PRECISION; self.equations.families.len()];
         let variance = FIRST_INFLATION * self.variance.unwrap_or(1.0);
         let posterior = self.equations.posterior(variance, &start)?;
         let families = posterior.effective.iter().enumerate();
@@ -389,6 +435,8 @@ impl FoldEquations {
     }
 }
 
+/// Precision of a family of a wide scale: the physical size.
+const WIDE_PRECISION: f64 = 1.0;
 /// Precision of a family from which the estimation starts: a scale of a hundredth of the physical size.
 const START_PRECISION: f64 = 1e4;
 

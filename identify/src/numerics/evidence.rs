@@ -50,6 +50,8 @@ pub(crate) struct Posterior {
     pub log_evidence: f64,
     /// `‖y − J b‖²`.
     pub residual_square: f64,
+    /// Decrease of the penalised sum of squares by the parameters: the right-hand side times the mean.
+    pub explained: f64,
 }
 
 /// Largest change of `ln α` in one step: a factor of 20 in the precision.
@@ -58,8 +60,8 @@ const MAX_STEP: f64 = 3.0;
 const MIN_GAIN: f64 = 1e-5;
 /// Maximum number of steps. From six orders of magnitude away, some ten are needed.
 const MAX_STEPS: usize = 60;
-/// Limits of `ln α`, in units of the parameters: scales of 10⁻⁹ and 10⁶ physical sizes.
-const LIMITS: [f64; 2] = [-27.0, 41.0];
+/// Limits of `ln α`, in units of the parameters: scales of 1 and 10⁻⁶ physical sizes.
+const LIMITS: [f64; 2] = [0.0, 27.6];
 
 impl NormalEquations {
     /// `H` for a noise variance and the precisions of the families.
@@ -111,6 +113,7 @@ impl NormalEquations {
             log_evidence: -0.5 * (self.square / variance - explained + log_determinant - log_precisions),
             residual_square: self.residual_square(&mean),
             mean,
+            explained,
             covariance,
             effective,
             effective_total,

@@ -13,7 +13,7 @@ use abbe_model::effect::shape::{Power, Spectrum};
 use abbe_model::effect::{CoefficientPrior, Component, Effect, Shape};
 
 use super::TraceOptions;
-use super::constants::{HIGHEST_ORDER_OF_SPECTRA, MIN_EFFECTIVE};
+use super::constants::{HIGHEST_ORDER_OF_SPECTRA, MIN_EFFECTIVE, MIN_EFFECTIVE_OF_MEMBER};
 use super::interrupt::Interrupt;
 use super::screening::is_requested;
 use crate::candidates::sampling::Sampling;
@@ -41,7 +41,8 @@ pub(super) struct AcceptedEffect {
     pub effect: Effect,
     /// What its group is, in words.
     pub group: String,
-    /// Probability of at least the decrease of the held-out error by its group, if the group has no effect.
+    /// Of a family: probability of at least the decrease of the held-out error by its group, if the group has no effect.
+    /// Of a single effect: probability of a gain as large among all candidates, with the inflated noise.
     pub p_value: f64,
     /// Held-out rms with its group and those before it, mm.
     pub heldout_rms_mm: f64,
@@ -142,7 +143,19 @@ pub(super) fn accepted(
             interrupt.check()?;
             let mut chosen: Vec<usize> = present.0.iter().chain(&families_of[k]).copied().collect();
             chosen.sort_unstable();
-            let scales = equations.with_families(&chosen).estimate()?;
+            let mut scales = equations.with_families(&chosen).estimate()?;
+            // Families whose scale vanishes explain nothing.
+            let weak: Vec<usize> = (chosen.iter().zip(scales.effective()))
+                .filter(|(family, effective)| families_of[k].contains(family) && **effective < MIN_EFFECTIVE)
+                .map(|(family, _)| *family)
+                .collect();
+            if weak.len() == families_of[k].len() {
+                continue;
+            }
+            if !weak.is_empty() {
+                chosen.retain(|family| !weak.contains(family));
+                scales = equations.with_families(&chosen).estimate()?;
+            }
             if best.as_ref().is_none_or(|(_, _, best)| scales.held_out_sum() < best.held_out_sum()) {
                 best = Some((k, chosen, scales));
             }
@@ -174,13 +187,29 @@ fn finish(
     let readings = equations.readings();
     let rms = |scales: &Scales| (scales.held_out_sum() / readings).sqrt() * problem.noise.likelihood_mm();
     let after: Vec<f64> = accepted.iter().skip(1).map(|next| rms(&next.scales)).chain([rms(&scales)]).collect();
+    let kept = equations.with_families(&chosen);
     let mut with = problem.clone();
     let mut effects = Vec::new();
+    let mut undetermined = Vec::new();
+    let mut first: Vec<usize> = Vec::new();
+    let mut next = problem.parameters.list.len();
+    for group in groups {
+        first.push(next);
+        next += group.effects.iter().map(|effect| effect.shape.coefficients()).sum::<usize>();
+    }
     for (place, group) in groups.iter().enumerate() {
         let Some(order) = accepted.iter().position(|accepted| accepted.group == place) else { continue };
         for effect in &group.effects {
             let Some(family) = effect.family() else { continue };
-            if chosen.iter().any(|k| names[*k] == family) {
+            // The readings determine nothing of a joint on which gravity has no moment.
+            let own: Vec<usize> = (first[place]..).take(effect.shape.coefficients()).collect();
+            first[place] += own.len();
+            if !chosen.iter().any(|k| names[*k] == family) {
+                continue;
+            }
+            if kept.effective_among(&scales, &own) < MIN_EFFECTIVE_OF_MEMBER {
+                undetermined.extend(own);
+            } else {
                 with.add_effect(effect)?;
                 effects.push(AcceptedEffect {
                     effect: effect.clone(),
@@ -191,9 +220,9 @@ fn finish(
             }
         }
     }
-    let equations = equations.with_families(&chosen);
     let start = beta[..with.parameters.list.len().min(beta.len())].to_vec();
-    let (problem, fit) = with_families(with, start, Some((equations, scales)))?;
+    let known = kept.without_parameters(&scales, &undetermined)?;
+    let (problem, fit) = with_families(with, start, Some(known))?;
     let proposed = groups.iter().map(|group| group.effects.len()).sum();
     Ok(AcceptedFamilies { problem, fit, effects, proposed })
 }

@@ -1,8 +1,9 @@
 //! The second stage of a search with families: single effects beside them.
 //!
 //! The candidates of the library are screened by their gain in the residual of the model with the families. The best
-//! are fitted together with the families, which keep their scales. One is added only if it lowers the held-out error
-//! over blocks of joint space by more than the standard error of the decrease. A harmonic of a joint about its own axis
+//! are fitted together with the families, which keep their scales. One is added only if its gain is significant among
+//! all candidates with the inflated noise of the families, and if it lowers the held-out error over blocks of joint
+//! space by more than the standard error of the decrease. A harmonic of a joint about its own axis
 //! frees that order from the prior of its spectrum.
 
 use abbe_model::driver::Driver;
@@ -59,7 +60,8 @@ pub(super) fn add(
         let ranked = ranked(&columns, &candidates, &start, found, interrupt)?;
         ended.detectable = ranked.detectable;
         let tried: Vec<&Candidate> = ranked.best.iter().map(|k| &candidates[*k]).collect();
-        let Some((candidate, p_value, held_out_mm)) = best_of(found, &tried, &mut ended, interrupt)? else { break };
+        let best = best_of(found, &tried, &mut ended, options.significance, interrupt)?;
+        let Some((candidate, p_value, held_out_mm)) = best else { break };
         let mut with = found.problem.clone();
         with.add_effect(&candidate.effect)?;
         let mut beta = found.fit.beta.clone();
@@ -127,6 +129,7 @@ fn best_of<'c>(
     found: &AcceptedFamilies,
     tried: &[&'c Candidate],
     ended: &mut LinesEnded,
+    significance: f64,
     interrupt: Interrupt<'_>,
 ) -> Result<Option<(&'c Candidate, f64, f64)>, IdentifyError> {
     let mut all = found.problem.clone();
@@ -143,16 +146,23 @@ fn best_of<'c>(
     interrupt.check()?;
     let without = equations.with_parameters(&(0..present).collect::<Vec<_>>()).at_present(&all)?;
     let mut best: Option<(&Candidate, f64, f64, f64)> = None;
+    let mut last = 1.0_f64;
     for (candidate, own) in tried.iter().zip(own) {
         interrupt.check()?;
         let parameters: Vec<usize> = (0..present).chain(own).collect();
         let with = equations.with_parameters(&parameters).at_present(&all)?;
         let decrease = with.decrease_from(&without);
-        ended.last_p_value = ended.last_p_value.min(decrease.p_value());
-        if decrease.is_significant() && best.as_ref().is_none_or(|(_, by, ..)| decrease.by > *by) {
+        // The best of all candidates, by the bound of Bonferroni.
+        let gain = (with.explained() - without.explained()).max(0.0);
+        let tail = ln_chi_square_tail(gain, candidate.columns.count);
+        let p_value = (tail + (ended.candidates as f64).ln()).min(0.0).exp();
+        last = last.min(p_value);
+        let accepted = p_value <= significance && decrease.is_significant();
+        if accepted && best.as_ref().is_none_or(|(_, by, ..)| decrease.by > *by) {
             let held_out_mm = (with.held_out_sum() / equations.readings()).sqrt() * all.noise.likelihood_mm();
-            best = Some((*candidate, decrease.by, decrease.p_value(), held_out_mm));
+            best = Some((*candidate, decrease.by, p_value, held_out_mm));
         }
     }
+    ended.last_p_value = last;
     Ok(best.map(|(candidate, _, p_value, held_out_mm)| (candidate, p_value, held_out_mm)))
 }
