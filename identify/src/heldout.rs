@@ -1,9 +1,9 @@
 //! Cross-validation: the residual of readings that the fit did not use.
 //!
 //! A fold is one run, or a contiguous block where there are no runs, or a block of joint space among independent poses.
-//! The fit of the other folds does not use the held-out fold. Let `A` be the normal matrix of all readings and `W` such that
-//! `WᵀAW = I`. Let `T = J·W` for the fold's rows `[J | r]`, and `y` the remaining step in these directions. The step to
-//! the fit of the other folds is `W(I − TᵀT)⁻¹(y − Tᵀr)`, with a matrix no larger than the number of the fold's rows
+//! The fit of the other folds does not use the held-out fold. Let `A` be the normal matrix of all readings and `W` such
+//! that `WᵀAW = I`. Let `T = J·W` for the fold's rows `[J | r]`, and `y` the remaining step in these directions. The
+//! step to the fit of the other folds is `W(I − TᵀT)⁻¹(y − Tᵀr)`, with a matrix no larger than the number of the fold's rows
 //! (Woodbury). If the other folds barely determine a direction, their triangular factors are merged and solved again.
 
 pub(crate) mod figures;

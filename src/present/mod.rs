@@ -4,8 +4,8 @@
 //! - printers: [`terminal`], [`csv`], [`html`];
 //! - one file per result: [`fit`], [`trace`], [`plan`], [`next_test`], [`method`], [`repeated`], [`self_calibration`],
 //!   [`simulation`], [`patterns`], [`volumetric`], [`compensation`];
-//! - parts of several results: [`parameters`], [`confounded`], [`cross_validation`], [`circular`], [`plausibility`], [`effect`],
-//!   [`uniqueness`], [`readings`];
+//! - parts of several results: [`parameters`], [`confounded`], [`cross_validation`], [`circular`], [`plausibility`],
+//!   [`effect`], [`uniqueness`], [`readings`];
 //! - [`report`]: the pages of `--report`.
 
 pub mod circular;

@@ -54,7 +54,8 @@ fn ur10_with_every_location_error() {
     let result = fitted(&session);
     let [extrapolation, interpolation] = held_out(&result);
     println!(
-        "UR10, all location errors: {extrapolation:.4} mm in held-out blocks, {interpolation:.4} mm in random poses, rank {} of {}",
+        "UR10, all location errors: {extrapolation:.4} mm in held-out blocks, {interpolation:.4} mm in random poses, \
+         rank {} of {}",
         result.rank, result.parameter_count
     );
     // An independent program (NumPy, SciPy's k-means) gives 0.439 mm over random tenths, and 0.483 to 0.497 mm over ten

@@ -14,8 +14,8 @@ use crate::fit::Fit;
 use crate::problem::Problem;
 use crate::results::{CrossValidation, TestNotLeftOut};
 
-/// The held-out errors of a fit. `deciding_mm` is the held-out error by the folds of the problem. Readings that `judged`
-/// excludes do not count.
+/// The held-out errors of a fit. `deciding_mm` is the held-out error by the folds of the problem. Readings that
+/// `judged` excludes do not count.
 ///
 /// # Errors
 /// If the model cannot be evaluated.

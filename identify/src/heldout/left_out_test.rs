@@ -13,8 +13,8 @@
 //! δM = (N⁻¹ g)_M,    δS = A_SS⁻¹ (a_S − A_SM δM)
 //! ```
 //!
-//! The prediction of the left-out test has the covariance `K N⁻¹`, with the information `K = A_MM − A_MS A_SS⁻¹ A_SM` of
-//! its readings on `M`. If the mean variance of the predicted readings exceeds that of the noise, the other tests do not
+//! The readings of the left-out test have the information `K = A_MM − A_MS A_SS⁻¹ A_SM` on `M`. The variances of their
+//! predictions sum to `tr(K N⁻¹)` in units of the noise variance. If their mean exceeds 1, the other tests do not
 //! identify what the left-out test needs. It is then not judged, and the parameters of the worst direction are named.
 
 use faer::linalg::solvers::Llt;

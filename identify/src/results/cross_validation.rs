@@ -6,8 +6,8 @@ use serde::Serialize;
 /// Held-out errors of a model, by what is held out. Absent where the readings or the tests do not permit it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct CrossValidation {
-    /// For poses: rms of the residual over held-out random poses, µm. It tests interpolation. The effects of `trace` are
-    /// those found on all poses.
+    /// For poses: rms of the residual over held-out random poses, µm. It tests interpolation. The effects of `trace`
+    /// are those found on all poses.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interpolation_rms_um: Option<f64>,
     /// For poses: rms length of the residual vector over held-out random poses, µm.

@@ -9,9 +9,8 @@
 //!    level and the held-out error decreases by more than the standard error of the decrease. That standard error
 //!    follows from paired differences over runs, blocks or poses.
 //! 4. All parameters are refitted together (`judge`). The result (`result`) states the held-out error before and after.
-//! 5. For each effect the trace lists its aliases ([`alias`]), in an order that left-out tests decide (`prediction`).
-//!    It tests the residual for remaining structure
-//!    (`remainder`).
+//! 5. For each effect the trace lists its aliases ([`alias`]), in an order that left-out tests decide. It tests the
+//!    residual for remaining structure (`remainder`).
 
 pub mod alias;
 mod constants;
@@ -24,7 +23,6 @@ mod moves;
 mod noise_model;
 mod null;
 mod policy;
-mod prediction;
 mod remainder;
 pub(crate) mod result;
 pub mod screening;

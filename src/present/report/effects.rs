@@ -144,7 +144,8 @@ fn alternatives(effect: &EffectResult, screened: usize) -> Markup {
                     }
                 }
                 tbody {
-                    (explanation(&effect.name, &with_prediction(effect, None, vec!["selected".to_string(); tests.len()])))
+                    @let selected = vec!["selected".to_string(); tests.len()];
+                    (explanation(&effect.name, &with_prediction(effect, None, selected)))
                     @for (place, alias) in effect.aliases.iter().enumerate() {
                         @let separations = tests.iter().map(|test| separation(alias, test)).collect();
                         (explanation(alias, &with_prediction(effect, Some(place), separations)))

@@ -33,9 +33,9 @@ impl Columns<'_> {
         self.blocks.iter().flat_map(|block| self.counting(block).into_iter().map(move |i| fold(block, i))).collect()
     }
 
-    /// The independent units over which held-out errors are paired. Along runs they are the folds (runs or blocks), each
-    /// of which belongs to one test. Among poses they are the blocks of joint space, because one fit predicts a whole
-    /// block, or the poses if folds are random. The rows are those of [`Columns::unwhitened_rows`].
+    /// The independent units over which held-out errors are paired. Along runs they are the folds (runs or blocks),
+    /// each of which belongs to one test. Among poses they are the blocks of joint space, because one fit predicts a
+    /// whole block, or the poses if folds are random. The rows are those of [`Columns::unwhitened_rows`].
     pub fn unwhitened_units(&self) -> Units {
         let coordinates = self.problem.coordinates();
         let rows = self.blocks.iter().flat_map(|block| {

@@ -4,8 +4,8 @@ use abbe_model::chain::Machine;
 use abbe_model::effect::Effect;
 use abbe_model::session::Prior;
 
-use super::super::prediction::Predictions;
 use super::curve::{curve_of, curve_units};
+use super::prediction::Predictions;
 use super::{HeldOut, Moves, TraceFindings};
 use crate::candidates::library::Family;
 use crate::fit::Fit;

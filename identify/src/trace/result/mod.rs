@@ -3,6 +3,7 @@
 mod curve;
 mod effect;
 mod families;
+mod prediction;
 mod rejected;
 mod unsearched;
 mod verdict;
@@ -10,7 +11,6 @@ mod verdict;
 use abbe_model::effect::Effect;
 
 use super::alias::{self, Alias, CompetingEffect};
-use super::prediction;
 use super::remainder::Structure;
 use super::start::Start;
 use super::state::SearchState;

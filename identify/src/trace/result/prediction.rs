@@ -7,12 +7,12 @@
 
 use abbe_model::effect::Effect;
 
-use super::alias::Alias;
-use super::constants::{INDISTINGUISHABLE, MAX_PREDICTING};
-use super::result::TraceFindings;
+use super::TraceFindings;
 use crate::error::IdentifyError;
 use crate::heldout::left_out_test::{LeftOutTests, left_out_tests};
 use crate::problem::Problem;
+use crate::trace::alias::Alias;
+use crate::trace::constants::{INDISTINGUISHABLE, MAX_PREDICTING};
 
 /// The left-out-test errors of a found effect and its aliases.
 pub(super) struct Predictions {
