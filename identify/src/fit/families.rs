@@ -259,24 +259,6 @@ impl FoldEquations {
         parameters.iter().filter_map(effective).sum()
     }
 
-    /// The equations without some parameters, by index among those of the problem, and the model at the same scales.
-    ///
-    /// # Errors
-    /// If the equations are not positive definite.
-    pub fn without_parameters(
-        &self,
-        scales: &Scales,
-        dropped: &[usize],
-    ) -> Result<(FoldEquations, Scales), IdentifyError> {
-        let present: Vec<usize> = (0..self.sizes.len()).filter(|k| !dropped.contains(&self.parameters[*k])).collect();
-        let remains = |family: &[usize]| family.iter().any(|k| present.binary_search(k).is_ok());
-        let families = self.equations.families.iter().zip(&scales.precisions);
-        let precisions = families.filter(|(family, _)| remains(family)).map(|(_, precision)| *precision).collect();
-        let equations = self.with_parameters(&present);
-        let scales = equations.model(precisions, scales.variance, scales.inflation)?;
-        Ok((equations, scales))
-    }
-
     /// The model with the present scales and the present noise of the problem that the equations are of.
     ///
     /// # Errors

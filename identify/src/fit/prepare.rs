@@ -6,7 +6,7 @@ use abbe_model::session::limits::MIN_UM;
 use faer::Mat;
 
 use super::Fit;
-use super::families::{FoldEquations, Scales, families};
+use super::families::{FoldEquations, families};
 use crate::error::IdentifyError;
 use crate::heldout::rms_mm;
 use crate::noise::outliers;
@@ -57,7 +57,7 @@ pub(crate) fn prepare_with(session: &Session, effects: &[Effect], seed: u64) -> 
     let mut start = vec![0.0; problem.parameters.list.len()];
     kept.iter().zip(&fit.beta).for_each(|(j, value)| start[*j] = *value);
     (problem.noise, problem.rejected) = (without.noise, without.rejected);
-    with_families(problem, start, None)
+    with_families(problem, start)
 }
 
 /// Fits a problem, in turn with its noise and its outliers.
@@ -85,25 +85,15 @@ fn settled(mut problem: Problem, stated: bool, floor: f64) -> Result<(Problem, F
 }
 
 /// Estimates the scales of the families of a problem with the noise that they require, and fits it, in turn with the
-/// outliers. `start` is the fit without the families, with coefficients of zero. `known` are the scales estimated there.
+/// outliers. `start` is the fit without the families, with coefficients of zero.
 ///
 /// # Errors
 /// See [`prepare`].
-pub(crate) fn with_families(
-    mut problem: Problem,
-    mut start: Vec<f64>,
-    mut known: Option<(FoldEquations, Scales)>,
-) -> Result<(Problem, Fit), IdentifyError> {
+pub(crate) fn with_families(mut problem: Problem, mut start: Vec<f64>) -> Result<(Problem, Fit), IdentifyError> {
     let mut round = 0;
     loop {
-        let (equations, scales) = match known.take() {
-            Some(known) => known,
-            None => {
-                let equations = FoldEquations::of(&problem, &start, &problem.triangles(&start)?);
-                let scales = equations.estimate()?;
-                (equations, scales)
-            }
-        };
+        let equations = FoldEquations::of(&problem, &start, &problem.triangles(&start)?);
+        let scales = equations.estimate()?;
         equations.apply(&scales, &mut problem);
         let found = super::fit(&problem, Some(&equations.beta(&scales)))?;
         let rejected = outliers::reject(&problem, &found);

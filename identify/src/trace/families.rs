@@ -137,7 +137,11 @@ pub(super) fn accepted(
     let mut present = (declared.clone(), equations.with_families(&declared).estimate()?);
     let mut accepted: Vec<Accepted> = Vec::new();
     loop {
-        let open = (0..groups.len()).filter(|k| !accepted.iter().any(|a| a.group == *k) && !families_of[*k].is_empty());
+        let taken: usize = accepted.iter().map(|accepted| groups[accepted.group].effects.len()).sum();
+        let open = (0..groups.len()).filter(|k| {
+            let is_new = !accepted.iter().any(|accepted| accepted.group == *k);
+            is_new && !families_of[*k].is_empty() && taken + groups[*k].effects.len() <= most
+        });
         let mut best: Option<(usize, Vec<usize>, Scales)> = None;
         for k in open {
             interrupt.check()?;
@@ -171,13 +175,13 @@ pub(super) fn accepted(
     if accepted.is_empty() {
         return Ok(None);
     }
-    finish(problem, &beta, &equations, (&groups, &names), accepted, present).map(Some)
+    finish(problem, &fit.beta, &equations, (&groups, &names), accepted, present).map(Some)
 }
 
 /// Fits the problem with the accepted families.
 fn finish(
     problem: &Problem,
-    beta: &[f64],
+    declared: &[f64],
     equations: &FoldEquations,
     (groups, names): (&[Group], &[String]),
     accepted: Vec<Accepted>,
@@ -190,7 +194,6 @@ fn finish(
     let kept = equations.with_families(&chosen);
     let mut with = problem.clone();
     let mut effects = Vec::new();
-    let mut undetermined = Vec::new();
     let mut first: Vec<usize> = Vec::new();
     let mut next = problem.parameters.list.len();
     for group in groups {
@@ -207,9 +210,7 @@ fn finish(
             if !chosen.iter().any(|k| names[*k] == family) {
                 continue;
             }
-            if kept.effective_among(&scales, &own) < MIN_EFFECTIVE_OF_MEMBER {
-                undetermined.extend(own);
-            } else {
+            if kept.effective_among(&scales, &own) >= MIN_EFFECTIVE_OF_MEMBER {
                 with.add_effect(effect)?;
                 effects.push(AcceptedEffect {
                     effect: effect.clone(),
@@ -220,9 +221,10 @@ fn finish(
             }
         }
     }
-    let start = beta[..with.parameters.list.len().min(beta.len())].to_vec();
-    let known = kept.without_parameters(&scales, &undetermined)?;
-    let (problem, fit) = with_families(with, start, Some(known))?;
+    // As in a fit of a session that declares these effects.
+    let mut start = declared.to_vec();
+    start.resize(with.parameters.list.len(), 0.0);
+    let (problem, fit) = with_families(with, start)?;
     let proposed = groups.iter().map(|group| group.effects.len()).sum();
     Ok(AcceptedFamilies { problem, fit, effects, proposed })
 }

@@ -67,7 +67,7 @@ pub(super) fn add(
         let mut beta = found.fit.beta.clone();
         beta.resize(with.parameters.list.len(), 0.0);
         interrupt.check()?;
-        (found.problem, found.fit) = with_families(with, beta, None)?;
+        (found.problem, found.fit) = with_families(with, beta)?;
         found.effects.push(AcceptedEffect {
             effect: candidate.effect.clone(),
             group: families.get(candidate.family).map(|family| family.name.clone()).unwrap_or_default(),
