@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use abbe_model::driver::{DriverInput, Reference};
-use abbe_model::effect::{Component, Effect};
+use abbe_model::effect::{CoefficientPrior, Component, Effect};
 use abbe_model::instrument::InternalUnit;
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::{Prior, Session, Test};
@@ -103,6 +103,9 @@ pub struct Parameters {
     /// second on.
     pub effect_ids: Vec<String>,
 }
+
+/// The prior standard deviation from which its estimation starts, in physical sizes.
+const START_OF_SCALE: f64 = 0.01;
 
 /// The physical size of a component.
 pub(crate) fn physical_size(unit: InternalUnit) -> f64 {
@@ -206,6 +209,12 @@ impl Parameters {
                 });
             }
         };
+        let prior = match effect.prior {
+            CoefficientPrior::Flat => Prior::Free,
+            CoefficientPrior::Scale(scale) => Prior::Gaussian(scale),
+            // The start of the estimation.
+            CoefficientPrior::Family(_) => Prior::Gaussian(START_OF_SCALE * size),
+        };
         let number = self.effects.len();
         let first = self.list.len();
         if self.effects.contains(effect) {
@@ -265,13 +274,37 @@ impl Parameters {
                 id: format!("{id}{dot}{name}"),
                 unit: Unit::of_effect(session, effect, k),
                 size: if largest[k] > 0.0 { size / largest[k] } else { size },
-                prior: Prior::Free,
+                prior,
                 role: Role::Coefficient { effect: number, coefficient: k },
             })?;
         }
         self.effects.push(effect.clone());
         self.effect_ids.push(id);
         Ok(())
+    }
+
+    /// The same parameters without the coefficients of families whose prior scale is estimated, and the index of each
+    /// remaining parameter among all. The contributions of the effects are removed, the list of effects is not.
+    pub(crate) fn without_families(&self) -> (Parameters, Vec<usize>) {
+        let of_family = |parameter: &Parameter| match parameter.role {
+            Role::Coefficient { effect, .. } => self.effects[effect].family().is_some(),
+            Role::Error | Role::Setup => false,
+        };
+        let kept: Vec<usize> = (0..self.list.len()).filter(|j| !of_family(&self.list[*j])).collect();
+        let contribution = |contribution: &SlotContribution| {
+            let parameter = kept.binary_search(&contribution.parameter).ok()?;
+            Some(SlotContribution { parameter, ..contribution.clone() })
+        };
+        let parameters = Parameters {
+            list: kept.iter().map(|j| self.list[*j].clone()).collect(),
+            contributions: self
+                .contributions
+                .iter()
+                .map(|test| test.iter().filter_map(contribution).collect())
+                .collect(),
+            ..self.clone()
+        };
+        (parameters, kept)
     }
 
     /// The components of every test at the parameters `beta` (internal units).

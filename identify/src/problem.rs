@@ -115,6 +115,14 @@ impl Problem {
             self.parameters.contributions.iter().map(|contributions| TestParameters::of(contributions)).collect();
     }
 
+    /// The same problem without the families whose prior scale is estimated, and the index of each of its parameters.
+    pub(crate) fn without_families(&self) -> (Problem, Vec<usize>) {
+        let (parameters, kept) = self.parameters.without_families();
+        let mut problem = Problem { parameters, ..self.clone() };
+        problem.update_test_parameters();
+        (problem, kept)
+    }
+
     /// The same problem with one fold for each test.
     pub(crate) fn folded_by_test(&self) -> Problem {
         self.with_folds(Folds::by_test(&self.models))

@@ -154,11 +154,8 @@ fn a_plan_beyond_the_travel_is_refused() {
 
 #[test]
 fn written_effects_read_back_equal() {
-    let effect = |component: &str, driver: &str, shape: Shape| Effect {
-        component: Component::parse(component).unwrap(),
-        driver: Driver::parse(driver),
-        shape,
-        tests: Vec::new(),
+    let effect = |component: &str, driver: &str, shape: Shape| {
+        Effect::new(Component::parse(component).unwrap(), Driver::parse(driver), shape)
     };
     let mut effects = vec![
         effect("EX0C", "time", Shape::Drift),

@@ -1,6 +1,7 @@
 //! The result of a trace: the residual before and after, rejected candidates, parameters that changed.
 
-use abbe::identify::results::{ModelResult, TraceResult};
+use abbe::identify::results::{ModelResult, PriorResult, TraceResult};
+use abbe::model::words::counted;
 
 use super::cross_validation;
 use super::effect::name;
@@ -79,6 +80,20 @@ pub fn changes(result: &TraceResult) -> Vec<(&str, String)> {
     changes.collect()
 }
 
+/// The prior of an effect's coefficients in words: `prior of 9.3″ for each of 80 coefficients, estimated for …`.
+pub fn prior(prior: &PriorResult) -> String {
+    let source = match &prior.family {
+        Some(family) => format!("estimated for the family {family}"),
+        None => "stated".to_string(),
+    };
+    format!(
+        "prior standard deviation {} ({source}); the readings determine {:.1} of {}",
+        quantity(&format!("{:.3}", prior.scale), &prior.unit),
+        prior.effective_parameters,
+        counted(prior.coefficients, "coefficient")
+    )
+}
+
 /// Every figure with all its digits, one row per figure.
 pub fn figures(result: &TraceResult) -> Table {
     let mut figures = Figures::default();
@@ -98,6 +113,10 @@ pub fn figures(result: &TraceResult) -> Table {
             }
         }
         figures.parameters(&section, &effect.parameters);
+        if let Some(prior) = &effect.prior {
+            figures.figure(&section, "prior standard deviation", "", prior.scale, &prior.unit);
+            figures.figure(&section, "effective number of parameters", "", prior.effective_parameters, "");
+        }
     }
     figures.table()
 }

@@ -10,11 +10,18 @@ const MAX_NAMED: usize = 3;
 /// Effects described one by one in the headline.
 const MAX_LISTED: usize = 4;
 
+/// What is said of an effect of a family.
+const NOT_COMPARED: &str = "competing explanations are not compared";
+
 /// The uniqueness of all effects in one line; `None` without an effect.
 pub fn headline(result: &TraceResult) -> Option<String> {
     let screened = result.candidates_detectable;
     match result.effects.as_slice() {
         [] => None,
+        all if all.iter().any(|effect| effect.prior.is_some()) => {
+            let of_families = all.iter().filter(|effect| effect.prior.is_some()).count();
+            Some(format!("{of_families} of the effects are members of families under a prior: {NOT_COMPARED}"))
+        }
         [one] => Some(format!("{}: {}", standing(one, screened), in_short(one))),
         all if all.iter().all(|effect| effect.unique) => {
             Some(format!("{} effects, each unique among {screened} candidates screened", all.len()))
@@ -41,7 +48,9 @@ pub fn headline(result: &TraceResult) -> Option<String> {
 
 /// `1 of 9 indistinguishable explanations`, or `unique among 4098 candidates screened`.
 pub fn standing(effect: &EffectResult, screened: usize) -> String {
-    if effect.unique {
+    if effect.prior.is_some() {
+        format!("member of a family: {NOT_COMPARED}")
+    } else if effect.unique {
         format!("unique among {screened} candidates screened")
     } else {
         format!("1 of {} indistinguishable explanations", effect.explanation_count)

@@ -109,12 +109,7 @@ fn every_candidate_of_the_library_has_its_own_description() {
 fn descriptions_name_the_part_and_its_motion() {
     let machine = circle().machine;
     let words = |machine: &Machine, component: &str, driver: &str, shape: Shape| {
-        let effect = Effect {
-            component: Component::parse(component).unwrap(),
-            driver: Driver::parse(driver),
-            shape,
-            tests: Vec::new(),
-        };
+        let effect = Effect::new(Component::parse(component).unwrap(), Driver::parse(driver), shape);
         meaning(machine, &effect).to_string()
     };
     let power = Shape::Power(Power { degree: 1, scale: 1.0 });
@@ -163,12 +158,8 @@ fn explanations_are_grouped_by_part() {
     let machine = circle().machine;
     let of = |freedom: Freedom, axis: &str, order: f64| {
         let name = abbe::model::component::ErrorName { kind: ErrorKind::Motion, freedom, axis: axis.to_string() };
-        let effect = Effect {
-            component: Component::Axis(name),
-            driver: Driver::Axis(axis.to_string()),
-            shape: Shape::Harmonic(Harmonic { order }),
-            tests: Vec::new(),
-        };
+        let effect =
+            Effect::new(Component::Axis(name), Driver::Axis(axis.to_string()), Shape::Harmonic(Harmonic { order }));
         meaning(&machine, &effect)
     };
     let all = [of(Freedom::Z, "C", 2.0), of(Freedom::Y, "B", 1.0), of(Freedom::A, "C", 1.0)];

@@ -49,12 +49,11 @@ fn measured() -> Session {
 /// The fit of a session with a declared harmonic over C.
 fn fitted(session: &Session, component: &str, order: f64) -> FitResult {
     let mut session = session.clone();
-    session.effects = vec![Effect {
-        component: Moved::parse(component).unwrap(),
-        driver: FollowedDriver::parse("C"),
-        shape: Form::Harmonic(Harmonic { order }),
-        tests: Vec::new(),
-    }];
+    session.effects = vec![Effect::new(
+        Moved::parse(component).unwrap(),
+        FollowedDriver::parse("C"),
+        Form::Harmonic(Harmonic { order }),
+    )];
     SessionFit::of(&session, 1).unwrap().result
 }
 

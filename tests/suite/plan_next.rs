@@ -77,11 +77,8 @@ fn a_second_radius_separates_tilt_and_axial_motion() {
     let session = ready("hermle-c600u/chapter5.toml");
     let complete = states::complete(&session, true).unwrap();
     let problem = states::problem_by_test(&complete, noise_um(0.3)).unwrap();
-    let harmonic = |component: &str, order: f64| Effect {
-        component: Component::parse(component).unwrap(),
-        driver: Driver::Axis("C".into()),
-        shape: Shape::Harmonic(Harmonic { order }),
-        tests: Vec::new(),
+    let harmonic = |component: &str, order: f64| {
+        Effect::new(Component::parse(component).unwrap(), Driver::Axis("C".into()), Shape::Harmonic(Harmonic { order }))
     };
     let beta = vec![0.0; problem.parameters.list.len()];
     let menu = TestVariations::short();

@@ -233,16 +233,11 @@ proptest! {
     #[test]
     fn an_effect_of_zero_size_changes_nothing(session in sessions(), axis in any::<Index>(), freedom in 0_usize..6) {
         let axis = &session.machine.axes[axis.index(session.machine.axes.len())];
-        let effect = Effect {
-            component: Component::Axis(ErrorName {
+        let effect = Effect::new(Component::Axis(ErrorName {
                 kind: ErrorKind::Motion,
                 freedom: Freedom::ALL[freedom],
                 axis: axis.name.clone(),
-            }),
-            driver: Driver::Axis(axis.name.clone()),
-            shape: Shape::Periodic(Periodic { period: 0.7 }),
-            tests: Vec::new(),
-        };
+            }), Driver::Axis(axis.name.clone()), Shape::Periodic(Periodic { period: 0.7 }));
         let mut with = session.clone();
         with.effects.push(effect.clone());
         let noise = || Noise::white(NOISE_MM, NoiseSource::Stated);

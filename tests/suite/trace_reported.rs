@@ -22,7 +22,7 @@ use abbe::model::session::Session;
 use super::{abbe, ready, text};
 
 fn of_c(component: &str, shape: Shape) -> Effect {
-    Effect { component: Component::parse(component).unwrap(), driver: Driver::parse("C"), shape, tests: Vec::new() }
+    Effect::new(Component::parse(component).unwrap(), Driver::parse("C"), shape)
 }
 
 /// The session of chapter 5 with readings of a machine with some effects, of which it declares the first `declared`.

@@ -9,7 +9,7 @@ use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::driver::{Driver, DriverPart};
 use abbe_model::effect::shape::{
-    Curve, Harmonic, Local, Periodic, Polynomial, Power, ReversalSpike, Steps, Triangle, Warmup,
+    Curve, Harmonic, Local, Periodic, Polynomial, Power, ReversalSpike, Spectrum, Steps, Triangle, Warmup,
 };
 use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::instrument::{Station, ballbar::BallBar, socket::Socket};
@@ -28,12 +28,7 @@ impl Source for Ball {
 }
 
 pub fn effect(component: &str, driver: &str, shape: Shape) -> Effect {
-    Effect {
-        component: Component::parse(component).expect("a component"),
-        driver: Driver::parse(driver),
-        shape,
-        tests: Vec::new(),
-    }
+    Effect::new(Component::parse(component).expect("a component"), Driver::parse(driver), shape)
 }
 
 fn with(effects: Vec<Effect>) -> Options {
@@ -98,6 +93,11 @@ fn smooth_shapes_by_hand() {
     near(&bases("X", harmonic, here(PI / 12.0)), &[0.5_f64.sqrt(), 0.5_f64.sqrt()]);
     let periodic = Shape::Periodic(Periodic { period: 12.0 });
     near(&bases("X", periodic, here(38.0)), &[(TAU / 6.0).cos(), (TAU / 6.0).sin()]);
+    let turn = Shape::Spectrum(Spectrum::of_turn(3));
+    let third = 0.75_f64.sqrt();
+    near(&bases("X", turn, here(PI / 3.0)), &[0.5, third, -0.5, third, -1.0, 0.0]);
+    let travel = Shape::Spectrum(Spectrum { orders: 2, period: 12.0 });
+    near(&bases("X", travel, here(1.0)), &[third, 0.5, 0.5, third]);
     near(&bases("time", Shape::Drift, here(1800.0)), &[0.5]);
     let warmup = Shape::Warmup(Warmup { tau_s: 600.0 });
     near(&bases("time", warmup, here(1200.0)), &[1.0 - (-2.0_f64).exp()]);
@@ -178,6 +178,8 @@ pub fn every_shape() -> Vec<Effect> {
         effect("EZC", "C", Shape::Harmonic(Harmonic { order: 2.0 })),
         effect("EXC", "C", Shape::Periodic(Periodic { period: 0.3 })),
         effect("EXC", "C", Shape::Triangle(Triangle { period: 0.7 })),
+        effect("EAC", "C", Shape::Spectrum(Spectrum::of_turn(2))),
+        effect("EYX", "X", Shape::Spectrum(Spectrum { orders: 2, period: 150.0 })),
         effect("EYC", "C", polynomial(2, PI)),
         effect("EX0C", "temperature", polynomial(1, 1.0)),
         effect("EY0C", "time", Shape::Drift),

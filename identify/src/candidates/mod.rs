@@ -6,6 +6,6 @@ pub(crate) mod columns;
 pub(crate) mod gain;
 pub mod library;
 pub(crate) mod moments;
-mod sampling;
+pub(crate) mod sampling;
 pub(crate) mod step_table;
 pub(crate) mod tuned;

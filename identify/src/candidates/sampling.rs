@@ -3,7 +3,7 @@
 use crate::problem::Problem;
 
 /// The sampling of the axes in a session.
-pub(super) struct Sampling {
+pub(crate) struct Sampling {
     pub moves: Vec<bool>,
     pub low: Vec<f64>,
     pub high: Vec<f64>,

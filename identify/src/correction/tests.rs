@@ -68,7 +68,7 @@ fn directions(frame: &Matrix4<f64>) -> Matrix3<f64> {
 }
 
 fn effect(id: &str, driver: Driver, shape: Shape, coefficients: &[f64]) -> EstimatedEffect {
-    let effect = Effect { component: Component::parse(id).unwrap(), driver, shape, tests: Vec::new() };
+    let effect = Effect::new(Component::parse(id).unwrap(), driver, shape);
     EstimatedEffect { effect, coefficients: coefficients.to_vec() }
 }
 

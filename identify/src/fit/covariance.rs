@@ -3,7 +3,7 @@
 use faer::Mat;
 
 use super::Fit;
-use super::quantities::{Quantity, quantities};
+use super::quantities::{Quantity, quantities, rms_of_waves};
 use crate::numerics::rank::Rank;
 use crate::problem::Problem;
 use crate::results::{Covariance, NullSpace, ParameterResult};
@@ -17,6 +17,11 @@ pub(crate) fn of_parameters(problem: &Problem, fit: &Fit, parameters: &[Paramete
     for quantity in quantities(problem, &fit.rank) {
         match quantity {
             Quantity::Parameter(j) => rows.push(vec![(j, list[j].unit.display_per_internal)]),
+            Quantity::Rms(j, count) => {
+                let rms = rms_of_waves(&fit.beta[j..j + count]).max(f64::MIN_POSITIVE);
+                let display = list[j].unit.display_per_internal;
+                rows.push((j..j + count).map(|k| (k, 0.5 * fit.beta[k] / rms * display)).collect());
+            }
             Quantity::Harmonic(j) => {
                 let (a, b) = (fit.beta[j], fit.beta[j + 1]);
                 let amplitude = a.hypot(b).max(f64::MIN_POSITIVE);

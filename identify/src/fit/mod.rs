@@ -7,6 +7,7 @@
 
 pub mod base;
 mod covariance;
+pub(crate) mod families;
 mod prepare;
 mod quantities;
 mod reported;
@@ -14,6 +15,7 @@ mod session;
 
 use std::cell::RefCell;
 
+use abbe_model::session::Prior;
 use faer::Mat;
 
 use crate::error::IdentifyError;
@@ -26,7 +28,7 @@ use crate::problem::Problem;
 
 pub(crate) use covariance::{null_space, of_parameters as covariance_of_parameters};
 pub use prepare::prepare;
-pub(crate) use prepare::prepare_with;
+pub(crate) use prepare::{prepare_with, with_families};
 pub(crate) use quantities::{Quantity, quantities, values_at};
 pub(crate) use reported::{ids, u_of_undetermined_phase_deg};
 pub use reported::{outliers, parameters, report, unobservable};
@@ -117,12 +119,8 @@ pub(crate) struct Minimum {
 /// # Errors
 /// If the model cannot be evaluated, or the iterations do not converge.
 pub(crate) fn minimum(problem: &Problem, start: Option<&[f64]>) -> Result<Minimum, IdentifyError> {
-    let parameter_count = problem.parameters.list.len();
-    let nominal = vec![0.0; parameter_count];
-    let triangles = problem.triangles(&nominal)?;
-    let rank = problem.parameters.rank(&problem.prior_triangle(&nominal).merged(&triangles))?;
-    let restricted =
-        IdentifiableDirections { problem, basis: &rank.identifiable_basis, last: RefCell::new((nominal, triangles)) };
+    let (rank, last) = rank_at_nominal(problem)?;
+    let restricted = IdentifiableDirections { problem, basis: &rank.identifiable_basis, last: RefCell::new(last) };
     let mut end = None;
     if rank.identifiable_basis.ncols() > 0 {
         let scale = Scaling::Physical(vec![1.0; rank.identifiable_basis.ncols()]);
@@ -140,6 +138,29 @@ pub(crate) fn minimum(problem: &Problem, start: Option<&[f64]>) -> Result<Minimu
     Ok(Minimum { beta, triangles, rank })
 }
 
+/// The rank at the nominal machine, and the parameters and triangular factors of its linearisation. The priors of
+/// families determine their coefficients, so the rank is that of the other parameters, and their linearisation is not
+/// computed: there may be hundreds of them.
+fn rank_at_nominal(problem: &Problem) -> Result<(Rank, (Vec<f64>, Vec<Triangle>)), IdentifyError> {
+    let decided = |problem: &Problem| {
+        let nominal = vec![0.0; problem.parameters.list.len()];
+        let triangles = problem.triangles(&nominal)?;
+        let rank = problem.parameters.rank(&problem.prior_triangle(&nominal).merged(&triangles))?;
+        Ok::<_, IdentifyError>((rank, (nominal, triangles)))
+    };
+    if families::families(&problem.parameters).is_empty() {
+        return decided(problem);
+    }
+    let (without, kept) = problem.without_families();
+    let (rank, _) = decided(&without)?;
+    let list = &problem.parameters.list;
+    let least = |j: usize| match list[j].prior {
+        Prior::Gaussian(scale) => list[j].size / scale,
+        Prior::Free | Prior::Known => 0.0,
+    };
+    Ok((rank.among(&kept, &problem.parameters.sizes(), least), (Vec::new(), Vec::new())))
+}
+
 /// Computes covariance, residuals, cross-validation and χ² at the solution.
 fn finish(problem: &Problem, minimum: Minimum) -> Result<Fit, IdentifyError> {
     let Minimum { beta, triangles, rank } = minimum;
@@ -147,7 +168,9 @@ fn finish(problem: &Problem, minimum: Minimum) -> Result<Fit, IdentifyError> {
     let covariance = whole.covariance(&rank.identifiable_basis)?;
     let residuals = problem.residuals(&beta);
     let held_out = held_out(problem, &beta, &triangles, &whole, &rank.identifiable_basis)?;
-    let chi_square = whole.sum_of_squares();
+    // The inflation of the likelihood is no noise: readings count with the noise, priors as they are.
+    let (penalised, of_priors) = (whole.sum_of_squares(), problem.prior_triangle(&beta).sum_of_squares());
+    let chi_square = penalised + (problem.noise.inflation - 1.0) * (penalised - of_priors);
     // Each prior counts as an observation in χ².
     let degrees_of_freedom = (problem.readings() * problem.coordinates() + problem.prior_rows())
         .saturating_sub(rank.identifiable_basis.ncols())

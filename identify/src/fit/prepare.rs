@@ -6,6 +6,7 @@ use abbe_model::session::limits::MIN_UM;
 use faer::Mat;
 
 use super::Fit;
+use super::families::{FoldEquations, families};
 use crate::error::IdentifyError;
 use crate::heldout::rms_mm;
 use crate::noise::outliers;
@@ -48,7 +49,20 @@ pub(crate) fn prepare_with(session: &Session, effects: &[Effect], seed: u64) -> 
     for effect in effects {
         problem.add_effect(effect)?;
     }
-    if stated.is_none() {
+    if families(&problem.parameters).is_empty() {
+        return settled(problem, stated.is_some(), floor);
+    }
+    let (without, kept) = problem.without_families();
+    let (without, fit) = settled(without, stated.is_some(), floor)?;
+    let mut start = vec![0.0; problem.parameters.list.len()];
+    kept.iter().zip(&fit.beta).for_each(|(j, value)| start[*j] = *value);
+    (problem.noise, problem.rejected) = (without.noise, without.rejected);
+    with_families(problem, start)
+}
+
+/// Fits a problem, in turn with its noise and its outliers.
+fn settled(mut problem: Problem, stated: bool, floor: f64) -> Result<(Problem, Fit), IdentifyError> {
+    if !stated {
         problem.noise =
             Noise::white(nominal_residual_mm(&problem)?.max(floor).max(MIN_NOISE_MM), NoiseSource::Residual);
     }
@@ -59,10 +73,7 @@ pub(crate) fn prepare_with(session: &Session, effects: &[Effect], seed: u64) -> 
         let rejected = outliers::reject(&problem, &fit.residuals);
         let unchanged = rejected == problem.rejected;
         problem.rejected = rejected;
-        let noise = match stated {
-            Some(_) => problem.noise.clone(),
-            None => estimated_noise(&problem, &fit, floor),
-        };
+        let noise = if stated { problem.noise.clone() } else { estimated_noise(&problem, &fit, floor) };
         let settled = (noise.sigma_mm / problem.noise.sigma_mm - 1.0).abs() < NOISE_TOLERANCE;
         if settled && unchanged {
             break;
@@ -71,6 +82,27 @@ pub(crate) fn prepare_with(session: &Session, effects: &[Effect], seed: u64) -> 
         fit = plausibility::checked(&problem, super::fit(&problem, Some(&fit.beta)))?;
     }
     Ok((problem, fit))
+}
+
+/// Estimates the scales of the families of a problem with the noise that they require, and fits it, in turn with the
+/// outliers. `start` is the fit without the families, with coefficients of zero.
+///
+/// # Errors
+/// See [`prepare`].
+pub(crate) fn with_families(mut problem: Problem, mut start: Vec<f64>) -> Result<(Problem, Fit), IdentifyError> {
+    let mut round = 0;
+    loop {
+        let equations = FoldEquations::of(&problem, &start, &problem.triangles(&start)?);
+        let scales = equations.estimate()?;
+        equations.apply(&scales, &mut problem);
+        let found = super::fit(&problem, Some(&equations.beta(&scales)))?;
+        let rejected = outliers::reject(&problem, &found.residuals);
+        round += 1;
+        if rejected == problem.rejected || round == MAX_ROUNDS {
+            return Ok((problem, found));
+        }
+        (start, problem.rejected) = (found.beta, rejected);
+    }
 }
 
 /// Root mean square of the residual of the nominal machine, mm, after a linearised fit of the set-up quantities. It

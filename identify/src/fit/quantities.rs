@@ -1,4 +1,4 @@
-//! The quantities that a fit reports: identifiable parameters, and amplitude and phase of harmonics.
+//! The quantities that a fit reports: identifiable parameters, amplitude and phase of harmonics, and the rms of spectra.
 
 use super::Fit;
 use crate::numerics::rank::Rank;
@@ -12,6 +12,13 @@ pub(crate) enum Quantity {
     Parameter(usize),
     /// Amplitude and phase of a harmonic, by the index of its cosine coefficient.
     Harmonic(usize),
+    /// Rms over a period of a sum of cosines and sines: `√(Σ c²/2)`. The first coefficient and their number.
+    Rms(usize, usize),
+}
+
+/// The rms over a period of a sum of cosines and sines with some coefficients.
+pub(crate) fn rms_of_waves(coefficients: &[f64]) -> f64 {
+    (0.5 * coefficients.iter().map(|c| c * c).sum::<f64>()).sqrt()
 }
 
 /// The reported quantities in their order: those of the identifiable parameters.
@@ -22,6 +29,12 @@ pub(crate) fn quantities(problem: &Problem, rank: &Rank) -> Vec<Quantity> {
     while j < list.len() {
         if let Role::Coefficient { effect, coefficient: 0 } = list[j].role {
             let effect = &problem.parameters.effects[effect];
+            if effect.shape.needs_prior() {
+                let count = effect.shape.coefficients();
+                quantities.push(Quantity::Rms(j, count));
+                j += count;
+                continue;
+            }
             let pair = effect.shape.is_wave();
             if pair && rank.is_identifiable(j) && rank.is_identifiable(j + 1) {
                 quantities.push(Quantity::Harmonic(j));
@@ -50,6 +63,7 @@ pub(crate) fn values_at(
     for quantity in quantities {
         match *quantity {
             Quantity::Parameter(j) => accept(beta[j] * list[j].unit.display_per_internal),
+            Quantity::Rms(j, count) => accept(rms_of_waves(&beta[j..j + count]) * list[j].unit.display_per_internal),
             Quantity::Harmonic(j) => {
                 accept(beta[j].hypot(beta[j + 1]) * list[j].unit.display_per_internal);
                 let (a, b) = (fit.beta[j], fit.beta[j + 1]);
@@ -79,12 +93,11 @@ mod tests {
         let session = files::session(&file, &ReadOptions::default()).unwrap();
         let (mut problem, _) = prepare(&session, 1).unwrap();
         problem
-            .add_effect(&Effect {
-                component: Component::parse("EZC").unwrap(),
-                driver: Driver::parse("C"),
-                shape: Shape::Harmonic(Harmonic { order: 3.0 }),
-                tests: Vec::new(),
-            })
+            .add_effect(&Effect::new(
+                Component::parse("EZC").unwrap(),
+                Driver::parse("C"),
+                Shape::Harmonic(Harmonic { order: 3.0 }),
+            ))
             .unwrap();
         let mut fit = fit(&problem, None).unwrap();
         let quantities = quantities(&problem, &fit.rank);
@@ -93,7 +106,7 @@ mod tests {
             .enumerate()
             .find_map(|(place, quantity)| match quantity {
                 Quantity::Harmonic(j) => Some((place, *j)),
-                Quantity::Parameter(_) => None,
+                Quantity::Parameter(_) | Quantity::Rms(..) => None,
             })
             .unwrap();
         let coefficients = |amplitude_um: f64, phase_deg: f64| {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::quantities::{Quantity, quantities};
+use super::quantities::{Quantity, quantities, rms_of_waves};
 use super::{Fit, covariance, enlargement_warning};
 use crate::circular;
 use crate::error::IdentifyError;
@@ -72,6 +72,7 @@ pub fn parameters(problem: &Problem, fit: &Fit) -> Vec<ParameterResult> {
     for quantity in quantities(problem, &fit.rank) {
         match quantity {
             Quantity::Harmonic(j) => results.extend(amplitude_and_phase(problem, fit, j)),
+            Quantity::Rms(j, count) => results.push(rms_of_spectrum(problem, fit, j, count)),
             Quantity::Parameter(j) => {
                 let unit = &list[j].unit;
                 let value = fit.beta[j] * unit.display_per_internal;
@@ -84,6 +85,24 @@ pub fn parameters(problem: &Problem, fit: &Fit) -> Vec<ParameterResult> {
         }
     }
     results
+}
+
+/// The rms of a spectrum over a period, with the uncertainty by propagation.
+fn rms_of_spectrum(problem: &Problem, fit: &Fit, first: usize, count: usize) -> ParameterResult {
+    let parameter = &problem.parameters.list[first];
+    let rms = rms_of_waves(&fit.beta[first..first + count]);
+    let along = |j: usize| 0.5 * fit.beta[j] / rms.max(f64::MIN_POSITIVE);
+    let own = first..first + count;
+    let products = own.clone().flat_map(|j| own.clone().map(move |k| (j, k)));
+    let variance: f64 = products.map(|(j, k)| along(j) * along(k) * fit.covariance[(j, k)]).sum();
+    let display = parameter.unit.display_per_internal;
+    let u = variance.max(0.0).sqrt() * fit.u_enlargement * display;
+    let id = parameter.id.trim_end_matches("cos1");
+    ParameterResult::new(format!("{id}rms"), rms * display, u, &parameter.unit.name).with_meaning(parameter_meaning(
+        problem,
+        first,
+        Some("rms"),
+    ))
 }
 
 fn amplitude_and_phase(problem: &Problem, fit: &Fit, j: usize) -> [ParameterResult; 2] {

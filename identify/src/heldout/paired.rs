@@ -8,6 +8,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::numerics::tails::chi_square_tail;
+
 /// Degrees of freedom below which the scatter of whole folds is unreliable. Folds are then divided into blocks.
 const MIN_FREEDOM: usize = 6;
 /// Least number of rows of a block: many times the correlation length of the noise.
@@ -105,6 +107,13 @@ impl HeldOutDecrease {
     /// Whether the held-out error decreases by more than the standard error.
     pub fn is_significant(self) -> bool {
         self.by > self.standard_error
+    }
+
+    /// One-sided probability of at least this decrease without a difference between the models, for a Gaussian decrease.
+    pub fn p_value(self) -> f64 {
+        let z = self.by / self.standard_error.max(f64::MIN_POSITIVE);
+        let both = chi_square_tail(z * z, 1.0);
+        if z > 0.0 { 0.5 * both } else { 1.0 - 0.5 * both }
     }
 
     /// Whether the held-out error increases by more than the standard error.

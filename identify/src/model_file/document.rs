@@ -145,6 +145,8 @@ pub struct Noise {
     pub ar_coefficients: Vec<f64>,
     /// Standard uncertainty of their sum.
     pub ar_sum_u: f64,
+    /// Factor on the variance of a reading in the likelihood of families of effects; 1 without families.
+    pub inflation: f64,
 }
 
 /// How well the model describes its own readings.

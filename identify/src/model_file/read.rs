@@ -307,11 +307,16 @@ impl File<'_> {
         if noise.noise_um <= 0.0 {
             return Err(self.error(format!("`noise.noise_um` is {}; it must be above 0", noise.noise_um), SAVE_AGAIN));
         }
+        if noise.inflation < 1.0 {
+            let message = format!("`noise.inflation` is {}; at least 1 is expected", noise.inflation);
+            return Err(self.error(message, SAVE_AGAIN));
+        }
         Ok(Noise {
             sigma_mm: noise.noise_um * 1e-3,
             ar_coefficients: noise.ar_coefficients.clone(),
             ar_sum_u: noise.ar_sum_u,
             source,
+            inflation: noise.inflation,
         })
     }
 }

@@ -58,6 +58,7 @@ impl IdentifiedModel {
                 source: self.noise.source.word().to_string(),
                 ar_coefficients: self.noise.ar_coefficients.clone(),
                 ar_sum_u: self.noise.ar_sum_u,
+                inflation: self.noise.inflation,
             },
             fit: document::FitQuality {
                 readings: self.quality.readings,

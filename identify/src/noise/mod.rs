@@ -36,6 +36,10 @@ pub struct Noise {
     pub ar_sum_u: f64,
     /// Source of the standard deviation.
     pub source: NoiseSource,
+    /// Variance that the likelihood assigns to a reading over the variance of the noise, at least 1. It exceeds 1 if the
+    /// misfit of neighbouring readings is correlated, so that they carry less information than independent readings
+    /// ([`crate::fit`]: families).
+    pub inflation: f64,
 }
 
 /// Source of a noise standard deviation.
@@ -63,7 +67,12 @@ impl NoiseSource {
 impl Noise {
     /// White noise.
     pub fn white(sigma_mm: f64, source: NoiseSource) -> Noise {
-        Noise { sigma_mm, ar_coefficients: Vec::new(), ar_sum_u: 0.0, source }
+        Noise { sigma_mm, ar_coefficients: Vec::new(), ar_sum_u: 0.0, source, inflation: 1.0 }
+    }
+
+    /// Standard deviation that the likelihood assigns to a reading, mm.
+    pub fn likelihood_mm(&self) -> f64 {
+        self.sigma_mm * self.inflation.sqrt()
     }
 
     /// Standard deviation of the innovation, mm: the part of a reading that earlier readings of its run do not predict.

@@ -5,6 +5,7 @@
 //! (`symmetric`). Every share below which a number counts as zero stands in `tolerances`.
 
 pub mod circle;
+pub(crate) mod evidence;
 pub(crate) mod gain;
 pub mod least_squares;
 mod median;

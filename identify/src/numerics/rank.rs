@@ -57,6 +57,39 @@ impl Rank {
         Ok(Rank { singular_values, identifiable_basis, null_combinations, pivots, null_space })
     }
 
+    /// The same directions among more parameters. `kept` is the index of each of the present parameters among them,
+    /// `size` the size of all. Priors determine the others: each is an identifiable direction of its own, which the
+    /// priors determine to `least[j]` standard deviations per physical size.
+    pub fn among(&self, kept: &[usize], size: &[f64], least: impl Fn(usize) -> f64) -> Rank {
+        let count = size.len();
+        let others: Vec<usize> = (0..count).filter(|j| kept.binary_search(j).is_err()).collect();
+        let rank = self.identifiable_basis.ncols();
+        let mut basis = Mat::zeros(count, rank + others.len());
+        for (i, j) in kept.iter().enumerate() {
+            (0..rank).for_each(|k| basis[(*j, k)] = self.identifiable_basis[(i, k)]);
+        }
+        others.iter().enumerate().for_each(|(k, j)| basis[(*j, rank + k)] = size[*j]);
+        let mut null_space = Mat::zeros(count, self.null_space.ncols());
+        for (i, j) in kept.iter().enumerate() {
+            null_space.row_mut(*j).copy_from(self.null_space.row(i));
+        }
+        let wide = |row: &Vec<f64>| {
+            let mut wide = vec![0.0; count];
+            kept.iter().zip(row).for_each(|(j, value)| wide[*j] = *value);
+            wide
+        };
+        let mut singular_values: Vec<f64> =
+            self.singular_values.iter().copied().chain(others.iter().map(|j| least(*j))).collect();
+        singular_values.sort_by(|a, b| b.total_cmp(a));
+        Rank {
+            singular_values,
+            identifiable_basis: basis,
+            null_combinations: self.null_combinations.iter().map(wide).collect(),
+            pivots: self.pivots.iter().map(|pivot| kept[*pivot]).collect(),
+            null_space,
+        }
+    }
+
     /// Coordinates of parameters in the identifiable basis, by least squares; null-space parts are dropped. `size` as
     /// in [`Rank::decide`]. Internal units.
     pub fn coordinates(&self, beta: &[f64], size: &[f64]) -> Vec<f64> {

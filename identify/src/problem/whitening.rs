@@ -41,8 +41,9 @@ impl Problem {
     pub fn whitened(&self, mut rows: Mat<f64>, kept: &[usize]) -> Mat<f64> {
         let coordinates = self.coordinates();
         let ar_coefficients = &self.noise.ar_coefficients;
-        let innovation = 1.0 / self.noise.innovation_mm();
-        let marginal = 1.0 / self.noise.sigma_mm;
+        let inflation = self.noise.inflation.sqrt();
+        let innovation = 1.0 / (self.noise.innovation_mm() * inflation);
+        let marginal = 1.0 / self.noise.likelihood_mm();
         if ar_coefficients.is_empty() && kept.len() == rows.nrows() {
             rows *= faer::Scale(innovation);
             return rows;

@@ -44,7 +44,7 @@ impl<'p> Refit<'p> {
         let mut starts = Vec::new();
         for residuals in &fit.residuals {
             starts.push(u.len());
-            u.resize(u.len() + residuals.len(), problem.noise.sigma_mm * enlarged);
+            u.resize(u.len() + residuals.len(), problem.noise.likelihood_mm() * enlarged);
         }
         let mut priors = Vec::new();
         for parameter in &problem.parameters.list {
@@ -114,7 +114,7 @@ impl Function for Refit<'_> {
 
     fn outputs(&self) -> usize {
         let of = |quantity: &Quantity| match quantity {
-            Quantity::Parameter(_) => 1,
+            Quantity::Parameter(_) | Quantity::Rms(..) => 1,
             Quantity::Harmonic(_) => 2,
         };
         self.quantities.iter().map(of).sum()

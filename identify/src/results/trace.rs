@@ -82,6 +82,26 @@ pub struct CurvePoint {
     pub value: f64,
     /// Standard uncertainty of `value`, in `curve_unit`.
     pub u: f64,
+    /// Whether no reading lies near this value of the driver, so that the prior determines the curve. Absent if one
+    /// does.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub extrapolated: bool,
+}
+
+/// The Gaussian prior of the coefficients of an effect.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct PriorResult {
+    /// Standard deviation of a coefficient: the component where a basis function is 1.
+    pub scale: f64,
+    /// Its unit.
+    pub unit: String,
+    /// The family of effects for which it was estimated from the readings; absent if the session states it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub family: Option<String>,
+    /// Effective number of parameters of the effect: those that the readings determine and not the prior.
+    pub effective_parameters: f64,
+    /// Number of its coefficients.
+    pub coefficients: usize,
 }
 
 /// A number in an effect's shape that is chosen on a grid. It has no uncertainty.
@@ -106,9 +126,12 @@ pub struct EffectResult {
     /// The numbers of its shape.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub shape_parameters: Vec<ShapeParameter>,
-    /// Its identifiable coefficients. A nonparametric curve may have none.
+    /// Its identifiable coefficients. A nonparametric curve may have none. A spectrum has the rms over a period.
     pub parameters: Vec<ParameterResult>,
-    /// The points of a nonparametric curve.
+    /// The prior of its coefficients; absent without one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prior: Option<PriorResult>,
+    /// The points of a nonparametric curve or of a spectrum.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub curve: Vec<CurvePoint>,
     /// Unit of the driver of a curve.

@@ -2,6 +2,15 @@
 
 /// Difference in `−ln P` below which two candidates are confounded. It corresponds to 2 σ for one column.
 pub const INDISTINGUISHABLE: f64 = 2.0;
+/// Highest order of the spectra of joints, as of the harmonics of poses.
+pub const HIGHEST_ORDER_OF_SPECTRA: usize = 40;
+/// Least effective number of parameters of a family. The readings hardly depend on a family with fewer, such as the
+/// spectrum of a last joint whose axis passes close to the target.
+pub const MIN_EFFECTIVE: f64 = 1.0;
+/// The same of one member of a family.
+pub const MIN_EFFECTIVE_OF_MEMBER: f64 = 0.5;
+/// Single effects whose held-out error is computed beside the families, in each round.
+pub const LINES_TRIED: usize = 8;
 /// Relative difference of scores below which two candidates count as equivalent.
 pub const EQUIVALENT: f64 = 1e-6;
 /// Least detectability of a searched effect. An effect of the largest plausible size has to change the readings by this

@@ -14,9 +14,11 @@
 
 pub mod alias;
 mod constants;
+mod families;
 mod implausible;
 pub(crate) mod interrupt;
 mod judge;
+mod lines;
 mod moves;
 pub(crate) mod noise_model;
 mod null;
@@ -39,11 +41,13 @@ use crate::numerics::parallel;
 use crate::problem::Problem;
 use crate::results::TraceResult;
 use constants::{BLOCK, SINGLE};
+use families::AcceptedFamilies;
 use implausible::Contradicted;
 use interrupt::Interrupt;
 use judge::RefittedModel;
 use noise_model::estimate_noise_model;
 use policy::{Policy, SIGNIFICANCE};
+use result::FamiliesEnded;
 use search::{SearchRecord, search_and_refit};
 use start::Start;
 use state::SearchState;
@@ -225,6 +229,11 @@ fn trace_or_interrupted(
         max_effects: options.max_effects.unwrap_or(policy.max_effects),
         ..policy
     };
+    if policy.families
+        && let Some(found) = families::accepted(problem, before_fit, options, policy.max_effects, interrupt)?
+    {
+        return with_accepted_families((problem, before_fit), found, options, policy, interrupt);
+    }
     let columns = Columns::new(problem, &before_fit.beta);
     let start = Start::of(problem, &columns, before_fit)?;
     interrupt.check()?;
@@ -306,6 +315,35 @@ fn trace_or_interrupted(
         steps: record.steps,
         result: reported.result,
     })
+}
+
+/// Adds single effects to accepted families, and reports.
+fn with_accepted_families(
+    (problem, fit): (&Problem, &Fit),
+    mut found: AcceptedFamilies,
+    options: &TraceOptions,
+    policy: Policy,
+    interrupt: Interrupt<'_>,
+) -> Result<TraceOutcome, IdentifyError> {
+    for (k, accepted) in found.effects.iter().enumerate() {
+        let held_out_um = accepted.heldout_rms_mm * 1e3;
+        (interrupt.0)(Progress::SelectedEffect(k + 1, accepted.effect.id(), held_out_um));
+    }
+    let lines = match lines::add((problem, fit), &mut found, options, policy.max_effects, interrupt) {
+        Err(IdentifyError::Interrupted) => None,
+        ended => Some(ended?),
+    };
+    let ended = FamiliesEnded {
+        families: found.proposed,
+        candidates: lines.as_ref().map_or(0, |lines| lines.candidates),
+        detectable: lines.as_ref().map_or(0, |lines| lines.detectable),
+        last_p_value: lines.as_ref().map_or(1.0, |lines| lines.last_p_value),
+        stopped_early: found.effects.len() >= policy.max_effects,
+        interrupted: lines.is_none(),
+        warnings: screening::unused_exclusions(problem, options)?,
+    };
+    (interrupt.0)(Progress::Judging);
+    result::outcome_with_families(problem, fit, found, ended)
 }
 
 /// The number of null draws: the requested number, but at least as many as the significance level needs.

@@ -42,6 +42,8 @@ pub struct Policy {
     pub in_residual_variance: bool,
     /// Whether every addition has to lower the held-out error. P-values are unreliable for poses.
     pub every_addition_lowers_heldout: bool,
+    /// Whether families of effects under one prior are proposed before single effects.
+    pub families: bool,
     /// Number of selected effects from which a swap no longer tunes positions and periods again.
     pub swap_tunes_below: usize,
     /// The moves after each addition, in order.
@@ -64,6 +66,7 @@ const RUNS: Policy = Policy {
     tests_structure: true,
     in_residual_variance: false,
     every_addition_lowers_heldout: false,
+    families: false,
     swap_tunes_below: 5,
     after_addition: &[MoveName::Swap, MoveName::Merge],
     without_addition: &[MoveName::Refine, MoveName::Pair],
@@ -79,6 +82,7 @@ const POSES: Policy = Policy {
     tests_structure: false,
     in_residual_variance: true,
     every_addition_lowers_heldout: true,
+    families: true,
     swap_tunes_below: 0,
     after_addition: &[MoveName::Swap],
     without_addition: &[],

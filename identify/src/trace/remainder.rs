@@ -87,12 +87,7 @@ impl TestResidual<'_, '_> {
         rows: Option<&Range<usize>>,
         description: String,
     ) {
-        let effect = Effect {
-            component: Component::Reading(self.name.to_string()),
-            driver: driver.clone(),
-            shape,
-            tests: Vec::new(),
-        };
+        let effect = Effect::new(Component::Reading(self.name.to_string()), driver.clone(), shape);
         for coordinate in 0..self.readings.coordinates {
             let column_set = self.columns.reading_columns(&effect, coordinate, by_direction, rows);
             let description = if self.readings.coordinates == 3 {

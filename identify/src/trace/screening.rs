@@ -93,7 +93,8 @@ fn matching_no_candidate<'t>(candidates: &[LibraryEffect], texts: &'t [String]) 
     texts.iter().filter(move |text| !ids.iter().any(|id| id.contains(text.as_str())))
 }
 
-fn is_requested(options: &TraceOptions, id: &str) -> bool {
+/// Whether the caller asks for a candidate of this identifier.
+pub(super) fn is_requested(options: &TraceOptions, id: &str) -> bool {
     let matches = |patterns: &[String]| patterns.iter().any(|pattern| id.contains(pattern.as_str()));
     (options.only.is_empty() || matches(&options.only)) && !matches(&options.exclude)
 }

@@ -67,7 +67,7 @@ pub fn effect(machine: &Machine, cell: &str) -> Effect {
     let text = cell.trim_matches('`');
     let plain = |component: &str| Component::parse(component).unwrap_or_else(|| panic!("{text}"));
     let Some((component, rest)) = text.split_once('~') else {
-        return Effect { component: plain(text), driver: Driver::None, shape: Shape::Constant, tests: Vec::new() };
+        return Effect::new(plain(text), Driver::None, Shape::Constant);
     };
     let component = plain(component);
     let (driver, shape) = rest.split_once(':').unwrap_or_else(|| panic!("{text}"));
@@ -82,7 +82,7 @@ pub fn effect(machine: &Machine, cell: &str) -> Effect {
     let entry = Shape::entry_of(if word == "h" { "harmonic" } else { word }).unwrap_or_else(|| panic!("{text}"));
     let shape = (entry.read)(&mut keys).unwrap();
     assert!(keys.numbers.is_empty(), "{text}");
-    Effect { component, driver, shape, tests: Vec::new() }
+    Effect::new(component, driver, shape)
 }
 
 /// The numbers of a shape as the page states them: without keys, in the order in which the shape reads them. Optional

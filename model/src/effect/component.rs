@@ -72,6 +72,17 @@ impl Component {
         }
     }
 
+    /// Whether it is an angle, of an axis or of any instrument.
+    pub fn is_angle(&self) -> bool {
+        match self {
+            Component::Axis(name) => name.freedom.is_angle(),
+            Component::Instrument { .. } => {
+                InstrumentKind::ALL.iter().any(|kind| self.unit(kind.unknowns()) == Some(InternalUnit::Radian))
+            }
+            Component::TriggerDelay | Component::Reading(_) => false,
+        }
+    }
+
     /// The slots that it changes (machine errors first), with what multiplies the basis function in each (`None`: 1). A
     /// delay changes the errors along every axis: `rate` is the rate of an axis, `None` if it stands; `times` is a rate
     /// times a number.

@@ -62,7 +62,7 @@ pub fn explanations(meanings: &[Meaning]) -> String {
 
 /// A constant effect on a component.
 fn constant(component: Component) -> Effect {
-    Effect { component, driver: Driver::None, shape: Shape::Constant, tests: Vec::new() }
+    Effect::new(component, Driver::None, Shape::Constant)
 }
 
 /// The name of an axis as a machine part.

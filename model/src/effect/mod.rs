@@ -9,10 +9,12 @@
 mod component;
 pub mod description;
 pub mod keys;
+pub mod prior;
 pub mod sampled;
 pub mod shape;
 
 pub use component::Component;
+pub use prior::CoefficientPrior;
 pub use shape::{Shape, ShapeFault};
 
 use crate::axis::AxisKind;
@@ -26,12 +28,8 @@ use crate::driver::{Driver, DriverUnit};
 /// use abbe_model::effect::shape::Harmonic;
 /// use abbe_model::effect::{Component, Effect, Shape};
 ///
-/// let effect = Effect {
-///     component: Component::parse("EZC").unwrap(),
-///     driver: Driver::parse("C"),
-///     shape: Shape::Harmonic(Harmonic { order: 2.0 }),
-///     tests: Vec::new(),
-/// };
+/// let component = Component::parse("EZC").unwrap();
+/// let effect = Effect::new(component, Driver::parse("C"), Shape::Harmonic(Harmonic { order: 2.0 }));
 /// assert_eq!(effect.id(), "EZC~C:h2");
 /// // Cosine and sine of 2 C, at C = 30°.
 /// let at = DriverSample { value: 30_f64.to_radians(), ..DriverSample::default() };
@@ -49,9 +47,27 @@ pub struct Effect {
     pub shape: Shape,
     /// The tests in which the effect acts; empty for all.
     pub tests: Vec<String>,
+    /// The prior of its coefficients.
+    pub prior: CoefficientPrior,
 }
 
 impl Effect {
+    /// An effect in all tests, with the prior of its shape.
+    pub fn new(component: Component, driver: Driver, shape: Shape) -> Effect {
+        let prior = CoefficientPrior::default_of(&shape);
+        Effect { component, driver, shape, tests: Vec::new(), prior }
+    }
+
+    /// The family whose prior standard deviation is estimated from the readings: the one that it names, or its own
+    /// identifier. `None` if there is no prior or its standard deviation is stated.
+    pub fn family(&self) -> Option<String> {
+        match &self.prior {
+            CoefficientPrior::Family(name) if name.is_empty() => Some(self.id()),
+            CoefficientPrior::Family(name) => Some(name.clone()),
+            CoefficientPrior::Flat | CoefficientPrior::Scale(_) => None,
+        }
+    }
+
     /// Whether the effect acts in a test of this name.
     pub fn acts_in(&self, test: &str) -> bool {
         self.tests.is_empty() || self.tests.iter().any(|name| name == test)

@@ -67,6 +67,19 @@ fn effects_on_missing_components() {
         &effect("component = \"EXX\"\nshape = \"periodic\"\nperiod_deg = 10"),
         &["session.toml:18", "`period_deg` for a driver in mm", "period_mm"],
     );
+    let spectrum = |keys: &str| effect(&format!("component = \"EZC\"\nshape = \"spectrum\"\n{keys}"));
+    assert_contains(&spectrum(""), &["the shape \"spectrum\" needs `orders`", "orders = 40"]);
+    assert_contains(&spectrum("orders = 0"), &["session.toml:18", "240"]);
+    assert_contains(&spectrum("orders = 4\nscale_arcsec = 1"), &["`scale_arcsec` for the component", "use `scale_um`"]);
+    assert_contains(&spectrum("orders = 4\nscale_um = -1"), &["session.toml:19"]);
+    assert_contains(&spectrum("orders = 4\nscale_um = 1e9"), &["must be between", "1000000"]);
+    assert_contains(&spectrum("orders = 4\nscale_um = 1\nfamily = \"a\""), &["`family` beside a stated scale"]);
+    assert_contains(&spectrum("orders = 4\nfamily = \"\""), &["the name of a family is empty"]);
+    assert_contains(&effect("component = \"EXX\"\nshape = \"spectrum\"\norders = 4"), &["needs `period_mm`"]);
+    assert_contains(
+        &effect("component = \"EXX\"\ndriver = \"time\"\nshape = \"spectrum\"\norders = 4\nperiod_s = 9"),
+        &["cannot have the driver \"time\"", "must be an axis"],
+    );
     assert_contains(
         &effect("component = \"target.x\"\ndriver = \"time\"\nshape = \"drift\""),
         &["a ballbar does not have"],

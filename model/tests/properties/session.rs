@@ -86,16 +86,15 @@ fn declared(machine: &Machine, drawn: Vec<(usize, usize, usize, Shape, Shape)>) 
     let axes = machine.axes.len();
     let effects = drawn.into_iter().map(|(freedom, of, driver, linear, rotary)| {
         let driver = &machine.axes[driver % axes];
-        Effect {
-            component: Component::Axis(ErrorName {
+        Effect::new(
+            Component::Axis(ErrorName {
                 kind: ErrorKind::Motion,
                 freedom: Freedom::ALL[freedom],
                 axis: machine.axes[of % axes].name.clone(),
             }),
-            driver: Driver::Axis(driver.name.clone()),
-            shape: if driver.kind == AxisKind::Rotary { rotary } else { linear },
-            tests: Vec::new(),
-        }
+            Driver::Axis(driver.name.clone()),
+            if driver.kind == AxisKind::Rotary { rotary } else { linear },
+        )
     });
     effects.collect()
 }

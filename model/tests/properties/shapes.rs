@@ -2,7 +2,7 @@
 
 use abbe_model::axis::AxisKind;
 use abbe_model::driver::{Driver, DriverSample};
-use abbe_model::effect::shape::{Curve, Harmonic, Local, Periodic, Polynomial, Power, ReversalSpike, Steps};
+use abbe_model::effect::shape::{Curve, Harmonic, Local, Periodic, Polynomial, Power, ReversalSpike, Spectrum, Steps};
 use abbe_model::effect::{Component, Effect, Shape};
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -28,6 +28,7 @@ pub fn shapes(kind: AxisKind) -> impl Strategy<Value = Shape> {
         (1_usize..6, width()).prop_map(|(degree, scale)| Shape::Polynomial(Polynomial { degree, scale })),
         (1_usize..6, width()).prop_map(|(degree, scale)| Shape::Power(Power { degree, scale })),
         width().prop_map(|period| Shape::Periodic(Periodic { period })),
+        (1_usize..12, width()).prop_map(|(orders, period)| Shape::Spectrum(Spectrum { orders, period })),
         (place(), width(), 4_usize..30, any::<bool>()).prop_map(|(from, length, intervals, closed)| {
             Shape::Curve(Curve { from, to: from + length, intervals, closed })
         }),
@@ -81,6 +82,14 @@ proptest! {
             Shape::Harmonic { .. } | Shape::Periodic { .. } => {
                 prop_assert!((found[0].hypot(found[1]) - 1.0).abs() < 1e-12);
             }
+            Shape::Spectrum(Spectrum { orders, period }) => {
+                for k in 0..orders {
+                    let of_order = Shape::Periodic(Periodic { period: period / (k + 1) as f64 });
+                    let expected = basis(&of_order, &sample);
+                    prop_assert!((found[2 * k] - expected[0]).abs() < 1e-6, "{found:?}");
+                    prop_assert!((found[2 * k + 1] - expected[1]).abs() < 1e-6, "{found:?}");
+                }
+            }
             Shape::Power(Power { degree, scale }) => {
                 let all = basis(&Shape::Polynomial(Polynomial { degree, scale }), &sample);
                 prop_assert!((found[0] - all[degree - 1]).abs() <= 1e-12 * found[0].abs());
@@ -94,7 +103,7 @@ proptest! {
     fn periodic_shapes_are_periodic(shape in shapes(AxisKind::Rotary), value in -3.0..3.0, turns in -3_i32..=3) {
         let period = match &shape {
             Shape::Harmonic(Harmonic { order }) => std::f64::consts::TAU / order,
-            Shape::Periodic(Periodic { period }) => *period,
+            Shape::Periodic(Periodic { period }) | Shape::Spectrum(Spectrum { period, .. }) => *period,
             Shape::Curve(Curve { from, to, closed: true, .. }) => to - from,
             Shape::Local(Local { recurs: Some(period), .. }) => *period,
             _ => return Ok(()),
@@ -109,12 +118,11 @@ proptest! {
 
 #[test]
 fn an_effect_acts_in_the_tests_that_it_is_confined_to() {
-    let mut effect = Effect {
-        component: Component::parse("EZC").expect("a component"),
-        driver: Driver::parse("C"),
-        shape: Shape::Harmonic(Harmonic { order: 1.0 }),
-        tests: Vec::new(),
-    };
+    let mut effect = Effect::new(
+        Component::parse("EZC").expect("a component"),
+        Driver::parse("C"),
+        Shape::Harmonic(Harmonic { order: 1.0 }),
+    );
     assert!(effect.acts_in("one") && effect.acts_in("two"));
     effect.tests.push("one".into());
     assert!(effect.acts_in("one") && !effect.acts_in("two"));

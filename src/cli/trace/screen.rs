@@ -65,6 +65,9 @@ fn print_effect(number: usize, effect: &EffectResult, screened: usize, all: bool
         let (value, u) = value_and_u(p.value, p.u);
         say!("   {}  {}", p.id, quantity(&format!("{value} ± {u}"), &p.unit));
     }
+    if let Some(prior) = &effect.prior {
+        say!("   {}", present::prior(prior));
+    }
     say!("   explains {} rms; p ≤ {:.3}", micrometres(effect.rms_gain_um), effect.p_value);
     say!("   {}", uniqueness::standing(effect, screened));
     let aliases = effect.aliases.iter();

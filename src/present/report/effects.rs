@@ -85,6 +85,7 @@ fn block(
                 dl {
                     dt { "Effect" } dd { (name(&effect.name)) }
                     dt { "Estimate" } dd { (estimate(effect)) }
+                    @if let Some(prior) = &effect.prior { dt { "Prior" } dd { (present::prior(prior)) } }
                     dt { "Explains" } dd { (micrometres(effect.rms_gain_um)) " rms (p ≤ " (format!("{:.3}", effect.p_value)) ")" }
                     dt { "Held-out rms" } dd { (micrometres(effect.heldout_rms_um)) " with this effect" }
                     dt { "Family" } dd { (effect.family) }
@@ -101,7 +102,7 @@ fn block(
 
 /// Coefficients with their standard uncertainties, and chosen numbers of the shape.
 fn estimate(effect: &EffectResult) -> String {
-    if !effect.curve.is_empty() {
+    if !effect.curve.is_empty() && effect.prior.is_none() {
         return "nonparametric curve, see the plot".to_string();
     }
     let values = effect.parameters.iter().map(|parameter| {
@@ -119,6 +120,11 @@ fn estimate(effect: &EffectResult) -> String {
 
 /// Explanations that the readings do not separate, with the separation from each that further tests achieve.
 fn alternatives(effect: &EffectResult, screened: usize) -> Markup {
+    if effect.prior.is_some() {
+        return html! {
+            h4 { (capitalised(&uniqueness::standing(effect, screened))) }
+        };
+    }
     if effect.unique {
         return html! {
             h4 { "Unique explanation" }
@@ -199,19 +205,28 @@ fn curve(effect: &EffectResult) -> Figure {
     };
     let values = effect.curve.iter().flat_map(|p| [p.value - 2.0 * p.u, p.value + 2.0 * p.u]);
     let name = &effect.name;
+    let mut series = vec![
+        Series::new("curve", "after", Mark::Line, line(0.0)),
+        Series::new("± 2 u", "found-line", Mark::Line, line(2.0)),
+        Series::new("± 2 u", "found-line", Mark::Line, line(-2.0)),
+    ];
+    // A point for each value of the driver without a reading nearby.
+    let extrapolated: Vec<(f64, f64)> =
+        effect.curve.iter().filter(|p| p.extrapolated).map(|p| (p.at, p.value)).collect();
+    let mut caption = "The curve excludes the components that are collinear with location errors.".to_string();
+    if !extrapolated.is_empty() {
+        caption += " Points: no reading lies nearby; the prior determines the curve.";
+        series.push(Series::new("extrapolated", "dot-before", Mark::Dots, extrapolated));
+    }
     let lines = Lines::new(
         Axis::new(&name.driver, &effect.curve_at_unit, Scale::over(span(effect.curve.iter().map(|p| p.at)), 8)),
         Axis::new(&name.component, &effect.curve_unit, Scale::with_zero(span(values), 6)),
-        vec![
-            Series::new("curve", "after", Mark::Line, line(0.0)),
-            Series::new("± 2 u", "found-line", Mark::Line, line(2.0)),
-            Series::new("± 2 u", "found-line", Mark::Line, line(-2.0)),
-        ],
+        series,
     );
     Figure::new(
         format!("curve-{}-{}", name.component, name.driver),
         format!("{} over {}", name.component, name.driver),
-        "The curve excludes the components that are collinear with location errors.",
+        caption,
         Chart::Lines(lines),
     )
 }

@@ -172,12 +172,11 @@ impl Columns<'_> {
             if high - low < 1e-6 || 2 * longest < 3 * intervals {
                 continue;
             }
-            let effect = Effect {
-                component: Component::Reading(test.name.clone()),
-                driver: driver.clone(),
-                shape: Shape::Curve(Curve { from: low, to: high, intervals, closed: false }),
-                tests: Vec::new(),
-            };
+            let effect = Effect::new(
+                Component::Reading(test.name.clone()),
+                driver.clone(),
+                Shape::Curve(Curve { from: low, to: high, intervals, closed: false }),
+            );
             for coordinate in 0..self.problem.coordinates() {
                 let column_set = self.reading_columns(&effect, coordinate, false, None);
                 column_sets.extend(column_set.map(|column_set| (effect.clone(), column_set)));
@@ -251,12 +250,7 @@ mod tests {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
         let session = files::session(&file, &ReadOptions::default()).unwrap();
         let (mut problem, fit) = prepare(&session, 1).unwrap();
-        let effect = Effect {
-            component: Component::Reading(problem.tests[1].name.clone()),
-            driver: Driver::None,
-            shape: Shape::Constant,
-            tests: Vec::new(),
-        };
+        let effect = Effect::new(Component::Reading(problem.tests[1].name.clone()), Driver::None, Shape::Constant);
         let columns = Columns::new(&problem, &fit.beta);
         let term = columns.reading_columns(&effect, 0, false, None).unwrap();
         let rows = columns.unwhitened_rows(&[&term]);

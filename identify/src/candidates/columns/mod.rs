@@ -214,6 +214,18 @@ impl<'p> Columns<'p> {
         Ok(rows)
     }
 
+    /// Whitens values by test and scalar reading, in mm, in fold order.
+    pub fn whitened_values(&self, values: &[Vec<f64>]) -> Vec<f64> {
+        let coordinates = self.problem.coordinates();
+        let mut white = Vec::with_capacity(self.rows);
+        for (block, kept) in self.blocks.iter().zip(&self.kept) {
+            let own = &values[block.test][block.rows.start * coordinates..block.rows.end * coordinates];
+            let column = Mat::from_fn(own.len(), 1, |i, _| own[i]);
+            white.extend(self.problem.whitened(column, kept).col(0).iter());
+        }
+        self.placed(&white)
+    }
+
     /// Sorts values that are whitened block by block into fold order.
     pub fn placed(&self, values: &[f64]) -> Vec<f64> {
         let mut placed = vec![0.0; self.rows];

@@ -103,7 +103,7 @@ pub fn candidates(problem: &Problem) -> Result<Vec<LibraryEffect>, IdentifyError
         for component in components(problem, &sampling, family.components) {
             for driver in drivers(problem, &sampling, &family.driver, &component) {
                 for (shape, tests, extra) in shapes(problem, &sampling, family, &component, &driver) {
-                    let effect = Effect { component: component.clone(), driver: driver.clone(), shape, tests };
+                    let effect = Effect { tests, ..Effect::new(component.clone(), driver.clone(), shape) };
                     let cost = family.simplicity + extra + tilt_cost(problem, &component);
                     let last_resort = family.last_resort;
                     let grid = grid(problem, &sampling, &effect);

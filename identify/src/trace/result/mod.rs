@@ -1,6 +1,8 @@
 //! Results of a finished search.
 
+mod curve;
 mod effect;
+mod families;
 mod prediction;
 mod rejected;
 mod unsearched;
@@ -24,6 +26,7 @@ use crate::results::{
     ChangedParameter, EffectResult, ModelResult, ParameterResult, TraceResult, phases_follow_amplitudes,
 };
 pub(crate) use effect::effect_name;
+pub(super) use families::{FamiliesEnded, outcome_with_families};
 pub(super) use unsearched::unsearched;
 use verdict::{not_examined, verdict};
 

@@ -6,15 +6,19 @@ use crate::fit::{self, Fit};
 use crate::noise;
 use crate::plausibility::Plausibility;
 use crate::problem::Problem;
-use crate::results::TraceResult;
+use crate::results::{ModelResult, TraceResult};
 
 /// The declared model alone, without a verdict.
 pub(in crate::trace) fn unsearched(problem: &Problem, fit: &Fit) -> Result<TraceResult, IdentifyError> {
-    let declared = model_result(problem, fit, fit.held_out.rms_mm)?;
+    Ok(unsearched_of(problem, fit, model_result(problem, fit, fit.held_out.rms_mm)?))
+}
+
+/// As [`unsearched`], with the known figures of the model.
+pub(super) fn unsearched_of(problem: &Problem, fit: &Fit, declared: ModelResult) -> TraceResult {
     let remainder = not_examined();
     let mut warnings = problem.session.warnings.clone();
     warnings.extend(noise::stated_against_repeats(problem, &fit.residuals));
-    Ok(TraceResult {
+    TraceResult {
         verdict: String::new(),
         interrupted: false,
         unique: true,
@@ -38,5 +42,5 @@ pub(in crate::trace) fn unsearched(problem: &Problem, fit: &Fit) -> Result<Trace
         about: problem.session.about.iter().cloned().collect(),
         plausibility: Plausibility::default(),
         warnings,
-    })
+    }
 }

@@ -127,6 +127,10 @@ pub trait ShapeKind {
     fn is_wave(&self) -> bool {
         false
     }
+    /// Whether its coefficients need a prior, because readings over part of the travel leave them undetermined.
+    fn needs_prior(&self) -> bool {
+        false
+    }
     /// The quantities of the driver that its basis functions use.
     fn uses(&self) -> DriverPart {
         DriverPart::Value

@@ -74,6 +74,7 @@ shapes! {
     power: Power(Power),
     harmonic: Harmonic(Harmonic),
     periodic: Periodic(Periodic),
+    spectrum: Spectrum(Spectrum),
     triangle: Triangle(Triangle),
     curve: Curve(Curve),
     backlash: Backlash,

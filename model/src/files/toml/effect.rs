@@ -1,7 +1,7 @@
 //! Reader of `[[effect]]`: component × driver × shape.
 
 use super::shape::ShapeKeys;
-use super::{Context, Declared, quantity};
+use super::{Context, Declared, prior, quantity};
 use crate::component::ErrorKind;
 use crate::driver::Driver;
 use crate::effect::shape::{Entry, SHAPES};
@@ -32,9 +32,10 @@ pub(super) fn effect(context: &Context<'_>, declared: &[Declared], item: Value<'
         word_value.error(message, Some(help.to_string()))
     })?;
     let tests = tests(&mut table, declared)?;
+    let prior = prior::read(&mut table, &component, &shape, context.instrument.unknowns())?;
     shape.check().map_err(|fault| word_value.error(fault.to_string(), None))?;
     table.finish()?;
-    Ok(Effect { component, driver, shape, tests })
+    Ok(Effect { component, driver, shape, tests, prior })
 }
 
 fn component(context: &Context<'_>, table: &mut Table<'_>) -> Result<Component, ModelError> {

@@ -7,6 +7,7 @@ mod format;
 mod machine;
 mod movement;
 pub mod parts;
+mod prior;
 pub mod rewrite;
 mod shape;
 mod sockets;

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use super::document::Source;
+use super::prior;
 use crate::chain::Machine;
 use crate::effect::Effect;
 use crate::effect::keys::KeyWriter;
@@ -19,12 +20,8 @@ use crate::error::ModelError;
 /// use abbe_model::files::toml::write;
 ///
 /// let machine = Machine::from_code("wCAbYXZt")?;
-/// let effect = Effect {
-///     component: Component::parse("EZC").unwrap(),
-///     driver: Driver::parse("C"),
-///     shape: Shape::Harmonic(Harmonic { order: 2.0 }),
-///     tests: Vec::new(),
-/// };
+/// let component = Component::parse("EZC").unwrap();
+/// let effect = Effect::new(component, Driver::parse("C"), Shape::Harmonic(Harmonic { order: 2.0 }));
 /// let text = write::with_effects("# a session\n", &[effect], &machine);
 /// assert_eq!(
 ///     text,
@@ -51,6 +48,7 @@ fn effect_table(effect: &Effect, machine: &Machine) -> String {
     keys.line("driver", quoted(&effect.driver.to_string()));
     keys.line("shape", quoted(effect.shape.entry().word));
     effect.shape.write(&mut keys);
+    prior::write(&effect.prior, &effect.component, &effect.shape, &mut keys);
     if !effect.tests.is_empty() {
         let names: Vec<String> = effect.tests.iter().map(|name| quoted(name)).collect();
         keys.line("tests", format!("[{}]", names.join(", ")));

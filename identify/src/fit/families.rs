@@ -1,0 +1,452 @@
+//! Families of effects: their prior scales, and the inflation of the noise that these require.
+//!
+//! The scales maximise the marginal likelihood ([`crate::numerics::evidence`]). The misfit of a model is correlated
+//! between neighbouring readings, so `n` readings do not carry `n` independent pieces of information, and the plain
+//! marginal likelihood claims scales and uncertainties that other readings contradict. The likelihood is therefore
+//! tempered: the variance of a reading is `κ σ²`, with the inflation `κ ≥ 1` (power likelihood: Holmes & Walker,
+//! Biometrika 104 (2017) 497; Grünwald & van Ommen, Bayesian Analysis 12 (2017) 1069). `κ` is the least value at which
+//! the held-out folds are covered:
+//!
+//! ```text
+//! mean over the readings of fold k of  ‖y_k − J_k b₋ₖ‖² / (n_k σ² + tr J_k C₋ₖ J_kᵀ) = 1
+//! ```
+//!
+//! `b₋ₖ` and `C₋ₖ` are mean and covariance without the fold. `κ = 1` if the folds are covered without inflation, as for
+//! independent noise. Everything follows from the triangular factors of the folds, without another pass over the
+//! readings.
+
+use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
+use faer::prelude::Solve;
+use faer::{Mat, Par, Side};
+
+use abbe_model::session::Prior;
+
+use crate::error::IdentifyError;
+use crate::heldout::paired::{HeldOutDecrease, Units};
+use crate::noise::NoiseSource;
+use crate::numerics::evidence::{NormalEquations, Posterior};
+use crate::numerics::parallel;
+use crate::numerics::triangle::Triangle;
+use crate::parameters::{Parameters, Role};
+use crate::problem::Problem;
+
+/// A family of a problem: the effects that share a prior scale.
+#[derive(Clone, Debug)]
+pub(crate) struct Family {
+    /// Its name.
+    pub name: String,
+    /// Its coefficients, by index among the parameters.
+    pub parameters: Vec<usize>,
+}
+
+/// The families of a problem whose scale is estimated, in the order of their first effects.
+pub(crate) fn families(parameters: &Parameters) -> Vec<Family> {
+    let mut families: Vec<Family> = Vec::new();
+    for (j, parameter) in parameters.list.iter().enumerate() {
+        let Role::Coefficient { effect, .. } = parameter.role else { continue };
+        let Some(name) = parameters.effects[effect].family() else { continue };
+        match families.iter_mut().find(|family| family.name == name) {
+            Some(family) => family.parameters.push(j),
+            None => families.push(Family { name, parameters: vec![j] }),
+        }
+    }
+    families
+}
+
+/// Effective number of parameters of an effect with a prior: `m − Σ C_jj/τ²`. `None` for an effect without one.
+pub(crate) fn effective_parameters(problem: &Problem, covariance: &Mat<f64>, effect: usize) -> Option<f64> {
+    let mut effective = 0.0;
+    for (j, parameter) in problem.parameters.list.iter().enumerate() {
+        match (parameter.role, parameter.prior) {
+            (Role::Coefficient { effect: of, .. }, Prior::Gaussian(scale)) if of == effect => {
+                effective += 1.0 - (covariance[(j, j)] / (scale * scale)).min(1.0);
+            }
+            (Role::Coefficient { effect: of, .. }, _) if of == effect => return None,
+            _ => {}
+        }
+    }
+    Some(effective)
+}
+
+/// Largest inflation: one piece of information in a thousand readings.
+const MAX_INFLATION: f64 = 1e3;
+/// The inflation that is tried first.
+const FIRST_INFLATION: f64 = 30.0;
+/// Relative tolerance of the calibration of held-out folds.
+const CALIBRATED: f64 = 0.01;
+/// Relative tolerance of the noise variance.
+const SETTLED: f64 = 1e-3;
+/// Maximum number of estimates of scales and noise in turn.
+const MAX_ROUNDS: usize = 8;
+
+/// The readings of the folds in the form of normal equations, linearised at given parameters. Parameters are in
+/// physical sizes, those of one family in a common size. Readings are whitened with the noise of the problem.
+pub(crate) struct FoldEquations {
+    equations: NormalEquations,
+    folds: Vec<FoldRows>,
+    /// Number of scalar readings.
+    readings: f64,
+    /// Variance of a reading in units of the whitening, if it does not follow from the residual.
+    variance: Option<f64>,
+    /// Index of each parameter among those of the problem.
+    parameters: Vec<usize>,
+    /// Size of each parameter.
+    sizes: Vec<f64>,
+    /// For each parameter, the value that its coordinate refers to: 0 for a coefficient of a family, else the point of
+    /// the linearisation.
+    origin: Vec<f64>,
+}
+
+/// The rows of a fold over scaled parameters, and their products.
+struct FoldRows {
+    rows: Mat<f64>,
+    y: Mat<f64>,
+    gram: Mat<f64>,
+    projection: Vec<f64>,
+    readings: f64,
+}
+
+/// The estimated scales, and the model that they give.
+pub(crate) struct Scales {
+    /// Precision of each family, over scaled parameters.
+    precisions: Vec<f64>,
+    /// Variance of a reading in units of the whitening.
+    variance: f64,
+    /// The inflation.
+    pub inflation: f64,
+    /// The posterior of the scaled parameters.
+    posterior: Posterior,
+    /// Sum of squares of the residual of each held-out fold, in units of the whitening.
+    held_out: Vec<f64>,
+}
+
+impl Scales {
+    /// Sum of squares of the residuals of all held-out folds, in units of the whitening.
+    pub fn held_out_sum(&self) -> f64 {
+        self.held_out.iter().sum()
+    }
+
+    /// Decrease of the penalised sum of squares of the tempered likelihood by the parameters.
+    pub fn explained(&self) -> f64 {
+        self.posterior.explained
+    }
+
+    /// Effective number of parameters of each family.
+    pub fn effective(&self) -> &[f64] {
+        &self.posterior.effective
+    }
+
+    /// The decrease of the held-out error from another model of the same readings, by folds.
+    pub fn decrease_from(&self, other: &Scales) -> HeldOutDecrease {
+        Units::of((0..self.held_out.len()).map(|fold| (0, fold))).decrease(&other.held_out, &self.held_out)
+    }
+}
+
+impl FoldEquations {
+    /// From the triangular factors of the folds at the parameters `beta`.
+    pub fn of(problem: &Problem, beta: &[f64], triangles: &[Triangle]) -> FoldEquations {
+        let list = &problem.parameters.list;
+        let count = list.len();
+        let families = families(&problem.parameters);
+        let mut sizes = problem.parameters.sizes();
+        let mut origin = beta.to_vec();
+        for family in &families {
+            let common = family.parameters.iter().map(|j| sizes[*j]).fold(f64::INFINITY, f64::min);
+            for j in &family.parameters {
+                sizes[*j] = common;
+                origin[*j] = 0.0;
+            }
+        }
+        // In the coordinates x = (b − origin)/size the present point is not zero for coefficients of families.
+        let present: Vec<f64> = (0..count).map(|j| (beta[j] - origin[j]) / sizes[j]).collect();
+        let absolute = |triangle: &Triangle| -> (Mat<f64>, Mat<f64>) {
+            let own = triangle.rows();
+            let rows = Mat::from_fn(own.nrows(), count, |i, j| own[(i, j)] * sizes[j]);
+            let y = Mat::from_fn(own.nrows(), 1, |i, _| {
+                own[(i, count)] + (0..count).map(|j| rows[(i, j)] * present[j]).sum::<f64>()
+            });
+            (rows, y)
+        };
+        let mut readings = vec![0.0; triangles.len()];
+        for (fold_of, rejected) in problem.folds.of_row.iter().zip(&problem.rejected) {
+            for (fold, _) in fold_of.iter().zip(rejected).filter(|(_, rejected)| !**rejected) {
+                readings[*fold] += problem.coordinates() as f64;
+            }
+        }
+        let folds: Vec<FoldRows> = parallel::map(triangles.len(), &|k| {
+            let (rows, y) = absolute(&triangles[k]);
+            let gram = rows.transpose() * &rows;
+            let projection = (rows.transpose() * &y).col(0).iter().copied().collect();
+            FoldRows { rows, y, gram, projection, readings: readings[k] }
+        });
+        let (mut gram, mut projection, mut square) = (Mat::zeros(count, count), vec![0.0; count], 0.0);
+        for fold in &folds {
+            gram += &fold.gram;
+            projection.iter_mut().zip(&fold.projection).for_each(|(sum, more)| *sum += more);
+            square += fold.y.squared_norm_l2();
+        }
+        let (prior, prior_projection) = fixed_prior(problem, beta, &families, &sizes, &present);
+        let noise = &problem.noise;
+        FoldEquations {
+            equations: NormalEquations {
+                gram,
+                projection,
+                square,
+                prior,
+                prior_projection,
+                families: families.into_iter().map(|family| family.parameters).collect(),
+            },
+            folds,
+            readings: readings.iter().sum(),
+            variance: (noise.source != NoiseSource::Residual).then_some(1.0 / noise.inflation),
+            parameters: (0..count).collect(),
+            sizes,
+            origin,
+        }
+    }
+
+    /// The same equations with some of the families only; the coefficients of the others are zero.
+    pub fn with_families(&self, kept: &[usize]) -> FoldEquations {
+        let families = &self.equations.families;
+        let dropped = (0..families.len()).filter(|family| !kept.contains(family));
+        let absent: Vec<usize> = dropped.flat_map(|family| families[family].iter().copied()).collect();
+        let present: Vec<usize> = (0..self.sizes.len()).filter(|j| !absent.contains(j)).collect();
+        self.with_parameters(&present)
+    }
+
+    /// The same equations with some of the parameters only, in ascending order; the others stay at the point of the
+    /// linearisation. Families without parameters are dropped.
+    pub fn with_parameters(&self, present: &[usize]) -> FoldEquations {
+        let place = |j: &usize| present.binary_search(j).ok();
+        let square =
+            |matrix: &Mat<f64>| Mat::from_fn(present.len(), present.len(), |i, j| matrix[(present[i], present[j])]);
+        let some = |values: &[f64]| -> Vec<f64> { present.iter().map(|j| values[*j]).collect() };
+        let own = &self.equations;
+        let families = own.families.iter().map(|family| family.iter().filter_map(place).collect::<Vec<usize>>());
+        FoldEquations {
+            equations: NormalEquations {
+                gram: square(&own.gram),
+                projection: some(&own.projection),
+                square: own.square,
+                prior: square(&own.prior),
+                prior_projection: some(&own.prior_projection),
+                families: families.filter(|family| !family.is_empty()).collect(),
+            },
+            folds: (self.folds.iter())
+                .map(|fold| FoldRows {
+                    rows: Mat::from_fn(fold.rows.nrows(), present.len(), |i, j| fold.rows[(i, present[j])]),
+                    y: fold.y.clone(),
+                    gram: square(&fold.gram),
+                    projection: some(&fold.projection),
+                    readings: fold.readings,
+                })
+                .collect(),
+            readings: self.readings,
+            variance: self.variance,
+            parameters: present.iter().map(|j| self.parameters[*j]).collect(),
+            sizes: some(&self.sizes),
+            origin: some(&self.origin),
+        }
+    }
+
+    /// Effective number of parameters among some parameters of one family, by index among those of the problem.
+    pub fn effective_among(&self, scales: &Scales, parameters: &[usize]) -> f64 {
+        let effective = |j: &usize| {
+            let place = self.parameters.binary_search(j).ok()?;
+            let family = self.equations.families.iter().position(|family| family.contains(&place))?;
+            Some((1.0 - scales.precisions[family] * scales.posterior.covariance[(place, place)]).max(0.0))
+        };
+        parameters.iter().filter_map(effective).sum()
+    }
+
+    /// The model with the present scales and the present noise of the problem that the equations are of.
+    ///
+    /// # Errors
+    /// If the equations are not positive definite.
+    pub fn at_present(&self, problem: &Problem) -> Result<Scales, IdentifyError> {
+        let families = families(&problem.parameters);
+        let precision =
+            |(family, own): (&Family, &Vec<usize>)| match problem.parameters.list[family.parameters[0]].prior {
+                Prior::Gaussian(scale) => (self.sizes[own[0]] / scale).powi(2),
+                Prior::Free | Prior::Known => START_PRECISION,
+            };
+        let precisions: Vec<f64> = families.iter().zip(&self.equations.families).map(precision).collect();
+        // Rows whitened with the present noise have the unit variance.
+        self.model(precisions, 1.0 / problem.noise.inflation, problem.noise.inflation)
+    }
+
+    /// The model with given scales, variance and inflation.
+    fn model(&self, precisions: Vec<f64>, variance: f64, inflation: f64) -> Result<Scales, IdentifyError> {
+        let posterior = self.equations.posterior(inflation * variance, &precisions)?;
+        let of_folds = self.held_out(inflation * variance, &precisions)?;
+        let held_out = of_folds.into_iter().map(|(square, _)| square).collect();
+        Ok(Scales { precisions, variance, inflation, posterior, held_out })
+    }
+
+    /// For each fold, the sum of squares of its residual under the model without it, and the sum of its variances from
+    /// the parameters.
+    fn held_out(&self, variance: f64, precisions: &[f64]) -> Result<Vec<(f64, f64)>, IdentifyError> {
+        let of_folds = parallel::map(self.folds.len(), &|k| self.without(k, variance, precisions));
+        of_folds.into_iter().collect()
+    }
+
+    /// Number of scalar readings.
+    pub fn readings(&self) -> f64 {
+        self.readings
+    }
+
+    /// The families that the readings determine: those with at least `least` effective parameters at a wide scale and
+    /// the inflation from which the estimation starts.
+    ///
+    /// # Errors
+    /// If the equations are not positive definite.
+    pub fn with_effect(&self, least: f64) -> Result<Vec<usize>, IdentifyError> {
+        let start = vec![WIDE_PRECISION; self.equations.families.len()];
+        let variance = FIRST_INFLATION * self.variance.unwrap_or(1.0);
+        let posterior = self.equations.posterior(variance, &start)?;
+        let families = posterior.effective.iter().enumerate();
+        Ok(families.filter(|(_, effective)| **effective >= least).map(|(family, _)| family).collect())
+    }
+
+    /// Estimates scales, noise and inflation.
+    ///
+    /// # Errors
+    /// If the equations are not positive definite.
+    pub fn estimate(&self) -> Result<Scales, IdentifyError> {
+        let start = vec![START_PRECISION; self.equations.families.len()];
+        let first = self.at(FIRST_INFLATION, &start)?;
+        if self.equations.families.is_empty() {
+            return self.at(1.0, &start).map(|(scales, _)| scales);
+        }
+        // The calibration decreases with the inflation. ln κ is bracketed and found by regula falsi (Illinois).
+        let (mut low, mut high) = if first.1 > 1.0 {
+            let last = self.at(MAX_INFLATION, &first.0.precisions)?;
+            if last.1 >= 1.0 {
+                return Ok(last.0);
+            }
+            (first, last)
+        } else {
+            let least = self.at(1.0, &first.0.precisions)?;
+            if least.1 <= 1.0 {
+                return Ok(least.0);
+            }
+            (least, first)
+        };
+        let (mut weight_low, mut weight_high) = (1.0, 1.0);
+        for _ in 0..MAX_ROUNDS {
+            let (a, b) = (low.0.inflation.ln(), high.0.inflation.ln());
+            let (of_low, of_high) = (weight_low * low.1.ln(), weight_high * high.1.ln());
+            let middle = (a * of_high - b * of_low) / (of_high - of_low);
+            let next = self.at(middle.exp(), &high.0.precisions)?;
+            if next.1.ln().abs() < CALIBRATED {
+                return Ok(next.0);
+            }
+            if next.1 > 1.0 {
+                (low, weight_low, weight_high) = (next, 1.0, 0.5 * weight_high);
+            } else {
+                (high, weight_high, weight_low) = (next, 1.0, 0.5 * weight_low);
+            }
+        }
+        Ok(high.0)
+    }
+
+    /// Scales and noise for an inflation, and the calibration of the held-out folds.
+    fn at(&self, inflation: f64, start: &[f64]) -> Result<(Scales, f64), IdentifyError> {
+        let (mut precisions, mut variance) = (start.to_vec(), self.variance.unwrap_or(1.0));
+        let mut rounds = 0;
+        let posterior = loop {
+            let posterior;
+            (precisions, posterior) = self.equations.maximise(inflation * variance, &precisions)?;
+            let freedom = (self.readings - posterior.effective_total).max(1.0);
+            let next = self.variance.unwrap_or(posterior.residual_square / freedom).max(f64::MIN_POSITIVE);
+            let change = (next / variance - 1.0).abs();
+            rounds += 1;
+            if change < SETTLED || rounds == MAX_ROUNDS {
+                break posterior;
+            }
+            variance = next;
+        };
+        let of_folds = self.held_out(inflation * variance, &precisions)?;
+        let calibrated: f64 = (self.folds.iter().zip(&of_folds))
+            .map(|(fold, (square, predicted))| {
+                let expected = fold.readings * variance + predicted;
+                if fold.readings > 0.0 { fold.readings * square / expected } else { 0.0 }
+            })
+            .sum();
+        let held_out = of_folds.into_iter().map(|(square, _)| square).collect();
+        let calibration = calibrated / self.readings.max(1.0);
+        Ok((Scales { precisions, variance, inflation, posterior, held_out }, calibration))
+    }
+
+    /// Sum of squares of a fold's residual under the model without it, and the sum of its variances from the parameters.
+    fn without(&self, k: usize, variance: f64, precisions: &[f64]) -> Result<(f64, f64), IdentifyError> {
+        let fold = &self.folds[k];
+        let information = self.equations.information(variance, precisions) - &fold.gram * faer::Scale(1.0 / variance);
+        let factor = information.llt(Side::Lower).map_err(|_| IdentifyError::Decomposition)?;
+        let right = self.equations.right_side(variance);
+        let right = Mat::from_fn(right.len(), 1, |j, _| right[j] - fold.projection[j] / variance);
+        let residual = &fold.y - &fold.rows * factor.solve(&right);
+        let mut along = fold.rows.transpose().to_owned();
+        solve_lower_triangular_in_place(factor.L(), along.as_mut(), Par::Seq);
+        Ok((residual.squared_norm_l2(), along.squared_norm_l2()))
+    }
+
+    /// The parameters at the posterior mean, in internal units.
+    pub fn beta(&self, scales: &Scales) -> Vec<f64> {
+        (0..self.sizes.len()).map(|j| self.origin[j] + self.sizes[j] * scales.posterior.mean[j]).collect()
+    }
+
+    /// The prior standard deviation of each family, in internal units.
+    fn scales(&self, scales: &Scales) -> Vec<f64> {
+        let families = self.equations.families.iter().zip(&scales.precisions);
+        families.map(|(family, precision)| self.sizes[family[0]] / precision.sqrt()).collect()
+    }
+
+    /// Sets priors and noise of the problem that the equations belong to.
+    pub fn apply(&self, scales: &Scales, problem: &mut Problem) {
+        for (family, scale) in families(&problem.parameters).iter().zip(self.scales(scales)) {
+            for j in &family.parameters {
+                problem.parameters.list[*j].prior = Prior::Gaussian(scale);
+            }
+        }
+        let noise = &mut problem.noise;
+        if self.variance.is_none() {
+            noise.sigma_mm = noise.likelihood_mm() * scales.variance.sqrt();
+        }
+        noise.inflation = scales.inflation;
+    }
+}
+
+/// Precision of a family of a wide scale: the physical size.
+const WIDE_PRECISION: f64 = 1.0;
+/// Precision of a family from which the estimation starts: a scale of a hundredth of the physical size.
+const START_PRECISION: f64 = 1e4;
+
+/// The priors other than those of the families, over scaled parameters. A parameter without a prior has a weak one of
+/// one physical size about the point of the linearisation: directions that the readings do not identify stay there.
+fn fixed_prior(
+    problem: &Problem,
+    beta: &[f64],
+    families: &[Family],
+    sizes: &[f64],
+    present: &[f64],
+) -> (Mat<f64>, Vec<f64>) {
+    let count = sizes.len();
+    let of_family = |j: usize| families.iter().any(|family| family.parameters.contains(&j));
+    let triangle = problem.prior_triangle(beta);
+    let rows = triangle.rows();
+    let scaled = Mat::from_fn(rows.nrows(), count, |i, j| if of_family(j) { 0.0 } else { rows[(i, j)] * sizes[j] });
+    // The rows of a family's own prior are zero now; their right-hand sides must not act either.
+    let own = |i: usize| (0..count).any(|j| scaled[(i, j)] != 0.0);
+    let y = Mat::from_fn(rows.nrows(), 1, |i, _| if own(i) { rows[(i, count)] } else { 0.0 });
+    let mut precision = scaled.transpose() * &scaled;
+    let projection = scaled.transpose() * &y;
+    for (j, parameter) in problem.parameters.list.iter().enumerate() {
+        if parameter.prior == Prior::Free {
+            precision[(j, j)] += 1.0;
+        }
+    }
+    // Parameters outside the families are at zero of their coordinates, so the priors' right-hand sides need no shift.
+    debug_assert!((0..count).all(|j| of_family(j) || present[j] == 0.0));
+    (precision, (0..count).map(|j| projection[(j, 0)]).collect())
+}
