@@ -4,7 +4,7 @@
 use std::any::TypeId;
 use std::path::Path;
 
-use abbe::identify::model_file::{self, Provenance};
+use abbe::identify::model_file::{InputFile, Provenance};
 use abbe::model::files::SourceMap;
 use clap::{Arg, ArgAction, ArgMatches, CommandFactory};
 use schemars::JsonSchema;
@@ -17,15 +17,6 @@ use crate::present::report::provenance::{self, Input};
 
 /// Version of the schemas of all documents.
 pub const SCHEMA_VERSION: u32 = 2;
-
-/// An input file.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct InputFile {
-    /// Path as the command or the session names it.
-    file: String,
-    /// SHA-256 of the contents, in hexadecimal; `null` for a pipe, which can be read only once.
-    sha256: Option<String>,
-}
 
 impl From<Input> for InputFile {
     fn from(input: Input) -> InputFile {
@@ -107,8 +98,7 @@ fn unreadable(file: &Path, fault: &str) -> Failure {
 pub fn provenance(sources: &SourceMap, seed: u64) -> Result<Provenance, Failure> {
     let (command, options) = command_line();
     let session = Origin::of_session(sources)?.session;
-    let inputs = session.iter().flat_map(|session| &session.inputs);
-    let inputs = inputs.map(|input| model_file::InputFile { file: input.file.clone(), sha256: input.sha256.clone() });
+    let inputs = session.iter().flat_map(|session| session.inputs.clone());
     Ok(Provenance {
         tool_version: env!("CARGO_PKG_VERSION").to_string(),
         command,

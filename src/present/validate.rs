@@ -91,9 +91,9 @@ pub fn residuals(result: &ValidationResult) -> Table {
 pub fn moved(result: &ValidationResult) -> Table {
     let rows = result.moved.iter().map(|moved| {
         let [value, u] = Cell::estimate(moved.value, moved.u);
-        cells![&moved.id, value, u, unit(&moved.unit), format!("{:.1e}", moved.p_value)]
+        cells![&moved.id, value, u, unit(&moved.unit), format!("{:.1e}", moved.p_value), moved.alternatives.join(", ")]
     });
-    Table::new(["parameter", ">change", ">u", "unit", ">p"], rows)
+    Table::new(["parameter", ">change", ">u", "unit", ">p", "or instead"], rows)
         .titled("Parameters that have moved since the model, with standard uncertainty u")
 }
 

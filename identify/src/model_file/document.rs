@@ -73,13 +73,14 @@ pub struct Provenance {
 pub struct InputFile {
     /// Path as the command or the session names it.
     pub file: String,
-    /// SHA-256 of the contents, in hexadecimal; `null` for a pipe.
+    /// SHA-256 of the contents, in hexadecimal; `null` for a pipe, which can be read only once.
     pub sha256: Option<String>,
 }
 
 /// A parameter.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "ModelParameter")]
 pub struct Parameter {
     /// Identifier, as in the results of a fit.
     pub id: String,
@@ -103,25 +104,16 @@ pub struct Parameter {
     pub internal: f64,
     /// Whether it is held at nominal, since it is not separable from other parameters.
     pub held: bool,
-    /// The prior: `free`, or the standard uncertainty of a Gaussian about 0 in the internal unit.
-    pub prior: ParameterPrior,
+    /// Standard uncertainty of its Gaussian prior about 0, internal unit; `null` without a prior.
+    pub prior_u: Option<f64>,
     /// Physical size, internal unit.
     pub size: f64,
-}
-
-/// A prior.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged)]
-pub enum ParameterPrior {
-    /// Gaussian about 0 with this standard uncertainty, internal unit.
-    Gaussian(f64),
-    /// `free` or `known`.
-    Word(String),
 }
 
 /// A location error.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "ModelLocation")]
 pub struct Location {
     /// `EX0C`, …
     pub id: String,
@@ -136,6 +128,7 @@ pub struct Location {
 /// The noise of one scalar reading.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "ModelNoise")]
 pub struct Noise {
     /// Standard deviation, µm.
     pub noise_um: f64,
@@ -152,6 +145,7 @@ pub struct Noise {
 /// How well the model describes its own readings.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "ModelFit")]
 pub struct FitQuality {
     /// Number of readings.
     pub readings: usize,
@@ -166,6 +160,7 @@ pub struct FitQuality {
 /// The range of an axis or a driver.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "ModelRange")]
 pub struct Range {
     /// An axis, `time`, `temperature`, `gravity`, …
     pub driver: String,
@@ -183,6 +178,7 @@ pub struct Range {
 /// Reference values from which drivers count.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "ModelReference")]
 pub struct Reference {
     /// Time of the first reading, s.
     pub time_s: f64,

@@ -15,7 +15,7 @@ use abbe_model::session::Prior;
 use faer::Mat;
 use serde_json::Value;
 
-use super::document::{self, Document, ParameterPrior, SCHEMA, SCHEMA_VERSION};
+use super::document::{self, Document, SCHEMA, SCHEMA_VERSION};
 use super::location::path_at;
 use super::write::{CHECKSUM, checksum};
 use super::{DriverRange, IdentifiedModel, ModelParameter, Quality};
@@ -240,11 +240,10 @@ impl File<'_> {
                     return Err(fault(what));
                 }
             };
-            let prior = match &entry.prior {
-                ParameterPrior::Gaussian(u) if *u > 0.0 => Prior::Gaussian(*u),
-                ParameterPrior::Word(word) if word == "free" => Prior::Free,
-                ParameterPrior::Word(word) if word == "known" => Prior::Known,
-                _ => return Err(fault("`prior` is \"free\", \"known\" or a standard uncertainty above 0")),
+            let prior = match entry.prior_u {
+                Some(u) if u > 0.0 => Prior::Gaussian(u),
+                None => Prior::Free,
+                Some(_) => return Err(fault("`prior_u` must be above 0, or `null`")),
             };
             if !(entry.size > 0.0 && entry.display_per_internal > 0.0) {
                 return Err(fault("`size` and `display_per_internal` must be above 0"));

@@ -6,7 +6,7 @@ use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 use super::IdentifiedModel;
-use super::document::{self, Document, ParameterPrior, SCHEMA, SCHEMA_VERSION};
+use super::document::{self, Document, SCHEMA, SCHEMA_VERSION};
 use crate::error::IdentifyError;
 use crate::parameters::Role;
 use crate::unit::Unit;
@@ -95,10 +95,9 @@ impl IdentifiedModel {
             display_per_internal: display,
             internal: parameter.value,
             held: parameter.held,
-            prior: match parameter.prior {
-                Prior::Gaussian(u) => ParameterPrior::Gaussian(u),
-                Prior::Free => ParameterPrior::Word("free".into()),
-                Prior::Known => ParameterPrior::Word("known".into()),
+            prior_u: match parameter.prior {
+                Prior::Gaussian(u) => Some(u),
+                Prior::Free | Prior::Known => None,
             },
             size: parameter.size,
         }

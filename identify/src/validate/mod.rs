@@ -103,7 +103,11 @@ pub fn validate(model: &IdentifiedModel, session: &Session) -> Result<Validation
         let rms = known.rms_with(&known.values_without(effect))?;
         without.push(WithoutResult { effect: known.effect_id(effect), rms: RmsResult::of(&rms) });
     }
-    let judged = in_range.as_ref().map_or(&all, |(_, judged, _)| judged);
+    // A residual as predicted everywhere is no extrapolation that fails: all readings then tell what has moved.
+    let judged = match &in_range {
+        Some((_, judged, _)) if !all.prediction.is_as_predicted() => judged,
+        _ => &all,
+    };
     let reference = if model.carried_effects().next().is_some() { &locations } else { &nominal };
     let compared = match &in_range {
         None => (&rms, reference.clone()),
@@ -118,6 +122,7 @@ pub fn validate(model: &IdentifiedModel, session: &Session) -> Result<Validation
     };
     let evidence = Evidence {
         all: all.is_consistent(),
+        as_predicted: all.prediction.is_as_predicted(),
         in_range: in_range.as_ref().map(|(_, judged, _)| judged.is_consistent()),
         better_than_reference: compared.0.noise_ratio < compared.1.noise_ratio,
     };

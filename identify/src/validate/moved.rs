@@ -21,7 +21,9 @@ use crate::numerics::symmetric::pseudo_inverse;
 use crate::numerics::tails::normal_tail;
 
 /// Probability that a change is stated of a machine that has not changed.
-const SIGNIFICANCE: f64 = 0.01;
+const SIGNIFICANCE: f64 = 0.005;
+/// Largest difference of χ² between a change and its alternatives.
+const NEARLY: f64 = 4.0;
 /// Least share of a parameter's information that must remain beside the selected ones.
 const LEAST_SHARE: f64 = 1e-6;
 
@@ -60,18 +62,26 @@ pub(super) fn moved(known: &KnownErrors<'_>, at: &Linearised) -> Result<Vec<Move
         selected.remove(k);
         changes = changes_of(&p, &y, &selected)?;
     }
+    let mut alternatives = Vec::with_capacity(selected.len());
+    for i in &selected {
+        let others: Vec<usize> = selected.iter().copied().filter(|j| j != i).collect();
+        alternatives.push(alternatives_of(*i, &separate(&p, &y, &others, &candidates)?));
+    }
+    let id = |i: usize| known.model.parameters[known.carried[i]].id.clone();
     let mut moved: Vec<MovedParameter> = selected
         .iter()
         .zip(&changes)
-        .map(|(i, change)| {
+        .zip(&alternatives)
+        .map(|((i, change), alternatives)| {
             let parameter = &known.model.parameters[known.carried[*i]];
             let display = parameter.unit.display_per_internal * parameter.size;
             MovedParameter {
-                id: parameter.id.clone(),
+                id: id(*i),
                 value: change.value * display,
                 u: change.u * variance.sqrt() * display,
                 unit: parameter.unit.name.clone(),
                 p_value: two_sided(change.z() / variance.sqrt(), candidates.len()),
+                alternatives: alternatives.iter().map(|j| id(*j)).collect(),
             }
         })
         .collect();
@@ -110,6 +120,17 @@ fn best(
     selected: &[usize],
     candidates: &[usize],
 ) -> Result<Option<(usize, f64)>, IdentifyError> {
+    let found = separate(p, y, selected, candidates)?.into_iter();
+    Ok(found.max_by(|(_, a), (_, b)| a.abs().total_cmp(&b.abs())))
+}
+
+/// Each candidate beside the selected parameters, with its change over the uncertainty of the change.
+fn separate(
+    p: &Mat<f64>,
+    y: &Mat<f64>,
+    selected: &[usize],
+    candidates: &[usize],
+) -> Result<Vec<(usize, f64)>, IdentifyError> {
     let inverse = inverse_at(p, selected)?;
     let found = candidates.iter().filter(|i| !selected.contains(i)).filter_map(|&i| {
         let shares = |k: usize| -> f64 { (0..selected.len()).map(|l| inverse[(k, l)] * p[(selected[l], i)]).sum() };
@@ -122,7 +143,16 @@ fn best(
         let is_separable = information > LEAST_SHARE * p[(i, i)] && information > 0.0;
         is_separable.then(|| (i, gradient / information.sqrt()))
     });
-    Ok(found.max_by(|(_, a), (_, b)| a.abs().total_cmp(&b.abs())))
+    Ok(found.collect())
+}
+
+/// The candidates that explain the readings nearly as well as one of them, the best first.
+fn alternatives_of(chosen: usize, found: &[(usize, f64)]) -> Vec<usize> {
+    let gain = found.iter().find(|(i, _)| *i == chosen).map_or(f64::INFINITY, |(_, z)| z * z);
+    let mut others: Vec<&(usize, f64)> =
+        found.iter().filter(|(i, z)| *i != chosen && z * z > gain - NEARLY && z * z > NEARLY).collect();
+    others.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
+    others.into_iter().map(|(i, _)| *i).collect()
 }
 
 /// The inverse of `P` over the selected parameters, by way of a matrix with ones on its diagonal.

@@ -32,7 +32,8 @@ pub struct ValidationResult {
     pub model: ValidatedModel,
     /// The model without each effect.
     pub without: Vec<WithoutResult>,
-    /// Parameters that have changed, the most significant first: inside the range, if some readings are.
+    /// Parameters that have changed, the most significant first. Where the residual of all readings is not as predicted,
+    /// from the readings inside the range.
     pub moved: Vec<MovedParameter>,
     /// The estimated set-up of the session.
     pub set_up: Vec<ParameterResult>,
@@ -123,4 +124,6 @@ pub struct MovedParameter {
     pub unit: String,
     /// Probability of such a change by chance in any parameter of an unchanged machine.
     pub p_value: f64,
+    /// Parameters whose change explains these readings nearly as well (χ² larger by less than 4).
+    pub alternatives: Vec<String>,
 }

@@ -16,7 +16,7 @@ const METHOD: &str = "The errors of the machine are those of the saved model. On
      estimated, with its priors, and again for each machine that is compared. The predicted variance of a residual is \
      that of the noise plus that of the model's covariance, after projection on the set-up. Consistent: the residual is \
      as large as predicted (ratio at most 1.05, or p at least 0.001), the 95 % intervals cover at least 90 % of the \
-     readings, and no parameter has moved (generalised least squares, 1 % over all parameters, Bonferroni).";
+     readings, and no parameter has moved (generalised least squares, 0.5 % over all parameters, Bonferroni).";
 
 /// The report.
 pub fn document(session: &Session, validation: &Validation) -> Document {
