@@ -90,6 +90,7 @@ fn a_test_that_alone_identifies_a_parameter_is_named_and_not_left_out() {
         driver: FollowedDriver::parse("C"),
         shape: Form::Harmonic(Harmonic { order: 2.0 }),
         tests: only,
+        prior: None,
     }];
     let result = SessionFit::of(&session, 1).unwrap().result.cross_validation;
     assert_eq!(result.left_out_tests, ["R100"]);
