@@ -4,7 +4,7 @@ use abbe::identify::fit::SessionFit;
 use abbe::identify::results::FitResult;
 use abbe::model::driver::Driver as FollowedDriver;
 use abbe::model::effect::shape::Harmonic;
-use abbe::model::effect::{Component as Moved, Effect, Shape as Form};
+use abbe::model::effect::{CoefficientPrior, Component as Moved, Effect, Shape as Form};
 use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
 
@@ -86,11 +86,8 @@ fn a_test_that_alone_identifies_a_parameter_is_named_and_not_left_out() {
     let only = session.tests.iter().map(|test| test.name.clone()).take(1).collect();
     let mut session = session;
     session.effects = vec![Effect {
-        component: Moved::parse("EZC").unwrap(),
-        driver: FollowedDriver::parse("C"),
-        shape: Form::Harmonic(Harmonic { order: 2.0 }),
         tests: only,
-        prior: None,
+        ..Effect::new(Moved::parse("EZC").unwrap(), FollowedDriver::parse("C"), Form::Harmonic(Harmonic { order: 2.0 }))
     }];
     let result = SessionFit::of(&session, 1).unwrap().result.cross_validation;
     assert_eq!(result.left_out_tests, ["R100"]);
