@@ -15,13 +15,14 @@ pub fn sentence(result: &ValidationResult) -> String {
         1 => "1 parameter has moved".to_string(),
         count => format!("{} have moved", counted(count, "parameter")),
     };
+    let other = if result.without.is_empty() { "the nominal machine" } else { "the location errors alone" };
     match result.verdict.as_str() {
         "holds" => "the model predicts the readings within noise and its uncertainty".to_string(),
         "holds-in-range" => {
             "the model predicts the readings inside the range of its data, not those outside it".to_string()
         }
-        "degraded" => format!("{cause}; the model is still better than the location errors alone"),
-        _ => format!("{cause}, and the model is no better than the location errors alone"),
+        "degraded" => format!("{cause}; the model is still better than {other}"),
+        _ => format!("{cause}, and the model is no better than {other}"),
     }
 }
 
