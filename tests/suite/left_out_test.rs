@@ -4,7 +4,7 @@ use abbe::identify::fit::SessionFit;
 use abbe::identify::results::FitResult;
 use abbe::model::driver::Driver as FollowedDriver;
 use abbe::model::effect::shape::Harmonic;
-use abbe::model::effect::{CoefficientPrior, Component as Moved, Effect, Shape as Form};
+use abbe::model::effect::{Component as Moved, Effect, Shape as Form};
 use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
 
