@@ -118,8 +118,12 @@ fn unit_of_component(
         Component::Axis(name) if machine.axis_index(&name.axis).is_none() => {
             Err(CodegenError::no_axis(machine, effect.id(), &name.axis))
         }
-        Component::Instrument { .. } | Component::Reading(_) if unit.is_none() => Err(CodegenError::NoSuchParameter {
+        Component::Instrument { .. } if unit.is_none() => Err(CodegenError::NoSuchParameter {
             parameter: format!("`{}` of the effect `{}`", effect.component, effect.id()),
+        }),
+        Component::Reading(test) => Err(CodegenError::EffectWithoutForm {
+            effect: effect.id(),
+            why: format!("it adds to the readings of {test} and is not part of the chain"),
         }),
         _ => Ok(unit),
     }

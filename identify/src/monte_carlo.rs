@@ -299,6 +299,22 @@ mod tests {
         near(found.to, 1.1, 1e-12);
     }
 
+    /// A density that falls linearly from both ends to the middle: bins of 1000, 999, … 501, 501, … 999, 1000 runs. The
+    /// shortest interval excludes one end, and both ends are equal. The upper 5 % of the 750 500 runs are 38 bins, which
+    /// hold 37 297, and 228 of the 962 runs in the next.
+    #[test]
+    fn of_two_intervals_of_equal_length_the_lower_one_is_the_shortest() {
+        for (centre, reach) in [(0.0, 1.0), (1e3 / 3.0, 0.1), (std::f64::consts::PI, 0.7), (-2.0 / 3.0, 1.0 / 3.0)] {
+            let mut count = Histogram::over(centre, reach);
+            let falling = (501..=1000).rev();
+            count.counts = falling.clone().chain(falling.rev()).collect();
+            let [low, high] = count.distribution(0.95).shortest;
+            let bins = 38.0 + 228.0 / 962.0;
+            assert_eq!(low, centre - reach);
+            assert!((high - (centre + reach * (1.0 - bins / 500.0))).abs() < 1e-9 * reach.max(centre.abs()), "{high}");
+        }
+    }
+
     #[test]
     fn values_outside_the_range_are_counted_and_nan_is_excluded() {
         let mut count = Histogram::over(0.0, 1.0);

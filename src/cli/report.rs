@@ -11,6 +11,7 @@ use super::{folder, output};
 use crate::present::report::document::Document;
 use crate::present::report::page;
 use crate::present::report::provenance::Provenance;
+use crate::present::{csv, figure::svg};
 
 /// The files of a report.
 #[derive(Args, Clone)]
@@ -20,8 +21,8 @@ pub struct ReportArguments {
     /// Example: --report report.html
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
-    /// Write each plot of the report into a new or empty folder, as SVG, and as PNG if the program is built with the
-    /// feature `png`.
+    /// Write each plot of the report into a new or empty folder, as SVG, its data as CSV, and as PNG if the program is
+    /// built with the feature `png`.
     ///
     /// Example: --plots plots
     #[arg(long, value_name = "DIR")]
@@ -79,13 +80,15 @@ fn write_plots(document: &Document, path: &Path) -> Result<(), Failure> {
     #[cfg(feature = "png")]
     let fonts = crate::present::figure::png::Fonts::bundled();
     let mut files = Vec::new();
-    for plot in &document.plots {
-        files.push((format!("{}.svg", plot.name), plot.svg().into_bytes()));
+    for figure in &document.figures {
+        let data = csv::text(&figure.table()).map_err(Failure::Other)?;
+        files.push((format!("{}.svg", figure.name), svg::file(figure).into_bytes()));
+        files.push((format!("{}.csv", figure.name), data));
         #[cfg(feature = "png")]
         {
-            let png = crate::present::figure::png::png(plot, &fonts)
-                .ok_or_else(|| Failure::Other(format!("the plot `{}` cannot be drawn as PNG", plot.name)))?;
-            files.push((format!("{}.png", plot.name), png));
+            let png = crate::present::figure::png::png(figure, &fonts)
+                .ok_or_else(|| Failure::Other(format!("the plot `{}` cannot be drawn as PNG", figure.name)))?;
+            files.push((format!("{}.png", figure.name), png));
         }
     }
     folder::write(path, &files, false, |_| Ok(()))

@@ -137,6 +137,18 @@ impl Table {
         Table { title: title.into(), ..self }
     }
 
+    /// Without the columns that have no text in any row.
+    pub fn without_empty_columns(mut self) -> Table {
+        for column in (0..self.columns.len()).rev() {
+            let is_empty = |row: &Vec<Cell>| matches!(&row[column], Cell::Text(text) if text.is_empty());
+            if self.rows.iter().all(is_empty) {
+                self.columns.remove(column);
+                self.rows.iter_mut().for_each(|row| drop(row.remove(column)));
+            }
+        }
+        self
+    }
+
     /// Without the columns at the end after the first `count`.
     pub fn first_columns(mut self, count: usize) -> Table {
         self.columns.truncate(count);

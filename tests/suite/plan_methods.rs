@@ -112,6 +112,29 @@ fn an_offset_of_the_spindle_ball_between_two_tests_explains_both_differences_wit
     println!("4.3 µm: EB0A {:+.2}″, EB0C {:+.2}″", 4.3 * per_um, 4.3 * bias(&plan, height, c));
 }
 
+/// Y stands at zero in all tests, so a squareness that tilts Y moves nothing. X stands at −D in A150 and at zero
+/// elsewhere, so a tilt of X displaces the ball by a constant in A150 alone, and 1″ of it is as 1″ of `EB0A`. Whatever
+/// the priors, rounding decides neither.
+#[test]
+fn an_effect_without_an_arm_has_no_signal_and_one_with_a_constant_arm_is_confounded() {
+    for setup_um in [0.0, 1.0, 2.0] {
+        let plan = analysis(5, setup_um, true);
+        let effects = &plan.effects.as_ref().unwrap().effects;
+        let of = |id: &str| effects.iter().find(|effect| effect.id == format!("{id}~none:constant")).unwrap();
+        for effect in [of("EA0Y"), of("EC0Y")] {
+            assert_eq!((effect.verdict.as_str(), effect.residual_share), ("no signal", 0.0), "{}", effect.id);
+            assert!(effect.detectable_amplitude.is_none() && effect.biases.is_empty(), "{}", effect.id);
+        }
+        for effect in [of("EB0X"), of("EC0X")] {
+            assert_eq!(effect.verdict, "confounded", "{}", effect.id);
+            assert!(effect.residual_share < 1e-9, "{}: {}", effect.id, effect.residual_share);
+        }
+        if setup_um == 0.0 {
+            assert!((bias(&plan, "EB0X~none:constant", "EB0A").abs() - 1.0).abs() < 1e-6);
+        }
+    }
+}
+
 #[test]
 fn a_repeatable_straightness_of_x_biases_both_chapters_alike() {
     let effect = "EZX~X:power2";

@@ -241,6 +241,7 @@ fn plots_are_written_completely_or_not_at_all() {
         assert!(names.contains(&format!("{wanted}.svg")), "{wanted}");
     }
     for name in names.iter().filter_map(|name| name.strip_suffix(".svg")) {
+        assert!(names.contains(&format!("{name}.csv")), "{name}");
         let png = std::fs::read(plots.join(format!("{name}.png")));
         assert_eq!(png.is_ok(), cfg!(feature = "png"), "{name}");
         if let Ok(png) = png {
@@ -266,6 +267,37 @@ fn plots_are_written_completely_or_not_at_all() {
     let refused = abbe(&["fit", text(&session), "--report", text(&nowhere)]);
     assert_eq!(refused.status.code(), Some(1));
     assert!(refused.stdout.is_empty(), "refused before the calculation");
+}
+
+/// The ball is at radius 100 mm about C and the spindle ball on the axis, so that the nominal reading is 100 mm in every
+/// row of the measured file. A plot shows a part of the rows, and both extremes.
+#[test]
+fn the_data_of_a_plot_are_those_of_the_measured_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let plots = folder.path().join("plots");
+    let session = ready("hermle-c600u/measured/session.toml");
+    assert!(abbe(&["fit", text(&session), "--quiet", "--plots", text(&plots)]).status.success());
+    let rows = |path: &Path, wanted: [&str; 2]| -> Vec<[f64; 2]> {
+        let table = std::fs::read_to_string(path).unwrap();
+        let mut lines = table.lines().map(|line| line.split(',').collect::<Vec<_>>());
+        let header = lines.next().unwrap();
+        let place = |name: &str| header.iter().position(|column| *column == name).unwrap();
+        let places = wanted.map(place);
+        lines.map(|cells| places.map(|place| cells[place].parse().unwrap())).collect()
+    };
+    let measured = rows(&session.with_file_name("C100.csv"), ["c_deg", "length_mm"]);
+    let measured: Vec<[f64; 2]> = measured.iter().map(|[deg, mm]| [*deg, (mm - 100.0) * 1e3]).collect();
+    let drawn = rows(&plots.join("deviation-C100-over-C.csv"), ["C_deg", "deviation_um"]);
+    assert_eq!(drawn, rows(&plots.join("trace-C100.csv"), ["C_deg", "deviation_um"]));
+    assert!(drawn.len() > 100);
+    for [deg, um] in &drawn {
+        let is_row = |row: &&[f64; 2]| (row[0] - deg).abs() < 1e-6 && (row[1] - um).abs() < 1e-6;
+        assert!(measured.iter().any(|row| is_row(&row)), "{deg}° {um} µm");
+    }
+    for largest in [f64::max, f64::min] {
+        let of = |rows: &[[f64; 2]]| rows.iter().map(|row| row[1]).fold(0.0, largest);
+        assert!((of(&drawn) - of(&measured)).abs() < 1e-6);
+    }
 }
 
 /// Maximum size of a page.

@@ -295,6 +295,12 @@ fn effects_without_a_closed_form_are_refused_by_name() {
     assert!(message.contains("tracker.x~time:drift"), "{message}");
     let message = refused(effect("bar", "gravity", Shape::Backlash));
     assert!(message.contains("cannot be written: gravity exerts no moment about \"bar\"; to omit it"), "{message}");
+    let of_readings =
+        Effect { component: Component::Reading("C150".to_string()), ..effect("EZC", "C", Shape::Constant) };
+    let message = refused(of_readings);
+    let wanted = "`reading[C150]~C:constant` cannot be written: it adds to the readings of C150 and is not part of \
+                  the chain; to omit it";
+    assert!(message.contains(wanted), "{message}");
     let twice = effect("EZC", "C", Shape::Backlash);
     let equation = Equation::of(&machine, &Bar, &[], &with(vec![twice.clone(), twice]));
     assert!(matches!(equation, Err(CodegenError::Twice { .. })));

@@ -1,138 +1,145 @@
-//! Plots as SVG, inside the report and as separate files. The feature `png` adds PNG files.
+//! Figures as data: what a chart shows, with its title, caption and units. Nothing here draws.
 //!
-//! The plots use the same templates as the page. Plotting crates lack three things that the reports need: a polar plot
-//! with a magnified deviation about a nominal circle, CSS classes that one style sheet colours for light screens, dark
-//! screens and print, and data attributes for the script of the page.
+//! One file per kind of chart ([`lines`], [`bars`], [`matrix`], [`polar`], [`chain`]) holds the data of the kind, its
+//! table and its drawing. Printers: [`svg`] draws a figure inside the report or as a file; `png` (feature `png`) draws
+//! that file as pixels; [`Figure::table`] gives the data as one tidy table, which [`super::csv`] writes. A further kind
+//! is one file and one variant of [`Chart`].
 
 pub mod bars;
 pub mod chain;
-pub mod heat;
 pub mod lines;
+pub mod matrix;
 #[cfg(feature = "png")]
 pub mod png;
 pub mod polar;
 pub mod scale;
+pub mod svg;
 
-use maud::{Markup, PreEscaped, html};
+use super::number;
+use super::table::{Cell, Column, Table};
 
-/// Width of a plot with straight axes, in SVG units. Two such plots stand beside one another at 1,280 px, and one fills
-/// a narrow screen with legible text.
-pub const WIDTH: f64 = 500.0;
+/// Most words of a column that the figure in words names.
+const MAX_LISTED: usize = 12;
 
-/// Style sheet of all plots.
-pub const STYLE: &str = include_str!("plot.css");
-
-/// A plot with its title and caption.
-#[derive(Clone)]
-pub struct Plot {
+/// A figure with its title and caption.
+#[derive(Clone, Debug)]
+pub struct Figure {
     /// Name of the file, without extension.
     pub name: String,
     /// Title.
     pub title: String,
     /// Caption.
     pub caption: String,
-    /// Width and height, SVG units.
-    pub size: [f64; 2],
-    /// Contents of the `svg` element.
-    pub inner: Markup,
-    /// Data for the script of the page, as JSON. Empty for a static plot.
-    pub interaction: String,
+    /// What it shows.
+    pub chart: Chart,
 }
 
-impl Plot {
-    /// A static plot.
-    pub fn new(
-        name: impl Into<String>,
-        title: impl Into<String>,
-        caption: impl Into<String>,
-        size: [f64; 2],
-        inner: Markup,
-    ) -> Plot {
-        Plot {
-            name: file_name(&name.into()),
-            title: title.into(),
-            caption: caption.into(),
-            size,
-            inner,
-            interaction: String::new(),
+/// The kinds of charts.
+#[derive(Clone, Debug)]
+pub enum Chart {
+    /// Series over two straight axes.
+    Lines(lines::Lines),
+    /// Values with error bars, one row per name.
+    Values(bars::Values),
+    /// Bars from zero, one row per name.
+    Bars(bars::Bars),
+    /// A symmetric matrix, such as a correlation.
+    Matrix(matrix::Matrix),
+    /// Deviations about a nominal circle.
+    Polar(polar::Polar),
+    /// Several deviations about nominal circles at one scale.
+    Panels(polar::Panels),
+    /// The kinematic chain of a machine.
+    Chain(chain::Chain),
+}
+
+/// What a kind of chart provides.
+trait Kind {
+    /// The drawing.
+    fn drawing(&self) -> svg::Drawing;
+    /// The data in full precision: one row per mark, the unit of a column in its heading.
+    fn table(&self) -> Table;
+}
+
+impl Figure {
+    /// A figure. Its file name is derived from `name`.
+    pub fn new(name: impl AsRef<str>, title: impl Into<String>, caption: impl Into<String>, chart: Chart) -> Figure {
+        Figure { name: file_name(name.as_ref()), title: title.into(), caption: caption.into(), chart }
+    }
+
+    fn kind(&self) -> &dyn Kind {
+        match &self.chart {
+            Chart::Lines(kind) => kind,
+            Chart::Values(kind) => kind,
+            Chart::Bars(kind) => kind,
+            Chart::Matrix(kind) => kind,
+            Chart::Polar(kind) => kind,
+            Chart::Panels(kind) => kind,
+            Chart::Chain(kind) => kind,
         }
     }
 
-    /// The `figure` element. The page contains the style sheet.
-    pub fn figure(&self) -> Markup {
-        let [width, height] = self.size;
-        html! {
-            figure class=[(width >= WIDTH).then_some("wide")] style=(format!("--width:{width}")) {
-                figcaption { b { (self.title) } " " (self.caption) }
-                svg xmlns="http://www.w3.org/2000/svg" class="plot" viewBox=(format!("0 0 {width} {height}"))
-                    role="img" aria-label=(self.title) data-interaction=[(!self.interaction.is_empty()).then_some(&self.interaction)] {
-                    (self.inner)
+    /// The data as one tidy table, in full precision.
+    pub fn table(&self) -> Table {
+        self.kind().table()
+    }
+
+    /// The figure in words, for readers who cannot see it: its title, and what each column of its data spans.
+    pub fn alternative(&self) -> String {
+        let table = self.table();
+        let spans = table.columns.iter().enumerate().map(|(column, Column { heading, .. })| {
+            let numbers = table.rows.iter().filter_map(|row| match row.get(column) {
+                Some(Cell::Number(value, _)) => Some(*value),
+                _ => None,
+            });
+            let name = number::unit(&heading.replace('_', " "));
+            match scale::span(numbers) {
+                [low, high] if low <= high => {
+                    format!("{name} {} to {}", number::three_digits(low), number::three_digits(high))
+                }
+                _ => {
+                    let texts = table.rows.iter().filter_map(|row| row.get(column)).map(ToString::to_string);
+                    let texts: Vec<String> = texts.filter(|text| !text.is_empty()).collect();
+                    let distinct = number::units(texts.iter().map(String::as_str));
+                    let more = if distinct.len() > MAX_LISTED { ", …" } else { "" };
+                    format!("{name} {}{more}", distinct[..distinct.len().min(MAX_LISTED)].join(", "))
                 }
             }
-        }
-    }
-
-    /// A separate SVG file on a white background, with the title above the plot.
-    pub fn svg(&self) -> String {
-        let [width, height] = self.size;
-        let lines = wrapped(&self.title, ((width - 16.0) / 7.4) as usize);
-        let above = 12.0 + 18.0 * lines.len() as f64;
-        let all = height + above;
-        html! {
-            svg xmlns="http://www.w3.org/2000/svg" class="plot" width=(width) height=(all)
-                viewBox=(format!("0 {} {width} {all}", -above)) {
-                style { (PreEscaped(light_style())) }
-                rect class="paper" x="0" y=(-above) width=(width) height=(all) {}
-                @for (number, line) in lines.iter().enumerate() {
-                    text class="title" x="8" y=(18.0 * (number as f64 + 1.0) - above) { (line) }
-                }
-                (self.inner)
-            }
-        }
-        .into_string()
+        });
+        format!("{}: {}", self.title, spans.collect::<Vec<_>>().join("; "))
     }
 }
 
-/// Replaces CSS variables by the light colours, because many SVG programs do not support variables.
-fn light_style() -> String {
-    let mut style = STYLE.to_string();
-    for (name, colour) in LIGHT {
-        style = style.replace(&format!("var(--{name})"), colour);
-    }
-    style
+/// What a number is, with its unit as in results: `residual` in `um`. Either may be empty.
+#[derive(Clone, Debug)]
+pub struct Quantity {
+    /// Name, with a remark after a comma: `order, cycles per turn of C`.
+    pub name: String,
+    /// Unit: `um`, `deg`, `um per arcsec`.
+    pub unit: String,
 }
 
-/// Colours for print and light screens: the palette of Okabe and Ito, suited to colour-blind readers.
-pub const LIGHT: [(&str, &str); 12] = [
-    ("paper", "#ffffff"),
-    ("ink", "#1b1b1b"),
-    ("soft", "#595959"),
-    ("grid", "#d5d5d5"),
-    ("forward", "#0072b2"),
-    ("backward", "#d55e00"),
-    ("before", "#d55e00"),
-    ("after", "#0072b2"),
-    ("mark", "#007a5a"),
-    ("other", "#b4b4b4"),
-    ("third", "#aa4499"),
-    ("fourth", "#8a6d00"),
-];
+impl Quantity {
+    /// A quantity.
+    pub fn new(name: impl Into<String>, unit: impl Into<String>) -> Quantity {
+        Quantity { name: name.into(), unit: unit.into() }
+    }
 
-/// Colours for dark screens.
-pub const DARK: [(&str, &str); 12] = [
-    ("paper", "#16181b"),
-    ("ink", "#ececec"),
-    ("soft", "#b0b0b0"),
-    ("grid", "#3d4147"),
-    ("forward", "#56b4e9"),
-    ("backward", "#ff9142"),
-    ("before", "#ff9142"),
-    ("after", "#56b4e9"),
-    ("mark", "#2fc79a"),
-    ("other", "#6a6f76"),
-    ("third", "#e59ad2"),
-    ("fourth", "#f0e442"),
-];
+    /// The label of an axis: `residual, µm`.
+    pub fn label(&self) -> String {
+        let parts = [self.name.clone(), number::unit(&self.unit)];
+        parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(", ")
+    }
+
+    /// The heading of a column: `residual_um`. Letters, digits and underscores only, without the remark.
+    pub fn heading(&self) -> String {
+        let name = self.name.split(',').next().unwrap_or_default();
+        let text = format!("{name} {}", self.unit);
+        let words = text.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
+        let words = words.collect::<Vec<_>>().join("_");
+        if words.is_empty() { "value".to_string() } else { words }
+    }
+}
 
 /// A file name that is valid on every file system.
 pub fn file_name(text: &str) -> String {
@@ -142,67 +149,30 @@ pub fn file_name(text: &str) -> String {
     text.chars().map(plain).take(80).collect::<String>().trim_matches('.').to_string()
 }
 
-/// Wraps text into lines of at most `max` characters. A longer word stays whole.
-pub fn wrapped(text: &str, max: usize) -> Vec<String> {
-    let mut lines: Vec<String> = Vec::new();
-    for word in text.split_whitespace() {
-        match lines.last_mut() {
-            Some(line) if line.chars().count() + 1 + word.chars().count() <= max => {
-                line.push(' ');
-                line.push_str(word);
-            }
-            _ => lines.push(word.to_string()),
-        }
-    }
-    lines
-}
+#[cfg(test)]
+mod tests {
+    use super::lines::{Axis, Lines, Mark, Series};
+    use super::scale::Scale;
+    use super::*;
 
-/// Shortens text to at most `max` characters, with an ellipsis.
-pub fn shortened(text: &str, max: usize) -> String {
-    if text.chars().count() <= max {
-        return text.to_string();
-    }
-    let kept: String = text.chars().take(max.saturating_sub(1)).collect();
-    format!("{kept}…")
-}
-
-/// Draws a legend from the left, in as many lines as needed. Returns it with the ordinate of its last line. Text widths
-/// are estimated generously.
-pub fn legend(entries: &[(&str, String)], x: f64, y: f64, width: f64) -> (Markup, f64) {
-    let mut placed = Vec::new();
-    let (mut left, mut baseline) = (x, y);
-    for (class, label) in entries {
-        let needed = 26.0 + 7.8 * label.chars().count() as f64;
-        if left > x && left + needed > x + width {
-            left = x;
-            baseline += 17.0;
-        }
-        placed.push((left, baseline, *class, label));
-        // A filled key needs more space after it than a line.
-        left += needed + if class.starts_with("key-") { 12.0 } else { 4.0 };
-    }
-    let markup = html! {
-        @for (left, baseline, class, label) in &placed {
-            @if class.starts_with("key-") {
-                (key(class, *left + 9.0, *baseline - 4.0))
-            } @else if class.contains("dots") {
-                path class=(class) d=(scale::dots([(left + 2.0, baseline - 4.0), (left + 9.0, baseline - 4.0), (left + 16.0, baseline - 4.0)])) {}
-            } @else {
-                path class=(class) d=(format!("M{left} {}h18", baseline - 4.0)) {}
-            }
-            text x=(left + 23.0) y=(baseline) { (label) }
-        }
-    };
-    (markup, baseline)
-}
-
-/// A filled key of a legend: the symbols of start and end, or the fill of a bar.
-fn key(class: &str, x: f64, y: f64) -> Markup {
-    html! {
-        @match class {
-            "key-start" => { circle class="start" cx=(x) cy=(y) r="4" {} }
-            "key-end" => { rect class="end" x=(x - 3.5) y=(y - 3.5) width="7" height="7" {} }
-            other => { rect class=(other) x=(x - 8.0) y=(y - 5.0) width="16" height="10" {} }
-        }
+    #[test]
+    fn a_figure_has_a_table_with_units_and_words_that_span_it() {
+        let scale = Scale::over([0.0, 1.0], 5);
+        let axes =
+            [Axis::new("C", "deg", scale), Axis::new("length of the residual, of \"all\"", "um per arcsec", scale)];
+        assert_eq!(axes.each_ref().map(|axis| axis.quantity.label())[0], "C, °");
+        assert_eq!(Quantity::new("", "").heading(), "value");
+        let [x, y] = axes;
+        let series = ["before", "after"]
+            .map(|label| Series::new(label, "before", Mark::Stems(0.2), vec![(-90.0, 0.125), (45.0, -1.0 / 3.0)]));
+        let figure = Figure::new("a/b", "Title", "", Chart::Lines(Lines::new(x, y, series.to_vec())));
+        assert_eq!(figure.name, "a-b");
+        let text = String::from_utf8(crate::present::csv::text(&figure.table()).unwrap()).unwrap();
+        let rows: Vec<&str> = text.lines().collect();
+        assert_eq!(rows[0], "series,C_deg,length_of_the_residual_um_per_arcsec");
+        assert_eq!(rows[1..3], ["before,-90,0.125", "before,45,-0.3333333333333333"]);
+        assert_eq!(rows.len(), 5);
+        let wanted = "Title: series before, after; C ° -90.0 to 45.0; length of the residual µm per ″ -0.333 to 0.125";
+        assert_eq!(figure.alternative(), wanted);
     }
 }

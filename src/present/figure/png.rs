@@ -1,10 +1,10 @@
-//! Plots as PNG (feature `png`). resvg draws the SVG file of a plot with the bundled fonts.
+//! Figures as PNG (feature `png`). resvg draws the SVG file of a figure with the bundled fonts.
 
 use std::sync::Arc;
 
 use resvg::{tiny_skia, usvg};
 
-use super::Plot;
+use super::{Figure, svg};
 
 /// Font family of PNG files.
 const FAMILY: &str = "Ubuntu";
@@ -24,12 +24,12 @@ impl Fonts {
     }
 }
 
-/// Draws a plot as PNG with two pixels per SVG unit. `None` if the SVG cannot be drawn.
-pub fn png(plot: &Plot, fonts: &Fonts) -> Option<Vec<u8>> {
+/// Draws a figure as PNG with two pixels per SVG unit. `None` if the SVG cannot be drawn.
+pub fn png(figure: &Figure, fonts: &Fonts) -> Option<Vec<u8>> {
     const PIXELS_PER_UNIT: f32 = 2.0;
     let options =
         usvg::Options { fontdb: fonts.0.clone(), font_family: FAMILY.to_string(), ..usvg::Options::default() };
-    let tree = usvg::Tree::from_str(&plot.svg(), &options).ok()?;
+    let tree = usvg::Tree::from_str(&svg::file(figure), &options).ok()?;
     let size = tree.size().to_int_size().scale_by(PIXELS_PER_UNIT)?;
     let mut pixels = tiny_skia::Pixmap::new(size.width(), size.height())?;
     let scale = tiny_skia::Transform::from_scale(PIXELS_PER_UNIT, PIXELS_PER_UNIT);

@@ -1,96 +1,123 @@
-//! Polar plots: the deviation of a ball bar, magnified, about a nominal circle.
+//! Polar charts: the deviation of a ball bar, magnified, about a nominal circle.
 
 use maud::{Markup, html};
+use serde_json::json;
 
+use super::lines::{self, Series};
 use super::scale::{coordinate, polyline, round_up, text};
-use super::{Plot, legend};
+use super::svg::{Drawing, WIDTH, legend, shortened};
+use super::{Kind, Quantity};
+use crate::present::table::Table;
 
 /// Divisions on either side of the nominal circle.
 pub const DIVISIONS: f64 = 4.0;
+/// Side of the square around the circles of a separate chart, SVG units.
+const SIDE: f64 = 340.0;
+/// Panels in a row.
+const PER_ROW: usize = 3;
+/// Largest angle of a chord, °. Longer gaps are subdivided, so that the line follows the circle.
+const CHORD_DEG: f64 = 4.0;
 
-/// One traversal of a polar plot.
-pub struct Traversal<'t> {
-    /// CSS class: `forward`, `backward` or `plain`.
-    pub class: &'t str,
-    /// Index among the traversals of its test. Only interactive plots have one.
-    pub index: Option<usize>,
-    /// Angle (°) and deviation (µm).
-    pub points: Vec<(f64, f64)>,
+/// Deviations about a nominal circle.
+#[derive(Clone, Debug)]
+pub struct Polar {
+    /// The angle.
+    pub angle: Quantity,
+    /// What is magnified.
+    pub deviation: Quantity,
+    /// Scale, µm per division.
+    pub division_um: f64,
+    /// Traversals: angle (°) and deviation (µm).
+    pub series: Vec<Series>,
+    /// Index of the test and data column of the readings behind it.
+    pub live: (usize, &'static str),
 }
 
-/// Size of a polar plot.
+/// Several deviations about nominal circles at one scale.
+#[derive(Clone, Debug)]
+pub struct Panels {
+    /// The angle.
+    pub angle: Quantity,
+    /// What is magnified.
+    pub deviation: Quantity,
+    /// Scale, µm per division.
+    pub division_um: f64,
+    /// One panel each, with its label: angle (°) and deviation (µm).
+    pub series: Vec<Series>,
+}
+
+/// The scale, µm per division, at which all values lie within the circles.
+pub fn division_um(values_um: impl IntoIterator<Item = f64>) -> f64 {
+    round_up(values_um.into_iter().map(f64::abs).fold(0.0, f64::max) / DIVISIONS)
+}
+
+/// Circles and spokes in a square.
 #[derive(Clone, Copy)]
-pub struct PolarSize {
-    /// Side of the square around the circles, SVG units.
-    pub side: f64,
+struct Circles {
+    /// Side of the square, SVG units.
+    side: f64,
     /// Whether angles and the symbols of start and end are drawn.
-    pub detailed: bool,
+    detailed: bool,
+    /// Scale, µm per division.
+    division_um: f64,
 }
 
-impl PolarSize {
-    /// A separate plot.
-    pub const LARGE: PolarSize = PolarSize { side: 340.0, detailed: true };
-    /// One of several in a plot, three to a row.
-    pub const SMALL: PolarSize = PolarSize { side: super::WIDTH / 3.0, detailed: false };
-
+impl Circles {
     /// Distance of two neighbouring circles.
-    pub fn division(self) -> f64 {
+    fn division(self) -> f64 {
         self.side * 0.042
     }
 
     /// Radius of the nominal circle.
-    pub fn nominal(self) -> f64 {
+    fn nominal(self) -> f64 {
         self.side * 0.22
     }
 
-    /// Coordinates of a reading.
+    /// Coordinates at an angle, a number of divisions outside the nominal circle.
     fn at(self, angle_deg: f64, divisions: f64) -> (f64, f64) {
         let radius = (self.nominal() + divisions * self.division()).max(0.0);
         let (sin, cos) = angle_deg.to_radians().sin_cos();
         (self.side / 2.0 + radius * cos, self.side / 2.0 - radius * sin)
     }
-}
 
-/// The scale, µm per division, at which all points lie within the circles.
-pub fn division_um<'p>(points: impl IntoIterator<Item = &'p (f64, f64)>) -> f64 {
-    let maximum = points.into_iter().map(|(_, um)| um.abs()).fold(0.0, f64::max);
-    round_up(maximum / DIVISIONS)
-}
+    /// Coordinates of a reading.
+    fn point(self, (angle_deg, um): (f64, f64)) -> (f64, f64) {
+        self.at(angle_deg, um / self.division_um)
+    }
 
-/// Draws circles, spokes, traversals and symbols.
-pub fn drawing(size: PolarSize, division_um: f64, traversals: &[Traversal<'_>]) -> Markup {
-    let centre = size.side / 2.0;
-    html! {
-        @for k in (-4..=4).filter(|k| *k != 0) {
-            circle class="grid" cx=(centre) cy=(centre) r=(coordinate(size.nominal() + f64::from(k) * size.division())) {}
-        }
-        @for k in 0..8 {
-            @let (x, y) = size.at(45.0 * f64::from(k), DIVISIONS);
-            path class="grid" d=(polyline([(centre, centre), (x, y)])) {}
-            @if size.detailed {
-                @let (x, y) = size.at(45.0 * f64::from(k), DIVISIONS + 0.6);
-                text class=(label_class(k)) x=(coordinate(x)) y=(coordinate(y + 4.0)) { (45 * k) "°" }
+    /// Draws circles, spokes, traversals and symbols.
+    fn drawing(self, series: &[Series]) -> Markup {
+        let centre = self.side / 2.0;
+        html! {
+            @for k in (-4..=4).filter(|k| *k != 0) {
+                @let radius = self.nominal() + f64::from(k) * self.division();
+                circle class="grid" cx=(centre) cy=(centre) r=(coordinate(radius)) {}
             }
-        }
-        circle class="nominal" cx=(centre) cy=(centre) r=(coordinate(size.nominal())) {}
-        @for traversal in traversals {
-            @let path = joined_along_arcs(&traversal.points).into_iter().map(|(angle, um)| size.at(angle, um / division_um));
-            path class=(format!("run {}", traversal.class)) data-run=[traversal.index] d=(polyline(path)) {}
-        }
-        @if size.detailed {
-            @for traversal in traversals {
-                @let at = |point: &(f64, f64)| size.at(point.0, point.1 / division_um);
-                @if let (Some(first), Some(last)) = (traversal.points.first().map(at), traversal.points.last().map(at)) {
-                    circle class="start" data-run=[traversal.index] cx=(coordinate(first.0)) cy=(coordinate(first.1)) r="4" {}
-                    rect class="end" data-run=[traversal.index] x=(coordinate(last.0 - 3.0)) y=(coordinate(last.1 - 3.0)) width="6" height="6" {}
+            @for k in 0..8 {
+                @let (x, y) = self.at(45.0 * f64::from(k), DIVISIONS);
+                path class="grid" d=(polyline([(centre, centre), (x, y)])) {}
+                @if self.detailed {
+                    @let (x, y) = self.at(45.0 * f64::from(k), DIVISIONS + 0.6);
+                    text class=(label_class(k)) x=(coordinate(x)) y=(coordinate(y + 4.0)) { (45 * k) "°" }
+                }
+            }
+            circle class="nominal" cx=(centre) cy=(centre) r=(coordinate(self.nominal())) {}
+            @for series in series {
+                @let path = joined_along_arcs(&series.points).into_iter().map(|point| self.point(point));
+                path class=(format!("run {}", series.class)) data-run=[series.traversal()] d=(polyline(path)) {}
+            }
+            @for series in series.iter().filter(|_| self.detailed) {
+                @if let (Some(first), Some(last)) = (series.points.first(), series.points.last()) {
+                    @let (first, last) = (self.point(*first), self.point(*last));
+                    circle class="start" data-run=[series.traversal()] cx=(coordinate(first.0)) cy=(coordinate(first.1))
+                        r="4" {}
+                    rect class="end" data-run=[series.traversal()] x=(coordinate(last.0 - 3.0))
+                        y=(coordinate(last.1 - 3.0)) width="6" height="6" {}
                 }
             }
         }
     }
 }
-
-/// Largest angle of a chord, °. Longer gaps are subdivided, so that the line follows the circle.
-const CHORD_DEG: f64 = 4.0;
 
 /// Joins distant readings along the arc. The deviation is interpolated linearly.
 fn joined_along_arcs(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
@@ -115,30 +142,52 @@ fn label_class(spoke: i32) -> &'static str {
     }
 }
 
-/// A separate polar plot.
-pub fn plot(
-    name: String,
-    title: String,
-    caption: String,
-    angle: &str,
-    traversals: &[Traversal<'_>],
-    division_um: f64,
-) -> Plot {
-    let size = PolarSize::LARGE;
-    let mut entries: Vec<(&str, String)> = Vec::new();
-    for (class, label) in [("forward", "forward"), ("backward", "backward"), ("plain", "readings")] {
-        if traversals.iter().any(|traversal| traversal.class == class) {
-            entries.push((class, label.to_string()));
-        }
+impl Kind for Polar {
+    fn drawing(&self) -> Drawing {
+        let circles = Circles { side: SIDE, detailed: true, division_um: self.division_um };
+        let mut entries = lines::entries(&self.series);
+        let symbols = [("nominal", "nominal"), ("key-start", "start"), ("key-end", "end")];
+        entries.extend(symbols.map(|(class, label)| (class.to_string(), label.to_string())));
+        let (keys, bottom) = legend(&entries, 10.0, SIDE + 32.0, SIDE - 20.0);
+        let um = self.division_um;
+        let inner = html! {
+            (circles.drawing(&self.series))
+            text x="10" y=(SIDE + 12.0) {
+                tspan class="division" { (text(um, um)) } " µm per division; angle of " (self.angle.name)
+            }
+            (keys)
+        };
+        let interaction = json!({
+            "kind": "polar", "test": self.live.0, "column": self.live.1, "x0": SIDE / 2.0, "y0": SIDE / 2.0,
+            "r": circles.nominal(), "px": circles.division(), "um": um, "abscissa": "x",
+        });
+        Drawing { size: [SIDE, bottom + 10.0], inner, interaction: Some(interaction.to_string()) }
     }
-    entries.push(("nominal", "nominal".to_string()));
-    entries.push(("key-start", "start".to_string()));
-    entries.push(("key-end", "end".to_string()));
-    let (keys, bottom) = legend(&entries, 10.0, size.side + 32.0, size.side - 20.0);
-    let inner = html! {
-        (drawing(size, division_um, traversals))
-        text x="10" y=(size.side + 12.0) { tspan class="division" { (text(division_um, division_um)) } " µm per division; angle of " (angle) }
-        (keys)
-    };
-    Plot::new(name, title, caption, [size.side, bottom + 10.0], inner)
+
+    fn table(&self) -> Table {
+        lines::table(&self.series, &self.angle, &self.deviation)
+    }
+}
+
+impl Kind for Panels {
+    fn drawing(&self) -> Drawing {
+        let side = WIDTH / PER_ROW as f64;
+        let circles = Circles { side, detailed: false, division_um: self.division_um };
+        let row_height = side + 22.0;
+        let inner = html! {
+            @for (number, series) in self.series.iter().enumerate() {
+                @let (x, y) = ((number % PER_ROW) as f64 * side, (number / PER_ROW) as f64 * row_height);
+                g transform=(format!("translate({x} {y})")) {
+                    (circles.drawing(std::slice::from_ref(series)))
+                    text class="middle" x=(side / 2.0) y=(side + 8.0) { (shortened(&series.label, 26)) }
+                }
+            }
+        };
+        let rows = self.series.len().div_ceil(PER_ROW).max(1);
+        Drawing::new([WIDTH, row_height * rows as f64 + 6.0], inner)
+    }
+
+    fn table(&self) -> Table {
+        lines::table(&self.series, &self.angle, &self.deviation)
+    }
 }

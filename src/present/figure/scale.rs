@@ -25,20 +25,18 @@ pub fn text(value: f64, step: f64) -> String {
     }
 }
 
-/// A linear scale from a range of values to a range of coordinates.
+/// A linear scale: a range of values with ticks.
 #[derive(Clone, Copy, Debug)]
 pub struct Scale {
     /// Minimum and maximum value.
     pub values: [f64; 2],
-    /// Coordinates of these two values.
-    pub coordinates: [f64; 2],
     /// Step between ticks.
     pub step: f64,
 }
 
 impl Scale {
     /// A scale over exactly this range, with about `ticks` ticks.
-    pub fn over(low: f64, high: f64, coordinates: [f64; 2], ticks: usize) -> Scale {
+    pub fn over([low, high]: [f64; 2], ticks: usize) -> Scale {
         let (low, high) = if low.is_finite() && high.is_finite() && high > low {
             (low, high)
         } else if low.is_finite() {
@@ -46,41 +44,34 @@ impl Scale {
         } else {
             (0.0, 1.0)
         };
-        Scale { values: [low, high], coordinates, step: round_up((high - low) / ticks.max(1) as f64) }
+        Scale { values: [low, high], step: round_up((high - low) / ticks.max(1) as f64) }
     }
 
     /// A scale over this range, extended to whole steps.
-    pub fn rounded(low: f64, high: f64, coordinates: [f64; 2], ticks: usize) -> Scale {
-        let scale = Scale::over(low, high, coordinates, ticks);
-        let whole = |value: f64| value / scale.step;
-        Scale {
-            values: [
-                (whole(scale.values[0]) + 1e-9).floor() * scale.step,
-                (whole(scale.values[1]) - 1e-9).ceil() * scale.step,
-            ],
-            ..scale
-        }
+    pub fn rounded(range: [f64; 2], ticks: usize) -> Scale {
+        let Scale { values: [low, high], step } = Scale::over(range, ticks);
+        Scale { values: [(low / step + 1e-9).floor() * step, (high / step - 1e-9).ceil() * step], step }
     }
 
-    /// The same scale with a step that divides a revolution.
-    pub fn in_degrees(self) -> Scale {
+    /// A scale over this range and zero, extended to whole steps.
+    pub fn with_zero([low, high]: [f64; 2], ticks: usize) -> Scale {
+        Scale::rounded([low.min(0.0), high.max(0.0)], ticks)
+    }
+
+    /// A scale over the range of an axis position. The steps of an angle divide a revolution.
+    pub fn of_axis(range: [f64; 2], is_angle: bool) -> Scale {
         let steps = [1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 45.0, 90.0, 180.0, 360.0];
-        let wanted = (self.values[1] - self.values[0]) / 9.0;
-        let step = steps.into_iter().find(|step| *step >= wanted);
-        match step {
-            Some(step) if wanted > 0.5 => Scale { step, ..self },
-            _ => self,
+        let scale = Scale::over(range, if is_angle { 9 } else { 7 });
+        let wanted = (scale.values[1] - scale.values[0]) / 9.0;
+        match steps.into_iter().find(|step| *step >= wanted) {
+            Some(step) if is_angle && wanted > 0.5 => Scale { step, ..scale },
+            _ => scale,
         }
     }
 
-    /// Coordinate difference per unit of the value.
-    pub fn per_unit(&self) -> f64 {
-        (self.coordinates[1] - self.coordinates[0]) / (self.values[1] - self.values[0])
-    }
-
-    /// Coordinate of a value.
-    pub fn at(&self, value: f64) -> f64 {
-        self.coordinates[0] + (value - self.values[0]) * self.per_unit()
+    /// The scale between two coordinates of a drawing: of the minimum, of the maximum.
+    pub fn between(self, coordinates: [f64; 2]) -> Placed {
+        Placed { scale: self, coordinates }
     }
 
     /// Values of the ticks within the range.
@@ -89,6 +80,40 @@ impl Scale {
         let last = (self.values[1] / self.step + 1e-9).floor() as i64;
         (first..=last).map(|k| k as f64 * self.step).collect()
     }
+}
+
+/// A scale in a drawing.
+#[derive(Clone, Copy, Debug)]
+pub struct Placed {
+    /// The scale.
+    pub scale: Scale,
+    /// Coordinates of its minimum and maximum.
+    pub coordinates: [f64; 2],
+}
+
+impl Placed {
+    /// Coordinate difference per unit of the value.
+    pub fn per_unit(&self) -> f64 {
+        (self.coordinates[1] - self.coordinates[0]) / (self.scale.values[1] - self.scale.values[0])
+    }
+
+    /// Coordinate of a value.
+    pub fn at(&self, value: f64) -> f64 {
+        self.coordinates[0] + (value - self.scale.values[0]) * self.per_unit()
+    }
+
+    /// The ticks: coordinate and label.
+    pub fn ticks(&self) -> Vec<(f64, String)> {
+        self.scale.ticks().into_iter().map(|value| (self.at(value), text(value, self.scale.step))).collect()
+    }
+}
+
+/// Minimum and maximum of the finite values.
+pub fn span(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
+    values
+        .into_iter()
+        .filter(|value| value.is_finite())
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
 }
 
 /// Formats a coordinate to a tenth of a pixel, without negative zero.
@@ -134,9 +159,10 @@ mod tests {
 
     #[test]
     fn ticks_lie_within_the_range_and_at_their_coordinates() {
-        let scale = Scale::rounded(-3.2, 9.1, [100.0, 0.0], 5);
+        let scale = Scale::rounded([-3.2, 9.1], 5);
         assert_eq!(scale.values, [-5.0, 10.0]);
         assert_eq!(scale.ticks(), [-5.0, 0.0, 5.0, 10.0]);
+        let scale = scale.between([100.0, 0.0]);
         assert!((scale.at(10.0) - 0.0).abs() < 1e-9 && (scale.at(-5.0) - 100.0).abs() < 1e-9);
     }
 }

@@ -8,7 +8,7 @@ use abbe::model::axis::AxisKind;
 pub struct PlotAxis {
     /// Name.
     pub name: String,
-    /// Unit.
+    /// Unit: `deg`, `mm` or `number`.
     pub unit: &'static str,
     /// Whether it is an angle.
     pub is_angle: bool,
@@ -21,7 +21,7 @@ pub fn axes_of(problem: &Problem, test: &TestSeries, number: usize) -> Vec<(Plot
     let readings = problem.tests[number].readings.as_ref();
     let (Some(readings), false) = (readings, is_traversal || test.way.moving.is_empty()) else {
         let unit = if test.way.is_angle {
-            "°"
+            "deg"
         } else if test.way.axis.is_some() {
             "mm"
         } else {
@@ -36,7 +36,7 @@ pub fn axes_of(problem: &Problem, test: &TestSeries, number: usize) -> Vec<(Plot
         let values = readings.positions[*axis].iter().map(|q| q * display).collect();
         let axis = PlotAxis {
             name: problem.session.machine.axes[*axis].name.clone(),
-            unit: if is_angle { "°" } else { "mm" },
+            unit: problem.session.machine.axes[*axis].kind.unit(),
             is_angle,
         };
         (axis, values)

@@ -1,9 +1,9 @@
-//! Contents of a report: title, summary, sections and plots.
+//! Contents of a report: title, summary, sections and figures.
 
 use maud::{Markup, html};
 use serde_json::Value;
 
-use crate::present::figure::{Plot, file_name};
+use crate::present::figure::{Figure, file_name, svg};
 use crate::present::table::Table;
 
 /// The contents of a report, independent of the page around it.
@@ -16,16 +16,16 @@ pub struct Document {
     /// Verdict in one or two sentences.
     pub verdict: String,
     /// Key figures of the summary.
-    pub figures: Vec<KeyFigure>,
+    pub key_figures: Vec<KeyFigure>,
     /// Warnings, shown below the key figures.
     pub warnings: Vec<String>,
     /// Method, in sentences.
     pub method: String,
     /// Sections in order: anchor, heading, contents.
     pub sections: Vec<(String, String, Markup)>,
-    /// All plots of the sections.
-    pub plots: Vec<Plot>,
-    /// Data of the interactive plots. Null if the page has none.
+    /// All figures of the sections.
+    pub figures: Vec<Figure>,
+    /// Data of the interactive figures. Null if the page has none.
     pub data: Value,
     /// All readings, for a download as CSV; no rows if the page has none.
     pub readings: Table,
@@ -55,51 +55,49 @@ impl Document {
         self.sections.push((anchor, heading.to_string(), contents));
     }
 
-    /// Adds plots to the document and returns their figures. Plots of one width stand in columns; plots of several
-    /// widths share rows.
-    pub fn show(&mut self, plots: impl IntoIterator<Item = Plot>) -> Markup {
-        let plots: Vec<Plot> = plots.into_iter().collect();
-        let widths: Vec<f64> = plots.iter().map(|plot| plot.size[0]).collect();
-        let is_mixed = widths.windows(2).any(|pair| pair[0] != pair[1]);
+    /// Adds figures to the document and draws them. Drawings of one width stand in columns; drawings of several widths
+    /// share rows.
+    pub fn show(&mut self, figures: impl IntoIterator<Item = Figure>) -> Markup {
+        let drawn = self.draw(figures);
+        let width = drawn.first().map_or(0.0, |(width, _)| *width);
+        let is_mixed = drawn.iter().any(|(other, _)| *other != width);
         let layout = if is_mixed { "figures row" } else { "figures columns" };
-        let width = widths.first().copied().unwrap_or_default();
-        let markup = html! {
-            @if !plots.is_empty() {
-                div class=(layout) style=(format!("--width:{width}")) { @for plot in &plots { (plot.figure()) } }
+        html! {
+            @if !drawn.is_empty() {
+                div class=(layout) style=(format!("--width:{width}")) { @for (_, figure) in &drawn { (figure) } }
             }
-        };
-        for plot in plots {
-            self.add(plot);
         }
-        markup
     }
 
-    /// Adds plots to the document and returns their figures in two groups, one beside the other on a wide page.
+    /// Adds figures to the document and draws them in two groups, one beside the other on a wide page.
     pub fn show_beside(
         &mut self,
-        left: impl IntoIterator<Item = Plot>,
-        right: impl IntoIterator<Item = Plot>,
+        left: impl IntoIterator<Item = Figure>,
+        right: impl IntoIterator<Item = Figure>,
     ) -> Markup {
-        let [left, right] = [left.into_iter().collect(), right.into_iter().collect::<Vec<Plot>>()];
-        let markup = html! {
+        let [left, right] = [self.draw(left), self.draw(right)];
+        html! {
             div class="beside" {
-                div class="figures row" { @for plot in &left { (plot.figure()) } }
-                div class="figures stack" { @for plot in &right { (plot.figure()) } }
+                div class="figures row" { @for (_, figure) in &left { (figure) } }
+                div class="figures stack" { @for (_, figure) in &right { (figure) } }
             }
-        };
-        left.into_iter().chain(right).for_each(|plot| self.add(plot));
-        markup
+        }
     }
 
-    /// Adds a plot under a unique name.
-    fn add(&mut self, mut plot: Plot) {
-        let wanted = plot.name.clone();
-        let mut number = 2;
-        // Names differ by more than case, because many file systems ignore case.
-        while self.plots.iter().any(|other| other.name.eq_ignore_ascii_case(&plot.name)) {
-            plot.name = format!("{wanted}-{number}");
-            number += 1;
-        }
-        self.plots.push(plot);
+    /// Adds figures under unique names and draws each: its width and its element.
+    fn draw(&mut self, figures: impl IntoIterator<Item = Figure>) -> Vec<(f64, Markup)> {
+        let add = |mut figure: Figure| {
+            let wanted = figure.name.clone();
+            let mut number = 2;
+            // Names differ by more than case, because many file systems ignore case.
+            while self.figures.iter().any(|other| other.name.eq_ignore_ascii_case(&figure.name)) {
+                figure.name = format!("{wanted}-{number}");
+                number += 1;
+            }
+            let drawn = svg::element(&figure);
+            self.figures.push(figure);
+            drawn
+        };
+        figures.into_iter().map(add).collect()
     }
 }

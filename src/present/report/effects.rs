@@ -8,10 +8,10 @@ use maud::{Markup, html};
 
 use super::document::Document;
 use crate::present::effect::name;
-use crate::present::figure::bars::{self, Fill};
-use crate::present::figure::lines::{ACROSS, Lines, Mark, Series, UP, span};
-use crate::present::figure::scale::{Scale, coordinate, polyline};
-use crate::present::figure::{Plot, shortened};
+use crate::present::figure::bars::{Bars, Fill};
+use crate::present::figure::lines::{Axis, Lines, Mark, Name, Series};
+use crate::present::figure::scale::{Scale, span};
+use crate::present::figure::{Chart, Figure, Quantity};
 use crate::present::html::{capitalised, integer, list, with_minus_signs};
 use crate::present::number::{micrometres, shape_number, unit, value_and_u};
 use crate::present::{trace as present, uniqueness};
@@ -73,7 +73,7 @@ fn block(
 ) -> Markup {
     let curve = (!effect.curve.is_empty()).then(|| curve(effect));
     let ranking = competing.map(|(effects, id)| ranking(effects, id));
-    let (left, right): (Vec<Plot>, Vec<Plot>) = if effect.unique {
+    let (left, right): (Vec<Figure>, Vec<Figure>) = if effect.unique {
         (curve.into_iter().collect(), ranking.into_iter().collect())
     } else {
         (curve.into_iter().chain(ranking).collect(), Vec::new())
@@ -177,99 +177,83 @@ fn separation(alias: &EffectName, test: &SeparatingTestResult) -> String {
 }
 
 /// Nonparametric curve with a band of ± 2 u.
-fn curve(effect: &EffectResult) -> Plot {
+fn curve(effect: &EffectResult) -> Figure {
     let line = |multiple: f64| {
         let points = effect.curve.iter();
         points.map(|p| (p.at, p.value + multiple * p.u)).collect::<Vec<_>>()
     };
-    let [low, high] = span(effect.curve.iter().map(|p| p.at));
-    let [minimum, maximum] = span(effect.curve.iter().flat_map(|p| [p.value - 2.0 * p.u, p.value + 2.0 * p.u]));
-    let series = [("after", 0.0), ("found-line", 2.0), ("found-line", -2.0)];
-    Lines {
-        name: format!("curve-{}-{}", effect.name.component, effect.name.driver),
-        title: format!("{} over {}", effect.name.component, effect.name.driver),
-        caption: "The curve excludes the components that are collinear with location errors.".to_string(),
-        x: (Scale::over(low, high, ACROSS, 8), format!("{}, {}", effect.name.driver, unit(&effect.curve_at_unit))),
-        y: (
-            Scale::rounded(minimum.min(0.0), maximum.max(0.0), UP, 6),
-            format!("{}, {}", effect.name.component, unit(&effect.curve_unit)),
-        ),
-        series: series
-            .iter()
-            .map(|(class, multiple)| Series { class, source: None, mark: Mark::Line, points: line(*multiple) })
-            .collect(),
-        legend: vec![("after", "curve".into()), ("found-line", "± 2 u".into())],
-        over: html! {},
-    }
-    .plot()
+    let values = effect.curve.iter().flat_map(|p| [p.value - 2.0 * p.u, p.value + 2.0 * p.u]);
+    let name = &effect.name;
+    let lines = Lines::new(
+        Axis::new(&name.driver, &effect.curve_at_unit, Scale::over(span(effect.curve.iter().map(|p| p.at)), 8)),
+        Axis::new(&name.component, &effect.curve_unit, Scale::with_zero(span(values), 6)),
+        vec![
+            Series::new("curve", "after", Mark::Line, line(0.0)),
+            Series::new("± 2 u", "found-line", Mark::Line, line(2.0)),
+            Series::new("± 2 u", "found-line", Mark::Line, line(-2.0)),
+        ],
+    );
+    Figure::new(
+        format!("curve-{}-{}", name.component, name.driver),
+        format!("{} over {}", name.component, name.driver),
+        "The curve excludes the components that are collinear with location errors.",
+        Chart::Lines(lines),
+    )
 }
 
 /// Held-out error after each addition of the search.
-fn convergence(trace: &TraceOutcome) -> Plot {
+fn convergence(trace: &TraceOutcome) -> Figure {
     let before = trace.result.before.heldout_rms_um;
     let mut points = vec![(0.0, before)];
     points.extend(trace.steps.iter().enumerate().map(|(k, step)| (k as f64 + 1.0, step.heldout_rms_um)));
     let maximum = points.iter().map(|p| p.1).fold(0.0, f64::max);
     let steps = trace.steps.len() as f64;
-    let is_named = trace.steps.len() <= MAX_NAMED;
+    let shown = trace.steps.len() <= MAX_NAMED;
+    let names = trace.steps.iter().map(|step| Name {
+        text: step.id.clone(),
+        note: format!("{}, {}", micrometres(step.heldout_rms_um), counted(step.effects, "effect")),
+        shown,
+    });
     // Names need space to the right of the last point.
-    let width = if is_named { 1.5 * steps } else { steps + 0.5 };
-    let x = Scale::over(0.0, width, ACROSS, 10);
-    let x = Scale { step: x.step.max(1.0), ..x };
-    let y = Scale::rounded(0.0, maximum * 1.05, UP, 5);
-    let over = html! {
-        @for (number, step) in trace.steps.iter().enumerate() {
-            @let (left, top) = (x.at(number as f64 + 1.0), y.at(step.heldout_rms_um));
-            circle class="dot-after" cx=(coordinate(left)) cy=(coordinate(top)) r="3.4" {
-                title { (step.id) ": " (micrometres(step.heldout_rms_um)) ", " (counted(step.effects, "effect")) }
-            }
-            @if is_named {
-                text class="small" x=(coordinate(left + 6.0)) y=(coordinate(top - 7.0)) { (shortened(&step.id, 26)) }
-            }
-        }
-        @let noise = y.at(trace.result.noise_um);
-        @if trace.result.noise_um < maximum {
-            path class="found-line" d=(polyline([(ACROSS[0], noise), (ACROSS[1], noise)])) {}
-        }
-    };
-    let mut legend = vec![("after", "held-out rms".to_string())];
-    if trace.result.noise_um < maximum {
-        legend.push(("found-line", "noise of a reading".to_string()));
+    let x = Scale::over([0.0, if shown { 1.5 * steps } else { steps + 0.5 }], 10);
+    let mut series =
+        vec![Series { names: names.collect(), ..Series::new("held-out rms", "after", Mark::Line, points) }];
+    let noise = trace.result.noise_um;
+    if noise < maximum {
+        let level = x.values.map(|at| (at, noise)).to_vec();
+        series.push(Series::new("noise of a reading", "found-line", Mark::Line, level));
     }
-    Lines {
-        name: "convergence".to_string(),
-        title: "Convergence of the search".to_string(),
-        caption: "Held-out error after each addition. Later steps can exchange an added effect.".to_string(),
-        x: (x, "additions".to_string()),
-        y: (y, "held-out rms, µm".to_string()),
-        series: vec![Series { class: "after", source: None, mark: Mark::Line, points }],
-        legend,
-        over,
-    }
-    .plot()
+    let lines = Lines::new(
+        Axis::new("additions", "", Scale { step: x.step.max(1.0), ..x }),
+        Axis::new("held-out rms", "um", Scale::rounded([0.0, maximum * 1.05], 5)),
+        series,
+    );
+    Figure::new(
+        "convergence",
+        "Convergence of the search",
+        "Held-out error after each addition. Later steps can exchange an added effect.",
+        Chart::Lines(lines),
+    )
 }
 
 /// Evidence of the competing explanations of an effect.
-fn ranking(competing: &[CompetingEffect], id: &str) -> Plot {
-    let rows: Vec<(String, f64, Fill)> = competing
-        .iter()
-        .map(|effect| {
-            let fill = if effect.named {
-                Fill::Named
-            } else if effect.alias {
-                Fill::Alias
-            } else {
-                Fill::Other
-            };
-            (effect.id.clone(), effect.evidence, fill)
-        })
-        .collect();
-    bars::bars(
+fn ranking(competing: &[CompetingEffect], id: &str) -> Figure {
+    let rows = competing.iter().map(|effect| {
+        let fill = match (effect.named, effect.alias) {
+            (true, _) => Fill::Named,
+            (false, true) => Fill::Alias,
+            (false, false) => Fill::Other,
+        };
+        (effect.id.clone(), effect.evidence, fill)
+    });
+    Figure::new(
         format!("ranking-{id}"),
         format!("Competing explanations of {id}"),
-        "Evidence together with the rest of the model: −ln P minus the complexity penalty.".to_string(),
-        "evidence, −ln P",
-        &rows,
-        &[("key-named", "selected"), ("key-alias", "indistinguishable"), ("key-other", "rejected")],
+        "Evidence together with the rest of the model: −ln P minus the complexity penalty.",
+        Chart::Bars(Bars {
+            quantity: Quantity::new("evidence, −ln P", ""),
+            rows: rows.collect(),
+            labels: vec![(Fill::Named, "selected"), (Fill::Alias, "indistinguishable"), (Fill::Other, "rejected")],
+        }),
     )
 }

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 
 use super::abscissae::axes_of;
 use super::plots::{Column, SessionPlots};
+use crate::present::number::unit;
 use crate::present::table::{self, Cell, Table, cells, numbers};
 
 /// Maximum number of sliders.
@@ -87,7 +88,7 @@ pub fn data(session: &SessionPlots<'_>) -> Value {
                     })
                 })
                 .collect();
-            let units: Vec<&str> = axes.iter().map(|(axis, _)| axis.unit).collect();
+            let units: Vec<String> = axes.iter().map(|(axis, _)| unit(axis.unit)).collect();
             json!({"name": test.name, "over": test.way.name, "units": units, "traversals": traversals})
         })
         .collect();

@@ -39,7 +39,7 @@ pub fn document(problem: &Problem, fit: &Fit, result: &FitResult) -> Result<Docu
     let mut document = Document {
         title: format!("Fit of {}", problem.session.machine.name),
         verdict: verdict(result),
-        figures: figures(problem, result),
+        key_figures: key_figures(problem, result),
         warnings: result.warnings.clone(),
         method: method(result),
         ..Document::default()
@@ -91,7 +91,7 @@ fn verdict(result: &FitResult) -> String {
 }
 
 /// Key figures of the summary.
-fn figures(problem: &Problem, result: &FitResult) -> Vec<KeyFigure> {
+fn key_figures(problem: &Problem, result: &FitResult) -> Vec<KeyFigure> {
     let quality = Quality {
         chi_square: result.chi_square,
         degrees_of_freedom: result.degrees_of_freedom,

@@ -7,8 +7,8 @@ use maud::html;
 use super::document::Document;
 use super::readings;
 use super::summary::noise_sentence;
-use crate::present::figure::Plot;
-use crate::present::figure::bars::{Row, Value, values};
+use crate::present::figure::bars::{Row, Value, Values};
+use crate::present::figure::{Chart, Figure, Quantity};
 use crate::present::html::table;
 use crate::present::method::{centres, errors};
 use crate::present::number::{micrometres, unit, units};
@@ -53,7 +53,7 @@ pub fn document(problem: &Problem, result: &Comparison) -> Document {
     document
 }
 
-fn plots(result: &Comparison) -> Vec<Plot> {
+fn plots(result: &Comparison) -> Vec<Figure> {
     let value = |value: Option<f64>, u: Option<f64>| Some(Value { value: value?, u: u? });
     units(result.errors.iter().map(|row| row.unit.as_str()))
         .into_iter()
@@ -68,13 +68,15 @@ fn plots(result: &Comparison) -> Vec<Plot> {
                     after: value(row.full_value, row.full_u),
                 })
                 .collect();
-            values(
+            Figure::new(
                 format!("errors-{name}"),
                 format!("Errors by both methods, {}", unit(name)),
-                "Whiskers: ± 2 u. An error that a method does not identify has no mark.".to_string(),
-                &format!("value, {}", unit(name)),
-                [&result.method, "full fit"],
-                &rows,
+                "Whiskers: ± 2 u. An error that a method does not identify has no mark.",
+                Chart::Values(Values {
+                    quantity: Quantity::new("value", name),
+                    labels: [result.method.clone(), "full fit".to_string()],
+                    rows,
+                }),
             )
         })
         .collect()

@@ -8,7 +8,8 @@ use maud::{Markup, html};
 
 use super::document::Document;
 use super::readings;
-use crate::present::figure::bars::{Fill, bars};
+use crate::present::figure::bars::{Bars, Fill};
+use crate::present::figure::{Chart, Figure, Quantity};
 use crate::present::html::{capitalised, list, table};
 use crate::present::next_test as present;
 use crate::present::number::{three_digits, unit};
@@ -77,13 +78,12 @@ fn proposed(document: &mut Document, found: &Improvement) -> Markup {
     }));
     // An error that is not identifiable has no uncertainty.
     bar_rows.retain(|row| row.1.is_finite());
-    let shown = document.show([bars(
-        "next-test".to_string(),
-        "Plan with each proposed test".to_string(),
-        format!("{}. The tests are added one after another.", capitalised(&unit(&found.criterion))),
-        &unit(&found.criterion),
-        &bar_rows,
-        &[],
+    let criterion = unit(&found.criterion);
+    let shown = document.show([Figure::new(
+        "next-test",
+        "Plan with each proposed test",
+        format!("{}. The tests are added one after another.", capitalised(&criterion)),
+        Chart::Bars(Bars { quantity: Quantity::new(criterion, ""), rows: bar_rows, labels: Vec::new() }),
     )]);
     html! {
         @if !found.steps.is_empty() { (table(&present::proposed(found))) }

@@ -6,7 +6,8 @@ use super::document::Document;
 use super::embed;
 use super::provenance::Provenance;
 use crate::present::csv;
-use crate::present::figure::{DARK, LIGHT, STYLE, file_name};
+use crate::present::figure::file_name;
+use crate::present::figure::svg::{DARK, LIGHT, STYLE};
 use crate::present::html::{capitalised, list, prose, table};
 use crate::present::table::{Table, cells};
 
@@ -90,9 +91,9 @@ fn summary(document: &Document) -> Markup {
             }
             (prose(&document.verdict))
         }
-        @if !document.figures.is_empty() {
+        @if !document.key_figures.is_empty() {
             dl class="key-figures" {
-                @for figure in &document.figures {
+                @for figure in &document.key_figures {
                     div { dt { (figure.label) } dd { (figure.value) } dd class="note" { (figure.note) } }
                 }
             }

@@ -9,8 +9,8 @@ use maud::{Markup, html};
 
 use super::document::{Document, KeyFigure};
 use super::{curves, readings, sections, summary};
-use crate::present::figure::Plot;
-use crate::present::figure::bars::{self, Fill};
+use crate::present::figure::bars::{Bars, Fill};
+use crate::present::figure::{Chart, Figure, Quantity};
 use crate::present::html::{capitalised, folded, integer, list, prose, table};
 use crate::present::number::{micrometres, three_digits, unit, units, with_symbols};
 use crate::present::plan::{self as present, effects};
@@ -44,7 +44,7 @@ pub fn document(problem: &Problem, analysis: &PlanAnalysis) -> Result<Document, 
             analysis.moving_min.map_or(String::new(), |min| format!(", {min:.0} min of movement")),
             limit(analysis),
         ),
-        figures: figures(problem, analysis),
+        key_figures: key_figures(problem, analysis),
         warnings: analysis.warnings.clone(),
         method: method(analysis),
         ..Document::default()
@@ -72,7 +72,7 @@ pub fn document(problem: &Problem, analysis: &PlanAnalysis) -> Result<Document, 
 }
 
 /// Key figures of the summary.
-fn figures(problem: &Problem, analysis: &PlanAnalysis) -> Vec<KeyFigure> {
+fn key_figures(problem: &Problem, analysis: &PlanAnalysis) -> Vec<KeyFigure> {
     let identifiable = analysis.errors.iter().filter(|error| error.u.is_some()).count();
     let mut figures = vec![
         KeyFigure::new("Identifiable errors", format!("{identifiable} of {}", analysis.errors.len()), ""),
@@ -126,7 +126,7 @@ fn limit(analysis: &PlanAnalysis) -> String {
 }
 
 /// Plots of the predicted standard uncertainties, one for each unit.
-fn uncertainties(errors: &[ErrorAnalysis]) -> Vec<Plot> {
+fn uncertainties(errors: &[ErrorAnalysis]) -> Vec<Figure> {
     units(errors.iter().map(|error| error.unit.as_str()))
         .into_iter()
         .map(|name| {
@@ -140,13 +140,15 @@ fn uncertainties(errors: &[ErrorAnalysis]) -> Vec<Plot> {
                 })
                 .take(2 * MAX_ROWS)
                 .collect();
-            bars::bars(
+            Figure::new(
                 format!("uncertainty-{}", name.replace('/', "-per-")),
                 format!("Predicted standard uncertainty, {}", unit(name)),
-                "Conditional: if all other errors were known.".to_string(),
-                &format!("u (k\u{a0}=\u{a0}1), {}", unit(name)),
-                &rows,
-                &[("key-named", "predicted"), ("key-alias", "conditional")],
+                "Conditional: if all other errors were known.",
+                Chart::Bars(Bars {
+                    quantity: Quantity::new("u (k\u{a0}=\u{a0}1)", name),
+                    rows,
+                    labels: vec![(Fill::Named, "predicted"), (Fill::Alias, "conditional")],
+                }),
             )
         })
         .collect()
@@ -155,7 +157,7 @@ fn uncertainties(errors: &[ErrorAnalysis]) -> Vec<Plot> {
 fn confounding(document: &mut Document, analysis: &PlanAnalysis) -> Markup {
     let ids = &analysis.correlation.ids;
     let shown = if ids.len() > 1 && ids.len() <= 60 {
-        document.show([readings::correlation_map(ids, &analysis.correlation.matrix)])
+        document.show([readings::correlation_map(ids.clone(), analysis.correlation.matrix.clone())])
     } else {
         html! {}
     };

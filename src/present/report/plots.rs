@@ -2,15 +2,13 @@
 
 use abbe::identify::problem::Problem;
 use abbe::identify::series::{SessionSeries, TestSeries, is_round, lengths};
-use maud::html;
-use serde_json::json;
 
 use super::abscissae::{PlotAxis, axes_of};
 use super::decimate;
-use crate::present::figure::lines::{ACROSS, Lines, Mark, Series, UP, span};
-use crate::present::figure::polar::{DIVISIONS, PolarSize, Traversal, division_um};
-use crate::present::figure::scale::Scale;
-use crate::present::figure::{Plot, polar};
+use crate::present::figure::lines::{Axis, Lines, Live, Mark, Series};
+use crate::present::figure::polar::{DIVISIONS, Polar, division_um};
+use crate::present::figure::scale::{Scale, round_up, span};
+use crate::present::figure::{Chart, Figure, Quantity};
 
 /// Intervals of a traversal in which the minimum and the maximum are kept.
 const TRAVERSAL_INTERVALS: usize = 360;
@@ -145,33 +143,31 @@ impl<'d> SessionPlots<'d> {
     }
 
     /// Polar plot of a test. `um` is the scale per division; by default all points lie within the circles.
-    fn polar(&self, number: usize, column: Column, name: &str, title: String, um: Option<f64>) -> Plot {
+    fn polar(&self, number: usize, column: Column, name: &str, title: String, um: Option<f64>) -> Figure {
         let test = &self.series.tests[number];
         let values = column.of(test);
-        let traversals: Vec<Traversal<'_>> = test
-            .stretches
-            .iter()
-            .enumerate()
-            .map(|(k, stretch)| Traversal {
-                class: class_of(stretch.forward),
-                index: Some(k),
-                points: self.points(number, k, &test.way.values, values),
-            })
-            .collect();
-        let um = um.unwrap_or_else(|| division_um(traversals.iter().flat_map(|traversal| &traversal.points)));
-        let caption = "Magnified about the nominal circle.".to_string();
-        let mut plot = polar::plot(format!("{name}-{}", test.name), title, caption, &test.way.name, &traversals, um);
-        let size = PolarSize::LARGE;
-        plot.interaction = json!({
-            "kind": "polar", "test": number, "column": column.name(), "x0": size.side / 2.0, "y0": size.side / 2.0,
-            "r": size.nominal(), "px": size.division(), "um": um, "abscissa": "x",
-        })
-        .to_string();
-        plot
+        let series = test.stretches.iter().enumerate().map(|(k, stretch)| {
+            let class = class_of(stretch.forward);
+            let label = if stretch.forward.is_some() { class } else { "readings" };
+            let points = self.points(number, k, &test.way.values, values);
+            Series { source: Some((k, column.name())), ..Series::new(label, class, Mark::Line, points) }
+        });
+        let series: Vec<Series> = series.collect();
+        let drawn_um = series.iter().flat_map(|series| &series.points).map(|(_, um)| *um);
+        let quantity = if column == Column::Deviation { "deviation" } else { "residual" };
+        let polar = Polar {
+            angle: Quantity::new(&test.way.name, "deg"),
+            deviation: Quantity::new(quantity, "um"),
+            division_um: um.unwrap_or_else(|| division_um(drawn_um)),
+            series,
+            live: (number, column.name()),
+        };
+        let name = format!("{name}-{}", test.name);
+        Figure::new(name, title, "Magnified about the nominal circle.", Chart::Polar(polar))
     }
 
     /// Polar plot of the deviation of a test, if its abscissa is an angle.
-    pub fn polar_deviation(&self, number: usize) -> Option<Plot> {
+    pub fn polar_deviation(&self, number: usize) -> Option<Figure> {
         let test = &self.series.tests[number];
         let title = format!("{}: deviation from nominal", test.name);
         (self.is_polar() && test.way.is_angle).then(|| self.polar(number, Column::Deviation, "trace", title, None))
@@ -188,14 +184,12 @@ impl<'d> SessionPlots<'d> {
     }
 
     /// Polar plots of the residuals of a test, at one magnification.
-    pub fn polar_residuals(&self, number: usize, models: [&str; 2]) -> Option<Vec<Plot>> {
+    pub fn polar_residuals(&self, number: usize, models: [&str; 2]) -> Option<Vec<Figure>> {
         let test = &self.series.tests[number];
         if !self.is_polar() || !test.way.is_angle {
             return None;
         }
-        let maximum = |values: &[f64]| values.iter().map(|v| v.abs()).fold(0.0, f64::max);
-        let um =
-            crate::present::figure::scale::round_up(maximum(&test.before_um).max(maximum(&test.after_um)) / DIVISIONS);
+        let um = division_um(test.before_um.iter().chain(&test.after_um).copied());
         let plot = |column: &Column| {
             let model = models[usize::from(*column == Column::After)];
             let name = format!("residual-{}", column.name());
@@ -205,16 +199,16 @@ impl<'d> SessionPlots<'d> {
     }
 
     /// Deviation of a test against its abscissa. For separate poses: against each axis.
-    pub fn deviations(&self, number: usize) -> Vec<Plot> {
+    pub fn deviations(&self, number: usize) -> Vec<Figure> {
         self.against(number, &[Column::Deviation])
     }
 
     /// Residuals of a test before and after, against the same abscissae.
-    pub fn residuals(&self, number: usize) -> Vec<Plot> {
+    pub fn residuals(&self, number: usize) -> Vec<Figure> {
         self.against(number, self.residual_columns())
     }
 
-    fn against(&self, number: usize, columns: &[Column]) -> Vec<Plot> {
+    fn against(&self, number: usize, columns: &[Column]) -> Vec<Figure> {
         let test = &self.series.tests[number];
         let values: Vec<Vec<f64>> = columns.iter().map(|c| lengths(c.of(test), self.series.coordinates)).collect();
         axes_of(self.problem, test, number)
@@ -230,81 +224,61 @@ impl<'d> SessionPlots<'d> {
         values: &[Vec<f64>],
         axis: &PlotAxis,
         abscissa: &[f64],
-    ) -> Plot {
+    ) -> Figure {
         let test = &self.series.tests[number];
         let three = self.series.coordinates == 3;
-        let [low, high] = span(abscissa.iter().copied());
-        let x = Scale::over(low, high, ACROSS, if axis.is_angle { 9 } else { 7 });
-        let x = if axis.is_angle { x.in_degrees() } else { x };
-        let [minimum, maximum] = span(values.iter().flatten().copied());
+        let range = span(values.iter().flatten().copied());
         let is_deviation = columns == [Column::Deviation];
         let y = if three {
-            Scale::rounded(0.0, maximum, UP, 5)
+            Scale::rounded([0.0, range[1]], 5)
         } else if is_deviation {
-            let um = crate::present::figure::scale::round_up(minimum.abs().max(maximum.abs()) / DIVISIONS);
-            Scale { values: [-DIVISIONS * um, DIVISIONS * um], coordinates: UP, step: um }
+            let um = round_up(range[0].abs().max(range[1].abs()) / DIVISIONS);
+            Scale { values: [-DIVISIONS * um, DIVISIONS * um], step: um }
         } else {
-            Scale::rounded(minimum.min(0.0), maximum.max(0.0), UP, 6)
+            Scale::with_zero(range, 6)
         };
         let is_pose = test.stretches.iter().any(|stretch| stretch.forward.is_none());
         let mark = if is_pose { Mark::Dots } else { Mark::Line };
-        let series = columns
-            .iter()
-            .zip(values)
-            .flat_map(|(column, values)| {
-                test.stretches.iter().enumerate().map(move |(k, stretch)| (*column, values, k, stretch))
+        let series = columns.iter().zip(values).flat_map(|(column, values)| {
+            test.stretches.iter().enumerate().map(move |(k, stretch)| {
+                let class = if is_deviation { class_of(stretch.forward) } else { column.name() };
+                let label = match (is_deviation, columns) {
+                    (true, _) if is_pose => "pose",
+                    (false, [_]) => "",
+                    _ => class,
+                };
+                let points = self.points(number, k, abscissa, values);
+                Series { source: Some((k, column.name())), ..Series::new(label, class, mark, points) }
             })
-            .map(|(column, values, k, stretch)| Series {
-                class: if is_deviation { class_of(stretch.forward) } else { column.name() },
-                source: Some((k, column.name())),
-                mark,
-                points: self.points(number, k, abscissa, values),
-            })
-            .collect();
-        let forward = test.stretches.iter().any(|s| s.forward == Some(true));
-        let backward = test.stretches.iter().any(|s| s.forward == Some(false));
-        let legend: Vec<(&str, String)> = match (is_deviation, is_pose) {
-            (true, true) => vec![("plain dots", "pose".to_string())],
-            (true, false) => [("forward", forward), ("backward", backward)]
-                .into_iter()
-                .filter(|(_, there)| *there)
-                .map(|(class, _)| (class, class.to_string()))
-                .collect(),
-            (false, _) if columns.len() == 1 => Vec::new(),
-            (false, true) => vec![("before dots", "before".into()), ("after dots", "after".into())],
-            (false, false) => vec![("before", "before".into()), ("after", "after".into())],
-        };
+        });
         let quantity = match (is_deviation, three) {
             (true, true) => "length of the deviation",
             (true, false) => "deviation",
             (false, true) => "length of the residual",
             (false, false) => "residual",
         };
-        let key = if is_pose { axis.name.clone() } else { "x".to_string() };
-        let mut plot = Lines {
-            name: format!("{}-{}-over-{}", if is_deviation { "deviation" } else { "residual" }, test.name, axis.name),
-            title: format!("{}: {quantity} against {}", test.name, axis.name),
-            caption: if is_deviation {
-                "Observed minus nominal reading.".to_string()
-            } else {
-                let text = if columns.len() == 1 { "" } else { "Before: red, dashed or large. After: blue." };
-                text.to_string()
-            },
-            x: (x, format!("{}, {}", axis.name, axis.unit)),
-            y: (y, format!("{quantity}, µm")),
-            series,
-            legend,
-            over: html! {},
-        }
-        .plot();
-        let (um, px) =
-            if is_deviation && !three { (y.step, y.per_unit().abs() * y.step) } else { (1.0, y.per_unit().abs()) };
-        plot.interaction = json!({
-            "kind": "line", "test": number, "column": columns[0].name(), "abscissa": key, "x0": x.at(0.0), "kx": x.per_unit(),
-            "y0": y.at(0.0), "px": px, "um": um, "scaled": is_deviation && !three,
-        })
-        .to_string();
-        plot
+        let lines = Lines {
+            x: Axis::new(&axis.name, axis.unit, Scale::of_axis(span(abscissa.iter().copied()), axis.is_angle)),
+            y: Axis::new(quantity, "um", y),
+            series: series.collect(),
+            live: Some(Live {
+                test: number,
+                column: columns[0].name(),
+                abscissa: if is_pose { axis.name.clone() } else { "x".to_string() },
+                scaled: is_deviation && !three,
+            }),
+        };
+        let caption = match (is_deviation, columns) {
+            (true, _) => "Observed minus nominal reading.",
+            (false, [_]) => "",
+            (false, _) => "Before: red, dashed or large. After: blue.",
+        };
+        Figure::new(
+            format!("{}-{}-over-{}", if is_deviation { "deviation" } else { "residual" }, test.name, axis.name),
+            format!("{}: {quantity} against {}", test.name, axis.name),
+            caption,
+            Chart::Lines(lines),
+        )
     }
 }
 

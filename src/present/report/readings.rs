@@ -12,7 +12,8 @@ use super::document::Document;
 use super::embed;
 use super::plots::SessionPlots;
 use super::residuals::{omitted_tests, unaffected_heading};
-use crate::present::figure::{Plot, chain, heat};
+use crate::present::figure::matrix::Matrix;
+use crate::present::figure::{Chart, Figure, chain};
 use crate::present::html::{folded, with_minus_signs};
 use crate::present::number::{unit, value_and_u};
 
@@ -51,7 +52,7 @@ pub fn traces(document: &mut Document, session: &SessionPlots<'_>) -> Markup {
     let (affected, unaffected): (Vec<usize>, Vec<usize>) =
         session.tests().map(|(number, _)| number).partition(|number| session.is_affected(*number));
     let mut of_tests = |numbers: &[usize]| {
-        let plots: Vec<Vec<Plot>> = numbers
+        let plots: Vec<Vec<Figure>> = numbers
             .iter()
             .map(|number| {
                 let polar = session.polar_deviation(*number).into_iter();
@@ -97,7 +98,7 @@ pub fn correlations(document: &mut Document, problem: &Problem, fit: &Fit) -> Ma
     if ids.len() < 2 {
         return html! { p { "Fewer than two errors are identifiable, so that there is no correlation." } };
     }
-    let shown = document.show([correlation_map(&ids, &matrix)]);
+    let shown = document.show([correlation_map(ids, matrix)]);
     html! {
         p { "Strongly correlated errors are poorly separable. A confounded parameter has no value of its own." }
         (shown)
@@ -106,14 +107,12 @@ pub fn correlations(document: &mut Document, problem: &Problem, fit: &Fit) -> Ma
 }
 
 /// A correlation map.
-pub fn correlation_map(ids: &[String], matrix: &[Vec<Option<f64>>]) -> Plot {
-    heat::map(
-        "correlation".to_string(),
-        "Correlation".to_string(),
-        "Below the diagonal: the area of a symbol is the magnitude. Above the diagonal: the value, if it fits."
-            .to_string(),
-        ids,
-        matrix,
+pub fn correlation_map(ids: Vec<String>, rows: Vec<Vec<Option<f64>>>) -> Figure {
+    Figure::new(
+        "correlation",
+        "Correlation",
+        "Below the diagonal: the area of a symbol is the magnitude. Above the diagonal: the value, if it fits.",
+        Chart::Matrix(Matrix { quantity: "correlation", ids, rows }),
     )
 }
 
@@ -123,5 +122,5 @@ pub fn machine(document: &mut Document, problem: &Problem) -> Markup {
     let mut errors: Vec<String> =
         list.filter(|parameter| parameter.role == Role::Error).map(|parameter| parameter.id.clone()).collect();
     errors.extend(problem.parameters.effect_ids.iter().cloned());
-    document.show([chain::plot(&problem.session.machine, &errors)])
+    document.show([chain::figure(&problem.session.machine, &errors)])
 }

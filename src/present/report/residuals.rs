@@ -7,7 +7,7 @@ use maud::{Markup, html};
 use super::curves;
 use super::document::Document;
 use super::plots::{MAX_TESTS, SessionPlots};
-use crate::present::figure::Plot;
+use crate::present::figure::Figure;
 use crate::present::html::{folded, folded_beyond, integer, table};
 use crate::present::number::micrometres;
 use crate::present::table::{Table, cells, numbers, words};
@@ -75,7 +75,7 @@ fn block(
 }
 
 /// Plots of one test with straight axes: residuals, and their spectra on one scale.
-fn straight(session: &SessionPlots<'_>, number: usize, spectra: &[Spectrum], maximum_um: f64) -> Vec<Plot> {
+fn straight(session: &SessionPlots<'_>, number: usize, spectra: &[Spectrum], maximum_um: f64) -> Vec<Figure> {
     let name = &session.series.tests[number].name;
     let effects = &session.problem.parameters.effects;
     let mut plots = session.residuals(number);

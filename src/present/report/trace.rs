@@ -66,7 +66,7 @@ pub fn document(trace: &TraceOutcome) -> Result<Document, IdentifyError> {
         title: format!("Trace of {}", problem.session.machine.name),
         word: result.verdict.clone(),
         verdict: verdict(result),
-        figures: figures(trace),
+        key_figures: key_figures(trace),
         warnings: result.warnings.clone(),
         method: method(result),
         ..Document::default()
@@ -122,7 +122,7 @@ fn quality<'r>(result: &'r TraceResult, model: &ModelResult) -> Quality<'r> {
 }
 
 /// Key figures of the summary.
-fn figures(trace: &TraceOutcome) -> Vec<KeyFigure> {
+fn key_figures(trace: &TraceOutcome) -> Vec<KeyFigure> {
     let result = &trace.result;
     let [before, after] = [&result.before, &result.after].map(|model| quality(result, model));
     let mut figures = vec![

@@ -25,7 +25,7 @@ pub fn document(session: &Session, validation: &Validation) -> Document {
         title: format!("Validation of a model of {}", session.machine.name),
         word: result.verdict.clone(),
         verdict: format!("{}.", crate::present::html::capitalised(&present::sentence(result))),
-        figures: figures(result),
+        key_figures: figures(result),
         warnings: result.warnings.clone(),
         method: METHOD.to_string(),
         ..Document::default()

@@ -5,8 +5,8 @@ use abbe::model::words::counted;
 use maud::{Markup, html};
 
 use super::document::Document;
-use crate::present::figure::Plot;
-use crate::present::figure::bars::{self, Row, Value};
+use crate::present::figure::bars::{Row, Value, Values};
+use crate::present::figure::{Chart, Figure, Quantity};
 use crate::present::html::{folded, table};
 use crate::present::number::{unit, units};
 use crate::present::parameters::{self, Estimates};
@@ -45,7 +45,7 @@ fn plots(
     title: &str,
 ) -> Markup {
     let bar = |parameter: &ParameterResult| Value { value: parameter.value, u: parameter.u };
-    let mut plots: Vec<Plot> = Vec::new();
+    let mut plots: Vec<Figure> = Vec::new();
     for unit_name in units(values.iter().map(|value| value.unit.as_str())) {
         let rows: Vec<Row> = values
             .iter()
@@ -59,13 +59,15 @@ fn plots(
         let parts = rows.len().div_ceil(MAX_ROWS);
         for (number, rows) in rows.chunks(MAX_ROWS).enumerate() {
             let part = if parts > 1 { format!(" ({} of {parts})", number + 1) } else { String::new() };
-            plots.push(bars::values(
+            plots.push(Figure::new(
                 format!("{name}-{}-{}", unit_name.replace('/', "-per-"), number + 1),
                 format!("{title} in {}{part}", unit(unit_name)),
-                "Whiskers: ± 2 u.".to_string(),
-                &format!("value, {}", unit(unit_name)),
-                ["before", "after"],
-                rows,
+                "Whiskers: ± 2 u.",
+                Chart::Values(Values {
+                    quantity: Quantity::new("value", unit_name),
+                    labels: ["before", "after"].map(str::to_string),
+                    rows: rows.to_vec(),
+                }),
             ));
         }
     }

@@ -119,7 +119,7 @@ fn driver(
 }
 
 /// `a, b and c`.
-fn listed(words: &[impl AsRef<str>], joint: &str) -> String {
+pub(super) fn listed(words: &[impl AsRef<str>], joint: &str) -> String {
     let words: Vec<&str> = words.iter().map(AsRef::as_ref).collect();
     match words.split_last() {
         Some((last, [_, ..])) => format!("{} {joint} {last}", words[..words.len() - 1].join(", ")),

@@ -272,8 +272,7 @@ fn about(root: &mut Table<'_>) -> Result<Vec<(String, String)>, ModelError> {
 /// The valid values of `kind` of an instrument, in words.
 fn kinds() -> String {
     let words: Vec<String> = InstrumentKind::ALL.iter().map(|kind| format!("\"{}\"", kind.word())).collect();
-    let (last, others) = words.split_last().expect("an instrument");
-    format!("{} or {last}", others.join(", "))
+    effect::listed(&words, "or")
 }
 
 struct Instrument {
