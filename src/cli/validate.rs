@@ -20,8 +20,8 @@ pub const HELP: &str = "Examples:
   abbe validate model.json run2/session.toml
   abbe validate model.json run2/session.toml --json validate.json --report validate.html
 
-The model is that of `abbe fit --save` or `abbe trace --save`. Only the set-up of SESSION is estimated: balls, bar, pose \
-of the tracker. The verdict is `holds`, `holds-in-range` (inside the range of axes and drivers of the model's data), \
+The model is that of `abbe fit --save` or `abbe trace --save`. Only the set-up of SESSION is estimated: balls, bar, \
+pose of the tracker. The verdict is `holds`, `holds-in-range` (inside the range of axes and drivers of the model's data), \
 `degraded` (better than the location errors alone, but worse than predicted) or `does-not-hold`.";
 
 /// Rows of a list that the first screen shows.

@@ -77,8 +77,8 @@ pub fn residuals(result: &ValidationResult) -> Table {
     let mut table =
         Table::new(["machine", ">rms", ">3-vector", ">of noise", ">predicted rms", ">of predicted", ">in 95 %"], rows);
     table.notes.push(
-        "of noise: √(χ²/ν) of the residual over the noise and of the set-up over its priors. of predicted: the same with \
-         the uncertainty of the model."
+        "of noise: √(χ²/ν) of the residual over the noise and of the set-up over its priors. of predicted: the same \
+         with the uncertainty of the model."
             .into(),
     );
     if !three {

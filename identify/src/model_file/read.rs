@@ -48,7 +48,8 @@ pub fn read_text(path: &Path, text: &str) -> Result<IdentifiedModel, IdentifyErr
     let document: Document = serde_json::from_str(text).map_err(|cause| file.wrong_value(text, &cause))?;
     if document.sha256 != checksum(&value) {
         let message = format!(
-            "`{CHECKSUM}` is \"{}\", but the checksum of the other keys is another: the file was changed after it was saved",
+            "`{CHECKSUM}` is \"{}\", but the checksum of the other keys is another: the file was changed after it \
+             was saved",
             document.sha256
         );
         return Err(file.error(message, "save the model again with `abbe fit --save` or `abbe trace --save`"));
@@ -101,7 +102,8 @@ impl File<'_> {
             Some(version) if version == u64::from(SCHEMA_VERSION) => Ok(()),
             Some(version) if version > u64::from(SCHEMA_VERSION) => Err(self.error(
                 format!(
-                    "`schema_version` is {version}; this program reads versions up to {SCHEMA_VERSION}: a newer program saved the model"
+                    "`schema_version` is {version}; this program reads versions up to {SCHEMA_VERSION}: a newer \
+                     program saved the model"
                 ),
                 "use a newer version of Abbe, or save the model again with this one",
             )),
@@ -236,7 +238,8 @@ impl File<'_> {
                     Role::Coefficient { effect, coefficient }
                 }
                 _ => {
-                    let what = "`role` is \"location\", \"set-up\", or \"coefficient\" with an index of `effects` and of its coefficients";
+                    let what = "`role` is \"location\", \"set-up\", or \"coefficient\" with an index of `effects` and of its \
+                                coefficients";
                     return Err(fault(what));
                 }
             };

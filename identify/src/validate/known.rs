@@ -93,8 +93,8 @@ impl<'m> KnownErrors<'m> {
         let depends = |test: usize| full.own_parameters(test).iter().any(|j| columns.contains(j));
         if columns.is_empty() || !(0..full.tests.len()).any(depends) {
             return Err(IdentifyError::Request(
-                "no reading of the session depends on an error that the model holds: model and session have nothing in common; \
-                 fit a model of the axes that the session moves"
+                "no reading of the session depends on an error that the model holds: model and session have nothing in \
+                 common; fit a model of the axes that the session moves"
                     .into(),
             ));
         }

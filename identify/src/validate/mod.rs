@@ -50,7 +50,7 @@ pub struct Validation {
     pub coordinates: usize,
 }
 
-/// Validates a model on a session. The seed decides nothing but folds, which validation does not use.
+/// Validates a model on a session.
 ///
 /// # Errors
 /// If the session is of another machine or has no readings, no reading depends on the model, or the set-up cannot be
@@ -92,7 +92,8 @@ pub fn validate(model: &IdentifiedModel, session: &Session) -> Result<Validation
     }
     if all.undetermined > 0 {
         warnings.push(format!(
-            "the readings depend on {} of parameters that the model's own readings did not determine; they stay at nominal and enlarge the predicted uncertainty",
+            "the readings depend on {} of parameters that the model's own readings did not determine; they stay at \
+             nominal and enlarge the predicted uncertainty",
             abbe_model::words::counted(all.undetermined, "combination")
         ));
     }

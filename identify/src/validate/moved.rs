@@ -1,7 +1,7 @@
 //! The parameters of the machine that have changed since the model was saved.
 //!
-//! A change `δ` of parameter `i` adds `J̃·eᵢ·δ` to the residual, whose covariance is `V = I + J̃·C·J̃ᵀ`. Generalised least
-//! squares gives, with the information `S = J̃ᵀJ̃` of the session and its gradient `g = J̃ᵀr`,
+//! A change `δ` of parameter `i` adds `J̃·eᵢ·δ` to the residual, whose covariance is `V = I + J̃·C·J̃ᵀ`. Generalised
+//! least squares gives, with the information `S = J̃ᵀJ̃` of the session and its gradient `g = J̃ᵀr`,
 //!
 //! ```text
 //! P = S·(I + C·S)⁻¹,   y = (I + S·C)⁻¹·g,   δ̂ = yᵢ/Pᵢᵢ,   u² = s²/Pᵢᵢ

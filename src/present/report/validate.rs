@@ -25,7 +25,7 @@ pub fn document(session: &Session, validation: &Validation) -> Document {
         title: format!("Validation of a model of {}", session.machine.name),
         word: result.verdict.clone(),
         verdict: format!("{}.", crate::present::html::capitalised(&present::sentence(result))),
-        key_figures: key_figures(result),
+        key_figures: figures(result),
         warnings: result.warnings.clone(),
         method: METHOD.to_string(),
         ..Document::default()
@@ -52,7 +52,7 @@ pub fn document(session: &Session, validation: &Validation) -> Document {
 }
 
 /// Key figures of the summary.
-fn key_figures(result: &ValidationResult) -> Vec<KeyFigure> {
+fn figures(result: &ValidationResult) -> Vec<KeyFigure> {
     let model = &result.model;
     let inside = format!("{} inside the range of the model", result.readings_in_range);
     let mut figures = vec![
