@@ -7,6 +7,7 @@ mod format;
 mod machine;
 mod movement;
 mod prior;
+mod quoted;
 pub mod rewrite;
 mod shape;
 mod sockets;
