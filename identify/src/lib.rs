@@ -17,6 +17,8 @@
 //! - [`simulate`]: simulated readings; [`patterns`]: the pattern of each single error in a test; [`quantity`]: values
 //!   with units;
 //! - [`series`]: the columns of a session, reading by reading, for plots;
+//! - [`model_file`]: the identified model as a value and as a file;
+//! - [`validate`](mod@validate): a model against readings that it never saw;
 //! - [`results`]: the reported results, in the form of the JSON output.
 //!
 //! The example fits a bundled session as declared, then traces it. Beside noise of 0.3 µm the readings contain one
@@ -47,12 +49,16 @@
 
 pub mod candidates;
 pub mod circular;
+pub mod compare;
 pub mod compensation;
+pub mod correction;
 pub mod directions;
 pub mod error;
+pub mod export;
 pub mod fit;
 pub mod geometric;
 pub mod heldout;
+pub mod model_file;
 pub mod monte_carlo;
 pub mod noise;
 pub mod numerics;
@@ -73,6 +79,7 @@ pub mod simulate;
 mod start;
 pub mod trace;
 pub mod unit;
+pub mod validate;
 pub mod volumetric;
 
 pub use error::IdentifyError;

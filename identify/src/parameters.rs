@@ -13,7 +13,7 @@ use abbe_model::session::{Prior, Session, Test};
 
 use crate::error::IdentifyError;
 use crate::unit::Unit;
-pub(crate) use preference::pivot_preference;
+pub(crate) use preference::{natural, pivot_preference};
 
 /// The kind of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,6 +95,8 @@ pub struct Parameters {
     pub list: Vec<Parameter>,
     /// For each test with readings, the contributions of parameters to slots.
     pub contributions: Vec<Vec<SlotContribution>>,
+    /// For each test with readings, known errors beside the parameters; none if empty.
+    pub known: Vec<SlotValues>,
     /// The effects whose coefficients are parameters.
     pub effects: Vec<Effect>,
     /// Their identifiers: [`Effect::id`]. Effects that differ only in the numbers of their shapes are numbered from the
@@ -310,8 +312,9 @@ impl Parameters {
         self.contributions
             .iter()
             .zip(models)
-            .map(|(contributions, model)| {
-                let mut values = SlotValues::zero(model.slots());
+            .enumerate()
+            .map(|(test, (contributions, model))| {
+                let mut values = self.known.get(test).cloned().unwrap_or_else(|| SlotValues::zero(model.slots()));
                 for contribution in contributions {
                     let coefficient = beta[contribution.parameter];
                     if coefficient == 0.0 {

@@ -1,5 +1,6 @@
 //! What `fit` and `trace` report, as JSON has it. Units stand in the names, or beside the value.
 
+mod base;
 mod cross_validation;
 mod monte_carlo;
 mod parameter;
@@ -12,6 +13,7 @@ use serde::Serialize;
 
 use crate::circular::CircularTest;
 use crate::plausibility::Plausibility;
+pub use base::BaseResult;
 pub use cross_validation::{CrossValidation, TestNotLeftOut};
 pub use monte_carlo::{DrawnParameter, FitMonteCarlo, Verdict};
 pub(crate) use parameter::phases_follow_amplitudes;
@@ -97,6 +99,9 @@ pub struct FitResult {
     /// Notes of the session file's `[about]`: `serial_number`, `operator`, `date`, `comment` and others.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub about: BTreeMap<String, String>,
+    /// The base parameters, if requested.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub base: Option<BaseResult>,
     /// The fit by Monte Carlo, if requested. `u` in `parameters` then is the quoted one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub monte_carlo: Option<FitMonteCarlo>,

@@ -9,6 +9,7 @@ use clap::{Args, ValueEnum};
 use super::failure::Failure;
 use super::message::print_warnings;
 use super::report::ReportArguments;
+use super::save::SaveArguments;
 use super::{
     CommonArguments, SessionArguments, compensation, geometric, output, read_session, repeated, self_calibration,
 };
@@ -21,6 +22,7 @@ pub const HELP: &str = "Examples:
   abbe fit sessions/hermle-c600u/measured/session.toml --all
   abbe fit sessions/hermle-c600u/measured/session.toml --json fit.json --csv fit.csv
   abbe fit sessions/hermle-c600u/measured/session.toml --report fit.html --plots plots
+  abbe fit run1/session.toml --base --save model.json
   abbe fit run2/session.toml --repeat run3/session.toml
   abbe fit run1/session.toml --method cone
   abbe fit run1/session.toml --monte-carlo 10000 --coverage 0.99
@@ -57,6 +59,12 @@ pub struct FitArguments {
     common: CommonArguments,
     #[command(flatten)]
     report: ReportArguments,
+    #[command(flatten)]
+    save: SaveArguments,
+    /// Print the base parameters: a minimal set of numbers with u that predicts the same readings, and the parameters
+    /// that are held at nominal because the readings do not separate them.
+    #[arg(long)]
+    base: bool,
     /// List everything that the first screen folds: set-up parameters, directions and diagnosis of ball-bar figures,
     /// null-space directions, outliers.
     #[arg(long)]
@@ -88,7 +96,7 @@ pub struct FitArguments {
         long,
         value_name = "SESSION",
         num_args = 1..,
-        conflicts_with_all = ["monte_carlo", "csv", "views", "residuals", "report", "plots", "compensation"]
+        conflicts_with_all = ["monte_carlo", "csv", "views", "residuals", "report", "plots", "compensation", "save", "base"]
     )]
     repeat: Vec<PathBuf>,
     /// Write the result as CSV, one row per value (full fit only).
@@ -106,6 +114,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     arguments.compensation.check()?;
     let others =
         [arguments.csv.as_ref(), arguments.views.as_ref(), arguments.residuals.as_ref(), arguments.report.file()];
+    let others = [others.as_slice(), &[arguments.save.file()]].concat();
     let outputs = arguments.common.outputs(&others)?;
     let tables = outputs.tables(arguments.common.quiet);
     if !arguments.repeat.is_empty() {
@@ -129,6 +138,10 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
         return Err(Failure::CommandLine(
             "`--csv` and `--compensation` write results of the full fit: leave out `--method`, or use `--json`".into(),
         ));
+    }
+    if arguments.method != Method::Full && (arguments.base || arguments.save.file().is_some()) {
+        let message = "`--base` and `--save` take the result of the full fit: leave out `--method`";
+        return Err(Failure::CommandLine(message.into()));
     }
     if arguments.method == Method::SelfCalibration && arguments.report.asked() {
         return Err(Failure::CommandLine(
@@ -160,6 +173,9 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     if let Some(draws) = &draws {
         abbe::identify::propagation::add_monte_carlo(&problem, &fit, draws, &mut result)?;
     }
+    if arguments.base {
+        result.base = Some(abbe::identify::fit::base::report(&problem, &fit)?);
+    }
     if tables {
         screen::print(&problem, &fit, &result, &arguments.session, arguments.all);
     }
@@ -172,5 +188,6 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
         let document = crate::present::report::fit::document(&problem, &fit, &result)?;
         arguments.report.write(&document, (&session, &sources), arguments.common.seed)?;
     }
+    arguments.save.run(&problem, &fit, &sources, arguments.common.seed)?;
     arguments.compensation.run(&problem, &fit, tables)
 }

@@ -4,6 +4,7 @@
 use std::any::TypeId;
 use std::path::Path;
 
+use abbe::identify::model_file::{InputFile, Provenance};
 use abbe::model::files::SourceMap;
 use clap::{Arg, ArgAction, ArgMatches, CommandFactory};
 use schemars::JsonSchema;
@@ -16,15 +17,6 @@ use crate::present::report::provenance::{self, Input};
 
 /// Version of the schemas of all documents.
 pub const SCHEMA_VERSION: u32 = 2;
-
-/// An input file.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct InputFile {
-    /// Path as the command or the session names it.
-    file: String,
-    /// SHA-256 of the contents, in hexadecimal; `null` for a pipe, which can be read only once.
-    sha256: Option<String>,
-}
 
 impl From<Input> for InputFile {
     fn from(input: Input) -> InputFile {
@@ -99,6 +91,24 @@ fn unreadable(file: &Path, fault: &str) -> Failure {
     Failure::Other(format!("{}: cannot be read again for its checksum in the JSON document: {fault}", file.display()))
 }
 
+/// Where a model comes from: this command and the files of its session.
+///
+/// # Errors
+/// If a file has changed since it was read.
+pub fn provenance(sources: &SourceMap, seed: u64) -> Result<Provenance, Failure> {
+    let (command, options) = command_line();
+    let session = Origin::of_session(sources)?.session;
+    let inputs = session.iter().flat_map(|session| session.inputs.clone());
+    Ok(Provenance {
+        tool_version: env!("CARGO_PKG_VERSION").to_string(),
+        command,
+        options,
+        seed,
+        inputs: inputs.collect(),
+        session: session.as_ref().map_or(String::new(), |session| session.file.clone()),
+    })
+}
+
 /// The document of a command: what it was, and its result.
 #[derive(Serialize, JsonSchema)]
 pub struct Document<'r, T> {
@@ -112,7 +122,7 @@ pub struct Document<'r, T> {
     /// The session, with checksums of all files that were read.
     #[serde(skip_serializing_if = "Option::is_none")]
     session: Option<SessionFile>,
-    /// The input files of a command without a session.
+    /// The input files beside those of a session.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     inputs: Vec<InputFile>,
     /// Seed of all random numbers.

@@ -5,8 +5,11 @@ macro_rules! say {
     ($($text:tt)*) => { $crate::cli::output::line(format_args!($($text)*)) };
 }
 
+mod compare;
+mod compensate;
 mod compensation;
 mod equation;
+mod export;
 mod failure;
 mod fit;
 mod folder;
@@ -20,11 +23,13 @@ mod output;
 mod plan;
 mod repeated;
 mod report;
+mod save;
 mod schema;
 mod screen;
 mod self_calibration;
 mod simulate;
 mod trace;
+mod validate;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -84,6 +89,15 @@ enum Command {
     /// Print the equation of the volumetric error, or map and compensate it over the workspace.
     #[command(after_help = equation::VOLUMETRIC_HELP)]
     Volumetric(equation::VolumetricArguments),
+    /// State the differences between sessions or models of one machine, with their significance.
+    #[command(after_help = compare::HELP)]
+    Compare(compare::CompareArguments),
+    /// Correct commanded positions or poses with an identified model.
+    #[command(after_help = compensate::HELP)]
+    Compensate(compensate::CompensateArguments),
+    /// Export the calibrated machine: URDF, Denavit-Hartenberg parameters, kinematic parameters of controls.
+    #[command(after_help = export::HELP)]
+    Export(export::ExportArguments),
     /// Estimate errors from readings, with uncertainties.
     #[command(after_help = fit::HELP)]
     Fit(fit::FitArguments),
@@ -108,6 +122,9 @@ enum Command {
     /// Find the unmodelled effect behind the residual.
     #[command(after_help = trace::HELP)]
     Trace(trace::TraceArguments),
+    /// Test a saved model on readings that it never saw.
+    #[command(after_help = validate::HELP)]
+    Validate(validate::ValidateArguments),
 }
 
 /// Arguments of every command that reads a session.
@@ -171,6 +188,9 @@ pub fn run() -> ExitCode {
     let outcome = match command {
         Command::Equation(arguments) => equation::run(&arguments),
         Command::Volumetric(arguments) => equation::run_volumetric(&arguments, quiet),
+        Command::Compare(arguments) => compare::run(&arguments),
+        Command::Compensate(arguments) => compensate::run(&arguments, quiet),
+        Command::Export(arguments) => export::run(&arguments, quiet),
         Command::Fit(arguments) => fit::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),
         Command::New(arguments) => new::run(&arguments, quiet),
@@ -183,6 +203,7 @@ pub fn run() -> ExitCode {
         Command::Schema(arguments) => schema::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Trace(arguments) => trace::run(&arguments),
+        Command::Validate(arguments) => validate::run(&arguments),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -250,11 +271,16 @@ mod tests {
                     "simulate" => &["SESSION", "--out", "DIR"],
                     "volumetric" => &["MACHINE"],
                     "new" => &["DIR"],
+                    "export" if example.contains("--as") => &["MODEL", "--out", "OUT"],
+                    "export" => &["MODEL", "--as", "urdf", "--out", "OUT"],
+                    "compare" => &["A", "B"],
+                    "compensate" => &["MODEL", "FILE", "--out", "OUT"],
+                    "validate" => &["MODEL", "SESSION"],
                     _ => &["SESSION"],
                 };
                 let is_given = |name: &str| example.split(' ').any(|word| word == name);
                 let required = match required {
-                    [positional, name, _] if is_given(name) => std::slice::from_ref(positional),
+                    [positional @ .., name, _] if is_given(name) => positional,
                     all => all,
                 };
                 let words = ["abbe", command.get_name()].into_iter();

@@ -23,14 +23,27 @@ const CONVENTION: &str = "# Errors by their names of ISO 230-1: EX0C is a locati
 /// standard output.
 pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), Failure> {
     let fault = |source| Failure::Write { path: path.display().to_string(), source };
-    check(path)?;
     if is_standard_output(path) {
         write_out(contents);
         return Ok(());
     }
+    write_streaming(path, |to| to.write_all(contents).map_err(fault))
+}
+
+/// As [`write_whole`], with contents that are not in memory together.
+pub fn write_streaming(
+    path: &Path,
+    contents: impl FnOnce(&mut dyn Write) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let fault = |source| Failure::Write { path: path.display().to_string(), source };
+    check(path)?;
+    if is_standard_output(path) {
+        return contents(&mut std::io::stdout().lock());
+    }
     if is_stream(path) {
         let mut stream = OpenOptions::new().append(true).open(path).map_err(fault)?;
-        return stream.write_all(contents).and_then(|()| stream.flush()).map_err(fault);
+        contents(&mut stream)?;
+        return stream.flush().map_err(fault);
     }
     // A symbolic link stays one: what it leads to is replaced.
     let place = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
@@ -42,7 +55,7 @@ pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), Failure> {
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
     let mut file = builder.tempfile_in(folder_of(&place)).map_err(fault)?;
-    file.write_all(contents).map_err(fault)?;
+    contents(&mut file)?;
     if let Ok(old) = std::fs::metadata(&place) {
         file.as_file().set_permissions(old.permissions()).map_err(fault)?;
     }

@@ -1,10 +1,13 @@
 //! `abbe schema`: what the files hold, as JSON Schema.
 
+use abbe::identify::correction::stream;
 use abbe::identify::geometric::Comparison;
+use abbe::identify::model_file;
 use abbe::identify::plan::results::PlanAnalysis;
 use abbe::identify::repeated::Repeated;
 use abbe::identify::results::{FitResult, TraceResult};
 use abbe::identify::self_calibration::SelfCalibration;
+use abbe::identify::validate::ValidationResult;
 use abbe::identify::volumetric::Summary;
 use abbe::model::files::schema;
 use clap::{Args, ValueEnum};
@@ -41,6 +44,10 @@ enum Subject {
     SelfCalibration,
     /// `abbe trace --json`
     Trace,
+    /// `abbe validate --json`
+    Validate,
+    /// `abbe fit|trace --save`
+    Model,
     /// `abbe plan --json`
     Plan,
     /// `abbe plan --improve|--separate|--range --json`
@@ -51,6 +58,12 @@ enum Subject {
     Simulate,
     /// `abbe volumetric --map --json`
     Map,
+    /// `abbe export --json`
+    Export,
+    /// `abbe compare --json`
+    Compare,
+    /// `abbe compensate --json`
+    Compensate,
 }
 
 /// `abbe schema SUBJECT`
@@ -71,11 +84,16 @@ pub fn run(arguments: &SchemaArguments) -> Result<(), Failure> {
         Subject::Geometric => of::<Comparison>(),
         Subject::SelfCalibration => of::<SelfCalibration>(),
         Subject::Trace => of::<TraceResult>(),
+        Subject::Validate => of::<ValidationResult>(),
+        Subject::Model => model(),
         Subject::Plan => of::<PlanAnalysis>(),
         Subject::NextTest => of::<plan::NextTest>(),
         Subject::Patterns => of::<plan::patterns::PatternSizes>(),
         Subject::Simulate => of::<simulate::SimulationResult>(),
         Subject::Map => of::<Summary>(),
+        Subject::Compare => of::<abbe::identify::compare::results::Comparison>(),
+        Subject::Export => of::<super::export::ExportResult>(),
+        Subject::Compensate => of::<stream::Summary>(),
     };
     let text = serde_json::to_string_pretty(&schema)
         .map_err(|error| Failure::Other(format!("the schema cannot be written: {error}")))?;
@@ -97,6 +115,14 @@ fn session() -> Result<Value, Failure> {
         }
     }
     Ok(session)
+}
+
+/// The schema of a model file.
+fn model() -> Value {
+    let generator = SchemaSettings::draft2020_12().for_serialize().into_generator();
+    let mut schema = generator.into_root_schema_for::<model_file::document::Document>().to_value();
+    close(&mut schema);
+    schema
 }
 
 fn parsed(text: &str) -> Result<Value, Failure> {

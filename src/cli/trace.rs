@@ -19,6 +19,7 @@ use super::failure::Failure;
 use super::interrupt::Interrupts;
 use super::message::{Kind, tell};
 use super::report::ReportArguments;
+use super::save::SaveArguments;
 use super::{CommonArguments, SessionArguments, compensation, message, output, read_session};
 use crate::present::{readings, trace as present};
 
@@ -28,6 +29,7 @@ pub const HELP: &str = "Examples:
   abbe trace sessions/hermle-c600u/measured/session.toml --all
   abbe trace sessions/hermle-c600u/measured/session.toml --json trace.json --csv trace.csv
   abbe trace sessions/hermle-c600u/measured/session.toml --report trace.html --write next.toml
+  abbe trace sessions/hermle-c600u/measured/session.toml --save model.json
   abbe trace sessions/hermle-c600u/measured/session.toml --only EZC \\
       --exclude ~time --max-effects 2
   abbe trace sessions/hermle-c600u/measured/session.toml --list
@@ -47,6 +49,8 @@ pub struct TraceArguments {
     common: CommonArguments,
     #[command(flatten)]
     report: ReportArguments,
+    #[command(flatten)]
+    save: SaveArguments,
     /// List everything that the first screen folds: all aliases, set-up parameters, null-space directions, outliers,
     /// rejected candidates.
     #[arg(long)]
@@ -67,7 +71,7 @@ pub struct TraceArguments {
     #[arg(long, value_name = "TEXT")]
     exclude: Vec<String>,
     /// List the candidates of the library with their detectability in this session, and stop.
-    #[arg(long, conflicts_with_all = ["json", "csv", "residuals", "write", "report", "plots", "compensation", "max_effects"])]
+    #[arg(long, conflicts_with_all = ["json", "csv", "residuals", "write", "report", "plots", "compensation", "max_effects", "save"])]
     list: bool,
     /// Write the session with the found effects declared.
     ///
@@ -96,6 +100,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     arguments.compensation.check()?;
     let others =
         [arguments.csv.as_ref(), arguments.write.as_ref(), arguments.residuals.as_ref(), arguments.report.file()];
+    let others = [others.as_slice(), &[arguments.save.file()]].concat();
     let outputs = arguments.common.outputs(&others)?;
     let tables = outputs.tables(arguments.common.quiet);
     let (session, sources) = read_session(&arguments.session, &outputs)?;
@@ -178,8 +183,12 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         if arguments.compensation.wanted() {
             eprintln!("warning: no compensation tables are written: effects may be missing from the model");
         }
+        if arguments.save.file().is_some() {
+            eprintln!("warning: no model is saved: effects may be missing from it");
+        }
         return Err(Failure::Interrupted(trace.result.interruption()));
     }
+    arguments.save.run(&trace.after, &trace.after_fit, &sources, arguments.common.seed)?;
     arguments.compensation.run(&trace.after, &trace.after_fit, tables)
 }
 

@@ -2,18 +2,22 @@
 //!
 //! - [`table`]: a table as data; [`number`]: digits and units; [`figure`]: plots;
 //! - printers: [`terminal`], [`csv`], [`html`];
-//! - one file per result: [`fit`], [`trace`], [`plan`], [`next_test`], [`method`], [`repeated`], [`self_calibration`],
+//! - one file per result: [`fit`], [`base`], [`trace`], [`validate`], [`plan`], [`next_test`], [`method`], [`repeated`], [`self_calibration`],
 //!   [`simulation`], [`patterns`], [`volumetric`], [`compensation`];
 //! - parts of several results: [`parameters`], [`confounded`], [`cross_validation`], [`circular`], [`plausibility`],
 //!   [`effect`], [`uniqueness`], [`readings`];
 //! - [`report`]: the pages of `--report`.
 
+pub mod base;
 pub mod circular;
+pub mod compare;
+pub mod compensate;
 pub mod compensation;
 pub mod confounded;
 pub mod cross_validation;
 pub mod csv;
 pub mod effect;
+pub mod export;
 pub mod figure;
 pub mod fit;
 pub mod html;
@@ -33,4 +37,5 @@ pub mod table;
 pub mod terminal;
 pub mod trace;
 pub mod uniqueness;
+pub mod validate;
 pub mod volumetric;

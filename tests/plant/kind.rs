@@ -129,6 +129,19 @@ impl Kind {
         }
     }
 
+    /// The tests of [`Kind::Rotary`] with the workpiece ball at another radius, below 150 mm.
+    pub fn rotary_at(radius_mm: f64, step_deg: f64) -> Vec<Test> {
+        let offset_mm = (150.0_f64.powi(2) - radius_mm.powi(2)).sqrt();
+        let ball = [0.0, radius_mm, 0.0];
+        let raised = with(all_stand(), AxisName::Z, Motion::Stands(offset_mm));
+        vec![
+            tilt("A-short", radius_mm, ball, "Q1", 0.0, step_deg),
+            tilt("A-long", 150.0, ball, "Q1", -offset_mm, step_deg),
+            table("C-short", radius_mm, ball, "Q1", all_stand(), step_deg),
+            table("C-long", 150.0, ball, "Q1", raised, step_deg),
+        ]
+    }
+
     /// The errors that the session file lists under `[unknowns]`; `None`: the default of a ball bar on two rotary axes.
     pub fn declared_unknowns(self) -> Option<Vec<Component>> {
         match self {

@@ -76,6 +76,11 @@ impl Recipe {
 
     /// The same for a plan from [`Recipe::plan`].
     pub fn draw_on(&self, plan: &Plan) -> SimulatedSession {
+        self.draw_of(plan, |_| None)
+    }
+
+    /// The same with given values of some parameters, by identifier, µm or arcsec; the others are drawn.
+    pub fn draw_of(&self, plan: &Plan, given: impl Fn(&str) -> Option<f64>) -> SimulatedSession {
         let mut random = Pcg64Mcg::seed_from_u64(self.seed);
         let values: Vec<f64> = plan
             .unknowns
@@ -86,7 +91,8 @@ impl Recipe {
                     (None, component) if component.unit() == "arcsec" => PIGE_SIGMA_ARCSEC,
                     (None, _) => PIGE_SIGMA_UM,
                 };
-                sigma * normal(&mut random)
+                let drawn = sigma * normal(&mut random);
+                given(&unknown.id).unwrap_or(drawn)
             })
             .collect();
         let mut rows = Vec::with_capacity(plan.instants.len());

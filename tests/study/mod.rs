@@ -11,6 +11,7 @@ mod judging;
 mod rates;
 mod sessions;
 
+mod carried;
 mod clean;
 mod outside;
 mod pairs;

@@ -8,12 +8,14 @@ use serde_json::{Map, Value};
 use super::{abbe, workspace};
 
 /// The commands, and the subject of `abbe schema` for each.
-const COMMANDS: [(&str, &str); 10] = [
+const COMMANDS: [(&str, &str); 12] = [
     ("abbe fit", "fit"),
     ("abbe fit --repeat", "repeat"),
     ("abbe fit --method circle, cone or two-plane", "geometric"),
     ("abbe fit --method self-calibration", "self-calibration"),
     ("abbe trace", "trace"),
+    ("abbe validate", "validate"),
+    ("abbe fit and abbe trace --save", "model"),
     ("abbe plan", "plan"),
     ("abbe plan --improve, --separate or --range", "next-test"),
     ("abbe plan --patterns", "patterns"),

@@ -26,6 +26,7 @@ mod left_out_test;
 mod limits;
 mod measured;
 mod messages;
+mod model_commands;
 mod new;
 mod nist;
 mod one_answer;
@@ -60,6 +61,7 @@ mod tour;
 mod trace;
 mod trace_reported;
 mod unknowns;
+mod validate_command;
 mod volumetric;
 
 use std::path::{Path, PathBuf};

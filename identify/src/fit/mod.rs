@@ -5,6 +5,7 @@
 //! number. The law of propagation gives the uncertainties, `Cov = N (Nᵀ JᵀV⁻¹J N)⁻¹ Nᵀ`. The columns of `N` span the
 //! identifiable directions (JCGM 100, 5.2; JCGM 102, 6.2).
 
+pub mod base;
 mod covariance;
 pub(crate) mod families;
 mod prepare;

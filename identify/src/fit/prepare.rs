@@ -70,7 +70,7 @@ fn settled(mut problem: Problem, stated: bool, floor: f64) -> Result<(Problem, F
     // Noise and outliers depend on the residuals, and the residuals on the fit. The returned fit always uses the
     // returned noise.
     for _ in 0..MAX_ROUNDS {
-        let rejected = outliers::reject(&problem, &fit);
+        let rejected = outliers::reject(&problem, &fit.residuals);
         let unchanged = rejected == problem.rejected;
         problem.rejected = rejected;
         let noise = if stated { problem.noise.clone() } else { estimated_noise(&problem, &fit, floor) };
@@ -96,7 +96,7 @@ pub(crate) fn with_families(mut problem: Problem, mut start: Vec<f64>) -> Result
         let scales = equations.estimate()?;
         equations.apply(&scales, &mut problem);
         let found = super::fit(&problem, Some(&equations.beta(&scales)))?;
-        let rejected = outliers::reject(&problem, &found);
+        let rejected = outliers::reject(&problem, &found.residuals);
         round += 1;
         if rejected == problem.rejected || round == MAX_ROUNDS {
             return Ok((problem, found));

@@ -106,7 +106,7 @@ mod tests {
             .enumerate()
             .find_map(|(place, quantity)| match quantity {
                 Quantity::Harmonic(j) => Some((place, *j)),
-                Quantity::Parameter(_) => None,
+                Quantity::Parameter(_) | Quantity::Rms(..) => None,
             })
             .unwrap();
         let coefficients = |amplitude_um: f64, phase_deg: f64| {

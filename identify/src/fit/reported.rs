@@ -58,6 +58,7 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> 
         plausibility,
         warnings,
         about: problem.session.about.iter().cloned().collect(),
+        base: None,
         monte_carlo: None,
     })
 }

@@ -9,7 +9,6 @@
 
 use abbe_model::session::readings::Readings;
 
-use crate::fit::Fit;
 use crate::numerics::{median, parallel, robust_deviation};
 use crate::problem::Problem;
 
@@ -24,12 +23,11 @@ const OUTLIER_POSE: f64 = 5.0;
 /// Limit for a single reading in the residual of a complete model, in robust standard deviations.
 const OUTLIER_ALONE: f64 = 6.0;
 
-/// The outliers of the problem, by test and row.
-pub fn reject(problem: &Problem, fit: &Fit) -> Vec<Vec<bool>> {
+/// The outliers of the problem, by test and row, from the residuals of a fit, mm.
+pub fn reject(problem: &Problem, residuals: &[Vec<f64>]) -> Vec<Vec<bool>> {
     let coordinates = problem.coordinates();
     if problem.folds.kind.is_poses() {
-        let lengths: Vec<Vec<f64>> = fit
-            .residuals
+        let lengths: Vec<Vec<f64>> = residuals
             .iter()
             .map(|residual| {
                 residual.chunks_exact(coordinates).map(|v| v.iter().map(|x| x * x).sum::<f64>().sqrt()).collect()
@@ -40,7 +38,7 @@ pub fn reject(problem: &Problem, fit: &Fit) -> Vec<Vec<bool>> {
         return lengths.iter().map(|test| test.iter().map(|length| *length > limit).collect()).collect();
     }
     parallel::map(problem.tests.len(), &|test| match &problem.tests[test].readings {
-        Some(readings) => reject_along_runs(readings, &fit.residuals[test], coordinates, problem.noise.sigma_mm),
+        Some(readings) => reject_along_runs(readings, &residuals[test], coordinates, problem.noise.sigma_mm),
         None => Vec::new(),
     })
 }

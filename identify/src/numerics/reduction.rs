@@ -41,16 +41,35 @@ impl Triangle {
     /// If the factor has entries that are not finite.
     pub fn marginal(&self, kept: &[usize], size: &[f64]) -> Result<Mat<f64>, IdentifyError> {
         let r = self.r();
-        let dropped: Vec<usize> = (0..size.len()).filter(|j| !kept.contains(j)).collect();
-        let mut rows = Mat::from_fn(r.nrows(), kept.len(), |i, j| r[(i, kept[j])]);
-        let scaled = Mat::from_fn(r.nrows(), dropped.len(), |i, j| r[(i, dropped[j])] * size[dropped[j]]);
-        let directions = Directions::of(scaled.as_ref())?;
-        // The column space of the dropped parameters is projected out of every column.
-        let informed = directions.left().subcols(0, directions.identifiable_rank());
-        let along = informed.transpose() * &rows;
-        rows -= informed * along;
-        Ok(upper(rows))
+        let rows = Mat::from_fn(r.nrows(), kept.len(), |i, j| r[(i, kept[j])]);
+        Ok(upper(without_dropped(&r, rows, kept, size)?))
     }
+
+    /// As [`Triangle::marginal`], with the residual: the factor `[R c; 0 ρ]` of the `kept` parameters after the best
+    /// change of the others.
+    ///
+    /// # Errors
+    /// If the factor has entries that are not finite.
+    pub fn eliminated(&self, kept: &[usize], size: &[f64]) -> Result<Triangle, IdentifyError> {
+        let (r, c, rest) = self.parts();
+        let rows = Mat::from_fn(r.nrows(), kept.len() + 1, |i, j| kept.get(j).map_or(c[i], |kept| r[(i, *kept)]));
+        let mut triangle = Triangle::of(without_dropped(&r, rows, kept, size)?);
+        let mut last = Mat::zeros(1, kept.len() + 1);
+        last[(0, kept.len())] = rest.sqrt();
+        triangle.absorb(last.as_ref());
+        Ok(triangle)
+    }
+}
+
+/// The rows with the column space of the parameters that are not `kept` projected out, as far as it is identifiable.
+fn without_dropped(r: &Mat<f64>, mut rows: Mat<f64>, kept: &[usize], size: &[f64]) -> Result<Mat<f64>, IdentifyError> {
+    let dropped: Vec<usize> = (0..size.len()).filter(|j| !kept.contains(j)).collect();
+    let scaled = Mat::from_fn(r.nrows(), dropped.len(), |i, j| r[(i, dropped[j])] * size[dropped[j]]);
+    let directions = Directions::of(scaled.as_ref())?;
+    let informed = directions.left().subcols(0, directions.identifiable_rank());
+    let along = informed.transpose() * &rows;
+    rows -= informed * along;
+    Ok(rows)
 }
 
 /// The inverse of an upper triangular matrix. A zero pivot yields infinity.

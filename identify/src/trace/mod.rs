@@ -20,7 +20,7 @@ pub(crate) mod interrupt;
 mod judge;
 mod lines;
 mod moves;
-mod noise_model;
+pub(crate) mod noise_model;
 mod null;
 mod policy;
 mod remainder;

@@ -7,7 +7,7 @@ use crate::problem::Problem;
 
 /// Sets the noise standard deviation and autocorrelation from repeats, if there are enough. Returns whether this
 /// changed them by more than their sampling scatter.
-pub(super) fn estimate_noise_model(problem: &mut Problem, residuals: &[Vec<f64>]) -> bool {
+pub(crate) fn estimate_noise_model(problem: &mut Problem, residuals: &[Vec<f64>]) -> bool {
     if !Policy::of(problem).noise_of_repeats {
         return false;
     }

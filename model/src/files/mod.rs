@@ -6,6 +6,7 @@
 //! - [`SourceMap`]: the files and texts of a session that was read;
 //! - [`schema`]: JSON Schema of machine and session files; [`stamp`]: state of the files that were read.
 
+pub mod commands;
 mod quantity;
 pub mod schema;
 pub mod source_map;

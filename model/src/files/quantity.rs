@@ -67,6 +67,14 @@ impl Unit {
         }
     }
 
+    /// The number of the file from the internal unit.
+    pub fn from_internal(self, value: f64) -> f64 {
+        match self {
+            Unit::Times(factor) => value / factor,
+            Unit::Degrees => value.to_degrees(),
+        }
+    }
+
     /// A unit of length: `mm`, `um`, `m`, `in`, `mil` (a thousandth of an inch).
     pub fn of_length(unit: &str) -> Option<Unit> {
         match unit {

@@ -99,6 +99,7 @@ impl Columns {
             positions,
             coordinates,
             observed,
+            travel_before: Vec::new(),
         })
     }
 }

@@ -32,6 +32,21 @@ pub struct Readings {
     pub coordinates: usize,
     /// The observed values, row by row, `coordinates` each, mm.
     pub observed: Vec<f64>,
+    /// The travel of every axis before the first row, if the rows continue others of the same run; otherwise empty.
+    pub travel_before: Vec<AxisTravel>,
+}
+
+/// How an axis has travelled up to a row.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AxisTravel {
+    /// Its position there, mm or rad.
+    pub position: f64,
+    /// Direction of its last movement: −1, 0 or 1.
+    pub direction: f64,
+    /// Its position at the last reversal.
+    pub turned_at: f64,
+    /// Time of the last reversal, s; 0 without a time column.
+    pub turned_at_s: f64,
 }
 
 impl Readings {
@@ -71,6 +86,7 @@ impl Readings {
                 })
                 .copied()
                 .collect(),
+            travel_before: Vec::new(),
         }
     }
 
@@ -114,23 +130,36 @@ impl Readings {
         };
         let mut samples: Vec<DriverSample<f64>> =
             positions.iter().map(|&value| DriverSample { value, ..DriverSample::default() }).collect();
-        for run in self.runs() {
+        for (number, run) in self.runs().into_iter().enumerate() {
             let (first, end) = (run.start, run.end);
-            let step = |row: usize| positions[row] - positions[row - 1];
-            let moving = (first + 1..end).find(|&row| step(row).abs() > still);
-            let mut direction = moving.map_or(0.0, |row| step(row).signum());
-            let mut turned_at = first;
+            let before = self.travel_before.get(axis).filter(|_| number == 0);
+            let step = |row: usize| match before {
+                Some(travel) if row == first => positions[row] - travel.position,
+                _ if row == first => 0.0,
+                _ => positions[row] - positions[row - 1],
+            };
+            let moves = |row: &usize| step(*row).abs() > still;
+            let time_s = |row: usize| self.time_s.get(row).copied().unwrap_or(0.0);
+            let start = AxisTravel { turned_at: positions[first], turned_at_s: time_s(first), ..AxisTravel::default() };
+            let mut travel = before.copied().unwrap_or(start);
+            if travel.direction == 0.0 {
+                travel.direction = (first..end).find(moves).map_or(0.0, |row| step(row).signum());
+            }
             for row in first..end {
-                if row > first && step(row).abs() > still && step(row).signum() != direction {
-                    direction = step(row).signum();
-                    turned_at = row - 1;
+                if moves(&row) && step(row).signum() != travel.direction {
+                    travel.direction = step(row).signum();
+                    // Between two blocks of rows the position before is known, but not its time.
+                    (travel.turned_at, travel.turned_at_s) = match before {
+                        Some(before) if row == first => (before.position, time_s(first)),
+                        _ => (positions[row - 1], time_s(row - 1)),
+                    };
                 }
                 let sample = &mut samples[row];
-                sample.direction = direction;
-                sample.since_reversal = (positions[row] - positions[turned_at]).abs();
+                sample.direction = travel.direction;
+                sample.since_reversal = (positions[row] - travel.turned_at).abs();
                 if !self.time_s.is_empty() {
                     let time = &self.time_s;
-                    sample.since_reversal_s = time[row] - time[turned_at];
+                    sample.since_reversal_s = time[row] - travel.turned_at_s;
                     let (before, after) = (row.max(first + 1) - 1, (row + 1).min(end - 1));
                     let elapsed = time[after] - time[before];
                     if elapsed > 0.0 {
@@ -140,5 +169,23 @@ impl Readings {
             }
         }
         samples
+    }
+
+    /// The travel of every axis up to the last row, for rows that continue these.
+    pub fn travel_after(&self, machine: &Machine) -> Vec<AxisTravel> {
+        let axes = machine.axes.iter().enumerate();
+        axes.map(|(axis, of)| {
+            let samples = self.axis_samples(axis, of.kind);
+            let Some(last) = samples.last() else {
+                return self.travel_before.get(axis).copied().unwrap_or_default();
+            };
+            AxisTravel {
+                position: last.value,
+                direction: last.direction,
+                turned_at: last.value - last.direction * last.since_reversal,
+                turned_at_s: self.time_s.last().map_or(0.0, |time| time - last.since_reversal_s),
+            }
+        })
+        .collect()
     }
 }

@@ -9,6 +9,7 @@ use abbe::model::words::counted;
 
 use crate::cli::screen::{self, Step, command};
 use crate::cli::{SessionArguments, output};
+use crate::present::base::{base_parameters, base_statement};
 use crate::present::cross_validation;
 use crate::present::fit as present;
 use crate::present::number::micrometres;
@@ -22,6 +23,10 @@ pub fn print(problem: &Problem, fit: &Fit, result: &FitResult, session: &Session
     match &result.monte_carlo {
         Some(drawn) => print_drawn(drawn, &estimates, all),
         None => screen::print_estimates(&estimates, all),
+    }
+    if let Some(base) = &result.base {
+        output::print(&base_parameters(base));
+        say!("{}", base_statement(base));
     }
     screen::print_circular(&result.circular, all);
     screen::print_missing(&result.unobservable, &result.outliers, all);

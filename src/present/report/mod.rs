@@ -3,7 +3,7 @@
 //!
 //! - [`document`], [`page`]: contents of a report, and the page around them. [`provenance`]: inputs, version and
 //!   command line. [`embed`]: data in the page.
-//! - [`fit`], [`trace`], [`plan`], [`method`], [`next_test`]: the report of each command.
+//! - [`fit`], [`trace`], [`validate`](mod@validate), [`plan`], [`method`], [`next_test`]: the report of each command.
 //! - [`summary`], [`values`], [`residuals`], [`effects`], [`readings`], [`sections`]: sections.
 //! - [`plots`], [`curves`]: plots of readings and of derived quantities. [`abscissae`]: what they are plotted against.
 //!   [`decimate`]: decimation that keeps extremes.
@@ -29,4 +29,6 @@ pub mod residuals;
 pub mod sections;
 pub mod summary;
 pub mod trace;
+pub mod validate;
+mod validate_plots;
 pub mod values;

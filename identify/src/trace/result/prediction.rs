@@ -43,11 +43,11 @@ pub(super) fn predictions(
             true => predicted_mm(findings, k, search.effect(alias.candidate), &found)?,
             false => None,
         };
-        // Twice the difference of the log-likelihoods, in whole margins.
+        // Twice the difference of the log-likelihoods; it counts in whole margins.
         let worse = mm.map_or(0.0, |mm| (mm.powi(2) - found_mm.powi(2)) * judged);
-        ranked.push(((worse / (2.0 * INDISTINGUISHABLE)).trunc(), mm, alias));
+        ranked.push(((worse / (2.0 * INDISTINGUISHABLE)) as i64, mm, alias));
     }
-    ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+    ranked.sort_by_key(|(margins, ..)| *margins);
     let mut predictions = Predictions { found_um: Some(found_mm * 1e3), aliases_um: Vec::new() };
     for (_, mm, alias) in ranked {
         predictions.aliases_um.push(mm.map(|mm| mm * 1e3));

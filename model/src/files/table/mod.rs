@@ -17,7 +17,7 @@ mod format;
 mod formats;
 mod json_lines;
 mod lines;
-mod number;
+pub(crate) mod number;
 pub(crate) mod request;
 mod required;
 mod row;

@@ -4,7 +4,7 @@ use super::request::Format;
 use crate::session::limits;
 
 /// A finite number in a cell, or its fault and what to do.
-pub(super) fn number(cell: &str, format: &Format) -> Result<f64, (String, &'static str)> {
+pub(crate) fn number(cell: &str, format: &Format) -> Result<f64, (String, &'static str)> {
     const NUMBER: &str = "enter a number or remove the row";
     if cell.is_empty() {
         return Err(("an empty cell where a number is expected".into(), NUMBER));

@@ -6,6 +6,7 @@ mod effect;
 mod format;
 mod machine;
 mod movement;
+pub mod parts;
 mod prior;
 mod quoted;
 pub mod rewrite;

@@ -1,0 +1,103 @@
+//! The difference of two models and its covariance, with a common set-up counted once.
+//!
+//! Each model is a Gaussian over its parameters, with information `Λ = C⁻¹`. If both sessions use the same bar, its
+//! deviation `s` is one parameter with one prior:
+//!
+//! ```text
+//! Λ = Λ_A(a, s) + Λ_B(b, s) − 1/u_s²,    Λ·(a, b, s) = Λ_A·(a, s)_A + Λ_B·(b, s)_B
+//! ```
+
+use abbe_model::session::Prior;
+use faer::Mat;
+
+use crate::error::IdentifyError;
+use crate::model_file::IdentifiedModel;
+use crate::numerics::symmetric::pseudo_inverse;
+use crate::parameters::Role;
+
+/// The difference B − A over the common parameters, its covariance, and the identifiers of the shared set-up.
+///
+/// # Errors
+/// If a covariance has no inverse.
+pub(super) fn difference(
+    a: &IdentifiedModel,
+    b: &IdentifiedModel,
+    common: &[(usize, usize)],
+    things: Option<&[String]>,
+) -> Result<(Vec<f64>, Mat<f64>, Vec<String>), IdentifyError> {
+    let shared = shared(a, b, things);
+    if shared.is_empty() {
+        let delta = common.iter().map(|(i, j)| b.parameters[*j].value - a.parameters[*i].value).collect();
+        let covariance = Mat::from_fn(common.len(), common.len(), |k, l| {
+            a.covariance[(common[k].0, common[l].0)] + b.covariance[(common[k].1, common[l].1)]
+        });
+        return Ok((delta, covariance, Vec::new()));
+    }
+    // The parameters of both: those of A, then those of B that are not shared.
+    let own_b: Vec<usize> = (0..b.parameters.len()).filter(|j| !shared.iter().any(|(_, of_b)| of_b == j)).collect();
+    let count = a.parameters.len() + own_b.len();
+    let place_b = |j: usize| match shared.iter().find(|(_, of_b)| *of_b == j) {
+        Some((of_a, _)) => *of_a,
+        None => a.parameters.len() + own_b.partition_point(|own| *own < j),
+    };
+    let mut information = Mat::<f64>::zeros(count, count);
+    let mut gradient = vec![0.0; count];
+    let mut add = |model: &IdentifiedModel, place: &dyn Fn(usize) -> usize| -> Result<(), IdentifyError> {
+        let own = inverse(model)?;
+        let value: Vec<f64> = model.parameters.iter().map(|parameter| parameter.value).collect();
+        for i in 0..value.len() {
+            for j in 0..value.len() {
+                information[(place(i), place(j))] += own[(i, j)];
+                gradient[place(i)] += own[(i, j)] * value[j];
+            }
+        }
+        Ok(())
+    };
+    add(a, &|i| i)?;
+    add(b, &place_b)?;
+    for (i, _) in &shared {
+        if let Prior::Gaussian(u) = a.parameters[*i].prior {
+            information[(*i, *i)] -= 1.0 / (u * u);
+        }
+    }
+    let scale: Vec<f64> =
+        (0..count).map(|i| if information[(i, i)] > 0.0 { information[(i, i)].sqrt().recip() } else { 0.0 }).collect();
+    let scaled = Mat::from_fn(count, count, |i, j| information[(i, j)] * scale[i] * scale[j]);
+    let inverse = pseudo_inverse(scaled.as_ref())?;
+    let joint = Mat::from_fn(count, count, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
+    let value: Vec<f64> = (0..count).map(|i| (0..count).map(|j| joint[(i, j)] * gradient[j]).sum()).collect();
+    let ends: Vec<(usize, usize)> = common.iter().map(|(i, j)| (*i, place_b(*j))).collect();
+    let delta = ends.iter().map(|(i, j)| value[*j] - value[*i]).collect();
+    let covariance = Mat::from_fn(ends.len(), ends.len(), |k, l| {
+        let ((i, j), (p, q)) = (ends[k], ends[l]);
+        joint[(j, q)] - joint[(j, p)] - joint[(i, q)] + joint[(i, p)]
+    });
+    Ok((delta, covariance, shared.iter().map(|(i, _)| a.parameters[*i].id.clone()).collect()))
+}
+
+/// The information of a model: the inverse of its covariance over the parameters that are not held.
+fn inverse(model: &IdentifiedModel) -> Result<Mat<f64>, IdentifyError> {
+    let count = model.parameters.len();
+    let scale: Vec<f64> = (0..count).map(|i| if model.u(i) > 0.0 { model.u(i).recip() } else { 0.0 }).collect();
+    let scaled = Mat::from_fn(count, count, |i, j| model.covariance[(i, j)] * scale[i] * scale[j]);
+    let inverse = pseudo_inverse(scaled.as_ref())?;
+    Ok(Mat::from_fn(count, count, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
+}
+
+/// The set-up quantities that are the same object in both sessions, by index in each.
+fn shared(a: &IdentifiedModel, b: &IdentifiedModel, things: Option<&[String]>) -> Vec<(usize, usize)> {
+    let stated = |id: &str| {
+        let thing = id.split(['[', '.']).next().unwrap_or(id);
+        things.map_or(thing == "bar", |things| things.iter().any(|stated| stated == thing))
+    };
+    let setups = a.parameters.iter().enumerate().filter(|(_, p)| p.role == Role::Setup && !p.held && stated(&p.id));
+    setups
+        .filter_map(|(i, p)| {
+            let same = |q: &crate::model_file::ModelParameter| {
+                q.id == p.id && q.role == Role::Setup && !q.held && q.prior == p.prior
+            };
+            let is_object = matches!(p.prior, Prior::Gaussian(_)) || things.is_some();
+            b.parameters.iter().position(same).filter(|_| is_object).map(|j| (i, j))
+        })
+        .collect()
+}

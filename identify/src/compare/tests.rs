@@ -1,0 +1,124 @@
+//! Rates of the comparison on simulated pairs of sessions.
+
+use std::path::Path;
+
+use abbe_model::files::{self, ReadOptions};
+use abbe_model::session::Session;
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::*;
+use crate::fit;
+use crate::model_file::Provenance;
+use crate::quantity::Given;
+use crate::simulate::{Simulation, simulate};
+
+fn plan() -> Session {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/chapter5.toml");
+    files::session(&file, &ReadOptions { read_data: false, ..ReadOptions::default() }).unwrap()
+}
+
+/// A session with the same bars as its partner, and balls that were mounted for it.
+fn model(plan: &Session, errors: &[(String, f64)], bars: &[(String, f64)], seed: u64) -> IdentifiedModel {
+    let given = errors.iter().chain(bars).map(|(id, um)| Given::parse(&format!("{id}={um}um")).unwrap()).collect();
+    let simulation = Simulation { given, draw_setups: true, seed, ..Simulation::default() };
+    let readings = simulate(plan, &simulation).unwrap().readings;
+    let (problem, fit) = fit::prepare(&plan.clone().with_readings(readings), 1).unwrap();
+    IdentifiedModel::of_fit(&problem, &fit, Provenance::default()).unwrap()
+}
+
+fn bars(seed: u64) -> Vec<(String, f64)> {
+    let mut random = rand_pcg::Pcg64::seed_from_u64(seed);
+    let mut draw = || -> f64 { StandardNormal.sample(&mut random) };
+    ["A100", "A150", "C100", "C150"].map(|test| (format!("bar[{test}]"), 0.5 * draw())).to_vec()
+}
+
+fn compared(a: &IdentifiedModel, b: &IdentifiedModel) -> Comparison {
+    let named = [Named { name: "A".into(), model: a }, Named { name: "B".into(), model: b }];
+    compare(&named, &CompareOptions { places: 0, ..CompareOptions::default() }).unwrap()
+}
+
+/// `ABBE_STUDY` pairs, or a few: the share of pairs with any false claim, and that in which a change of 5 u is found.
+#[test]
+fn changes_are_found_and_false_claims_are_rare() {
+    let stated = std::env::var("ABBE_STUDY").ok().and_then(|text| text.parse::<u64>().ok());
+    let pairs = stated.unwrap_or(40).max(1);
+    let plan = plan();
+    let before = vec![("EX0C".to_string(), 10.0), ("EY0A".to_string(), -20.0)];
+    let (mut false_claims, mut found, mut sum, mut freedom) = (0, 0, 0.0, 0);
+    for number in 0..pairs {
+        let bars = bars(number);
+        let a = model(&plan, &before, &bars, 1000 + 2 * number);
+        let b = model(&plan, &before, &bars, 1001 + 2 * number);
+        let same = compared(&a, &b);
+        false_claims += usize::from(same.pairs[0].significant > 0);
+        sum += same.pairs[0].chi_square;
+        freedom += same.pairs[0].degrees_of_freedom;
+        assert_eq!(same.pairs[0].shared_setup.len(), 4);
+        let u = same.differences.iter().find(|difference| difference.id == "EX0C").unwrap().u;
+        let after = vec![("EX0C".to_string(), 10.0 + 5.0 * u), before[1].clone()];
+        let c = model(&plan, &after, &bars, 1001 + 2 * number);
+        let changed = compared(&a, &c);
+        found += usize::from(changed.differences.iter().any(|d| d.id == "EX0C" && d.significant));
+    }
+    println!(
+        "{pairs} pairs: {false_claims} with a false claim, {found} with the change found, χ² {sum:.1} of {freedom}"
+    );
+    // Three standard deviations of the counts about 5 % and 95 %.
+    let slack = 3.0 * (0.05 * 0.95 * pairs as f64).sqrt();
+    assert!(false_claims as f64 <= 0.05 * pairs as f64 + slack, "{false_claims} of {pairs}");
+    assert!(found as f64 >= 0.95 * pairs as f64 - slack, "{found} of {pairs}");
+    let deviation = (sum - freedom as f64) / (2.0 * freedom as f64).sqrt();
+    assert!(deviation.abs() < 4.0, "χ² {sum} with {freedom} degrees of freedom");
+}
+
+/// The textbook example: of p = 0.01, 0.04, 0.03, 0.005 at the level 0.05 the two smallest are rejected.
+#[test]
+fn the_procedure_of_holm_steps_down() {
+    let difference = |p_value: f64| Difference {
+        from: String::new(),
+        to: String::new(),
+        id: String::new(),
+        value: 0.0,
+        u: 1.0,
+        unit: String::new(),
+        p_value,
+        significant: false,
+    };
+    let mut differences = [0.01, 0.04, 0.03, 0.005].map(difference);
+    holm(&mut differences, 0.05);
+    assert_eq!(differences.map(|difference| difference.significant), [true, false, false, true]);
+}
+
+/// All location errors of both axes, of which the tests separate some: two models in different gauges have the same
+/// differences.
+#[test]
+fn differences_do_not_depend_on_the_gauge() {
+    let mut plan = plan();
+    let names = ["X", "Y", "Z", "A", "B", "C"].into_iter().flat_map(|freedom| ["A", "C"].map(|axis| (freedom, axis)));
+    plan.unknowns =
+        names.filter_map(|(f, axis)| abbe_model::component::ErrorName::parse(&format!("E{f}0{axis}"))).collect();
+    let a = model(&plan, &[("EX0C".to_string(), 10.0)], &[], 7);
+    let b = model(&plan, &[("EX0C".to_string(), 30.0)], &[], 8);
+    assert!(!a.null_directions.is_empty());
+    let reference = compared(&a, &b);
+    assert!(!reference.pairs[0].not_comparable.is_empty());
+    // The same model elsewhere along its null space: values move, predictions do not.
+    let mut moved = b.clone();
+    for direction in &b.null_directions {
+        for (parameter, share) in moved.parameters.iter_mut().zip(direction) {
+            parameter.value += 0.01 * share;
+        }
+    }
+    let named = [Named { name: "A".into(), model: &a }, Named { name: "B".into(), model: &moved }];
+    let none = Some(vec!["none".to_string()]);
+    let options = CompareOptions { places: 0, shared: none, ..CompareOptions::default() };
+    let again = compare(&named, &options).unwrap();
+    let reference =
+        compare(&[Named { name: "A".into(), model: &a }, Named { name: "B".into(), model: &b }], &options).unwrap();
+    for difference in &reference.differences {
+        let other = again.differences.iter().find(|other| other.id == difference.id).unwrap();
+        // The null directions of the two sessions differ in second order of the errors.
+        assert!((difference.value - other.value).abs() < 1e-3 * difference.u, "{difference:?} {other:?}");
+    }
+}

@@ -1,0 +1,154 @@
+//! The errors of a machine along a sequence of positions.
+
+use std::sync::Arc;
+
+use abbe_model::chain::Machine;
+use abbe_model::component::ErrorName;
+use abbe_model::driver::{DriverInput, DriverSample, Reference};
+use abbe_model::effect::Effect;
+use abbe_model::instrument::Station;
+use abbe_model::instrument::ballbar::BallBar;
+use abbe_model::sensitivity::{SlotValues, TestModel};
+use abbe_model::session::readings::Readings;
+
+use crate::error::IdentifyError;
+use crate::model_file::IdentifiedModel;
+use crate::parameters::Role;
+
+/// The errors at positions near the commanded ones, by slot of the machine, mm or rad.
+pub type ErrorsNear<'a> = Box<dyn Fn(&Readings) -> Result<SlotValues, IdentifyError> + 'a>;
+
+/// The errors of a machine as functions of its axes, and of what else the rows of a file state.
+pub trait MachineErrors: Sync {
+    /// The errors along commanded positions. Direction and speed of travel, time and temperature are those of the
+    /// commands. The result gives the errors at positions that deviate from them by corrections.
+    ///
+    /// # Errors
+    /// If the rows lack a column that an error depends on.
+    fn along<'a>(&'a self, commanded: &'a Readings) -> Result<ErrorsNear<'a>, IdentifyError>;
+}
+
+/// An effect with its coefficients.
+#[derive(Clone, Debug)]
+pub struct EstimatedEffect {
+    /// The effect.
+    pub effect: Effect,
+    /// One per basis function, internal units.
+    pub coefficients: Vec<f64>,
+}
+
+/// Estimated errors: constant ones, and effects.
+#[derive(Clone, Debug)]
+pub struct EstimatedErrors {
+    /// The machine.
+    pub machine: Arc<Machine>,
+    /// The instrument as set up: gravity acts at its point.
+    pub station: Station<f64>,
+    /// Reference time and temperature.
+    pub reference: Reference,
+    /// The constant errors by slot of the machine, mm or rad.
+    pub constant: Vec<f64>,
+    /// The effects on errors of the machine.
+    pub effects: Vec<EstimatedEffect>,
+}
+
+impl EstimatedErrors {
+    /// The errors of a model: those that belong to the machine. Gravity acts at the load points, in the tool frame and in
+    /// the table frame.
+    pub fn of_model(model: &IdentifiedModel, tool_mm: [f64; 3], table_mm: [f64; 3]) -> EstimatedErrors {
+        let machine = Arc::new(model.machine.clone());
+        let mut constant = vec![0.0; machine.error_slots()];
+        let coefficients = |effect: &Effect| vec![0.0; effect.shape.coefficients()];
+        let mut coefficients: Vec<Vec<f64>> = model.effects.iter().map(coefficients).collect();
+        for parameter in &model.parameters {
+            match parameter.role {
+                Role::Error => {
+                    let name = ErrorName::parse(&parameter.id);
+                    if let Some(slot) = name.and_then(|name| machine.error_slot(&name)) {
+                        constant[slot] = parameter.value;
+                    }
+                }
+                Role::Coefficient { effect, coefficient } => coefficients[effect][coefficient] = parameter.value,
+                Role::Setup => {}
+            }
+        }
+        let effects = model.carried_effects().map(|index| EstimatedEffect {
+            effect: model.effects[index].clone(),
+            coefficients: coefficients[index].clone(),
+        });
+        let effects = effects.collect();
+        // A reading that connects both load points is affected by all errors.
+        let station = Station::BallBar(BallBar { workpiece_ball: table_mm, spindle_ball: tool_mm, bar: 1.0 });
+        EstimatedErrors { machine, station, reference: model.reference, constant, effects }
+    }
+
+    fn samples(
+        &self,
+        effect: &Effect,
+        rows: &Readings,
+        model: &TestModel,
+    ) -> Result<Vec<DriverSample<f64>>, IdentifyError> {
+        let driver = effect.driver.kind();
+        let input = DriverInput {
+            machine: &self.machine,
+            model,
+            readings: rows,
+            reference: &self.reference,
+            component_axis: effect.component.axis(&self.machine),
+        };
+        driver.samples(&input).ok_or_else(|| IdentifyError::MissingDriver {
+            effect: effect.id(),
+            driver: effect.driver.to_string(),
+            test: "the commands".to_string(),
+            column: driver.column().map_or_else(|| effect.driver.to_string(), str::to_string),
+        })
+    }
+
+    fn model(&self, rows: &Readings) -> TestModel {
+        TestModel::new(Arc::clone(&self.machine), self.station.clone(), rows)
+    }
+}
+
+impl MachineErrors for EstimatedErrors {
+    fn along<'a>(&'a self, commanded: &'a Readings) -> Result<ErrorsNear<'a>, IdentifyError> {
+        let model = self.model(commanded);
+        let parameters = self.station.kind().unknowns();
+        let travel: Vec<Vec<DriverSample<f64>>> = self
+            .effects
+            .iter()
+            .map(|estimated| self.samples(&estimated.effect, commanded, &model))
+            .collect::<Result<_, _>>()?;
+        let slots: Vec<Vec<(usize, Option<Vec<f64>>)>> = self
+            .effects
+            .iter()
+            .map(|estimated| estimated.effect.component.slots_in(&self.machine, parameters, commanded))
+            .collect();
+        Ok(Box::new(move |positions: &Readings| {
+            let model = self.model(positions);
+            let mut values =
+                SlotValues { constant: self.constant.clone(), varying: Vec::with_capacity(self.effects.len()) };
+            for ((estimated, travel), slots) in self.effects.iter().zip(&travel).zip(&slots) {
+                let mut samples = self.samples(&estimated.effect, positions, &model)?;
+                for (sample, commanded) in samples.iter_mut().zip(travel) {
+                    *sample = DriverSample { value: sample.value, ..*commanded };
+                }
+                let mut sum = vec![0.0; positions.rows()];
+                let columns = estimated.effect.shape.columns(&samples);
+                for (coefficient, column) in estimated.coefficients.iter().zip(&columns) {
+                    sum.iter_mut().zip(column).for_each(|(sum, basis)| *sum += coefficient * basis);
+                }
+                for (slot, factor) in slots {
+                    let term: Vec<f64> = match factor {
+                        None => sum.clone(),
+                        Some(factor) => sum.iter().zip(factor).map(|(value, factor)| value * factor).collect(),
+                    };
+                    match values.varying.iter_mut().find(|(own, _)| own == slot) {
+                        Some((_, column)) => column.iter_mut().zip(&term).for_each(|(sum, term)| *sum += term),
+                        None => values.varying.push((*slot, term)),
+                    }
+                }
+            }
+            Ok(values)
+        }))
+    }
+}

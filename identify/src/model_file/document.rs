@@ -1,0 +1,187 @@
+//! The JSON form of a model. Keys of machine and effects are those of machine and session files.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+/// The word that marks a model file.
+pub const SCHEMA: &str = "abbe-model";
+/// Version of the form. A reader refuses newer ones.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// A model file: `abbe fit|trace --save`.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Document {
+    /// `abbe-model`.
+    pub schema: String,
+    /// Version of this form.
+    pub schema_version: u32,
+    /// SHA-256 of the other keys as compact JSON, in hexadecimal.
+    pub sha256: String,
+    /// Where the model comes from.
+    pub provenance: Provenance,
+    /// The machine, with the keys of a machine file.
+    pub machine: Value,
+    /// The instrument of the readings: `ballbar`, `tracker`, …
+    pub instrument: String,
+    /// The effects, with the keys of `[[effect]]`.
+    pub effects: Vec<Value>,
+    /// All parameters in the order of `covariance`.
+    pub parameters: Vec<Parameter>,
+    /// Lower triangle of the covariance of the parameters, row by row, internal units (mm, rad, s).
+    pub covariance: Vec<Vec<f64>>,
+    /// Directions that the readings do not determine, internal units.
+    pub null_directions: Vec<Vec<f64>>,
+    /// Location errors as estimated without any effect.
+    pub locations: Vec<Location>,
+    /// The noise of a reading.
+    pub noise: Noise,
+    /// How well the model describes its own readings.
+    pub fit: FitQuality,
+    /// The range of every axis and driver that the readings covered.
+    pub ranges: Vec<Range>,
+    /// The instrument's point in the tool frame at the first test.
+    pub tool_mm: [f64; 3],
+    /// The instrument's point in the table frame there; 0 for instruments without one.
+    pub table_mm: [f64; 3],
+    /// Reference values from which drivers count.
+    pub reference: Reference,
+}
+
+/// The command and the files from which a model follows.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Provenance {
+    /// Version of the program.
+    pub tool_version: String,
+    /// `fit` or `trace`.
+    pub command: String,
+    /// The options on the command line.
+    pub options: Map<String, Value>,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// The session file.
+    pub session: String,
+    /// All files that were read.
+    pub inputs: Vec<InputFile>,
+}
+
+/// An input file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct InputFile {
+    /// Path as the command or the session names it.
+    pub file: String,
+    /// SHA-256 of the contents, in hexadecimal; `null` for a pipe, which can be read only once.
+    pub sha256: Option<String>,
+}
+
+/// A parameter.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "ModelParameter")]
+pub struct Parameter {
+    /// Identifier, as in the results of a fit.
+    pub id: String,
+    /// `location`, `set-up` or `coefficient`.
+    pub role: String,
+    /// Index of the effect of a coefficient.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub effect: Option<usize>,
+    /// Index of a coefficient within its effect.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub coefficient: Option<usize>,
+    /// Value, in `unit`; 0 if it is held.
+    pub value: f64,
+    /// Standard uncertainty, in `unit`; `null` if it is held.
+    pub u: Option<f64>,
+    /// Unit of `value` and `u`.
+    pub unit: String,
+    /// Number of display units per internal unit.
+    pub display_per_internal: f64,
+    /// Value in the internal unit, from which predictions follow.
+    pub internal: f64,
+    /// Whether it is held at nominal, since it is not separable from other parameters.
+    pub held: bool,
+    /// Standard uncertainty of its Gaussian prior about 0, internal unit; `null` without a prior.
+    pub prior_u: Option<f64>,
+    /// Physical size, internal unit.
+    pub size: f64,
+}
+
+/// A location error.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "ModelLocation")]
+pub struct Location {
+    /// `EX0C`, …
+    pub id: String,
+    /// Value, µm or ″.
+    pub value: f64,
+    /// `um` or `arcsec`.
+    pub unit: String,
+    /// Value in the internal unit.
+    pub internal: f64,
+}
+
+/// The noise of one scalar reading.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "ModelNoise")]
+pub struct Noise {
+    /// Standard deviation, µm.
+    pub noise_um: f64,
+    /// `stated`, `repeats` or `residual`.
+    pub source: String,
+    /// Autoregressive coefficients along a run.
+    pub ar_coefficients: Vec<f64>,
+    /// Standard uncertainty of their sum.
+    pub ar_sum_u: f64,
+    /// Factor on the variance of a reading in the likelihood of families of effects; 1 without families.
+    pub inflation: f64,
+}
+
+/// How well the model describes its own readings.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "ModelFit")]
+pub struct FitQuality {
+    /// Number of readings.
+    pub readings: usize,
+    /// Rms of the residual over scalar readings, µm.
+    pub rms_um: f64,
+    /// Rms over held-out scalar readings, µm.
+    pub heldout_rms_um: f64,
+    /// Factor on the uncertainties, which `covariance` contains.
+    pub u_enlargement: f64,
+}
+
+/// The range of an axis or a driver.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "ModelRange")]
+pub struct Range {
+    /// An axis, `time`, `temperature`, `gravity`, …
+    pub driver: String,
+    /// The axis that the driver is about, for drivers that differ from axis to axis.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub axis: Option<String>,
+    /// Least and greatest value, in `unit`.
+    pub range: [f64; 2],
+    /// `mm`, `deg`, `s`, `K`, `m`.
+    pub unit: String,
+    /// Least and greatest value, internal unit.
+    pub internal: [f64; 2],
+}
+
+/// Reference values from which drivers count.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "ModelReference")]
+pub struct Reference {
+    /// Time of the first reading, s.
+    pub time_s: f64,
+    /// Mean of the temperatures, °C.
+    pub temperature_c: f64,
+}

@@ -1,0 +1,111 @@
+//! The identified model as a value, and as a file that a later session is compared with.
+//!
+//! A model holds what a fit or a trace found: the machine, the values of all parameters with their covariance, the
+//! effects, the noise, and the range of axes and drivers that the readings covered. Values are those of a base
+//! parametrisation ([`crate::fit::base`]): parameters that are not separable are held at nominal, and predictions do
+//! not depend on which ones.
+//!
+//! - `of_fit`: the model of a fit; [`carried`]: the part that another session shares, with the errors of the machine at
+//!   any state;
+//! - [`range`]: the range of axes and drivers;
+//! - [`document`]: the JSON form; `read`, `write`: from and to a file, with a checksum; `location`: the path of a key.
+
+pub mod carried;
+pub mod document;
+mod location;
+mod of_fit;
+pub mod range;
+mod read;
+mod write;
+
+use abbe_model::chain::Machine;
+use abbe_model::component::ErrorName;
+use abbe_model::driver::Reference;
+use abbe_model::effect::Effect;
+use abbe_model::instrument::InstrumentKind;
+use abbe_model::session::Prior;
+use faer::Mat;
+
+use crate::noise::Noise;
+use crate::parameters::Role;
+use crate::unit::Unit;
+pub use document::{InputFile, Provenance};
+pub use range::DriverRange;
+pub use read::{read, read_text};
+
+/// A parameter of a model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelParameter {
+    /// Identifier in results: `EY0A`, `bar[A100]`, `EZC~C:h2.cos`.
+    pub id: String,
+    /// The kind; a coefficient refers to [`IdentifiedModel::effects`].
+    pub role: Role,
+    /// Display unit.
+    pub unit: Unit,
+    /// Value in internal units (mm, rad); 0 if it is held.
+    pub value: f64,
+    /// Whether it is held at nominal, since the readings do not separate it from other parameters.
+    pub held: bool,
+    /// The prior of the fit.
+    pub prior: Prior,
+    /// Physical size, internal units: 1 mm, 0.01 rad, or the value that changes the component by that much.
+    pub size: f64,
+}
+
+/// How well the model describes its own readings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quality {
+    /// Number of readings.
+    pub readings: usize,
+    /// Rms of the residual over scalar readings, mm.
+    pub rms_mm: f64,
+    /// Rms over held-out scalar readings, mm.
+    pub heldout_rms_mm: f64,
+    /// Factor on the uncertainties, which the covariance contains.
+    pub u_enlargement: f64,
+}
+
+/// An identified model.
+#[derive(Clone, Debug)]
+pub struct IdentifiedModel {
+    /// The machine.
+    pub machine: Machine,
+    /// The instrument of the readings.
+    pub instrument: InstrumentKind,
+    /// All effects.
+    pub effects: Vec<Effect>,
+    /// All parameters: location errors, set-up quantities, coefficients of effects.
+    pub parameters: Vec<ModelParameter>,
+    /// Covariance of the parameters, internal units; 0 for held ones.
+    pub covariance: Mat<f64>,
+    /// Directions that the readings do not determine, one row each, internal units; a row is one physical size long.
+    /// They change no reading of the session of the model by more than its noise.
+    pub null_directions: Vec<Vec<f64>>,
+    /// Location errors as estimated without any effect, internal units.
+    pub locations: Vec<(ErrorName, f64)>,
+    /// The noise of a reading.
+    pub noise: Noise,
+    /// How well the model describes its own readings.
+    pub quality: Quality,
+    /// The range of every axis and driver.
+    pub ranges: Vec<DriverRange>,
+    /// The instrument's point in the tool frame at the first test, mm: the load point of gravity, and the tool point if
+    /// no other is stated.
+    pub tool_mm: [f64; 3],
+    /// The instrument's point in the table frame there, mm; 0 for instruments without one.
+    pub table_mm: [f64; 3],
+    /// Reference time and temperature, from which drivers count.
+    pub reference: Reference,
+    /// Where the model comes from.
+    pub provenance: Provenance,
+}
+
+impl IdentifiedModel {
+    /// Standard uncertainty of a parameter, internal units; 0 if it is held.
+    pub fn u(&self, parameter: usize) -> f64 {
+        self.covariance[(parameter, parameter)].max(0.0).sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests;

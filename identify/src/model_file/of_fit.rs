@@ -1,0 +1,77 @@
+//! The model of a fit.
+
+use abbe_model::component::ErrorName;
+use abbe_model::session::Session;
+
+use super::{IdentifiedModel, ModelParameter, Provenance, Quality, range};
+use crate::error::IdentifyError;
+use crate::fit::base::{Gauge, base_parameters};
+use crate::fit::{Fit, minimum};
+use crate::heldout::rms_mm;
+use crate::parameters::Role;
+use crate::problem::Problem;
+
+impl IdentifiedModel {
+    /// The model of a fit, in the base parametrisation of [`Gauge::OwnDirection`].
+    ///
+    /// # Errors
+    /// If no parameter is identifiable, or the fit of the location errors alone does not converge.
+    pub fn of_fit(problem: &Problem, fit: &Fit, provenance: Provenance) -> Result<IdentifiedModel, IdentifyError> {
+        if fit.rank.identifiable_basis.ncols() == 0 {
+            return Err(IdentifyError::Request(
+                "no parameter is identifiable from these readings, so there is no model to save".into(),
+            ));
+        }
+        let base = base_parameters(problem, fit, Gauge::OwnDirection)?;
+        let list = &problem.parameters.list;
+        let parameters = list.iter().enumerate().map(|(j, parameter)| ModelParameter {
+            id: parameter.id.clone(),
+            role: parameter.role,
+            unit: parameter.unit.clone(),
+            value: base.beta[j],
+            held: base.held.contains(&j),
+            prior: parameter.prior,
+            size: parameter.size,
+        });
+        let null_directions = base.null_space.col_iter();
+        Ok(IdentifiedModel {
+            machine: problem.session.machine.as_ref().clone(),
+            instrument: problem.session.instrument,
+            effects: problem.parameters.effects.clone(),
+            parameters: parameters.collect(),
+            covariance: base.covariance,
+            null_directions: null_directions
+                .map(|direction| direction.iter().zip(list).map(|(share, of)| share * of.size).collect())
+                .collect(),
+            locations: locations(problem, fit)?,
+            noise: problem.noise.clone(),
+            quality: Quality {
+                readings: problem.readings(),
+                rms_mm: rms_mm(problem, &fit.residuals),
+                heldout_rms_mm: fit.held_out.rms_mm,
+                u_enlargement: fit.u_enlargement,
+            },
+            ranges: range::of_problem(problem, &problem.parameters.effects),
+            tool_mm: problem.models[0].station().tool_point_mm(),
+            table_mm: problem.models[0].station().table_point_mm().unwrap_or_default(),
+            reference: problem.reference,
+            provenance,
+        })
+    }
+}
+
+/// The location errors as the same readings give them without any effect.
+fn locations(problem: &Problem, fit: &Fit) -> Result<Vec<(ErrorName, f64)>, IdentifyError> {
+    let named = |problem: &Problem, beta: &[f64]| {
+        let errors = problem.parameters.list.iter().zip(beta).filter(|(parameter, _)| parameter.role == Role::Error);
+        errors.filter_map(|(parameter, value)| Some((ErrorName::parse(&parameter.id)?, *value))).collect()
+    };
+    if problem.parameters.effects.is_empty() {
+        return Ok(named(problem, &fit.beta));
+    }
+    let session = Session { effects: Vec::new(), ..problem.session.as_ref().clone() };
+    let mut alone = Problem::new(&session, problem.noise.clone(), 1)?;
+    alone.rejected.clone_from(&problem.rejected);
+    let beta = minimum(&alone, None)?.beta;
+    Ok(named(&alone, &beta))
+}

@@ -1,0 +1,122 @@
+use std::path::{Path, PathBuf};
+
+use abbe_model::files::{self, ReadOptions};
+use abbe_model::session::Session;
+use serde_json::Value;
+
+use super::carried::States;
+use super::write::checksum;
+use super::*;
+use crate::error::IdentifyError;
+use crate::fit::{Fit, prepare};
+use crate::problem::Problem;
+
+/// A bundled session with an effect on the axial motion of C, and its fit.
+fn fitted() -> (Session, Problem, Fit) {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+    let mut session = files::session(&file, &ReadOptions::default()).unwrap();
+    let text = "[[effect]]\ncomponent = \"EZC\"\nshape = \"harmonic\"\norder = 2\n[[effect]]\ncomponent = \"EXA\"\n\
+                shape = \"periodic\"\nperiod_deg = 33.3\n";
+    let read = files::toml::parts::effects_of_text(&file, text, &session.machine, session.instrument, &[]);
+    session.effects = read.unwrap();
+    let (problem, fit) = prepare(&session, 1).unwrap();
+    (session, problem, fit)
+}
+
+fn text() -> String {
+    let (_, problem, fit) = fitted();
+    IdentifiedModel::of_fit(&problem, &fit, Provenance::default()).unwrap().to_text().unwrap()
+}
+
+fn file() -> PathBuf {
+    PathBuf::from("model.json")
+}
+
+#[test]
+fn a_model_reads_back_to_the_same_bits_and_predicts_the_same_readings() {
+    let (_, problem, fit) = fitted();
+    let saved = IdentifiedModel::of_fit(&problem, &fit, Provenance::default()).unwrap();
+    let text = saved.to_text().unwrap();
+    let read = read_text(&file(), &text).unwrap();
+    assert_eq!(read.machine, saved.machine);
+    assert_eq!(read.effects, saved.effects);
+    assert_eq!(read.parameters, saved.parameters);
+    assert_eq!(read.covariance, saved.covariance);
+    assert_eq!(read.locations, saved.locations);
+    assert_eq!(read.ranges, saved.ranges);
+    assert_eq!(read.to_text().unwrap(), text);
+    let values: Vec<f64> = read.parameters.iter().map(|parameter| parameter.value).collect();
+    for (new, old) in problem.residuals(&values).iter().flatten().zip(fit.residuals.iter().flatten()) {
+        assert!((new - old).abs() < 1e-12, "{new} {old}");
+    }
+    // Uncertainties are those of the fit, as every parameter is identifiable.
+    for (j, parameter) in problem.parameters.list.iter().enumerate() {
+        let u = fit.covariance[(j, j)].sqrt() * fit.u_enlargement;
+        assert!((read.u(j) / u - 1.0).abs() < 1e-9, "{}", parameter.id);
+    }
+}
+
+/// `EZC` at an angle is `a cos 2C + b sin 2C`; a location error is constant.
+#[test]
+fn errors_at_states_are_those_of_the_effects() {
+    let model = read_text(&file(), &text()).unwrap();
+    let value = |id: &str| model.parameters.iter().find(|parameter| parameter.id == id).unwrap().value;
+    let c = model.machine.axis_index("C").unwrap();
+    let angles = [0.1, 0.7, 2.0];
+    let mut positions = vec![vec![0.0; 3]; model.machine.axes.len()];
+    positions[c] = angles.to_vec();
+    let readings = abbe_model::session::readings::Readings { positions, coordinates: 1, ..Default::default() };
+    let states = States { readings, tool_mm: [0.0; 3], table_mm: [0.0; 3] };
+    let errors = model.errors_at(&states).unwrap();
+    let slot = |name: &str| model.machine.error_slot(&ErrorName::parse(name).unwrap()).unwrap();
+    assert_eq!(errors.constant[slot("EX0C")], value("EX0C"));
+    let (_, column) = errors.varying.iter().find(|(varying, _)| *varying == slot("EZC")).unwrap();
+    for (found, angle) in column.iter().zip(angles) {
+        let expected = value("EZC~C:h2.cos") * (2.0 * angle).cos() + value("EZC~C:h2.sin") * (2.0 * angle).sin();
+        assert!((found - expected).abs() < 1e-18);
+    }
+    let contributions = model.contributions(&states).unwrap();
+    let carried = model.carried_parameters();
+    assert!(contributions.iter().all(|contribution| contribution.parameter < carried.len()));
+}
+
+/// The text with one value changed and the checksum renewed or left.
+fn changed(path: &str, value: Value, renew: bool) -> String {
+    let mut document: Value = serde_json::from_str(&text()).unwrap();
+    *document.pointer_mut(path).unwrap() = value;
+    if renew {
+        document["sha256"] = Value::String(checksum(&document));
+    }
+    serde_json::to_string_pretty(&document).unwrap()
+}
+
+fn message(text: &str) -> String {
+    let error = read_text(&file(), text).unwrap_err();
+    let IdentifyError::Model(error) = error else { panic!("{error}") };
+    format!("{error}; {}", error.help().unwrap_or_default())
+}
+
+#[test]
+fn a_file_that_cannot_be_used_is_refused_with_its_key() {
+    use serde_json::json;
+    for (text, expected) in [
+        ("[machine]\nfile = \"machine.toml\"".to_string(), "this is a session or machine file, not a model"),
+        ("{\"command\": \"fit\"}".to_string(), "this is the result of a command"),
+        ("{".to_string(), "model.json:1: not valid JSON"),
+        ("{}".to_string(), "has no `schema`"),
+        (changed("/schema_version", json!(2), true), "a newer program saved the model"),
+        (changed("/parameters/0/internal", json!(1e-3), false), "the file was changed after it was saved"),
+        (changed("/parameters/2/internal", json!("1"), true), "`parameters[2].internal`: invalid type: string"),
+        (changed("/covariance/3/3", json!(-1.0), true), "the variance of EC0A is negative"),
+        (changed("/covariance/3/2", json!(1.0), true), "`covariance` is not positive semidefinite"),
+        (changed("/covariance/3", json!([1.0]), true), "`covariance` is no lower triangle"),
+        (changed("/effects/0/shape", json!("wave"), true), "`effects[0]`: \"wave\" is not a shape"),
+        (changed("/machine/chain", json!("w C b"), true), "`machine`: "),
+        (changed("/instrument", json!("eye"), true), "\"eye\" is not an instrument"),
+        (changed("/noise/source", json!("guess"), true), "`noise.source` is \"guess\""),
+    ] {
+        let message = message(&text);
+        assert!(message.contains(expected), "{message}\nexpected {expected}");
+        assert!(message.starts_with("model.json"), "{message}");
+    }
+}

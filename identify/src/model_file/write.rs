@@ -1,0 +1,177 @@
+//! A model as a JSON text.
+
+use abbe_model::files::toml::parts;
+use abbe_model::session::Prior;
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+
+use super::IdentifiedModel;
+use super::document::{self, Document, SCHEMA, SCHEMA_VERSION};
+use crate::error::IdentifyError;
+use crate::parameters::Role;
+use crate::unit::Unit;
+use abbe_model::instrument::InternalUnit;
+
+/// The key of the checksum.
+pub(super) const CHECKSUM: &str = "sha256";
+
+impl IdentifiedModel {
+    /// The text of the model file.
+    ///
+    /// # Errors
+    /// If a number of the model is not finite.
+    pub fn to_text(&self) -> Result<String, IdentifyError> {
+        let fault = |cause: String| IdentifyError::Request(format!("the model cannot be written as JSON: {cause}"));
+        let finite = self.covariance.is_all_finite() && self.parameters.iter().all(|p| p.value.is_finite());
+        if !finite {
+            return Err(fault("a value or an uncertainty is not finite".into()));
+        }
+        let document = self.document().map_err(fault)?;
+        let mut value = serde_json::to_value(document).map_err(|cause| fault(cause.to_string()))?;
+        let sum = checksum(&value);
+        value[CHECKSUM] = Value::String(sum);
+        let mut text = String::new();
+        print(&value, 0, &mut text);
+        text.push('\n');
+        Ok(text)
+    }
+
+    fn document(&self) -> Result<Document, String> {
+        let machine = toml_value(&parts::machine_text(&self.machine))?;
+        let effects = toml_value(&parts::effects_text(&self.effects, &self.machine))?;
+        let effects = effects.get("effect").and_then(Value::as_array).cloned().unwrap_or_default();
+        let size = self.parameters.len();
+        Ok(Document {
+            schema: SCHEMA.to_string(),
+            schema_version: SCHEMA_VERSION,
+            sha256: String::new(),
+            provenance: self.provenance.clone(),
+            machine,
+            instrument: self.instrument.word().to_string(),
+            effects,
+            parameters: (0..size).map(|j| self.parameter(j)).collect(),
+            covariance: (0..size).map(|i| (0..=i).map(|j| self.covariance[(i, j)]).collect()).collect(),
+            null_directions: self.null_directions.clone(),
+            locations: self.locations.iter().map(location).collect(),
+            noise: document::Noise {
+                noise_um: self.noise.sigma_mm * 1e3,
+                source: self.noise.source.word().to_string(),
+                ar_coefficients: self.noise.ar_coefficients.clone(),
+                ar_sum_u: self.noise.ar_sum_u,
+                inflation: self.noise.inflation,
+            },
+            fit: document::FitQuality {
+                readings: self.quality.readings,
+                rms_um: self.quality.rms_mm * 1e3,
+                heldout_rms_um: self.quality.heldout_rms_mm * 1e3,
+                u_enlargement: self.quality.u_enlargement,
+            },
+            ranges: self.ranges.iter().map(|range| self.range(range)).collect(),
+            tool_mm: self.tool_mm,
+            table_mm: self.table_mm,
+            reference: document::Reference {
+                time_s: self.reference.time_s,
+                temperature_c: self.reference.temperature_c,
+            },
+        })
+    }
+
+    fn parameter(&self, j: usize) -> document::Parameter {
+        let parameter = &self.parameters[j];
+        let (role, effect, coefficient) = match parameter.role {
+            Role::Error => ("location", None, None),
+            Role::Setup => ("set-up", None, None),
+            Role::Coefficient { effect, coefficient } => ("coefficient", Some(effect), Some(coefficient)),
+        };
+        let display = parameter.unit.display_per_internal;
+        document::Parameter {
+            id: parameter.id.clone(),
+            role: role.to_string(),
+            effect,
+            coefficient,
+            value: parameter.value * display,
+            u: (!parameter.held).then(|| self.u(j) * display),
+            unit: parameter.unit.name.clone(),
+            display_per_internal: display,
+            internal: parameter.value,
+            held: parameter.held,
+            prior_u: match parameter.prior {
+                Prior::Gaussian(u) => Some(u),
+                Prior::Free | Prior::Known => None,
+            },
+            size: parameter.size,
+        }
+    }
+
+    fn range(&self, range: &super::DriverRange) -> document::Range {
+        let component = range.component_axis.as_deref().and_then(|axis| self.machine.axis_index(axis));
+        let kind = range.driver.kind_of_axis(&self.machine, component);
+        let unit = range.driver.kind().unit(kind);
+        document::Range {
+            driver: range.driver.to_string(),
+            axis: range.component_axis.clone(),
+            range: range.range.map(|value| unit.to_display(value)),
+            unit: unit.result.to_string(),
+            internal: range.range,
+        }
+    }
+}
+
+fn location((name, value): &(abbe_model::component::ErrorName, f64)) -> document::Location {
+    let internal = if name.freedom.is_angle() { InternalUnit::Radian } else { InternalUnit::Millimetre };
+    let unit = Unit::of(internal);
+    document::Location {
+        id: name.to_string(),
+        value: value * unit.display_per_internal,
+        unit: unit.name,
+        internal: *value,
+    }
+}
+
+/// The values of a TOML text as JSON.
+fn toml_value(text: &str) -> Result<Value, String> {
+    let table: toml::Table = text.parse().map_err(|cause: toml::de::Error| cause.to_string())?;
+    serde_json::to_value(table).map_err(|cause| cause.to_string())
+}
+
+/// SHA-256 of a document without its checksum, as compact JSON.
+pub(super) fn checksum(document: &Value) -> String {
+    let mut content = document.clone();
+    if let Some(keys) = content.as_object_mut() {
+        keys.shift_remove(CHECKSUM);
+    }
+    Sha256::digest(content.to_string().as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Prints JSON with lists of numbers on one line.
+fn print(value: &Value, depth: usize, text: &mut String) {
+    let line = |text: &mut String, depth: usize| {
+        text.push('\n');
+        text.push_str(&"  ".repeat(depth));
+    };
+    match value {
+        Value::Object(keys) if !keys.is_empty() => {
+            text.push('{');
+            for (place, (key, value)) in keys.iter().enumerate() {
+                text.push_str(if place > 0 { "," } else { "" });
+                line(text, depth + 1);
+                text.push_str(&Value::String(key.clone()).to_string());
+                text.push_str(": ");
+                print(value, depth + 1, text);
+            }
+            line(text, depth);
+            text.push('}');
+        }
+        Value::Array(items) if items.iter().any(|item| item.is_object() || item.is_array()) => {
+            text.push('[');
+            for (place, item) in items.iter().enumerate() {
+                text.push_str(if place > 0 { "," } else { "" });
+                line(text, depth + 1);
+                print(item, depth + 1, text);
+            }
+            line(text, depth);
+            text.push(']');
+        }
+        other => text.push_str(&other.to_string()),
+    }
+}

@@ -1,0 +1,332 @@
+//! The fit of a session's set-up with known errors of the machine.
+
+use abbe_model::session::Session;
+use abbe_model::session::limits::MIN_UM;
+
+use super::is_set_up;
+use crate::error::IdentifyError;
+use crate::fit::{Minimum, minimum};
+use crate::heldout::rms_mm;
+use crate::model_file::IdentifiedModel;
+use crate::noise::outliers;
+use crate::noise::{Noise, NoiseSource, PureError};
+use crate::numerics::triangle::Triangle;
+use crate::parameters::Role;
+use crate::problem::Problem;
+use crate::results::ParameterResult;
+use crate::trace::noise_model::estimate_noise_model;
+use abbe_model::session::Prior;
+
+/// Maximum number of rounds that re-estimate noise and outliers.
+const MAX_ROUNDS: usize = 4;
+
+/// Root mean square of residuals, mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Rms {
+    /// Over scalar readings.
+    pub scalar_mm: f64,
+    /// Number of coordinates of a reading.
+    pub coordinates: usize,
+    /// `√(χ²/ν)` of the whitened residual and of the set-up about its priors.
+    pub noise_ratio: f64,
+}
+
+/// A session whose errors of the machine are known and whose set-up is estimated.
+#[derive(Clone)]
+pub(super) struct KnownErrors<'m> {
+    pub model: &'m IdentifiedModel,
+    /// The session with the parameters of the model beside its set-up.
+    pub full: Problem,
+    /// The session with its set-up only.
+    pub set_up: Problem,
+    /// The parameters of the machine by index in the model.
+    pub carried: Vec<usize>,
+    /// The same by index in `full`.
+    pub columns: Vec<usize>,
+    /// Effects of the model that do not belong to the machine.
+    pub not_carried: Vec<String>,
+    /// Where the noise comes from: `stated`, `repeats` or `model`.
+    pub noise_source: &'static str,
+}
+
+/// The session linearised at known errors and an estimated set-up.
+pub(super) struct Linearised {
+    /// Whitened rows over the parameters of [`KnownErrors::full`], priors of the set-up included.
+    pub triangle: Triangle,
+    /// The parameters of [`KnownErrors::full`].
+    pub beta: Vec<f64>,
+    /// The factor of the model's parameters and the residual, with the set-up eliminated.
+    pub machine: Triangle,
+    /// Covariance of the model's parameters, enlarged along its null directions.
+    pub covariance: faer::Mat<f64>,
+    /// The null directions of the model over its parameters of the machine, one column each.
+    pub null_directions: faer::Mat<f64>,
+    /// Degrees of freedom of the residual.
+    pub freedom: usize,
+}
+
+impl<'m> KnownErrors<'m> {
+    /// A model on a session.
+    ///
+    /// # Errors
+    /// If the session has no readings, or none that depends on the model.
+    pub fn new(model: &'m IdentifiedModel, session: &Session) -> Result<KnownErrors<'m>, IdentifyError> {
+        let (noise, noise_source) = first_noise(model, session);
+        let mut full = Problem::new(&model.session(session), noise.clone(), 1)?;
+        // The uncertainty of the model contains the priors of its coefficients.
+        full.parameters.list.iter_mut().filter(|p| !is_set_up(p.role)).for_each(|p| p.prior = Prior::Free);
+        let own = Session { unknowns: Vec::new(), effects: Vec::new(), ..session.clone() };
+        let set_up = Problem::new(&own, noise, 1)?;
+        let carried = model.carried_parameters();
+        let effects: Vec<usize> = model.carried_effects().collect();
+        let column = |j: &usize| {
+            full.parameters.list.iter().position(|parameter| match (model.parameters[*j].role, parameter.role) {
+                (Role::Error, Role::Error) => model.parameters[*j].id == parameter.id,
+                (Role::Coefficient { effect, coefficient }, Role::Coefficient { effect: of, coefficient: k }) => {
+                    effects.get(of) == Some(&effect) && coefficient == k
+                }
+                _ => false,
+            })
+        };
+        let columns: Option<Vec<usize>> = carried.iter().map(column).collect();
+        let columns = columns.unwrap_or_default();
+        let depends = |test: usize| full.own_parameters(test).iter().any(|j| columns.contains(j));
+        if columns.is_empty() || !(0..full.tests.len()).any(depends) {
+            return Err(IdentifyError::Request(
+                "no reading of the session depends on an error that the model holds: model and session have nothing in common; \
+                 fit a model of the axes that the session moves"
+                    .into(),
+            ));
+        }
+        let left_out = model.effects.iter().filter(|effect| !IdentifiedModel::is_carried(effect));
+        let not_carried = left_out.map(|effect| match effect.tests.is_empty() {
+            true => format!("{} (an effect on the set-up of its session)", effect.id()),
+            false => format!("{} (an effect of single tests of its session)", effect.id()),
+        });
+        Ok(KnownErrors { model, not_carried: not_carried.collect(), full, set_up, carried, columns, noise_source })
+    }
+
+    /// The values of the model.
+    pub fn model_values(&self) -> Vec<f64> {
+        self.carried.iter().map(|j| self.model.parameters[*j].value).collect()
+    }
+
+    /// The location errors as estimated without any effect.
+    pub fn location_values(&self) -> Vec<f64> {
+        let value = |j: &usize| {
+            let own = |(name, _): &&(abbe_model::component::ErrorName, f64)| {
+                self.model.parameters[*j].role == Role::Error && name.to_string() == self.model.parameters[*j].id
+            };
+            self.model.locations.iter().find(own).map_or(0.0, |(_, value)| *value)
+        };
+        self.carried.iter().map(value).collect()
+    }
+
+    /// The values of the model without an effect.
+    pub fn values_without(&self, effect: usize) -> Vec<f64> {
+        let value = |j: &usize| match self.model.parameters[*j].role {
+            Role::Coefficient { effect: of, .. } if of == effect => 0.0,
+            _ => self.model.parameters[*j].value,
+        };
+        self.carried.iter().map(value).collect()
+    }
+
+    /// The identifier of an effect of the model.
+    pub fn effect_id(&self, effect: usize) -> String {
+        let place = self.model.carried_effects().position(|carried| carried == effect);
+        place.and_then(|place| self.full.parameters.effect_ids.get(place)).cloned().unwrap_or_default()
+    }
+
+    /// The problem of the set-up with these errors of the machine.
+    fn problem(&self, values: &[f64]) -> Problem {
+        let mut beta = vec![0.0; self.full.parameters.list.len()];
+        self.columns.iter().zip(values).for_each(|(column, value)| beta[*column] = *value);
+        let mut problem = self.set_up.clone();
+        problem.parameters.known = self.full.slot_values(&beta);
+        problem
+    }
+
+    /// Estimates the set-up.
+    ///
+    /// # Errors
+    /// If the iterations do not converge.
+    pub fn fit(&self, values: &[f64]) -> Result<Vec<f64>, IdentifyError> {
+        Ok(minimum(&self.problem(values), None)?.beta)
+    }
+
+    /// Estimates the set-up, and noise and outliers in turn with it.
+    ///
+    /// # Errors
+    /// If the iterations do not converge.
+    pub fn settle(&mut self, values: &[f64]) -> Result<Vec<f64>, IdentifyError> {
+        let mut problem = self.problem(values);
+        let floor = problem.session.resolution_mm.unwrap_or(0.0) / 12.0_f64.sqrt();
+        let mut beta = minimum(&problem, None)?.beta;
+        for _ in 0..MAX_ROUNDS {
+            let residuals = problem.residuals(&beta);
+            let rejected = outliers::reject(&problem, &residuals);
+            let mut settled = rejected == problem.rejected;
+            problem.rejected = rejected;
+            let mut estimated = estimate_noise_model(&mut problem, &residuals);
+            if !estimated && problem.noise.source == NoiseSource::Residual {
+                let pure = PureError::of(&problem.tests, &residuals, |test, row| !problem.rejected[test][row]);
+                if let Some(sigma) = pure.sigma_mm() {
+                    problem.noise = Noise::white(sigma.max(floor).max(MIN_UM * 1e-3), NoiseSource::Repeats);
+                    estimated = true;
+                }
+            }
+            if problem.noise.source == NoiseSource::Repeats {
+                self.noise_source = NoiseSource::Repeats.word();
+            }
+            settled &= !estimated;
+            if settled {
+                break;
+            }
+            beta = minimum(&problem, None)?.beta;
+        }
+        if self.model.noise.source == NoiseSource::Residual {
+            // The model's own residual contains what the model lacks, and so does the residual here.
+            let lacking = self.model.quality.heldout_rms_mm;
+            if problem.noise.sigma_mm < lacking {
+                problem.noise = Noise::white(lacking, NoiseSource::Residual);
+                self.noise_source = "model";
+                beta = minimum(&problem, None)?.beta;
+            }
+        }
+        self.set_up.noise = problem.noise.clone();
+        self.set_up.rejected.clone_from(&problem.rejected);
+        self.full.noise = problem.noise;
+        self.full.rejected = problem.rejected;
+        Ok(beta)
+    }
+
+    /// The same readings without those that are not chosen.
+    pub fn restricted_to(&self, chosen: &[Vec<bool>]) -> KnownErrors<'m> {
+        let mut restricted = self.clone();
+        for problem in [&mut restricted.set_up, &mut restricted.full] {
+            for (rejected, chosen) in problem.rejected.iter_mut().zip(chosen) {
+                rejected.iter_mut().zip(chosen).for_each(|(rejected, chosen)| *rejected |= !chosen);
+            }
+        }
+        restricted
+    }
+
+    /// Rms and residuals at known errors and an estimated set-up.
+    pub fn rms(&self, values: &[f64], beta: &[f64]) -> (Rms, Vec<Vec<f64>>) {
+        let problem = self.problem(values);
+        let residuals = problem.residuals(beta);
+        let observations = whitened_readings(&problem) + problem.prior_rows();
+        let freedom = observations.saturating_sub(beta.len()).max(1) as f64;
+        let rms = Rms {
+            scalar_mm: rms_mm(&self.set_up, &residuals),
+            coordinates: self.set_up.coordinates(),
+            noise_ratio: (problem.sum_of_squares(beta) / freedom).sqrt(),
+        };
+        (rms, residuals)
+    }
+
+    /// Rms with other known errors and the set-up estimated again.
+    ///
+    /// # Errors
+    /// If the iterations do not converge.
+    pub fn rms_with(&self, values: &[f64]) -> Result<Rms, IdentifyError> {
+        Ok(self.rms(values, &self.fit(values)?).0)
+    }
+
+    /// Residuals with other known errors and the set-up estimated again.
+    ///
+    /// # Errors
+    /// If the iterations do not converge.
+    pub fn residuals_with(&self, values: &[f64]) -> Result<Vec<Vec<f64>>, IdentifyError> {
+        Ok(self.rms(values, &self.fit(values)?).1)
+    }
+
+    /// The session linearised by all parameters, at known errors and an estimated set-up.
+    ///
+    /// # Errors
+    /// If the model cannot be evaluated.
+    pub fn linearised(&self, values: &[f64], set_up: &[f64]) -> Result<Linearised, IdentifyError> {
+        let list = &self.full.parameters.list;
+        let mut beta = vec![0.0; list.len()];
+        self.columns.iter().zip(values).for_each(|(column, value)| beta[*column] = *value);
+        for (parameter, value) in self.set_up.parameters.list.iter().zip(set_up) {
+            if let Some(j) = list.iter().position(|other| other.id == parameter.id) {
+                beta[j] = *value;
+            }
+        }
+        let triangle = self.full.prior_triangle(&beta).merged(&self.full.triangles(&beta)?);
+        let sizes = self.full.parameters.sizes();
+        let machine = triangle.eliminated(&self.columns, &sizes)?;
+        let whitened = whitened_readings(&self.full);
+        let rank = self.rank_of_set_up(&triangle, &sizes)?;
+        let count = self.carried.len();
+        let directions = &self.model.null_directions;
+        let null_directions = faer::Mat::from_fn(count, directions.len(), |i, k| directions[k][self.carried[i]]);
+        let own = &self.model.covariance;
+        let covariance = faer::Mat::from_fn(count, count, |i, j| own[(self.carried[i], self.carried[j])])
+            + &null_directions * null_directions.transpose();
+        let freedom = (whitened + self.full.prior_rows()).saturating_sub(rank).max(1);
+        Ok(Linearised { triangle, beta, machine, covariance, null_directions, freedom })
+    }
+
+    /// Number of identifiable directions of the set-up.
+    fn rank_of_set_up(&self, triangle: &Triangle, sizes: &[f64]) -> Result<usize, IdentifyError> {
+        let set_up: Vec<usize> = (0..sizes.len()).filter(|j| !self.columns.contains(j)).collect();
+        let r = triangle.r();
+        let scaled = faer::Mat::from_fn(r.nrows(), set_up.len(), |i, k| r[(i, set_up[k])] * sizes[set_up[k]]);
+        Ok(crate::numerics::solve::Directions::of(scaled.as_ref())?.identifiable_rank())
+    }
+
+    /// The estimated set-up in display units.
+    ///
+    /// # Errors
+    /// If the model cannot be evaluated.
+    pub fn set_up_estimates(&self, values: &[f64]) -> Result<Vec<ParameterResult>, IdentifyError> {
+        let problem = self.problem(values);
+        let Minimum { beta, triangles, rank } = minimum(&problem, None)?;
+        let whole = problem.prior_triangle(&beta).merged(&triangles);
+        let covariance = whole.covariance(&rank.identifiable_basis)?;
+        let list = problem.parameters.list.iter().enumerate().filter(|(j, _)| rank.is_identifiable(*j));
+        let estimate = list.map(|(j, parameter)| {
+            let display = parameter.unit.display_per_internal;
+            let u = covariance[(j, j)].max(0.0).sqrt() * display;
+            let meaning = crate::parameter_description::parameter_meaning(&problem, j, None);
+            ParameterResult::new(&parameter.id, beta[j] * display, u, &parameter.unit.name).with_meaning(meaning)
+        });
+        Ok(estimate.collect())
+    }
+
+    /// A warning if the noise is not that of the session.
+    pub fn noise_warning(&self) -> Option<String> {
+        (self.noise_source == "model").then(|| {
+            format!(
+                "the model's {} of {:.2} µm counts as noise",
+                match self.model.noise.source {
+                    NoiseSource::Residual => "held-out rms, which contains what the model lacks,",
+                    _ => "noise",
+                },
+                self.set_up.noise.sigma_mm * 1e3
+            )
+        })
+    }
+}
+
+/// Number of scalar readings after whitening.
+fn whitened_readings(problem: &Problem) -> usize {
+    problem.blocks().iter().map(|block| problem.kept_rows(block).len()).sum()
+}
+
+/// The noise before repeats are examined, and its source.
+fn first_noise(model: &IdentifiedModel, session: &Session) -> (Noise, &'static str) {
+    if let Some(sigma) = session.noise_mm.filter(|sigma| *sigma > 0.0) {
+        return (Noise::white(sigma, NoiseSource::Stated), NoiseSource::Stated.word());
+    }
+    let noise = match model.noise.source {
+        // A residual contains what the model lacks; on readings that it has not seen, that is the held-out error.
+        NoiseSource::Residual => {
+            Noise::white(model.quality.heldout_rms_mm.max(model.noise.sigma_mm), NoiseSource::Residual)
+        }
+        NoiseSource::Stated | NoiseSource::Repeats => Noise { source: NoiseSource::Residual, ..model.noise.clone() },
+    };
+    (noise, "model")
+}

@@ -1,0 +1,173 @@
+//! `abbe compare`: differences between sessions or models of one machine.
+
+use std::path::{Path, PathBuf};
+
+use abbe::identify::compare::{CompareOptions, Named, SIGNIFICANCE, compare};
+use abbe::identify::fit;
+use abbe::identify::model_file::{self, IdentifiedModel, Provenance};
+use abbe::model::files::{self, ReadOptions};
+use abbe::model::session::Session;
+use clap::Args;
+
+use super::failure::Failure;
+use super::json::{self, Origin};
+use super::output;
+use super::{CommonArguments, output::Outputs};
+use crate::present::compare as present;
+
+/// Examples of `abbe compare`.
+pub const HELP: &str = "Each input is a session, which is fitted as declared, or a model of `abbe fit --save` or `abbe trace --save`. Sessions are fitted \
+with the errors and effects that any of them declares, so that their parameters are the same. The others are compared with the first.
+
+A difference is significant if Holm's procedure rejects that it is zero: the probability of any false claim between two inputs is at \
+most the level of --significance. Bars of the same name with the same prior are one bar, whose deviation cancels; --shared names \
+other set-up quantities that were not mounted again.
+
+Examples:
+  abbe compare before/session.toml after/session.toml
+  abbe compare model-2025.json model-2026.json --json differences.json
+  abbe compare before/session.toml after/session.toml --shared bar --shared workpiece_ball
+  abbe compare before.json after.json --significance 0.01 --places 7 --csv differences.csv";
+
+/// `abbe compare A B …`
+#[derive(Args)]
+pub struct CompareArguments {
+    /// Sessions or models, the first one being that with which the others are compared.
+    #[arg(required = true, num_args = 2..)]
+    inputs: Vec<PathBuf>,
+    /// Folder of the data files of the sessions, if they do not lie beside the session files.
+    ///
+    /// Example: --data measurements
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Allow the sessions to read files outside their own folder and the folder of --data.
+    #[arg(long)]
+    allow_outside: bool,
+    /// Set-up quantity that was not mounted again between the sessions: bar, workpiece_ball, spindle_ball, `none`; may be
+    /// repeated [default: bars of the same name with the same prior].
+    ///
+    /// Example: --shared workpiece_ball
+    #[arg(long = "shared", value_name = "THING")]
+    shared: Vec<String>,
+    /// Probability of any false claim of a difference between two inputs.
+    ///
+    /// Example: --significance 0.01
+    #[arg(long, value_name = "P", default_value_t = SIGNIFICANCE)]
+    significance: f64,
+    /// Places along each axis at which the volumetric error is evaluated; 0 for none.
+    ///
+    /// Example: --places 7
+    #[arg(long, value_name = "N", default_value_t = 5)]
+    places: usize,
+    /// List every difference.
+    #[arg(long)]
+    all: bool,
+    /// Write the differences as CSV.
+    ///
+    /// Example: --csv differences.csv
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    #[command(flatten)]
+    common: CommonArguments,
+}
+
+/// What an input is.
+enum Input {
+    Model(Box<IdentifiedModel>),
+    Session(Box<Session>),
+}
+
+/// Runs `abbe compare`.
+pub fn run(arguments: &CompareArguments) -> Result<(), Failure> {
+    if !(arguments.significance > 0.0 && arguments.significance < 1.0) {
+        let found = arguments.significance;
+        return Err(Failure::CommandLine(format!(
+            "`--significance {found}`: a probability between 0 and 1 is expected"
+        )));
+    }
+    if arguments.places > 100 {
+        return Err(Failure::CommandLine(format!("`--places {}`: 100 is the most", arguments.places)));
+    }
+    let outputs = arguments.common.outputs(&[arguments.csv.as_ref()])?;
+    let mut origin = Origin::default();
+    let inputs: Vec<Input> =
+        arguments.inputs.iter().map(|file| read(file, arguments, &outputs, &mut origin)).collect::<Result<_, _>>()?;
+    let models = models(inputs, arguments.common.seed)?;
+    let named: Vec<Named<'_>> = arguments
+        .inputs
+        .iter()
+        .zip(&models)
+        .map(|(file, model)| Named { name: file.display().to_string(), model })
+        .collect();
+    let options = CompareOptions {
+        significance: arguments.significance,
+        shared: (!arguments.shared.is_empty()).then(|| arguments.shared.clone()),
+        places: arguments.places,
+    };
+    let comparison = compare(&named, &options)?;
+    if outputs.tables(arguments.common.quiet) {
+        for (number, pair) in comparison.pairs.iter().enumerate() {
+            if number > 0 {
+                say!("");
+            }
+            for line in present::headline(&comparison, pair) {
+                say!("{line}");
+            }
+            output::print(&present::differences(&comparison, pair, arguments.all));
+        }
+        if !comparison.workspace.is_empty() {
+            output::print(&present::workspace(&comparison));
+        }
+    }
+    if let Some(path) = &arguments.csv {
+        output::write_figures(path, &present::figures(&comparison))?;
+    }
+    match &arguments.common.json {
+        Some(path) => json::write(path, origin, Some(arguments.common.seed), &comparison),
+        None => Ok(()),
+    }
+}
+
+fn read(file: &Path, arguments: &CompareArguments, outputs: &Outputs, origin: &mut Origin) -> Result<Input, Failure> {
+    let is_model = file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json"));
+    if is_model {
+        outputs.refuse_overwrite([file])?;
+        origin.add(Origin::of_files(&[file])?);
+        return Ok(Input::Model(Box::new(model_file::read(file)?)));
+    }
+    let options =
+        ReadOptions { data_directory: arguments.data.clone(), read_data: true, allow_outside: arguments.allow_outside };
+    let (session, sources) = files::session_with_sources(file, &options)?;
+    outputs.refuse_overwrite_of_sources(&sources)?;
+    origin.add(Origin::of_session(&sources)?);
+    Ok(Input::Session(Box::new(session)))
+}
+
+/// The models of all inputs. Sessions are fitted with the errors and effects that any of them declares.
+fn models(inputs: Vec<Input>, seed: u64) -> Result<Vec<IdentifiedModel>, Failure> {
+    let (mut errors, mut effects) = (Vec::new(), Vec::new());
+    for input in &inputs {
+        let Input::Session(session) = input else { continue };
+        for error in &session.unknowns {
+            if !errors.contains(error) {
+                errors.push(error.clone());
+            }
+        }
+        for effect in session.effects.iter().filter(|effect| effect.tests.is_empty()) {
+            if !effects.contains(effect) {
+                effects.push(effect.clone());
+            }
+        }
+    }
+    let model = |input: Input| match input {
+        Input::Model(model) => Ok(*model),
+        Input::Session(session) => {
+            let own = session.effects.iter().filter(|effect| !effect.tests.is_empty()).cloned();
+            let effects = effects.iter().cloned().chain(own).collect();
+            let session = Session { unknowns: errors.clone(), effects, ..*session };
+            let (problem, fit) = fit::prepare(&session, seed)?;
+            Ok(IdentifiedModel::of_fit(&problem, &fit, Provenance::default())?)
+        }
+    };
+    inputs.into_iter().map(model).collect()
+}

@@ -1,0 +1,175 @@
+//! `abbe export`: the calibrated machine for other programs and for controls.
+
+use std::path::PathBuf;
+
+use abbe::identify::compensation::{self, Compensation, Control};
+use abbe::identify::export::control::{self, KinematicTable, NOT_DOCUMENTED};
+use abbe::identify::export::dh::{self, DhTable};
+use abbe::identify::export::{left_out, urdf};
+use abbe::identify::model_file::{self, IdentifiedModel};
+use abbe::identify::parameters::Role;
+use abbe::model::component::ErrorName;
+use abbe::model::session::limits::LARGEST;
+use clap::{Args, ValueEnum};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::failure::Failure;
+use super::json::{self, Origin};
+use super::output::{self, Outputs};
+use crate::present::export as present;
+
+/// Examples of `abbe export`.
+pub const HELP: &str = "urdf writes the calibrated chain (ROS, lengths in m); dh writes Denavit-Hartenberg parameters in the modified form of Craig, with \
+Hayati's angle for parallel axes. linuxcnc and fanuc write the change of each kinematic parameter of the control: what is added to the \
+present entry, with its standard uncertainty. beckhoff writes location errors in the ISG CSV format. The source of each control's model \
+stands in the table. For siemens and heidenhain the public manuals leave the signs open: nothing is written.
+
+A fixed geometry holds location errors only. Effects are listed as left out.
+
+Examples:
+  abbe export model.json --as urdf --out robot.urdf
+  abbe export model.json --as dh --out dh.csv --tool-mm 0,0,120
+  abbe export model.json --as linuxcnc --out kinematics.csv --json kinematics.json";
+
+/// What is written.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// URDF of the calibrated chain
+    Urdf,
+    /// Denavit-Hartenberg parameters, calibrated and nominal
+    Dh,
+    /// LinuxCNC, xyzac-trt-kins and xyzbc-trt-kins
+    Linuxcnc,
+    /// Fanuc 30i, table rotation type
+    Fanuc,
+    /// Beckhoff TF5280, location errors
+    Beckhoff,
+    /// SINUMERIK 840D
+    Siemens,
+    /// Heidenhain TNC
+    Heidenhain,
+}
+
+impl Format {
+    /// The word of a control.
+    fn control(self) -> &'static str {
+        match self {
+            Format::Linuxcnc => "linuxcnc",
+            Format::Fanuc => "fanuc",
+            Format::Siemens => NOT_DOCUMENTED[0].0,
+            Format::Heidenhain => NOT_DOCUMENTED[1].0,
+            Format::Beckhoff => "beckhoff",
+            Format::Urdf | Format::Dh => "",
+        }
+    }
+}
+
+/// `abbe export MODEL --as FORMAT --out FILE`
+#[derive(Args)]
+pub struct ExportArguments {
+    /// The identified model: `abbe fit --save` or `abbe trace --save`.
+    model: PathBuf,
+    /// What is written.
+    ///
+    /// Example: --as urdf
+    #[arg(long = "as", value_enum, value_name = "FORMAT")]
+    format: Format,
+    /// Where it is written; `-` is standard output.
+    ///
+    /// Example: --out robot.urdf
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// The tool point in the tool frame, for urdf and dh [default: the instrument's point in the model].
+    ///
+    /// Example: --tool-mm 0,0,120
+    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_hyphen_values = true)]
+    tool_mm: Vec<f64>,
+    /// Write the same as JSON (dh and controls).
+    ///
+    /// Example: --json kinematics.json
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// The result of `abbe export` in JSON.
+#[derive(Serialize, JsonSchema)]
+pub struct ExportResult {
+    /// Denavit-Hartenberg parameters with the identified location errors.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    calibrated: Option<DhTable>,
+    /// Those of the machine without errors.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    nominal: Option<DhTable>,
+    /// Changes of a control's kinematic parameters.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    kinematics: Option<KinematicTable>,
+    /// Effects and errors that a fixed geometry does not hold.
+    left_out: Vec<String>,
+}
+
+/// Runs `abbe export`.
+pub fn run(arguments: &ExportArguments, quiet: bool) -> Result<(), Failure> {
+    let outputs = Outputs::new(std::iter::once(&arguments.out).chain(&arguments.json))?;
+    outputs.refuse_overwrite([arguments.model.as_path()])?;
+    let model = model_file::read(&arguments.model)?;
+    let tool_mm = match arguments.tool_mm[..] {
+        [] => model.tool_mm,
+        [x, y, z] if [x, y, z].iter().all(|mm: &f64| mm.abs() <= LARGEST) => [x, y, z],
+        _ => {
+            return Err(Failure::Other(format!("--tool-mm: three numbers of {LARGEST:e} at most, as in 0,0,120")));
+        }
+    };
+    let mut result = ExportResult { calibrated: None, nominal: None, kinematics: None, left_out: left_out(&model) };
+    let (text, tables) = match arguments.format {
+        Format::Urdf => (urdf::urdf(&model, tool_mm)?.into_bytes(), Vec::new()),
+        Format::Dh => {
+            let [calibrated, nominal] = dh::tables(&model, tool_mm)?;
+            let table = present::dh(&calibrated, &nominal);
+            (result.calibrated, result.nominal) = (Some(calibrated), Some(nominal));
+            (output::csv(&table)?, vec![table])
+        }
+        Format::Beckhoff => {
+            let (text, missing) = beckhoff(&model)?;
+            result.left_out = missing;
+            (text, Vec::new())
+        }
+        control => {
+            let table = control::table(&model, control.control())?;
+            result.left_out.clone_from(&table.left_out);
+            let printed = present::kinematics(&table);
+            let text = [present::kinematics_header(&table).into_bytes(), output::csv(&printed)?].concat();
+            result.kinematics = Some(table);
+            (text, vec![printed])
+        }
+    };
+    output::write_whole(&arguments.out, &text)?;
+    if outputs.tables(quiet) {
+        say!("{}: written", arguments.out.display());
+        tables.iter().for_each(output::print);
+        for missing in &result.left_out {
+            say!("left out: {missing}");
+        }
+    }
+    match &arguments.json {
+        Some(path) => json::write(path, Origin::of_files(&[&arguments.model])?, None, &result),
+        None => Ok(()),
+    }
+}
+
+/// The location errors in the format of the control, and what it does not hold.
+fn beckhoff(model: &IdentifiedModel) -> Result<(Vec<u8>, Vec<String>), Failure> {
+    let errors = model.parameters.iter().filter(|parameter| parameter.role == Role::Error && !parameter.held);
+    let locations = errors.filter_map(|parameter| Some((ErrorName::parse(&parameter.id)?, parameter.value))).collect();
+    let compensation = Compensation { locations, left_out: left_out(model), ..Compensation::default() };
+    let control: Option<&Control> =
+        compensation::CONTROLS.iter().find(|control| control.word == Format::Beckhoff.control());
+    let Some(control) = control else {
+        return Err(Failure::Other("the format of Beckhoff is not in the registry".into()));
+    };
+    let tables = compensation::tables(&model.machine, &compensation, control, compensation::MAX_POINTS);
+    match tables.files.into_iter().next() {
+        Some((_, text)) => Ok((text.into_bytes(), tables.left_out)),
+        None => Err(Failure::Other("the model has no location error that the format holds".into())),
+    }
+}

@@ -1,0 +1,44 @@
+//! Corrected commands: what became of the rows.
+
+use abbe::identify::correction::Aim;
+use abbe::identify::correction::stream::Summary;
+use abbe::model::words::counted;
+
+use super::table::{Cell, Table, cells};
+
+/// What was done, in a line.
+pub fn headline(summary: &Summary, aim: Aim) -> String {
+    let part = match aim {
+        Aim::Position => "position",
+        Aim::PositionAndAxis => "position and direction of the tool",
+        Aim::Pose => "position and orientation of the tool",
+    };
+    match summary.largest_remaining_um {
+        Some(_) => format!("{}, {part} corrected", counted(summary.rows, "row")),
+        None => format!("{}, no command changed", counted(summary.rows, "row")),
+    }
+}
+
+/// Number of rows by state, and the largest errors.
+pub fn states(summary: &Summary) -> Table {
+    let mut rows: Vec<Vec<Cell>> = summary
+        .states
+        .iter()
+        .map(|count| cells![format!("rows {}", count.state), count.rows.to_string(), ""])
+        .collect();
+    let mut size = |name: &str, um: Option<f64>, arcsec: Option<f64>| {
+        if let (Some(um), Some(arcsec)) = (um, arcsec) {
+            let figure = |value: f64| if value < 1e-3 { format!("{value:.1e}") } else { format!("{value:.3}") };
+            rows.push(cells![name, format!("{} µm", figure(um)), format!("{}″", figure(arcsec))]);
+        }
+    };
+    size("largest error at the commands", Some(summary.largest_error_um), Some(summary.largest_error_arcsec));
+    size("largest remaining error", summary.largest_remaining_um, summary.largest_remaining_arcsec);
+    Table::new(["", ">position", ">orientation"], rows)
+}
+
+/// The first rows that are not simply corrected.
+pub fn marked(summary: &Summary) -> Table {
+    let rows = summary.marked.iter().map(|row| cells![row.line.to_string(), row.state, row.fault.clone()]);
+    Table::new([">line", "state", ""], rows).titled("Rows that are marked")
+}

@@ -1,0 +1,131 @@
+//! Plots of a validation: rms of each machine, residuals and coverage of each test, share of each effect.
+
+use abbe::identify::validate::{Validation, ValidationResult};
+
+use crate::present::figure::bars::{Bars, Fill};
+use crate::present::figure::lines::{Axis, Lines, Mark, Series};
+use crate::present::figure::scale::{Scale, span};
+use crate::present::figure::{Chart, Figure, Quantity};
+
+/// Maximum number of tests with plots of their own.
+const MAX_TESTS: usize = 12;
+/// Maximum number of effects in a plot.
+const MAX_EFFECTS: usize = 30;
+/// Maximum number of drawn readings of a test.
+const MAX_POINTS: usize = 1500;
+/// Standard deviations of a 95 % interval.
+const INTERVAL: f64 = 1.96;
+
+/// Rms of the nominal machine, of the location errors and of the model.
+pub fn of_machines(result: &ValidationResult) -> Vec<Figure> {
+    let model = &result.model;
+    let mut rows = vec![
+        ("nominal machine".to_string(), result.nominal.rms_um, Fill::Other),
+        ("location errors".to_string(), result.locations.rms_um, Fill::Alias),
+        ("model".to_string(), model.rms.rms_um, Fill::Named),
+        ("predicted".to_string(), model.predicted_rms_um, Fill::Other),
+    ];
+    rows.extend(
+        model.in_range.as_ref().map(|inside| ("model, inside its range".to_string(), inside.rms.rms_um, Fill::Named)),
+    );
+    vec![bars(
+        "rms",
+        "Residual of each machine",
+        "With the set-up of this session estimated for each.",
+        Quantity::new("rms", "um"),
+        rows,
+    )]
+}
+
+/// Rms without each effect, less that of the whole model.
+pub fn of_effects(result: &ValidationResult) -> Vec<Figure> {
+    let change = |rms_um: f64| rms_um - result.model.rms.rms_um;
+    let mut rows: Vec<(String, f64, Fill)> = result
+        .without
+        .iter()
+        .map(|without| {
+            let change = change(without.rms.rms_um);
+            (without.effect.clone(), change, if change > 0.0 { Fill::Named } else { Fill::Other })
+        })
+        .collect();
+    rows.sort_by(|a, b| b.1.total_cmp(&a.1));
+    rows.truncate(MAX_EFFECTS);
+    vec![bars(
+        "effects",
+        "Share of each effect",
+        "Increase of the rms without the effect. A negative bar: the effect does not hold here.",
+        Quantity::new("increase of the rms", "um"),
+        rows,
+    )]
+}
+
+/// Residuals of each test before and after, with the 95 % intervals of the model.
+pub fn of_tests(validation: &Validation) -> Vec<Figure> {
+    let mut plots = vec![coverage(validation)];
+    plots.extend((0..validation.tests.len().min(MAX_TESTS)).map(|test| residuals(validation, test)));
+    plots
+}
+
+/// Share of readings of each test inside their intervals.
+fn coverage(validation: &Validation) -> Figure {
+    let share = |test: usize| {
+        let rows = validation.residuals[test].iter().zip(&validation.predicted_mm[test]).enumerate();
+        let kept: Vec<bool> = rows
+            .filter(|(i, _)| !validation.rejected[test][i / validation.coordinates])
+            .map(|(_, (residual, deviation))| residual.abs() <= INTERVAL * deviation)
+            .collect();
+        100.0 * kept.iter().filter(|inside| **inside).count() as f64 / kept.len().max(1) as f64
+    };
+    let rows: Vec<(String, f64, Fill)> = validation
+        .tests
+        .iter()
+        .enumerate()
+        .take(MAX_EFFECTS)
+        .map(|(test, name)| (name.clone(), share(test), Fill::Named))
+        .collect();
+    bars(
+        "coverage",
+        "Coverage of the 95 % intervals",
+        "Share of the scalar readings of each test.",
+        Quantity::new("inside", "%"),
+        rows,
+    )
+}
+
+/// Residuals of a test: the nominal machine, the model, and the ends of the model's intervals.
+fn residuals(validation: &Validation, test: usize) -> Figure {
+    let count = validation.residuals[test].len();
+    let step = count.div_ceil(MAX_POINTS).max(1);
+    let points = |value: &dyn Fn(usize) -> f64| -> Vec<(f64, f64)> {
+        (0..count).step_by(step).map(|i| ((i / validation.coordinates + 1) as f64, value(i))).collect()
+    };
+    // The interval of the first coordinate of a reading, so that its line is smooth.
+    let of_row = |i: usize| validation.predicted_mm[test][i - i % validation.coordinates] * 1e3;
+    let series = [
+        ("run before", "nominal machine", points(&|i| validation.residuals_nominal[test][i] * 1e3)),
+        ("run after", "model", points(&|i| validation.residuals[test][i] * 1e3)),
+        ("after", "95 % interval", points(&|i| INTERVAL * of_row(i))),
+        ("after", "", points(&|i| -INTERVAL * of_row(i))),
+    ];
+    let [low, high] = span(series.iter().flat_map(|(_, _, points)| points.iter().map(|point| point.1)));
+    let last = (count / validation.coordinates).max(2) as f64;
+    let name = &validation.tests[test];
+    let series = series.into_iter().enumerate().map(|(k, (class, label, points))| {
+        Series::new(label, class, if k < 2 { Mark::Dots } else { Mark::Line }, points)
+    });
+    Figure::new(
+        format!("residual-{name}"),
+        format!("{name}: residuals"),
+        "Nominal machine and model, each with its estimated set-up.",
+        Chart::Lines(Lines::new(
+            Axis::new("reading", "", Scale::rounded([1.0, last], 6)),
+            Axis::new("residual", "um", Scale::rounded([low.min(0.0), high.max(0.0)], 6)),
+            series.collect(),
+        )),
+    )
+}
+
+/// A chart of bars without a legend.
+fn bars(name: &str, title: &str, caption: &str, quantity: Quantity, rows: Vec<(String, f64, Fill)>) -> Figure {
+    Figure::new(name, title, caption, Chart::Bars(Bars { quantity, rows, labels: Vec::new() }))
+}

@@ -1,0 +1,157 @@
+//! A validated model: verdict, residuals of each machine, moved parameters, share of each effect.
+
+use abbe::identify::validate::ValidationResult;
+use abbe::identify::validate::results::RmsResult;
+use abbe::model::words::counted;
+
+use super::fit::Figures;
+use super::number::{micrometres, unit};
+use super::table::{Cell, Table, cells};
+
+/// The verdict in a sentence.
+pub fn sentence(result: &ValidationResult) -> String {
+    let cause = match result.moved.len() {
+        0 => "the residual is larger than predicted".to_string(),
+        1 => "1 parameter has moved".to_string(),
+        count => format!("{} have moved", counted(count, "parameter")),
+    };
+    let other = if result.without.is_empty() { "the nominal machine" } else { "the location errors alone" };
+    match result.verdict.as_str() {
+        "holds" => "the model predicts the readings within noise and its uncertainty".to_string(),
+        "holds-in-range" => {
+            "the model predicts the readings inside the range of its data, not those outside it".to_string()
+        }
+        "degraded" => format!("{cause}; the model is still better than {other}"),
+        _ => format!("{cause}, and the model is no better than {other}"),
+    }
+}
+
+/// The readings, those inside the range, and the noise.
+pub fn readings(result: &ValidationResult) -> String {
+    let outside = match result.outside.as_slice() {
+        [] => String::new(),
+        names => format!(" (outside: {})", names.join(", ")),
+    };
+    let outliers = match result.outliers {
+        0 => String::new(),
+        count => format!(", {} excluded", counted(count, "outlier")),
+    };
+    format!(
+        "{}, {} inside the range of the model{outside}{outliers}; noise {} ({})",
+        counted(result.readings, "reading"),
+        result.readings_in_range,
+        micrometres(result.noise_um),
+        result.noise_source
+    )
+}
+
+/// Rms of each machine, with what the model predicts and covers.
+pub fn residuals(result: &ValidationResult) -> Table {
+    let length = |rms: &RmsResult| rms.rms_3d_um.map_or("–".to_string(), micrometres);
+    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    let row = |name: &str, rms: &RmsResult| {
+        cells![name, micrometres(rms.rms_um), length(rms), Cell::fixed(rms.noise_ratio, 3), "–", "–", "–"]
+    };
+    let model = &result.model;
+    let predicted = |rms: &RmsResult, predicted_um: f64, ratio: f64, coverage: f64, name: &str| {
+        cells![
+            name,
+            micrometres(rms.rms_um),
+            length(rms),
+            Cell::fixed(rms.noise_ratio, 3),
+            micrometres(predicted_um),
+            Cell::fixed(ratio, 3),
+            percent(coverage)
+        ]
+    };
+    let mut rows = vec![
+        row("nominal machine", &result.nominal),
+        row("location errors", &result.locations),
+        predicted(&model.rms, model.predicted_rms_um, model.residual_ratio, model.coverage_95, "model"),
+    ];
+    rows.extend(model.in_range.as_ref().map(|inside| {
+        let name = "model, inside its range";
+        predicted(&inside.rms, inside.predicted_rms_um, inside.residual_ratio, inside.coverage_95, name)
+    }));
+    let three = model.rms.rms_3d_um.is_some();
+    let mut table =
+        Table::new(["machine", ">rms", ">3-vector", ">of noise", ">predicted rms", ">of predicted", ">in 95 %"], rows);
+    table.notes.push(
+        "of noise: √(χ²/ν) of the residual over the noise and of the set-up over its priors. of predicted: the same with \
+         the uncertainty of the model."
+            .into(),
+    );
+    if !three {
+        table.columns.remove(2);
+        table.rows.iter_mut().for_each(|row| drop(row.remove(2)));
+    }
+    table.titled("Residual with the set-up of this session estimated")
+}
+
+/// The moved parameters.
+pub fn moved(result: &ValidationResult) -> Table {
+    let rows = result.moved.iter().map(|moved| {
+        let [value, u] = Cell::estimate(moved.value, moved.u);
+        cells![&moved.id, value, u, unit(&moved.unit), format!("{:.1e}", moved.p_value), moved.alternatives.join(", ")]
+    });
+    Table::new(["parameter", ">change", ">u", "unit", ">p", "or instead"], rows)
+        .titled("Parameters that have moved since the model, with standard uncertainty u")
+}
+
+/// The model without each effect, the most important first.
+pub fn without(result: &ValidationResult) -> Table {
+    let mut order: Vec<usize> = (0..result.without.len()).collect();
+    order.sort_by(|a, b| result.without[*b].rms.rms_um.total_cmp(&result.without[*a].rms.rms_um));
+    let rows = order.into_iter().map(|k| {
+        let without = &result.without[k];
+        let change = without.rms.rms_um - result.model.rms.rms_um;
+        cells![&without.effect, micrometres(without.rms.rms_um), format!("{change:+.3}")]
+    });
+    Table::new(["effect", ">rms without it", ">change, µm"], rows)
+        .titled("The model without each effect; an effect that lowers no residual does not hold here")
+}
+
+/// The estimated set-up.
+pub fn set_up(result: &ValidationResult) -> Table {
+    let rows = result.set_up.iter().map(|parameter| {
+        let [value, u] = Cell::estimate(parameter.value, parameter.u);
+        cells![&parameter.id, value, u, unit(&parameter.unit), &parameter.meaning]
+    });
+    Table::new(["parameter", ">value", ">u", "unit", "meaning"], rows)
+        .titled("Set-up of this session, as deviations from its stated values")
+}
+
+/// Every figure with all its digits, one row per figure.
+pub fn figures(result: &ValidationResult) -> Table {
+    let mut figures = Figures::default();
+    figures.statement("verdict", &result.verdict, &sentence(result));
+    let mut rms = |id: &str, rms: &RmsResult| {
+        figures.figure("residual", id, "rms over scalar readings", rms.rms_um, "um");
+        if let Some(length) = rms.rms_3d_um {
+            figures.figure("residual", id, "rms length of the vector", length, "um");
+        }
+    };
+    rms("nominal", &result.nominal);
+    rms("locations", &result.locations);
+    rms("model", &result.model.rms);
+    if let Some(inside) = &result.model.in_range {
+        rms("model in range", &inside.rms);
+    }
+    for without in &result.without {
+        rms(&format!("without {}", without.effect), &without.rms);
+    }
+    figures.figure("prediction", "predicted rms", "", result.model.predicted_rms_um, "um");
+    figures.figure("prediction", "coverage", "share inside the 95 % intervals", result.model.coverage_95, "1");
+    let mut table = figures.table();
+    table.rows.extend(result.moved.iter().map(|moved| {
+        cells![
+            "moved",
+            &moved.id,
+            "change since the model",
+            Cell::exact(moved.value),
+            Cell::exact(moved.u),
+            &moved.unit
+        ]
+    }));
+    table
+}
