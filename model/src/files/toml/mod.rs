@@ -8,6 +8,7 @@ mod machine;
 mod movement;
 pub mod parts;
 mod prior;
+mod quoted;
 pub mod rewrite;
 mod shape;
 mod sockets;

@@ -7,7 +7,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use super::document::Source;
-use super::write::{quoted, with_effects};
+use super::quoted::quoted;
+use super::write::with_effects;
 use super::{Context, Declared, ReadOptions, effect, machine};
 use crate::axis::AxisKind;
 use crate::chain::Machine;

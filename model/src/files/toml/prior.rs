@@ -1,7 +1,7 @@
 //! Reader and writer of the prior of an effect's coefficients: `scale_um`, `scale_arcsec`, `family`.
 
 use super::document::{Table, Value};
-use super::write::quoted;
+use super::quoted::quoted;
 use crate::effect::keys::KeyWriter;
 use crate::effect::{CoefficientPrior, Component, Shape};
 use crate::error::ModelError;

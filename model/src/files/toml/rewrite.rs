@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::document::{Source, Value};
-use super::write::quoted;
+use super::quoted::quoted;
 use crate::error::ModelError;
 
 /// The text with its machine read from another file; a text with the machine's own tables is unchanged.

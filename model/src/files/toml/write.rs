@@ -1,10 +1,10 @@
 //! Writer of additional effects and data files into the text of a session.
 
-use std::fmt::Write as _;
 use std::path::Path;
 
 use super::document::Source;
 use super::prior;
+use super::quoted::quoted;
 use crate::chain::Machine;
 use crate::effect::Effect;
 use crate::effect::keys::KeyWriter;
@@ -54,23 +54,6 @@ fn effect_table(effect: &Effect, machine: &Machine) -> String {
         keys.line("tests", format!("[{}]", names.join(", ")));
     }
     keys.finish()
-}
-
-/// A TOML string: JSON escapes are valid in TOML.
-pub(super) fn quoted(text: &str) -> String {
-    let mut quoted = String::from("\"");
-    for c in text.chars() {
-        match c {
-            '"' => quoted.push_str("\\\""),
-            '\\' => quoted.push_str("\\\\"),
-            c if c.is_control() => {
-                let _ = write!(quoted, "\\u{:04X}", c as u32);
-            }
-            c => quoted.push(c),
-        }
-    }
-    quoted.push('"');
-    quoted
 }
 
 /// A plan's text with a data file for each named test, otherwise unchanged. An existing data file of a test is
