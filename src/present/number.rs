@@ -37,6 +37,11 @@ pub fn three_digits(value: f64) -> String {
     format!("{value:.places$}")
 }
 
+/// A p-value as a statement: `p ≤ 0.005`, `p < 0.001`.
+pub fn p_value(p: f64) -> String {
+    if p < 5e-4 { "p < 0.001".to_string() } else { format!("p ≤ {p:.3}") }
+}
+
 /// A residual or a noise figure in µm.
 pub fn micrometres(value_um: f64) -> String {
     let places = if value_um >= 100.0 { 1 } else { 3 };

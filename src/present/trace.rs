@@ -6,7 +6,7 @@ use abbe::model::words::counted;
 use super::cross_validation;
 use super::effect::name;
 use super::fit::{Figures, noise as noise_in_words, rank};
-use super::number::{micrometres, quantity, value_and_u};
+use super::number::{micrometres, p_value, quantity, value_and_u};
 use super::table::{Cell, Table, cells};
 
 /// The noise and its source in words. A residual is not called noise.
@@ -56,9 +56,9 @@ pub fn rejected(result: &TraceResult) -> Vec<String> {
     let rejected = result.rejected_candidates.iter().map(|candidate| {
         let (decrease, u) = value_and_u(candidate.heldout_decrease_um, candidate.u_heldout_decrease_um);
         format!(
-            "{} (p ≤ {:.3}): the held-out rms decreases by {decrease} µm, with a standard error of {u} µm",
+            "{} ({}): the held-out rms decreases by {decrease} µm, with a standard error of {u} µm",
             name(&candidate.name),
-            candidate.p_value
+            p_value(candidate.p_value)
         )
     });
     rejected.collect()
@@ -67,7 +67,7 @@ pub fn rejected(result: &TraceResult) -> Vec<String> {
 /// The structure that remains, and its significance; `None` without one.
 pub fn remainder(result: &TraceResult) -> Option<String> {
     let place = result.remainder.place.as_deref().unwrap_or("");
-    result.remainder.structured.then(|| format!("(p ≤ {:.3}): {place}", result.remainder.p_value))
+    result.remainder.structured.then(|| format!("({}): {place}", p_value(result.remainder.p_value)))
 }
 
 /// Parameters that changed by more than their uncertainty when the effects were added, each with its identifier.

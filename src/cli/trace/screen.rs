@@ -8,7 +8,7 @@ use abbe::model::words::counted;
 use crate::cli::screen::{self, Step, command};
 use crate::cli::{SessionArguments, output};
 use crate::present::effect::name;
-use crate::present::number::{micrometres, quantity, shape_number, value_and_u};
+use crate::present::number::{micrometres, p_value, quantity, shape_number, value_and_u};
 use crate::present::parameters::Estimates;
 use crate::present::{trace as present, uniqueness};
 
@@ -68,7 +68,7 @@ fn print_effect(number: usize, effect: &EffectResult, screened: usize, all: bool
     if let Some(prior) = &effect.prior {
         say!("   {}", present::prior(prior));
     }
-    say!("   explains {} rms; p ≤ {:.3}", micrometres(effect.rms_gain_um), effect.p_value);
+    say!("   explains {} rms; {}", micrometres(effect.rms_gain_um), p_value(effect.p_value));
     say!("   {}", uniqueness::standing(effect, screened));
     let aliases = effect.aliases.iter();
     let line = |(place, alias): (usize, &EffectName)| {

@@ -13,7 +13,7 @@ use crate::present::figure::lines::{Axis, Lines, Mark, Name, Series};
 use crate::present::figure::scale::{Scale, span};
 use crate::present::figure::{Chart, Figure, Quantity};
 use crate::present::html::{capitalised, integer, list, with_minus_signs};
-use crate::present::number::{micrometres, shape_number, unit, value_and_u};
+use crate::present::number::{micrometres, p_value, shape_number, unit, value_and_u};
 use crate::present::{trace as present, uniqueness};
 
 /// Maximum number of effects that are shown unfolded.
@@ -86,7 +86,7 @@ fn block(
                     dt { "Effect" } dd { (name(&effect.name)) }
                     dt { "Estimate" } dd { (estimate(effect)) }
                     @if let Some(prior) = &effect.prior { dt { "Prior" } dd { (present::prior(prior)) } }
-                    dt { "Explains" } dd { (micrometres(effect.rms_gain_um)) " rms (p ≤ " (format!("{:.3}", effect.p_value)) ")" }
+                    dt { "Explains" } dd { (micrometres(effect.rms_gain_um)) " rms (" (p_value(effect.p_value)) ")" }
                     dt { "Held-out rms" } dd { (micrometres(effect.heldout_rms_um)) " with this effect" }
                     dt { "Family" } dd { (effect.family) }
                 }
