@@ -23,8 +23,8 @@ with i, j, k (direction of the tool's Z: machines with five axes) or qw, qx, qy,
 
 The output has the same rows. Its axis positions are corrected, so that the machine with its errors puts the tool where the machine \
 without errors would be at the commanded positions. Machines with five axes correct position and direction of the tool, robots the whole \
-pose, other machines the position. The last column of a row states what became of it: corrected, near-singular, beyond-travel, \
-not-correctable, not-reachable, not-a-number. A row that is not corrected keeps its command.
+pose, other machines the position. The last column of a row states what became of it: corrected, position-only (near a \
+singularity), near-singular, beyond-travel, not-correctable, not-reachable, not-a-number. A row that is not corrected keeps its command.
 
 Examples:
   abbe trace run1/session.toml --save model.json

@@ -4,6 +4,7 @@ mod another_build;
 mod bad_input;
 mod circular;
 mod claims;
+mod closed_loop;
 mod codes;
 mod compensation;
 mod data;

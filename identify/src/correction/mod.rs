@@ -52,7 +52,10 @@ const LARGEST_CORRECTION_MM: f64 = 50.0;
 pub enum State {
     /// Corrected.
     Corrected,
-    /// Corrected; the position is near a singularity, where small changes of the pose need large motions.
+    /// The position is corrected by the linear axes, the orientation is not: near a singularity, where small rotations
+    /// of the tool need large motions of the rotary axes.
+    PositionOnly,
+    /// Corrected near a singularity by a machine without linear axes that could correct the position alone.
     NearSingular,
     /// No command removes the error here: a singularity, or errors too large. The command is unchanged.
     NotCorrectable,
@@ -69,6 +72,7 @@ impl State {
     pub fn word(self) -> &'static str {
         match self {
             State::Corrected => "corrected",
+            State::PositionOnly => "position-only",
             State::NearSingular => "near-singular",
             State::NotCorrectable => "not-correctable",
             State::BeyondTravel => "beyond-travel",
@@ -166,15 +170,26 @@ impl Correction<'_> {
             )));
         }
         let errors = self.errors.along(commanded)?;
+        let linear = Aim::Position.axes(machine);
         let mut rows: Vec<Row> = Vec::with_capacity(commanded.rows());
         let mut state: Vec<AxisPosition<f64>> = Vec::new();
         for row in 0..commanded.rows() {
             commanded.state(machine, row, &mut state);
             let number = commanded.positions.iter().all(|column| column[row].is_finite());
-            let inverse = Inverse::at(machine, &state, self.tool_mm, self.aim, &axes);
+            let mut inverse = Inverse::at(machine, &state, self.tool_mm, self.aim, &axes);
+            let mut aim = self.aim;
+            if inverse.condition > NEAR_SINGULAR && aim != Aim::Position {
+                let mut position = Inverse::at(machine, &state, self.tool_mm, Aim::Position, &linear);
+                if position.condition <= NEAR_SINGULAR {
+                    position.condition = inverse.condition;
+                    (inverse, aim) = (position, Aim::Position);
+                }
+            }
+            let singular = aim == self.aim && inverse.is_singular();
             rows.push(Row {
                 wanted: Pose::nominal(machine, &state, self.tool_mm),
-                state: if !number || inverse.is_singular() { Progress::Failed } else { Progress::Open },
+                aim,
+                state: if !number || singular { Progress::Failed } else { Progress::Open },
                 remaining: [f64::INFINITY; 2],
                 number,
                 inverse,
@@ -192,8 +207,9 @@ impl Correction<'_> {
                 }
                 positions.state(machine, number, &mut state);
                 let actual = Pose::of(machine, &state, &block.bodies(machine, number), self.tool_mm);
-                let deviation = self.aim.deviation(&actual, &row.wanted);
-                row.advance(deviation, &axes, machine, number, commanded, &mut positions);
+                let deviation = row.aim.deviation(&actual, &row.wanted);
+                let axes = if row.aim == self.aim { &axes } else { &linear };
+                row.advance(deviation, axes, machine, number, commanded, &mut positions);
                 open |= row.state == Progress::Open;
             }
             evaluated = Some(values);
@@ -223,7 +239,8 @@ impl Correction<'_> {
                 column[number] = command[number];
             }
         }
-        let values = rows.iter().any(failed).then(|| errors(&positions)).transpose()?;
+        let partly = |row: &Row| failed(row) || row.aim != self.aim;
+        let values = rows.iter().any(partly).then(|| errors(&positions)).transpose()?;
         let block = values.as_ref().map(|values| Rows::of(values, machine.error_slots()));
         let mut state = Vec::new();
         Ok(rows
@@ -237,7 +254,9 @@ impl Correction<'_> {
                 });
                 let corrected = !failed(&row);
                 let [mut remaining_mm, mut remaining_rad] = row.remaining;
-                if let (false, true, Some(block)) = (corrected, row.number, &block) {
+                // The orientation that a row leaves as it is counts too.
+                let whole = corrected && row.aim == self.aim;
+                if let (false, true, Some(block)) = (whole, row.number, &block) {
                     positions.state(machine, number, &mut state);
                     let actual = Pose::of(machine, &state, &block.bodies(machine, number), self.tool_mm);
                     [remaining_mm, remaining_rad] = size(&self.aim.deviation(&actual, &row.wanted));
@@ -247,6 +266,7 @@ impl Correction<'_> {
                     () if !row.number => State::NotANumber,
                     () if !corrected => State::NotCorrectable,
                     () if beyond => State::BeyondTravel,
+                    () if row.aim != self.aim => State::PositionOnly,
                     () if condition > NEAR_SINGULAR => State::NearSingular,
                     () => State::Corrected,
                 };
@@ -271,6 +291,8 @@ enum Progress {
 /// One row in the iteration.
 struct Row {
     wanted: Pose,
+    /// What is corrected: that of the machine, or near a singularity the position alone.
+    aim: Aim,
     inverse: Inverse,
     remaining: [f64; 2],
     state: Progress,

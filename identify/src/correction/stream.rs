@@ -45,7 +45,7 @@ pub struct Summary {
     pub largest_error_arcsec: f64,
     /// Largest remaining error of the position among corrected rows, µm; `null` for errors.
     pub largest_remaining_um: Option<f64>,
-    /// Largest remaining error of the orientation among corrected rows, arcsec; `null` for errors.
+    /// Largest remaining error of the orientation among rows whose orientation is corrected, arcsec; `null` for errors.
     pub largest_remaining_arcsec: Option<f64>,
     /// The first rows that are not simply corrected.
     pub marked: Vec<MarkedRow>,
@@ -334,7 +334,9 @@ impl Summary {
                 self.largest_error_um = self.largest_error_um.max(*before_um);
                 self.largest_error_arcsec = self.largest_error_arcsec.max(*before_arcsec);
             }
-            if output == Output::Command && usable && *state != State::NotCorrectable {
+            if output == Output::Command && usable && *state == State::PositionOnly {
+                self.largest_remaining_um = Some(self.largest_remaining_um.unwrap_or(0.0).max(*um));
+            } else if output == Output::Command && usable && *state != State::NotCorrectable {
                 let most = |so_far: Option<f64>, value: f64| Some(so_far.unwrap_or(0.0).max(value));
                 self.largest_remaining_um = most(self.largest_remaining_um, *um);
                 self.largest_remaining_arcsec = most(self.largest_remaining_arcsec, *arcsec);
