@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use abbe::identify::compare::{CompareOptions, Named, SIGNIFICANCE, compare};
+use abbe::identify::compare::{CompareOptions, Named, SIGNIFICANCE, compare, one_machine};
 use abbe::identify::fit;
 use abbe::identify::model_file::{self, IdentifiedModel, Provenance};
+use abbe::model::chain::Machine;
 use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
 use clap::Args;
@@ -24,10 +25,11 @@ most the level of --significance. Bars of the same name with the same prior are 
 other set-up quantities that were not mounted again.
 
 Examples:
-  abbe compare before/session.toml after/session.toml
-  abbe compare model-2025.json model-2026.json --json differences.json
-  abbe compare before/session.toml after/session.toml --shared bar --shared workpiece_ball
-  abbe compare before.json after.json --significance 0.01 --places 7 --csv differences.csv";
+  abbe compare run1/session.toml run2/session.toml
+  abbe compare run1/session.toml run2/session.toml --shared bar --shared workpiece_ball
+  abbe fit run1/session.toml --save model.json
+  abbe compare model.json run2/session.toml --json differences.json
+  abbe compare model.json run2/session.toml --significance 0.01 --places 7 --csv differences.csv";
 
 /// `abbe compare A B …`
 #[derive(Args)]
@@ -77,6 +79,15 @@ enum Input {
     Session(Box<Session>),
 }
 
+impl Input {
+    fn machine(&self) -> &Machine {
+        match self {
+            Input::Model(model) => &model.machine,
+            Input::Session(session) => &session.machine,
+        }
+    }
+}
+
 /// Runs `abbe compare`.
 pub fn run(arguments: &CompareArguments) -> Result<(), Failure> {
     if !(arguments.significance > 0.0 && arguments.significance < 1.0) {
@@ -92,13 +103,12 @@ pub fn run(arguments: &CompareArguments) -> Result<(), Failure> {
     let mut origin = Origin::default();
     let inputs: Vec<Input> =
         arguments.inputs.iter().map(|file| read(file, arguments, &outputs, &mut origin)).collect::<Result<_, _>>()?;
+    let names: Vec<String> = arguments.inputs.iter().map(|file| file.display().to_string()).collect();
+    for (name, input) in names.iter().zip(&inputs).skip(1) {
+        one_machine((&names[0], inputs[0].machine()), (name, input.machine()))?;
+    }
     let models = models(inputs, arguments.common.seed)?;
-    let named: Vec<Named<'_>> = arguments
-        .inputs
-        .iter()
-        .zip(&models)
-        .map(|(file, model)| Named { name: file.display().to_string(), model })
-        .collect();
+    let named: Vec<Named<'_>> = names.into_iter().zip(&models).map(|(name, model)| Named { name, model }).collect();
     let options = CompareOptions {
         significance: arguments.significance,
         shared: (!arguments.shared.is_empty()).then(|| arguments.shared.clone()),

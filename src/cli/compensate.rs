@@ -27,7 +27,7 @@ pose, other machines the position. The last column of a row states what became o
 singularity), near-singular, beyond-travel, not-correctable, not-reachable, not-a-number. A row that is not corrected keeps its command.
 
 Examples:
-  abbe trace run1/session.toml --save model.json
+  abbe fit run1/session.toml --save model.json
   abbe compensate model.json program.csv --out corrected.csv
   abbe compensate model.json program.csv --out errors.csv --inverse
   abbe compensate model.json poses.csv --out corrected.csv --tool-mm 0,0,-120";

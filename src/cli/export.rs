@@ -20,16 +20,16 @@ use super::output::{self, Outputs};
 use crate::present::export as present;
 
 /// Examples of `abbe export`.
-pub const HELP: &str = "urdf writes the calibrated chain (ROS, lengths in m); dh writes Denavit-Hartenberg parameters in the modified form of Craig, with \
-Hayati's angle for parallel axes. linuxcnc and fanuc write the change of each kinematic parameter of the control: what is added to the \
+pub const HELP: &str = "urdf writes the calibrated chain (ROS, lengths in m); dh writes Denavit-Hartenberg parameters of a robot in the modified form of Craig, \
+with Hayati's angle for parallel axes. linuxcnc and fanuc write the change of each kinematic parameter of the control: what is added to the \
 present entry, with its standard uncertainty. beckhoff writes location errors in the ISG CSV format. The source of each control's model \
 stands in the table. For siemens and heidenhain the public manuals leave the signs open: nothing is written.
 
 A fixed geometry holds location errors only. Effects are listed as left out.
 
 Examples:
-  abbe export model.json --as urdf --out robot.urdf
-  abbe export model.json --as dh --out dh.csv --tool-mm 0,0,120
+  abbe fit run1/session.toml --save model.json
+  abbe export model.json --as urdf --out machine.urdf --tool-mm 0,0,-120
   abbe export model.json --as linuxcnc --out kinematics.csv --json kinematics.json";
 
 /// What is written.

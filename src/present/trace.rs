@@ -51,6 +51,9 @@ pub fn before_and_after(result: &TraceResult) -> Table {
     table
 }
 
+/// Probability below which an order of a spectrum stands out of the others.
+const OUTSTANDING: f64 = 0.05;
+
 /// Candidates that do not lower the held-out error significantly, one sentence each.
 pub fn rejected(result: &TraceResult) -> Vec<String> {
     let rejected = result.rejected_candidates.iter().map(|candidate| {
@@ -86,8 +89,14 @@ pub fn prior(prior: &PriorResult) -> String {
         Some(family) => format!("estimated for the family {family}"),
         None => "stated".to_string(),
     };
+    let line = prior.largest_order.as_ref().map_or_else(String::new, |line| {
+        let amplitude = quantity(&format!("{:.3}", line.amplitude), &prior.unit);
+        let verdict = if line.p_value < OUTSTANDING { "stands out" } else { "does not stand out" };
+        let order = line.order;
+        format!("; order {order} has the largest amplitude, {amplitude}, and {verdict} ({})", p_value(line.p_value))
+    });
     format!(
-        "prior standard deviation {} ({source}); the readings determine {:.1} of {}",
+        "prior standard deviation {} ({source}); the readings determine {:.1} of {}{line}",
         quantity(&format!("{:.3}", prior.scale), &prior.unit),
         prior.effective_parameters,
         counted(prior.coefficients, "coefficient")

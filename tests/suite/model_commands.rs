@@ -207,7 +207,11 @@ fn mujoco_reads_the_exported_urdf() {
     let script = r#"
 import json, sys
 import numpy as np, mujoco
-m = mujoco.MjModel.from_xml_path(sys.argv[1]); d = mujoco.MjData(m)
+xml = open(sys.argv[1]).read()
+# MuJoCo joins links without joints to their parents unless it is told not to.
+at = xml.index(">", xml.index("<robot")) + 1
+xml = xml[:at] + '<mujoco><compiler fusestatic="false"/></mujoco>' + xml[at:]
+m = mujoco.MjModel.from_xml_string(xml); d = mujoco.MjData(m)
 model = json.load(open(sys.argv[2]))
 e = {p["id"]: p["internal"] for p in model["parameters"]}
 def rx(a): c,s=np.cos(a),np.sin(a); return np.array([[1,0,0],[0,c,-s],[0,s,c]])

@@ -23,6 +23,7 @@ pub mod workspace;
 
 use std::collections::BTreeMap;
 
+use abbe_model::chain::Machine;
 use faer::Mat;
 
 use crate::error::IdentifyError;
@@ -64,6 +65,18 @@ pub struct Named<'m> {
     pub model: &'m IdentifiedModel,
 }
 
+/// Checks that two inputs, each with its name, are of one machine.
+///
+/// # Errors
+/// If chain, axes, rotation convention or gravity differ, with what differs.
+pub fn one_machine(a: (&str, &Machine), b: (&str, &Machine)) -> Result<(), IdentifyError> {
+    let apart = differences(a.1, b.1, [a.0, b.0]);
+    if apart.is_empty() {
+        return Ok(());
+    }
+    Err(IdentifyError::Request(format!("a comparison needs sessions and models of one machine: {}", apart.join("; "))))
+}
+
 /// Compares each model with the first one.
 ///
 /// # Errors
@@ -81,11 +94,7 @@ pub fn compare(models: &[Named<'_>], options: &CompareOptions) -> Result<Compari
         ..Comparison::default()
     };
     for other in others {
-        let apart = differences(&first.model.machine, &other.model.machine, [&first.name, &other.name]);
-        if !apart.is_empty() {
-            let message = format!("a comparison needs models of one machine: {}", apart.join("; "));
-            return Err(IdentifyError::Request(message));
-        }
+        one_machine((&first.name, &first.model.machine), (&other.name, &other.model.machine))?;
         let pair = pair(first, other, options)?;
         comparison.differences.extend(pair.differences);
         comparison.pairs.push(pair.summary);

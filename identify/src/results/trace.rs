@@ -102,6 +102,21 @@ pub struct PriorResult {
     pub effective_parameters: f64,
     /// Number of its coefficients.
     pub coefficients: usize,
+    /// The order of a spectrum with the largest amplitude. Absent for other shapes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub largest_order: Option<LargestOrder>,
+}
+
+/// The order of a spectrum with the largest amplitude: a gear ratio, a number of poles.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct LargestOrder {
+    /// The order.
+    pub order: usize,
+    /// Its amplitude, in the unit of the prior's scale.
+    pub amplitude: f64,
+    /// Probability that the largest of all orders is as large if none stands out: squared amplitudes are then
+    /// exponentially distributed with the mean of the other orders.
+    pub p_value: f64,
 }
 
 /// A number in an effect's shape that is chosen on a grid. It has no uncertainty.

@@ -1,7 +1,7 @@
 //! Results of a found effect: name, numbers of the shape, parameters, curve.
 
 use abbe_model::chain::Machine;
-use abbe_model::effect::Effect;
+use abbe_model::effect::{Effect, Shape};
 use abbe_model::session::Prior;
 
 use super::curve::{curve_of, curve_units};
@@ -12,7 +12,7 @@ use crate::fit::Fit;
 use crate::fit::families::effective_parameters;
 use crate::parameters::{Parameter, Role};
 use crate::problem::Problem;
-use crate::results::{EffectName, EffectResult, ParameterResult, PriorResult, ShapeParameter};
+use crate::results::{EffectName, EffectResult, LargestOrder, ParameterResult, PriorResult, ShapeParameter};
 use abbe_model::effect::description::{explanations, meaning};
 
 /// The name of an effect in results.
@@ -122,6 +122,28 @@ fn prior_of(problem: &Problem, fit: &Fit, number: usize) -> Option<PriorResult> 
         family: effect.family(),
         effective_parameters: effective_parameters(problem, &fit.covariance, number)?,
         coefficients: effect.shape.coefficients(),
+        largest_order: largest_order(problem, fit, number),
+    })
+}
+
+/// The order of a spectrum with the largest amplitude; `None` for other shapes and for a single order.
+fn largest_order(problem: &Problem, fit: &Fit, number: usize) -> Option<LargestOrder> {
+    let Shape::Spectrum(spectrum) = problem.parameters.effects[number].shape else { return None };
+    let own = |parameter: &Parameter| matches!(parameter.role, Role::Coefficient { effect, .. } if effect == number);
+    let first = problem.parameters.list.iter().position(own)?;
+    let display = problem.parameters.list[first].unit.display_per_internal;
+    let squares: Vec<f64> =
+        (0..spectrum.orders).map(|k| fit.beta[first + 2 * k].powi(2) + fit.beta[first + 2 * k + 1].powi(2)).collect();
+    let (place, largest) = squares.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let mean = (squares.iter().sum::<f64>() - largest) / spectrum.orders.checked_sub(1)? as f64;
+    if mean <= 0.0 {
+        return None;
+    }
+    let below = 1.0 - (-largest / mean).exp();
+    Some(LargestOrder {
+        order: place + 1,
+        amplitude: largest.sqrt() * display,
+        p_value: 1.0 - below.powi(spectrum.orders as i32),
     })
 }
 
