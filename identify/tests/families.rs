@@ -39,7 +39,7 @@ errors = ["EA0J2", "EX0J3"]
 fn error_of(joint: usize, q: f64) -> f64 {
     const BUMPS: [(f64, f64); 6] = [(-1.2, 0.15), (-0.7, 0.09), (-0.35, 0.12), (0.1, 0.1), (0.6, 0.2), (1.05, 0.08)];
     let bump = |(k, (centre, width)): (usize, (f64, f64))| {
-        let sign = if (k * (joint + 2)) % 3 == 0 { -1.0 } else { 1.0 };
+        let sign = if (k * (joint + 2)).is_multiple_of(3) { -1.0 } else { 1.0 };
         sign * 150e-6 * (-((q - centre - 0.1 * joint as f64) / width).powi(2)).exp()
     };
     let gear = if joint == 1 { 60e-6 * (17.0 * q + 0.4).cos() } else { 0.0 };

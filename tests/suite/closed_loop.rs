@@ -68,7 +68,7 @@ fn displacement(session: &SimulatedSession, effects: &[Injected], like: &Instant
     for value in session.truth.unknowns.iter().filter(|value| !value.is_setup) {
         displacement.add(value.component, value.value * crate::plant::component::unit_size(value.component.unit()));
     }
-    let mut at = like.clone();
+    let mut at = *like;
     at.commanded.position = position;
     for effect in effects {
         effect.displace(&at, &mut displacement);

@@ -183,7 +183,7 @@ fn ur10_has_a_curve_of_each_joint_and_compliances() {
     let Some(session) = session_on_public_data(name, "ur10/session.toml", "landgraf_ur10") else {
         return;
     };
-    let options = TraceOptions { max_effects: Some(8), draws: 99, ..TraceOptions::default() };
+    let options = TraceOptions { draws: 99, ..TraceOptions::default() };
     let result = traced(&session, &options);
     let has = |component: &str, driver: &str, shape: &str| {
         let found = |name: &EffectName| name.component == component && name.driver == driver && name.shape == shape;

@@ -12,7 +12,7 @@
 //! rejective multiple test procedure, Scand. J. Statist. 6 (1979) 65), so that the probability of any false claim is at
 //! most the level.
 //!
-//! - [`shared`]: the covariance of two models with a common set-up; `gauge`: one gauge for both;
+//! - `shared`: the covariance of two models with a common set-up; `gauge`: one gauge for both;
 //! - [`workspace`]: the volumetric error of each model over the common range;
 //! - [`results`]: the reported comparison.
 

@@ -327,7 +327,8 @@ impl Row {
             let column = &mut positions.positions[*axis];
             column[number] -= change;
             let correction = (column[number] - commanded.positions[*axis][number]).abs();
-            if !(correction * jacobian::lever_mm(machine.axes[*axis].kind) <= LARGEST_CORRECTION_MM) {
+            let arc = correction * jacobian::lever_mm(machine.axes[*axis].kind);
+            if arc.is_nan() || arc > LARGEST_CORRECTION_MM {
                 self.state = Progress::Failed;
             }
         }

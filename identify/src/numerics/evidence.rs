@@ -251,7 +251,7 @@ mod tests {
                 1 => t,
                 2..12 => {
                     let (sin, cos) = ((j / 2) as f64 * t).sin_cos();
-                    if j % 2 == 0 { cos } else { sin }
+                    if j.is_multiple_of(2) { cos } else { sin }
                 }
                 // The unit of the second family keeps its scale below one physical size.
                 12 => ((i * 11 % 17) as f64 - 8.0) / 0.8,

@@ -111,7 +111,7 @@ pub fn validate(model: &IdentifiedModel, session: &Session) -> Result<Validation
     };
     let reference = if model.carried_effects().next().is_some() { &locations } else { &nominal };
     let compared = match &in_range {
-        None => (&rms, reference.clone()),
+        None => (&rms, *reference),
         Some((rms, _, within)) => {
             let values = if model.carried_effects().next().is_some() {
                 within.location_values()

@@ -185,7 +185,7 @@ impl CommandFile {
     /// A position in the unit of a column, mm and rad inside.
     pub fn in_unit_of(&self, column: usize, position: f64) -> f64 {
         match self.meanings.get(column) {
-            Some(Meaning::Axis(_, unit)) => unit.from_internal(position),
+            Some(Meaning::Axis(_, unit)) => unit.in_unit(position),
             _ => position,
         }
     }

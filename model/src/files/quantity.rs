@@ -68,7 +68,7 @@ impl Unit {
     }
 
     /// The number of the file from the internal unit.
-    pub fn from_internal(self, value: f64) -> f64 {
+    pub fn in_unit(self, value: f64) -> f64 {
         match self {
             Unit::Times(factor) => value / factor,
             Unit::Degrees => value.to_degrees(),
