@@ -11,7 +11,7 @@ use rand::RngExt;
 use rayon::prelude::*;
 
 use super::rates::Rate;
-use super::sessions::{NOISES, at_multiple, oracle, random, sessions, skipped, verbose};
+use super::sessions::{NOISES, at_multiple, first_number, oracle, random, sessions, skipped, verbose};
 use crate::plant::{Component, Driver, Injected, Kind, Noise, Oracle, Plan, Recipe, SimulatedSession};
 
 /// Readings of a session.
@@ -104,7 +104,8 @@ fn a_model_holds_on_a_second_session_and_changes_are_named() {
     if skipped("a_model_holds_on_a_second_session_and_changes_are_named") {
         return;
     }
-    let outcomes: Vec<_> = (0..sessions())
+    let first_number = first_number();
+    let outcomes: Vec<_> = (first_number..first_number + sessions())
         .into_par_iter()
         .map(|number| {
             let pair = pair(number);

@@ -90,6 +90,11 @@ pub struct TracedSession {
     pub seconds: f64,
 }
 
+/// The number of the first session: `ABBE_STUDY_FIRST`.
+pub fn first_number() -> usize {
+    number("ABBE_STUDY_FIRST").unwrap_or(0)
+}
+
 /// Runs a study: `make` gives kind, noise and effects for each number. `ABBE_STUDY_FIRST` is added to every number, so
 /// that a rule can be tuned on other sessions than those that validate it.
 pub fn run(
@@ -97,7 +102,7 @@ pub fn run(
     make: impl Fn(usize) -> (Kind, Noise, Vec<Injected>) + Sync,
 ) -> Vec<TracedSession> {
     let only = number("ABBE_STUDY_ONLY");
-    let first = number("ABBE_STUDY_FIRST").unwrap_or(0);
+    let first = first_number();
     numbers
         .into_par_iter()
         .map(|session| session + first)

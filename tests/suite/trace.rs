@@ -1,13 +1,16 @@
 //! Trace on sessions of an independent simulator and on real robots. The program reads the readings only; the true
 //! effects are in other files or in the literature.
 
+use abbe::identify::model_file::{IdentifiedModel, Provenance};
 use abbe::identify::results::{EffectName, TraceResult};
 use abbe::identify::trace::{TraceOptions, trace};
+use abbe::identify::validate::validate;
 use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
 
 use super::data::data;
 use super::robots::session_on_public_data;
+use super::validate_command::ur10_series_b;
 use super::{abbe, ready, text};
 
 fn traced(session: &Session, options: &TraceOptions) -> TraceResult {
@@ -184,7 +187,8 @@ fn ur10_has_a_curve_of_each_joint_and_compliances() {
         return;
     };
     let options = TraceOptions { draws: 99, ..TraceOptions::default() };
-    let result = traced(&session, &options);
+    let outcome = trace(&session, &options, &|_| true).unwrap();
+    let result = &outcome.result;
     let has = |component: &str, driver: &str, shape: &str| {
         let found = |name: &EffectName| name.component == component && name.driver == driver && name.shape == shape;
         result.effects.iter().any(|effect| found(&effect.name))
@@ -193,9 +197,17 @@ fn ur10_has_a_curve_of_each_joint_and_compliances() {
         assert!(has(component, joint, "spectrum"), "{component}");
     }
     assert!(has("EBJ2", "gravity", "polynomial") && has("EBJ3", "gravity", "polynomial"));
-    let [extrapolation, interpolation] = held_out(&result);
+    let [extrapolation, interpolation] = held_out(result);
     println!("UR10 with {} effects: {extrapolation:.4} mm, {interpolation:.4} mm", result.effects.len());
     assert!(extrapolation <= 0.18 && interpolation <= 0.10, "{extrapolation} {interpolation}");
+
+    // Series B was not used for fitting, choosing or tuning.
+    let model = IdentifiedModel::of_fit(&outcome.after, &outcome.after_fit, Provenance::default()).unwrap();
+    let second = validate(&model, &ur10_series_b(name)).unwrap().result.model;
+    let length_mm = second.rms.rms_3d_um.unwrap() * 1e-3;
+    let inside = second.in_range.as_ref().map_or(second.coverage_95, |inside| inside.coverage_95);
+    println!("UR10, Series B: {length_mm:.4} mm, {:.1} % inside the 95 % intervals in range", 100.0 * inside);
+    assert!(length_mm <= 0.30 && (0.90..=0.98).contains(&inside), "{length_mm} {inside}");
 }
 
 #[test]

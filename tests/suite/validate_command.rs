@@ -7,10 +7,24 @@ use abbe::identify::fit::prepare;
 use abbe::identify::model_file::{IdentifiedModel, Provenance};
 use abbe::identify::parameters::Role;
 use abbe::identify::validate::validate;
+use abbe::model::files::{self, ReadOptions};
+use abbe::model::session::Session;
 use serde_json::{Value, json};
 
 use super::robots::session_on_public_data;
 use super::{abbe, ready, text};
+
+/// Series B of the UR10: other poses on another day.
+pub(super) fn ur10_series_b(test: &str) -> Session {
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(ready("ur10/session.toml")).unwrap();
+    let series_b = text.replace("Series_A/measurements_grid.csv", "Series_B/measurements_joint_configurations.csv");
+    let file = folder.path().join("session.toml");
+    std::fs::write(&file, series_b).unwrap();
+    std::fs::copy(ready("ur10/machine.toml"), folder.path().join("machine.toml")).unwrap();
+    let data = super::data::data(test, "landgraf_ur10").unwrap().parent().unwrap().to_path_buf();
+    files::session(&file, &ReadOptions { data_directory: Some(data), ..ReadOptions::default() }).unwrap()
+}
 
 /// A folder with two simulated sessions of one machine, each with its own set-up, and the model of the first.
 fn simulated() -> (tempfile::TempDir, PathBuf, PathBuf) {
@@ -165,16 +179,7 @@ fn ur10_base_parameters_and_series_b() {
     assert!(errors.len() <= 30 && errors.iter().all(|parameter| parameter.u > 0.0), "{}", errors.len());
 
     let model = IdentifiedModel::of_fit(&problem, &fit, Provenance::default()).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    let text = std::fs::read_to_string(ready("ur10/session.toml")).unwrap();
-    let series_b = text.replace("Series_A/measurements_grid.csv", "Series_B/measurements_joint_configurations.csv");
-    let file = folder.path().join("session.toml");
-    std::fs::write(&file, series_b).unwrap();
-    std::fs::copy(ready("ur10/machine.toml"), folder.path().join("machine.toml")).unwrap();
-    let data = super::data::data(name, "landgraf_ur10").unwrap().parent().unwrap().to_path_buf();
-    let options =
-        abbe::model::files::ReadOptions { data_directory: Some(data), ..abbe::model::files::ReadOptions::default() };
-    let second = abbe::model::files::session(&file, &options).unwrap();
+    let second = ur10_series_b(name);
     let result = validate(&model, &second).unwrap().result;
     let length_mm = result.model.rms.rms_3d_um.unwrap() * 1e-3;
     println!("UR10, location errors of Series A on Series B: {length_mm:.4} mm, {}", result.verdict);
