@@ -131,7 +131,8 @@ impl NormalEquations {
     }
 
     /// The precisions of the families at the maximum of the marginal likelihood for a noise variance, and the posterior
-    /// there. A family that explains nothing reaches the limit of small scales.
+    /// there. A family that explains nothing reaches the limit of small scales. A start must leave the readings some
+    /// influence: from precisions far above theirs the evidence has no slope.
     ///
     /// # Errors
     /// If the normal equations are not positive definite.
@@ -225,10 +226,11 @@ mod tests {
                 families: vec![(0..groups).collect()],
             };
             let expected = means.iter().map(|mean| mean * mean).sum::<f64>() / groups as f64 - variance / of_group;
-            for start in [1.0, 100.0, 1e8] {
+            for start in [1.0, 100.0, 1e4] {
                 let (precisions, posterior) = equations.maximise(variance, &[start]).unwrap();
                 if expected > 0.0 {
-                    assert!((1.0 / precisions[0] / expected - 1.0).abs() < 1e-3, "{start}: {precisions:?} {expected}");
+                    // The iteration ends within MIN_GAIN of the maximum: ½·(m/2)·(δ ln α)² = 10⁻⁵.
+                    assert!((1.0 / precisions[0] / expected - 1.0).abs() < 3e-3, "{start}: {precisions:?} {expected}");
                     let shrunk = of_group / (of_group + variance / expected);
                     assert!((posterior.effective[0] / (groups as f64 * shrunk) - 1.0).abs() < 1e-3);
                     assert!((posterior.mean[1] / (means[1] * shrunk) - 1.0).abs() < 1e-3);
