@@ -80,7 +80,8 @@ fn uniform(random: &mut impl Rng, low: f64, high: f64) -> f64 {
     low + (high - low) * random.random::<f64>()
 }
 
-/// `w C A b Y X Z t` with 33 location errors and squarenesses of up to 100 µm and 100″, and four effects.
+/// `w C A b Y X Z t` with 33 errors: 21 location errors and squarenesses of up to 100 µm and 100″, and 12 error motions
+/// as functions of the axes.
 #[test]
 fn a_five_axis_machine_is_corrected_to_a_picometre() {
     let machine = Arc::new(Machine::from_code("w C A b Y X Z t").unwrap());
@@ -104,6 +105,23 @@ fn a_five_axis_machine_is_corrected_to_a_picometre() {
         effect("EXX", Driver::Axis("X".into()), scale(100.0), &[0.02, -0.01]),
         effect("EYY", Driver::Axis("Y".into()), Shape::Backlash, &[0.006]),
     ];
+    // Eight more, proportional to the position of their axis.
+    let proportional: Vec<(&str, &str, f64)> = vec![
+        ("EYX", "X", 0.007),
+        ("EZX", "X", -0.005),
+        ("ECX", "X", 4e-5),
+        ("EXY", "Y", 0.006),
+        ("EAY", "Y", -3e-5),
+        ("EZZ", "Z", 0.009),
+        ("EXZ", "Z", -0.004),
+        ("EBZ", "Z", 5e-5),
+    ];
+    let mut effects = effects;
+    effects.extend(proportional.iter().map(|(id, axis, coefficient)| {
+        let line = Shape::Polynomial(Polynomial { degree: 1, scale: 100.0 });
+        effect(id, Driver::Axis((*axis).to_string()), line, &[*coefficient])
+    }));
+    assert_eq!(count + effects.len(), 33);
     let station = Station::BallBar(BallBar { workpiece_ball: [0.0; 3], spindle_ball: tool_mm, bar: 1.0 });
     let reference = Reference::default();
     let errors =
@@ -140,6 +158,12 @@ fn a_five_axis_machine_is_corrected_to_a_picometre() {
             } else if axis == y {
                 // Lost motion: the axis lags behind its command by half of it.
                 varying[1] = -0.5 * 0.006 * direction(row);
+            }
+            for (id, of, coefficient) in &proportional {
+                if machine.axes[axis].name == *of {
+                    let place = "XYZABC".find(&id[1..2]).unwrap();
+                    varying[place] += coefficient * q[axis] / 100.0;
+                }
             }
             (location, varying)
         };
