@@ -2,6 +2,17 @@
 
 use crate::scalar::Nominal;
 
+/// A named length of a session.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Constant {
+    /// Its name, the symbol in equations: `R`, `Z_CA`.
+    pub name: String,
+    /// Its value, mm.
+    pub mm: f64,
+    /// Its meaning in words, as tables of symbols print it.
+    pub means: Option<String>,
+}
+
 /// A length in mm as written: `0`, `"R"`, `"H - Z_CA"`, `"sqrt(L^2 - R^2)"`.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Length {

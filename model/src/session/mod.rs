@@ -24,6 +24,7 @@ use crate::component::ErrorName;
 use crate::driver::Reference;
 use crate::effect::Effect;
 use crate::instrument::{Entry, InstrumentKind, SharedBy, Station};
+use expression::Constant;
 use readings::Readings;
 
 /// A validated session. Lengths in mm, angles in rad.
@@ -31,8 +32,8 @@ use readings::Readings;
 pub struct Session {
     /// The machine.
     pub machine: Arc<Machine>,
-    /// Named lengths in the order of the file, mm.
-    pub constants: Vec<(String, f64)>,
+    /// Named lengths in the order of the file.
+    pub constants: Vec<Constant>,
     /// The instrument.
     pub instrument: InstrumentKind,
     /// Standard deviation of one scalar reading, mm; `None` if it is to be estimated.

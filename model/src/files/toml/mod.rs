@@ -1,5 +1,6 @@
 //! Reader of machine and session files.
 
+mod constants;
 mod data_folder;
 pub(crate) mod document;
 mod effect;
@@ -29,7 +30,7 @@ use super::table::request::{ColumnMapping, Format};
 use crate::chain::Machine;
 use crate::error::{Location, ModelError};
 use crate::instrument::InstrumentKind;
-use crate::session::expression::Length;
+use crate::session::expression::{Constant, Length};
 use crate::session::limits;
 use crate::session::{Session, Test, setups};
 use document::{Source, Table, Value};
@@ -58,7 +59,7 @@ struct Context<'a> {
     file: &'a Path,
     machine: &'a Machine,
     instrument: InstrumentKind,
-    constants: &'a [(String, f64)],
+    constants: &'a [Constant],
     format: Format,
     columns: Option<Vec<ColumnMapping>>,
     options: &'a ReadOptions,
@@ -74,14 +75,14 @@ impl Context<'_> {
             }
             return Ok((Length::Number(number), number));
         };
-        let names: Vec<&str> = self.constants.iter().map(|(name, _)| name.as_str()).collect();
+        let names: Vec<&str> = self.constants.iter().map(|constant| constant.name.as_str()).collect();
         let length = Length::parse(text, &names).map_err(|fault| {
             let help = "a length is a number or an expression in [constants] with + - * / ^2 sqrt( )";
             value.error(format!("`{}` = \"{text}\": {fault}", value.key), Some(help.into()))
         })?;
         let number = length.evaluate(&|name: &str| {
-            let found = self.constants.iter().find(|(known, _)| known == name);
-            found.map_or(f64::NAN, |(_, value)| *value)
+            let found = self.constants.iter().find(|known| known.name == name);
+            found.map_or(f64::NAN, |constant| constant.mm)
         });
         if let Some(fault) = limits::too_large(number) {
             let message = format!("`{}` = \"{text}\" evaluates to {fault}", value.key);
@@ -130,7 +131,7 @@ pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Sessi
     let source = Source::read(path, "the session file")?;
     let mut root = source.parse()?;
     let SessionMachine { machine, source: machine_source } = session_machine(path, options, &mut root)?;
-    let constants = constants(&mut root)?;
+    let constants = constants::constants(&mut root)?;
     let instrument = Instrument::read(&mut root)?;
     let about = about(&mut root)?;
     let unknowns = unknowns::unknowns(&machine, instrument.kind, &mut root)?;
@@ -228,27 +229,6 @@ fn session_machine(path: &Path, options: &ReadOptions, root: &mut Table<'_>) -> 
     table.finish()?;
     let source = machine::source(&found)?;
     Ok(SessionMachine { machine: machine::from_table(source.parse()?)?, source: Some(source) })
-}
-
-fn constants(root: &mut Table<'_>) -> Result<Vec<(String, f64)>, ModelError> {
-    let Some(value) = root.take("constants") else {
-        return Ok(Vec::new());
-    };
-    let mut constants = Vec::new();
-    for entry in value.table("[constants]".into())?.remaining_values()? {
-        let name = entry.key.clone();
-        let mut letters = name.chars();
-        let valid = letters.next().is_some_and(|c| c.is_alphabetic() || c == '_')
-            && letters.all(|c| c.is_alphanumeric() || c == '_')
-            && name != "sqrt";
-        if !valid {
-            let help = "a name is a letter followed by letters, digits and `_`; `sqrt` is reserved";
-            let message = format!("a constant cannot have the name `{name}`");
-            return Err(entry.source.error(entry.key_span.clone(), message, Some(help.into())));
-        }
-        constants.push((name, entry.number()?));
-    }
-    Ok(constants)
 }
 
 /// Reads `[about]`: notes that reports repeat.

@@ -86,6 +86,11 @@ impl<'a> Value<'a> {
         self.value.is_array()
     }
 
+    /// Whether it is a table.
+    pub fn is_table(&self) -> bool {
+        self.value.is_table()
+    }
+
     /// true or false.
     pub fn boolean(&self) -> Result<bool, ModelError> {
         self.value.as_bool().ok_or_else(|| self.unexpected("true or false"))
