@@ -12,6 +12,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let equation = Equation::of(&session.machine, &source, &errors, &options)?;
     // Only an equation that equals the kinematic chain can be printed.
     let checked = check(&equation, &source)?;
-    println!("{}", language("text")?.print(&checked)?);
+    println!("{}", language("text")?.print(&checked, &Style::default())?);
     Ok(())
 }

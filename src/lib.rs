@@ -22,7 +22,7 @@
 //! let source = SessionTest::new(&session, &session.tests[test])?;
 //! let options = EquationOptions { order: Order::First, ..EquationOptions::default() };
 //! let equation = Equation::of(&session.machine, &source, &[ErrorName::parse("EX0C").unwrap()], &options)?;
-//! let text = language("text")?.print(&check(&equation, &source)?)?;
+//! let text = language("text")?.print(&check(&equation, &source)?, &Style::default())?;
 //! assert!(text.contains("∂L/∂e_x0c = −R·s_c/L_0"));
 //!
 //! let found = patterns(&session, &[Given::parse("EX0C=10um")?])?;
@@ -42,6 +42,7 @@ pub use abbe_model as model;
 pub mod prelude {
     use std::path::Path;
 
+    pub use abbe_codegen::print::Style;
     pub use abbe_codegen::{Equation, Options as EquationOptions, Order, SessionTest, check, language};
     pub use abbe_identify::fit::SessionFit;
     pub use abbe_identify::plan::{PlanOptions, analyse};

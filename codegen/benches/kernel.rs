@@ -6,6 +6,7 @@
 use std::hint::black_box;
 use std::path::Path;
 
+use abbe_codegen::print::{Layout, Style};
 use abbe_codegen::{Equation, Options, ToolPoint, check, language};
 use abbe_model::component::ErrorName;
 use abbe_model::files::machine;
@@ -90,13 +91,14 @@ fn equations(criterion: &mut Criterion) {
         .map(|name| ErrorName::parse(name).expect("an error"))
         .collect();
     let options = Options { gradient: true, ..Options::default() };
+    let flat = Style { layout: Layout::Flat, ..Style::default() };
     let mut group = criterion.benchmark_group("equation");
     group.sample_size(10);
     group.bench_function("error vector with eight derivatives, as C", |bencher| {
         bencher.iter(|| {
             let equation = Equation::volumetric(black_box(&machine), &errors, &options).expect("an equation");
             let checked = check(&equation, &ToolPoint).expect("agreement");
-            black_box(language("c").expect("C").print(&checked).expect("code"))
+            black_box(language("c").expect("C").print(&checked, &flat).expect("code"))
         });
     });
     group.finish();

@@ -1,7 +1,7 @@
 //! Arranges polynomials for printing: grouped by error, then by sines and cosines of the axes, with lengths in
 //! parentheses.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use num_rational::BigRational;
 use num_traits::{One, Signed, ToPrimitive};
@@ -22,6 +22,40 @@ impl Collector<'_, '_> {
     /// Arranges a polynomial: the terms without errors first, then error by error, then products of errors.
     pub(crate) fn group(&self, polynomial: &Polynomial) -> Tree {
         sum(self.group_terms(polynomial))
+    }
+
+    /// Arranges the square of a length: `R² + (H − Z)²` in place of `R² + H² − 2·H·Z + Z²`.
+    pub(crate) fn squares(&self, polynomial: &Polynomial) -> Tree {
+        let (mut rest, mut squares) = (polynomial.clone(), Vec::new());
+        let atoms = polynomial.terms().flat_map(|(monomial, _)| monomial.powers());
+        let lengths: BTreeSet<Atom> = atoms.filter(|(_, power)| *power == 2).map(|(atom, _)| *atom).collect();
+        for length in lengths {
+            if let Some((base, without)) = self.completed(&rest, length) {
+                squares.push(base);
+                rest = without;
+            }
+        }
+        let square = |base: &Polynomial| {
+            let base = self.group(base);
+            (false, binary(Binary::Mul, base.clone(), base))
+        };
+        let mut terms = self.group_terms(&rest);
+        terms.extend(squares.iter().map(square));
+        sum(terms)
+    }
+
+    /// `x + b/2` and what remains beside its square, if `x² + b·x` has no sine in `b` and the remainder is shorter.
+    fn completed(&self, polynomial: &Polynomial, length: Atom) -> Option<(Polynomial, Polynomial)> {
+        let by_power = polynomial.collect(|atom| atom == length);
+        let power = |power| by_power.get(&Monomial(vec![(length, power)]));
+        let (square, linear) = (power(2)?, power(1)?);
+        if !square.is_about(1.0) || linear.contains(is_sin_cos) {
+            return None;
+        }
+        let half = BigRational::new(1.into(), 2.into());
+        let base = &Polynomial::atom(length) + &linear.scaled(&half);
+        let rest = polynomial - &self.ring.product(&base, &base);
+        (rest.len() + base.len() < polynomial.len()).then_some((base, rest))
     }
 
     fn group_terms(&self, polynomial: &Polynomial) -> Vec<Term> {
@@ -101,7 +135,16 @@ impl Collector<'_, '_> {
         (coefficient.is_negative(), product(factors))
     }
 
-    fn powers(&self, monomial: &Monomial) -> Vec<Tree> {
+    /// The sort key of a length: numbers first, then by name.
+    pub(crate) fn name(&self, monomial: &Monomial) -> String {
+        let name = |(atom, _): &(Atom, u32)| match atom {
+            Atom::Variable(id) | Atom::Sin(id) | Atom::Cos(id) => self.ring.variable(*id).name(),
+            Atom::Root(_) | Atom::Function(_) => "√".to_string(),
+        };
+        monomial.powers().iter().map(name).collect()
+    }
+
+    pub(crate) fn powers(&self, monomial: &Monomial) -> Vec<Tree> {
         let power = |(atom, power): &(Atom, u32)| {
             let atom = self.atom(*atom);
             let rest = std::iter::repeat_n(atom.clone(), *power as usize - 1);
@@ -135,7 +178,7 @@ impl Collector<'_, '_> {
                 let program = Program::of(arena, inputs, &function, &HashMap::new(), Naming::Labelled);
                 program.outputs.into_iter().next().unwrap_or(Tree::Number(f64::NAN))
             }
-            Atom::Root(root) => Tree::Unary(Unary::Sqrt, Box::new(self.group(self.ring.radicand(root)))),
+            Atom::Root(root) => Tree::Unary(Unary::Sqrt, Box::new(self.squares(self.ring.radicand(root)))),
         }
     }
 }

@@ -8,7 +8,8 @@ use abbe_model::instrument::Station;
 
 use crate::coefficient::Coefficient;
 use crate::error::CodegenError;
-use crate::form::{Form, Kind, Options, Order};
+use crate::factored;
+use crate::form::{Arrangement, Form, Kind, Options, Order};
 use crate::program::{Input, Label, Naming, Program};
 use crate::run::{self, Run};
 use crate::subject::{Source, Subject, ToolPoint};
@@ -38,6 +39,10 @@ pub struct Equation {
     pub outputs: Vec<Operand>,
     /// The requested form.
     pub form: Form,
+    /// The name of the test, if it has one.
+    pub name: Option<String>,
+    /// The named lengths whose meaning is known.
+    pub meanings: Vec<(String, String)>,
     /// The intermediate vectors.
     pub vectors: Vec<NamedVector>,
     /// The driven errors: errors and instrument parameters that are determined by effects alone, as functions of their
@@ -91,7 +96,15 @@ impl Equation {
         let whole = curves(&run, &parameters);
         let written = FormContext { arena: &arena, inputs: &inputs, parameters: &parameters, whole: &whole };
         let (outputs, form) = match options.order {
-            Order::Exact => (exact.clone(), Form::Exact),
+            Order::Exact if options.arrangement == Arrangement::Frames => (exact.clone(), Form::Exact),
+            Order::Exact => {
+                let bar = vectors.last().map_or([Operand::constant(0.0); 3], |bar| bar.components);
+                (exact.clone(), Form::Factored(factored::groups(&run, bar, options.arrangement, &written)?))
+            }
+            Order::First if options.arrangement == Arrangement::Groups => {
+                let why = "does not exist in first order; use the form frames or single".to_string();
+                return Err(CodegenError::NoSuchForm { form: "groups", why });
+            }
             Order::Bilinear => truncation::bilinear(&run, &exact, &mut vectors, &written)?,
             Order::First => truncation::first(&run, &exact, &mut vectors, &written)?,
         };
@@ -110,6 +123,8 @@ impl Equation {
             _ => ProbeTerms::of(&geometry, &on_the_way),
         });
         drop(run);
+        let lengths = arena.variables().into_iter().filter(|variable| matches!(variable, Variable::Length(_)));
+        let meanings = lengths.filter_map(|length| Some((length.name(), source.meaning(&length.name())?))).collect();
         Ok(Equation {
             machine,
             options: options.clone(),
@@ -119,6 +134,8 @@ impl Equation {
             exact,
             outputs,
             form,
+            name: source.name().map(str::to_string),
+            meanings,
             vectors,
             driven_errors,
             stated_length,

@@ -46,6 +46,14 @@ pub enum CodegenError {
         /// The languages that carry them.
         languages: String,
     },
+    /// A form that an equation does not have, or that is too long for a reader.
+    #[error("the form `{form}` {why}")]
+    NoSuchForm {
+        /// The form.
+        form: &'static str,
+        /// The obstacle, and what to request instead.
+        why: String,
+    },
     /// A curve, which has hundreds of terms, in mathematical notation.
     #[error("the curve `{effect}` is written as code only: as {languages}; to omit it, name the errors to keep")]
     CurveForReaders {

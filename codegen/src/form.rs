@@ -22,11 +22,36 @@ pub enum Order {
     First,
 }
 
+/// How an equation is divided for readers. Code does not depend on it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Arrangement {
+    /// The division that suits the order: named vectors frame by frame, coordinate groups, or a table of coefficients.
+    #[default]
+    Frames,
+    /// One equation for the reading.
+    Single,
+    /// The coordinate groups, and the reading as a function of them.
+    Groups,
+}
+
+impl Arrangement {
+    /// The word by which it is requested.
+    pub fn word(self) -> &'static str {
+        match self {
+            Arrangement::Frames => "frames",
+            Arrangement::Single => "single",
+            Arrangement::Groups => "groups",
+        }
+    }
+}
+
 /// The form of an equation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
     /// Truncation order in the errors.
     pub order: Order,
+    /// How the equation is divided for readers.
+    pub arrangement: Arrangement,
     /// Rotation convention of the error angles; `None` for that of the machine.
     pub rotation: Option<Rotation>,
     /// Naming convention of the errors.
@@ -57,6 +82,8 @@ pub enum Kind {
 pub enum Form {
     /// The named vectors, and the outputs in terms of them.
     Exact,
+    /// The coordinate groups of the bar vector as products of the matrices of the chain, without truncation.
+    Factored(Vec<Tree>),
     /// The coordinate groups, grouped by error: the bar vector for a length, otherwise the coordinates themselves.
     Groups {
         /// The normal forms.

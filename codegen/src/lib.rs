@@ -17,6 +17,7 @@
 //! ```
 //! use std::path::Path;
 //!
+//! use abbe_codegen::print::Style;
 //! use abbe_codegen::{Equation, Options, Order, SessionTest, check, language};
 //! use abbe_model::component::ErrorName;
 //! use abbe_model::files::{self, ReadOptions};
@@ -28,7 +29,7 @@
 //! let options = Options { order: Order::First, ..Options::default() };
 //! let source = SessionTest::new(&session, test)?;
 //! let equation = Equation::of(&session.machine, &source, &errors, &options)?;
-//! let text = language("text")?.print(&check(&equation, &source)?)?;
+//! let text = language("text")?.print(&check(&equation, &source)?, &Style::default())?;
 //! assert!(text.contains("∂L/∂e_x0c = −R·s_c/L_0"), "{text}");
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -40,6 +41,7 @@ mod effect;
 pub mod equation;
 mod error;
 pub mod evaluate;
+mod factored;
 pub mod first_order;
 pub mod form;
 pub mod normal_form;
@@ -61,7 +63,7 @@ pub use coefficient::Coefficient;
 pub use equation::Equation;
 pub use error::CodegenError;
 pub use evaluate::VariableValue;
-pub use form::{Form, Kind, Options, Order};
+pub use form::{Arrangement, Form, Kind, Options, Order};
 pub use normal_form::Ring;
 pub use polynomial::Polynomial;
 pub use print::{LANGUAGES, OutputLanguage, language};

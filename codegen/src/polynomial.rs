@@ -74,7 +74,7 @@ impl Monomial {
     }
 
     /// The product, without applying the rules.
-    fn times(&self, other: &Monomial) -> Monomial {
+    pub(crate) fn times(&self, other: &Monomial) -> Monomial {
         let mut product = Vec::with_capacity(self.0.len() + other.0.len());
         let (mut a, mut b) = (self.0.as_slice(), other.0.as_slice());
         while let (Some(&(x, n)), Some(&(y, m))) = (a.first(), b.first()) {

@@ -18,6 +18,15 @@ pub enum Input {
     Cosine(Variable),
 }
 
+impl Input {
+    /// The variable, or the angle of the sine or cosine.
+    pub fn variable(&self) -> &Variable {
+        match self {
+            Input::Plain(variable) | Input::Sine(variable) | Input::Cosine(variable) => variable,
+        }
+    }
+}
+
 /// The name of a step.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Label {

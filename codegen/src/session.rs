@@ -2,6 +2,7 @@
 
 use abbe_model::error::ModelError;
 use abbe_model::scalar::Nominal;
+use abbe_model::session::expression::Constant;
 use abbe_model::session::motion::Motion;
 use abbe_model::session::planned;
 use abbe_model::session::{Session, Test};
@@ -44,6 +45,10 @@ impl<'s> SessionTest<'s> {
         };
         Ok(SessionTest { session, test, ranges })
     }
+
+    fn constant(&self, name: &str) -> Option<&Constant> {
+        self.session.constants.iter().find(|constant| constant.name == name)
+    }
 }
 
 impl Source for SessionTest<'_> {
@@ -63,8 +68,15 @@ impl Source for SessionTest<'_> {
     }
 
     fn length_mm(&self, name: &str) -> Option<f64> {
-        let constant = self.session.constants.iter().find(|(known, _)| known == name);
-        constant.map(|(_, value)| *value)
+        self.constant(name).map(|constant| constant.mm)
+    }
+
+    fn meaning(&self, name: &str) -> Option<String> {
+        self.constant(name)?.means.clone()
+    }
+
+    fn name(&self) -> Option<&str> {
+        Some(&self.test.name)
     }
 
     fn range(&self, axis: &str) -> Option<[f64; 2]> {

@@ -24,6 +24,17 @@ pub trait Source {
         None
     }
 
+    /// The meaning of a named length in words, if the session states it.
+    fn meaning(&self, name: &str) -> Option<String> {
+        let _ = name;
+        None
+    }
+
+    /// The name of the test, for the label of its equation.
+    fn name(&self) -> Option<&str> {
+        None
+    }
+
     /// Least and greatest position of a moving axis, mm or rad, if the test states it.
     fn range(&self, axis: &str) -> Option<[f64; 2]> {
         let _ = axis;

@@ -41,10 +41,15 @@ impl Tree {
 
     /// Replaces every occurrence of an expression by another one.
     pub(crate) fn replaced(&self, what: &Tree, by: &Tree) -> Tree {
-        if self == what {
-            return by.clone();
+        self.mapped(&|tree| (tree == what).then(|| by.clone()))
+    }
+
+    /// Replaces every expression for which `by` gives another one, from the outside inwards.
+    pub(crate) fn mapped(&self, by: &dyn Fn(&Tree) -> Option<Tree>) -> Tree {
+        if let Some(other) = by(self) {
+            return other;
         }
-        let inner = |tree: &Tree| Box::new(tree.replaced(what, by));
+        let inner = |tree: &Tree| Box::new(tree.mapped(by));
         match self {
             Tree::Number(_) | Tree::Input(_) | Tree::Step(_) => self.clone(),
             Tree::Unary(function, a) => Tree::Unary(*function, inner(a)),

@@ -99,7 +99,10 @@ pub(crate) fn first<'a>(
     let collector = Collector { ring: &ring, inputs };
     let collect = |polynomials: &[Polynomial]| polynomials.iter().map(|p| collector.group(p)).collect();
     let laid_out = PrintedFirstOrder {
-        nominal: collect(&form.nominal),
+        nominal: match form.nominal.as_slice() {
+            [square] => vec![collector.squares(square)],
+            coordinates => collect(coordinates),
+        },
         alternative_length: form
             .alternative_length
             .as_ref()
@@ -157,7 +160,7 @@ fn read_over(run: &Run<'_, Symbol<'_>>, vectors: &[NamedVector]) -> Vec<NamedVec
 }
 
 /// The operands of the program's inputs.
-fn operands(arena: &Arena, inputs: &[Input]) -> Vec<Operand> {
+pub(crate) fn operands(arena: &Arena, inputs: &[Input]) -> Vec<Operand> {
     let operand = |input: &Input| {
         let symbol = match input {
             Input::Plain(variable) => arena.variable(variable.clone()),

@@ -1,9 +1,11 @@
 //! `abbe equation` and `abbe volumetric`: closed-form equations.
 
+mod style;
+
 use std::path::PathBuf;
 
 use abbe::codegen::print::{LANGUAGES, OutputLanguage, language};
-use abbe::codegen::{Equation, Options, Order, SessionTest, Source, Symbols, ToolPoint, Variable, check};
+use abbe::codegen::{Arrangement, Equation, Options, Order, SessionTest, Source, Symbols, ToolPoint, Variable, check};
 use abbe::model::chain::Machine;
 use abbe::model::component::ErrorName;
 use abbe::model::effect::{Component, Effect};
@@ -15,6 +17,7 @@ use abbe::model::session::Session;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 
+use self::style::StyleArguments;
 use super::failure::Failure;
 use super::message::{Kind, tell};
 use super::output::{self, Outputs};
@@ -62,6 +65,13 @@ enum SymbolsArgument {
     Iso,
 }
 
+#[derive(Clone, Copy, ValueEnum)]
+enum ArrangementArgument {
+    Frames,
+    Single,
+    Groups,
+}
+
 /// The form of an equation.
 #[derive(Args)]
 struct FormArguments {
@@ -75,6 +85,12 @@ struct FormArguments {
     /// Example: --order first
     #[arg(long, value_enum, default_value = "exact")]
     order: OrderArgument,
+    /// How the equation is divided, in text, LaTeX and Typst: frame by frame, one equation as the literature prints it, or
+    /// coordinate groups.
+    ///
+    /// Example: --form single
+    #[arg(long, value_enum, default_value = "frames")]
+    form: ArrangementArgument,
     /// Rotation by error angles [default: as the machine file states].
     ///
     /// Example: --rotation small-angle
@@ -96,6 +112,8 @@ struct FormArguments {
     /// Typst for the exact length of a bar.
     #[arg(long)]
     gradient: bool,
+    #[command(flatten)]
+    style: StyleArguments,
     /// Write the equation to a file instead of standard output.
     ///
     /// Example: --out equation.tex
@@ -215,6 +233,11 @@ impl FormArguments {
                 OrderArgument::Bilinear => Order::Bilinear,
                 OrderArgument::First => Order::First,
             },
+            arrangement: match self.form {
+                ArrangementArgument::Frames => Arrangement::Frames,
+                ArrangementArgument::Single => Arrangement::Single,
+                ArrangementArgument::Groups => Arrangement::Groups,
+            },
             rotation: self.rotation.map(|rotation| match rotation {
                 RotationArgument::Exact => Rotation::Exact,
                 RotationArgument::SmallAngle => Rotation::SmallAngle,
@@ -230,7 +253,7 @@ impl FormArguments {
     }
 
     fn write(&self, equation: &Equation, source: &impl Source) -> Result<(), Failure> {
-        let text = self.language.print(&check(equation, source)?)?;
+        let text = self.language.print(&check(equation, source)?, &self.style.style(self.language)?)?;
         match &self.out {
             Some(path) => output::write_whole(path, text.as_bytes()),
             None => {

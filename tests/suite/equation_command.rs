@@ -5,7 +5,7 @@ use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
 
-use abbe::codegen::print::{LANGUAGES, OutputLanguage};
+use abbe::codegen::print::{LANGUAGES, OutputLanguage, Style};
 use abbe::codegen::{Equation, Options, Order, SessionTest, Symbols, check};
 use abbe::model::component::ErrorName;
 use abbe::model::files::{self, ReadOptions};
@@ -51,7 +51,7 @@ fn of_library(language: &OutputLanguage, errors: &[&str], options: &Options) -> 
     let errors = if errors.is_empty() { &session.unknowns } else { &named };
     let equation = Equation::of(&session.machine, &source, errors, options).unwrap();
     let checked = check(&equation, &source).unwrap();
-    language.print(&checked).unwrap().trim_end().to_string() + "\n"
+    language.print(&checked, &Style::default()).unwrap().trim_end().to_string() + "\n"
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use crate::check::Checked;
 use crate::print::code::{Code, GROUPS, Syntax, functions, lines, name};
 use crate::print::language::Language;
+use crate::print::style::Style;
 use crate::symbol::Unary;
 
 /// C99.
@@ -24,7 +25,7 @@ const ADVICE: &str = " * Compile with -O3 -fno-math-errno, otherwise the square 
                       loop over readings.\n";
 
 impl Language for C {
-    fn print(&self, checked: &Checked<'_>) -> String {
+    fn print(&self, checked: &Checked<'_>, _: &Style) -> String {
         let functions = functions(checked, &SYNTAX);
         let whole = &functions[functions.len() - 1];
         let header = whole.header(0, ['[', ']']).into_iter();

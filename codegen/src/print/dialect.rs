@@ -1,5 +1,6 @@
 //! Expressions on one line in any language, with the necessary parentheses.
 
+use crate::print::notation::PRODUCT;
 use crate::symbol::{Binary, Unary};
 use crate::tree::Tree;
 
@@ -21,6 +22,14 @@ pub(crate) trait Dialect {
     }
     /// A function of an argument without parentheses.
     fn call(&self, function: Unary, argument: &str) -> String;
+    /// A root whose argument can break across lines.
+    fn long_root(&self, argument: &str) -> String {
+        self.call(Unary::Sqrt, argument)
+    }
+    /// A quotient on the line; both parts have the necessary parentheses.
+    fn inline_quotient(&self, a: &str, b: &str) -> String {
+        self.quotient(a, b)
+    }
     /// An expression in parentheses.
     fn group(&self, inside: &str) -> String {
         format!("({inside})")
@@ -58,15 +67,32 @@ pub(crate) fn write_term(tree: &Tree, dialect: &impl Dialect) -> String {
     if binding < Binding::Product { dialect.group(&text) } else { text }
 }
 
-/// Breaks a sum into lines of at most `width` visible characters if possible. Breaks lie before a plus or minus outside
-/// braces, in as few parentheses as the width allows. `visible` counts the characters of a piece. Every line except the
-/// first starts with its sign.
-pub(crate) fn lines(
+/// Breaks a sum into lines that are at most as wide as the first one, then the others, if possible. Breaks lie before a
+/// plus or minus outside braces, in as few parentheses as the width allows; as a last resort roots and fractions are
+/// written so that they break, and then products do. Every line except the first starts with its sign.
+pub(crate) fn lines<D: Dialect>(
     terms: &[(bool, Tree)],
-    dialect: &impl Dialect,
-    width: usize,
-    visible: impl Fn(&str) -> usize,
+    dialect: &D,
+    widths: [usize; 2],
+    measure: impl Fn(&str) -> usize,
 ) -> Vec<String> {
+    let fits = |lines: &[String]| {
+        let widths = std::iter::once(widths[0]).chain(std::iter::repeat(widths[1]));
+        lines.iter().zip(widths).all(|(line, width)| measure(line) <= width)
+    };
+    let lines = filled(&joined(terms, dialect), dialect, widths, 4, &measure);
+    if fits(&lines) {
+        return lines;
+    }
+    let fits_one = |text: &str| measure(text) <= widths[1] / 2;
+    let loose = Loose { dialect, fits: &fits_one };
+    let text = joined(terms, &loose);
+    let lines = filled(&text, &loose, widths, 6, &measure);
+    if fits(&lines) { lines } else { filled(&text, &loose, widths, 7, &measure) }
+}
+
+/// The terms on one line.
+fn joined(terms: &[(bool, Tree)], dialect: &impl Dialect) -> String {
     let mut whole = String::new();
     for (index, (minus, tree)) in terms.iter().enumerate() {
         let sign = match (index, minus) {
@@ -80,23 +106,87 @@ pub(crate) fn lines(
         whole.push_str(&sign);
         whole.push_str(&text);
     }
-    let mut pieces = split(&whole, dialect, 0);
-    for parentheses in 1..5 {
-        let fits = |piece: &String| visible(piece) <= width;
-        let finer = |piece: String| {
-            if fits(&piece) { vec![piece] } else { split(&piece, dialect, parentheses) }
+    whole
+}
+
+/// Fills lines with pieces that are as long as the width allows. The last of the depths of parentheses breaks products.
+/// What must be broken inside its parentheses starts on a line of its own.
+fn filled(
+    text: &str,
+    dialect: &impl Dialect,
+    widths: [usize; 2],
+    deepest: i32,
+    measure: &impl Fn(&str) -> usize,
+) -> Vec<String> {
+    let width = widths[0].min(widths[1]);
+    let mut pieces: Vec<(bool, String)> = split(text, dialect, 0).into_iter().map(|piece| (false, piece)).collect();
+    for parentheses in 1..=deepest {
+        let finer = |(alone, piece): (bool, String)| -> Vec<(bool, String)> {
+            if measure(&piece) <= width {
+                return vec![(alone, piece)];
+            }
+            let parts: Vec<String> = if parentheses == 7 {
+                piece.split_inclusive(PRODUCT).map(str::to_string).collect()
+            } else {
+                split(&piece, dialect, parentheses)
+            };
+            let several = parts.len() > 1;
+            parts.into_iter().enumerate().map(|(index, part)| ((alone || several) && index == 0, part)).collect()
         };
         pieces = pieces.into_iter().flat_map(finer).collect();
     }
     let mut lines: Vec<String> = Vec::new();
-    for piece in pieces {
+    for (alone, piece) in pieces {
+        let width = widths[usize::from(lines.len() > 1)];
         match lines.last_mut() {
-            Some(line) if visible(line) + visible(&piece) <= width => line.push_str(&piece),
+            Some(line) if !alone && measure(&format!("{line}{piece}")) <= width => line.push_str(&piece),
             Some(_) => lines.push(piece.trim_start().to_string()),
             None => lines.push(piece),
         }
     }
     lines
+}
+
+/// A notation whose roots and fractions break across lines, where they do not fit on one.
+struct Loose<'d, D> {
+    dialect: &'d D,
+    fits: &'d dyn Fn(&str) -> bool,
+}
+
+impl<D: Dialect> Dialect for Loose<'_, D> {
+    fn number(&self, value: f64) -> String {
+        self.dialect.number(value)
+    }
+    fn input(&self, index: usize) -> String {
+        self.dialect.input(index)
+    }
+    fn step(&self, index: usize) -> String {
+        self.dialect.step(index)
+    }
+    fn product(&self, a: &str, b: &str) -> String {
+        self.dialect.product(a, b)
+    }
+    fn quotient(&self, a: &str, b: &str) -> String {
+        self.dialect.inline_quotient(a, b)
+    }
+    fn call(&self, function: Unary, argument: &str) -> String {
+        match function {
+            Unary::Sqrt if !(self.fits)(argument) => self.dialect.long_root(argument),
+            other => self.dialect.call(other, argument),
+        }
+    }
+    fn group(&self, inside: &str) -> String {
+        self.dialect.group(inside)
+    }
+    fn minus(&self) -> &str {
+        self.dialect.minus()
+    }
+    fn square(&self, factor: &str) -> Option<String> {
+        self.dialect.square(factor)
+    }
+    fn keeps_order(&self) -> bool {
+        self.dialect.keeps_order()
+    }
 }
 
 /// Splits the text before each plus and minus that is in at most `parentheses` parentheses and in no braces.

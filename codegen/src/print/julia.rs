@@ -3,6 +3,7 @@
 use crate::check::Checked;
 use crate::print::code::{Code, GROUPS, Syntax, functions, lines, name};
 use crate::print::language::Language;
+use crate::print::style::Style;
 use crate::symbol::Unary;
 
 /// Julia 1.9 or later, without packages.
@@ -22,7 +23,7 @@ const SYNTAX: Syntax = Syntax {
 };
 
 impl Language for Julia {
-    fn print(&self, checked: &Checked<'_>) -> String {
+    fn print(&self, checked: &Checked<'_>, _: &Style) -> String {
         let functions = functions(checked, &SYNTAX);
         let header = functions[functions.len() - 1].header(1, ['[', ']']).into_iter();
         let header = lines(header.map(|line| format!("# {line}").trim_end().to_string()));

@@ -4,7 +4,9 @@ use std::f64::consts::{PI, TAU};
 
 use crate::check::Checked;
 use crate::print::language::Language;
-use crate::print::notation::{Notation, juxtaposed, of_sin_cos, rounded};
+use crate::print::notation::{Notation, juxtaposed, rounded};
+use crate::print::style::Style;
+use crate::print::tex_width;
 use crate::print::typeset::{Markup, page};
 use crate::symbol::Unary;
 
@@ -12,27 +14,47 @@ use crate::symbol::Unary;
 pub(crate) struct Latex;
 
 impl Language for Latex {
-    fn print(&self, checked: &Checked<'_>) -> String {
-        page(checked, self, &MARKUP)
+    fn print(&self, checked: &Checked<'_>, style: &Style) -> String {
+        page(checked, style, self, &MARKUP)
     }
 }
 
 const MARKUP: Markup = Markup {
-    // A 16 cm column at ten points.
-    width: 70,
-    visible,
+    // The text width of the class `article` at ten points.
+    width_mm: 121.0,
+    measure: tex_width::width,
+    indentation: 2100,
     escape,
     comment: "% ",
     around_sections: ["% Needs \\usepackage{amsmath}.\n\\begingroup\\allowdisplaybreaks\n", "\\endgroup\n"],
-    section: ["", ":\n\\begin{align}\n", " \\\\\n", "\n\\end{align}\n"],
+    display,
     approximately: "\\approx",
     line_break: " \\notag\\\\\n  &\\qquad {} ",
     remark: [" \\quad\\text{", "}"],
-    rows: 40,
-    table: ["\\noindent\n\\begin{tabular}{lll}\n  Symbol & Unit & Meaning \\\\ \\hline\n", "\\end{tabular}\n"],
+    table: |meanings| {
+        let opening = "% Needs \\usepackage{array,booktabs}.\n\\noindent\n\\begin{tabular}{@{}l>{\\raggedright\\arraybackslash}p{";
+        let head = "  \\toprule\n  Symbol & Meaning & Unit \\\\\n  \\midrule\n";
+        [format!("{opening}{meanings}pt}}l@{{}}}}\n{head}"), "  \\bottomrule\n\\end{tabular}\n".to_string()]
+    },
     cells: ["  ", " & ", " \\\\\n"],
     names: ",\\ ",
 };
+
+/// An environment of amsmath; equations without a label have no number.
+fn display(rows: &[(String, Option<String>)]) -> String {
+    let star = if rows.iter().all(|(_, label)| label.is_none()) { "*" } else { "" };
+    let row = |(text, label): &(String, Option<String>)| match label {
+        Some(label) => format!("{text} \\label{{{label}}}"),
+        None if star.is_empty() => format!("{text} \\notag"),
+        None => text.clone(),
+    };
+    let rows: Vec<String> = rows.iter().map(row).collect();
+    let mut rows = rows.join(" \\\\\n");
+    if !star.is_empty() {
+        rows = rows.replace(" \\notag", "");
+    }
+    format!("\\begin{{align{star}}}\n{rows}\n\\end{{align{star}}}\n")
+}
 
 impl Notation for Latex {
     fn number(&self, value: f64) -> String {
@@ -86,8 +108,8 @@ impl Notation for Latex {
     fn call(&self, function: Unary, argument: &str) -> String {
         match function {
             Unary::Sqrt => format!("\\sqrt{{{argument}}}"),
-            Unary::Sin => format!("\\sin {}", of_sin_cos(self, argument)),
-            Unary::Cos => format!("\\cos {}", of_sin_cos(self, argument)),
+            Unary::Sin => format!("\\sin({argument})"),
+            Unary::Cos => format!("\\cos({argument})"),
             Unary::Exp => format!("\\exp({argument})"),
             Unary::Signum => format!("\\operatorname{{sgn}}({argument})"),
             Unary::Step => format!("\\operatorname{{step}}({argument})"),
@@ -95,6 +117,12 @@ impl Notation for Latex {
             Unary::Round => format!("\\operatorname{{round}}({argument})"),
             Unary::Neg => format!("-({argument})"),
         }
+    }
+    fn abbreviated(&self, function: &str, angle: &str) -> String {
+        format!("\\mathrm{{{function}}}{angle}")
+    }
+    fn long_root(&self, argument: &str) -> String {
+        format!("\\bigl( {argument} \\bigr)^{{1/2}}")
     }
     fn square(&self, factor: &str) -> String {
         if factor.contains(['\'', '^', ' ']) && !factor.starts_with('(') {
@@ -128,25 +156,4 @@ fn escape(text: &str) -> String {
         }
     }
     escaped
-}
-
-/// Approximate number of visible characters: a command counts as one, braces and subscript marks as none.
-fn visible(text: &str) -> usize {
-    let mut count = 0;
-    let mut rest = text.chars().peekable();
-    while let Some(character) = rest.next() {
-        match character {
-            '\\' => {
-                let mut name = String::new();
-                while let Some(next) = rest.next_if(|c| c.is_ascii_alphabetic()) {
-                    name.push(next);
-                }
-                count += usize::from(name != "mathrm");
-            }
-            '_' | '^' | '{' | '}' | ' ' => {}
-            '+' | '-' => count += 3,
-            _ => count += 1,
-        }
-    }
-    count
 }

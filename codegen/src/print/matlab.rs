@@ -3,6 +3,7 @@
 use crate::check::Checked;
 use crate::print::code::{Code, GROUPS, Syntax, function_name, lines, name};
 use crate::print::language::Language;
+use crate::print::style::Style;
 use crate::symbol::Unary;
 
 /// MATLAB or Octave.
@@ -20,7 +21,7 @@ const SYNTAX: Syntax = Syntax {
 
 impl Language for Matlab {
     /// The file must have the name of its function.
-    fn print(&self, checked: &Checked<'_>) -> String {
+    fn print(&self, checked: &Checked<'_>, _: &Style) -> String {
         let code = Code::new(checked, checked.equation.options.gradient, &SYNTAX);
         let (values, slopes) = code.results();
         let returned = if slopes.is_empty() { "value" } else { "[value, gradient]" };

@@ -14,6 +14,8 @@ mod notation;
 mod notes;
 mod python;
 mod rust;
+mod style;
+mod tex_width;
 mod text;
 mod typeset;
 mod typst;
@@ -26,16 +28,19 @@ use crate::error::CodegenError;
 use crate::form::{Kind, Order};
 
 pub use language::Language;
+pub use style::{AngleUnit, Layout, Numbering, Style};
 
 /// Whom a language addresses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Audience {
-    /// Readers: text and typesetting languages, with a table of symbols.
+    /// Readers of plain text, with a table of symbols.
     Readers,
+    /// Authors: typesetting languages.
+    Authors,
     /// Compilers and interpreters: code with value and derivatives.
     Compilers,
 }
-use Audience::{Compilers, Readers};
+use Audience::{Authors, Compilers, Readers};
 
 /// One line of the registry.
 pub struct OutputLanguage {
@@ -51,8 +56,8 @@ pub struct OutputLanguage {
 /// All languages, in the order in which they are listed.
 pub const LANGUAGES: &[OutputLanguage] = &[
     entry("text", "txt", Readers, &text::Text),
-    entry("latex", "tex", Readers, &latex::Latex),
-    entry("typst", "typ", Readers, &typst::Typst),
+    entry("latex", "tex", Authors, &latex::Latex),
+    entry("typst", "typ", Authors, &typst::Typst),
     entry("rust", "rs", Compilers, &rust::Rust),
     entry("c", "c", Compilers, &c::C),
     entry("python", "py", Compilers, &python::Python),
@@ -83,11 +88,11 @@ impl OutputLanguage {
     ///
     /// # Errors
     /// If the language is for readers and the form is readable only as code: a curve, or derivatives of most forms.
-    pub fn print(&self, checked: &Checked<'_>) -> Result<String, CodegenError> {
-        if self.audience == Readers {
+    pub fn print(&self, checked: &Checked<'_>, style: &Style) -> Result<String, CodegenError> {
+        if self.audience != Compilers {
             refuse_unreadable(checked.equation)?;
         }
-        Ok(self.language.print(checked))
+        Ok(self.language.print(checked, style))
     }
 }
 

@@ -1,11 +1,15 @@
 //! Notation of an article in a language for readers: how it spells names and expressions.
 
-use crate::form::Kind;
+use crate::equation::Equation;
+use crate::form::{Arrangement, Kind, Options};
 use crate::print::article::line::LeftSide;
 use crate::print::dialect::Dialect;
 use crate::program::{Input, Label, Program};
 use crate::symbol::Unary;
 use crate::variable::{Symbols, Variable};
+
+/// Between two factors without a sign, until the page is complete: a place where a line can break.
+pub(crate) const PRODUCT: char = '\u{2062}';
 
 /// How a language for readers spells names and operations. Arguments already have their parentheses where they need
 /// them.
@@ -38,6 +42,18 @@ pub(crate) trait Notation {
     }
     /// A function of an argument without parentheses.
     fn call(&self, function: Unary, argument: &str) -> String;
+    /// An abbreviated function of an angle: `cθ_a`.
+    fn abbreviated(&self, function: &str, angle: &str) -> String {
+        format!("{function}{angle}")
+    }
+    /// A root whose argument can break across lines.
+    fn long_root(&self, argument: &str) -> String {
+        self.call(Unary::Sqrt, argument)
+    }
+    /// A quotient on the line; both parts have the necessary parentheses.
+    fn inline_quotient(&self, a: &str, b: &str) -> String {
+        format!("{a}/{b}")
+    }
     /// An expression in parentheses.
     fn group(&self, inside: &str) -> String {
         format!("({inside})")
@@ -60,9 +76,18 @@ pub(crate) struct Spelling<'a, N> {
     pub(crate) program: &'a Program,
     pub(crate) symbols: Symbols,
     pub(crate) kind: Kind,
+    /// Whether sine and cosine of an axis are `sθ_a` and `cθ_a`, as in single equations of the literature.
+    pub(crate) angles: bool,
 }
 
-impl<N: Notation> Spelling<'_, N> {
+impl<'a, N: Notation> Spelling<'a, N> {
+    /// The names of an equation.
+    pub(crate) fn new(notation: &'a N, program: &'a Program, equation: &Equation) -> Self {
+        let Options { symbols, arrangement, .. } = equation.options;
+        let angles = arrangement != Arrangement::Frames;
+        Spelling { notation, program, symbols, kind: equation.kind, angles }
+    }
+
     /// A variable.
     pub(crate) fn variable(&self, variable: &Variable) -> String {
         self.notation.variable(variable, self.symbols)
@@ -96,6 +121,7 @@ impl<N: Notation> Spelling<'_, N> {
     /// An input, such as `s_a` for the sine of θ_a.
     fn symbol(&self, input: &Input) -> String {
         let turn = |letter: &str, function: Unary, of: &Variable| match of {
+            Variable::Position { .. } if self.angles => self.notation.abbreviated(letter, &self.variable(of)),
             Variable::Position { axis, .. } => self.notation.subscripted(letter, &axis.to_lowercase()),
             other => self.notation.call(function, &self.variable(other)),
         };
@@ -107,7 +133,7 @@ impl<N: Notation> Spelling<'_, N> {
     }
 
     /// A step, such as `p_A.x` for a coordinate of the point p in the frame of A.
-    fn label(&self, label: &Label) -> String {
+    pub(crate) fn label(&self, label: &Label) -> String {
         match label {
             Label::Vector { letter, frame, prime, coordinate } => {
                 self.notation.coordinate(letter, *prime, frame, ["x", "y", "z"][*coordinate])
@@ -118,7 +144,7 @@ impl<N: Notation> Spelling<'_, N> {
         }
     }
 
-    fn output(&self, index: usize) -> String {
+    pub(crate) fn output(&self, index: usize) -> String {
         let coordinate = |letter: &str| {
             let letter = self.notation.letter(letter);
             self.notation.coordinate(&letter, false, "", ["x", "y", "z"][index])
@@ -160,6 +186,12 @@ impl<N: Notation> Dialect for Spelling<'_, N> {
     fn minus(&self) -> &str {
         self.notation.minus()
     }
+    fn long_root(&self, argument: &str) -> String {
+        self.notation.long_root(argument)
+    }
+    fn inline_quotient(&self, a: &str, b: &str) -> String {
+        self.notation.inline_quotient(a, b)
+    }
     fn square(&self, factor: &str) -> Option<String> {
         Some(self.notation.square(factor))
     }
@@ -175,19 +207,9 @@ pub(crate) fn rounded(value: f64) -> f64 {
 
 /// A product without a sign between the factors; `dot` separates digits, which a space alone would join to one number.
 pub(crate) fn juxtaposed(a: &str, b: &str, dot: &str) -> String {
-    let gap = if a.ends_with(|c: char| c.is_ascii_digit()) && b.starts_with(|c: char| c.is_ascii_digit()) {
-        dot
+    if a.ends_with(|c: char| c.is_ascii_digit()) && b.starts_with(|c: char| c.is_ascii_digit()) {
+        format!("{a}{dot}{b}")
     } else {
-        " "
-    };
-    format!("{a}{gap}{b}")
-}
-
-/// The argument of a sine or cosine: in parentheses if it is more than one name.
-pub(crate) fn of_sin_cos(notation: &impl Notation, argument: &str) -> String {
-    if argument.contains([' ', '^']) || argument.starts_with(notation.minus()) {
-        notation.group(argument)
-    } else {
-        argument.to_string()
+        format!("{a}{PRODUCT}{b}")
     }
 }

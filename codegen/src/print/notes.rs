@@ -39,29 +39,34 @@ pub(crate) fn title(equation: &Equation) -> Vec<String> {
     vec![format!("{what}: {name}{code}; {order}{rotation}."), format!("Written by Abbe {}.", env!("CARGO_PKG_VERSION"))]
 }
 
-/// The notes in plain text: the check, the truncation error, and the parameters that the equation does not contain.
-pub(crate) fn notes(checked: &Checked<'_>) -> Vec<String> {
-    let symbols = checked.equation.options.symbols;
-    notes_spelt(checked, &str::to_string, &|variable| variable.text(symbols))
+/// The label of the reading: `eq:ldbb-C150`.
+pub(crate) fn label(equation: &Equation) -> String {
+    let quantity = match equation.kind {
+        Kind::Length => "ldbb",
+        Kind::Distance => "distance",
+        Kind::Coordinates => "coordinates",
+        Kind::Volumetric => "volumetric",
+    };
+    let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '-' };
+    let test = equation.name.iter().map(|name| format!("-{}", name.chars().map(plain).collect::<String>()));
+    format!("eq:{quantity}{}", test.collect::<String>())
 }
 
-/// The notes, with `escape` for words and `name` for names.
-pub(crate) fn notes_spelt(
-    checked: &Checked<'_>,
-    escape: &dyn Fn(&str) -> String,
-    name: &dyn Fn(&Variable) -> String,
-) -> Vec<String> {
+/// The notes: the check, the truncation error, and the parameters that the equation does not contain.
+pub(crate) fn notes(checked: &Checked<'_>) -> Vec<String> {
+    let symbols = checked.equation.options.symbols;
+    let name = |variable: &Variable| variable.text(symbols);
     let (equation, check) = (checked.equation, &checked.agreement);
     let of = match equation.options.order {
         Order::Exact => "the chain",
         Order::Bilinear => "the second-order series of the chain",
         Order::First => "the first-order series of the chain",
     };
-    let mut notes = vec![escape(&format!(
+    let mut notes = vec![format!(
         "Checked against {of} with dual numbers at {} points, errors to ±10 mm and ±0.1 rad: \
          largest relative difference {:.0e} (value), {:.0e} (gradient).",
         check.points, check.value, check.gradient
-    ))];
+    )];
     if !checked.deviations.is_empty() {
         let found = checked.deviations.iter().map(|deviation| {
             format!(
@@ -73,7 +78,7 @@ pub(crate) fn notes_spelt(
         });
         let found = found.collect::<Vec<_>>().join(", ");
         let over = range(checked);
-        notes.push(escape(&format!("Largest deviation from the exact chain{over}: {found}.")));
+        notes.push(format!("Largest deviation from the exact chain{over}: {found}."));
     }
     if !checked.absent.is_empty() {
         let names: Vec<String> = checked.absent.iter().map(name).collect();
@@ -83,11 +88,9 @@ pub(crate) fn notes_spelt(
         for sensitivity in &first.sensitivities {
             if let Column::Multiple { of, .. } = &sensitivity.column {
                 notes.push(format!(
-                    "{} {} {}{}",
+                    "{} is confounded with {}: a constant multiple at all positions of the axes.",
                     name(&sensitivity.parameter),
-                    escape("is confounded with"),
-                    name(of),
-                    escape(": a constant multiple at all positions of the axes.")
+                    name(of)
                 ));
             }
         }
@@ -142,6 +145,10 @@ pub(crate) fn meaning(equation: &Equation, variable: &Variable) -> String {
         Variable::Length(name) if equation.kind == Kind::Volumetric => {
             let coordinate = name.split('_').next().unwrap_or_default();
             format!("{coordinate} of the tool point in the tool frame")
+        }
+        Variable::Length(name) => {
+            let stated = equation.meanings.iter().find(|(known, _)| known == name);
+            stated.map_or_else(|| variable.meaning(), |(_, meaning)| meaning.clone())
         }
         other => other.meaning(),
     }

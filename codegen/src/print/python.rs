@@ -3,6 +3,7 @@
 use crate::check::Checked;
 use crate::print::code::{Code, GROUPS, Syntax, functions, lines, name};
 use crate::print::language::Language;
+use crate::print::style::Style;
 use crate::symbol::Unary;
 
 /// Python with NumPy.
@@ -19,7 +20,7 @@ const SYNTAX: Syntax = Syntax {
 };
 
 impl Language for Python {
-    fn print(&self, checked: &Checked<'_>) -> String {
+    fn print(&self, checked: &Checked<'_>, _: &Style) -> String {
         let functions = functions(checked, &SYNTAX);
         let header = lines(functions[functions.len() - 1].header(0, ['[', ']']));
         let functions: String = functions.iter().map(function).collect();

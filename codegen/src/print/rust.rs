@@ -3,6 +3,7 @@
 use crate::check::Checked;
 use crate::print::code::{Code, GROUPS, Syntax, functions, lines, name};
 use crate::print::language::Language;
+use crate::print::style::Style;
 
 /// Rust without dependencies.
 pub(crate) struct Rust;
@@ -11,7 +12,7 @@ const SYNTAX: Syntax =
     Syntax { times: "*", over: "/", call: |function, x| format!("elementary::{}({x})", name(function)), reserved: "" };
 
 impl Language for Rust {
-    fn print(&self, checked: &Checked<'_>) -> String {
+    fn print(&self, checked: &Checked<'_>, _: &Style) -> String {
         let functions = functions(checked, &SYNTAX);
         let whole = &functions[functions.len() - 1];
         let header = whole.header(0, ['[', ']']).into_iter();

@@ -9,6 +9,7 @@ use crate::print::dialect;
 use crate::print::language::Language;
 use crate::print::notation::{Notation, Spelling, rounded};
 use crate::print::notes;
+use crate::print::style::Style;
 use crate::symbol::Unary;
 use crate::tree::terms_of;
 use crate::variable::{Symbols, Variable};
@@ -74,15 +75,10 @@ impl Notation for Text {
 }
 
 impl Language for Text {
-    fn print(&self, checked: &Checked<'_>) -> String {
+    fn print(&self, checked: &Checked<'_>, _: &Style) -> String {
         let equation = checked.equation;
         let article = Article::new(equation);
-        let spelling = Spelling {
-            notation: self,
-            program: &article.program,
-            symbols: equation.options.symbols,
-            kind: equation.kind,
-        };
+        let spelling = Spelling::new(self, &article.program, equation);
         let width = |text: &str| text.chars().count();
         let mut page = notes::title(equation).join("\n") + "\n";
         for section in &article.sections {
@@ -93,7 +89,7 @@ impl Language for Text {
             for (row, left) in section.rows.iter().zip(&lefts) {
                 let relation = if row.approximate { "≈" } else { "=" };
                 let gap = " ".repeat(widest - width(left));
-                let right = dialect::lines(&terms_of(&row.right), &spelling, WIDTH, width).join(&next_line);
+                let right = dialect::lines(&terms_of(&row.right), &spelling, [WIDTH; 2], width).join(&next_line);
                 let remark = match &row.remark {
                     None => String::new(),
                     Some(NoteKind::NotObservable) => "   (not observable)".to_string(),

@@ -1,81 +1,141 @@
-//! The page of an article in a typesetting language: title, equations section by section, table of symbols, notes.
+//! The page of an article in a typesetting language: equations section by section, and a table of symbols. What was
+//! checked stands in comments.
 
 use crate::check::Checked;
 use crate::print::article::Article;
-use crate::print::article::line::{EquationLine, NoteKind};
+use crate::print::article::line::{EquationLine, LeftSide, NoteKind};
 use crate::print::dialect;
-use crate::print::notation::{Notation, Spelling};
+use crate::print::notation::{Notation, PRODUCT, Spelling};
 use crate::print::notes;
+use crate::print::style::{Numbering, Style};
+use crate::print::tex_width::POINTS_PER_MM;
 use crate::tree::terms_of;
 
-/// The commands of a typesetting language around the expressions.
+/// The commands of a typesetting language around the expressions. Widths are in 1/100 pt.
 pub(crate) struct Markup {
-    /// Visible characters per line.
-    pub(crate) width: usize,
-    /// The number of visible characters of a piece of an equation.
-    pub(crate) visible: fn(&str) -> usize,
+    /// Width of a line, mm, if none is requested.
+    pub(crate) width_mm: f64,
+    /// The width of a piece of an equation.
+    pub(crate) measure: fn(&str) -> usize,
+    /// Width of the indentation of a continued line.
+    pub(crate) indentation: usize,
     /// Escapes the special characters of words.
     pub(crate) escape: fn(&str) -> String,
-    /// Before each line of the title.
+    /// Before each line of a comment.
     pub(crate) comment: &'static str,
     /// Before the first section and after the last one.
     pub(crate) around_sections: [&'static str; 2],
-    /// Before the heading of a section, after it, between the equations, and after them.
-    pub(crate) section: [&'static str; 4],
+    /// The displayed equations: each its text and, if it has a number, its label.
+    pub(crate) display: fn(&[(String, Option<String>)]) -> String,
     /// The sign of an approximation.
     pub(crate) approximately: &'static str,
     /// Between the lines of one equation.
     pub(crate) line_break: &'static str,
     /// Before and after a remark on an equation.
     pub(crate) remark: [&'static str; 2],
-    /// Rows of a table that fit a page.
-    pub(crate) rows: usize,
-    /// Before and after the rows of a table of three columns.
-    pub(crate) table: [&'static str; 2],
+    /// Before and after the rows of the table of symbols, from the width of the meanings in points.
+    pub(crate) table: fn(usize) -> [String; 2],
     /// Around the cells of a row: before the first, between two, after the last.
     pub(crate) cells: [&'static str; 3],
     /// Between two symbols in one cell.
     pub(crate) names: &'static str,
 }
 
+/// Width of the relation and the spaces beside it.
+const RELATION: usize = 1400;
+/// Width of the number of an equation and the space before it.
+const NUMBER: usize = 3500;
+/// Width of units and of the spaces between the columns of the table of symbols.
+const UNIT_COLUMN: usize = 7000;
+/// Lines of a table of symbols that fit a column of a page.
+const LINES: usize = 34;
+
 /// The page of an equation.
-pub(crate) fn page(checked: &Checked<'_>, notation: &impl Notation, markup: &Markup) -> String {
+pub(crate) fn page(checked: &Checked<'_>, style: &Style, notation: &impl Notation, markup: &Markup) -> String {
     let equation = checked.equation;
     let article = Article::new(equation);
-    let spelling =
-        Spelling { notation, program: &article.program, symbols: equation.options.symbols, kind: equation.kind };
-    let escape = markup.escape;
-    let title = notes::title(equation).into_iter();
-    let mut page: String = title.map(|line| format!("{}{line}\n", markup.comment)).collect();
+    let spelling = Spelling::new(notation, &article.program, equation);
+    let width = (style.width_mm.unwrap_or(markup.width_mm) * POINTS_PER_MM * 100.0) as usize;
+    let comments = |lines: Vec<String>| -> String {
+        lines.into_iter().map(|line| format!("{}{line}\n", markup.comment)).collect()
+    };
+    let mut page = comments(notes::title(equation));
     page.push_str(markup.around_sections[0]);
+    let label = notes::label(equation);
+    let mut number = 0;
+    // The reading is the last output; coefficients follow it.
+    let reading = |row: &EquationLine| matches!(row.left, LeftSide::Output(_));
+    let count = article.sections.iter().flat_map(|section| &section.rows).filter(|row| reading(row)).count();
+    let mut readings = 0;
     for section in &article.sections {
-        let [before, opening, between, end] = markup.section;
-        let rows: Vec<String> = section.rows.iter().map(|row| line(row, &spelling, markup)).collect();
-        let heading = escape(&capital(&section.heading));
-        page.extend([before, &heading, opening, &rows.join(between), end]);
+        let lefts = section.rows.iter().map(|row| (markup.measure)(&spelling.left(&row.left)));
+        let taken = lefts.max().unwrap_or(0) + RELATION + if style.numbering == Numbering::None { 0 } else { NUMBER };
+        let rows: Vec<(String, Option<String>)> = section
+            .rows
+            .iter()
+            .map(|row| {
+                readings += usize::from(reading(row));
+                let last = reading(row) && readings == count;
+                let numbered = match style.numbering {
+                    Numbering::None => None,
+                    _ if last => Some(label.clone()),
+                    Numbering::Last => None,
+                    Numbering::All => {
+                        number += 1;
+                        Some(format!("{label}-{number}"))
+                    }
+                };
+                (line(row, &spelling, markup, width.saturating_sub(taken)), numbered)
+            })
+            .collect();
+        let heading = (markup.escape)(&capital(&section.heading));
+        page.push_str(&format!("{heading}:\n{}", (markup.display)(&rows)));
     }
     page.push_str(markup.around_sections[1]);
-    let tables = article.symbols.chunks(markup.rows).map(|symbols| {
-        let [before, between, after] = markup.cells;
-        let rows = symbols.iter().map(|(symbol, meaning, unit)| {
-            let (names, unit, meaning) = (spelling.names(symbol, markup.names), escape(unit), escape(meaning));
-            format!("{before}${names}${between}{unit}{between}{meaning}{after}")
-        });
-        format!("{}{}{}", markup.table[0], rows.collect::<String>(), markup.table[1])
-    });
-    page.push_str(&tables.collect::<Vec<_>>().join("\n"));
-    page.push('\n');
-    for note in notes::notes_spelt(checked, &escape, &|of| format!("${}$", spelling.variable(of))) {
-        page.extend([&note, "\n"]);
+    if style.nomenclature {
+        page.push_str(&nomenclature(&article, &spelling, markup, width));
     }
-    page
+    page.push_str(&comments(notes::notes(checked)));
+    page.replace(PRODUCT, " ")
 }
 
-/// One equation, aligned at its relation.
-fn line<N: Notation>(row: &EquationLine, spelling: &Spelling<'_, N>, markup: &Markup) -> String {
+/// The table of all symbols.
+fn nomenclature<N: Notation>(article: &Article, spelling: &Spelling<'_, N>, markup: &Markup, width: usize) -> String {
+    let [before, between, after] = markup.cells;
+    let inputs = article
+        .symbols
+        .iter()
+        .map(|(symbol, meaning, unit)| (spelling.names(symbol, markup.names), meaning.clone(), *unit));
+    let rows: Vec<(String, String, &str)> = inputs.chain(article.quantities(spelling)).collect();
+    let widest = rows.iter().map(|(names, ..)| (markup.measure)(names)).max().unwrap_or(0);
+    let meanings = width.saturating_sub(widest + UNIT_COLUMN).max(8000) / 100;
+    // Rows of a table that fit a column of a page: a meaning takes as many lines as its width needs.
+    let lines = |meaning: &str| 1 + meaning.chars().count() * 5 / meanings;
+    let mut height = 0;
+    let tables = rows.chunk_by(|_, (_, meaning, _)| {
+        height += lines(meaning);
+        if height > LINES {
+            height = 0;
+        }
+        height > 0
+    });
+    let tables = tables.map(|rows| {
+        let rows = rows.iter().map(|(names, meaning, unit)| {
+            let (meaning, unit) = ((markup.escape)(meaning), (markup.escape)(unit));
+            format!("{before}${names}${between}{meaning}{between}{unit}{after}")
+        });
+        let [opening, end] = (markup.table)(meanings);
+        format!("{opening}{}{end}", rows.collect::<String>())
+    });
+    tables.collect::<Vec<_>>().join("\n")
+}
+
+/// One equation, aligned at its relation, in lines of the available width.
+fn line<N: Notation>(row: &EquationLine, spelling: &Spelling<'_, N>, markup: &Markup, width: usize) -> String {
     let left = spelling.left(&row.left);
     let relation = if row.approximate { markup.approximately } else { "=" };
-    let lines = dialect::lines(&terms_of(&row.right), spelling, markup.width, markup.visible);
+    let narrow = width.saturating_sub(markup.indentation);
+    let mut lines = dialect::lines(&terms_of(&row.right), spelling, [width, narrow], markup.measure);
     let remark = match &row.remark {
         None => String::new(),
         Some(NoteKind::NotObservable) => markup.remark.join("(not observable)"),
@@ -84,7 +144,14 @@ fn line<N: Notation>(row: &EquationLine, spelling: &Spelling<'_, N>, markup: &Ma
             markup.remark.join(&format!("(multiple of ${other}$)"))
         }
     };
-    format!("  {left} &{relation} {}{remark}", lines.join(markup.line_break))
+    if let Some(last) = lines.last_mut() {
+        if !remark.is_empty() && (markup.measure)(last) + (markup.measure)(&remark) > narrow {
+            lines.push(remark);
+        } else {
+            last.push_str(&remark);
+        }
+    }
+    format!("  {left} &{relation} {}", lines.join(markup.line_break))
 }
 
 /// The text with a capital first letter.

@@ -4,7 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use crate::check::Checked;
 use crate::print::language::Language;
-use crate::print::notation::{Notation, juxtaposed, of_sin_cos, rounded};
+use crate::print::notation::{Notation, PRODUCT, juxtaposed, rounded};
+use crate::print::style::Style;
 use crate::print::typeset::{Markup, page};
 use crate::symbol::Unary;
 
@@ -12,27 +13,44 @@ use crate::symbol::Unary;
 pub(crate) struct Typst;
 
 impl Language for Typst {
-    fn print(&self, checked: &Checked<'_>) -> String {
-        page(checked, self, &MARKUP)
+    fn print(&self, checked: &Checked<'_>, style: &Style) -> String {
+        page(checked, style, self, &MARKUP)
     }
 }
 
 const MARKUP: Markup = Markup {
-    width: 72,
-    visible,
+    width_mm: 160.0,
+    measure,
+    indentation: 1100,
     escape,
     comment: "// ",
     around_sections: ["", "\n"],
-    section: ["\n", ":\n$\n", " \\\n", "\n$\n"],
+    display,
     approximately: "approx",
     line_break: " \\\n  & quad ",
     remark: [" quad #[", "]"],
-    // A table breaks across pages.
-    rows: usize::MAX,
-    table: ["#table(\n  columns: 3,\n  [Symbol], [Unit], [Meaning],\n", ")\n"],
+    table: |_| {
+        let head = "  table.hline(), [Symbol], [Meaning], [Unit], table.hline(stroke: 0.5pt),\n";
+        let opening = "#table(\n  columns: (auto, 1fr, auto), stroke: none, inset: (x: 4pt, y: 3pt),\n";
+        [format!("{opening}{head}"), "  table.hline(),\n)\n".to_string()]
+    },
     cells: ["  [", "], [", "],\n"],
     names: ", ",
 };
+
+/// Equations without a number in one block, each numbered one in its own.
+fn display(rows: &[(String, Option<String>)]) -> String {
+    let mut text = String::new();
+    for rows in rows.chunk_by(|(_, a), (_, b)| a.is_none() && b.is_none()) {
+        let lines: Vec<&str> = rows.iter().map(|(line, _)| line.as_str()).collect();
+        let lines = lines.join(" \\\n");
+        text += &match &rows[0].1 {
+            None => format!("$\n{lines}\n$\n"),
+            Some(label) => format!("#math.equation(block: true, numbering: \"(1)\", $\n{lines}\n$) <{label}>\n"),
+        };
+    }
+    text
+}
 
 impl Notation for Typst {
     fn number(&self, value: f64) -> String {
@@ -71,8 +89,8 @@ impl Notation for Typst {
     fn call(&self, function: Unary, argument: &str) -> String {
         match function {
             Unary::Sqrt => format!("sqrt({argument})"),
-            Unary::Sin => format!("sin {}", of_sin_cos(self, argument)),
-            Unary::Cos => format!("cos {}", of_sin_cos(self, argument)),
+            Unary::Sin => format!("sin \\({argument}\\)"),
+            Unary::Cos => format!("cos \\({argument}\\)"),
             Unary::Exp => format!("exp \\({argument}\\)"),
             Unary::Signum => format!("\"sgn\" \\({argument}\\)"),
             Unary::Step => format!("\"step\" \\({argument}\\)"),
@@ -80,6 +98,15 @@ impl Notation for Typst {
             Unary::Round => format!("\"round\" \\({argument}\\)"),
             Unary::Neg => format!("- \\({argument}\\)"),
         }
+    }
+    fn abbreviated(&self, function: &str, angle: &str) -> String {
+        format!("upright({function}) {angle}")
+    }
+    fn inline_quotient(&self, a: &str, b: &str) -> String {
+        format!("{a} \\/ {b}")
+    }
+    fn long_root(&self, argument: &str) -> String {
+        format!("\\({argument}\\)^(1\\/2)")
     }
     fn group(&self, inside: &str) -> String {
         // Escaped, so that a line can break between them.
@@ -102,6 +129,12 @@ fn escape(text: &str) -> String {
     escaped
 }
 
-fn visible(text: &str) -> usize {
-    text.chars().filter(|c| !"\"_^\\ ".contains(*c)).count()
+/// Every visible character is as wide as a letter, signs with their spaces as two.
+fn measure(text: &str) -> usize {
+    let one = |character: char| match character {
+        '"' | '_' | '^' | '\\' | ' ' | PRODUCT => 0,
+        '+' | '-' | '=' => 1400,
+        _ => 580,
+    };
+    text.chars().map(one).sum()
 }

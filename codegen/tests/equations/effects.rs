@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use abbe_codegen::evaluate::evaluate_f64;
-use abbe_codegen::print::{Audience, LANGUAGES};
+use abbe_codegen::print::{Audience, LANGUAGES, Style};
 use abbe_codegen::{CodegenError, Equation, Options, Order, Source, Subject, Variable, check};
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
@@ -230,8 +230,8 @@ fn every_form_is_confirmed_with_every_shape() {
             let checked = check(&equation, &Bar).expect("agreement");
             assert!(checked.agreement.points == 40 && checked.agreement.largest() < 1e-12);
             for language in LANGUAGES {
-                let for_readers = language.audience == Audience::Readers;
-                match language.print(&checked) {
+                let for_readers = language.audience != Audience::Compilers;
+                match language.print(&checked, &Style::default()) {
                     Ok(text) => assert!(!(text.contains("NaN") || curved && for_readers), "{text}"),
                     Err(refused) => {
                         let message = refused.to_string();

@@ -2,7 +2,7 @@
 
 use std::process::Command;
 
-use abbe_codegen::{Equation, Options, Order, Symbols};
+use abbe_codegen::{Arrangement, Equation, Options, Order, Symbols};
 use abbe_model::frames::Rotation;
 
 use crate::support::{self, Chapter5, eight, hermle};
@@ -58,6 +58,20 @@ fn readable_forms_of_the_chapter_5_test() {
             let options = Options { order, symbols, ..Options::default() };
             let text = printed(&chapter5(&options), language);
             snapshot(&format!("chapter5_{language}_{word}"), &text);
+        }
+    }
+}
+
+/// Eqs. 3.20 and 3.21 of Jiang (2014). The normal form proves each equal to the chain before it is printed.
+#[test]
+fn single_equations_of_the_chapter_5_tests() {
+    let options = Options { arrangement: Arrangement::Single, ..Options::default() };
+    for (name, extended) in [("eq_3_20", false), ("eq_3_21", true)] {
+        let source = Chapter5 { extended };
+        let machine = hermle(Rotation::SmallAngle);
+        let equation = Equation::of(&machine, &source, &eight(), &options).expect("an equation");
+        for language in ["text", "latex"] {
+            snapshot(&format!("{name}_{language}"), &support::printed(&equation, &source, language));
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Tests of the probe's reading against geometry with 4 × 4 matrices: the intersection of the probing line with the
 //! cylinder, found by bisection.
 
+use abbe_codegen::print::Style;
 use abbe_codegen::program::Input;
 use abbe_codegen::{CodegenError, Equation, Options, Order, Source, Subject, Variable, check};
 use abbe_model::axis::AxisKind;
@@ -372,7 +373,7 @@ pub fn printed(language: &str, count: usize, random: &mut impl rand::Rng) -> Vec
 }
 
 /// Every form, for the engines that typeset them.
-pub fn fragments(language: &str) -> Vec<String> {
+pub fn fragments(language: &str, style: &Style) -> Vec<String> {
     let mut fragments = Vec::new();
     for stated in [false, true] {
         for order in [Order::Exact, Order::Bilinear, Order::First] {
@@ -380,7 +381,9 @@ pub fn fragments(language: &str) -> Vec<String> {
             let machine = touch.machine();
             let options = Options { gradient: order == Order::First, ..options(order) };
             let equation = Equation::of(&machine, &touch, &errors(&machine), &options).expect("an equation");
-            fragments.push(support::printed(&equation, &touch, language));
+            let checked = check(&equation, &touch).expect("agreement with dual numbers");
+            let language = abbe_codegen::language(language).expect("a language");
+            fragments.push(language.print(&checked, style).expect("a page"));
         }
     }
     fragments

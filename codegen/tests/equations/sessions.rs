@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use abbe_codegen::print::LANGUAGES;
+use abbe_codegen::print::{LANGUAGES, Style};
 use abbe_codegen::{Equation, Kind, Options, Order, SessionTest, check};
 use abbe_model::files;
 
@@ -26,7 +26,7 @@ fn every_test_of_the_bundled_plans() {
                 assert_eq!(equation.kind, Kind::Length);
                 let checked = check(&equation, &source).expect("agreement");
                 for language in LANGUAGES {
-                    assert!(!language.print(&checked).expect("a page").is_empty());
+                    assert!(!language.print(&checked, &Style::default()).expect("a page").is_empty());
                 }
             }
         }
@@ -46,7 +46,7 @@ fn every_test_of_the_self_calibration() {
             assert_eq!(equation.kind, Kind::Distance);
             let checked = check(&equation, &source).expect("agreement");
             for language in LANGUAGES {
-                assert!(!language.print(&checked).expect("a page").is_empty());
+                assert!(!language.print(&checked, &Style::default()).expect("a page").is_empty());
             }
         }
     }

@@ -1,6 +1,7 @@
 //! Shared support of this crate's integration tests.
 #![allow(dead_code)]
 
+use abbe_codegen::print::{Layout, Style};
 use abbe_codegen::{Equation, Source, Subject, check, language};
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
@@ -66,5 +67,6 @@ pub fn eight() -> Vec<ErrorName> {
 /// A checked equation in a language.
 pub fn printed(equation: &Equation, source: &impl Source, word: &str) -> String {
     let checked = check(equation, source).expect("agreement with dual numbers");
-    language(word).expect("a language").print(&checked).expect("a page")
+    let style = Style { layout: Layout::Flat, ..Style::default() };
+    language(word).expect("a language").print(&checked, &style).expect("a page")
 }

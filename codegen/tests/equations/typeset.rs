@@ -3,24 +3,48 @@
 use std::fmt::Write;
 use std::process::Command;
 
-use abbe_codegen::{Equation, Options, Order, Source, Symbols, ToolPoint};
+use abbe_codegen::print::{Numbering, Style};
+use abbe_codegen::{Arrangement, Equation, Options, Order, Source, Symbols, ToolPoint, check};
 use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::frames::Rotation;
 
 use crate::effects::{Bar, every_shape};
-use crate::support::{Chapter5, eight, hermle, printed};
+use crate::support::{Chapter5, eight, hermle};
 use crate::tools;
 use crate::topologies::{AnyBar, CODES, all_errors, machine};
 
-fn of(machine: &Machine, source: &impl Source, errors: &[ErrorName], options: &Options, language: &str) -> String {
-    let equation = Equation::of(machine, source, errors, options).expect("an equation");
-    printed(&equation, source, language)
+/// A source whose equation is printed.
+trait Draw {
+    fn draw(&self, machine: &Machine, errors: &[ErrorName], options: &Options, language: &str, style: &Style)
+    -> String;
+}
+
+impl<S: Source> Draw for S {
+    fn draw(
+        &self,
+        machine: &Machine,
+        errors: &[ErrorName],
+        options: &Options,
+        language: &str,
+        style: &Style,
+    ) -> String {
+        let equation = Equation::of(machine, self, errors, options).expect("an equation");
+        let checked = check(&equation, self).expect("agreement with dual numbers");
+        abbe_codegen::language(language).expect("a language").print(&checked, style).expect("a page")
+    }
 }
 
 /// Every form of the chapter 5 test. For every topology the exact length, its first order, and the first order of the
 /// volumetric error.
 fn fragments(language: &str) -> Vec<String> {
+    styled(language, &Style::default())
+}
+
+fn styled(language: &str, style: &Style) -> Vec<String> {
+    let of = |machine: &Machine, source: &dyn Draw, errors: &[ErrorName], options: &Options| {
+        source.draw(machine, errors, options, language, style)
+    };
     let mut fragments = Vec::new();
     for rotation in [Rotation::Exact, Rotation::SmallAngle] {
         for order in [Order::Exact, Order::Bilinear, Order::First] {
@@ -34,27 +58,34 @@ fn fragments(language: &str) -> Vec<String> {
                     ..Options::default()
                 };
                 let bar = Chapter5 { extended: true };
-                fragments.push(of(&hermle(rotation), &bar, &eight(), &options, language));
+                fragments.push(of(&hermle(rotation), &bar, &eight(), &options));
             }
+        }
+    }
+    for arrangement in [Arrangement::Single, Arrangement::Groups] {
+        for rotation in [Rotation::Exact, Rotation::SmallAngle] {
+            let options =
+                Options { arrangement, rotation: Some(rotation), unknowns: (0..8).collect(), ..Options::default() };
+            fragments.push(of(&hermle(rotation), &Chapter5 { extended: true }, &eight(), &options));
         }
     }
     for code in CODES {
         let machine = machine(code);
         let errors = all_errors(&machine);
         let motions: Vec<ErrorName> = errors.iter().filter(|name| name.kind == ErrorKind::Motion).cloned().collect();
-        fragments.push(of(&machine, &AnyBar, &errors, &Options::default(), language));
+        fragments.push(of(&machine, &AnyBar, &errors, &Options::default()));
         let first = Options { order: Order::First, ..Options::default() };
-        fragments.push(of(&machine, &AnyBar, &errors, &first, language));
-        fragments.push(of(&machine, &ToolPoint, &motions, &first, language));
+        fragments.push(of(&machine, &AnyBar, &errors, &first));
+        fragments.push(of(&machine, &ToolPoint, &motions, &first));
     }
     // Every declared shape.
     let machine = Machine::from_code("w C b X t").expect("a code");
     for order in [Order::Exact, Order::Bilinear, Order::First] {
         let options =
             Options { order, gradient: order != Order::Bilinear, effects: every_shape(), ..Options::default() };
-        fragments.push(of(&machine, &Bar, &eight()[4..], &options, language));
+        fragments.push(of(&machine, &Bar, &eight()[4..], &options));
     }
-    fragments.extend(crate::probe::fragments(language));
+    fragments.extend(crate::probe::fragments(language, style));
     fragments
 }
 
@@ -115,5 +146,33 @@ fn typst() {
     let script = "import typst\n_, warnings = typst.compile_with_warnings('all.typ', output='all.pdf')\nfor w in warnings: print(w.message)";
     let complaints = tools::run(Command::new(python).current_dir(&folder).args(["-c", script]));
     assert!(complaints.trim().is_empty(), "{complaints}");
+    let _ = std::fs::remove_dir_all(&folder);
+}
+
+/// Every fragment in a column of 84 mm with numbers and a table of symbols: no line is too long.
+#[test]
+fn latex_in_two_columns() {
+    let Some(engine) = tools::find("typeset::latex_in_two_columns", &["pdflatex"], &["--version"]) else {
+        return;
+    };
+    let folder = tools::folder("latex-two-columns");
+    let mut document = String::from(
+        "\\documentclass[10pt]{article}\n\\usepackage{amsmath,array,booktabs}\n\\setlength\\textwidth{84mm}\n\
+         \\raggedbottom\\begin{document}\n",
+    );
+    let style = Style { numbering: Numbering::All, width_mm: Some(84.0), nomenclature: true, ..Style::default() };
+    for (index, fragment) in styled("latex", &style).into_iter().enumerate() {
+        let _ =
+            writeln!(document, "{}\n\\clearpage", fragment.replace("\\label{eq:", &format!("\\label{{eq:{index}-")));
+    }
+    document.push_str("\\end{document}\n");
+    tools::write(&folder.join("all.tex"), &document);
+    let arguments = ["-interaction=nonstopmode", "-halt-on-error", "all.tex"];
+    let output = Command::new(engine).current_dir(&folder).args(arguments).output().expect("the engine starts");
+    let log = String::from_utf8_lossy(&std::fs::read(folder.join("all.log")).expect("a log")).into_owned();
+    assert!(output.status.success(), "{}", &log[log.len().saturating_sub(3000)..]);
+    let complaint = |line: &&str| line.contains("Overfull") || line.contains("Warning") && !line.contains("Label(s)");
+    let complaints: Vec<&str> = log.lines().filter(complaint).collect();
+    assert!(complaints.is_empty(), "{} complaints, {:?}", complaints.len(), &complaints[..complaints.len().min(20)]);
     let _ = std::fs::remove_dir_all(&folder);
 }

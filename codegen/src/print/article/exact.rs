@@ -90,7 +90,8 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
         let start = program.steps.len();
         let aliases = (0..3).map(|coordinate| Step { label: bar.label(coordinate), value: Tree::Number(0.0) });
         program.steps.extend(aliases);
-        let norm = norm_of_steps(start);
+        let zero = bar.components.map(|component| component == Operand::constant(0.0));
+        let norm = norm_of_steps(start, zero);
         let named = program.steps.iter().position(|step| step.label == Label::Scalar("d"));
         read.rows = match named {
             Some(index) => vec![

@@ -3,16 +3,24 @@
 use std::collections::HashMap;
 
 use crate::equation::Equation;
-use crate::form::Kind;
+use crate::form::{Arrangement, Kind};
 use crate::print::article::line::{LeftSide, Section, naming, quantity_heading, row, section, truncated};
 use crate::program::{Label, Naming, Program};
 use crate::symbol::{Binary, Operand, Unary};
-use crate::tree::{Tree, binary, product, sum};
+use crate::tree::{Tree, binary, product, sum, terms_of};
 
-/// `√(x² + y² + z²)` of three steps.
-pub(crate) fn norm_of_steps(start: usize) -> Tree {
+/// `√(x² + y² + z²)` of three steps, without those that are zero.
+pub(crate) fn norm_of_steps(start: usize, zero: [bool; 3]) -> Tree {
     let square = |index| (false, binary(Binary::Mul, Tree::Step(index), Tree::Step(index)));
-    Tree::Unary(Unary::Sqrt, Box::new(sum((start..start + 3).map(square).collect())))
+    let present = (0..3).filter(|coordinate| !zero[*coordinate]);
+    Tree::Unary(Unary::Sqrt, Box::new(sum(present.map(|coordinate| square(start + coordinate)).collect())))
+}
+
+/// The sum, or its negative if most of its terms are negative: its square is the same.
+fn mostly_positive(tree: &Tree) -> Tree {
+    let terms = terms_of(tree);
+    let minus = 2 * terms.iter().filter(|(minus, _)| *minus).count() > terms.len();
+    sum(terms.into_iter().map(|(own, term)| (own != minus, term)).collect())
 }
 
 /// The coordinate groups, and the length as a function of them.
@@ -23,11 +31,25 @@ pub(crate) fn sections(equation: &Equation, trees: &[Tree], complete: bool) -> (
         let section = section(quantity_heading(equation), rows);
         return (naming(equation, Vec::new()), vec![section]);
     }
-    let bar = &equation.vectors[0];
+    if equation.options.arrangement == Arrangement::Single {
+        let program = naming(equation, Vec::new());
+        let squares = trees.iter().filter(|tree| **tree != Tree::Number(0.0)).map(|tree| {
+            let tree = mostly_positive(tree);
+            (false, binary(Binary::Mul, tree.clone(), tree))
+        });
+        let norm = Tree::Unary(Unary::Sqrt, Box::new(sum(squares.collect())));
+        let length = truncated(LeftSide::Output(0), with_bar_parameters(equation, &program, norm), complete);
+        return (program, vec![section(quantity_heading(equation), [length])]);
+    }
+    let bar = &equation.vectors[equation.vectors.len() - 1];
     let labels: Vec<Label> = (0..3).map(|coordinate| bar.label(coordinate)).collect();
     let program = naming(equation, labels.clone());
     let rows = labels.into_iter().zip(trees).map(|(label, tree)| row(LeftSide::Named(label), tree.clone()));
-    let length = with_bar_parameters(equation, &program, norm_of_steps(0));
+    let length = with_bar_parameters(
+        equation,
+        &program,
+        norm_of_steps(0, std::array::from_fn(|i| trees[i] == Tree::Number(0.0))),
+    );
     let length = truncated(LeftSide::Output(0), length, complete);
     let sections = [section(&bar.meaning, rows), section(quantity_heading(equation), [length])];
     (program, sections.into())

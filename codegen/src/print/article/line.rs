@@ -76,3 +76,17 @@ pub(crate) fn naming(equation: &Equation, labels: Vec<Label>) -> Program {
     let step = |label| Step { label, value: Tree::Number(0.0) };
     Program { inputs: equation.inputs(), steps: labels.into_iter().map(step).collect(), outputs: Vec::new() }
 }
+
+/// The meaning and the unit of a named scalar.
+pub(crate) fn scalar(name: &str) -> (&'static str, &'static str) {
+    match name {
+        "L_0" => ("distance without errors", "mm"),
+        "S" => ("sum of the errors, each times its coefficient and L_0", "mm²"),
+        "d" => ("distance between the balls", "mm"),
+        "a" => ("square of the step perpendicular to the axis of the artefact", "mm²"),
+        "b" => ("product of position and step perpendicular to the axis", "mm²"),
+        "c" => ("square of the position perpendicular to the axis, less that of the radius", "mm²"),
+        "l_n" => ("length of the step of the probe", "mm"),
+        _ => ("reading", "mm"),
+    }
+}
