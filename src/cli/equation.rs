@@ -4,8 +4,10 @@ mod style;
 
 use std::path::PathBuf;
 
-use abbe::codegen::print::{LANGUAGES, OutputLanguage, language};
-use abbe::codegen::{Arrangement, Equation, Options, Order, SessionTest, Source, Symbols, ToolPoint, Variable, check};
+use abbe::codegen::print::{LANGUAGES, OutputLanguage, TestEquations, language};
+use abbe::codegen::{
+    Arrangement, Checked, Equation, Options, Order, SessionTest, Source, Symbols, ToolPoint, Variable, check,
+};
 use abbe::model::chain::Machine;
 use abbe::model::component::ErrorName;
 use abbe::model::effect::{Component, Effect};
@@ -13,7 +15,7 @@ use abbe::model::files::{self, ReadOptions, SourceMap};
 use abbe::model::frames::Rotation;
 use abbe::model::instrument::InstrumentParameter;
 use abbe::model::pattern;
-use abbe::model::session::Session;
+use abbe::model::session::{Session, Test};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 
@@ -27,6 +29,9 @@ pub const HELP: &str = "Examples:
   abbe equation sessions/hermle-c600u/chapter5.toml --test A150 --as latex
   abbe equation sessions/hermle-c600u/chapter5.toml --test C150 --order first \\
       --errors EX0C,EY0C,bar
+  abbe equation sessions/hermle-c600u/chapter5.toml --test A150 --rotation small-angle \\
+      --form single --as latex --two-column --number last --nomenclature
+  abbe equation sessions/hermle-c600u/chapter5.toml --all --order first --as latex
   abbe equation sessions/hermle-c600u/chapter5.toml --test A150 --as python \\
       --gradient --out a150.py";
 
@@ -129,8 +134,12 @@ pub struct EquationArguments {
     /// Name of the test in the session. Its readings, if there are any, state only which axes move and how far.
     ///
     /// Example: --test A150
-    #[arg(long, value_name = "NAME")]
-    test: String,
+    #[arg(long, value_name = "NAME", required_unless_present = "all", conflicts_with = "all")]
+    test: Option<String>,
+    /// The equations of all tests, and the derivatives of their readings by the errors as a matrix, in text, LaTeX and
+    /// Typst.
+    #[arg(long)]
+    all: bool,
     #[command(flatten)]
     form: FormArguments,
 }
@@ -253,7 +262,11 @@ impl FormArguments {
     }
 
     fn write(&self, equation: &Equation, source: &impl Source) -> Result<(), Failure> {
-        let text = self.language.print(&check(equation, source)?, &self.style.style(self.language)?)?;
+        self.put(&self.language.print(&check(equation, source)?, &self.style.style(self.language)?)?)
+    }
+
+    /// Writes a text to the requested file or to standard output.
+    fn put(&self, text: &str) -> Result<(), Failure> {
         match &self.out {
             Some(path) => output::write_whole(path, text.as_bytes()),
             None => {
@@ -289,22 +302,45 @@ pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
     let outputs = Outputs::new(&arguments.form.out)?;
     let (session, sources) = read(&arguments.session)?;
     outputs.refuse_overwrite_of_sources(&sources)?;
-    let Some(test) = session.tests.iter().find(|test| test.name == arguments.test) else {
-        let names: Vec<&str> = session.tests.iter().map(|test| test.name.as_str()).collect();
-        let names = names.join(", ");
-        return Err(Failure::Other(format!("no test `{}`; the session has {names}", arguments.test)));
-    };
-    let source = SessionTest::new(&session, test)?;
     let form = &arguments.form;
-    let effects: Vec<Effect> = session.effects.iter().filter(|effect| effect.acts_in(&test.name)).cloned().collect();
-    let mut parameters =
-        EquationParameters::parse(&form.errors, &session.machine, session.instrument.unknowns(), &effects)?;
-    if form.errors.is_empty() {
-        parameters.errors.clone_from(&session.unknowns);
-        parameters.effects = effects;
+    let derived = |test: &Test, first: bool| -> Result<(Equation, SessionTest<'_>), Failure> {
+        let source = SessionTest::new(&session, test)?;
+        let effects = session.effects.iter().filter(|effect| effect.acts_in(&test.name)).cloned();
+        let effects: Vec<Effect> = effects.collect();
+        let mut parameters =
+            EquationParameters::parse(&form.errors, &session.machine, session.instrument.unknowns(), &effects)?;
+        if form.errors.is_empty() {
+            parameters.errors.clone_from(&session.unknowns);
+            parameters.effects = effects;
+        }
+        let mut options = form.options(&parameters);
+        if first {
+            options = Options { order: Order::First, gradient: false, ..options };
+            options.arrangement = match options.arrangement {
+                Arrangement::Groups => Arrangement::Single,
+                other => other,
+            };
+        }
+        Ok((Equation::of(&session.machine, &source, &parameters.errors, &options)?, source))
+    };
+    if let Some(name) = &arguments.test {
+        let Some(test) = session.tests.iter().find(|test| test.name == *name) else {
+            let names: Vec<&str> = session.tests.iter().map(|test| test.name.as_str()).collect();
+            let names = names.join(", ");
+            return Err(Failure::Other(format!("no test `{name}`; the session has {names}")));
+        };
+        let (equation, source) = derived(test, false)?;
+        return form.write(&equation, &source);
     }
-    let equation = Equation::of(&session.machine, &source, &parameters.errors, &form.options(&parameters))?;
-    form.write(&equation, &source)
+    let style = form.style.style(form.language)?;
+    let both = session.tests.iter().map(|test| Ok([derived(test, false)?, derived(test, true)?]));
+    let both: Vec<[(Equation, SessionTest<'_>); 2]> = both.collect::<Result<_, Failure>>()?;
+    let checked = |(equation, source)| -> Result<_, Failure> { Ok(check(equation, source)?) };
+    let pairs = both.iter().map(|[whole, first]| Ok([checked((&whole.0, &whole.1))?, checked((&first.0, &first.1))?]));
+    let pairs: Vec<[Checked<'_>; 2]> = pairs.collect::<Result<_, Failure>>()?;
+    let tests: Vec<TestEquations<'_>> =
+        pairs.iter().map(|[equation, first]| TestEquations { equation, first }).collect();
+    form.put(&form.language.print_system(&tests, &style)?)
 }
 
 /// Runs `abbe volumetric`.

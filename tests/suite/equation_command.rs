@@ -85,15 +85,18 @@ fn the_error_vector_in_every_language() {
     let mut outputs = Vec::new();
     for (word, sign) in [
         ("text", "Δ.x ="),
-        ("latex", "\\begin{align}"),
+        ("latex", "\\begin{align*}"),
         ("typst", "Delta"),
         ("rust", "pub fn volumetric_error("),
         ("c", "void volumetric_error("),
         ("python", "def volumetric_error("),
         ("matlab", "= volumetric_error("),
         ("julia", "function volumetric_error("),
+        ("sympy", "import sympy as sp"),
+        ("casadi", "import casadi as ca"),
     ] {
-        let found = printed(&["volumetric", text(&machine), "--as", word]);
+        let symbols: &[&str] = if matches!(word, "latex" | "typst") { &["--nomenclature"] } else { &[] };
+        let found = printed(&[&["volumetric", text(&machine), "--as", word], symbols].concat());
         assert!(found.contains(sign), "{word}: {found}");
         assert!(found.contains("X of the tool point in the tool frame"), "{word}");
         outputs.push(found);
@@ -228,7 +231,7 @@ fn the_reading_of_a_probe_in_every_language() {
     let exact = of("1a", &[]);
     assert!(exact.contains("d   = −l_n·(b + √(b² − a·c))/a"), "{exact}");
     for (language, start) in [
-        ("latex", "\\begin{align}"),
+        ("latex", "\\begin{align*}"),
         ("typst", "#table("),
         ("rust", "pub fn probe_distance("),
         ("c", "probe_distance("),
@@ -320,7 +323,7 @@ fn printed_code_runs_unchanged() {
     let script = "
 import math, c100
 for c in [0.0, 0.7, 2.0, -2.5]:
-    value, gradient = c100.bar_length_gradient([100.0, 75.0, 75.0], [math.sin(c), math.cos(c)], [0.3])
+    value, gradient = c100.bar_length_gradient(R=100.0, H=75.0, Z_CA=75.0, C_rad=c, EX0C=0.3)
     expected = math.sqrt(100.0**2 + 0.09 - 2 * 0.3 * 100.0 * math.sin(c))
     slope = (0.3 - 100.0 * math.sin(c)) / expected
     assert abs(float(value) - expected) < 1e-12 * expected, (value, expected)
@@ -328,4 +331,37 @@ for c in [0.0, 0.7, 2.0, -2.5]:
 ";
     let ran = Command::new(python).current_dir(folder.path()).args(["-c", script]).output().unwrap();
     assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+}
+
+/// Options of typesetting and of code reach the library; a language that ignores one refuses it.
+#[test]
+fn equations_are_set_and_called_as_requested() {
+    let plan = plan();
+    let a150 = ["equation", text(&plan), "--test", "A150"];
+    let of = |more: &[&str]| printed(&[&a150[..], more].concat());
+    let latex = of(&["--as", "latex", "--number", "last", "--two-column", "--nomenclature"]);
+    assert!(latex.contains("\\label{eq:ldbb-A150}") && !latex.contains("\\label{eq:ldbb-A150-1}"), "{latex}");
+    assert!(latex.contains("test radius: distance of the pivot from the axis (Table 3.1)"), "{latex}");
+    assert_eq!(latex, of(&["--as", "latex", "--number", "last", "--width", "8.4cm", "--nomenclature"]));
+    assert!(of(&["--as", "latex", "--number", "all"]).contains("\\label{eq:ldbb-A150-1}"));
+    let single = of(&["--form", "single", "--rotation", "small-angle"]);
+    assert!(single.contains("e_y0a + cθ_a·(e_y0c"), "{single}");
+    assert!(of(&["--as", "c"]).contains("struct bar_length_errors {"));
+    assert!(of(&["--as", "c", "--angles", "deg"]).contains("double A_deg;"));
+    assert!(of(&["--as", "c", "--layout", "flat"]).contains("void bar_length_columns("));
+    let all = printed(&["equation", text(&plan), "--all", "--order", "first"]);
+    for part in ["test A100", "test C150", "derivatives of the readings", "A100", "√(R_e² − R²)/L_0"] {
+        assert!(all.contains(part), "`{part}` is not in\n{all}");
+    }
+    let refuse = |more: &[&str], parts: &[&str]| refused(&[&a150[..], more].concat(), parts);
+    refuse(&["--width", "84mm"], &["`--width` does not apply to `--as text`", "latex, typst"]);
+    refuse(&["--as", "latex", "--layout", "flat"], &["`--layout` does not apply to `--as latex`", "rust, c, python"]);
+    refuse(&["--as", "c", "--layout", "flat", "--angles", "deg"], &["`--angles` does not apply to `--layout flat`"]);
+    refuse(&["--order", "first", "--form", "groups"], &["`groups`", "first order"]);
+    refused(&["equation", text(&plan), "--all", "--as", "c"], &["`all`", "text, latex or typst"]);
+    for wrong in [&["--width", "84"][..], &["--width", "1mm"]] {
+        let output = abbe(&[&a150[..], &["--as", "latex"], wrong].concat());
+        assert_eq!(output.status.code(), Some(2));
+    }
+    assert_eq!(abbe(&["equation", text(&plan)]).status.code(), Some(2));
 }

@@ -76,7 +76,7 @@ fn printed_effects_run_unchanged() {
     let file = session(folder.path(), EFFECTS);
     let module = folder.path().join("c100.py");
     let names = "EZC~C:h2,bar~time:warmup";
-    let start = ["equation", text(&file), "--test", "C100", "--as", "python", "--gradient"];
+    let start = ["equation", text(&file), "--test", "C100", "--as", "python", "--gradient", "--layout", "flat"];
     printed(&[&start[..], &["--errors", names, "--out", text(&module)]].concat());
     let script = "
 import math, c100

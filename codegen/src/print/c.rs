@@ -3,7 +3,7 @@
 use crate::check::Checked;
 use crate::print::code::{Code, GROUPS, Syntax, functions, lines, name};
 use crate::print::language::Language;
-use crate::print::style::Style;
+use crate::print::style::{Layout, Style};
 use crate::symbol::Unary;
 
 /// C99.
@@ -17,7 +17,7 @@ const SYNTAX: Syntax = Syntax {
         Unary::Step => format!("(double)(({x}) >= 0.0)"),
         other => format!("{}({x})", name(other)),
     },
-    reserved: "",
+    reserved: "nominal value gradient",
 };
 
 /// The advice for a file with square roots.
@@ -25,11 +25,14 @@ const ADVICE: &str = " * Compile with -O3 -fno-math-errno, otherwise the square 
                       loop over readings.\n";
 
 impl Language for C {
-    fn print(&self, checked: &Checked<'_>, _: &Style) -> String {
-        let functions = functions(checked, &SYNTAX);
+    fn print(&self, checked: &Checked<'_>, style: &Style) -> String {
+        let functions = functions(checked, style, &SYNTAX);
         let whole = &functions[functions.len() - 1];
         let header = whole.header(0, ['[', ']']).into_iter();
         let header = lines(header.map(|line| format!(" * {line}").trim_end().to_string()));
+        if style.layout == Layout::Named {
+            return named(&functions, &header);
+        }
         let advice = if whole.program.operations().roots == 0 { "" } else { ADVICE };
         let slopes =
             if whole.gradient { format!(", gradient[(j * {} + k) * n + i]", whole.errors()) } else { String::new() };
@@ -41,6 +44,65 @@ impl Language for C {
             kernels.join("\n")
         )
     }
+}
+
+/// A header with a structure for lengths and positions and one for errors.
+fn named(functions: &[Code<'_>], header: &str) -> String {
+    let code = &functions[0];
+    let name = code.function();
+    let fields = |errors: bool| {
+        let fields = code.named(errors).map(|a| format!("    double {}; /* {} */\n", a.name, a.unit));
+        let fields: String = fields.collect();
+        // A structure without members is not C.
+        if fields.is_empty() { "    double none;\n".to_string() } else { fields }
+    };
+    let guard = name.to_uppercase() + "_H";
+    let mut file = format!(
+        "/*\n{header} * A member that an initialiser does not name is 0.\n */\n\
+         #ifndef {guard}\n#define {guard}\n\n#include <math.h>\n\nstruct {name}_nominal {{\n{}}};\n\n\
+         struct {name}_errors {{\n{}}};\n",
+        fields(false),
+        fields(true)
+    );
+    for code in functions {
+        let several = code.outputs() > 1;
+        let result = if several { ", double value[3]" } else { "" };
+        let slopes = match (code.gradient, several) {
+            (false, _) => String::new(),
+            (true, false) => format!(", struct {name}_errors *gradient"),
+            (true, true) => format!(", struct {name}_errors gradient[3]"),
+        };
+        let returned = if several { "void" } else { "double" };
+        let what = if code.gradient { "Value, and its derivatives by the errors" } else { "Value" };
+        file += &format!(
+            "\n/* {what}. */\nstatic inline {returned} {}(const struct {name}_nominal *nominal, const struct \
+             {name}_errors *errors{result}{slopes})\n{{\n",
+            code.function()
+        );
+        for errors in [false, true] {
+            let group = if errors { "errors" } else { "nominal" };
+            let used = code.named(errors).filter(|argument| code.uses_argument(argument));
+            file += &lines(used.map(|a| format!("    const double {0} = {group}->{0};", a.name)));
+            file += &format!("    (void){group};\n");
+        }
+        let angles = code.of_angles("(3.14159265358979323846 / 180.0)").into_iter();
+        file += &lines(angles.map(|(name, value)| format!("    const double {name} = {value};")));
+        file += &lines(code.assignments("    const double ", ";"));
+        let (values, slopes) = code.results();
+        if several {
+            file += &lines(values.iter().enumerate().map(|(i, value)| format!("    value[{i}] = {value};")));
+        }
+        for (output, slopes) in slopes.chunks(code.errors().max(1)).enumerate() {
+            let to = if several { format!("gradient[{output}].") } else { "gradient->".to_string() };
+            let slopes = code.named(true).zip(slopes);
+            file += &lines(slopes.map(|(argument, slope)| format!("    {to}{} = {slope};", argument.name)));
+        }
+        if code.gradient && code.errors() == 0 {
+            file += "    (void)gradient;\n";
+        }
+        file += &if several { "}\n".to_string() } else { format!("    return {};\n}}\n", values[0]) };
+    }
+    file + "\n#endif\n"
 }
 
 /// What a function computes, and its signature as declaration and as head of the definition.

@@ -5,8 +5,10 @@ use std::ops::Range;
 
 use crate::check::Checked;
 use crate::form::Kind;
+use crate::print::arguments::{self, Argument};
 use crate::print::dialect::{self, Dialect};
 use crate::print::notes;
+use crate::print::style::{Layout, Style};
 use crate::program::{Input, Label, Program};
 use crate::symbol::Unary;
 use crate::variable::{Symbols, Variable, identifier};
@@ -59,6 +61,8 @@ pub(crate) struct Code<'e> {
     steps: Vec<String>,
     /// Index ranges of the lengths, the axes and the errors among the inputs.
     pub(crate) groups: [Range<usize>; 3],
+    /// The arguments by name; empty for arrays.
+    pub(crate) arguments: Vec<Argument>,
     syntax: &'static Syntax,
 }
 
@@ -66,10 +70,10 @@ pub(crate) struct Code<'e> {
 pub(crate) const GROUPS: [&str; 3] = ["lengths", "axes", "errors"];
 
 /// The functions of a file: the value alone and, if requested, value and gradient.
-pub(crate) fn functions<'e>(checked: &'e Checked<'e>, syntax: &'static Syntax) -> Vec<Code<'e>> {
+pub(crate) fn functions<'e>(checked: &'e Checked<'e>, style: &Style, syntax: &'static Syntax) -> Vec<Code<'e>> {
     let gradient = checked.equation.options.gradient.then_some(true);
     let requested = [false].into_iter().chain(gradient);
-    requested.map(|gradient| Code::new(checked, gradient, syntax)).collect()
+    requested.map(|gradient| Code::new(checked, gradient, style, syntax)).collect()
 }
 
 /// Lines, each with a line break at its end.
@@ -78,7 +82,7 @@ pub(crate) fn lines(lines: impl IntoIterator<Item = String>) -> String {
 }
 
 impl<'e> Code<'e> {
-    pub(crate) fn new(checked: &'e Checked<'e>, gradient: bool, syntax: &'static Syntax) -> Self {
+    pub(crate) fn new(checked: &'e Checked<'e>, gradient: bool, style: &Style, syntax: &'static Syntax) -> Self {
         let equation = checked.equation;
         let program = equation.program(gradient);
         let mut taken: HashSet<String> = [RESERVED_WORDS, syntax.reserved]
@@ -96,6 +100,13 @@ impl<'e> Code<'e> {
             free
         };
         let symbols = equation.options.symbols;
+        let mut arguments = Vec::new();
+        if style.layout == Layout::Named {
+            arguments = arguments::of(equation, &program.inputs, style.angles);
+            for argument in &mut arguments {
+                argument.name = name(std::mem::take(&mut argument.name));
+            }
+        }
         let turn = |variable: &Variable| match variable {
             Variable::Position { axis, .. } => identifier(axis),
             other => other.identifier(symbols),
@@ -103,11 +114,15 @@ impl<'e> Code<'e> {
         let inputs: Vec<String> = program
             .inputs
             .iter()
-            .map(|input| {
-                name(match input {
-                    Input::Plain(variable) => variable.identifier(symbols),
-                    Input::Sine(variable) => format!("sin_{}", turn(variable)),
-                    Input::Cosine(variable) => format!("cos_{}", turn(variable)),
+            .enumerate()
+            .map(|(index, input)| {
+                let own = arguments.iter().find(|argument| argument.input() == Some(index));
+                own.map(|argument| argument.name.clone()).unwrap_or_else(|| {
+                    name(match input {
+                        Input::Plain(variable) => variable.identifier(symbols),
+                        Input::Sine(variable) => format!("sin_{}", turn(variable)),
+                        Input::Cosine(variable) => format!("cos_{}", turn(variable)),
+                    })
                 })
             })
             .collect();
@@ -120,6 +135,7 @@ impl<'e> Code<'e> {
             checked,
             gradient,
             syntax,
+            arguments,
             groups: [0..lengths, lengths..all - small, all - small..all],
             program,
             inputs,
@@ -150,6 +166,36 @@ impl<'e> Code<'e> {
         used.map(|(number, index)| (number, self.inputs[index].as_str())).collect()
     }
 
+    /// The arguments that are errors (`true`), or lengths, positions and drivers.
+    pub(crate) fn named(&self, errors: bool) -> impl Iterator<Item = &Argument> {
+        self.arguments.iter().filter(move |argument| argument.error == errors)
+    }
+
+    /// The sines, cosines and angles that the program uses, with their expressions in the arguments.
+    pub(crate) fn of_angles(&self, per_degree: &str) -> Vec<(&str, String)> {
+        let mut found = Vec::new();
+        for argument in &self.arguments {
+            let Some(angle) = &argument.angle else { continue };
+            let name = &argument.name;
+            let radian = if argument.unit == "deg" {
+                format!("{name} {} {per_degree}", self.syntax.times)
+            } else {
+                name.clone()
+            };
+            let of = |function: Unary| (self.syntax.call)(function, &radian);
+            let values = [(angle[0], of(Unary::Sin)), (angle[1], of(Unary::Cos)), (angle[2], radian.clone())];
+            let used = values.into_iter().filter_map(|(index, value)| Some((index.filter(|i| self.uses(*i))?, value)));
+            found.extend(used.map(|(index, value)| (self.inputs[index].as_str(), value)));
+        }
+        found
+    }
+
+    /// Whether the program uses an argument, itself or its sine, cosine or angle.
+    pub(crate) fn uses_argument(&self, argument: &Argument) -> bool {
+        let angle = argument.angle.iter().flatten().flatten().copied();
+        argument.input().into_iter().chain(angle).any(|index| self.uses(index))
+    }
+
     /// Whether the program uses an input.
     pub(crate) fn uses(&self, index: usize) -> bool {
         let steps = self.program.steps.iter().map(|step| &step.value);
@@ -177,8 +223,15 @@ impl<'e> Code<'e> {
         let equation = self.checked.equation;
         let mut lines = notes::title(equation);
         lines.push(String::new());
-        lines.push("Arguments in order:".to_string());
-        for (group, places) in GROUPS.iter().zip(&self.groups) {
+        if self.arguments.is_empty() {
+            lines.push("Arguments in order:".to_string());
+        } else {
+            lines.push("Arguments by name; errors are 0 by default:".to_string());
+            let row = |a: &Argument| format!("  {:<20} {:<4} {}", a.name, a.unit, a.meaning);
+            lines.extend(self.arguments.iter().map(row));
+        }
+        let groups = GROUPS.iter().filter(|_| self.arguments.is_empty());
+        for (group, places) in groups.zip(&self.groups) {
             for (number, index) in places.clone().enumerate() {
                 let input = &self.program.inputs[index];
                 let (unit, meaning) = match input {
@@ -196,11 +249,12 @@ impl<'e> Code<'e> {
             Kind::Coordinates => "the three coordinates read, mm",
             Kind::Volumetric => "the error vector x, y, z, mm",
         };
-        lines.push(format!(
-            "Value: {what}. Gradient: by {}, {} and so on, mm/mm and mm/rad.",
-            at("errors", 0),
-            at("errors", 1)
-        ));
+        lines.push(if self.arguments.is_empty() {
+            let (first, second) = (at("errors", 0), at("errors", 1));
+            format!("Value: {what}. Gradient: by {first}, {second} and so on, mm/mm and mm/rad.")
+        } else {
+            format!("Value: {what}. Gradient: by the errors in their order, mm/mm and mm/rad.")
+        });
         let operations = self.program.operations();
         let functions = match operations.functions {
             0 => String::new(),

@@ -3,7 +3,7 @@
 use crate::check::Checked;
 use crate::print::code::{Code, GROUPS, Syntax, functions, lines, name};
 use crate::print::language::Language;
-use crate::print::style::Style;
+use crate::print::style::{Layout, Style};
 use crate::symbol::Unary;
 
 /// Julia 1.9 or later, without packages.
@@ -18,15 +18,18 @@ const SYNTAX: Syntax = Syntax {
         Unary::Round => format!("round({x}, RoundNearestTiesAway)"),
         other => format!("{}({x})", name(other)),
     },
-    reserved: "baremodule begin column eachcol export first ifelse isa last local macro module outer quote readings \
+    reserved: "kernel baremodule begin column eachcol export first ifelse isa last local macro module outer quote readings \
                reshape stack using zeros",
 };
 
 impl Language for Julia {
-    fn print(&self, checked: &Checked<'_>, _: &Style) -> String {
-        let functions = functions(checked, &SYNTAX);
+    fn print(&self, checked: &Checked<'_>, style: &Style) -> String {
+        let functions = functions(checked, style, &SYNTAX);
         let header = functions[functions.len() - 1].header(1, ['[', ']']).into_iter();
         let header = lines(header.map(|line| format!("# {line}").trim_end().to_string()));
+        if style.layout == Layout::Named {
+            return header + &functions.iter().map(named).collect::<String>();
+        }
         let methods: String = functions.iter().map(|code| single(code) + &columns(code)).collect();
         format!(
             "{header}# axes: a vector for one reading, or a matrix with a row for each input and a column for each \
@@ -34,6 +37,39 @@ impl Language for Julia {
              {methods}"
         )
     }
+}
+
+/// The function with named arguments: numbers or arrays, which broadcast.
+fn named(code: &Code<'_>) -> String {
+    let names: Vec<&str> = code.arguments.iter().map(|argument| argument.name.as_str()).collect();
+    let names = names.join(", ");
+    let defaults = code.arguments.iter().map(|a| if a.error { format!("{} = 0.0", a.name) } else { a.name.clone() });
+    let defaults = defaults.collect::<Vec<_>>().join(", ");
+    let angles = code.of_angles("(pi / 180.0)").into_iter().map(|(name, value)| format!("        {name} = {value}"));
+    let body = lines(angles) + &lines(code.assignments("        ", ""));
+    let (values, slopes) = code.results();
+    let gathered = |items: &[String]| match items {
+        [one] => one.clone(),
+        several => format!("({})", several.join(", ")),
+    };
+    let errors: Vec<&str> = code.named(true).map(|argument| argument.name.as_str()).collect();
+    let row = |slopes: &[String]| {
+        let fields = errors.iter().zip(slopes).map(|(name, slope)| format!("            {name} = {slope},\n"));
+        format!("(;\n{}        )", fields.collect::<String>())
+    };
+    let rows: Vec<String> = slopes.chunks(errors.len().max(1)).map(row).collect();
+    let value = gathered(&values);
+    let (what, result) = if code.gradient {
+        let result = format!("(; value = {value}, gradient = {})", gathered(&rows));
+        ("Named tuple of the value and its derivatives by the errors", result)
+    } else {
+        ("Value", value)
+    };
+    format!(
+        "\n\"{what}, for numbers or for arrays of one shape.\"\nfunction {}(; {defaults})\n    function kernel({names})\n\
+         {body}        return {result}\n    end\n    return kernel.({names})\nend\n",
+        code.function()
+    )
 }
 
 /// The sizes of value and gradient of one reading, each without or with a last index for the reading.

@@ -6,8 +6,9 @@ use crate::check::Checked;
 use crate::print::language::Language;
 use crate::print::notation::{Notation, juxtaposed, rounded};
 use crate::print::style::Style;
+use crate::print::system::{Block, TestEquations};
 use crate::print::tex_width;
-use crate::print::typeset::{Markup, page};
+use crate::print::typeset::{Markup, page, system};
 use crate::symbol::Unary;
 
 /// LaTeX with `amsmath`.
@@ -16,6 +17,9 @@ pub(crate) struct Latex;
 impl Language for Latex {
     fn print(&self, checked: &Checked<'_>, style: &Style) -> String {
         page(checked, style, self, &MARKUP)
+    }
+    fn system(&self, tests: &[TestEquations<'_>], style: &Style) -> Option<String> {
+        Some(system(tests, style, self, &MARKUP))
     }
 }
 
@@ -28,6 +32,8 @@ const MARKUP: Markup = Markup {
     comment: "% ",
     around_sections: ["% Needs \\usepackage{amsmath}.\n\\begingroup\\allowdisplaybreaks\n", "\\endgroup\n"],
     display,
+    heading: ["\\paragraph{", "}\n"],
+    matrix,
     approximately: "\\approx",
     line_break: " \\notag\\\\\n  &\\qquad {} ",
     remark: [" \\quad\\text{", "}"],
@@ -54,6 +60,26 @@ fn display(rows: &[(String, Option<String>)]) -> String {
         rows = rows.replace(" \\notag", "");
     }
     format!("\\begin{{align{star}}}\n{rows}\n\\end{{align{star}}}\n")
+}
+
+/// An array with named rows and columns. A cell of several lines is an array of its own.
+fn matrix(block: &Block) -> String {
+    let cell = |lines: &Vec<String>| match lines.as_slice() {
+        [line] => line.clone(),
+        lines => format!("\\begin{{array}}[t]{{@{{}}l@{{}}}} {} \\end{{array}}", lines.join(" \\\\ {} ")),
+    };
+    let headers: Vec<String> = block.headers.iter().map(|header| format!(" & \\text{{{header}}}")).collect();
+    let row = |(name, cells): &(String, Vec<Vec<String>>)| {
+        let cells: Vec<String> = cells.iter().map(|lines| format!(" & {}", cell(lines))).collect();
+        format!("  {name}{} \\\\\n", cells.concat())
+    };
+    let rows: String = block.rows.iter().map(row).collect();
+    let columns = "l".repeat(block.headers.len());
+    format!(
+        "\\begin{{equation*}}\n\\setlength{{\\arraycolsep}}{{3pt}}\n\\begin{{array}}{{@{{}}l|{columns}@{{}}}}\n  {} \\\\ \\hline\n\
+         {rows}\\end{{array}}\n\\end{{equation*}}\n",
+        headers.concat()
+    )
 }
 
 impl Notation for Latex {
@@ -139,12 +165,22 @@ impl Notation for Latex {
 /// Escapes the special characters of TeX.
 fn escape(text: &str) -> String {
     let mut escaped = String::new();
-    for character in text.chars() {
+    let mut characters = text.chars().peekable();
+    while let Some(character) = characters.next() {
         match character {
-            '_' | '&' | '%' | '#' | '$' | '{' | '}' => escaped.extend(['\\', character]),
+            // An identifier breaks behind its parts.
+            '_' | '~' => escaped.push_str(if character == '_' {
+                "\\_\\allowbreak{}"
+            } else {
+                "\\textasciitilde{}\\allowbreak{}"
+            }),
+            ':' | '.' if characters.peek().is_some_and(|next| next.is_alphabetic()) => {
+                escaped.extend([character]);
+                escaped.push_str("\\allowbreak{}");
+            }
+            '&' | '%' | '#' | '$' | '{' | '}' => escaped.extend(['\\', character]),
             '\\' => escaped.push_str("\\textbackslash{}"),
             '^' => escaped.push_str("\\textasciicircum{}"),
-            '~' => escaped.push_str("\\textasciitilde{}"),
             '·' => escaped.push_str("$\\cdot$"),
             '×' => escaped.push_str("$\\times$"),
             '±' => escaped.push_str("$\\pm$"),

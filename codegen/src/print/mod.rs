@@ -2,6 +2,7 @@
 //!
 //! A new language is a file that implements [`Language`] and a line in [`LANGUAGES`].
 
+mod arguments;
 mod article;
 mod c;
 mod code;
@@ -15,6 +16,8 @@ mod notes;
 mod python;
 mod rust;
 mod style;
+mod symbolic;
+mod system;
 mod tex_width;
 mod text;
 mod typeset;
@@ -29,6 +32,7 @@ use crate::form::{Kind, Order};
 
 pub use language::Language;
 pub use style::{AngleUnit, Layout, Numbering, Style};
+pub use system::TestEquations;
 
 /// Whom a language addresses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,8 +43,10 @@ pub enum Audience {
     Authors,
     /// Compilers and interpreters: code with value and derivatives.
     Compilers,
+    /// Computer algebra: functions of named symbols.
+    Algebra,
 }
-use Audience::{Authors, Compilers, Readers};
+use Audience::{Algebra, Authors, Compilers, Readers};
 
 /// One line of the registry.
 pub struct OutputLanguage {
@@ -63,6 +69,8 @@ pub const LANGUAGES: &[OutputLanguage] = &[
     entry("python", "py", Compilers, &python::Python),
     entry("matlab", "m", Compilers, &matlab::Matlab),
     entry("julia", "jl", Compilers, &julia::Julia),
+    entry("sympy", "py", Algebra, &symbolic::SymPy),
+    entry("casadi", "py", Algebra, &symbolic::CasAdi),
 ];
 
 const fn entry(
@@ -89,10 +97,29 @@ impl OutputLanguage {
     /// # Errors
     /// If the language is for readers and the form is readable only as code: a curve, or derivatives of most forms.
     pub fn print(&self, checked: &Checked<'_>, style: &Style) -> Result<String, CodegenError> {
-        if self.audience != Compilers {
+        if matches!(self.audience, Readers | Authors) {
             refuse_unreadable(checked.equation)?;
         }
-        Ok(self.language.print(checked, style))
+        let named = Style { layout: Layout::Named, ..*style };
+        Ok(self.language.print(checked, if self.audience == Algebra { &named } else { style }))
+    }
+}
+
+impl OutputLanguage {
+    /// Prints the equations of all tests of a session, and their sensitivities as a matrix.
+    ///
+    /// # Errors
+    /// As [`OutputLanguage::print`]; also if the language is for compilers.
+    pub fn print_system(&self, tests: &[TestEquations<'_>], style: &Style) -> Result<String, CodegenError> {
+        for test in tests {
+            if matches!(self.audience, Readers | Authors) {
+                refuse_unreadable(test.equation.equation)?;
+            }
+        }
+        self.language.system(tests, style).ok_or_else(|| CodegenError::NoSuchForm {
+            form: "all",
+            why: format!("is written as {} only", words(|entry| matches!(entry.audience, Readers | Authors), "or")),
+        })
     }
 }
 

@@ -3,20 +3,44 @@
 use crate::check::Checked;
 use crate::print::code::{Code, GROUPS, Syntax, functions, lines, name};
 use crate::print::language::Language;
-use crate::print::style::Style;
+use crate::print::style::{Layout, Style};
 
 /// Rust without dependencies.
 pub(crate) struct Rust;
 
-const SYNTAX: Syntax =
-    Syntax { times: "*", over: "/", call: |function, x| format!("elementary::{}({x})", name(function)), reserved: "" };
+const SYNTAX: Syntax = Syntax {
+    times: "*",
+    over: "/",
+    call: |function, x| format!("elementary::{}({x})", name(function)),
+    reserved: "nominal elementary",
+};
 
 impl Language for Rust {
-    fn print(&self, checked: &Checked<'_>, _: &Style) -> String {
-        let functions = functions(checked, &SYNTAX);
+    fn print(&self, checked: &Checked<'_>, style: &Style) -> String {
+        let functions = functions(checked, style, &SYNTAX);
         let whole = &functions[functions.len() - 1];
         let header = whole.header(0, ['[', ']']).into_iter();
         let mut file = lines(header.map(|line| format!("//! {line}").trim_end().to_string())) + "\n";
+        if style.layout == Layout::Named {
+            let structures = [
+                (false, "Lengths, positions and drivers; all of them are stated.", ""),
+                (true, "Errors.", ", Default"),
+            ];
+            for (errors, what, derived) in structures {
+                let name = if errors { "Errors" } else { "Nominal" };
+                let fields = whole
+                    .named(errors)
+                    .map(|a| format!("    /// {}, {}.\n    pub {}: f64,\n", a.meaning, a.unit, a.name));
+                file += &format!(
+                    "/// {what}\n#[allow(non_snake_case)]\n#[derive(Clone, Copy, Debug, PartialEq{derived})]\npub struct {name} \
+                     {{\n{}}}\n\n",
+                    fields.collect::<String>()
+                );
+            }
+            file += &functions.iter().map(named).collect::<Vec<_>>().join("\n");
+            file.push('\n');
+            return file + &elementary(whole);
+        }
         let axes = if checked.equation.options.effects.is_empty() {
             "Positions of moving axes: sine and cosine of a rotary one."
         } else {
@@ -49,6 +73,44 @@ fn gathered(items: &[String]) -> String {
         [one] => one.clone(),
         several => format!("[{}]", several.join(", ")),
     }
+}
+
+/// The function with named arguments.
+fn named(code: &Code<'_>) -> String {
+    let (returned, what) = if code.gradient {
+        (format!("({}, {})", shape(code, "f64"), shape(code, "Errors")), "Value, and its derivatives by the errors")
+    } else {
+        (shape(code, "f64"), "Value")
+    };
+    let mut text = format!(
+        "/// {what}.\n#[allow(non_snake_case, unused_variables)]\n#[must_use]\npub fn {}(nominal: &Nominal, errors: &Errors) -> {returned} {{\n",
+        code.function()
+    );
+    for errors in [false, true] {
+        let group = if errors { "Errors" } else { "Nominal" };
+        let used = code.named(errors).filter(|argument| code.uses_argument(argument));
+        let names: Vec<&str> = used.map(|argument| argument.name.as_str()).collect();
+        let names = names.iter().map(|name| format!("{name}, ")).collect::<String>();
+        text += &format!("    let {group} {{ {names}.. }} = *{};\n", group.to_lowercase());
+    }
+    let angles = code.of_angles("(core::f64::consts::PI / 180.0)").into_iter();
+    text += &lines(angles.map(|(name, value)| format!("    let {name} = {value};")));
+    text += &lines(code.assignments("    let ", ";"));
+    let (values, slopes) = code.results();
+    let mut value = gathered(&values);
+    if code.gradient {
+        let row = |slopes: &[String]| {
+            let fields = code.named(true).zip(slopes);
+            let fields = fields.map(|(argument, slope)| format!("        {}: {slope},\n", argument.name));
+            format!("Errors {{\n{}    }}", fields.collect::<String>())
+        };
+        let rows: Vec<String> = match code.errors() {
+            0 => vec!["Errors {}".to_string(); code.outputs()],
+            errors => slopes.chunks(errors).map(row).collect(),
+        };
+        value = format!("({value}, {})", gathered(&rows));
+    }
+    text + &format!("    {value}\n}}\n")
 }
 
 /// The function for one reading.
@@ -173,7 +235,8 @@ value: &mut [&mut [f64]; {outputs}]{slopes}) {{
 /// The functions that `core` lacks, if the code calls them.
 fn elementary(code: &Code<'_>) -> String {
     let (values, slopes) = code.results();
-    let text = [code.assignments("", ""), values, slopes].concat().concat();
+    let angles = code.of_angles("").into_iter().map(|(_, value)| value).collect();
+    let text = [code.assignments("", ""), values, slopes, angles].concat().concat();
     let functions = [
         ("sqrt", "x.sqrt()"),
         ("sin", "x.sin()"),

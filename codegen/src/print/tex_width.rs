@@ -95,7 +95,7 @@ impl Measure<'_> {
             "bigl" | "bigr" => 60.0,
             "quad" => 1000.0,
             "qquad" => 2000.0,
-            "notag" | "label" => 0.0,
+            "notag" | "label" | "allowbreak" => 0.0,
             "approx" => 1333.0,
             "cdot" => 722.0,
             "times" => 1222.0,

@@ -10,6 +10,7 @@ use crate::print::language::Language;
 use crate::print::notation::{Notation, Spelling, rounded};
 use crate::print::notes;
 use crate::print::style::Style;
+use crate::print::system::{self, TestEquations};
 use crate::symbol::Unary;
 use crate::tree::terms_of;
 use crate::variable::{Symbols, Variable};
@@ -76,37 +77,96 @@ impl Notation for Text {
 
 impl Language for Text {
     fn print(&self, checked: &Checked<'_>, _: &Style) -> String {
-        let equation = checked.equation;
-        let article = Article::new(equation);
-        let spelling = Spelling::new(self, &article.program, equation);
-        let width = |text: &str| text.chars().count();
-        let mut page = notes::title(equation).join("\n") + "\n";
-        for section in &article.sections {
-            page.extend(["\n", &section.heading, "\n"]);
-            let lefts: Vec<String> = section.rows.iter().map(|row| spelling.left(&row.left)).collect();
-            let widest = lefts.iter().map(|left| width(left)).max().unwrap_or(0);
-            let next_line = format!("\n  {}     ", " ".repeat(widest));
-            for (row, left) in section.rows.iter().zip(&lefts) {
-                let relation = if row.approximate { "≈" } else { "=" };
-                let gap = " ".repeat(widest - width(left));
-                let right = dialect::lines(&terms_of(&row.right), &spelling, [WIDTH; 2], width).join(&next_line);
-                let remark = match &row.remark {
-                    None => String::new(),
-                    Some(NoteKind::NotObservable) => "   (not observable)".to_string(),
-                    Some(NoteKind::MultipleOf(other)) => {
-                        format!("   (a constant multiple of that of {})", spelling.variable(other))
-                    }
-                };
-                page += &format!("  {left}{gap} {relation} {right}{remark}\n");
-            }
-        }
+        let mut page = notes::title(checked.equation).join("\n") + "\n";
+        let article = Article::new(checked.equation);
+        page.push_str(&sections(checked, &article));
         page.push_str("\nsymbols\n");
-        for (symbol, meaning, unit) in &article.symbols {
-            let names = spelling.names(symbol, ", ");
-            let gap = " ".repeat(10_usize.saturating_sub(width(&names)));
-            page += &format!("  {names}{gap} {unit:<4} {meaning}\n");
-        }
+        page.extend(symbols(checked, &article));
         page.extend(["\n", &notes::notes(checked).join("\n"), "\n"]);
         page
     }
+
+    fn system(&self, tests: &[TestEquations<'_>], _: &Style) -> Option<String> {
+        let (mut page, mut names, mut remarks) = (String::new(), Vec::new(), String::new());
+        for test in tests {
+            let equation = test.equation.equation;
+            let name = equation.name.as_deref().unwrap_or_default();
+            let article = Article::new(equation);
+            page += &format!("test {name}\n{}\n", sections(test.equation, &article));
+            remarks += &format!("{name}: {}\n", notes::notes(test.equation).join("\n  "));
+            for row in symbols(test.equation, &article) {
+                if !names.contains(&row) {
+                    names.push(row);
+                }
+            }
+        }
+        page += "derivatives of the readings by the errors, at zero errors\n";
+        for block in system::blocks(tests, self, WIDTH, width) {
+            let head = (String::new(), block.headers.iter().map(|header| vec![header.clone()]).collect());
+            let rows: Vec<&(String, Vec<Vec<String>>)> = std::iter::once(&head).chain(&block.rows).collect();
+            let widest = |column: usize| {
+                let lines = rows.iter().flat_map(|(_, cells)| &cells[column]);
+                lines.map(|line| width(line)).max().unwrap_or(0)
+            };
+            let widths: Vec<usize> = (0..block.headers.len()).map(widest).collect();
+            for (name, cells) in rows {
+                let height = cells.iter().map(Vec::len).max().unwrap_or(1);
+                for line in 0..height {
+                    let mut text = padded(if line == 0 { name } else { "" }, 10);
+                    for (cell, width) in cells.iter().zip(&widths) {
+                        text += &padded(cell.get(line).map_or("", String::as_str), width + 3);
+                    }
+                    page.extend(["  ", text.trim_end(), "\n"]);
+                }
+            }
+            page.push('\n');
+        }
+        page.push_str("symbols\n");
+        page.extend(names);
+        page.extend(["\n", &remarks]);
+        Some(page)
+    }
+}
+
+fn width(text: &str) -> usize {
+    text.chars().count()
+}
+
+fn padded(text: &str, to: usize) -> String {
+    format!("{text}{}", " ".repeat(to.saturating_sub(width(text))))
+}
+
+/// The equations under their headings, aligned at their relations.
+fn sections(checked: &Checked<'_>, article: &Article) -> String {
+    let spelling = Spelling::new(&Text, &article.program, checked.equation);
+    let mut page = String::new();
+    for section in article.displayed(checked.equation) {
+        page.extend(["\n", &section.heading, "\n"]);
+        let lefts: Vec<String> = section.rows.iter().map(|row| spelling.left(&row.left)).collect();
+        let widest = lefts.iter().map(|left| width(left)).max().unwrap_or(0);
+        let next_line = format!("\n  {}     ", " ".repeat(widest));
+        for (row, left) in section.rows.iter().zip(&lefts) {
+            let relation = if row.approximate { "≈" } else { "=" };
+            let left = padded(left, widest);
+            let right = dialect::lines(&terms_of(&row.right), &spelling, [WIDTH; 2], width).join(&next_line);
+            let remark = match &row.remark {
+                None => String::new(),
+                Some(NoteKind::NotObservable) => "   (not observable)".to_string(),
+                Some(NoteKind::MultipleOf(other)) => {
+                    format!("   (a constant multiple of that of {})", spelling.variable(other))
+                }
+            };
+            page += &format!("  {left} {relation} {right}{remark}\n");
+        }
+    }
+    page
+}
+
+/// The lines of the table of symbols.
+fn symbols(checked: &Checked<'_>, article: &Article) -> Vec<String> {
+    let spelling = Spelling::new(&Text, &article.program, checked.equation);
+    let row = |(symbol, meaning, unit): &(_, String, &str)| {
+        format!("  {} {unit:<4} {meaning}\n", padded(&spelling.names(symbol, ", "), 10))
+    };
+    article.symbols.iter().map(row).collect()
 }

@@ -8,6 +8,7 @@ use crate::print::dialect;
 use crate::print::notation::{Notation, PRODUCT, Spelling};
 use crate::print::notes;
 use crate::print::style::{Numbering, Style};
+use crate::print::system::{self, Block, TestEquations};
 use crate::print::tex_width::POINTS_PER_MM;
 use crate::tree::terms_of;
 
@@ -27,6 +28,10 @@ pub(crate) struct Markup {
     pub(crate) around_sections: [&'static str; 2],
     /// The displayed equations: each its text and, if it has a number, its label.
     pub(crate) display: fn(&[(String, Option<String>)]) -> String,
+    /// Around the heading of a test or of the matrix.
+    pub(crate) heading: [&'static str; 2],
+    /// A block of the matrix of sensitivities.
+    pub(crate) matrix: fn(&Block) -> String,
     /// The sign of an approximation.
     pub(crate) approximately: &'static str,
     /// Between the lines of one equation.
@@ -52,61 +57,118 @@ const LINES: usize = 34;
 
 /// The page of an equation.
 pub(crate) fn page(checked: &Checked<'_>, style: &Style, notation: &impl Notation, markup: &Markup) -> String {
-    let equation = checked.equation;
-    let article = Article::new(equation);
-    let spelling = Spelling::new(notation, &article.program, equation);
-    let width = (style.width_mm.unwrap_or(markup.width_mm) * POINTS_PER_MM * 100.0) as usize;
-    let comments = |lines: Vec<String>| -> String {
-        lines.into_iter().map(|line| format!("{}{line}\n", markup.comment)).collect()
-    };
-    let mut page = comments(notes::title(equation));
+    let article = Article::new(checked.equation);
+    let spelling = Spelling::new(notation, &article.program, checked.equation);
+    let mut page = comments(markup, notes::title(checked.equation));
     page.push_str(markup.around_sections[0]);
-    let label = notes::label(equation);
-    let mut number = 0;
-    // The reading is the last output; coefficients follow it.
-    let reading = |row: &EquationLine| matches!(row.left, LeftSide::Output(_));
-    let count = article.sections.iter().flat_map(|section| &section.rows).filter(|row| reading(row)).count();
-    let mut readings = 0;
-    for section in &article.sections {
-        let lefts = section.rows.iter().map(|row| (markup.measure)(&spelling.left(&row.left)));
-        let taken = lefts.max().unwrap_or(0) + RELATION + if style.numbering == Numbering::None { 0 } else { NUMBER };
-        let rows: Vec<(String, Option<String>)> = section
-            .rows
-            .iter()
-            .map(|row| {
-                readings += usize::from(reading(row));
-                let last = reading(row) && readings == count;
-                let numbered = match style.numbering {
-                    Numbering::None => None,
-                    _ if last => Some(label.clone()),
-                    Numbering::Last => None,
-                    Numbering::All => {
-                        number += 1;
-                        Some(format!("{label}-{number}"))
-                    }
-                };
-                (line(row, &spelling, markup, width.saturating_sub(taken)), numbered)
-            })
-            .collect();
-        let heading = (markup.escape)(&capital(&section.heading));
-        page.push_str(&format!("{heading}:\n{}", (markup.display)(&rows)));
-    }
+    page.push_str(&sections(checked, &article, &spelling, style, markup));
     page.push_str(markup.around_sections[1]);
     if style.nomenclature {
-        page.push_str(&nomenclature(&article, &spelling, markup, width));
+        page.push_str(&nomenclature(symbols(&article, &spelling, markup), markup, width(style, markup)));
     }
-    page.push_str(&comments(notes::notes(checked)));
+    page.push_str(&comments(markup, notes::notes(checked)));
     page.replace(PRODUCT, " ")
 }
 
-/// The table of all symbols.
-fn nomenclature<N: Notation>(article: &Article, spelling: &Spelling<'_, N>, markup: &Markup, width: usize) -> String {
-    let [before, between, after] = markup.cells;
+/// The page of all tests: their equations, and the matrix of their sensitivities.
+pub(crate) fn system(tests: &[TestEquations<'_>], style: &Style, notation: &impl Notation, markup: &Markup) -> String {
+    let mut page = markup.around_sections[0].to_string();
+    let mut names: Vec<(String, String, &str)> = Vec::new();
+    let mut remarks = String::new();
+    for test in tests {
+        let equation = test.equation.equation;
+        let article = Article::new(equation);
+        let spelling = Spelling::new(notation, &article.program, equation);
+        let name = (markup.escape)(equation.name.as_deref().unwrap_or_default());
+        page.push_str(&format!("{}Test {name}{}", markup.heading[0], markup.heading[1]));
+        page.push_str(&sections(test.equation, &article, &spelling, style, markup));
+        for row in symbols(&article, &spelling, markup) {
+            if !names.contains(&row) {
+                names.push(row);
+            }
+        }
+        remarks.push_str(&comments(markup, notes::title(equation)));
+        remarks.push_str(&comments(markup, notes::notes(test.equation)));
+    }
+    let width = width(style, markup);
+    let [before, after] = markup.heading;
+    page.push_str(&format!("{before}Derivatives of the readings by the errors, at zero errors{after}"));
+    for mut block in system::blocks(tests, notation, width, markup.measure) {
+        block.headers = block.headers.iter().map(|header| (markup.escape)(header)).collect();
+        page.push_str(&(markup.matrix)(&block));
+    }
+    page.push_str(markup.around_sections[1]);
+    if style.nomenclature {
+        page.push_str(&nomenclature(names, markup, width));
+    }
+    page.push_str(&remarks);
+    page.replace(PRODUCT, " ")
+}
+
+/// The available width, 1/100 pt.
+fn width(style: &Style, markup: &Markup) -> usize {
+    (style.width_mm.unwrap_or(markup.width_mm) * POINTS_PER_MM * 100.0) as usize
+}
+
+fn comments(markup: &Markup, lines: Vec<String>) -> String {
+    lines.into_iter().map(|line| format!("{}{line}\n", markup.comment)).collect()
+}
+
+/// The displayed equations under their headings.
+fn sections<N: Notation>(
+    checked: &Checked<'_>,
+    article: &Article,
+    spelling: &Spelling<'_, N>,
+    style: &Style,
+    markup: &Markup,
+) -> String {
+    let width = width(style, markup);
+    let label = notes::label(checked.equation);
+    // The reading is the last output; coefficients follow it.
+    let reading = |row: &EquationLine| matches!(row.left, LeftSide::Output(_));
+    let count = article.sections.iter().flat_map(|section| &section.rows).filter(|row| reading(row)).count();
+    let (mut number, mut readings) = (0, 0);
+    let mut text = String::new();
+    for section in article.displayed(checked.equation) {
+        let lefts = section.rows.iter().map(|row| (markup.measure)(&spelling.left(&row.left)));
+        let taken = lefts.max().unwrap_or(0) + RELATION + if style.numbering == Numbering::None { 0 } else { NUMBER };
+        let numbered = |row: &EquationLine| {
+            readings += usize::from(reading(row));
+            let last = reading(row) && readings == count;
+            let label = match style.numbering {
+                Numbering::None => None,
+                _ if last => Some(label.clone()),
+                Numbering::Last => None,
+                Numbering::All => {
+                    number += 1;
+                    Some(format!("{label}-{number}"))
+                }
+            };
+            (line(row, spelling, markup, width.saturating_sub(taken)), label)
+        };
+        let rows: Vec<(String, Option<String>)> = section.rows.iter().map(numbered).collect();
+        let heading = (markup.escape)(&capital(&section.heading));
+        text.push_str(&format!("{heading}:\n{}", (markup.display)(&rows)));
+    }
+    text
+}
+
+/// All symbols: names, meaning, unit.
+fn symbols<N: Notation>(
+    article: &Article,
+    spelling: &Spelling<'_, N>,
+    markup: &Markup,
+) -> Vec<(String, String, &'static str)> {
     let inputs = article
         .symbols
         .iter()
         .map(|(symbol, meaning, unit)| (spelling.names(symbol, markup.names), meaning.clone(), *unit));
-    let rows: Vec<(String, String, &str)> = inputs.chain(article.quantities(spelling)).collect();
+    inputs.chain(article.quantities(spelling)).collect()
+}
+
+/// The table of all symbols.
+fn nomenclature(rows: Vec<(String, String, &str)>, markup: &Markup, width: usize) -> String {
+    let [before, between, after] = markup.cells;
     let widest = rows.iter().map(|(names, ..)| (markup.measure)(names)).max().unwrap_or(0);
     let meanings = width.saturating_sub(widest + UNIT_COLUMN).max(8000) / 100;
     // Rows of a table that fit a column of a page: a meaning takes as many lines as its width needs.

@@ -6,7 +6,8 @@ use crate::check::Checked;
 use crate::print::language::Language;
 use crate::print::notation::{Notation, PRODUCT, juxtaposed, rounded};
 use crate::print::style::Style;
-use crate::print::typeset::{Markup, page};
+use crate::print::system::{Block, TestEquations};
+use crate::print::typeset::{Markup, page, system};
 use crate::symbol::Unary;
 
 /// Typst.
@@ -15,6 +16,9 @@ pub(crate) struct Typst;
 impl Language for Typst {
     fn print(&self, checked: &Checked<'_>, style: &Style) -> String {
         page(checked, style, self, &MARKUP)
+    }
+    fn system(&self, tests: &[TestEquations<'_>], style: &Style) -> Option<String> {
+        Some(system(tests, style, self, &MARKUP))
     }
 }
 
@@ -26,6 +30,8 @@ const MARKUP: Markup = Markup {
     comment: "// ",
     around_sections: ["", "\n"],
     display,
+    heading: ["*", "*\n\n"],
+    matrix,
     approximately: "approx",
     line_break: " \\\n  & quad ",
     remark: [" quad #[", "]"],
@@ -50,6 +56,21 @@ fn display(rows: &[(String, Option<String>)]) -> String {
         };
     }
     text
+}
+
+/// A table with named rows and columns.
+fn matrix(block: &Block) -> String {
+    let headers: Vec<String> = block.headers.iter().map(|header| format!(", [{header}]")).collect();
+    let row = |(name, cells): &(String, Vec<Vec<String>>)| {
+        let cells: Vec<String> = cells.iter().map(|lines| format!(", [${}$]", lines.join("$ \\ $"))).collect();
+        format!("  [${name}$]{},\n", cells.concat())
+    };
+    let rows: String = block.rows.iter().map(row).collect();
+    let columns = block.headers.len() + 1;
+    format!(
+        "#table(\n  columns: {columns}, stroke: none, inset: 3pt,\n  []{}, table.hline(),\n{rows})\n",
+        headers.concat()
+    )
 }
 
 impl Notation for Typst {

@@ -264,7 +264,7 @@ fn an_equation_names_driven_errors_and_their_drivers() {
         assert!(text.contains(line), "`{line}` is not in\n{text}");
     }
     let latex = printed(&equation, &Bar, "latex");
-    assert!(latex.contains("e_{zc} &= k_{1} \\cos (2 \\theta_{c}) + k_{2} \\sin (2 \\theta_{c})"), "{latex}");
+    assert!(latex.contains("e_{zc} &= k_{1} \\cos(2 \\theta_{c}) + k_{2} \\sin(2 \\theta_{c})"), "{latex}");
 }
 
 /// A first-order harmonic in X and Y of C is confounded with the eccentricity of the ball: the same column twice.

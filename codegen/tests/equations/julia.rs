@@ -5,9 +5,11 @@ use std::collections::HashMap;
 use std::fmt::Write;
 use std::process::Command;
 
-use crate::programs::{Printed, all, check_all, points, sizes};
+use abbe_codegen::print::Layout;
+
+use crate::programs::{Printed, all, check_all, laid_out, points, sizes};
 use crate::tools;
-use crate::topologies::disagreement;
+use crate::topologies::{Case, disagreement};
 
 /// Both methods of value and gradient, by Julia 1.9 or later.
 #[test]
@@ -65,6 +67,46 @@ fn read_by_the_rules_of_julia() {
         let worst = disagreement(&printed.cases, &found, true);
         assert!(worst <= 1e-12, "{}: {worst:e}", printed.name);
     }
+}
+
+/// As above for the functions with named arguments.
+#[test]
+fn named_read_by_the_rules_of_julia() {
+    for printed in laid_out("julia", Layout::Named) {
+        let found: Vec<Vec<f64>> = printed.cases.iter().map(|case| evaluate_named(&printed, case)).collect();
+        let worst = disagreement(&printed.cases, &found, true);
+        assert!(worst <= 1e-12, "{}: {worst:e}", printed.name);
+    }
+}
+
+/// Value and derivatives by the kernel of `…_gradient` with named arguments.
+fn evaluate_named(printed: &Printed, case: &Case) -> Vec<f64> {
+    let arguments = printed.named(case);
+    let list = |text: &str, start: &str| -> Vec<String> {
+        let (_, rest) = text.split_once(start).expect("a list");
+        let (list, _) = rest.split_once(')').expect("its end");
+        list.split(", ").map(|item| item.split(" = ").next().unwrap_or_default().to_string()).collect()
+    };
+    let (_, text) = printed.text.split_once(&format!("function {}_gradient(; ", printed.function)).expect("it");
+    let names: Vec<String> = arguments.iter().map(|(name, _)| name.clone()).collect();
+    assert_eq!(list(&format!("({text}"), "("), names);
+    assert_eq!(list(text, "function kernel("), names);
+    assert_eq!(list(text, "return kernel.("), names);
+    let (_, body) = text.split_once("function kernel(").expect("the kernel");
+    let (steps, result) = body.split_once("        return (; value = ").expect("its result");
+    let mut names: HashMap<String, Vec<f64>> = arguments.into_iter().map(|(name, value)| (name, vec![value])).collect();
+    for line in steps.lines().skip(1) {
+        let (name, value) = line.trim().split_once(" = ").expect("an assignment");
+        let value = Reader { rest: value, names: &names }.whole();
+        assert!(names.insert(name.to_string(), vec![value]).is_none(), "{name} is assigned twice");
+    }
+    let (values, gradient) = result.split_once(", gradient = ").expect("a gradient");
+    let mut read = |text: &str| Reader { rest: text, names: &names }.whole();
+    let values = if printed.cases[0].values.len() > 1 { &values[1..values.len() - 1] } else { values };
+    let mut found: Vec<f64> = values.split(", ").map(&mut read).collect();
+    let slopes = gradient.lines().filter_map(|line| line.trim().strip_suffix(',')?.split_once(" = "));
+    found.extend(slopes.map(|(_, slope)| read(slope)));
+    found
 }
 
 /// Value and derivatives by the method of `…_gradient` for one reading.

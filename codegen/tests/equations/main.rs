@@ -8,6 +8,7 @@ mod compiled;
 mod effects;
 mod forms;
 mod julia;
+mod named;
 mod operators;
 mod probe;
 mod programs;

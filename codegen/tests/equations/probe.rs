@@ -1,7 +1,7 @@
 //! Tests of the probe's reading against geometry with 4 × 4 matrices: the intersection of the probing line with the
 //! cylinder, found by bisection.
 
-use abbe_codegen::print::Style;
+use abbe_codegen::print::{Layout, Style};
 use abbe_codegen::program::Input;
 use abbe_codegen::{CodegenError, Equation, Options, Order, Source, Subject, Variable, check};
 use abbe_model::axis::AxisKind;
@@ -350,7 +350,12 @@ fn a_direction_that_the_table_tilts_away_from_has_no_first_order() {
 }
 
 /// Printed code to compile and run: every language, with the values that dual numbers confirmed to 1e-12.
-pub fn printed(language: &str, count: usize, random: &mut impl rand::Rng) -> Vec<(String, String, Vec<Case>)> {
+pub fn printed(
+    language: &str,
+    layout: Layout,
+    count: usize,
+    random: &mut impl rand::Rng,
+) -> Vec<(String, String, Vec<Case>, Vec<Input>)> {
     let mut printed = Vec::new();
     for stated in [false, true] {
         let touch = Touch { stated };
@@ -366,8 +371,8 @@ pub fn printed(language: &str, count: usize, random: &mut impl rand::Rng) -> Vec
                 cases.push(Case { arguments, values: found[..1].to_vec(), gradient: found[1..].to_vec() });
             }
         }
-        let text = support::printed(&equation, &touch, language);
-        printed.push((format!("probe_{}", usize::from(stated)), text, cases));
+        let text = support::laid_out(&equation, &touch, language, layout);
+        printed.push((format!("probe_{}", usize::from(stated)), text, cases, equation.inputs()));
     }
     printed
 }

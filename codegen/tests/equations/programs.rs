@@ -1,8 +1,10 @@
 //! Equations to print, compile and run, and the values that their code must give: every topology of Table 1.1 at random
 //! errors of 0.1 rad and 10 mm, value and gradient.
 
+use abbe_codegen::print::Layout;
 use abbe_codegen::program::Input;
 use abbe_codegen::{Equation, Options, ToolPoint, Variable};
+use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::driver::{Driver, DriverPart};
@@ -24,10 +26,48 @@ pub struct Printed {
     pub function: &'static str,
     pub text: String,
     pub cases: Vec<Case>,
+    /// The inputs to which the arguments of the cases belong.
+    pub inputs: Vec<Input>,
+}
+
+impl Printed {
+    /// The arguments of a case by name: lengths and parameters by their names, positions with their unit.
+    pub fn named(&self, case: &Case) -> Vec<(String, f64)> {
+        let values = case.arguments.concat();
+        let mut named = Vec::new();
+        for (index, (input, value)) in self.inputs.iter().zip(&values).enumerate() {
+            let name = match input {
+                Input::Sine(Variable::Position { axis, .. }) => {
+                    named.push((format!("{axis}_rad"), value.atan2(values[index + 1])));
+                    continue;
+                }
+                Input::Sine(_) | Input::Cosine(_) => continue,
+                Input::Plain(Variable::Position { axis, kind }) => match kind {
+                    AxisKind::Linear => format!("{axis}_mm"),
+                    AxisKind::Rotary => continue,
+                },
+                Input::Plain(Variable::Driver(quantity)) => quantity.identifier.clone(),
+                Input::Plain(Variable::Coefficient(coefficient)) => format!("k_{}", coefficient.number),
+                Input::Plain(variable) => variable.name().replace('.', "_"),
+            };
+            named.push((name, *value));
+        }
+        named
+    }
+
+    /// Number of arguments by name that are errors, instrument parameters or coefficients.
+    pub fn errors(&self) -> usize {
+        self.cases[0].arguments[2].len()
+    }
 }
 
 /// The equations of every topology, of operators, of effects and of probes, in a language.
 pub fn all(language: &str) -> Vec<Printed> {
+    laid_out(language, Layout::Flat)
+}
+
+/// As [`all`], with arguments as arrays or by name.
+pub fn laid_out(language: &str, layout: Layout) -> Vec<Printed> {
     let mut random = rand_pcg::Pcg64::seed_from_u64(11);
     let mut printed = Vec::new();
     for code in CODES {
@@ -41,31 +81,35 @@ pub fn all(language: &str) -> Vec<Printed> {
             };
             let equation = equation.expect("an equation");
             let (kind, function, text) = match what {
-                What::Bar => ("bar", "bar_length", support::printed(&equation, &AnyBar, language)),
-                What::Volumetric => ("vol", "volumetric_error", support::printed(&equation, &ToolPoint, language)),
+                What::Bar => ("bar", "bar_length", support::laid_out(&equation, &AnyBar, language, layout)),
+                What::Volumetric => {
+                    ("vol", "volumetric_error", support::laid_out(&equation, &ToolPoint, language, layout))
+                }
             };
             printed.push(Printed {
                 name: format!("{kind}_{}", short(code)),
                 function,
                 text,
+                inputs: equation.inputs(),
                 cases: cases(what, &machine, &errors, CASES, &mut random),
             });
         }
     }
-    printed.extend(operators(language, &mut random));
-    printed.push(effects(language, &mut random));
-    let probes = crate::probe::printed(language, CASES, &mut random);
-    printed.extend(probes.into_iter().map(|(name, text, cases)| Printed {
+    printed.extend(operators(language, layout, &mut random));
+    printed.push(effects(language, layout, &mut random));
+    let probes = crate::probe::printed(language, layout, CASES, &mut random);
+    printed.extend(probes.into_iter().map(|(name, text, cases, inputs)| Printed {
         name,
         function: "probe_distance",
         text,
         cases,
+        inputs,
     }));
     printed
 }
 
 /// Compound operands under every operator: three coordinates, each shifted by one of three errors.
-fn operators(language: &str, random: &mut impl rand::Rng) -> Vec<Printed> {
+fn operators(language: &str, layout: Layout, random: &mut impl rand::Rng) -> Vec<Printed> {
     let machine = Machine::from_code("w b X t").expect("a code");
     let errors: Vec<ErrorName> = ["EXX", "EYX", "EZX"].iter().filter_map(|name| ErrorName::parse(name)).collect();
     let options = Options { gradient: true, ..Options::default() };
@@ -85,7 +129,8 @@ fn operators(language: &str, random: &mut impl rand::Rng) -> Vec<Printed> {
         printed.push(Printed {
             name: format!("operators_{}", batch.0),
             function: "coordinates",
-            text: support::printed(&equation, &batch, language),
+            inputs: equation.inputs(),
+            text: support::laid_out(&equation, &batch, language, layout),
             cases: cases.collect(),
         });
     }
@@ -93,7 +138,7 @@ fn operators(language: &str, random: &mut impl rand::Rng) -> Vec<Printed> {
 }
 
 /// A bar with an effect of every shape, against the program that dual numbers confirmed.
-fn effects(language: &str, random: &mut impl rand::Rng) -> Printed {
+fn effects(language: &str, layout: Layout, random: &mut impl rand::Rng) -> Printed {
     let machine = Machine::from_code("w C b X t").expect("a code");
     let options =
         Options { gradient: true, effects: every_shape().into_iter().chain([curve()]).collect(), ..Options::default() };
@@ -132,8 +177,9 @@ fn effects(language: &str, random: &mut impl rand::Rng) -> Printed {
     Printed {
         name: "effects".to_string(),
         function: "bar_length",
+        inputs: equation.inputs(),
         cases: cases.collect(),
-        text: support::printed(&equation, &Bar, language),
+        text: support::laid_out(&equation, &Bar, language, layout),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use abbe_codegen::print::{LANGUAGES, Style};
+use abbe_codegen::print::{LANGUAGES, Style, TestEquations};
 use abbe_codegen::{Equation, Kind, Options, Order, SessionTest, check};
 use abbe_model::files;
 
@@ -10,6 +10,43 @@ use crate::support::printed;
 
 fn file(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../sessions").join(name)
+}
+
+/// The page of all tests of a session.
+pub fn system(name: &str, order: Order, word: &str, style: &Style) -> String {
+    let session = files::session(&file(name), &files::ReadOptions::default()).expect("a session");
+    let equations = |order: Order| -> Vec<(Equation, SessionTest<'_>)> {
+        let options = Options { order, ..Options::default() };
+        let of = |test| {
+            let source = SessionTest::new(&session, test).expect("a plan");
+            (Equation::of(&session.machine, &source, &session.unknowns, &options).expect("an equation"), source)
+        };
+        session.tests.iter().map(of).collect()
+    };
+    let (whole, first) = (equations(order), equations(Order::First));
+    let whole: Vec<_> = whole.iter().map(|(equation, source)| check(equation, source).expect("agreement")).collect();
+    let first: Vec<_> = first.iter().map(|(equation, source)| check(equation, source).expect("agreement")).collect();
+    let tests = whole.iter().zip(&first).map(|(equation, first)| TestEquations { equation, first });
+    let language = abbe_codegen::language(word).expect("a language");
+    language.print_system(&tests.collect::<Vec<_>>(), style).expect("a page")
+}
+
+/// Every test has a column, every error a row; the entries are the known coefficients.
+#[test]
+fn the_equations_of_a_session() {
+    let text = system("hermle-c600u/chapter5.toml", Order::First, "text", &Style::default());
+    let (_, matrix) = text.split_once("derivatives of the readings").expect("a matrix");
+    let row = |name: &str| {
+        let line = matrix.lines().find(|line| line.trim_start().starts_with(name)).expect("a row");
+        line.split_whitespace().map(str::to_string).collect::<Vec<String>>().join(" ")
+    };
+    assert_eq!(row("A100"), "A100 A150 C100 C150");
+    // By hand: the unit vector of the bar times the displacement by the error.
+    assert_eq!(row("e_x0c "), "e_x0c 0 √(R_e² − R²)/L_0 −R·s_c/L_0 −R·s_c/L_0");
+    assert_eq!(
+        row("e_z0a "),
+        "e_z0a (R·s_a + (H − Z_CA)·c_a)/L_0 (R·s_a + (H − Z_CA)·c_a)/L_0 (H − Z_CA)/L_0 (H − Z_CA − √(R_e² − R²))/L_0"
+    );
 }
 
 #[test]

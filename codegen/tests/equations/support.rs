@@ -66,7 +66,12 @@ pub fn eight() -> Vec<ErrorName> {
 
 /// A checked equation in a language.
 pub fn printed(equation: &Equation, source: &impl Source, word: &str) -> String {
+    laid_out(equation, source, word, Layout::Flat)
+}
+
+/// A checked equation in a language, with arguments as arrays or by name.
+pub fn laid_out(equation: &Equation, source: &impl Source, word: &str, layout: Layout) -> String {
     let checked = check(equation, source).expect("agreement with dual numbers");
-    let style = Style { layout: Layout::Flat, ..Style::default() };
+    let style = Style { layout, ..Style::default() };
     language(word).expect("a language").print(&checked, &style).expect("a page")
 }

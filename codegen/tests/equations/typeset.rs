@@ -86,6 +86,12 @@ fn styled(language: &str, style: &Style) -> Vec<String> {
         fragments.push(of(&machine, &Bar, &eight()[4..], &options));
     }
     fragments.extend(crate::probe::fragments(language, style));
+    for chapter in ["chapter4", "chapter5", "chapter6"] {
+        for order in [Order::Exact, Order::First] {
+            fragments.push(crate::sessions::system(&format!("hermle-c600u/{chapter}.toml"), order, language, style));
+        }
+    }
+    fragments.push(crate::sessions::system("r-test/plan.toml", Order::First, language, style));
     fragments
 }
 

@@ -185,6 +185,8 @@ refused! {
     an_expression_that_goes_on: ball("1 1") => ["`1` where the expression should end"]
     a_call_of_another_function: ball("exec(1)") => ["no constant `exec`"]
     a_constant_with_the_name_of_the_root: with_session("[[test]]", "[constants]\nsqrt = 1\n[[test]]") => ["a constant cannot have the name `sqrt`"]
+    a_constant_without_a_value: with_session("[[test]]", "[constants]\nR = { means = \"radius\" }\n[[test]]") => ["the constant `R` has no `mm`"]
+    a_constant_with_an_unknown_key: with_session("[[test]]", "[constants]\nR = { mm = 1, unit = \"mm\" }\n[[test]]") => ["the constant `R` has the unknown key `unit`"]
     more_constants_than_anybody_names: with_session("[[test]]", &format!("[constants]\n{}\n[[test]]", (0..1200).map(|k| format!("c{k} = 1\n")).collect::<String>())) => ["[constants] has 1200 entries; the limit is 1000"]
     more_tests_than_anybody_runs: error_text(session(MACHINE, &format!("{SESSION}{}", "[[test]]\n".repeat(1200)), Some(DATA))) => ["`test` is a list of 1201; the limit is 1000"]
     more_effects_than_anybody_declares: with_session("[[test]]", &format!("{}\n[[test]]", "[[effect]]\n".repeat(1200))) => ["`effect` is a list of 1200; the limit is 1000"]

@@ -77,11 +77,17 @@ impl StyleArguments {
             ("--two-column", self.two_column),
             ("--nomenclature", self.nomenclature),
         ];
-        let code = [("--layout", self.layout.is_some()), ("--angles", self.angles.is_some())];
-        let groups = [(Audience::Authors, &typeset[..]), (Audience::Compilers, &code)];
+        let groups: [(&[Audience], &[(&str, bool)]); 3] = [
+            (&[Audience::Authors], &typeset),
+            (&[Audience::Compilers], &[("--layout", self.layout.is_some())]),
+            (&[Audience::Compilers, Audience::Algebra], &[("--angles", self.angles.is_some())]),
+        ];
         for (audience, options) in groups {
-            if let (true, Some((option, _))) = (language.audience != audience, options.iter().find(|(_, set)| *set)) {
-                let known: Vec<&str> = LANGUAGES.iter().filter(|l| l.audience == audience).map(|l| l.word).collect();
+            if let (true, Some((option, _))) =
+                (!audience.contains(&language.audience), options.iter().find(|(_, set)| *set))
+            {
+                let known: Vec<&str> =
+                    LANGUAGES.iter().filter(|l| audience.contains(&l.audience)).map(|l| l.word).collect();
                 let message = format!(
                     "`{option}` does not apply to `--as {}`; it applies to {}",
                     language.word,

@@ -9,7 +9,7 @@ mod probe;
 mod tidy;
 
 use crate::equation::Equation;
-use crate::form::Form;
+use crate::form::{Arrangement, Form};
 use crate::print::article::line::{EquationLine, LeftSide, Section};
 use crate::print::notation::{Notation, Spelling};
 use crate::print::notes;
@@ -59,6 +59,13 @@ impl Article {
             })
             .collect();
         Article { program, sections, heading: line::quantity_heading(equation), symbols }
+    }
+
+    /// The sections on the page: one equation has no table of coefficients.
+    pub(crate) fn displayed(&self, equation: &Equation) -> impl Iterator<Item = &Section> {
+        let single = equation.options.arrangement == Arrangement::Single;
+        let slopes = |section: &&Section| section.rows.iter().all(|row| matches!(row.left, LeftSide::Slope(..)));
+        self.sections.iter().filter(move |section| !(single && slopes(section)))
     }
 
     /// The named quantities on the left-hand sides, with meaning and unit.

@@ -78,8 +78,9 @@ fn class(program: &Program, tree: &Tree) -> u8 {
     match tree {
         Tree::Number(_) => 0,
         Tree::Input(index) => match &program.inputs[*index] {
+            // The coefficient of an effect stands before its function, as in a series.
+            Input::Plain(Variable::Length(_) | Variable::Coefficient(_)) => 1,
             input if input.variable().is_small() => 5,
-            Input::Plain(Variable::Length(_)) => 1,
             Input::Plain(variable) if !variable.is_angle() && matches!(variable, Variable::Position { .. }) => 1,
             _ => 3,
         },
