@@ -90,7 +90,7 @@ struct FormArguments {
     /// Example: --order first
     #[arg(long, value_enum, default_value = "exact")]
     order: OrderArgument,
-    /// How the equation is divided, in text, LaTeX and Typst: frame by frame, one equation as the literature prints it, or
+    /// How the equation is divided, in text, LaTeX and Typst: frame by frame, one equation as in the literature, or
     /// coordinate groups.
     ///
     /// Example: --form single

@@ -1,8 +1,10 @@
 //! Expressions on one line in any language, with the necessary parentheses.
 
-use crate::print::notation::PRODUCT;
 use crate::symbol::{Binary, Unary};
 use crate::tree::Tree;
+
+/// Between two factors without a sign, until the page is complete: a place where a line can break.
+pub(crate) const PRODUCT: char = '\u{2062}';
 
 /// Notation of a language for the elements of expressions.
 pub(crate) trait Dialect {

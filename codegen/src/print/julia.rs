@@ -18,8 +18,8 @@ const SYNTAX: Syntax = Syntax {
         Unary::Round => format!("round({x}, RoundNearestTiesAway)"),
         other => format!("{}({x})", name(other)),
     },
-    reserved: "kernel baremodule begin column eachcol export first ifelse isa last local macro module outer quote readings \
-               reshape stack using zeros",
+    reserved: "kernel baremodule begin column eachcol export first ifelse isa last local macro module outer quote \
+               readings reshape stack using zeros",
 };
 
 impl Language for Julia {
@@ -66,8 +66,8 @@ fn named(code: &Code<'_>) -> String {
         ("Value", value)
     };
     format!(
-        "\n\"{what}, for numbers or for arrays of one shape.\"\nfunction {}(; {defaults})\n    function kernel({names})\n\
-         {body}        return {result}\n    end\n    return kernel.({names})\nend\n",
+        "\n\"{what}, for numbers or for arrays of one shape.\"\nfunction {}(; {defaults})\n    \
+         function kernel({names})\n{body}        return {result}\n    end\n    return kernel.({names})\nend\n",
         code.function()
     )
 }

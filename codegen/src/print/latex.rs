@@ -38,7 +38,8 @@ const MARKUP: Markup = Markup {
     line_break: " \\notag\\\\\n  &\\qquad {} ",
     remark: [" \\quad\\text{", "}"],
     table: |meanings| {
-        let opening = "% Needs \\usepackage{array,booktabs}.\n\\noindent\n\\begin{tabular}{@{}l>{\\raggedright\\arraybackslash}p{";
+        let opening = "% Needs \\usepackage{array,booktabs}.\n\\noindent\n\\begin{tabular}{@{}l>{\\raggedright\
+                       \\arraybackslash}p{";
         let head = "  \\toprule\n  Symbol & Meaning & Unit \\\\\n  \\midrule\n";
         [format!("{opening}{meanings}pt}}l@{{}}}}\n{head}"), "  \\bottomrule\n\\end{tabular}\n".to_string()]
     },
@@ -76,7 +77,8 @@ fn matrix(block: &Block) -> String {
     let rows: String = block.rows.iter().map(row).collect();
     let columns = "l".repeat(block.headers.len());
     format!(
-        "\\begin{{equation*}}\n\\setlength{{\\arraycolsep}}{{3pt}}\n\\begin{{array}}{{@{{}}l|{columns}@{{}}}}\n  {} \\\\ \\hline\n\
+        "\\begin{{equation*}}\n\\setlength{{\\arraycolsep}}{{3pt}}\n\
+         \\begin{{array}}{{@{{}}l|{columns}@{{}}}}\n  {} \\\\ \\hline\n\
          {rows}\\end{{array}}\n\\end{{equation*}}\n",
         headers.concat()
     )

@@ -36,7 +36,8 @@ impl Language for Matlab {
             file += &format!("% Save as {name}.m. A number or a row for each argument, by name: {name}(R=100, ...).\n");
         } else {
             file += &format!(
-                "% Save as {name}.m. axes: a row for each input, a column for each reading; value and gradient likewise.\n"
+                "% Save as {name}.m. axes: a row for each input, a column for each reading; \
+                 value and gradient likewise.\n"
             );
         }
         if code.outputs() > 1 && !slopes.is_empty() {

@@ -3,13 +3,10 @@
 use crate::equation::Equation;
 use crate::form::{Arrangement, Kind, Options};
 use crate::print::article::line::LeftSide;
-use crate::print::dialect::Dialect;
+use crate::print::dialect::{Dialect, PRODUCT};
 use crate::program::{Input, Label, Program};
 use crate::symbol::Unary;
 use crate::variable::{Symbols, Variable};
-
-/// Between two factors without a sign, until the page is complete: a place where a line can break.
-pub(crate) const PRODUCT: char = '\u{2062}';
 
 /// How a language for readers spells names and operations. Arguments already have their parentheses where they need
 /// them.

@@ -32,7 +32,8 @@ impl Language for Rust {
                     .named(errors)
                     .map(|a| format!("    /// {}, {}.\n    pub {}: f64,\n", a.meaning, a.unit, a.name));
                 file += &format!(
-                    "/// {what}\n#[allow(non_snake_case)]\n#[derive(Clone, Copy, Debug, PartialEq{derived})]\npub struct {name} \
+                    "/// {what}\n#[allow(non_snake_case)]\n\
+                     #[derive(Clone, Copy, Debug, PartialEq{derived})]\npub struct {name} \
                      {{\n{}}}\n\n",
                     fields.collect::<String>()
                 );
@@ -83,7 +84,8 @@ fn named(code: &Code<'_>) -> String {
         (shape(code, "f64"), "Value")
     };
     let mut text = format!(
-        "/// {what}.\n#[allow(non_snake_case, unused_variables)]\n#[must_use]\npub fn {}(nominal: &Nominal, errors: &Errors) -> {returned} {{\n",
+        "/// {what}.\n#[allow(non_snake_case, unused_variables)]\n#[must_use]\n\
+         pub fn {}(nominal: &Nominal, errors: &Errors) -> {returned} {{\n",
         code.function()
     );
     for errors in [false, true] {

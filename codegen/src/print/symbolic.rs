@@ -91,8 +91,8 @@ impl Language for CasAdi {
         let whole = &functions[functions.len() - 1];
         let header = lines(whole.header(0, ['[', ']']));
         let mut file = format!(
-            "\"\"\"\n{header}Each function returns a casadi.Function with named inputs and outputs; a length or position that \
-             is not given is NaN.\n\"\"\"\n\nimport casadi as ca\n"
+            "\"\"\"\n{header}Each function returns a casadi.Function with named inputs and outputs; a length or \
+             position that is not given is NaN.\n\"\"\"\n\nimport casadi as ca\n"
         );
         for code in &functions {
             let symbols = code.arguments.iter().map(|a| format!("    {0} = ca.SX.sym(\"{0}\")\n", a.name));
@@ -111,8 +111,9 @@ impl Language for CasAdi {
             }
             let name = code.function();
             file += &format!(
-                "\n\ndef {name}() -> ca.Function:\n{symbols}{}    inputs = [{}]\n    outputs = [{}]\n    names = [{}]\n    \
-                 options = {{\"default_in\": [{}]}}\n    return ca.Function(\"{name}\", inputs, outputs, names, [{}], options)\n",
+                "\n\ndef {name}() -> ca.Function:\n{symbols}{}    inputs = [{}]\n    outputs = [{}]\n    \
+                 names = [{}]\n    options = {{\"default_in\": [{}]}}\n    \
+                 return ca.Function(\"{name}\", inputs, outputs, names, [{}], options)\n",
                 body(code, "(ca.pi / 180)"),
                 all.join(", "),
                 outputs.join(", "),

@@ -4,8 +4,8 @@
 use crate::check::Checked;
 use crate::print::article::Article;
 use crate::print::article::line::{EquationLine, LeftSide, NoteKind};
-use crate::print::dialect;
-use crate::print::notation::{Notation, PRODUCT, Spelling};
+use crate::print::dialect::{self, PRODUCT};
+use crate::print::notation::{Notation, Spelling};
 use crate::print::notes;
 use crate::print::style::{Numbering, Style};
 use crate::print::system::{self, Block, TestEquations};

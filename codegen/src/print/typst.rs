@@ -3,8 +3,9 @@
 use std::f64::consts::{PI, TAU};
 
 use crate::check::Checked;
+use crate::print::dialect::PRODUCT;
 use crate::print::language::Language;
-use crate::print::notation::{Notation, PRODUCT, juxtaposed, rounded};
+use crate::print::notation::{Notation, juxtaposed, rounded};
 use crate::print::style::Style;
 use crate::print::system::{Block, TestEquations};
 use crate::print::typeset::{Markup, page, system};

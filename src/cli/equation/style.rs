@@ -32,7 +32,7 @@ pub struct StyleArguments {
     /// Example: --number last
     #[arg(long, value_enum)]
     number: Option<NumberArgument>,
-    /// LaTeX, Typst: width of a line, for example 84mm; longer equations are broken [default: one column of an article].
+    /// LaTeX, Typst: width of a line, as 84mm; longer equations are broken [default: a column of an article].
     ///
     /// Example: --width 84mm
     #[arg(long, value_name = "LENGTH", value_parser = width_mm)]
