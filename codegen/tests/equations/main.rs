@@ -9,6 +9,7 @@ mod effects;
 mod forms;
 mod julia;
 mod named;
+mod nc;
 mod operators;
 mod probe;
 mod programs;
