@@ -261,6 +261,33 @@ impl FormArguments {
         }
     }
 
+    /// The equation of a test, as requested or in first order.
+    fn of_test<'s>(
+        &self,
+        session: &'s Session,
+        test: &'s Test,
+        first: bool,
+    ) -> Result<(Equation, SessionTest<'s>), Failure> {
+        let source = SessionTest::new(session, test)?;
+        let effects = session.effects.iter().filter(|effect| effect.acts_in(&test.name)).cloned();
+        let effects: Vec<Effect> = effects.collect();
+        let mut parameters =
+            EquationParameters::parse(&self.errors, &session.machine, session.instrument.unknowns(), &effects)?;
+        if self.errors.is_empty() {
+            parameters.errors.clone_from(&session.unknowns);
+            parameters.effects = effects;
+        }
+        let mut options = self.options(&parameters);
+        if first {
+            options = Options { order: Order::First, gradient: false, ..options };
+            options.arrangement = match options.arrangement {
+                Arrangement::Groups => Arrangement::Single,
+                other => other,
+            };
+        }
+        Ok((Equation::of(&session.machine, &source, &parameters.errors, &options)?, source))
+    }
+
     fn write(&self, equation: &Equation, source: &impl Source) -> Result<(), Failure> {
         self.put(&self.language.print(&check(equation, source)?, &self.style.style(self.language)?)?)
     }
@@ -303,37 +330,20 @@ pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
     let (session, sources) = read(&arguments.session)?;
     outputs.refuse_overwrite_of_sources(&sources)?;
     let form = &arguments.form;
-    let derived = |test: &Test, first: bool| -> Result<(Equation, SessionTest<'_>), Failure> {
-        let source = SessionTest::new(&session, test)?;
-        let effects = session.effects.iter().filter(|effect| effect.acts_in(&test.name)).cloned();
-        let effects: Vec<Effect> = effects.collect();
-        let mut parameters =
-            EquationParameters::parse(&form.errors, &session.machine, session.instrument.unknowns(), &effects)?;
-        if form.errors.is_empty() {
-            parameters.errors.clone_from(&session.unknowns);
-            parameters.effects = effects;
-        }
-        let mut options = form.options(&parameters);
-        if first {
-            options = Options { order: Order::First, gradient: false, ..options };
-            options.arrangement = match options.arrangement {
-                Arrangement::Groups => Arrangement::Single,
-                other => other,
-            };
-        }
-        Ok((Equation::of(&session.machine, &source, &parameters.errors, &options)?, source))
-    };
     if let Some(name) = &arguments.test {
         let Some(test) = session.tests.iter().find(|test| test.name == *name) else {
             let names: Vec<&str> = session.tests.iter().map(|test| test.name.as_str()).collect();
             let names = names.join(", ");
             return Err(Failure::Other(format!("no test `{name}`; the session has {names}")));
         };
-        let (equation, source) = derived(test, false)?;
+        let (equation, source) = form.of_test(&session, test, false)?;
         return form.write(&equation, &source);
     }
     let style = form.style.style(form.language)?;
-    let both = session.tests.iter().map(|test| Ok([derived(test, false)?, derived(test, true)?]));
+    let both = session
+        .tests
+        .iter()
+        .map(|test| Ok([form.of_test(&session, test, false)?, form.of_test(&session, test, true)?]));
     let both: Vec<[(Equation, SessionTest<'_>); 2]> = both.collect::<Result<_, Failure>>()?;
     let checked = |(equation, source)| -> Result<_, Failure> { Ok(check(equation, source)?) };
     let pairs = both.iter().map(|[whole, first]| Ok([checked((&whole.0, &whole.1))?, checked((&first.0, &first.1))?]));

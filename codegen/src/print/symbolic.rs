@@ -32,7 +32,7 @@ const CASADI: Syntax = Syntax {
         Unary::Round => format!("(ca.sign({x}) * ca.floor(ca.fabs({x}) + 0.5))"),
         other => format!("ca.{}({x})", name(other)),
     },
-    reserved: "value gradient ca",
+    reserved: "value gradient ca nan inputs outputs names options",
 };
 
 /// The names of the arguments of a kind, each in a pattern.
@@ -92,13 +92,13 @@ impl Language for CasAdi {
         let header = lines(whole.header(0, ['[', ']']));
         let mut file = format!(
             "\"\"\"\n{header}Each function returns a casadi.Function with named inputs and outputs; a length or \
-             position that is not given is NaN.\n\"\"\"\n\nimport casadi as ca\n"
+             position that is not given is NaN.\n\"\"\"\n\nfrom math import nan\n\nimport casadi as ca\n"
         );
         for code in &functions {
             let symbols = code.arguments.iter().map(|a| format!("    {0} = ca.SX.sym(\"{0}\")\n", a.name));
             let symbols: String = symbols.collect();
             let all: Vec<&str> = code.arguments.iter().map(|argument| argument.name.as_str()).collect();
-            let defaults = code.arguments.iter().map(|a| if a.error { "0.0" } else { "ca.nan" });
+            let defaults = code.arguments.iter().map(|a| if a.error { "0.0" } else { "nan" });
             let defaults: Vec<&str> = defaults.collect();
             let quoted: Vec<String> = all.iter().map(|name| format!("\"{name}\"")).collect();
             let (values, slopes) = code.results();

@@ -48,3 +48,29 @@ fn comment(entry: &Value<'_>) -> Option<String> {
     let usable = !text.is_empty() && !text.chars().any(char::is_control);
     usable.then(|| text.to_string())
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::super::document::Source;
+    use super::constants;
+
+    #[test]
+    fn meanings_are_stated_or_comments() {
+        let text = "[constants]\nR = 100.0  # radius; see below\nH = { mm = 75, means = \"height\" } # not this\n\
+                    Z = { mm = 1 } # offset\nD = 2 #\nE = 3\n";
+        let source = Source::new(Path::new("session.toml"), text);
+        let found = constants(&mut source.parse().unwrap()).unwrap();
+        let found: Vec<(&str, f64, Option<&str>)> =
+            found.iter().map(|constant| (constant.name.as_str(), constant.mm, constant.means.as_deref())).collect();
+        let expected = [
+            ("R", 100.0, Some("radius")),
+            ("H", 75.0, Some("height")),
+            ("Z", 1.0, Some("offset")),
+            ("D", 2.0, None),
+            ("E", 3.0, None),
+        ];
+        assert_eq!(found, expected);
+    }
+}
