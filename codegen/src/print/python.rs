@@ -60,8 +60,6 @@ fn function(code: &Code<'_>) -> String {
                 text += &format!("    {input} = {word}[{number}]\n");
             }
         }
-        text += "    shape = np.broadcast_shapes(*(np.shape(argument) for group in (lengths, axes, errors) for \
-                 argument in group))\n";
     } else {
         let required = code.named(false).map(|argument| format!("    {}: ArrayLike,\n", argument.name));
         let optional = code.named(true).map(|argument| format!("    {}: ArrayLike = 0.0,\n", argument.name));
@@ -79,6 +77,10 @@ fn function(code: &Code<'_>) -> String {
             &lines(code.of_angles("(np.pi / 180.0)").into_iter().map(|(name, value)| format!("    {name} = {value}")));
     }
     text += &lines(code.assignments("    ", ""));
+    if code.arguments.is_empty() {
+        text += "    shape = np.broadcast_shapes(*(np.shape(argument) for group in (lengths, axes, errors) for \
+                 argument in group))\n";
+    }
     let (values, slopes) = code.results();
     let stack = |items: &[String]| {
         let rows = items.iter().map(|item| format!("        np.broadcast_to({item}, shape),\n"));

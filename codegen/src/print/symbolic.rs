@@ -92,7 +92,7 @@ impl Language for CasAdi {
         let header = lines(whole.header(0, ['[', ']']));
         let mut file = format!(
             "\"\"\"\n{header}Each function returns a casadi.Function with named inputs and outputs; a length or \
-             position that is not given is NaN.\n\"\"\"\n\nfrom math import nan\n\nimport casadi as ca\n"
+             position that is not given is not a number.\n\"\"\"\n\nfrom math import nan\n\nimport casadi as ca\n"
         );
         for code in &functions {
             let symbols = code.arguments.iter().map(|a| format!("    {0} = ca.SX.sym(\"{0}\")\n", a.name));

@@ -230,7 +230,7 @@ fn every_form_is_confirmed_with_every_shape() {
             let checked = check(&equation, &Bar).expect("agreement");
             assert!(checked.agreement.points == 40 && checked.agreement.largest() < 1e-12);
             for language in LANGUAGES {
-                let for_readers = language.audience != Audience::Compilers;
+                let for_readers = matches!(language.audience, Audience::Readers | Audience::Authors);
                 match language.print(&checked, &Style::default()) {
                     Ok(text) => assert!(!(text.contains("NaN") || curved && for_readers), "{text}"),
                     Err(refused) => {

@@ -279,7 +279,7 @@ fn every_shape_of_an_effect() {
             "fit run/session.toml --compensation beckhoff --control beckhoff --points 9",
             "trace run/session.toml --max-effects 2 --only C --json trace.json",
             "trace run/session.toml --list --only :h2 --only backlash --only time",
-            "equation plan.toml --test C --as python --order bilinear --gradient",
+            "equation plan.toml --test C --as python --layout flat --order bilinear --gradient",
         ],
     );
 }
