@@ -4,8 +4,12 @@
 //! deviation `s` is one parameter with one prior:
 //!
 //! ```text
-//! Λ = Λ_A(a, s) + Λ_B(b, s) − 1/u_s²,    Λ·(a, b, s) = Λ_A·(a, s)_A + Λ_B·(b, s)_B
+//! Λ = Λ_A(a, s) + Λ_B(b, s) − 1/(f·u_s)²,    Λ·(a, b, s) = Λ_A·(a, s)_A + Λ_B·(b, s)_B
 //! ```
+//!
+//! A fit whose residual exceeds its noise enlarges all its uncertainties by a factor, those of its priors included. `f`
+//! is the larger factor of the two: each model contains at least that prior, so that `Λ` stays positive semidefinite,
+//! and the prior that remains is the narrower one.
 
 use abbe_model::session::Prior;
 use faer::Mat;
@@ -58,9 +62,10 @@ pub(super) fn difference(
     };
     add(a, &|i| i)?;
     add(b, &place_b)?;
+    let enlargement = a.quality.u_enlargement.max(b.quality.u_enlargement);
     for (i, _) in &shared {
         if let Prior::Gaussian(u) = a.parameters[*i].prior {
-            information[(*i, *i)] -= 1.0 / (u * u);
+            information[(*i, *i)] -= (enlargement * u).powi(-2);
         }
     }
     let scale: Vec<f64> =
