@@ -126,6 +126,22 @@ fn differences_do_not_depend_on_the_gauge() {
     }
 }
 
+/// Models whose readings determine no error of the machine: no difference is not "no significant difference".
+#[test]
+fn models_without_a_common_estimate_are_refused() {
+    let mut a = model(&plan(), &[], &[], 9);
+    for j in a.carried_parameters() {
+        a.parameters[j].held = true;
+        a.parameters[j].value = 0.0;
+        (0..a.parameters.len()).for_each(|i| (a.covariance[(i, j)], a.covariance[(j, i)]) = (0.0, 0.0));
+        let direction = (0..a.parameters.len()).map(|i| if i == j { a.parameters[j].size } else { 0.0 });
+        a.null_directions.push(direction.collect());
+    }
+    let named = [Named { name: "A".into(), model: &a }, Named { name: "B".into(), model: &a }];
+    let refused = compare(&named, &CompareOptions::default()).unwrap_err().to_string();
+    assert!(refused.contains("nothing can be compared"), "{refused}");
+}
+
 /// A reading `error + bar` in one session and `error + 2·bar` in the other, with uncertainties that are enlarged by 2
 /// and by 3. The readings do not determine the bar: it stays at its narrower prior, and enters the difference once.
 #[test]
