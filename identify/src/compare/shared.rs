@@ -95,7 +95,7 @@ fn inverse(model: &IdentifiedModel) -> Result<Mat<f64>, IdentifyError> {
 /// The set-up quantities that are the same object in both sessions, by index in each.
 ///
 /// # Errors
-/// If a stated quantity is not estimated, with the same prior, in both.
+/// If a stated quantity is not estimated, with the same prior, in both, or if nothing is stated beside others.
 fn shared(
     a: &IdentifiedModel,
     b: &IdentifiedModel,
@@ -108,9 +108,16 @@ fn shared(
     });
     let mut of_both: Vec<(usize, usize)> = of_both.collect();
     let thing = |i: usize| a.parameters[i].id.split(['[', '.']).next().unwrap_or_default();
-    for stated in things.unwrap_or_default().iter().filter(|stated| *stated != NOTHING) {
+    let things_stated = things.unwrap_or_default();
+    if things_stated.len() > 1 && things_stated.iter().any(|stated| stated == NOTHING) {
+        return Err(IdentifyError::Request(format!(
+            "shared set-up quantities are stated beside \"{NOTHING}\", which says that there are none; state either"
+        )));
+    }
+    for stated in things_stated.iter().filter(|stated| *stated != NOTHING) {
         if !of_both.iter().any(|(i, _)| thing(*i) == stated) {
             let mut known: Vec<&str> = of_both.iter().map(|(i, _)| thing(*i)).collect();
+            known.sort_unstable();
             known.dedup();
             let known = if known.is_empty() { NOTHING.to_string() } else { known.join(", ") };
             return Err(IdentifyError::Request(format!(

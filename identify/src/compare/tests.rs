@@ -116,6 +116,9 @@ fn differences_do_not_depend_on_the_gauge() {
     let unknown = CompareOptions { shared: Some(vec!["ball".to_string()]), ..options.clone() };
     let refused = compare(&named, &unknown).unwrap_err().to_string();
     assert!(refused.contains("\"ball\" is not estimated"), "{refused}");
+    assert!(refused.ends_with("these are: bar, spindle_ball, workpiece_ball"), "{refused}");
+    let both = CompareOptions { shared: Some(vec!["bar".to_string(), "none".to_string()]), ..options.clone() };
+    assert!(compare(&named, &both).unwrap_err().to_string().contains("state either"));
     let again = compare(&named, &options).unwrap();
     let reference =
         compare(&[Named { name: "A".into(), model: &a }, Named { name: "B".into(), model: &b }], &options).unwrap();
