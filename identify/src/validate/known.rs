@@ -326,7 +326,10 @@ fn first_noise(model: &IdentifiedModel, session: &Session) -> (Noise, &'static s
         NoiseSource::Residual => {
             Noise::white(model.quality.heldout_rms_mm.max(model.noise.sigma_mm), NoiseSource::Residual)
         }
-        NoiseSource::Stated | NoiseSource::Repeats => Noise { source: NoiseSource::Residual, ..model.noise.clone() },
+        // The inflation belongs to the likelihood of the model's families; it is no noise.
+        NoiseSource::Stated | NoiseSource::Repeats => {
+            Noise { source: NoiseSource::Residual, inflation: 1.0, ..model.noise.clone() }
+        }
     };
     (noise, "model")
 }
