@@ -2,7 +2,6 @@
 
 use std::io::Write;
 
-use abbe_model::axis::AxisKind;
 use abbe_model::files::commands::{Block, CommandFile, PoseColumns};
 use abbe_model::session::readings::Readings;
 use csv::StringRecord;
@@ -89,13 +88,23 @@ pub fn run(
     write(to, layout.header(file).as_bytes())?;
     let mut summary = Summary::default();
     let mut last = start.to_vec();
+    let mut waiting: Option<(Block, Vec<bool>)> = None;
     loop {
-        let mut blocks = Vec::with_capacity(BLOCKS);
-        while blocks.len() < BLOCKS {
-            let Some(mut block) = file.next_block(correction.machine, BLOCK_ROWS)? else { break };
+        let mut blocks: Vec<(Block, Vec<bool>)> = waiting.take().into_iter().collect();
+        let mut ended = false;
+        while blocks.len() <= BLOCKS && !ended {
+            let Some(mut block) = file.next_block(correction.machine, BLOCK_ROWS)? else {
+                ended = true;
+                continue;
+            };
             let unreachable = reach_poses(correction, file, &mut block, &mut last);
+            if let Some((before, _)) = blocks.last_mut() {
+                before.rows.continue_with(&block.rows);
+            }
             blocks.push((block, unreachable));
         }
+        // The speed at the last row of a block depends on the row after it.
+        waiting = if ended { None } else { blocks.pop() };
         if blocks.is_empty() {
             return Ok(summary);
         }
@@ -350,11 +359,5 @@ impl Summary {
     }
 }
 
-/// Start positions of axes without a stated position: the middle of the travel, or zero.
-pub fn middle_of_travel(machine: &abbe_model::chain::Machine) -> Vec<f64> {
-    let middle = |axis: &abbe_model::axis::Axis| match axis.travel {
-        Some([low, high]) if axis.kind == AxisKind::Linear || (low > 0.0 || high < 0.0) => 0.5 * (low + high),
-        _ => 0.0,
-    };
-    machine.axes.iter().map(middle).collect()
-}
+#[cfg(test)]
+mod tests;
