@@ -165,7 +165,7 @@ fn reach_poses(
             *last = found;
         }
         for (column, position) in block.rows.positions.iter_mut().zip(last.iter()) {
-            column[row] = if faulty { f64::NAN } else { *position };
+            column[row] = *position;
         }
     }
     file.follow(&mut block.rows, machine);

@@ -1,4 +1,4 @@
-//! Files of commands: blocks change nothing for their rows.
+//! Files of commands: blocks and rows with a fault change nothing for other rows.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -68,5 +68,28 @@ fn speeds_do_not_depend_on_the_blocks_of_a_file() {
         let expected_um = (x_mm(row + 1) - x_mm(row - 1)) / 0.02;
         let found_um: f64 = cells[0].parse().unwrap();
         assert!((found_um.abs() - expected_um.abs()).abs() < 1e-4, "row {row}: {found_um} µm, not {expected_um}");
+    }
+}
+
+/// The other rows have the errors that they have without the rows with a fault.
+#[test]
+fn a_row_with_a_fault_changes_no_other_row() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("commands.csv");
+    let y_mm = ["none", "?", "0", "1", "2", "3", "none", "5", "6", "5", "4", "none"];
+    let line = |(row, y): (usize, &&str)| format!("{:.2},{:.1},{y}\n", 0.01 * row as f64, 0.5 * row as f64);
+    let lines: Vec<String> = y_mm.iter().enumerate().map(line).collect();
+    let faulty: Vec<bool> = y_mm.iter().map(|y| y.parse::<f64>().is_err()).collect();
+    let found = evaluated(&path, &format!("time_s,x_mm,y_mm\n{}", lines.concat()));
+    let without: Vec<&str> =
+        lines.iter().zip(&faulty).filter(|(_, faulty)| !**faulty).map(|(line, _)| line.as_str()).collect();
+    let mut expected = evaluated(&path, &format!("time_s,x_mm,y_mm\n{}", without.concat())).into_iter();
+    assert_eq!(found.len(), y_mm.len());
+    for (row, (found, faulty)) in found.into_iter().zip(faulty).enumerate() {
+        if faulty {
+            assert_eq!(found[6], "not-a-number", "row {row}");
+        } else {
+            assert_eq!(Some(found), expected.next(), "row {row}");
+        }
     }
 }
