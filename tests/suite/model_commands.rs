@@ -141,6 +141,7 @@ fn a_file_that_cannot_be_compensated_is_refused_before_anything_is_written() {
     refused(&run(&file("both.csv", "x_mm,px_mm,py_mm,pz_mm,i,j,k\n1,2,3,4,5,6,7\n")), "both axis positions and poses");
     refused(&run(&file("part.csv", "px_mm,py_mm\n1,2\n")), "incomplete");
     refused(&run(&file("point.csv", "px_mm,py_mm,pz_mm\n1,2,3\n")), "direction of the tool's Z");
+    refused(&run(&file("corrected.csv", "x_mm,state\n1,corrected\n")), "may be corrected already");
     refused(&run(&folder.path().join("absent.csv")), "cannot be read");
     assert!(!out.exists());
     let commands = file("program.csv", "x_mm\n1\n");

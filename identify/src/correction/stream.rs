@@ -31,6 +31,16 @@ pub enum Output {
     Error,
 }
 
+impl Output {
+    /// The columns that are added to those of the file.
+    fn columns(self) -> &'static [&'static str] {
+        match self {
+            Output::Command => &["remaining_um", "remaining_arcsec", "condition", "state"],
+            Output::Error => &["dx_um", "dy_um", "dz_um", "da_arcsec", "db_arcsec", "dc_arcsec", "state"],
+        }
+    }
+}
+
 /// What became of the rows of a file.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Summary {
@@ -74,8 +84,8 @@ pub struct MarkedRow {
 /// axes replaced, and columns for what remains. Axes without a column get one.
 ///
 /// # Errors
-/// If the file cannot be read, lacks a column that an error depends on, or states what the machine cannot correct, or
-/// if a row cannot be written.
+/// If the file cannot be read, lacks a column that an error depends on, has a column of the output, or states what the
+/// machine cannot correct, or if a row cannot be written.
 pub fn run(
     correction: &Correction<'_>,
     file: &mut CommandFile,
@@ -85,6 +95,12 @@ pub fn run(
 ) -> Result<Summary, IdentifyError> {
     check(correction, file.poses())?;
     let layout = Layout::of(correction, file, output);
+    if let Some(name) = output.columns().iter().find(|name| file.header().iter().any(|own| own == **name)) {
+        return Err(IdentifyError::Request(format!(
+            "the commands have a column `{name}`, which the output adds: the file may be corrected already; remove the \
+             column or give it another name"
+        )));
+    }
     write(to, layout.header(file).as_bytes())?;
     let mut summary = Summary::default();
     let mut last = start.to_vec();
@@ -220,11 +236,7 @@ impl Layout {
     fn header(&self, file: &CommandFile) -> String {
         let mut names: Vec<String> = file.header().iter().map(quoted).collect();
         names.extend(self.added.iter().map(|axis| file.column_of(*axis)));
-        let results: &[&str] = match self.output {
-            Output::Command => &["remaining_um", "remaining_arcsec", "condition", "state"],
-            Output::Error => &["dx_um", "dy_um", "dz_um", "da_arcsec", "db_arcsec", "dc_arcsec", "state"],
-        };
-        names.extend(results.iter().map(ToString::to_string));
+        names.extend(self.output.columns().iter().map(ToString::to_string));
         names.join(",") + "\n"
     }
 

@@ -93,3 +93,15 @@ fn a_row_with_a_fault_changes_no_other_row() {
         }
     }
 }
+
+/// A file that is corrected already would be corrected twice.
+#[test]
+fn a_corrected_file_is_no_file_of_commands() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("commands.csv");
+    std::fs::write(&path, "time_s,x_mm\n0,1\n1,2\n").unwrap();
+    let corrected = text(&path, Output::Command).unwrap();
+    std::fs::write(&path, corrected).unwrap();
+    let refused = text(&path, Output::Command).unwrap_err().to_string();
+    assert!(refused.contains("a column `remaining_um`"), "{refused}");
+}
