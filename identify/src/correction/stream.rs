@@ -54,7 +54,8 @@ pub struct Summary {
     pub largest_error_arcsec: f64,
     /// Largest remaining error of the position among corrected rows, µm; `null` for errors.
     pub largest_remaining_um: Option<f64>,
-    /// Largest remaining error of the orientation among rows whose orientation is corrected, arcsec; `null` for errors.
+    /// Largest remaining error of the orientation among the same rows without those in the state `position-only`,
+    /// arcsec; `null` for errors.
     pub largest_remaining_arcsec: Option<f64>,
     /// The first rows that are not simply corrected.
     pub marked: Vec<MarkedRow>,
