@@ -127,7 +127,7 @@ pub fn run(arguments: &ExportArguments, quiet: bool) -> Result<(), Failure> {
             let [calibrated, nominal] = dh::tables(&model, tool_mm)?;
             let table = present::dh(&calibrated, &nominal);
             (result.calibrated, result.nominal) = (Some(calibrated), Some(nominal));
-            (output::csv(&table)?, vec![table])
+            ([present::dh_header(&table).into_bytes(), output::csv(&table)?].concat(), vec![table])
         }
         Format::Beckhoff => {
             let (text, missing) = beckhoff(&model)?;
