@@ -188,6 +188,26 @@ fn a_comparison_names_what_has_changed() {
     refused(&abbe(&["compare", text(&before), text(&other)]), "one machine");
 }
 
+/// A constant error motion is no location error: it is listed as left out, and not written.
+#[test]
+fn an_error_motion_is_not_exported_as_a_location_error() {
+    let folder = folder();
+    let bundled = ready("hermle-c600u/measured/session.toml");
+    for entry in std::fs::read_dir(bundled.parent().unwrap()).unwrap() {
+        let path = entry.unwrap().path();
+        std::fs::copy(&path, folder.path().join(path.file_name().unwrap())).unwrap();
+    }
+    let session = folder.path().join("session.toml");
+    let declared = std::fs::read_to_string(&session).unwrap() + "\n[unknowns]\nerrors = [\"EY0C\", \"EXC\"]\n";
+    std::fs::write(&session, declared).unwrap();
+    let (model, out) = (folder.path().join("model.json"), folder.path().join("table.csv"));
+    success(&abbe(&["fit", text(&session), "--save", text(&model), "--quiet"]));
+    let printed = success(&abbe(&["export", text(&model), "--as", "beckhoff", "--out", text(&out)]));
+    assert!(printed.contains("left out: EXC"), "{printed}");
+    let table = std::fs::read_to_string(&out).unwrap();
+    assert!(table.contains("Y0C") && !table.contains("XC"), "{table}");
+}
+
 /// MuJoCo reads the exported chain and moves the tool as the model does. Skipped by name where it is not installed.
 #[test]
 fn mujoco_reads_the_exported_urdf() {
