@@ -183,6 +183,9 @@ fn a_comparison_names_what_has_changed() {
     let again: Value = serde_json::from_str(&std::fs::read_to_string(&again).unwrap()).unwrap();
     let same = again["differences"][0]["value"].as_f64().unwrap();
     assert!((same - value).abs() < 1e-6 * value.abs(), "{same} {value}");
+    // An input that is given twice has two tables, each with every difference once.
+    let twice = success(&abbe(&["compare", text(&models[0]), text(&models[1]), text(&models[1]), "--all"]));
+    assert_eq!(twice.lines().filter(|line| line.trim_start().starts_with("EX0C")).count(), 2, "{twice}");
     assert_eq!(abbe(&["compare", text(&before)]).status.code(), Some(2));
     let other = ready("r-test/measured/session.toml");
     refused(&abbe(&["compare", text(&before), text(&other)]), "one machine");
