@@ -143,8 +143,10 @@ fn a_file_that_cannot_be_compensated_is_refused_before_anything_is_written() {
     refused(&run(&file("point.csv", "px_mm,py_mm,pz_mm\n1,2,3\n")), "direction of the tool's Z");
     refused(&run(&file("corrected.csv", "x_mm,state\n1,corrected\n")), "may be corrected already");
     refused(&run(&folder.path().join("absent.csv")), "cannot be read");
-    assert!(!out.exists());
     let commands = file("program.csv", "x_mm\n1\n");
+    let at = ["compensate", text(&model), text(&commands), "--out", text(&out), "--at", "X=5"];
+    refused(&abbe(&at), "--at X=5: the commands have a column for the positions of X");
+    assert!(!out.exists());
     let over = abbe(&["compensate", text(&model), text(&commands), "--out", text(&commands)]);
     refused(&over, "one of the files that are read");
     assert_eq!(std::fs::read_to_string(&commands).unwrap(), "x_mm\n1\n");
