@@ -41,7 +41,10 @@ const MARKUP: Markup = Markup {
         let opening = "% Needs \\usepackage{array,booktabs}.\n\\noindent\n\\begin{tabular}{@{}l>{\\raggedright\
                        \\arraybackslash}p{";
         let head = "  \\toprule\n  Symbol & Meaning & Unit \\\\\n  \\midrule\n";
-        [format!("{opening}{meanings}pt}}l@{{}}}}\n{head}"), "  \\bottomrule\n\\end{tabular}\n\\par\\medskip\n".to_string()]
+        [
+            format!("{opening}{meanings}pt}}l@{{}}}}\n{head}"),
+            "  \\bottomrule\n\\end{tabular}\n\\par\\medskip\n".to_string(),
+        ]
     },
     cells: ["  ", " & ", " \\\\\n"],
     names: ",\\ ",
