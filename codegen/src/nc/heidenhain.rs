@@ -1,7 +1,7 @@
 //! Programs in the plain text of Heidenhain's TNC.
 
+use super::block::Block;
 use super::iso::{number, plain, simple};
-use super::program::Block;
 use super::{Control, Plane, Program};
 
 /// Decimals of a position.

@@ -1,6 +1,6 @@
 //! Programs in G codes after ISO 6983-1, as LinuxCNC, Fanuc and SINUMERIK read them.
 
-use super::program::Block;
+use super::block::Block;
 use super::{Control, Plane, Program};
 
 /// What differs between controls that read G codes.

@@ -9,10 +9,10 @@
 //! | ‖P_w − P_s‖ at the middle of a segment − ‖P_w − P_s‖ at its ends |  ≤  chord error
 //! ```
 //!
-//! - [`program`]: the blocks of a test, and where they come from; [`options`]: what the user may choose;
-//! - [`iso`]: controls that read G codes, after ISO 6983-1; [`heidenhain`]: plain text of the TNC;
-//! - [`CONTROLS`]: all of them.
+//! - [`options`]: what the user may choose; [`block`], [`program`]: the blocks of a test, and where they come from;
+//! - [`CONTROLS`]: controls that read G codes, after ISO 6983-1, and the plain text of the TNC.
 
+pub mod block;
 mod heidenhain;
 mod iso;
 pub mod options;

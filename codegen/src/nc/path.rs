@@ -11,7 +11,7 @@ use abbe_model::session::motion::Motion;
 use abbe_model::session::placing::balls;
 use abbe_model::session::planned::planned;
 
-use super::program::Block;
+use super::block::Block;
 use super::{Control, NcOptions, Plane};
 use crate::error::CodegenError;
 
