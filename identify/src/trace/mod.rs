@@ -244,7 +244,7 @@ fn trace_or_interrupted(
     let structure_before = || {
         let (model, prior) = (start.model.clone(), start.prior());
         let draws = null(SINGLE);
-        remainder::structure(problem, &columns, model, &start.residual, draws, &prior)
+        remainder::structure(problem, &columns, model, &start.residual, draws, prior)
     };
     let (draws, structure_before) = parallel::both(|| null(BLOCK), || policy.tests_structure.then(structure_before));
 
@@ -255,16 +255,16 @@ fn trace_or_interrupted(
     let candidate_count = searched.len();
     progress(Progress::Screening(candidate_count));
     let (reserve, candidates): (Vec<_>, Vec<_>) = searched.into_iter().partition(|candidate| candidate.last_resort);
-    let column_sets: Vec<&EffectColumns> = candidates.iter().map(|candidate| &candidate.columns).collect();
+    let column_sets: Vec<EffectColumns> = candidates.iter().map(|candidate| candidate.columns.clone()).collect();
     let (model, prior) = (start.model.clone(), start.prior());
     let go_on = || interrupt.check().is_ok();
-    let moments = Moments::new(&columns, &column_sets, model, &start.residual, draws, &go_on)
-        .ok_or(IdentifyError::Interrupted)?;
+    let moments = Moments::new(&columns, column_sets, model, &start.residual, prior, draws)?;
+    moments.prepare(&[], &go_on)?;
     let unwhitened = start.unwhitened(&columns, &before_fit.beta, problem.noise.sigma_mm)?;
-    let mut search = SearchState::new(&columns, candidates, moments, prior, unwhitened, policy)?;
+    let mut search = SearchState::new(&columns, candidates, moments, unwhitened, policy)?;
     search.reserve = reserve;
     search.interrupt = Some(interrupt);
-    let gains = search.model_without(None)?.gains();
+    let gains = search.model_without(None)?.gains(&|_| true)?;
     let observable = gains.iter().filter(|gain| gain.freedom > 0).count();
 
     let mut record = SearchRecord { steps: Vec::new(), noise_um: problem.noise.sigma_mm * 1e3, progress };

@@ -68,8 +68,6 @@ impl Proposal {
     fn accept(self, search: &mut SearchState<'_>, branch: usize) -> bool {
         let accepted = self.increase > self.margin;
         if accepted {
-            let chosen: Vec<usize> = self.selected.iter().map(|selected| selected.candidate).collect();
-            search.add_to_base(&chosen);
             search.selection.branches[branch].selected = self.selected;
         }
         accepted
@@ -93,6 +91,7 @@ pub fn named(name: MoveName) -> &'static dyn Move {
 pub fn on_every_branch(tried: &dyn Move, search: &mut SearchState<'_>) -> Result<bool, IdentifyError> {
     let all = tried.try_on(search, ALL)?;
     if all || !tried.follows_all_readings() {
+        search.prepare_branches()?;
         for branch in ALL + 1..search.selection.branches.len() {
             tried.try_on(search, branch)?;
         }

@@ -10,8 +10,6 @@ mod objective;
 mod pool;
 mod tuning;
 
-use std::ops::Range;
-
 use abbe_model::effect::Effect;
 
 use super::constants::{Effort, ON_ALL, ON_FOLDS};
@@ -19,7 +17,6 @@ use super::interrupt::Interrupt;
 use super::policy::Policy;
 use crate::candidates::candidate::Candidate;
 use crate::candidates::columns::Columns;
-use crate::candidates::gain::PriorMoments;
 use crate::candidates::moments::Moments;
 use crate::error::IdentifyError;
 pub use heldout::{RejectedByHeldOut, Selection, UnwhitenedModel};
@@ -61,19 +58,13 @@ pub struct SearchState<'s> {
     /// The candidates.
     pub candidates: Vec<Candidate>,
     /// All products.
-    pub moments: Moments,
-    /// The priors.
-    prior: PriorMoments,
-    /// Number of base columns that the fitted model has.
-    pub rank: usize,
+    pub moments: Moments<'s>,
     /// The selected effects.
     pub selection: Selection,
     /// The accepted effects: additions that lowered the held-out error by more than the standard error of the decrease.
     accepted: Selection,
     /// The declared model: no effects.
     declared: Selection,
-    /// For each candidate that was ever added, the range of its columns in the base.
-    added_to_base: Vec<(usize, Range<usize>)>,
     /// For each round, the best score that readings without structure exceed with the probability of the significance
     /// level.
     pub thresholds: Vec<f64>,
@@ -81,7 +72,7 @@ pub struct SearchState<'s> {
     pub last_resort: bool,
     /// Candidates of last resort whose products are not computed yet.
     pub reserve: Vec<Candidate>,
-    /// The unwhitened base and residual for the held-out error.
+    /// The unwhitened model and residual for the held-out error.
     unwhitened: UnwhitenedModel,
     /// Effects that scored better than readings without structure but were not accepted, in order of addition.
     pub rejected: Vec<RejectedByHeldOut>,
@@ -101,24 +92,19 @@ impl<'s> SearchState<'s> {
     pub fn new(
         columns: &'s Columns<'s>,
         candidates: Vec<Candidate>,
-        moments: Moments,
-        prior: PriorMoments,
+        moments: Moments<'s>,
         unwhitened: UnwhitenedModel,
         policy: Policy,
     ) -> Result<SearchState<'s>, IdentifyError> {
-        let rank = moments.base();
         let none = Selection::none(columns.fold_rows.len());
         let mut search = SearchState {
             policy,
             columns,
             candidates,
             moments,
-            prior,
-            rank,
             selection: none.clone(),
             accepted: none.clone(),
             declared: none,
-            added_to_base: Vec::new(),
             thresholds: Vec::new(),
             last_resort: false,
             reserve: Vec::new(),

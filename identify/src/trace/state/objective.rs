@@ -18,10 +18,8 @@ impl SearchState<'_> {
         if !self.policy.in_residual_variance {
             return 1.0;
         }
-        let sum: f64 = model.folds.iter().map(|fold| model.sum_of_squares_on(*fold)).sum();
-        let rows: usize = model.folds.iter().map(|fold| self.columns.fold_rows[*fold].len()).sum();
-        let freedom = rows.saturating_sub(model.base.len()).max(1) as f64;
-        (sum / freedom).max(f64::MIN_POSITIVE)
+        let (sum, freedom) = model.residual_square();
+        (sum / freedom as f64).max(f64::MIN_POSITIVE)
     }
 
     /// `−ln P` of a gain.
@@ -44,8 +42,8 @@ impl SearchState<'_> {
 
     /// The score of a candidate beside others.
     pub fn score_beside(&self, candidate: usize, others: &[usize], folds: &[usize]) -> Result<f64, IdentifyError> {
-        let model = self.projection_of(others, folds)?;
-        Ok(self.score(candidate, &model.gain(candidate), self.variance(&model)))
+        let model = self.model_of(others, folds)?;
+        Ok(self.score(candidate, &model.gain(candidate)?, self.variance(&model)))
     }
 
     /// Description length of the choice of one effect in the library.
@@ -60,16 +58,16 @@ impl SearchState<'_> {
 
     /// The objective of some candidates and one more, which need not be in the base.
     pub fn objective_with(&self, some: &[usize], one: usize, folds: &[usize]) -> Result<f64, IdentifyError> {
-        let model = self.projection_of(some, folds)?;
+        let model = self.model_of(some, folds)?;
         let all: Vec<usize> = some.iter().copied().chain([one]).collect();
-        let explained = model.explained() + model.gain(one).gain;
+        let explained = model.explained() + model.gain(one)?.gain;
         Ok(self.evidence_of_gain(explained, &all, &[], folds)? - self.description_length(&all))
     }
 
     /// `−ln P` of the joint gain of a group beside other effects.
     pub fn evidence_of(&self, group: &[usize], rest: &[usize], folds: &[usize]) -> Result<f64, IdentifyError> {
         let all: Vec<usize> = rest.iter().chain(group).copied().collect();
-        self.evidence_of_gain(self.projection_of(&all, folds)?.explained(), group, rest, folds)
+        self.evidence_of_gain(self.model_of(&all, folds)?.explained(), group, rest, folds)
     }
 
     fn evidence_of_gain(
@@ -79,10 +77,10 @@ impl SearchState<'_> {
         rest: &[usize],
         folds: &[usize],
     ) -> Result<f64, IdentifyError> {
-        let without = self.projection_of(rest, folds)?;
+        let without = self.model_of(rest, folds)?;
         let gain = Gain {
             gain: explained - without.explained(),
-            freedom: group.iter().map(|c| self.moments.count[*c] + self.moments.numbers[*c]).sum(),
+            freedom: group.iter().map(|c| self.moments.count(*c) + self.moments.numbers(*c)).sum(),
         };
         Ok(self.evidence(&gain, self.variance(&without)))
     }
@@ -142,7 +140,7 @@ impl SearchState<'_> {
     ) -> Result<Vec<usize>, IdentifyError> {
         let model = self.model_of(base, folds)?;
         let variance = self.variance(&model);
-        let gains = model.gains();
+        let gains = self.gains(&model)?;
         let mut scored: Vec<(usize, f64)> = (0..self.candidates.len())
             .filter(|c| self.may_be_added(*c, folds) && !base.contains(c))
             .map(|c| (c, self.score(c, &gains[c], variance)))
@@ -159,17 +157,17 @@ impl SearchState<'_> {
     pub fn best_against_null(&self) -> Result<Option<(f64, f64)>, IdentifyError> {
         let chosen = self.selection.branches[ALL].chosen();
         let model = self.model_without(None)?;
-        let Some((_, score)) = self.best_of(&model, &model.gains(), &chosen) else {
+        let Some((_, score)) = self.best_of(&model, &self.gains(&model)?, &chosen) else {
             return Ok(None);
         };
-        let score = self.step_tables(&model).iter().map(StepTable::score).fold(score, f64::max);
+        let score = self.step_tables(&model)?.iter().map(StepTable::score).fold(score, f64::max);
         let costs: Vec<f64> = (0..self.candidates.len())
             .map(|c| {
                 if self.may_be_added(c, &model.folds) { self.candidates[c].description_length() } else { f64::INFINITY }
             })
             .collect();
-        let null_variance = self.variance(&self.projection_of(&[], &self.selection.branches[ALL].folds)?);
-        let mut null = model.null_best(&costs, null_variance);
+        let null_variance = self.variance(&self.model_of(&[], &self.selection.branches[ALL].folds)?);
+        let mut null = model.null_best(&chosen, &costs, null_variance)?;
         null.sort_by(f64::total_cmp);
         let above = null.iter().filter(|best| **best >= score).count();
         let p_value = (above + 1) as f64 / (null.len() + 1) as f64;
