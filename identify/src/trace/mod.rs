@@ -261,10 +261,9 @@ fn trace_or_interrupted(
     let moments = Moments::new(&columns, column_sets, model, &start.residual, prior, draws)?;
     moments.prepare(&[], &go_on)?;
     let unwhitened = start.unwhitened(&columns, &before_fit.beta, problem.noise.sigma_mm)?;
-    let mut search = SearchState::new(&columns, candidates, moments, unwhitened, policy)?;
-    search.reserve = reserve;
+    let mut search = SearchState::new(&columns, candidates, reserve, moments, unwhitened, policy)?;
     search.interrupt = Some(interrupt);
-    let gains = search.model_without(None)?.gains(&|_| true)?;
+    let gains = search.model_without(None)?.gains(&|candidate| !search.candidates[candidate].last_resort)?;
     let observable = gains.iter().filter(|gain| gain.freedom > 0).count();
 
     let mut record = SearchRecord { steps: Vec::new(), noise_um: problem.noise.sigma_mm * 1e3, progress };

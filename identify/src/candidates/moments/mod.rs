@@ -21,6 +21,7 @@ mod tuning;
 
 use std::collections::HashMap;
 use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
 use faer::linalg::matmul::matmul;
@@ -45,28 +46,36 @@ pub struct PriorMoments {
 }
 
 /// Candidates whose products are formed together.
+#[derive(Clone)]
 struct Segment {
     /// Index of the first candidate.
     start: usize,
-    layout: Layout,
+    /// Its key in the stores of products. Clones with other segments share these stores.
+    key: usize,
+    layout: Arc<Layout>,
 }
 
-/// The products of the candidates of a session.
+/// The products of the candidates of a session. Clones share all products. Each can have further candidates.
+#[derive(Clone)]
 pub struct Moments<'c> {
     columns: &'c Columns<'c>,
     sets: Vec<EffectColumns>,
     segments: Vec<Segment>,
+    next_key: Arc<AtomicUsize>,
     /// Rows × rank.
-    model: Mat<f64>,
-    residual: Vec<f64>,
-    prior: PriorMoments,
+    model: Arc<Mat<f64>>,
+    residual: Arc<Vec<f64>>,
+    prior: Arc<PriorMoments>,
     /// The null draws with the model projected out.
-    null: Adjoint,
+    null: Arc<Adjoint>,
     /// For each segment draws × columns.
-    null_products: Mutex<HashMap<usize, Arc<Mat<f64>>>>,
+    null_products: Store<usize, Mat<f64>>,
     /// By training folds.
-    projections: Mutex<HashMap<Vec<usize>, Arc<Projection>>>,
+    projections: Store<Vec<usize>, Projection>,
 }
+
+/// Values that clones share.
+type Store<K, V> = Arc<Mutex<HashMap<K, Arc<V>>>>;
 
 pub(crate) fn transposed_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     let mut product = Mat::zeros(a.ncols(), b.ncols());
@@ -107,18 +116,19 @@ impl<'c> Moments<'c> {
             columns,
             sets: Vec::new(),
             segments: Vec::new(),
-            model,
-            residual: residual.to_vec(),
-            prior,
-            null: Adjoint { rows: Vec::new(), values: Mat::zeros(0, 0) },
-            null_products: Mutex::default(),
-            projections: Mutex::default(),
+            next_key: Arc::default(),
+            model: Arc::new(model),
+            residual: Arc::new(residual.to_vec()),
+            prior: Arc::new(prior),
+            null: Arc::new(Adjoint { rows: Vec::new(), values: Mat::zeros(0, 0) }),
+            null_products: Arc::default(),
+            projections: Arc::default(),
         };
         if null.ncols() > 0 {
             let whole = moments.projection(&moments.all_folds())?;
-            let along = &whole.inverse * transposed_product(moments.model.as_ref(), null.as_ref());
-            matmul(null.as_mut(), Accum::Add, moments.model.as_ref(), along.as_ref(), -1.0, Par::Seq);
-            moments.null = Adjoint::of(&whole.training, null.as_ref());
+            let along = &whole.inverse * transposed_product(moments.model(), null.as_ref());
+            matmul(null.as_mut(), Accum::Add, moments.model(), along.as_ref(), -1.0, Par::Seq);
+            moments.null = Arc::new(Adjoint::of(&whole.training, null.as_ref()));
         }
         moments.append(sets);
         Ok(moments)
@@ -126,13 +136,19 @@ impl<'c> Moments<'c> {
 
     /// Adds candidates as a segment of their own.
     pub fn append(&mut self, sets: Vec<EffectColumns>) {
-        self.segments.push(Segment { start: self.sets.len(), layout: Layout::of(&sets) });
+        let key = self.next_key.fetch_add(1, Ordering::Relaxed);
+        self.segments.push(Segment { start: self.sets.len(), key, layout: Arc::new(Layout::of(&sets)) });
         self.sets.extend(sets);
     }
 
     /// Number of candidates.
     pub fn candidates(&self) -> usize {
         self.sets.len()
+    }
+
+    /// The model columns: rows × rank.
+    fn model(&self) -> MatRef<'_, f64> {
+        Mat::as_ref(&self.model)
     }
 
     /// Number of model columns.
@@ -206,7 +222,7 @@ impl<'c> Moments<'c> {
 
     /// The products of a segment with the projected null draws: draws × columns.
     pub(super) fn null_products(&self, segment: usize) -> Result<Arc<Mat<f64>>, IdentifyError> {
-        stored(&self.null_products, &segment, || {
+        stored(&self.null_products, &self.segments[segment].key, || {
             let whole = self.projection(&self.all_folds())?;
             let layout = &self.segments[segment].layout;
             let draws = self.draws();

@@ -16,7 +16,7 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 
 use super::{Moments, stored, transposed_product};
-use crate::candidates::columns::{Adjoint, TrainingRows};
+use crate::candidates::columns::{Adjoint, EffectColumns, TrainingRows};
 use crate::error::IdentifyError;
 use crate::numerics::symmetric::pseudo_inverse;
 
@@ -42,7 +42,8 @@ pub(in crate::candidates) struct Projection {
     /// The rows that were left out; `None` if there are none.
     left_out: Option<LeftOut>,
     segments: Mutex<HashMap<usize, Arc<SegmentProducts>>>,
-    chosen: Mutex<HashMap<usize, Arc<ChosenEffect>>>,
+    /// By the address of the basis functions, which the effect keeps, and that of the channel.
+    chosen: Mutex<HashMap<(usize, usize), Arc<ChosenEffect>>>,
 }
 
 /// The rows of the folds that are not trained on.
@@ -80,6 +81,8 @@ pub(in crate::candidates) struct ChosenEffect {
     pub with_residual: Vec<f64>,
     /// Length of each column over all rows.
     pub lengths: Vec<f64>,
+    /// Keeps the addresses that are its key.
+    _set: EffectColumns,
     side: OnceLock<Adjoint>,
     segments: Mutex<HashMap<usize, Arc<Mat<f64>>>>,
 }
@@ -103,7 +106,7 @@ impl Projection {
         let training = columns.training_rows(folds);
         let part = |fold: usize| {
             let rows = &columns.fold_rows[fold];
-            moments.model.as_ref().subrows(rows.start, rows.len())
+            moments.model().subrows(rows.start, rows.len())
         };
         let mut gram = moments.prior.base.clone();
         let mut with_y = Mat::from_fn(moments.rank(), 1, |i, _| moments.prior.base_y[i]);
@@ -116,7 +119,7 @@ impl Projection {
         let inverse = pseudo_inverse(gram.as_ref())?;
         let coefficients = &inverse * &with_y;
         let y = MatRef::from_column_major_slice(&moments.residual, moments.residual.len(), 1);
-        let residual = restricted((y - &moments.model * &coefficients).as_ref(), &training);
+        let residual = restricted((y - moments.model() * &coefficients).as_ref(), &training);
         let left_out: Vec<usize> = all.iter().copied().filter(|fold| !folds.contains(fold)).collect();
         let left_out = match left_out.is_empty() {
             true => None,
@@ -145,7 +148,7 @@ impl Projection {
         segment: usize,
         go_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Arc<SegmentProducts>, IdentifyError> {
-        stored(&self.segments, &segment, || {
+        stored(&self.segments, &moments.segments[segment].key, || {
             let products = match &self.left_out {
                 None => self.of_all(moments, segment, go_on)?,
                 Some(left_out) => left_out.products(moments, segment, go_on)?,
@@ -163,7 +166,7 @@ impl Projection {
         let layout = &moments.segments[segment].layout;
         let rank = moments.rank();
         let mut side = Mat::zeros(moments.residual.len(), rank + 1);
-        side.as_mut().subcols_mut(0, rank).copy_from(&moments.model);
+        side.as_mut().subcols_mut(0, rank).copy_from(moments.model());
         side.as_mut().subcols_mut(rank, 1).copy_from(&self.residual);
         let side = Adjoint::of(&self.training, side.as_ref());
         let products = layout.products(&self.training, &side, true, go_on).ok_or(IdentifyError::Interrupted)?;
@@ -182,17 +185,18 @@ impl Projection {
 
     /// A chosen effect.
     pub fn chosen(&self, moments: &Moments<'_>, candidate: usize) -> Result<Arc<ChosenEffect>, IdentifyError> {
-        stored(&self.chosen, &candidate, || {
-            let set = moments.set(candidate);
+        let set = moments.set(candidate);
+        let key = (Arc::as_ptr(&set.basis) as usize, Arc::as_ptr(&set.channel) as usize);
+        stored(&self.chosen, &key, || {
             let mut all = Mat::zeros(moments.columns.rows(), set.count);
             moments.columns.fill(&[set], all.as_mut());
             let lengths = all.col_iter().map(|column| column.norm_l2()).collect();
             let mut rows = restricted(all.as_ref(), &self.training);
-            let of_model = &self.inverse * transposed_product(moments.model.as_ref(), rows.as_ref());
+            let of_model = &self.inverse * transposed_product(moments.model(), rows.as_ref());
             let with_residual = transposed_product(rows.as_ref(), self.residual.as_ref()).col(0).iter().copied().collect();
             for fold in &self.folds {
                 let of_fold = &moments.columns.fold_rows[*fold];
-                let model = moments.model.as_ref().subrows(of_fold.start, of_fold.len());
+                let model = moments.model().subrows(of_fold.start, of_fold.len());
                 let to = rows.as_mut().subrows_mut(of_fold.start, of_fold.len());
                 matmul(to, Accum::Add, model, of_model.as_ref(), -1.0, Par::Seq);
             }
@@ -201,6 +205,7 @@ impl Projection {
                 of_model,
                 with_residual,
                 lengths,
+                _set: set.clone(),
                 side: OnceLock::new(),
                 segments: Mutex::default(),
             }))
@@ -214,7 +219,7 @@ impl Projection {
         chosen: &ChosenEffect,
         segment: usize,
     ) -> Result<Arc<Mat<f64>>, IdentifyError> {
-        stored(&chosen.segments, &segment, || {
+        stored(&chosen.segments, &moments.segments[segment].key, || {
             let side = chosen.side.get_or_init(|| Adjoint::of(&self.training, chosen.rows.as_ref()));
             let layout = &moments.segments[segment].layout;
             let products = layout.products(&self.training, side, false, &|| true);

@@ -29,7 +29,7 @@ impl TuningSide {
         let rank = moments.rank();
         let width = rank + 1 + chosen.iter().map(|chosen| chosen.rows.ncols()).sum::<usize>();
         let mut vectors = Mat::zeros(projection.residual.nrows(), width);
-        vectors.as_mut().subcols_mut(0, rank).copy_from(&moments.model);
+        vectors.as_mut().subcols_mut(0, rank).copy_from(moments.model());
         vectors.as_mut().subcols_mut(rank, 1).copy_from(&projection.residual);
         let mut next = rank + 1;
         for chosen in chosen {

@@ -46,9 +46,6 @@ fn merged(search: &mut SearchState<'_>, branch: usize, group: &[usize]) -> Resul
     if group.len() > 1 {
         search.tune_near_best(&rest, &folds)?;
     }
-    if curves {
-        search.add_reserve_candidates();
-    }
     let may_be_added = |c: &usize| {
         search.may_be_added(*c, &folds) || curves && search.candidates[*c].last_resort && search.may_be_used(*c, &folds)
     };

@@ -31,9 +31,10 @@ pub mod withdraw;
 use super::policy::MoveName;
 use super::state::{ALL, SearchState, SelectedEffect};
 use crate::error::IdentifyError;
+use crate::numerics::parallel;
 
 /// A move of the search.
-pub trait Move {
+pub trait Move: Sync {
     /// Tries the move on one branch. Returns whether its selected effects changed.
     ///
     /// # Errors
@@ -84,7 +85,7 @@ pub fn named(name: MoveName) -> &'static dyn Move {
     }
 }
 
-/// Tries a move on every branch. Returns whether the branch on all readings changed.
+/// Tries a move on every branch, on those without a fold at the same time. Returns whether the branch on all readings changed.
 ///
 /// # Errors
 /// See [`Move::try_on`].
@@ -92,8 +93,15 @@ pub fn on_every_branch(tried: &dyn Move, search: &mut SearchState<'_>) -> Result
     let all = tried.try_on(search, ALL)?;
     if all || !tried.follows_all_readings() {
         search.prepare_branches()?;
-        for branch in ALL + 1..search.selection.branches.len() {
-            tried.try_on(search, branch)?;
+        let branches = search.selection.branches.len();
+        let tried = parallel::map(branches - 1, &|fold| {
+            let mut own = search.clone();
+            tried.try_on(&mut own, ALL + 1 + fold)?;
+            Ok(own)
+        });
+        let tried: Vec<SearchState<'_>> = tried.into_iter().collect::<Result<_, IdentifyError>>()?;
+        for (fold, own) in tried.into_iter().enumerate() {
+            search.adopt(ALL + 1 + fold, own);
         }
     }
     Ok(all)

@@ -75,7 +75,7 @@ impl SearchState<'_> {
 
     /// The squares of the residuals of one fold as the branch without it predicts them.
     fn squares_of_fold(&self, fold: usize, branch: &SearchBranch) -> Result<Vec<f64>, IdentifyError> {
-        let UnwhitenedModel { model, residual, folds, sigma_mm, .. } = &self.unwhitened;
+        let UnwhitenedModel { model, residual, folds, sigma_mm, .. } = &*self.unwhitened;
         let chosen = branch.chosen();
         let trained = self.model_of(&chosen, &branch.folds)?;
         let (of_model, of_chosen) = trained.coefficients();

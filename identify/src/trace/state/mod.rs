@@ -10,6 +10,8 @@ mod objective;
 mod pool;
 mod tuning;
 
+use std::sync::Arc;
+
 use abbe_model::effect::Effect;
 
 use super::constants::{Effort, ON_ALL, ON_FOLDS};
@@ -49,14 +51,15 @@ impl SearchBranch {
 /// Index of the branch on all readings. The branch that excludes fold `k` has index `k + 1`.
 pub(super) const ALL: usize = 0;
 
-/// The state of the search.
+/// The state of the search. A clone shares the products with the original and searches on its own.
+#[derive(Clone)]
 pub struct SearchState<'s> {
     /// The policy for the readings.
     pub policy: Policy,
     /// The columns.
     pub columns: &'s Columns<'s>,
     /// The candidates.
-    pub candidates: Vec<Candidate>,
+    pub candidates: Vec<Arc<Candidate>>,
     /// All products.
     pub moments: Moments<'s>,
     /// The selected effects.
@@ -70,10 +73,8 @@ pub struct SearchState<'s> {
     pub thresholds: Vec<f64>,
     /// Whether candidates of last resort are searched.
     pub last_resort: bool,
-    /// Candidates of last resort whose products are not computed yet.
-    pub reserve: Vec<Candidate>,
     /// The unwhitened model and residual for the held-out error.
-    unwhitened: UnwhitenedModel,
+    unwhitened: Arc<UnwhitenedModel>,
     /// Effects that scored better than readings without structure but were not accepted, in order of addition.
     pub rejected: Vec<RejectedByHeldOut>,
     /// Number of the library's detectable effects. A dictionary counts once: its step tables share its identifier, and
@@ -85,13 +86,15 @@ pub struct SearchState<'s> {
 }
 
 impl<'s> SearchState<'s> {
-    /// The state before the first round.
+    /// The state before the first round. `moments` holds the products of the candidates without those of last resort,
+    /// `reserve`.
     ///
     /// # Errors
     /// If products are not finite.
     pub fn new(
         columns: &'s Columns<'s>,
         candidates: Vec<Candidate>,
+        reserve: Vec<Candidate>,
         moments: Moments<'s>,
         unwhitened: UnwhitenedModel,
         policy: Policy,
@@ -100,20 +103,20 @@ impl<'s> SearchState<'s> {
         let mut search = SearchState {
             policy,
             columns,
-            candidates,
+            candidates: candidates.into_iter().map(Arc::new).collect(),
             moments,
             selection: none.clone(),
             accepted: none.clone(),
             declared: none,
             thresholds: Vec::new(),
             last_resort: false,
-            reserve: Vec::new(),
-            unwhitened,
+            unwhitened: Arc::new(unwhitened),
             rejected: Vec::new(),
             detectable_effects: 0,
             interrupt: None,
         };
         search.judge_detectability()?;
+        search.append(reserve);
         search.note_held_out()?;
         search.declared = search.selection.clone();
         search.accepted = search.selection.clone();

@@ -1,5 +1,8 @@
 //! The candidates that a search may add: the library's detectable effects, and the effects that it has tuned itself.
 
+use std::collections::HashMap;
+use std::sync::Arc;
+
 use super::SearchState;
 use super::tuning::Tuned;
 use crate::candidates::candidate::Candidate;
@@ -24,16 +27,15 @@ impl SearchState<'_> {
         .collect::<Result<_, IdentifyError>>()?;
         drop(model);
         self.detectable_effects = detectable.iter().filter(|detectable| **detectable).count();
-        self.candidates
-            .iter_mut()
-            .zip(detectable)
-            .for_each(|(candidate, detectable)| candidate.detectable = detectable);
+        for (candidate, detectable) in self.candidates.iter_mut().zip(detectable) {
+            Arc::make_mut(candidate).detectable = detectable;
+        }
         Ok(())
     }
 
     /// Whether a branch with some training folds may add a candidate now.
     pub fn may_be_added(&self, candidate: usize, folds: &[usize]) -> bool {
-        let Candidate { detectable, dictionary, last_resort, .. } = self.candidates[candidate];
+        let Candidate { detectable, dictionary, last_resort, .. } = *self.candidates[candidate];
         detectable && !dictionary && (!last_resort || self.last_resort) && self.may_be_used(candidate, folds)
     }
 
@@ -89,11 +91,19 @@ impl SearchState<'_> {
     /// tuned. Returns the index of the first.
     pub(super) fn add_tuned(&mut self, tuned: Vec<Tuned>, folds: &[usize]) -> usize {
         let first = self.candidates.len();
-        let candidates = tuned.into_iter().filter_map(|Tuned { original, effect, selection_penalty }| {
-            let columns = self.columns.reshaped(&effect.shape, &self.candidates[original].columns.channel);
-            let (tuned_on, original) = (folds.to_vec(), self.candidates[original].clone());
+        let candidates = tuned.into_iter().map(|Tuned { original, effect, selection_penalty }| {
+            let original = Candidate::clone(&self.candidates[original]);
+            let columns = self.columns.reshaped(&effect.shape, &original.columns.channel);
             let (dictionary, detectable) = (false, true);
-            Some(Candidate { effect, columns, selection_penalty, tuned_on, dictionary, detectable, ..original })
+            Candidate {
+                effect,
+                columns,
+                selection_penalty,
+                tuned_on: folds.to_vec(),
+                dictionary,
+                detectable,
+                ..original
+            }
         });
         let candidates = candidates.collect();
         self.append(candidates);
@@ -101,17 +111,30 @@ impl SearchState<'_> {
     }
 
     /// Adds candidates. Their products are formed when they are needed.
-    fn append(&mut self, fresh: Vec<Candidate>) {
+    pub(super) fn append(&mut self, fresh: Vec<Candidate>) {
         if !fresh.is_empty() {
             self.moments.append(fresh.iter().map(|candidate| candidate.columns.clone()).collect());
-            self.candidates.extend(fresh);
+            self.candidates.extend(fresh.into_iter().map(Arc::new));
         }
     }
 
-    /// Adds the candidates of last resort to the candidates.
-    pub fn add_reserve_candidates(&mut self) {
-        let reserve = std::mem::take(&mut self.reserve);
-        self.append(reserve);
+    /// Takes over what a clone of this state has selected for a branch, and the effects that it has tuned.
+    pub fn adopt(&mut self, branch: usize, from: SearchState<'_>) {
+        let present = self.candidates.len();
+        let mut place: HashMap<usize, usize> = HashMap::new();
+        let mut tuned = Vec::new();
+        for (index, candidate) in from.candidates.iter().enumerate().skip(present) {
+            if !candidate.tuned_on.is_empty() {
+                place.insert(index, present + tuned.len());
+                tuned.push(Candidate::clone(candidate));
+            }
+        }
+        self.append(tuned);
+        let mut adopted = from.selection.branches[branch].clone();
+        for selected in &mut adopted.selected {
+            selected.candidate = place.get(&selected.candidate).copied().unwrap_or(selected.candidate);
+        }
+        self.selection.branches[branch] = adopted;
     }
 
     /// Curves over an axis, one for each test, without a component. Their columns are computed at the first call.

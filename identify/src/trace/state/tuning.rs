@@ -4,6 +4,7 @@
 //! one, which gains more at its own optimum. Every component near the best is therefore tuned first.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use abbe_model::effect::Effect;
 
@@ -36,7 +37,7 @@ impl SearchState<'_> {
     /// Adds to the candidates those near the best, with their shape numbers tuned beside some candidates on some folds,
     /// and the step tables near the best. Returns the gains of the candidates that were present before.
     pub fn tune_near_best(&mut self, beside: &[usize], folds: &[usize]) -> Result<Vec<Gain>, IdentifyError> {
-        let can_be_tuned = |candidate: &Candidate| candidate.dictionary || !candidate.brackets().is_empty();
+        let can_be_tuned = |candidate: &Arc<Candidate>| candidate.dictionary || !candidate.brackets().is_empty();
         if !self.candidates.iter().any(can_be_tuned) {
             return Ok(Vec::new());
         }
@@ -131,9 +132,9 @@ impl SearchState<'_> {
 
     /// The best step table of the dictionary of an identifier for addition to a model.
     fn step_table_of(&self, model: &TrainedModel<'_>, id: &str) -> Result<Option<StepTable>, IdentifyError> {
-        let has_positions = |candidate: &Candidate| !candidate.effect.shape.positions().is_empty();
+        let has_positions = |candidate: &Arc<Candidate>| !candidate.effect.shape.positions().is_empty();
         let own =
-            |candidate: &Candidate| candidate.dictionary && has_positions(candidate) && candidate.effect.id() == id;
+            |candidate: &Arc<Candidate>| candidate.dictionary && has_positions(candidate) && candidate.effect.id() == id;
         let Some(dictionary) = self.candidates.iter().position(own) else { return Ok(None) };
         best_step_table(model, dictionary, &self.candidates[dictionary], self.variance(model))
     }
@@ -146,7 +147,7 @@ impl SearchState<'_> {
         original: usize,
         before: f64,
     ) -> Option<Tuned> {
-        let Candidate { selection_penalty, ref effect, ref columns, .. } = self.candidates[original];
+        let Candidate { selection_penalty, ref effect, ref columns, .. } = *self.candidates[original];
         let mut effect = effect.clone();
         let channel = TunedChannel::of(self.columns, tuning, columns);
         let brackets = self.candidates[original].brackets();
