@@ -17,41 +17,39 @@ use std::sync::{Arc, Mutex};
 
 use faer::Mat;
 
-use super::columns::Channel;
-use super::moments::{ChannelProducts, ChosenEffect, Moments, Projection, SegmentProducts, TuningSide, stored};
+use super::moments::{ChosenEffect, Moments, Projection, SegmentProducts, stored};
 use crate::error::IdentifyError;
 use crate::numerics::gain::{ObservableSubspace, gain_of_few};
 use crate::numerics::parallel;
 use crate::numerics::symmetric::pseudo_inverse;
-use crate::numerics::tails::{ln_chi_square_tail, most_evidence};
 
 /// Candidates that one parallel task evaluates.
-const AT_ONCE: usize = 128;
+pub(super) const AT_ONCE: usize = 128;
 
 /// The fitted model with chosen effects, trained on some folds.
 pub struct TrainedModel<'m> {
-    moments: &'m Moments<'m>,
-    projection: Arc<Projection>,
+    pub(super) moments: &'m Moments<'m>,
+    pub(super) projection: Arc<Projection>,
     /// The training folds.
     pub folds: Vec<usize>,
     /// The chosen effects.
-    chosen: Vec<Arc<ChosenEffect>>,
+    pub(super) chosen: Vec<Arc<ChosenEffect>>,
     /// `(EᵀE⊥)⁻¹`.
-    inverse: Mat<f64>,
+    pub(super) inverse: Mat<f64>,
     /// `Eᵀ y⊥`.
-    along: Vec<f64>,
+    pub(super) along: Vec<f64>,
     /// Coefficients of the chosen effects.
     coefficients: Vec<f64>,
     segments: Mutex<HashMap<usize, Arc<Segment>>>,
 }
 
 /// The products of the candidates of a segment with the chosen effects.
-struct Segment {
+pub(super) struct Segment {
     products: Arc<SegmentProducts>,
     /// `V`: chosen columns × columns.
     with_chosen: Mat<f64>,
     /// `(EᵀE⊥)⁻¹ V`.
-    solved: Mat<f64>,
+    pub solved: Mat<f64>,
 }
 
 /// The gain of a candidate.
@@ -100,12 +98,13 @@ impl<'m> TrainedModel<'m> {
         let scaled = Mat::from_fn(scale.len(), scale.len(), |i, j| gram[(i, j)] * scale[i] * scale[j]);
         let inverse = pseudo_inverse(scaled.as_ref())?;
         let inverse = Mat::from_fn(scale.len(), scale.len(), |i, j| inverse[(i, j)] * scale[i] * scale[j]);
-        let coefficients = (0..along.len()).map(|i| (0..along.len()).map(|j| inverse[(i, j)] * along[j]).sum()).collect();
+        let coefficients =
+            (0..along.len()).map(|i| (0..along.len()).map(|j| inverse[(i, j)] * along[j]).sum()).collect();
         let (folds, segments) = (folds.to_vec(), Mutex::default());
         Ok(TrainedModel { moments, projection, folds, chosen, inverse, along, coefficients, segments })
     }
 
-    fn segment(&self, number: usize) -> Result<Arc<Segment>, IdentifyError> {
+    pub(super) fn segment(&self, number: usize) -> Result<Arc<Segment>, IdentifyError> {
         stored(&self.segments, &number, || {
             let products = self.projection.products(self.moments, number, &|| true)?;
             let mut with_chosen = Mat::zeros(self.along.len(), products.g.len());
@@ -136,7 +135,7 @@ impl<'m> TrainedModel<'m> {
         Ok(self.projected_in(&segment, columns, square))
     }
 
-    fn projected_in(&self, segment: &Segment, columns: Range<usize>, square: Range<usize>) -> Projected {
+    pub(super) fn projected_in(&self, segment: &Segment, columns: Range<usize>, square: Range<usize>) -> Projected {
         let count = columns.len();
         let (d, own) = (&segment.products.d[square.clone()], &segment.products.own[square]);
         let (first, chosen) = (columns.start, self.along.len());
@@ -159,7 +158,7 @@ impl<'m> TrainedModel<'m> {
 
     /// The degrees of freedom of a candidate's gain: its observable directions and its tuned shape numbers. Without the
     /// latter, tunable candidates would be preferred.
-    fn freedom(&self, candidate: usize, observable: usize) -> usize {
+    pub(super) fn freedom(&self, candidate: usize, observable: usize) -> usize {
         if observable == 0 { 0 } else { observable + self.moments.numbers(candidate) }
     }
 
@@ -230,92 +229,27 @@ impl<'m> TrainedModel<'m> {
         let (first, total) = (known.len(), self.moments.candidates());
         let chunks: Vec<Range<usize>> =
             (first..total).step_by(AT_ONCE).map(|start| start..(start + AT_ONCE).min(total)).collect();
+        let mut segments: Vec<Option<Arc<Segment>>> = Vec::new();
         for candidate in (first..total).filter(|candidate| usable(*candidate)) {
-            self.segment(self.moments.place(candidate).0)?;
+            let number = self.moments.place(candidate).0;
+            segments.resize(segments.len().max(number + 1), None);
+            if segments[number].is_none() {
+                segments[number] = Some(self.segment(number)?);
+            }
         }
-        let gains = parallel::map(chunks.len(), &|k| {
-            let gain = |candidate: usize| if usable(candidate) { self.gain(candidate) } else { Ok(Gain::default()) };
-            chunks[k].clone().map(gain).collect::<Result<Vec<Gain>, IdentifyError>>()
-        });
+        let gain = |candidate: usize| {
+            let (number, local) = self.moments.place(candidate);
+            let segment = segments.get(number).and_then(Option::as_ref).filter(|_| usable(candidate));
+            segment.map_or_else(Gain::default, |segment| {
+                let columns = self.moments.columns_of(number, local);
+                self.gain_in(candidate, segment, columns, self.moments.square_of(number, local))
+            })
+        };
+        let gains = parallel::map(chunks.len(), &|k| chunks[k].clone().map(gain).collect::<Vec<Gain>>());
         for part in gains {
-            known.extend(part?);
+            known.extend(part);
         }
         Ok(known)
-    }
-
-    /// The best score of each null draw over all candidates. `costs` and `variance` are those of the real search.
-    ///
-    /// # Errors
-    /// If products are not finite.
-    pub fn null_best(&self, chosen: &[usize], costs: &[f64], variance: f64) -> Result<Vec<f64>, IdentifyError> {
-        let draws = self.moments.draws();
-        let mut h = Mat::zeros(draws, self.along.len());
-        let mut column = 0;
-        for candidate in chosen {
-            let (segment, local) = self.moments.place(*candidate);
-            let products = self.moments.null_products(segment)?;
-            for k in self.moments.columns_of(segment, local) {
-                h.col_mut(column).copy_from(products.col(k));
-                column += 1;
-            }
-        }
-        let counted: Vec<usize> = (0..costs.len()).filter(|candidate| costs[*candidate].is_finite()).collect();
-        for candidate in &counted {
-            let segment = self.moments.place(*candidate).0;
-            self.segment(segment)?;
-            self.moments.null_products(segment)?;
-        }
-        let chunks: Vec<&[usize]> = counted.chunks(AT_ONCE).collect();
-        let of_chunks = parallel::map(chunks.len(), &|k| self.null_best_of(chunks[k], costs, variance, &h));
-        let mut best = vec![f64::NEG_INFINITY; draws];
-        for chunk in of_chunks {
-            best.iter_mut().zip(chunk?).for_each(|(b, c)| *b = b.max(c));
-        }
-        Ok(best)
-    }
-
-    fn null_best_of(
-        &self,
-        candidates: &[usize],
-        costs: &[f64],
-        variance: f64,
-        h: &Mat<f64>,
-    ) -> Result<Vec<f64>, IdentifyError> {
-        let draws = h.nrows();
-        let mut best = vec![f64::NEG_INFINITY; draws];
-        let mut g: Vec<f64> = Vec::new();
-        let mut left = Mat::zeros(0, 0);
-        for candidate in candidates {
-            let (number, local) = self.moments.place(*candidate);
-            let (columns, square) = (self.moments.columns_of(number, local), self.moments.square_of(number, local));
-            let (segment, null) = (self.segment(number)?, self.moments.null_products(number)?);
-            let projected = self.projected_in(&segment, columns.clone(), square);
-            let subspace = ObservableSubspace::of(&projected.d, &projected.own);
-            let freedom = self.freedom(*candidate, subspace.freedom);
-            if freedom == 0 {
-                continue;
-            }
-            let null = null.as_ref().subcols(columns.start, columns.len());
-            let null = if h.ncols() == 0 {
-                null
-            } else {
-                left = null - h * segment.solved.as_ref().subcols(columns.start, columns.len());
-                left.as_ref()
-            };
-            for (draw, best) in best.iter_mut().enumerate() {
-                g.clear();
-                g.extend((0..columns.len()).map(|k| null[(draw, k)]));
-                let gain = subspace.quadratic(&g) / variance;
-                // The tail is computed only if it can exceed the best score.
-                if most_evidence(gain, freedom) - costs[*candidate] <= *best {
-                    continue;
-                }
-                let score = -ln_chi_square_tail(gain, freedom) - costs[*candidate];
-                *best = best.max(score);
-            }
-        }
-        drop(left);
-        Ok(best)
     }
 
     /// The share of a signature that a candidate can reproduce in addition to the model: `cos²` of the angle between
@@ -415,47 +349,5 @@ impl<'m> TrainedModel<'m> {
         let rows: usize = self.projection.training.blocks.iter().map(|block| block.rows.len()).sum();
         let parameters = self.moments.rank() + self.along.len();
         (residual.squared_norm_l2(), rows.saturating_sub(parameters).max(1))
-    }
-
-    /// What the columns of tuned effects are multiplied with.
-    pub fn tuning(&self) -> Tuning<'_> {
-        Tuning { model: self, side: TuningSide::of(self.moments, &self.projection, &self.chosen) }
-    }
-}
-
-/// Gains of effects that are no candidates beside a model.
-pub struct Tuning<'t> {
-    model: &'t TrainedModel<'t>,
-    side: TuningSide,
-}
-
-/// The products of one effect with a model.
-#[derive(Clone)]
-pub(super) struct EffectProducts {
-    /// With the model columns, the residual and the chosen effects: vectors × columns.
-    pub cross: Mat<f64>,
-    /// With itself.
-    pub own: Mat<f64>,
-}
-
-impl<'t> Tuning<'t> {
-    /// The sums over the states of a channel.
-    pub(super) fn channel<'c>(&'c self, channel: &'c Channel) -> ChannelProducts<'c> {
-        self.side.channel(&self.model.projection, channel)
-    }
-
-    /// The gain of an effect.
-    pub(super) fn gain(&self, products: &EffectProducts) -> f64 {
-        let rank = self.model.moments.rank();
-        let (cross, count) = (&products.cross, products.own.ncols());
-        let of_model = cross.subrows(0, rank);
-        let of_chosen = cross.subrows(rank + 1, self.model.along.len());
-        let solved = &self.model.inverse * of_chosen;
-        let d = &products.own
-            - of_model.transpose() * (&self.model.projection.inverse * of_model)
-            - of_chosen.transpose() * &solved;
-        let along = |k: usize| -> f64 { self.model.along.iter().enumerate().map(|(i, y)| solved[(i, k)] * y).sum() };
-        let g: Vec<f64> = (0..count).map(|k| cross[(rank, k)] - along(k)).collect();
-        crate::numerics::gain::quadratic_gain(&d, &products.own, &g)
     }
 }

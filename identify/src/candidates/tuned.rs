@@ -3,12 +3,59 @@
 //! Its products follow from the sums over the states of its driver, which do not depend on the numbers. If one of
 //! several positions changes, only its column is computed again.
 
+use std::sync::Arc;
+
 use abbe_model::effect::Shape;
 use faer::Mat;
 
-use super::columns::{Columns, EffectColumns};
-use super::gain::{EffectProducts, Tuning};
-use super::moments::ChannelProducts;
+use super::columns::{Channel, Columns, EffectColumns};
+use super::gain::TrainedModel;
+use super::moments::{ChannelProducts, TuningSide};
+use crate::numerics::gain::quadratic_gain;
+
+impl TrainedModel<'_> {
+    /// What the columns of tuned effects are multiplied with.
+    pub fn tuning(&self) -> Tuning<'_> {
+        Tuning { model: self, side: TuningSide::of(self.moments, &self.projection, &self.chosen) }
+    }
+}
+
+/// Gains of effects that are no candidates beside a model.
+pub struct Tuning<'t> {
+    model: &'t TrainedModel<'t>,
+    side: TuningSide,
+}
+
+/// The products of one effect with a model.
+#[derive(Clone)]
+struct EffectProducts {
+    /// With the model columns, the residual and the chosen effects: vectors × columns.
+    cross: Mat<f64>,
+    /// With itself.
+    own: Mat<f64>,
+}
+
+impl<'t> Tuning<'t> {
+    /// The sums over the states of a channel.
+    fn channel<'c>(&'c self, channel: &'c Channel) -> ChannelProducts<'c> {
+        self.side.channel(&self.model.projection, channel)
+    }
+
+    /// The gain of an effect.
+    fn gain(&self, products: &EffectProducts) -> f64 {
+        let rank = self.model.moments.rank();
+        let (cross, count) = (&products.cross, products.own.ncols());
+        let of_model = cross.subrows(0, rank);
+        let of_chosen = cross.subrows(rank + 1, self.model.along.len());
+        let solved = &self.model.inverse * of_chosen;
+        let d = &products.own
+            - of_model.transpose() * (&self.model.projection.inverse * of_model)
+            - of_chosen.transpose() * &solved;
+        let along = |k: usize| -> f64 { self.model.along.iter().enumerate().map(|(i, y)| solved[(i, k)] * y).sum() };
+        let g: Vec<f64> = (0..count).map(|k| cross[(rank, k)] - along(k)).collect();
+        quadratic_gain(&d, &products.own, &g)
+    }
+}
 
 /// A channel whose effects are tuned.
 pub struct TunedChannel<'t> {
@@ -35,9 +82,13 @@ impl<'t> TunedChannel<'t> {
 
     /// The effect with a shape.
     pub fn effect(&self, shape: &Shape) -> TunedEffect {
-        let basis = (*self.columns.reshaped(shape, &self.set.channel).basis).clone();
-        let (local, cross, own) = self.products.of(&basis);
-        TunedEffect { local, basis, products: EffectProducts { cross, own } }
+        self.effect_of(&self.columns.reshaped(shape, &self.set.channel).basis)
+    }
+
+    /// The effect with basis functions (states × columns).
+    pub(super) fn effect_of(&self, basis: &Arc<Mat<f64>>) -> TunedEffect {
+        let (local, cross, own) = self.products.of(basis);
+        TunedEffect { local, basis: Mat::clone(basis), products: EffectProducts { cross, own } }
     }
 
     /// The gain of an effect.

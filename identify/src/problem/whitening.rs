@@ -15,6 +15,11 @@ pub struct Filter {
 }
 
 impl Filter {
+    /// Whether each whitened row is formed from one row.
+    pub fn is_pointwise(&self) -> bool {
+        self.terms.len() == 1
+    }
+
     /// The scalar rows of a block from which its whitened row `i` is formed, with their factors.
     pub fn terms(&self, i: usize) -> impl Iterator<Item = (usize, f64)> {
         let (count, first) = if i < self.past { (1, self.at_start) } else { (self.terms.len(), self.terms[0].1) };

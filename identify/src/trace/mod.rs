@@ -30,6 +30,8 @@ mod search;
 mod start;
 mod state;
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use abbe_model::effect::Effect;
 use abbe_model::session::Session;
 
@@ -93,6 +95,8 @@ pub enum Progress {
     Screening(usize),
     /// An effect was added: the number of effects, its identifier, the held-out rms in µm.
     SelectedEffect(usize, String, f64),
+    /// Searches without one fold that have ended, and their number. Each predicts the readings that it lacks.
+    Folds(usize, usize),
     /// The model with the found effects is being refitted, and its residual tested.
     Judging,
     /// No new event. Reported often, so that the caller can stop the trace soon.
@@ -145,6 +149,17 @@ pub fn trace(
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<TraceOutcome, IdentifyError> {
+    // Once the caller has stopped the trace, it is not asked again by computations that run at the same time.
+    let stopped = AtomicBool::new(false);
+    let progress = &|event: Progress| {
+        let asks = matches!(event, Progress::Working);
+        if asks && stopped.load(Ordering::Relaxed) {
+            return false;
+        }
+        let goes_on = progress(event);
+        stopped.fetch_or(!goes_on, Ordering::Relaxed);
+        goes_on
+    };
     progress(Progress::Fitting);
     let (problem, fitted) = prepare(session, options.seed)?;
     let contradicted = Contradicted::of(&problem, &fitted)?;

@@ -27,9 +27,8 @@ impl DriverStates {
             DriverPart::Rate => [sample.rate + 0.0, 0.0, 0.0],
             DriverPart::SinceReversal => [sample.direction, sample.since_reversal, sample.since_reversal_s],
         };
-        let ascending = |a: &[f64; 3], b: &[f64; 3]| {
-            a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])).then(a[2].total_cmp(&b[2]))
-        };
+        let ascending =
+            |a: &[f64; 3], b: &[f64; 3]| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])).then(a[2].total_cmp(&b[2]));
         let mut order: Vec<([f64; 3], usize, usize)> = Vec::new();
         for (test, samples) in samples.iter().enumerate() {
             let of_test = samples.iter().flat_map(|samples| samples.iter()).enumerate();
@@ -77,7 +76,8 @@ mod tests {
     /// Readings at one position are one state, whatever the test. States ascend.
     #[test]
     fn readings_at_one_position_share_a_state() {
-        let at = |values: &[f64]| Some(Arc::new(values.iter().map(|v| DriverSample::plain(*v, 0.0)).collect::<Vec<_>>()));
+        let at =
+            |values: &[f64]| Some(Arc::new(values.iter().map(|v| DriverSample::plain(*v, 0.0)).collect::<Vec<_>>()));
         let states = DriverStates::of(&[at(&[2.0, 0.0, 1.0, -0.0]), None, at(&[1.0, 3.0])], DriverPart::Value);
         let values: Vec<f64> = states.samples.iter().map(|sample| sample.value).collect();
         assert_eq!(values, [0.0, 1.0, 2.0, 3.0]);

@@ -27,6 +27,8 @@ const CHUNK_COLUMNS: usize = 64;
 const CHUNKS_PER_TASK: usize = 6;
 /// Largest number of entries of the sums over states of one task, if it has more than one channel.
 const MAX_SUMS: usize = 500_000;
+/// Largest number of entries of the sums of one channel that are kept for all tasks.
+const MAX_KEPT: usize = 100_000;
 
 /// The candidates of a segment by states, basis and channel.
 pub(super) struct Layout {
@@ -139,7 +141,17 @@ impl Layout {
         go_on: &(dyn Fn() -> bool + Sync),
     ) -> Option<Products> {
         let vectors = side.values.nrows();
-        let local = parallel::map(self.groups.len(), &|k| LocalStates::of(&self.groups[k].states, training, &side.rows));
+        let local =
+            parallel::map(self.groups.len(), &|k| LocalStates::of(&self.groups[k].states, training, &side.rows));
+        let kept: Vec<(usize, usize)> = (self.groups.iter().enumerate())
+            .filter(|(k, _)| vectors * local[*k].count() <= MAX_KEPT)
+            .flat_map(|(k, group)| (0..group.channels.len()).map(move |channel| (k, channel)))
+            .collect();
+        let kept_sums = parallel::map(kept.len(), &|k| {
+            let (group, channel) = kept[k];
+            local[group].gather(&self.groups[group].channels[channel], side)
+        });
+        let kept_sums: HashMap<(usize, usize), Mat<f64>> = kept.into_iter().zip(kept_sums).collect();
         let mut tasks = Vec::new();
         for (number, group) in self.groups.iter().enumerate() {
             let at_once = (MAX_SUMS / (vectors * local[number].count()).max(1)).clamp(1, group.channels.len().max(1));
@@ -154,7 +166,7 @@ impl Layout {
             }
         }
         let results = parallel::map(tasks.len(), &|k| {
-            go_on().then(|| self.products_of(&tasks[k], &local[tasks[k].group], training, side, with_own))
+            go_on().then(|| self.products_of(&tasks[k], &local[tasks[k].group], training, side, &kept_sums, with_own))
         });
         let mut products = Products {
             side: Mat::zeros(vectors, self.total()),
@@ -188,6 +200,7 @@ impl Layout {
         local: &LocalStates,
         training: &TrainingRows,
         side: &Adjoint,
+        kept: &HashMap<(usize, usize), Mat<f64>>,
         with_own: bool,
     ) -> (Mat<f64>, Vec<f64>) {
         let group = &self.groups[task.group];
@@ -195,7 +208,11 @@ impl Layout {
         let channels = &group.channels[task.channels.clone()];
         let mut gathered = Mat::zeros(vectors * channels.len(), local.count());
         for (k, channel) in channels.iter().enumerate() {
-            local.gather(channel, training.coordinates, side, &mut gathered, k * vectors);
+            let mut to = gathered.as_mut().subrows_mut(k * vectors, vectors);
+            match kept.get(&(task.group, task.channels.start + k)) {
+                Some(sums) => to.copy_from(sums),
+                None => to.copy_from(&local.gather(channel, side)),
+            }
         }
         let chunks = &group.chunks[task.chunks.clone()];
         let width = |chunk: &[Member]| -> usize { chunk.iter().map(|member| member.basis.ncols()).sum() };

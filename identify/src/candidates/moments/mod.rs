@@ -201,11 +201,7 @@ impl<'c> Moments<'c> {
     ///
     /// # Errors
     /// If products are not finite, or [`IdentifyError::Interrupted`] if `go_on` returns `false`.
-    pub fn prepare(
-        &self,
-        folds: &[&[usize]],
-        go_on: &(dyn Fn() -> bool + Sync),
-    ) -> Result<(), IdentifyError> {
+    pub fn prepare(&self, folds: &[&[usize]], go_on: &(dyn Fn() -> bool + Sync)) -> Result<(), IdentifyError> {
         self.projection(&self.all_folds())?.products(self, 0, go_on)?;
         let prepared = parallel::map(folds.len(), &|k| {
             self.projection(folds[k])?.products(self, 0, go_on)?;

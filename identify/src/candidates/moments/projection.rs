@@ -193,7 +193,8 @@ impl Projection {
             let lengths = all.col_iter().map(|column| column.norm_l2()).collect();
             let mut rows = restricted(all.as_ref(), &self.training);
             let of_model = &self.inverse * transposed_product(moments.model(), rows.as_ref());
-            let with_residual = transposed_product(rows.as_ref(), self.residual.as_ref()).col(0).iter().copied().collect();
+            let with_residual =
+                transposed_product(rows.as_ref(), self.residual.as_ref()).col(0).iter().copied().collect();
             for fold in &self.folds {
                 let of_fold = &moments.columns.fold_rows[*fold];
                 let model = moments.model().subrows(of_fold.start, of_fold.len());
@@ -274,15 +275,15 @@ impl LeftOut {
         let all = moments.projection(&moments.all_folds())?.products(moments, segment, go_on)?;
         let fold = layout.products(&self.training, &self.side, true, go_on).ok_or(IdentifyError::Interrupted)?;
         let m = self.along.len();
-        let of_model = all.with_model.as_ref().map(|solved| &self.r * solved).unwrap_or_else(|| Mat::zeros(m, layout.total()));
+        let of_model =
+            all.with_model.as_ref().map(|solved| &self.r * solved).unwrap_or_else(|| Mat::zeros(m, layout.total()));
         // Qᵀe of the columns.
         let left = fold.side.subrows(0, m) - &of_model;
         let weighted = &self.weight * &left;
         let mut g = all.g.clone();
         for (k, g) in g.iter_mut().enumerate() {
-            let entries = (0..m).map(|i| {
-                of_model[(i, k)] * self.along[i] - (weighted[(i, k)] - left[(i, k)]) * self.along[i]
-            });
+            let entries =
+                (0..m).map(|i| of_model[(i, k)] * self.along[i] - (weighted[(i, k)] - left[(i, k)]) * self.along[i]);
             *g += entries.sum::<f64>() - fold.side[(m, k)];
         }
         let mut own: Vec<f64> = all.own.iter().zip(&fold.own).map(|(all, fold)| all - fold).collect();

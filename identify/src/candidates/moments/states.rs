@@ -15,6 +15,8 @@ pub(super) struct LocalStates {
     states: Vec<u32>,
     /// The index among these of each state.
     place: Vec<u32>,
+    /// The same for each scalar reading that the rows combine; `NONE` in a test in which the effect does not act.
+    of_rows: Vec<u32>,
     /// The largest distance of two states that one whitened row combines.
     band: usize,
 }
@@ -32,12 +34,21 @@ impl LocalStates {
             *place = present.len() as u32;
             present.push(state as u32);
         }
-        let mut local = LocalStates { states: present, place, band: 0 };
+        let of_row = |(test, scalar): &(usize, usize)| {
+            let of_reading = &states.of_reading[*test];
+            if of_reading.is_empty() { NONE } else { place[of_reading[scalar / coordinates] as usize] }
+        };
+        let of_rows = rows.iter().map(of_row).collect();
+        let mut local = LocalStates { states: present, place, of_rows, band: 0 };
+        if training.filter.is_pointwise() {
+            return local;
+        }
         for block in training.blocks.iter().filter(|block| !states.of_reading[block.test].is_empty()) {
             for (i, _) in &block.rows {
-                let places = training.filter.terms(*i).map(|(raw, _)| {
-                    local.of_scalar(&states.of_reading[block.test], block.start + raw, coordinates)
-                });
+                let places = training
+                    .filter
+                    .terms(*i)
+                    .map(|(raw, _)| local.of_scalar(&states.of_reading[block.test], block.start + raw, coordinates));
                 let (low, high) = places.fold((usize::MAX, 0), |(low, high), p| (low.min(p), high.max(p)));
                 local.band = local.band.max(high - low);
             }
@@ -59,21 +70,19 @@ impl LocalStates {
         to.iter_mut().zip(&self.states).for_each(|(to, state)| *to = from[*state as usize]);
     }
 
-    /// Sums `s · z` of a channel over the readings of each state, into the rows of `sums` from `first` on.
-    pub fn gather(&self, channel: &Channel, coordinates: usize, side: &Adjoint, sums: &mut Mat<f64>, first: usize) {
-        let vectors = side.values.nrows();
-        for ((test, scalar), values) in side.rows.iter().zip(side.values.col_iter()) {
-            if !channel.acts_in(*test) {
-                continue;
-            }
+    /// Sums `s · z` of a channel over the readings of each state: vectors × states.
+    pub fn gather(&self, channel: &Channel, side: &Adjoint) -> Mat<f64> {
+        let mut sums = Mat::zeros(side.values.nrows(), self.count());
+        let rows = side.rows.iter().zip(&self.of_rows).enumerate();
+        for (row, ((test, scalar), place)) in rows.filter(|(_, (_, place))| **place != NONE) {
             let sensitivity = channel.sensitivity[*test][*scalar];
-            if sensitivity == 0.0 {
-                continue;
+            if sensitivity != 0.0 {
+                let values = side.values.col_as_slice(row);
+                let sums = sums.col_as_slice_mut(*place as usize);
+                sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += sensitivity * value);
             }
-            let place = self.of_scalar(&channel.states.of_reading[*test], *scalar, coordinates);
-            let sums = &mut sums.col_as_slice_mut(place)[first..first + vectors];
-            sums.iter_mut().zip(values.iter()).for_each(|(sum, value)| *sum += sensitivity * value);
         }
+        sums
     }
 }
 
@@ -96,7 +105,8 @@ impl<'r> OwnProducts<'r> {
             band = vec![vec![0.0; states]; local.band + 1];
             let mut terms: Vec<(usize, f64)> = Vec::new();
             for block in training.blocks.iter().filter(|block| channel.acts_in(block.test)) {
-                let (sensitivity, of_reading) = (&channel.sensitivity[block.test], &channel.states.of_reading[block.test]);
+                let (sensitivity, of_reading) =
+                    (&channel.sensitivity[block.test], &channel.states.of_reading[block.test]);
                 for (i, _) in &block.rows {
                     terms.clear();
                     terms.extend(training.filter.terms(*i).map(|(raw, factor)| {
@@ -123,7 +133,8 @@ impl<'r> OwnProducts<'r> {
         let column = |k: usize| local.col(k).try_as_col_major().map_or(&[][..], |column| column.as_slice());
         if self.band.is_empty() && self.states > 0 {
             let rows = self.rows(basis);
-            squares.extend((0..count * count).map(|at| dot(rows.col_as_slice(at / count), rows.col_as_slice(at % count))));
+            squares
+                .extend((0..count * count).map(|at| dot(rows.col_as_slice(at / count), rows.col_as_slice(at % count))));
         } else if count <= 2 {
             let start = squares.len();
             squares.resize(start + count * count, 0.0);
@@ -160,9 +171,7 @@ impl<'r> OwnProducts<'r> {
     fn product(&self, a: &[f64], b: &[f64]) -> f64 {
         let diagonal = self.band.first().map_or(0.0, |band| dot3(band, a, b));
         let off = self.band.iter().enumerate().skip(1).filter(|(distance, _)| *distance < a.len());
-        off.fold(diagonal, |sum, (distance, band)| {
-            sum + dot3(band, a, &b[distance..]) + dot3(band, &a[distance..], b)
-        })
+        off.fold(diagonal, |sum, (distance, band)| sum + dot3(band, a, &b[distance..]) + dot3(band, &a[distance..], b))
     }
 
     /// `H b`.

@@ -43,8 +43,7 @@ impl TuningSide {
     pub fn channel<'m>(&self, projection: &'m Projection, channel: &'m Channel) -> ChannelProducts<'m> {
         let training = &projection.training;
         let local = LocalStates::of(&channel.states, training, &self.side.rows);
-        let mut sums = Mat::zeros(self.side.values.nrows(), local.count());
-        local.gather(channel, training.coordinates, &self.side, &mut sums, 0);
+        let sums = local.gather(channel, &self.side);
         let own = OwnProducts::of(channel, &local, training);
         ChannelProducts { local, sums, own }
     }

@@ -28,6 +28,10 @@ pub mod remove;
 pub mod swap;
 pub mod withdraw;
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::Progress;
+use super::interrupt::Interrupt;
 use super::policy::MoveName;
 use super::state::{ALL, SearchState, SelectedEffect};
 use crate::error::IdentifyError;
@@ -93,10 +97,14 @@ pub fn on_every_branch(tried: &dyn Move, search: &mut SearchState<'_>) -> Result
     let all = tried.try_on(search, ALL)?;
     if all || !tried.follows_all_readings() {
         search.prepare_branches()?;
-        let branches = search.selection.branches.len();
-        let tried = parallel::map(branches - 1, &|fold| {
+        let folds = search.selection.branches.len() - 1;
+        let ended = AtomicUsize::new(0);
+        let tried = parallel::map(folds, &|fold| {
             let mut own = search.clone();
             tried.try_on(&mut own, ALL + 1 + fold)?;
+            if let Some(Interrupt(progress)) = search.interrupt {
+                progress(Progress::Folds(1 + ended.fetch_add(1, Ordering::Relaxed), folds));
+            }
             Ok(own)
         });
         let tried: Vec<SearchState<'_>> = tried.into_iter().collect::<Result<_, IdentifyError>>()?;

@@ -106,6 +106,7 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
     let mut result = TraceResult {
         verdict,
         interrupted: false,
+        time_limit_s: None,
         unique,
         noise_um: after.noise.sigma_mm * 1e3,
         noise_source: after.noise.source.word().to_string(),

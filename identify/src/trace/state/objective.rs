@@ -9,7 +9,7 @@ use super::{ALL, SearchState};
 use crate::candidates::gain::{Gain, TrainedModel};
 use crate::candidates::step_table::StepTable;
 use crate::error::IdentifyError;
-use crate::numerics::tails::ln_chi_square_tail;
+use crate::numerics::tails::{ln_chi_square_tail, most_evidence};
 use crate::trace::constants::{EQUIVALENT, INDISTINGUISHABLE};
 
 impl SearchState<'_> {
@@ -33,6 +33,16 @@ impl SearchState<'_> {
     /// The evidence for a candidate: `−ln P` of its gain, less its selection penalty.
     pub fn evidence_for(&self, candidate: usize, gain: &Gain, variance: f64) -> f64 {
         self.evidence(gain, variance) - self.candidates[candidate].selection_penalty
+    }
+
+    /// An upper bound of the evidence for a candidate, which takes no evaluation of the tail.
+    pub fn most_evidence_for(&self, candidate: usize, gain: &Gain, variance: f64) -> f64 {
+        most_evidence(gain.gain / variance, gain.freedom) - self.candidates[candidate].selection_penalty
+    }
+
+    /// An upper bound of the score of a candidate.
+    fn most_score(&self, candidate: usize, gain: &Gain, variance: f64) -> f64 {
+        self.most_evidence_for(candidate, gain, variance) - self.candidates[candidate].cost
     }
 
     /// The evidence for a candidate, less its cost.
@@ -97,6 +107,9 @@ impl SearchState<'_> {
             if chosen.contains(&candidate) || !self.may_be_added(candidate, &model.folds) {
                 continue;
             }
+            if best.is_some_and(|(_, most)| self.most_score(candidate, gain, variance) <= most) {
+                continue;
+            }
             let score = self.score(candidate, gain, variance);
             if best.is_none_or(|(_, most)| score > most) {
                 best = Some((candidate, score));
@@ -117,7 +130,9 @@ impl SearchState<'_> {
         let least = self.evidence_for(best, &gains[best], variance) - INDISTINGUISHABLE;
         let mut first = best;
         for (candidate, gain) in gains.iter().enumerate() {
-            let passed_over = chosen.contains(&candidate) || !self.may_be_added(candidate, &model.folds);
+            let passed_over = chosen.contains(&candidate)
+                || !self.may_be_added(candidate, &model.folds)
+                || self.most_evidence_for(candidate, gain, variance) < least;
             if passed_over || gain.freedom == 0 || self.evidence_for(candidate, gain, variance) < least {
                 continue;
             }

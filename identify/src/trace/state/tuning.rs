@@ -10,11 +10,12 @@ use abbe_model::effect::Effect;
 
 use super::SearchState;
 use crate::candidates::candidate::Candidate;
-use crate::candidates::gain::{Gain, TrainedModel, Tuning};
+use crate::candidates::gain::{Gain, TrainedModel};
 use crate::candidates::step_table::{StepTable, best_step_table};
-use crate::candidates::tuned::TunedChannel;
+use crate::candidates::tuned::{TunedChannel, Tuning};
 use crate::error::IdentifyError;
 use crate::numerics::parallel;
+use crate::numerics::tails::most_evidence;
 use crate::trace::constants::{MAX_EVIDENCE_DEFICIT, MIN_EVIDENCE_SHARE};
 
 /// An effect with tuned numbers or positions.
@@ -58,6 +59,9 @@ impl SearchState<'_> {
         let mut best = 0.0_f64;
         for (candidate, gain) in gains.iter().enumerate() {
             if gain.freedom == 0 || !self.may_be_added(candidate, &model.folds) {
+                continue;
+            }
+            if most_evidence(gain.gain / variance, gain.freedom) < MIN_EVIDENCE_SHARE * best {
                 continue;
             }
             let evidence = self.evidence(gain, variance);
@@ -133,8 +137,9 @@ impl SearchState<'_> {
     /// The best step table of the dictionary of an identifier for addition to a model.
     fn step_table_of(&self, model: &TrainedModel<'_>, id: &str) -> Result<Option<StepTable>, IdentifyError> {
         let has_positions = |candidate: &Arc<Candidate>| !candidate.effect.shape.positions().is_empty();
-        let own =
-            |candidate: &Arc<Candidate>| candidate.dictionary && has_positions(candidate) && candidate.effect.id() == id;
+        let own = |candidate: &Arc<Candidate>| {
+            candidate.dictionary && has_positions(candidate) && candidate.effect.id() == id
+        };
         let Some(dictionary) = self.candidates.iter().position(own) else { return Ok(None) };
         best_step_table(model, dictionary, &self.candidates[dictionary], self.variance(model))
     }
