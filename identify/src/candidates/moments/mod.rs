@@ -197,6 +197,14 @@ impl<'c> Moments<'c> {
         (0..self.columns.fold_rows.len()).collect()
     }
 
+    /// Forgets the products over some training folds of chosen effects other than some candidates.
+    pub fn keep_chosen(&self, folds: &[usize], candidates: &[usize]) {
+        let projection = self.projections.lock().ok().and_then(|projections| projections.get(folds).cloned());
+        if let Some(projection) = projection {
+            projection.keep_chosen(self, candidates);
+        }
+    }
+
     /// Forms the products of the library for several sets of training folds at the same time.
     ///
     /// # Errors

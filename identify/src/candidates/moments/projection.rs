@@ -42,7 +42,7 @@ pub(in crate::candidates) struct Projection {
     /// The rows that were left out; `None` if there are none.
     left_out: Option<LeftOut>,
     segments: Mutex<HashMap<usize, Arc<SegmentProducts>>>,
-    /// By the address of the basis functions, which the effect keeps, and that of the channel.
+    /// By [`key`]: the effect keeps what the addresses refer to.
     chosen: Mutex<HashMap<(usize, usize), Arc<ChosenEffect>>>,
 }
 
@@ -85,6 +85,11 @@ pub(in crate::candidates) struct ChosenEffect {
     _set: EffectColumns,
     side: OnceLock<Adjoint>,
     segments: Mutex<HashMap<usize, Arc<Mat<f64>>>>,
+}
+
+/// The key of an effect: the address of its basis functions and that of its channel.
+fn key(set: &EffectColumns) -> (usize, usize) {
+    (Arc::as_ptr(&set.basis) as usize, Arc::as_ptr(&set.channel) as usize)
 }
 
 /// The given rows of a matrix, and zeros elsewhere.
@@ -183,11 +188,18 @@ impl Projection {
         Ok(SegmentProducts { own: products.own, d, g, with_model: Some(solved) })
     }
 
+    /// Forgets the products of chosen effects other than some candidates.
+    pub fn keep_chosen(&self, moments: &Moments<'_>, candidates: &[usize]) {
+        let kept: Vec<(usize, usize)> = candidates.iter().map(|k| key(moments.set(*k))).collect();
+        if let Ok(mut chosen) = self.chosen.lock() {
+            chosen.retain(|key, _| kept.contains(key));
+        }
+    }
+
     /// A chosen effect.
     pub fn chosen(&self, moments: &Moments<'_>, candidate: usize) -> Result<Arc<ChosenEffect>, IdentifyError> {
         let set = moments.set(candidate);
-        let key = (Arc::as_ptr(&set.basis) as usize, Arc::as_ptr(&set.channel) as usize);
-        stored(&self.chosen, &key, || {
+        stored(&self.chosen, &key(set), || {
             let mut all = Mat::zeros(moments.columns.rows(), set.count);
             moments.columns.fill(&[set], all.as_mut());
             let lengths = all.col_iter().map(|column| column.norm_l2()).collect();

@@ -95,6 +95,7 @@ pub fn named(name: MoveName) -> &'static dyn Move {
 /// See [`Move::try_on`].
 pub fn on_every_branch(tried: &dyn Move, search: &mut SearchState<'_>) -> Result<bool, IdentifyError> {
     let all = tried.try_on(search, ALL)?;
+    search.forget_unselected(ALL);
     if all || !tried.follows_all_readings() {
         search.prepare_branches()?;
         let folds = search.selection.branches.len() - 1;
@@ -102,6 +103,7 @@ pub fn on_every_branch(tried: &dyn Move, search: &mut SearchState<'_>) -> Result
         let tried = parallel::map(folds, &|fold| {
             let mut own = search.clone();
             tried.try_on(&mut own, ALL + 1 + fold)?;
+            own.forget_unselected(ALL + 1 + fold);
             if let Some(Interrupt(progress)) = search.interrupt {
                 progress(Progress::Folds(1 + ended.fetch_add(1, Ordering::Relaxed), folds));
             }

@@ -36,6 +36,12 @@ impl SearchState<'_> {
         self.moments.prepare(&folds, &|| self.check().is_ok())
     }
 
+    /// Forgets the products of effects that were tried on a branch and are not selected.
+    pub fn forget_unselected(&self, branch: usize) {
+        let branch = &self.selection.branches[branch];
+        self.moments.keep_chosen(&branch.folds, &branch.chosen());
+    }
+
     fn check(&self) -> Result<(), IdentifyError> {
         self.interrupt.map_or(Ok(()), |interrupt| interrupt.check())
     }
