@@ -7,7 +7,6 @@
 //! frees that order from the prior of its spectrum.
 
 use abbe_model::driver::Driver;
-use faer::Mat;
 
 use super::constants::LINES_TRIED;
 use super::families::{AcceptedEffect, AcceptedFamilies};
@@ -95,9 +94,8 @@ fn ranked(
 ) -> Result<Ranked, IdentifyError> {
     let sets: Vec<EffectColumns> = candidates.iter().map(|candidate| candidate.columns.clone()).collect();
     let residual = columns.whitened_values(&found.fit.residuals);
-    let none = Mat::zeros(columns.rows(), 0);
     let go_on = || interrupt.check().is_ok();
-    let moments = Moments::new(columns, sets, start.model.clone(), &residual, start.prior(), none)?;
+    let moments = Moments::new(columns, sets, start.model.clone(), &residual, start.prior(), Vec::new())?;
     let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
     moments.prepare(&[], &go_on)?;
     let trained = TrainedModel::new(&moments, &[], &folds)?;

@@ -188,7 +188,7 @@ pub fn structure(
     columns: &Columns<'_>,
     model: faer::Mat<f64>,
     residual: &[f64],
-    null: faer::Mat<f64>,
+    null: Vec<Vec<f64>>,
     prior: PriorMoments,
 ) -> Result<Structure, IdentifyError> {
     let detectors = detectors(problem, columns);

@@ -2,7 +2,6 @@
 //! declared parameters.
 
 use abbe_model::session::Session;
-use faer::Mat;
 
 use super::TraceOptions;
 use super::start::Start;
@@ -38,8 +37,7 @@ pub fn screened_effects(session: &Session, options: &TraceOptions) -> Result<Vec
     let prior = start.prior();
     let searched = searched_candidates(&problem, &columns, options)?;
     let column_sets: Vec<EffectColumns> = searched.iter().map(|candidate| candidate.columns.clone()).collect();
-    let none = Mat::zeros(columns.rows(), 0);
-    let moments = Moments::new(&columns, column_sets, start.model, &start.residual, prior, none)?;
+    let moments = Moments::new(&columns, column_sets, start.model, &start.residual, prior, Vec::new())?;
     let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
     let trained = TrainedModel::new(&moments, &[], &folds)?;
     Ok(searched

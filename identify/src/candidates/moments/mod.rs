@@ -34,6 +34,8 @@ use layout::Layout;
 pub(super) use projection::{ChosenEffect, Projection, SegmentProducts};
 pub(super) use tuning::{ChannelProducts, TuningSide};
 
+/// Null draws that are projected together.
+const DRAWS_AT_ONCE: usize = 32;
 /// Largest number of entries of the null draws whose products are formed together.
 const MAX_NULL_ENTRIES: usize = 4_000_000;
 
@@ -100,7 +102,7 @@ pub(super) fn stored<K: std::hash::Hash + Eq + Clone, V: Clone, E>(
 }
 
 impl<'c> Moments<'c> {
-    /// From the orthonormal model columns (rows × rank), the residual and the null draws (rows × draws).
+    /// From the orthonormal model columns (rows × rank), the residual, and the null draws, each over all rows.
     ///
     /// # Errors
     /// If products are not finite.
@@ -110,7 +112,7 @@ impl<'c> Moments<'c> {
         model: Mat<f64>,
         residual: &[f64],
         prior: PriorMoments,
-        mut null: Mat<f64>,
+        null: Vec<Vec<f64>>,
     ) -> Result<Moments<'c>, IdentifyError> {
         let mut moments = Moments {
             columns,
@@ -124,14 +126,28 @@ impl<'c> Moments<'c> {
             null_products: Arc::default(),
             projections: Arc::default(),
         };
-        if null.ncols() > 0 {
-            let whole = moments.projection(&moments.all_folds())?;
-            let along = &whole.inverse * transposed_product(moments.model(), null.as_ref());
-            matmul(null.as_mut(), Accum::Add, moments.model(), along.as_ref(), -1.0, Par::Seq);
-            moments.null = Arc::new(Adjoint::of(&whole.training, null.as_ref()));
-        }
+        moments.take_draws(null)?;
         moments.append(sets);
         Ok(moments)
+    }
+
+    /// Projects the model out of the null draws and keeps them. Each draw is released as soon as it is projected.
+    fn take_draws(&mut self, null: Vec<Vec<f64>>) -> Result<(), IdentifyError> {
+        let draws = null.len();
+        let whole = self.projection(&self.all_folds())?;
+        let mut values: Option<Adjoint> = None;
+        let mut rest = null.into_iter();
+        for first in (0..draws).step_by(DRAWS_AT_ONCE) {
+            let part: Vec<Vec<f64>> = rest.by_ref().take(DRAWS_AT_ONCE).collect();
+            let mut part = Mat::from_fn(self.residual.len(), part.len(), |i, k| part[k][i]);
+            let along = &whole.inverse * transposed_product(self.model(), part.as_ref());
+            matmul(part.as_mut(), Accum::Add, self.model(), along.as_ref(), -1.0, Par::Seq);
+            let Adjoint { rows, values: of_part } = Adjoint::of(&whole.training, part.as_ref());
+            let kept = values.get_or_insert_with(|| Adjoint { values: Mat::zeros(draws, rows.len()), rows });
+            kept.values.as_mut().subrows_mut(first, of_part.nrows()).copy_from(&of_part);
+        }
+        self.null = Arc::new(values.unwrap_or(Adjoint { rows: Vec::new(), values: Mat::zeros(0, 0) }));
+        Ok(())
     }
 
     /// Adds candidates as a segment of their own.
