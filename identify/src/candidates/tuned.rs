@@ -37,7 +37,7 @@ struct EffectProducts {
 
 impl<'t> Tuning<'t> {
     /// The sums over the states of a channel.
-    fn channel<'c>(&'c self, channel: &'c Channel) -> ChannelProducts<'c> {
+    fn channel<'c>(&'c self, channel: &'c Arc<Channel>) -> ChannelProducts<'c> {
         self.side.channel(&self.model.projection, channel)
     }
 

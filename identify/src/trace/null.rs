@@ -61,23 +61,23 @@ fn sign(generator: &mut Pcg64) -> f64 {
 
 /// Draws `rows` deviations from the pool in blocks with random signs. Draws Gaussian noise if the pool is too small.
 fn block_draws(pool: &[Vec<f64>], rows: usize, block: usize, generator: &mut Pcg64) -> Vec<f64> {
-    let total: usize = pool.iter().map(Vec::len).sum();
+    let ends: Vec<usize> = (pool.iter())
+        .scan(0, |end, stretch| {
+            *end += stretch.len();
+            Some(*end)
+        })
+        .collect();
+    let total = ends.last().copied().unwrap_or(0);
     if total < MIN_POOL {
         return (0..rows).map(|_| generator.sample(StandardNormal)).collect();
     }
     let mut values = Vec::with_capacity(rows + block);
     while values.len() < rows {
         // A stretch is chosen with probability proportional to its length, and a start within it uniformly.
-        let mut start = generator.random_range(0..total);
-        let stretch = pool.iter().find(|stretch| {
-            if start < stretch.len() {
-                true
-            } else {
-                start -= stretch.len();
-                false
-            }
-        });
-        let Some(stretch) = stretch else { continue };
+        let place = generator.random_range(0..total);
+        let chosen = ends.partition_point(|end| *end <= place);
+        let stretch = &pool[chosen];
+        let start = place - (ends[chosen] - stretch.len());
         let sign = sign(generator);
         let end = (start + block).min(stretch.len());
         values.extend(stretch[start..end].iter().map(|value| sign * value));

@@ -24,11 +24,11 @@ use crate::numerics::parallel;
 /// Columns that are copied and multiplied together: they fit into the second cache.
 const CHUNK_COLUMNS: usize = 64;
 /// Chunks of one task, for which the sums over states are formed once.
-const CHUNKS_PER_TASK: usize = 6;
-/// Largest number of entries of the sums over states of one task, if it has more than one channel.
-const MAX_SUMS: usize = 500_000;
-/// Largest number of entries of the sums of one channel that are kept for all tasks.
-const MAX_KEPT: usize = 100_000;
+const CHUNKS_PER_TASK: usize = 12;
+/// States whose sums are formed and multiplied together.
+const STATES_AT_ONCE: usize = 256;
+/// Largest number of vectors of one task over all its channels, if it has more than one channel.
+const MAX_VECTORS: usize = 512;
 
 /// The candidates of a segment by states, basis and channel.
 pub(super) struct Layout {
@@ -143,18 +143,9 @@ impl Layout {
         let vectors = side.values.nrows();
         let local =
             parallel::map(self.groups.len(), &|k| LocalStates::of(&self.groups[k].states, training, &side.rows));
-        let kept: Vec<(usize, usize)> = (self.groups.iter().enumerate())
-            .filter(|(k, _)| vectors * local[*k].count() <= MAX_KEPT)
-            .flat_map(|(k, group)| (0..group.channels.len()).map(move |channel| (k, channel)))
-            .collect();
-        let kept_sums = parallel::map(kept.len(), &|k| {
-            let (group, channel) = kept[k];
-            local[group].gather(&self.groups[group].channels[channel], side)
-        });
-        let kept_sums: HashMap<(usize, usize), Mat<f64>> = kept.into_iter().zip(kept_sums).collect();
         let mut tasks = Vec::new();
         for (number, group) in self.groups.iter().enumerate() {
-            let at_once = (MAX_SUMS / (vectors * local[number].count()).max(1)).clamp(1, group.channels.len().max(1));
+            let at_once = (MAX_VECTORS / vectors.max(1)).max(1);
             for first in (0..group.channels.len()).step_by(at_once) {
                 for chunk in (0..group.chunks.len()).step_by(CHUNKS_PER_TASK) {
                     tasks.push(Task {
@@ -166,7 +157,7 @@ impl Layout {
             }
         }
         let results = parallel::map(tasks.len(), &|k| {
-            go_on().then(|| self.products_of(&tasks[k], &local[tasks[k].group], training, side, &kept_sums, with_own))
+            go_on().then(|| self.products_of(&tasks[k], &local[tasks[k].group], training, side, with_own))
         });
         let mut products = Products {
             side: Mat::zeros(vectors, self.total()),
@@ -200,48 +191,54 @@ impl Layout {
         local: &LocalStates,
         training: &TrainingRows,
         side: &Adjoint,
-        kept: &HashMap<(usize, usize), Mat<f64>>,
         with_own: bool,
     ) -> (Mat<f64>, Vec<f64>) {
         let group = &self.groups[task.group];
         let vectors = side.values.nrows();
         let channels = &group.channels[task.channels.clone()];
-        let mut gathered = Mat::zeros(vectors * channels.len(), local.count());
-        for (k, channel) in channels.iter().enumerate() {
-            let mut to = gathered.as_mut().subrows_mut(k * vectors, vectors);
-            match kept.get(&(task.group, task.channels.start + k)) {
-                Some(sums) => to.copy_from(sums),
-                None => to.copy_from(&local.gather(channel, side)),
+        let chunks = &group.chunks[task.chunks.clone()];
+        let widths: Vec<usize> =
+            chunks.iter().map(|chunk| chunk.iter().map(|member| member.basis.ncols()).sum()).collect();
+        let mut sums = Mat::zeros(vectors * channels.len(), widths.iter().sum());
+        let at_once = STATES_AT_ONCE.min(local.count());
+        let mut gathered = Mat::zeros(sums.nrows(), at_once);
+        let mut basis = Mat::zeros(at_once, widths.iter().copied().max().unwrap_or(0));
+        for first in (0..local.count()).step_by(at_once.max(1)) {
+            let states = first..(first + at_once).min(local.count());
+            local.gather(states.clone(), channels, side, gathered.as_mut().subcols_mut(0, states.len()));
+            let gathered = gathered.as_ref().subcols(0, states.len());
+            let mut column = 0;
+            for (chunk, width) in chunks.iter().zip(&widths) {
+                let columns =
+                    chunk.iter().flat_map(|member| (0..member.basis.ncols()).map(|k| member.basis.col_as_slice(k)));
+                for (k, from) in columns.enumerate() {
+                    local.copy(states.clone(), from, basis.col_as_slice_mut(k));
+                }
+                let to = sums.as_mut().subcols_mut(column, *width);
+                let basis = basis.as_ref().submatrix(0, 0, states.len(), *width);
+                matmul(to, Accum::Add, gathered, basis, 1.0, Par::Seq);
+                column += width;
             }
         }
-        let chunks = &group.chunks[task.chunks.clone()];
-        let width = |chunk: &[Member]| -> usize { chunk.iter().map(|member| member.basis.ncols()).sum() };
-        let mut sums = Mat::zeros(gathered.nrows(), chunks.iter().map(|chunk| width(chunk)).sum());
-        let own: Vec<OwnProducts<'_>> = if with_own {
-            channels.iter().map(|channel| OwnProducts::of(channel, local, training)).collect()
-        } else {
-            Vec::new()
-        };
         let mut squares = Vec::new();
-        let mut basis = Mat::zeros(local.count(), chunks.iter().map(|chunk| width(chunk)).max().unwrap_or(0));
-        let mut column = 0;
-        for chunk in chunks {
-            let mut next = 0;
-            for member in chunk {
-                for k in 0..member.basis.ncols() {
-                    local.copy(member.basis.col_as_slice(k), basis.col_as_slice_mut(next + k));
+        if with_own {
+            let own: Vec<OwnProducts<'_>> =
+                channels.iter().map(|channel| OwnProducts::of(channel, local, training)).collect();
+            let mut basis = Mat::zeros(0, 0);
+            for member in chunks.iter().flatten() {
+                let count = member.basis.ncols();
+                basis.resize_with(local.count(), basis.ncols().max(count), |_, _| 0.0);
+                for k in 0..count {
+                    local.copy(0..local.count(), member.basis.col_as_slice(k), basis.col_as_slice_mut(k));
                 }
-                if with_own {
-                    let part = basis.as_ref().subcols(next, member.basis.ncols());
-                    for (channel, _) in member.users_of(&task.channels) {
-                        own[channel - task.channels.start].append(part, &member.basis, &mut squares);
-                    }
+                for (channel, _) in member.users_of(&task.channels) {
+                    own[channel - task.channels.start].append(
+                        basis.as_ref().subcols(0, count),
+                        &member.basis,
+                        &mut squares,
+                    );
                 }
-                next += member.basis.ncols();
             }
-            let to = sums.as_mut().subcols_mut(column, next);
-            matmul(to, Accum::Replace, gathered.as_ref(), basis.as_ref().subcols(0, next), 1.0, Par::Seq);
-            column += next;
         }
         (sums, squares)
     }

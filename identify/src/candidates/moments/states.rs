@@ -1,7 +1,10 @@
 //! Sums over the states of a driver: of the readings of some rows, and of the products of a column with itself.
 
+use std::ops::Range;
+use std::sync::Arc;
+
 use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, MatRef, Par};
+use faer::{Accum, Mat, MatMut, MatRef, Par};
 
 use crate::candidates::columns::{Adjoint, Channel, DriverStates, TrainingRows};
 
@@ -15,8 +18,9 @@ pub(super) struct LocalStates {
     states: Vec<u32>,
     /// The index among these of each state.
     place: Vec<u32>,
-    /// The same for each scalar reading that the rows combine; `NONE` in a test in which the effect does not act.
-    of_rows: Vec<u32>,
+    /// The scalar readings that the rows combine, by state: those of state `k` are `by_state[ends[k - 1]..ends[k]]`.
+    by_state: Vec<u32>,
+    ends: Vec<usize>,
     /// The largest distance of two states that one whitened row combines.
     band: usize,
 }
@@ -38,8 +42,18 @@ impl LocalStates {
             let of_reading = &states.of_reading[*test];
             if of_reading.is_empty() { NONE } else { place[of_reading[scalar / coordinates] as usize] }
         };
-        let of_rows = rows.iter().map(of_row).collect();
-        let mut local = LocalStates { states: present, place, of_rows, band: 0 };
+        let of_rows: Vec<u32> = rows.iter().map(of_row).collect();
+        let mut ends = vec![0; present.len() + 1];
+        of_rows.iter().filter(|place| **place != NONE).for_each(|place| ends[*place as usize + 1] += 1);
+        (1..ends.len()).for_each(|k| ends[k] += ends[k - 1]);
+        let mut next = ends.clone();
+        let mut by_state = vec![0; ends[present.len()]];
+        for (row, place) in of_rows.iter().enumerate().filter(|(_, place)| **place != NONE) {
+            by_state[next[*place as usize]] = row as u32;
+            next[*place as usize] += 1;
+        }
+        ends.remove(0);
+        let mut local = LocalStates { states: present, place, by_state, ends, band: 0 };
         if training.filter.is_pointwise() {
             return local;
         }
@@ -65,24 +79,29 @@ impl LocalStates {
         self.states.len()
     }
 
-    /// Copies the entries of a basis function at these states.
-    pub fn copy(&self, from: &[f64], to: &mut [f64]) {
-        to.iter_mut().zip(&self.states).for_each(|(to, state)| *to = from[*state as usize]);
+    /// Copies the entries of a basis function at some of these states.
+    pub fn copy(&self, states: Range<usize>, from: &[f64], to: &mut [f64]) {
+        to.iter_mut().zip(&self.states[states]).for_each(|(to, state)| *to = from[*state as usize]);
     }
 
-    /// Sums `s · z` of a channel over the readings of each state: vectors × states.
-    pub fn gather(&self, channel: &Channel, side: &Adjoint) -> Mat<f64> {
-        let mut sums = Mat::zeros(side.values.nrows(), self.count());
-        let rows = side.rows.iter().zip(&self.of_rows).enumerate();
-        for (row, ((test, scalar), place)) in rows.filter(|(_, (_, place))| **place != NONE) {
-            let sensitivity = channel.sensitivity[*test][*scalar];
-            if sensitivity != 0.0 {
-                let values = side.values.col_as_slice(row);
-                let sums = sums.col_as_slice_mut(*place as usize);
-                sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += sensitivity * value);
+    /// Sums `s · z` of some channels over the readings of each of some states: vectors of one channel after another ×
+    /// states.
+    pub fn gather(&self, states: Range<usize>, channels: &[Arc<Channel>], side: &Adjoint, mut sums: MatMut<'_, f64>) {
+        let vectors = side.values.nrows();
+        sums.fill(0.0);
+        for (state, to) in states.zip(sums.col_iter_mut()) {
+            let Some(to) = to.try_as_col_major_mut() else { continue };
+            let to = to.as_slice_mut();
+            let start = if state == 0 { 0 } else { self.ends[state - 1] };
+            for row in &self.by_state[start..self.ends[state]] {
+                let (test, scalar) = side.rows[*row as usize];
+                let values = side.values.col_as_slice(*row as usize);
+                for (channel, to) in channels.iter().zip(to.chunks_exact_mut(vectors.max(1))) {
+                    let sensitivity = channel.sensitivity[test][scalar];
+                    to.iter_mut().zip(values).for_each(|(sum, value)| *sum += sensitivity * value);
+                }
             }
         }
-        sums
     }
 }
 

@@ -40,10 +40,11 @@ impl TuningSide {
     }
 
     /// The sums over the states of a channel.
-    pub fn channel<'m>(&self, projection: &'m Projection, channel: &'m Channel) -> ChannelProducts<'m> {
+    pub fn channel<'m>(&self, projection: &'m Projection, channel: &'m Arc<Channel>) -> ChannelProducts<'m> {
         let training = &projection.training;
         let local = LocalStates::of(&channel.states, training, &self.side.rows);
-        let sums = local.gather(channel, &self.side);
+        let mut sums = Mat::zeros(self.side.values.nrows(), local.count());
+        local.gather(0..local.count(), std::slice::from_ref(channel), &self.side, sums.as_mut());
         let own = OwnProducts::of(channel, &local, training);
         ChannelProducts { local, sums, own }
     }
@@ -56,7 +57,7 @@ impl ChannelProducts<'_> {
         let count = basis.ncols();
         let mut local = Mat::zeros(self.local.count(), count);
         for k in 0..count {
-            self.local.copy(basis.col_as_slice(k), local.col_as_slice_mut(k));
+            self.local.copy(0..self.local.count(), basis.col_as_slice(k), local.col_as_slice_mut(k));
         }
         let mut cross = Mat::zeros(self.sums.nrows(), count);
         matmul(cross.as_mut(), Accum::Replace, self.sums.as_ref(), local.as_ref(), 1.0, Par::Seq);
