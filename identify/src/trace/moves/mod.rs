@@ -98,7 +98,7 @@ pub fn on_every_branch(tried: &dyn Move, search: &mut SearchState<'_>) -> Result
     search.forget_unselected(ALL);
     if all || !tried.follows_all_readings() {
         search.prepare_branches()?;
-        let folds = search.selection.branches.len() - 1;
+        let (folds, common) = (search.selection.branches.len() - 1, search.candidates.len());
         let ended = AtomicUsize::new(0);
         let tried = parallel::map(folds, &|fold| {
             let mut own = search.clone();
@@ -111,7 +111,7 @@ pub fn on_every_branch(tried: &dyn Move, search: &mut SearchState<'_>) -> Result
         });
         let tried: Vec<SearchState<'_>> = tried.into_iter().collect::<Result<_, IdentifyError>>()?;
         for (fold, own) in tried.into_iter().enumerate() {
-            search.adopt(ALL + 1 + fold, own);
+            search.adopt(ALL + 1 + fold, &own, common);
         }
     }
     Ok(all)

@@ -119,11 +119,12 @@ impl SearchState<'_> {
     }
 
     /// Takes over what a clone of this state has selected for a branch, and the effects that it has tuned.
-    pub fn adopt(&mut self, branch: usize, from: SearchState<'_>) {
+    /// `common` is the number of candidates that both had when it was cloned.
+    pub fn adopt(&mut self, branch: usize, from: &SearchState<'_>, common: usize) {
         let present = self.candidates.len();
         let mut place: HashMap<usize, usize> = HashMap::new();
         let mut tuned = Vec::new();
-        for (index, candidate) in from.candidates.iter().enumerate().skip(present) {
+        for (index, candidate) in from.candidates.iter().enumerate().skip(common) {
             if !candidate.tuned_on.is_empty() {
                 place.insert(index, present + tuned.len());
                 tuned.push(Candidate::clone(candidate));
