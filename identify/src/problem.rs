@@ -8,6 +8,8 @@ mod factors;
 mod priors;
 mod whitening;
 
+pub use whitening::Filter;
+
 use std::ops::Range;
 use std::sync::Arc;
 

@@ -1,5 +1,6 @@
 //! `abbe trace`: find the unmodelled effect behind the residual.
 
+mod clock;
 mod screen;
 
 use std::path::PathBuf;
@@ -14,6 +15,8 @@ use abbe::model::files::toml::{rewrite, write};
 use abbe::model::words::counted;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
+
+use clock::{Clock, seconds};
 
 use super::failure::Failure;
 use super::interrupt::Interrupts;
@@ -70,8 +73,14 @@ pub struct TraceArguments {
     /// Example: --exclude :spline --exclude ~time
     #[arg(long, value_name = "TEXT")]
     exclude: Vec<String>,
+    /// End the search after this many seconds. The effects found until then are fitted and reported, and every output
+    /// states that the result is incomplete.
+    ///
+    /// Example: --time-limit 10
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    time_limit: Option<f64>,
     /// List the candidates of the library with their detectability in this session, and stop.
-    #[arg(long, conflicts_with_all = ["json", "csv", "residuals", "write", "report", "plots", "compensation", "max_effects", "save"])]
+    #[arg(long, conflicts_with_all = ["json", "csv", "residuals", "write", "report", "plots", "compensation", "max_effects", "time_limit", "save"])]
     list: bool,
     /// Write the session with the found effects declared.
     ///
@@ -96,6 +105,7 @@ pub struct TraceArguments {
 
 /// Runs `abbe trace`.
 pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
+    let clock = Clock::started(arguments.time_limit);
     arguments.report.check()?;
     arguments.compensation.check()?;
     let others =
@@ -121,7 +131,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         if matches!(progress, Progress::Working) {
             // Called often and from many threads; it shows nothing.
             interrupts.keep_results();
-            return !interrupts.came();
+            return !interrupts.came() && !clock.has_run_out();
         }
         let _one_at_a_time = shown.lock();
         match progress {
@@ -129,6 +139,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
             Progress::Screening(candidates) => {
                 bar.set_message(format!("screening {}", counted(candidates, "candidate")))
             }
+            Progress::Folds(ended, folds) => bar.set_message(clock.remaining(ended, folds)),
             Progress::SelectedEffect(number, id, rms_um) => {
                 let effects = counted(number, "effect");
                 bar.set_message(format!("{effects}, held out {rms_um:.2} µm: {id}"));
@@ -139,13 +150,16 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
             Progress::Judging => bar.set_message("refitting and judging"),
             Progress::Working => {}
         }
-        !interrupts.came()
+        !interrupts.came() && !clock.has_run_out()
     };
     let mut trace = abbe::identify::trace::trace(&session, &options, &report)?;
     bar.set_message("comparing candidate tests");
     separate_aliases(&mut trace, &TestVariations::short(), &report)?;
     interrupts.end_at_once();
     bar.finish_and_clear();
+    if let Some(seconds) = arguments.time_limit.filter(|_| !interrupts.came()) {
+        trace.result.mark_time_limit(seconds);
+    }
     if tables {
         screen::print(&trace, &arguments.session, arguments.all);
     }
@@ -186,7 +200,10 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         if arguments.save.file().is_some() {
             eprintln!("warning: no model is saved: effects may be missing from it");
         }
-        return Err(Failure::Interrupted(trace.result.interruption()));
+        return match trace.result.time_limit_s {
+            Some(_) => Ok(()),
+            None => Err(Failure::Interrupted(trace.result.interruption())),
+        };
     }
     arguments.save.run(&trace.after, &trace.after_fit, &sources, arguments.common.seed)?;
     arguments.compensation.run(&trace.after, &trace.after_fit, tables)

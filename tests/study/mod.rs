@@ -16,3 +16,4 @@ mod clean;
 mod outside;
 mod pairs;
 mod single;
+mod speed;

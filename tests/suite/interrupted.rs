@@ -118,6 +118,36 @@ fn a_second_interruption_ends_the_program_at_once() {
     assert!(stderr.contains("interrupted; nothing more is written"), "{stderr}");
 }
 
+/// A time limit that ends before the search does leaves the declared model, with exit status 0 and a field that names
+/// the limit. A limit that is long enough changes nothing.
+#[test]
+fn a_time_limit_ends_the_search_and_every_output_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let [json, whole, next] = ["t.json", "whole.json", "next.toml"].map(at);
+    let session = ready("hermle-c600u/measured/session.toml");
+    let run = |limit: &str, json: &Path| {
+        let arguments = ["trace", text(&session), "--only", "EZC~C:h", "--quiet", "--time-limit", limit];
+        let arguments = [&arguments[..], &["--json", text(json), "--write", text(&next)]].concat();
+        Command::new(env!("CARGO_BIN_EXE_abbe")).args(arguments).output().unwrap()
+    };
+    let output = run("1e-6", &json);
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(0), "{stderr}");
+    let said = "interrupted by the time limit of 0.000001 s after 0 effects";
+    assert!(stderr.contains(said), "{stderr}");
+    let read =
+        |path: &Path| -> serde_json::Value { serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap() };
+    let result = read(&json);
+    assert_eq!((&result["interrupted"], &result["verdict"]), (&true.into(), &"incomplete".into()));
+    assert_eq!(result["time_limit_s"], 1e-6);
+    assert!(std::fs::read_to_string(&next).unwrap().contains(said));
+    assert_eq!(run("600", &whole).status.code(), Some(0));
+    let result = read(&whole);
+    assert_eq!((&result["interrupted"], &result["time_limit_s"]), (&false.into(), &serde_json::Value::Null));
+    assert_eq!(run("soon", &whole).status.code(), Some(2));
+}
+
 /// A fit has no partial result: the signal ends the program, and nothing is written.
 #[test]
 fn an_interrupted_fit_ends_by_the_signal() {

@@ -3,43 +3,53 @@
 //! If a candidate with `k` observable columns is absent, its gain follows a `χ²ₖ` distribution. The gain is the
 //! decrease of the sum of squares of whitened residuals. The score is `−ln P(χ²ₖ > gain)` less the candidate's cost in
 //! the library. The tail is computed in logarithms, because it underflows at real effect sizes.
+//!
+//! With the products `d` and `g` of a candidate beside the fitted model, and `V = E⊥ᵀC` with the chosen effects
+//! ([`super::moments`]),
+//!
+//! ```text
+//! gain = g'ᵀ D⁻¹ g',   D = d − Vᵀ (EᵀE⊥)⁻¹ V,   g' = g − Vᵀ (EᵀE⊥)⁻¹ Eᵀy⊥
+//! ```
 
-use std::borrow::Cow;
+use std::collections::HashMap;
 use std::ops::Range;
+use std::sync::{Arc, Mutex};
 
-use super::moments::{FoldMoments, Moments};
+use faer::Mat;
+
+use super::moments::{ChosenEffect, Moments, Projection, SegmentProducts, stored};
 use crate::error::IdentifyError;
-use crate::numerics::gain::ObservableSubspace;
+use crate::numerics::gain::{ObservableSubspace, gain_of_few};
 use crate::numerics::parallel;
 use crate::numerics::symmetric::pseudo_inverse;
-use crate::numerics::tails::{ln_chi_square_tail, most_evidence};
-use faer::{Mat, MatRef};
 
-/// A model over the base: its base columns and its training folds.
+/// Candidates that one parallel task evaluates.
+pub(super) const AT_ONCE: usize = 128;
+
+/// The fitted model with chosen effects, trained on some folds.
 pub struct TrainedModel<'m> {
-    moments: &'m Moments,
-    /// Indices of its base columns.
-    pub base: Vec<usize>,
+    pub(super) moments: &'m Moments<'m>,
+    pub(super) projection: Arc<Projection>,
     /// The training folds.
     pub folds: Vec<usize>,
-    /// `(XᵀX)⁻¹`.
-    pub inverse: Mat<f64>,
-    /// `Xᵀ C` and `(XᵀX)⁻¹ Xᵀ C` of all candidates. `None` for a model that evaluates few candidates.
-    all: Option<(Mat<f64>, Mat<f64>)>,
-    /// The summed products, each with its sign. A sum over most folds is the sum over all folds less the others.
-    parts: Vec<(&'m FoldMoments, f64)>,
-    /// `Xᵀ y`.
-    pub base_y: Vec<f64>,
-    /// Coefficients of the base columns: `(XᵀX)⁻¹ Xᵀ y`.
-    pub coefficients: Vec<f64>,
+    /// The chosen effects.
+    pub(super) chosen: Vec<Arc<ChosenEffect>>,
+    /// `(EᵀE⊥)⁻¹`.
+    pub(super) inverse: Mat<f64>,
+    /// `Eᵀ y⊥`.
+    pub(super) along: Vec<f64>,
+    /// Coefficients of the chosen effects.
+    coefficients: Vec<f64>,
+    segments: Mutex<HashMap<usize, Arc<Segment>>>,
 }
 
-/// The priors as products with the first base columns.
-pub struct PriorMoments {
-    /// Base with base.
-    pub base: Mat<f64>,
-    /// Base with residual.
-    pub base_y: Vec<f64>,
+/// The products of the candidates of a segment with the chosen effects.
+pub(super) struct Segment {
+    products: Arc<SegmentProducts>,
+    /// `V`: chosen columns × columns.
+    with_chosen: Mat<f64>,
+    /// `(EᵀE⊥)⁻¹ V`.
+    pub solved: Mat<f64>,
 }
 
 /// The gain of a candidate.
@@ -51,279 +61,293 @@ pub struct Gain {
     pub freedom: usize,
 }
 
-/// `Xᵀ C` and `(XᵀX)⁻¹ Xᵀ C` of a candidate, borrowed from those of all candidates or computed for this one.
-struct GivenModel<'t> {
-    cross: Cow<'t, Mat<f64>>,
-    solved: Cow<'t, Mat<f64>>,
-    /// Its columns within these matrices.
-    columns: Range<usize>,
-}
-
-impl GivenModel<'_> {
-    /// Of its `k`-th column.
-    fn cross(&self, k: usize) -> &[f64] {
-        self.cross.col_as_slice(self.columns.start + k)
-    }
-
-    /// Of its `k`-th column.
-    fn solved(&self, k: usize) -> &[f64] {
-        self.solved.col_as_slice(self.columns.start + k)
-    }
-
-    /// Of all its columns.
-    fn all_solved(&self) -> MatRef<'_, f64> {
-        self.solved.subcols(self.columns.start, self.columns.len())
-    }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+/// `D`, `g'` and the product with itself of a candidate.
+pub struct Projected {
+    /// `D`.
+    pub d: Mat<f64>,
+    /// `g'`.
+    pub g: Vec<f64>,
+    /// `CᵀC`.
+    pub own: Mat<f64>,
 }
 
 impl<'m> TrainedModel<'m> {
-    /// Trains a model for the evaluation of every candidate.
+    /// The fitted model with chosen candidates.
     ///
     /// # Errors
     /// If products are not finite.
-    pub fn new(
-        moments: &'m Moments,
-        prior: &PriorMoments,
-        base: Vec<usize>,
-        folds: Vec<usize>,
-    ) -> Result<TrainedModel<'m>, IdentifyError> {
-        let mut trained = TrainedModel::projection(moments, prior, base, folds)?;
-        let total = moments.first.last().map_or(0, |first| first + moments.count.last().copied().unwrap_or(0));
-        let cross = trained.cross(0, total);
-        let solved = &trained.inverse * &cross;
-        trained.all = Some((cross, solved));
-        Ok(trained)
+    pub fn new(moments: &'m Moments<'m>, chosen: &[usize], folds: &[usize]) -> Result<Self, IdentifyError> {
+        let projection = moments.projection(folds)?;
+        let chosen: Vec<Arc<ChosenEffect>> =
+            chosen.iter().map(|candidate| projection.chosen(moments, *candidate)).collect::<Result<_, _>>()?;
+        let along: Vec<f64> = chosen.iter().flat_map(|chosen| chosen.with_residual.iter().copied()).collect();
+        let lengths: Vec<f64> = chosen.iter().flat_map(|chosen| chosen.lengths.iter().copied()).collect();
+        let mut gram = Mat::zeros(along.len(), along.len());
+        let mut row = 0;
+        for a in &chosen {
+            let mut column = 0;
+            for b in &chosen {
+                let part = moments.between(a, b);
+                gram.as_mut().submatrix_mut(row, column, part.nrows(), part.ncols()).copy_from(&part);
+                column += part.ncols();
+            }
+            row += a.rows.ncols();
+        }
+        // Columns of unit length make the rank independent of units.
+        let scale: Vec<f64> = lengths.iter().map(|length| if *length > 0.0 { 1.0 / length } else { 0.0 }).collect();
+        let scaled = Mat::from_fn(scale.len(), scale.len(), |i, j| gram[(i, j)] * scale[i] * scale[j]);
+        let inverse = pseudo_inverse(scaled.as_ref())?;
+        let inverse = Mat::from_fn(scale.len(), scale.len(), |i, j| inverse[(i, j)] * scale[i] * scale[j]);
+        let coefficients =
+            (0..along.len()).map(|i| (0..along.len()).map(|j| inverse[(i, j)] * along[j]).sum()).collect();
+        let (folds, segments) = (folds.to_vec(), Mutex::default());
+        Ok(TrainedModel { moments, projection, folds, chosen, inverse, along, coefficients, segments })
     }
 
-    /// Trains a model for the evaluation of few candidates.
+    pub(super) fn segment(&self, number: usize) -> Result<Arc<Segment>, IdentifyError> {
+        stored(&self.segments, &number, || {
+            let products = self.projection.products(self.moments, number, &|| true)?;
+            let mut with_chosen = Mat::zeros(self.along.len(), products.g.len());
+            let mut row = 0;
+            for chosen in &self.chosen {
+                let part = self.projection.with_segment(self.moments, chosen, number)?;
+                with_chosen.as_mut().subrows_mut(row, part.nrows()).copy_from(&*part);
+                row += part.nrows();
+            }
+            let solved = &self.inverse * &with_chosen;
+            Ok(Arc::new(Segment { products, with_chosen, solved }))
+        })
+    }
+
+    /// A candidate in its segment: the segment, its columns and its square.
+    fn place(&self, candidate: usize) -> Result<(Arc<Segment>, Range<usize>, Range<usize>), IdentifyError> {
+        let (segment, local) = self.moments.place(candidate);
+        let (columns, square) = (self.moments.columns_of(segment, local), self.moments.square_of(segment, local));
+        Ok((self.segment(segment)?, columns, square))
+    }
+
+    /// `D`, `g'` and the product with itself of a candidate.
     ///
     /// # Errors
     /// If products are not finite.
-    pub fn projection(
-        moments: &'m Moments,
-        prior: &PriorMoments,
-        base: Vec<usize>,
-        folds: Vec<usize>,
-    ) -> Result<TrainedModel<'m>, IdentifyError> {
-        let m = base.len();
-        let left_out: Vec<usize> = (0..moments.folds.len()).filter(|fold| !folds.contains(fold)).collect();
-        let parts: Vec<(&FoldMoments, f64)> = if left_out.len() < folds.len() {
-            std::iter::once((&moments.whole, 1.0))
-                .chain(left_out.iter().map(|fold| (&moments.folds[*fold], -1.0)))
-                .collect()
-        } else {
-            folds.iter().map(|fold| (&moments.folds[*fold], 1.0)).collect()
+    pub fn projected(&self, candidate: usize) -> Result<Projected, IdentifyError> {
+        let (segment, columns, square) = self.place(candidate)?;
+        Ok(self.projected_in(&segment, columns, square))
+    }
+
+    pub(super) fn projected_in(&self, segment: &Segment, columns: Range<usize>, square: Range<usize>) -> Projected {
+        let count = columns.len();
+        let (d, own) = (&segment.products.d[square.clone()], &segment.products.own[square]);
+        let (first, chosen) = (columns.start, self.along.len());
+        let with = |k: usize, l: usize| -> f64 {
+            let (v, solved) = (segment.with_chosen.col(first + k), segment.solved.col(first + l));
+            (0..chosen).map(|i| v[i] * solved[i]).sum()
         };
-        let of_prior = prior.base.nrows();
-        let mut gram = Mat::<f64>::zeros(m, m);
-        let mut base_y = vec![0.0; m];
-        for (i, bi) in base.iter().enumerate() {
-            for (j, bj) in base.iter().enumerate() {
-                let mut sum = if *bi < of_prior && *bj < of_prior { prior.base[(*bi, *bj)] } else { 0.0 };
-                for (part, sign) in &parts {
-                    sum += sign * part.base[(*bi, *bj)];
-                }
-                gram[(i, j)] = sum;
-            }
-            base_y[i] = if *bi < of_prior { prior.base_y[*bi] } else { 0.0 };
-            for (part, sign) in &parts {
-                base_y[i] += sign * part.base_y[*bi];
-            }
+        let along = |k: usize| -> f64 { (0..chosen).map(|i| segment.solved[(i, first + k)] * self.along[i]).sum() };
+        Projected {
+            d: Mat::from_fn(count, count, |k, l| d[k * count + l] - with(k, l)),
+            g: (0..count).map(|k| segment.products.g[first + k] - along(k)).collect(),
+            own: Mat::from_fn(count, count, |k, l| own[k * count + l]),
         }
-        let inverse = pseudo_inverse(gram.as_ref())?;
-        let coefficients = (0..m).map(|i| (0..m).map(|j| inverse[(i, j)] * base_y[j]).sum()).collect();
-        Ok(TrainedModel { moments, base, folds, inverse, all: None, parts, base_y, coefficients })
-    }
-
-    /// `Xᵀ C` of consecutive candidate columns.
-    fn cross(&self, first: usize, count: usize) -> Mat<f64> {
-        let mut cross = Mat::zeros(self.base.len(), count);
-        for (part, sign) in &self.parts {
-            for (j, to) in cross.col_iter_mut().enumerate() {
-                let of_part = part.cross.col_as_slice(first + j);
-                to.iter_mut().zip(&self.base).for_each(|(to, base)| *to += sign * of_part[*base]);
-            }
-        }
-        cross
-    }
-
-    /// `Xᵀ C` and `(XᵀX)⁻¹ Xᵀ C` of a candidate.
-    fn beside(&self, candidate: usize) -> GivenModel<'_> {
-        let (first, count) = (self.moments.first[candidate], self.moments.count[candidate]);
-        match &self.all {
-            Some((cross, solved)) => {
-                GivenModel { cross: Cow::Borrowed(cross), solved: Cow::Borrowed(solved), columns: first..first + count }
-            }
-            None => {
-                let cross = self.cross(first, count);
-                GivenModel { solved: Cow::Owned(&self.inverse * &cross), cross: Cow::Owned(cross), columns: 0..count }
-            }
-        }
-    }
-
-    /// `D`, `g` and the product with itself of a candidate.
-    pub fn projected(&self, candidate: usize) -> (Mat<f64>, Vec<f64>, Mat<f64>) {
-        self.projected_with(candidate, &self.beside(candidate))
-    }
-
-    fn projected_with(&self, candidate: usize, beside: &GivenModel<'_>) -> (Mat<f64>, Vec<f64>, Mat<f64>) {
-        let (first, count) = (self.moments.first[candidate], self.moments.count[candidate]);
-        let over_parts =
-            |of: &dyn Fn(&FoldMoments) -> f64| -> f64 { self.parts.iter().map(|(part, sign)| sign * of(part)).sum() };
-        let mut own = Mat::from_fn(count, count, |k, l| over_parts(&|part| part.own[candidate][(k, l)]));
-        let mut g: Vec<f64> = (0..count).map(|k| over_parts(&|part| part.cross_y[first + k])).collect();
-        // A difference at the rounding level counts as zero.
-        let whole = &self.moments.whole.own[candidate];
-        for k in 0..count {
-            if own[(k, k)] <= 1e-12 * whole[(k, k)] {
-                own.row_mut(k).fill(0.0);
-                own.col_mut(k).fill(0.0);
-                g[k] = 0.0;
-            }
-        }
-        let d = Mat::from_fn(count, count, |k, l| own[(k, l)] - dot(beside.cross(k), beside.solved(l)));
-        for k in 0..count {
-            g[k] -= dot(beside.solved(k), &self.base_y);
-        }
-        (d, g, own)
     }
 
     /// The decrease of the sum of squares by the model, priors included.
     pub fn explained(&self) -> f64 {
-        self.base_y.iter().zip(&self.coefficients).map(|(y, c)| y * c).sum()
+        self.projection.explained + self.along.iter().zip(&self.coefficients).map(|(y, c)| y * c).sum::<f64>()
     }
 
     /// The degrees of freedom of a candidate's gain: its observable directions and its tuned shape numbers. Without the
     /// latter, tunable candidates would be preferred.
-    fn freedom(&self, candidate: usize, observable: usize) -> usize {
-        if observable == 0 { 0 } else { observable + self.moments.numbers[candidate] }
+    pub(super) fn freedom(&self, candidate: usize, observable: usize) -> usize {
+        if observable == 0 { 0 } else { observable + self.moments.numbers(candidate) }
     }
 
     /// The gain of a candidate.
-    pub fn gain(&self, candidate: usize) -> Gain {
-        let (d, g, own) = self.projected(candidate);
-        let inverse = ObservableSubspace::of(&d, &own);
-        Gain { gain: inverse.quadratic(&g), freedom: self.freedom(candidate, inverse.freedom) }
+    ///
+    /// # Errors
+    /// If products are not finite.
+    pub fn gain(&self, candidate: usize) -> Result<Gain, IdentifyError> {
+        let (segment, columns, square) = self.place(candidate)?;
+        Ok(self.gain_in(candidate, &segment, columns, square))
     }
 
-    /// The gains of all candidates.
-    pub fn gains(&self) -> Vec<Gain> {
-        self.remaining_gains(Vec::new())
+    fn gain_in(&self, candidate: usize, segment: &Segment, columns: Range<usize>, square: Range<usize>) -> Gain {
+        let (gain, observable) = match columns.len() {
+            1 | 2 => self.gain_of_few(segment, columns, square),
+            _ => {
+                let Projected { d, g, own } = self.projected_in(segment, columns, square);
+                let subspace = ObservableSubspace::of(&d, &own);
+                (subspace.quadratic(&g), subspace.freedom)
+            }
+        };
+        Gain { gain, freedom: self.freedom(candidate, observable) }
+    }
+
+    /// The gain and the observable directions of one or two columns, without allocation.
+    fn gain_of_few(&self, segment: &Segment, columns: Range<usize>, square: Range<usize>) -> (f64, usize) {
+        let count = columns.len();
+        let (mut d, mut own, mut g) = ([[0.0; 2]; 2], [0.0; 2], [0.0; 2]);
+        let (of_d, of_own) = (&segment.products.d[square.clone()], &segment.products.own[square]);
+        for k in 0..count {
+            g[k] = segment.products.g[columns.start + k];
+            own[k] = of_own[k * count + k];
+            for l in 0..count {
+                d[k][l] = of_d[k * count + l];
+            }
+        }
+        if !self.along.is_empty() {
+            for k in 0..count {
+                let v = segment.with_chosen.col_as_slice(columns.start + k);
+                let solved = segment.solved.col_as_slice(columns.start + k);
+                g[k] -= solved.iter().zip(&self.along).map(|(a, b)| a * b).sum::<f64>();
+                for l in 0..count {
+                    let solved = segment.solved.col_as_slice(columns.start + l);
+                    d[k][l] -= v.iter().zip(solved).map(|(a, b)| a * b).sum::<f64>();
+                }
+            }
+        }
+        gain_of_few(count, d, own, g)
+    }
+
+    /// The gains of all candidates that `usable` accepts; those of the others are zero.
+    ///
+    /// # Errors
+    /// If products are not finite.
+    pub fn gains(&self, usable: &(dyn Fn(usize) -> bool + Sync)) -> Result<Vec<Gain>, IdentifyError> {
+        self.remaining_gains(Vec::new(), usable)
     }
 
     /// The gains of all candidates. `known` are those of the first candidates with the same model.
-    pub fn remaining_gains(&self, mut known: Vec<Gain>) -> Vec<Gain> {
-        let first = known.len();
-        known.extend(parallel::map(self.moments.count.len() - first, &|k| self.gain(first + k)));
-        known
-    }
-
-    /// The best score of each null draw over all candidates. `costs` and `variance` are those of the real search.
-    pub fn null_best(&self, costs: &[f64], variance: f64) -> Vec<f64> {
-        let draws = self.moments.null_cross.nrows();
-        let h = Mat::from_fn(draws, self.base.len(), |d, i| self.moments.null_base[(self.base[i], d)]);
-        const AT_ONCE: usize = 64;
-        let per_chunk: Vec<Vec<f64>> = parallel::map(costs.len().div_ceil(AT_ONCE), &|chunk| {
-            let mut best = vec![f64::NEG_INFINITY; draws];
-            let mut g = Vec::new();
-            let of_chunk = chunk * AT_ONCE..((chunk + 1) * AT_ONCE).min(costs.len());
-            for candidate in of_chunk.filter(|candidate| costs[*candidate].is_finite()) {
-                let beside = self.beside(candidate);
-                let (d, _, own) = self.projected_with(candidate, &beside);
-                let inverse = ObservableSubspace::of(&d, &own);
-                let freedom = self.freedom(candidate, inverse.freedom);
-                if freedom == 0 {
-                    continue;
-                }
-                let (first, count) = (self.moments.first[candidate], self.moments.count[candidate]);
-                let modelled = &h * beside.all_solved();
-                for draw in 0..draws {
-                    g.clear();
-                    let left = |k: usize| self.moments.null_cross[(draw, first + k)] - modelled[(draw, k)];
-                    g.extend((0..count).map(left));
-                    let gain = inverse.quadratic(&g) / variance;
-                    // The tail is computed only if it can exceed the best score.
-                    if most_evidence(gain, freedom) - costs[candidate] <= best[draw] {
-                        continue;
-                    }
-                    let score = -ln_chi_square_tail(gain, freedom) - costs[candidate];
-                    best[draw] = best[draw].max(score);
-                }
+    ///
+    /// # Errors
+    /// If products are not finite.
+    pub fn remaining_gains(
+        &self,
+        mut known: Vec<Gain>,
+        usable: &(dyn Fn(usize) -> bool + Sync),
+    ) -> Result<Vec<Gain>, IdentifyError> {
+        let (first, total) = (known.len(), self.moments.candidates());
+        let chunks: Vec<Range<usize>> =
+            (first..total).step_by(AT_ONCE).map(|start| start..(start + AT_ONCE).min(total)).collect();
+        let mut segments: Vec<Option<Arc<Segment>>> = Vec::new();
+        for candidate in (first..total).filter(|candidate| usable(*candidate)) {
+            let number = self.moments.place(candidate).0;
+            segments.resize(segments.len().max(number + 1), None);
+            if segments[number].is_none() {
+                segments[number] = Some(self.segment(number)?);
             }
-            best
-        });
-        let mut best = vec![f64::NEG_INFINITY; draws];
-        for chunk in per_chunk {
-            best.iter_mut().zip(chunk).for_each(|(b, c)| *b = b.max(c));
         }
-        best
+        let gain = |candidate: usize| {
+            let (number, local) = self.moments.place(candidate);
+            let segment = segments.get(number).and_then(Option::as_ref).filter(|_| usable(candidate));
+            segment.map_or_else(Gain::default, |segment| {
+                let columns = self.moments.columns_of(number, local);
+                self.gain_in(candidate, segment, columns, self.moments.square_of(number, local))
+            })
+        };
+        let gains = parallel::map(chunks.len(), &|k| chunks[k].clone().map(gain).collect::<Vec<Gain>>());
+        for part in gains {
+            known.extend(part);
+        }
+        Ok(known)
     }
 
     /// The share of a signature that a candidate can reproduce in addition to the model: `cos²` of the angle between
-    /// the two. The signature is given by coefficients of base columns that are not in this model.
-    pub fn explained_by_signature(&self, candidate: usize, signature: &[(usize, f64)]) -> f64 {
-        let (d, _, own) = self.projected(candidate);
-        let (first, count) = (self.moments.first[candidate], self.moments.count[candidate]);
-        let mut g = vec![0.0; count];
-        let mut gram_with = vec![0.0; self.base.len()];
-        let mut length = 0.0;
-        for (part, sign) in &self.parts {
-            for (a, ca) in signature {
-                for k in 0..count {
-                    g[k] += sign * ca * part.cross[(*a, first + k)];
-                }
-                for (i, bi) in self.base.iter().enumerate() {
-                    gram_with[i] += sign * ca * part.base[(*a, *bi)];
-                }
-                for (b, cb) in signature {
-                    length += sign * ca * cb * part.base[(*a, *b)];
-                }
-            }
-        }
-        let beside = self.beside(candidate);
-        for k in 0..count {
-            g[k] -= dot(beside.solved(k), &gram_with);
-        }
-        let inverse = ObservableSubspace::of(&d, &own);
-        let projected = length - self.model_share(&gram_with);
-        if projected <= 0.0 { 0.0 } else { (inverse.quadratic(&g) / projected).clamp(0.0, 1.0) }
-    }
-
-    /// `gᵀ (XᵀX)⁻¹ g`.
-    fn model_share(&self, gram_with: &[f64]) -> f64 {
-        let m = self.base.len();
-        let quadratic = |i: usize, j: usize| gram_with[i] * self.inverse[(i, j)] * gram_with[j];
-        (0..m).flat_map(|i| (0..m).map(move |j| (i, j))).map(|(i, j)| quadratic(i, j)).sum()
-    }
-
-    /// Coefficients of the model's base columns and of a candidate's columns if the candidate is added.
-    pub fn with_candidate(&self, candidate: usize) -> (Vec<f64>, Vec<f64>) {
-        let (d, g, own) = self.projected(candidate);
-        let of_candidate = ObservableSubspace::of(&d, &own).solve(&g);
-        let beside = self.beside(candidate);
-        let of_model = (0..self.base.len())
-            .map(|i| {
-                let shift: f64 = of_candidate.iter().enumerate().map(|(k, c)| beside.solved(k)[i] * c).sum();
-                self.coefficients[i] - shift
+    /// the two. The signature is that of an effect which the model lacks, with its coefficients.
+    ///
+    /// # Errors
+    /// If products are not finite.
+    pub fn explained_by_signature(
+        &self,
+        candidate: usize,
+        effect: usize,
+        coefficients: &[f64],
+    ) -> Result<f64, IdentifyError> {
+        let Projected { d, own, .. } = self.projected(candidate)?;
+        let signature = self.projection.chosen(self.moments, effect)?;
+        // The signature's products with the chosen effects and with the candidate, the fitted model projected out.
+        let along = |products: &Mat<f64>, column: usize| -> f64 {
+            coefficients.iter().enumerate().map(|(k, c)| c * products[(k, column)]).sum()
+        };
+        let with_chosen: Vec<f64> = (self.chosen.iter())
+            .flat_map(|chosen| {
+                let products = self.moments.between(&signature, chosen);
+                (0..chosen.rows.ncols()).map(move |l| along(&products, l)).collect::<Vec<_>>()
             })
             .collect();
-        (of_model, of_candidate)
+        let (number, local) = self.moments.place(candidate);
+        let columns = self.moments.columns_of(number, local);
+        let (segment, products) =
+            (self.segment(number)?, self.projection.with_segment(self.moments, &signature, number)?);
+        let beside = |solved: &dyn Fn(usize) -> f64| -> f64 {
+            with_chosen.iter().enumerate().map(|(i, value)| value * solved(i)).sum()
+        };
+        let g: Vec<f64> =
+            columns.map(|column| along(&products, column) - beside(&|i| segment.solved[(i, column)])).collect();
+        let itself = self.moments.between(&signature, &signature);
+        let length: f64 = coefficients.iter().enumerate().map(|(l, c)| c * along(&itself, l)).sum();
+        let m = with_chosen.len();
+        let solved = |i: usize| (0..m).map(|j| self.inverse[(i, j)] * with_chosen[j]).sum::<f64>();
+        let projected = length - beside(&solved);
+        let subspace = ObservableSubspace::of(&d, &own);
+        Ok(if projected <= 0.0 { 0.0 } else { (subspace.quadratic(&g) / projected).clamp(0.0, 1.0) })
     }
 
-    /// Sum of squares of a fold's residual under this model.
-    pub fn sum_of_squares_on(&self, fold: usize) -> f64 {
-        let fold = &self.moments.folds[fold];
-        let mut sum = fold.yy;
-        for (i, bi) in self.base.iter().enumerate() {
-            sum -= 2.0 * self.coefficients[i] * fold.base_y[*bi];
-            for (j, bj) in self.base.iter().enumerate() {
-                sum += self.coefficients[i] * self.coefficients[j] * fold.base[(*bi, *bj)];
+    /// Coefficients of the model columns and of the chosen effects, and of a candidate's columns, if the candidate is
+    /// added.
+    ///
+    /// # Errors
+    /// If products are not finite.
+    pub fn with_candidate(&self, candidate: usize) -> Result<(Vec<f64>, Vec<f64>), IdentifyError> {
+        let Projected { d, g, own } = self.projected(candidate)?;
+        let of_candidate = ObservableSubspace::of(&d, &own).solve(&g);
+        let (segment, columns, _) = self.place(candidate)?;
+        let mut of_chosen = self.coefficients.clone();
+        for (column, c) in columns.zip(&of_candidate) {
+            of_chosen.iter_mut().enumerate().for_each(|(i, of)| *of -= segment.solved[(i, column)] * c);
+        }
+        let added = self.projection.chosen(self.moments, candidate)?;
+        let mut of_model = self.of_model(&of_chosen);
+        for (i, of) in of_model.iter_mut().enumerate() {
+            *of -= of_candidate.iter().enumerate().map(|(k, c)| added.of_model[(i, k)] * c).sum::<f64>();
+        }
+        of_model.extend(of_chosen);
+        Ok((of_model, of_candidate))
+    }
+
+    /// Coefficients of the model columns for coefficients of the chosen effects.
+    fn of_model(&self, of_chosen: &[f64]) -> Vec<f64> {
+        let mut of_model = self.projection.coefficients.clone();
+        let mut rest = of_chosen;
+        for chosen in &self.chosen {
+            let (own, others) = rest.split_at(chosen.rows.ncols());
+            rest = others;
+            for (i, of) in of_model.iter_mut().enumerate() {
+                *of -= own.iter().enumerate().map(|(k, c)| chosen.of_model[(i, k)] * c).sum::<f64>();
             }
         }
-        sum
+        of_model
+    }
+
+    /// Coefficients of the model columns and of the chosen effects.
+    pub fn coefficients(&self) -> (Vec<f64>, &[f64]) {
+        (self.of_model(&self.coefficients), &self.coefficients)
+    }
+
+    /// Sum of squares of the residual over the training folds, and its degrees of freedom.
+    pub fn residual_square(&self) -> (f64, usize) {
+        let mut residual = self.projection.residual.clone();
+        let mut rest = &self.coefficients[..];
+        for chosen in &self.chosen {
+            let (own, others) = rest.split_at(chosen.rows.ncols());
+            rest = others;
+            for (k, c) in own.iter().enumerate() {
+                let of_effect = chosen.rows.col_as_slice(k);
+                residual.col_as_slice_mut(0).iter_mut().zip(of_effect).for_each(|(r, e)| *r -= c * e);
+            }
+        }
+        let rows: usize = self.projection.training.blocks.iter().map(|block| block.rows.len()).sum();
+        let parameters = self.moments.rank() + self.along.len();
+        (residual.squared_norm_l2(), rows.saturating_sub(parameters).max(1))
     }
 }

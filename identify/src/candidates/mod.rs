@@ -6,6 +6,10 @@ pub(crate) mod columns;
 pub(crate) mod gain;
 pub mod library;
 pub(crate) mod moments;
+mod null_scores;
 pub(crate) mod sampling;
 pub(crate) mod step_table;
 pub(crate) mod tuned;
+
+#[cfg(test)]
+mod check;

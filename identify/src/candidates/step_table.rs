@@ -10,7 +10,8 @@ use faer::Mat;
 use statrs::function::gamma::ln_gamma;
 
 use super::candidate::Candidate;
-use super::gain::TrainedModel;
+use super::gain::{Projected, TrainedModel};
+use crate::error::IdentifyError;
 use crate::numerics::solve::solve_square;
 use crate::numerics::tails::ln_chi_square_tail;
 use crate::numerics::tolerances::MIN_OBSERVABLE;
@@ -44,17 +45,20 @@ impl StepTable {
 
 /// The best step table of a dictionary for addition to a model, with at least two positions. A single step is an effect
 /// of the library itself.
+///
+/// # Errors
+/// If products are not finite.
 pub fn best_step_table(
     model: &TrainedModel<'_>,
     number: usize,
     dictionary: &Candidate,
     variance: f64,
-) -> Option<StepTable> {
+) -> Result<Option<StepTable>, IdentifyError> {
     let at = dictionary.effect.shape.positions();
     if at.is_empty() {
-        return None;
+        return Ok(None);
     }
-    let (d, g, own) = model.projected(number);
+    let Projected { d, g, own } = model.projected(number)?;
     let subset = Subset { d: &d, g: &g, own: &own };
     let mut chosen: Vec<usize> = Vec::new();
     let mut best: Option<StepTable> = None;
@@ -79,7 +83,7 @@ pub fn best_step_table(
             best = Some(StepTable { dictionary: number, effect, selection_penalty, cost, evidence });
         }
     }
-    best
+    Ok(best)
 }
 
 /// `ln C(m, n)`, the logarithm of the binomial coefficient.

@@ -1,113 +1,124 @@
 //! The gain of an effect whose shape numbers or positions differ from those of the library.
 //!
-//! Its products are computed from the readings. If one of several positions changes, only its column is computed again.
+//! Its products follow from the sums over the states of its driver, which do not depend on the numbers. If one of
+//! several positions changes, only its column is computed again.
 
-use std::ops::Range;
+use std::sync::Arc;
 
+use abbe_model::effect::Shape;
 use faer::Mat;
 
-use super::columns::{Columns, EffectColumns};
+use super::columns::{Channel, Columns, EffectColumns};
 use super::gain::TrainedModel;
-use super::moments::{Moments, transposed_product};
+use super::moments::{ChannelProducts, TuningSide};
 use crate::numerics::gain::quadratic_gain;
 
-/// The columns of an effect and their products over the training folds of a model.
+impl TrainedModel<'_> {
+    /// What the columns of tuned effects are multiplied with.
+    pub fn tuning(&self) -> Tuning<'_> {
+        Tuning { model: self, side: TuningSide::of(self.moments, &self.projection, &self.chosen) }
+    }
+}
+
+/// Gains of effects that are no candidates beside a model.
+pub struct Tuning<'t> {
+    model: &'t TrainedModel<'t>,
+    side: TuningSide,
+}
+
+/// The products of one effect with a model.
+#[derive(Clone)]
+struct EffectProducts {
+    /// With the model columns, the residual and the chosen effects: vectors × columns.
+    cross: Mat<f64>,
+    /// With itself.
+    own: Mat<f64>,
+}
+
+impl<'t> Tuning<'t> {
+    /// The sums over the states of a channel.
+    fn channel<'c>(&'c self, channel: &'c Arc<Channel>) -> ChannelProducts<'c> {
+        self.side.channel(&self.model.projection, channel)
+    }
+
+    /// The gain of an effect.
+    fn gain(&self, products: &EffectProducts) -> f64 {
+        let rank = self.model.moments.rank();
+        let (cross, count) = (&products.cross, products.own.ncols());
+        let of_model = cross.subrows(0, rank);
+        let of_chosen = cross.subrows(rank + 1, self.model.along.len());
+        let solved = &self.model.inverse * of_chosen;
+        let d = &products.own
+            - of_model.transpose() * (&self.model.projection.inverse * of_model)
+            - of_chosen.transpose() * &solved;
+        let along = |k: usize| -> f64 { self.model.along.iter().enumerate().map(|(i, y)| solved[(i, k)] * y).sum() };
+        let g: Vec<f64> = (0..count).map(|k| cross[(rank, k)] - along(k)).collect();
+        quadratic_gain(&d, &products.own, &g)
+    }
+}
+
+/// A channel whose effects are tuned.
+pub struct TunedChannel<'t> {
+    columns: &'t Columns<'t>,
+    tuning: &'t Tuning<'t>,
+    set: &'t EffectColumns,
+    products: ChannelProducts<'t>,
+}
+
+/// The basis functions of an effect and their products over the training folds of a model.
 pub struct TunedEffect {
-    /// Rows × columns of the effect.
-    rows: Mat<f64>,
+    /// At the states of the training rows.
+    local: Mat<f64>,
+    /// At all states.
+    basis: Mat<f64>,
     products: EffectProducts,
 }
 
-#[derive(Clone)]
-struct EffectProducts {
-    /// `Xᵀ C`.
-    cross: Mat<f64>,
-    /// `Cᵀ C`.
-    own: Mat<f64>,
-    /// `Cᵀ y`.
-    with_y: Mat<f64>,
-}
-
-impl TunedEffect {
-    /// Computes the columns of an effect and their products.
-    pub fn new(
-        columns: &Columns<'_>,
-        moments: &Moments,
-        column_set: &EffectColumns,
-        model: &TrainedModel<'_>,
-    ) -> TunedEffect {
-        let mut rows = Mat::zeros(columns.rows(), column_set.count);
-        columns.fill(&[column_set], rows.as_mut());
-        let mut products = EffectProducts {
-            cross: Mat::zeros(model.base.len(), column_set.count),
-            own: Mat::zeros(column_set.count, column_set.count),
-            with_y: Mat::zeros(column_set.count, 1),
-        };
-        for stretch in columns.moved_stretches(&[column_set], model.folds.iter().copied()) {
-            let (start, count) = (stretch.start, stretch.len());
-            let fresh = rows.as_ref().subrows(start, count);
-            let present = moments.base_columns().subrows(start, count);
-            let mut row = 0;
-            for run in model.base.chunk_by(|a, b| a + 1 == *b) {
-                let mut rows_of_run = products.cross.as_mut().subrows_mut(row, run.len());
-                rows_of_run += transposed_product(present.subcols(run[0], run.len()), fresh);
-                row += run.len();
-            }
-            products.own += transposed_product(fresh, fresh);
-            products.with_y += transposed_product(fresh, moments.residual().subrows(start, count));
-        }
-        TunedEffect { rows, products }
+impl<'t> TunedChannel<'t> {
+    /// Of the channel of an effect.
+    pub fn of(columns: &'t Columns<'t>, tuning: &'t Tuning<'t>, set: &'t EffectColumns) -> TunedChannel<'t> {
+        TunedChannel { columns, tuning, set, products: tuning.channel(&set.channel) }
     }
 
-    /// The gain of the effect with the model for which its products were computed.
-    pub fn gain(&self, model: &TrainedModel<'_>) -> f64 {
-        self.products.gain(model)
+    /// The effect with a shape.
+    pub fn effect(&self, shape: &Shape) -> TunedEffect {
+        self.effect_of(&self.columns.reshaped(shape, &self.set.channel).basis)
     }
 
-    /// The gain with column `column` replaced by the column of `other`. `stretches` are the rows that the model is
-    /// trained on.
-    pub fn gain_with(
-        &self,
-        column: usize,
-        other: &TunedEffect,
-        stretches: &[Range<usize>],
-        model: &TrainedModel<'_>,
-    ) -> f64 {
-        self.exchanged(column, other, stretches).gain(model)
+    /// The effect with basis functions (states × columns).
+    pub(super) fn effect_of(&self, basis: &Arc<Mat<f64>>) -> TunedEffect {
+        let (local, cross, own) = self.products.of(basis);
+        TunedEffect { local, basis: Mat::clone(basis), products: EffectProducts { cross, own } }
     }
 
-    /// Replaces column `column` by the column of `other`.
-    pub fn exchange(&mut self, column: usize, other: &TunedEffect, stretches: &[Range<usize>]) {
-        self.products = self.exchanged(column, other, stretches);
-        self.rows.col_mut(column).copy_from(other.rows.col(0));
+    /// The gain of an effect.
+    pub fn gain(&self, effect: &TunedEffect) -> f64 {
+        self.tuning.gain(&effect.products)
     }
 
-    fn exchanged(&self, column: usize, other: &TunedEffect, stretches: &[Range<usize>]) -> EffectProducts {
-        let mut products = self.products.clone();
+    /// The gain of an effect with column `column` replaced by the column of `other`.
+    pub fn gain_with(&self, effect: &TunedEffect, column: usize, other: &TunedEffect) -> f64 {
+        self.tuning.gain(&self.exchanged(effect, column, other))
+    }
+
+    /// Replaces column `column` of an effect by the column of `other`.
+    pub fn exchange(&self, effect: &mut TunedEffect, column: usize, other: &TunedEffect) {
+        effect.products = self.exchanged(effect, column, other);
+        effect.local.col_mut(column).copy_from(other.local.col(0));
+        effect.basis.col_mut(column).copy_from(other.basis.col(0));
+    }
+
+    fn exchanged(&self, effect: &TunedEffect, column: usize, other: &TunedEffect) -> EffectProducts {
+        let mut products = effect.products.clone();
         products.cross.col_mut(column).copy_from(other.products.cross.col(0));
-        products.with_y[(column, 0)] = other.products.with_y[(0, 0)];
-        for k in 0..self.rows.ncols() {
-            let with_other = |rows: &Range<usize>| {
-                let (own, other) = (self.rows.col(k), other.rows.col(0));
-                own.subrows(rows.start, rows.len()).transpose() * other.subrows(rows.start, rows.len())
-            };
-            let product = if k == column { other.products.own[(0, 0)] } else { stretches.iter().map(with_other).sum() };
+        let of_other = (other.local.col_as_slice(0), other.basis.col_as_slice(0));
+        for k in 0..effect.local.ncols() {
+            let of_effect = (effect.local.col_as_slice(k), effect.basis.col_as_slice(k));
+            let same = k == column;
+            let product = if same { other.products.own[(0, 0)] } else { self.products.between(of_effect, of_other) };
             products.own[(k, column)] = product;
             products.own[(column, k)] = product;
         }
         products
-    }
-}
-
-impl EffectProducts {
-    fn gain(&self, model: &TrainedModel<'_>) -> f64 {
-        let solved = &model.inverse * &self.cross;
-        let d = &self.own - transposed_product(self.cross.as_ref(), solved.as_ref());
-        let modelled = |k: usize| -> f64 {
-            let terms = (0..model.base.len()).map(|i| solved[(i, k)] * model.base_y[i]);
-            terms.sum()
-        };
-        let g: Vec<f64> = (0..d.nrows()).map(|k| self.with_y[(k, 0)] - modelled(k)).collect();
-        quadratic_gain(&d, &self.own, &g)
     }
 }

@@ -5,12 +5,28 @@
 
 use faer::{Mat, MatRef};
 
-use super::symmetric::Symmetric;
+use super::symmetric::{Symmetric, eigen_of_two};
 use super::tolerances::MIN_OBSERVABLE;
 
 /// `gᵀ D⁻¹ g` on the observable directions. `own` is the product before projection.
 pub(crate) fn quadratic_gain(d: &Mat<f64>, own: &Mat<f64>, g: &[f64]) -> f64 {
     ObservableSubspace::of(d, own).quadratic(g)
+}
+
+/// `gᵀ D⁻¹ g` of one or two columns, and the number of observable directions. `own` are the squared lengths before
+/// projection.
+pub(crate) fn gain_of_few(count: usize, d: [[f64; 2]; 2], own: [f64; 2], g: [f64; 2]) -> (f64, usize) {
+    let scale = own.map(|own| if own > 0.0 { 1.0 / own.sqrt() } else { 0.0 });
+    let scaled = |k: usize, l: usize| d[k][l] * scale[k] * scale[l];
+    let pairs = match count {
+        1 => [(scaled(0, 0), [1.0, 0.0]), (0.0, [0.0, 0.0])],
+        _ => eigen_of_two(scaled(0, 0), scaled(1, 0), scaled(1, 1)),
+    };
+    let g = [g[0] * scale[0], g[1] * scale[1]];
+    pairs.iter().filter(|(value, _)| *value > MIN_OBSERVABLE).fold((0.0, 0), |(gain, freedom), (value, vector)| {
+        let along = vector[0] * g[0] + vector[1] * g[1];
+        (gain + along * along / value, freedom + 1)
+    })
 }
 
 /// The inverse of a projected product on its observable directions.
@@ -80,5 +96,24 @@ mod tests {
         assert!((subspace.quadratic(&[6.0, 5.0]) - 9.0).abs() < 1e-12);
         assert!((subspace.solve(&[6.0, 5.0])[0] - 1.5).abs() < 1e-12);
         assert_eq!(subspace.solve(&[6.0, 5.0])[1], 0.0);
+    }
+
+    /// Two columns without matrices give the same as with them.
+    #[test]
+    fn few_columns_have_the_gain_of_the_general_case() {
+        for (a, b, c) in [(4.0, 0.3, 2.0), (1e-9, 1e-12, 3.0), (2.0, 2.0, 2.0), (0.0, 0.0, 0.0)] {
+            let d = Mat::from_fn(2, 2, |i, j| [[a, b], [b, c]][i][j]);
+            let own = Mat::from_fn(2, 2, |i, j| [[4.0, 0.5], [0.5, 3.0]][i][j]);
+            let subspace = ObservableSubspace::of(&d, &own);
+            let (gain, freedom) = gain_of_few(2, [[a, b], [b, c]], [4.0, 3.0], [1.5, -0.7]);
+            assert_eq!(freedom, subspace.freedom);
+            let expected = subspace.quadratic(&[1.5, -0.7]);
+            assert!((gain - expected).abs() <= 1e-12 * expected);
+            let one = |of: &Mat<f64>| of.submatrix(1, 1, 1, 1).to_owned();
+            let subspace = ObservableSubspace::of(&one(&d), &one(&own));
+            let (gain, freedom) = gain_of_few(1, [[c, 0.0], [0.0, 0.0]], [3.0, 0.0], [-0.7, 0.0]);
+            assert_eq!(freedom, subspace.freedom);
+            assert!((gain - subspace.quadratic(&[-0.7])).abs() <= 1e-12 * gain);
+        }
     }
 }

@@ -31,19 +31,8 @@ impl Symmetric {
         }
     }
 
-    /// For two columns, as sine and cosine have: one Jacobi rotation (Golub & Van Loan, section 8.5).
     fn of_two(matrix: MatRef<'_, f64>) -> Symmetric {
-        let (a, b, c) = (matrix[(0, 0)], matrix[(1, 0)], matrix[(1, 1)]);
-        let tangent = if b == 0.0 {
-            0.0
-        } else {
-            let tau = (c - a) / (2.0 * b);
-            tau.signum() / (tau.abs() + 1.0_f64.hypot(tau))
-        };
-        let cos = 1.0 / 1.0_f64.hypot(tangent);
-        let sin = tangent * cos;
-        let pairs = [(a - tangent * b, [cos, -sin]), (c + tangent * b, [sin, cos])];
-        let [low, high] = if pairs[0].0 <= pairs[1].0 { pairs } else { [pairs[1], pairs[0]] };
+        let [low, high] = eigen_of_two(matrix[(0, 0)], matrix[(1, 0)], matrix[(1, 1)]);
         Symmetric {
             values: vec![low.0, high.0],
             vectors: Mat::from_fn(2, 2, |i, k| if k == 0 { low.1[i] } else { high.1[i] }),
@@ -54,6 +43,21 @@ impl Symmetric {
     pub fn extremes(&self) -> [f64; 2] {
         [self.values.first(), self.values.last()].map(|value| value.copied().unwrap_or(0.0))
     }
+}
+
+/// The eigenvalues of `[[a, b], [b, c]]` in ascending order with their vectors, as sine and cosine have them: one Jacobi
+/// rotation (Golub & Van Loan, section 8.5).
+pub(crate) fn eigen_of_two(a: f64, b: f64, c: f64) -> [(f64, [f64; 2]); 2] {
+    let tangent = if b == 0.0 {
+        0.0
+    } else {
+        let tau = (c - a) / (2.0 * b);
+        tau.signum() / (tau.abs() + 1.0_f64.hypot(tau))
+    };
+    let cos = 1.0 / 1.0_f64.hypot(tangent);
+    let sin = tangent * cos;
+    let pairs = [(a - tangent * b, [cos, -sin]), (c + tangent * b, [sin, cos])];
+    if pairs[0].0 <= pairs[1].0 { pairs } else { [pairs[1], pairs[0]] }
 }
 
 /// Inverse of a product `XᵀX`. Directions below rounding are excluded.

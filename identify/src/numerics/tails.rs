@@ -36,6 +36,9 @@ pub fn ln_chi_square_tail(x: f64, k: usize) -> f64 {
         return 0.0;
     }
     let (a, z) = (k as f64 / 2.0, x / 2.0);
+    if k == 2 {
+        return -z;
+    }
     if z < a + 1.0 {
         return gamma_ur(a, z).max(f64::MIN_POSITIVE).ln();
     }

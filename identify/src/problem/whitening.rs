@@ -4,6 +4,30 @@ use faer::Mat;
 
 use super::{Problem, RowBlock};
 
+/// The linear filter that whitens the rows of a run.
+pub struct Filter {
+    /// Factor of a row without a complete past.
+    at_start: f64,
+    /// Number of scalar rows at the start of a block without a complete past.
+    past: usize,
+    /// Lag in scalar rows and factor of each term, the present first.
+    terms: Vec<(usize, f64)>,
+}
+
+impl Filter {
+    /// Whether each whitened row is formed from one row.
+    pub fn is_pointwise(&self) -> bool {
+        self.terms.len() == 1
+    }
+
+    /// The scalar rows of a block from which its whitened row `i` is formed, with their factors.
+    pub fn terms(&self, i: usize) -> impl Iterator<Item = (usize, f64)> {
+        let (count, first) = if i < self.past { (1, self.at_start) } else { (self.terms.len(), self.terms[0].1) };
+        let factor = move |k: usize, factor: f64| if k == 0 { first } else { factor };
+        self.terms[..count].iter().enumerate().map(move |(k, (lag, of))| (i - lag, factor(k, *of)))
+    }
+}
+
 impl Problem {
     /// The scalar rows of a block that remain after whitening. A row is dropped if its reading, or one within the
     /// filter's order before it, is an outlier.
@@ -35,6 +59,21 @@ impl Problem {
         let fold_of = &self.folds.of_row[block.test][block.rows.clone()];
         let coordinates = self.coordinates();
         rows.iter().map(move |i| fold_of[i / coordinates])
+    }
+
+    /// What whitening makes of each scalar row of a block: the value of that row times the first factor, plus earlier
+    /// values times the others. The rows at the start of a run have no past.
+    pub fn filter(&self) -> Filter {
+        let inflation = self.noise.inflation.sqrt();
+        let innovation = 1.0 / (self.noise.innovation_mm() * inflation);
+        let coordinates = self.coordinates();
+        let lagged = self.noise.ar_coefficients.iter().enumerate();
+        let lagged = lagged.map(|(lag, a)| ((lag + 1) * coordinates, -a * innovation));
+        Filter {
+            at_start: 1.0 / self.noise.likelihood_mm(),
+            past: self.noise.ar_coefficients.len() * coordinates,
+            terms: std::iter::once((0, innovation)).chain(lagged).collect(),
+        }
     }
 
     /// The rows of [`Problem::whiten`] for known remaining rows.

@@ -276,6 +276,9 @@ pub struct TraceResult {
     pub verdict: String,
     /// Whether the trace was interrupted. Effects may then be missing.
     pub interrupted: bool,
+    /// The time limit that interrupted it, s; absent if none did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time_limit_s: Option<f64>,
     /// Whether every found effect is unique; `true` where there is none.
     pub unique: bool,
     /// Standard deviation of one scalar reading with the found effects, µm: that of `after`.

@@ -13,6 +13,7 @@ use abbe_model::effect::Shape;
 use super::constants::{INDISTINGUISHABLE, MAX_COMPETING, MIN_COSINE};
 use super::state::{ALL, SearchState};
 use crate::candidates::gain::{Gain, TrainedModel};
+use crate::error::IdentifyError;
 
 /// An alias of a selected effect.
 #[derive(Clone, Debug)]
@@ -103,27 +104,23 @@ pub(super) fn aliases(
     k: usize,
     model: &TrainedModel<'_>,
     variance: f64,
-) -> (Vec<Alias>, Vec<CompetingEffect>) {
+) -> Result<(Vec<Alias>, Vec<CompetingEffect>), IdentifyError> {
     let selected = &search.selected()[k];
-    let of_named = model.gain(selected.candidate);
+    let of_named = model.gain(selected.candidate)?;
     let least = search.evidence_for(selected.candidate, &of_named, variance) - INDISTINGUISHABLE;
     let least_unpriced = search.evidence(&of_named, variance) - INDISTINGUISHABLE;
     let least_gain = of_named.gain / variance - 2.0 * INDISTINGUISHABLE;
-    let columns = |candidate: usize| search.moments.count[candidate];
+    let columns = |candidate: usize| search.moments.count(candidate);
     // A harmonic has two columns because its phase is estimated. It still counts as an alias of an effect with one
     // column.
     let no_more_said = |candidate: usize| {
         columns(candidate) <= columns(selected.candidate)
             || matches!(search.effect(candidate).shape, Shape::Harmonic { .. })
     };
-    let (_, coefficients) = model.with_candidate(selected.candidate);
-    // Base columns are the candidate's columns at unit length. The signature is their linear combination.
-    let norms = search.norms(selected.candidate);
-    let signature: Vec<(usize, f64)> =
-        search.places(selected.candidate).zip(coefficients.iter().zip(&norms).map(|(c, norm)| c * norm)).collect();
+    let (_, signature) = model.with_candidate(selected.candidate)?;
     let others: Vec<usize> = search.selected().iter().map(|t| t.candidate).collect();
-    let gains = model.gains();
-    let mut aliases: Vec<Alias> = gains
+    let gains = search.gains(model)?;
+    let near: Vec<usize> = gains
         .iter()
         .enumerate()
         .filter(|(candidate, gain)| {
@@ -135,15 +132,15 @@ pub(super) fn aliases(
                     || search.evidence(gain, variance) >= least_unpriced
                     || no_more_said(*candidate) && gain.gain / variance >= least_gain)
         })
-        .filter_map(|(candidate, _)| {
-            let cosine = model.explained_by_signature(candidate, &signature).sqrt();
-            (cosine >= MIN_COSINE).then(|| Alias {
-                candidate,
-                cosine,
-                model_coefficients: model.with_candidate(candidate).0,
-            })
-        })
+        .map(|(candidate, _)| candidate)
         .collect();
+    let mut aliases = Vec::new();
+    for candidate in near {
+        let cosine = model.explained_by_signature(candidate, selected.candidate, &signature)?.sqrt();
+        if cosine >= MIN_COSINE {
+            aliases.push(Alias { candidate, cosine, model_coefficients: model.with_candidate(candidate)?.0 });
+        }
+    }
     aliases.sort_by(|a, b| {
         to_six_decimals(b.cosine)
             .total_cmp(&to_six_decimals(a.cosine))
@@ -155,5 +152,5 @@ pub(super) fn aliases(
     let mut ids = HashSet::from([named]);
     aliases.retain(|alias| ids.insert(search.effect(alias.candidate).id()));
     let competing_effects = competing_effects(search, k, &gains, variance, &aliases);
-    (aliases, competing_effects)
+    Ok((aliases, competing_effects))
 }

@@ -85,5 +85,5 @@ fn remaining_structure(problem: &Problem, fit: &Fit, options: &TraceOptions) -> 
     let (count, seed) = (null_draw_count(options), options.seed.wrapping_add(1));
     let draws = null::draws(problem, &columns, &fit.residuals, &start.residual, count, SINGLE, seed);
     let prior = start.prior();
-    remainder::structure(problem, &columns, start.model, &start.residual, draws, &prior)
+    remainder::structure(problem, &columns, start.model, &start.residual, draws, prior)
 }

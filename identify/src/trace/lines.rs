@@ -7,7 +7,6 @@
 //! frees that order from the prior of its spectrum.
 
 use abbe_model::driver::Driver;
-use faer::Mat;
 
 use super::constants::LINES_TRIED;
 use super::families::{AcceptedEffect, AcceptedFamilies};
@@ -93,17 +92,16 @@ fn ranked(
     found: &AcceptedFamilies,
     interrupt: Interrupt<'_>,
 ) -> Result<Ranked, IdentifyError> {
-    let sets: Vec<&EffectColumns> = candidates.iter().map(|candidate| &candidate.columns).collect();
+    let sets: Vec<EffectColumns> = candidates.iter().map(|candidate| candidate.columns.clone()).collect();
     let residual = columns.whitened_values(&found.fit.residuals);
-    let none = Mat::zeros(columns.rows(), 0);
     let go_on = || interrupt.check().is_ok();
-    let moments =
-        Moments::new(columns, &sets, start.model.clone(), &residual, none, &go_on).ok_or(IdentifyError::Interrupted)?;
+    let moments = Moments::new(columns, sets, start.model.clone(), &residual, start.prior(), Vec::new())?;
     let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
-    let trained = TrainedModel::new(&moments, &start.prior(), (0..moments.base()).collect(), folds)?;
+    moments.prepare(&[], &go_on)?;
+    let trained = TrainedModel::new(&moments, &[], &folds)?;
     let square: f64 = residual.iter().map(|value| value * value).sum();
     let variance = (square / columns.rows().max(1) as f64).max(f64::MIN_POSITIVE);
-    let gains = trained.gains();
+    let gains = trained.gains(&|_| true)?;
     let chosen: Vec<_> = found.effects.iter().map(|found| &found.effect).collect();
     let mut scored: Vec<(usize, f64)> = (gains.iter().enumerate())
         .filter(|(k, gain)| gain.freedom > 0 && !chosen.contains(&&candidates[*k].effect))

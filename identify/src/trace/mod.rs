@@ -30,6 +30,8 @@ mod search;
 mod start;
 mod state;
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use abbe_model::effect::Effect;
 use abbe_model::session::Session;
 
@@ -93,6 +95,8 @@ pub enum Progress {
     Screening(usize),
     /// An effect was added: the number of effects, its identifier, the held-out rms in µm.
     SelectedEffect(usize, String, f64),
+    /// Searches without one fold that have ended, and their number. Each predicts the readings that it lacks.
+    Folds(usize, usize),
     /// The model with the found effects is being refitted, and its residual tested.
     Judging,
     /// No new event. Reported often, so that the caller can stop the trace soon.
@@ -145,6 +149,17 @@ pub fn trace(
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<TraceOutcome, IdentifyError> {
+    // Once the caller has stopped the trace, it is not asked again by computations that run at the same time.
+    let stopped = AtomicBool::new(false);
+    let progress = &|event: Progress| {
+        let asks = matches!(event, Progress::Working);
+        if asks && stopped.load(Ordering::Relaxed) {
+            return false;
+        }
+        let goes_on = progress(event);
+        stopped.fetch_or(!goes_on, Ordering::Relaxed);
+        goes_on
+    };
     progress(Progress::Fitting);
     let (problem, fitted) = prepare(session, options.seed)?;
     let contradicted = Contradicted::of(&problem, &fitted)?;
@@ -244,7 +259,7 @@ fn trace_or_interrupted(
     let structure_before = || {
         let (model, prior) = (start.model.clone(), start.prior());
         let draws = null(SINGLE);
-        remainder::structure(problem, &columns, model, &start.residual, draws, &prior)
+        remainder::structure(problem, &columns, model, &start.residual, draws, prior)
     };
     let (draws, structure_before) = parallel::both(|| null(BLOCK), || policy.tests_structure.then(structure_before));
 
@@ -255,16 +270,15 @@ fn trace_or_interrupted(
     let candidate_count = searched.len();
     progress(Progress::Screening(candidate_count));
     let (reserve, candidates): (Vec<_>, Vec<_>) = searched.into_iter().partition(|candidate| candidate.last_resort);
-    let column_sets: Vec<&EffectColumns> = candidates.iter().map(|candidate| &candidate.columns).collect();
+    let column_sets: Vec<EffectColumns> = candidates.iter().map(|candidate| candidate.columns.clone()).collect();
     let (model, prior) = (start.model.clone(), start.prior());
     let go_on = || interrupt.check().is_ok();
-    let moments = Moments::new(&columns, &column_sets, model, &start.residual, draws, &go_on)
-        .ok_or(IdentifyError::Interrupted)?;
+    let moments = Moments::new(&columns, column_sets, model, &start.residual, prior, draws)?;
+    moments.prepare(&[], &go_on)?;
     let unwhitened = start.unwhitened(&columns, &before_fit.beta, problem.noise.sigma_mm)?;
-    let mut search = SearchState::new(&columns, candidates, moments, prior, unwhitened, policy)?;
-    search.reserve = reserve;
+    let mut search = SearchState::new(&columns, candidates, reserve, moments, unwhitened, policy)?;
     search.interrupt = Some(interrupt);
-    let gains = search.model_without(None)?.gains();
+    let gains = search.model_without(None)?.gains(&|candidate| !search.candidates[candidate].last_resort)?;
     let observable = gains.iter().filter(|gain| gain.freedom > 0).count();
 
     let mut record = SearchRecord { steps: Vec::new(), noise_um: problem.noise.sigma_mm * 1e3, progress };

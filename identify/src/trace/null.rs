@@ -7,7 +7,6 @@
 
 use std::collections::HashMap;
 
-use faer::Mat;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
@@ -19,7 +18,7 @@ use crate::noise::{Noise, PureError};
 use crate::numerics::median;
 use crate::problem::Problem;
 
-/// Null draws (whitened rows in fold order × draws), in blocks of `block` readings.
+/// Null draws, each over the whitened rows in fold order, in blocks of `block` readings.
 pub fn draws(
     problem: &Problem,
     columns: &Columns<'_>,
@@ -28,35 +27,32 @@ pub fn draws(
     count: usize,
     block: usize,
     seed: u64,
-) -> Mat<f64> {
+) -> Vec<Vec<f64>> {
     let mut generator = Pcg64::seed_from_u64(seed ^ 0x6e75_6c6c);
     if Policy::of(problem).null == NullSource::SignFlips {
         return sign_flipped(columns, whitened, count, &mut generator);
     }
     let pool = pool(problem, residuals);
-    let mut draws = Mat::zeros(columns.rows(), count);
-    for draw in 0..count {
+    let mut draw = || {
         let mut values = block_draws(&pool, columns.rows(), block, &mut generator);
         with_noise_spectrum(&mut values, &problem.noise, &mut generator);
-        for (i, value) in columns.placed(&values).into_iter().enumerate() {
-            draws[(i, draw)] = value;
-        }
-    }
-    draws
+        columns.placed(&values)
+    };
+    (0..count).map(|_| draw()).collect()
 }
 
 /// The residual with a random sign for each pose.
-fn sign_flipped(columns: &Columns<'_>, whitened: &[f64], count: usize, generator: &mut Pcg64) -> Mat<f64> {
+fn sign_flipped(columns: &Columns<'_>, whitened: &[f64], count: usize, generator: &mut Pcg64) -> Vec<Vec<f64>> {
     let origins = columns.origin_of_rows();
-    let mut draws = Mat::zeros(columns.rows(), count);
-    for draw in 0..count {
+    let mut draw = || {
         let mut signs: HashMap<(usize, usize), f64> = HashMap::new();
-        for (i, (test, row, _)) in origins.iter().enumerate() {
-            let sign = *signs.entry((*test, *row)).or_insert_with(|| sign(generator));
-            draws[(i, draw)] = sign * whitened[i];
-        }
-    }
-    draws
+        let values = origins.iter().zip(whitened);
+        let flipped = |((test, row, _), value): (&(usize, usize, usize), &f64)| {
+            *signs.entry((*test, *row)).or_insert_with(|| sign(generator)) * value
+        };
+        values.map(flipped).collect()
+    };
+    (0..count).map(|_| draw()).collect()
 }
 
 fn sign(generator: &mut Pcg64) -> f64 {
@@ -65,23 +61,23 @@ fn sign(generator: &mut Pcg64) -> f64 {
 
 /// Draws `rows` deviations from the pool in blocks with random signs. Draws Gaussian noise if the pool is too small.
 fn block_draws(pool: &[Vec<f64>], rows: usize, block: usize, generator: &mut Pcg64) -> Vec<f64> {
-    let total: usize = pool.iter().map(Vec::len).sum();
+    let ends: Vec<usize> = (pool.iter())
+        .scan(0, |end, stretch| {
+            *end += stretch.len();
+            Some(*end)
+        })
+        .collect();
+    let total = ends.last().copied().unwrap_or(0);
     if total < MIN_POOL {
         return (0..rows).map(|_| generator.sample(StandardNormal)).collect();
     }
     let mut values = Vec::with_capacity(rows + block);
     while values.len() < rows {
         // A stretch is chosen with probability proportional to its length, and a start within it uniformly.
-        let mut start = generator.random_range(0..total);
-        let stretch = pool.iter().find(|stretch| {
-            if start < stretch.len() {
-                true
-            } else {
-                start -= stretch.len();
-                false
-            }
-        });
-        let Some(stretch) = stretch else { continue };
+        let place = generator.random_range(0..total);
+        let chosen = ends.partition_point(|end| *end <= place);
+        let stretch = &pool[chosen];
+        let start = place - (ends[chosen] - stretch.len());
         let sign = sign(generator);
         let end = (start + block).min(stretch.len());
         values.extend(stretch[start..end].iter().map(|value| sign * value));

@@ -14,8 +14,8 @@ use abbe_model::session::readings::Readings;
 
 use super::constants::STRUCTURED;
 use crate::candidates::columns::{Columns, EffectColumns};
-use crate::candidates::gain::{PriorMoments, TrainedModel};
-use crate::candidates::moments::Moments;
+use crate::candidates::gain::TrainedModel;
+use crate::candidates::moments::{Moments, PriorMoments};
 use crate::error::IdentifyError;
 use crate::numerics::tails::ln_chi_square_tail;
 use crate::problem::Problem;
@@ -188,8 +188,8 @@ pub fn structure(
     columns: &Columns<'_>,
     model: faer::Mat<f64>,
     residual: &[f64],
-    null: faer::Mat<f64>,
-    prior: &PriorMoments,
+    null: Vec<Vec<f64>>,
+    prior: PriorMoments,
 ) -> Result<Structure, IdentifyError> {
     let detectors = detectors(problem, columns);
     if detectors.is_empty() {
@@ -199,14 +199,13 @@ pub fn structure(
             description: "no detector applies to these readings".to_string(),
         });
     }
-    let column_sets: Vec<&EffectColumns> = detectors.iter().map(|detector| &detector.column_set).collect();
-    let rank = model.ncols();
-    let moments =
-        Moments::new(columns, &column_sets, model, residual, null, &|| true).ok_or(IdentifyError::Interrupted)?;
-    let folds = (0..columns.fold_rows.len()).collect();
-    let trained = TrainedModel::new(&moments, prior, (0..rank).collect(), folds)?;
+    let column_sets: Vec<EffectColumns> = detectors.iter().map(|detector| detector.column_set.clone()).collect();
+    let count = column_sets.len();
+    let moments = Moments::new(columns, column_sets, model, residual, prior, null)?;
+    let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
+    let trained = TrainedModel::new(&moments, &[], &folds)?;
     let mut best = (0, f64::NEG_INFINITY, 0.0);
-    for (index, gain) in trained.gains().iter().enumerate() {
+    for (index, gain) in trained.gains(&|_| true)?.iter().enumerate() {
         if gain.freedom == 0 {
             continue;
         }
@@ -215,7 +214,7 @@ pub fn structure(
             best = (index, score, gain.gain - gain.freedom as f64);
         }
     }
-    let null_best = trained.null_best(&vec![0.0; column_sets.len()], 1.0);
+    let null_best = trained.null_best(&[], &vec![0.0; count], 1.0)?;
     let above = null_best.iter().filter(|score| **score >= best.1).count();
     let p_value = (above + 1) as f64 / (null_best.len() + 1) as f64;
     let size_um = (2.0 * best.2.max(0.0) / columns.rows().max(1) as f64).sqrt() * problem.noise.sigma_mm * 1e3;

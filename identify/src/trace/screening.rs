@@ -2,7 +2,6 @@
 //! declared parameters.
 
 use abbe_model::session::Session;
-use faer::Mat;
 
 use super::TraceOptions;
 use super::start::Start;
@@ -37,16 +36,13 @@ pub fn screened_effects(session: &Session, options: &TraceOptions) -> Result<Vec
     let start = Start::of(&problem, &columns, &fit)?;
     let prior = start.prior();
     let searched = searched_candidates(&problem, &columns, options)?;
-    let column_sets: Vec<&EffectColumns> = searched.iter().map(|candidate| &candidate.columns).collect();
-    let none = Mat::zeros(columns.rows(), 0);
-    let moments = Moments::new(&columns, &column_sets, start.model, &start.residual, none, &|| true)
-        .ok_or(IdentifyError::Interrupted)?;
-    let rank = moments.base();
-    let folds = (0..columns.fold_rows.len()).collect();
-    let trained = TrainedModel::new(&moments, &prior, (0..rank).collect(), folds)?;
+    let column_sets: Vec<EffectColumns> = searched.iter().map(|candidate| candidate.columns.clone()).collect();
+    let moments = Moments::new(&columns, column_sets, start.model, &start.residual, prior, Vec::new())?;
+    let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
+    let trained = TrainedModel::new(&moments, &[], &folds)?;
     Ok(searched
         .iter()
-        .zip(trained.gains())
+        .zip(trained.gains(&|_| true)?)
         .map(|(candidate, gain)| ScreenedEffect {
             id: candidate.effect.id(),
             family: candidate.family,

@@ -63,7 +63,6 @@ pub(super) fn search_and_refit(
     (record.progress)(Progress::Judging);
     let mut judged = judge(search)?;
     if judged.is_structured() && search.selected().len() < search.policy.max_effects {
-        search.add_reserve_candidates();
         search.last_resort = true;
         ended = search_on(search, record)?;
         if !judged.is_of(search) {

@@ -7,7 +7,7 @@ use faer::Mat;
 
 use super::state::UnwhitenedModel;
 use crate::candidates::columns::Columns;
-use crate::candidates::gain::PriorMoments;
+use crate::candidates::moments::PriorMoments;
 use crate::error::IdentifyError;
 use crate::fit::Fit;
 use crate::numerics::reduction::inverse_of_upper;
@@ -55,7 +55,7 @@ impl Start {
         let parameters = beta.len();
         let base = rows.as_ref().subcols(0, parameters) * &self.to_parameters;
         Ok(UnwhitenedModel {
-            base: Mat::from_fn(base.nrows(), base.ncols(), |i, j| base[(i, j)] / sigma_mm),
+            model: Mat::from_fn(base.nrows(), base.ncols(), |i, j| base[(i, j)] / sigma_mm),
             residual: (0..rows.nrows()).map(|i| rows[(i, parameters)] / sigma_mm).collect(),
             folds: columns.unwhitened_folds(),
             units: columns.unwhitened_units(),

@@ -1,119 +1,113 @@
-//! The basis columns of an effect for the tests of a session: the component it moves, and its basis functions.
+//! The columns of an effect for the tests of a session: its channel, and its basis functions of the driver.
 
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
 
-use abbe_model::driver::{Driver, DriverInput, DriverSample};
+use abbe_model::driver::{Driver, DriverInput, DriverPart, DriverSample};
 use abbe_model::effect::shape::Curve;
 use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::instrument::InternalUnit;
+use faer::Mat;
 
-use super::Columns;
+use super::states::{Channel, DriverStates};
+use super::{Columns, SharedSamples};
 
-/// The basis columns of an effect in each test.
+/// The columns of an effect: a channel, and basis functions of the states of its driver.
 #[derive(Clone, Debug)]
 pub struct EffectColumns {
     /// Number of columns.
     pub count: usize,
     /// Number of tuned shape numbers. Each counts as a degree of freedom of the gain.
     pub numbers: usize,
-    /// The terms of each test. Empty for a test in which the effect does not act.
-    pub(super) terms: Vec<Vec<EffectTerm>>,
+    /// What moves the readings, and what it follows.
+    pub channel: Arc<Channel>,
+    /// The basis functions: states × columns.
+    pub basis: Arc<Mat<f64>>,
 }
 
 impl EffectColumns {
     /// Whether the effect acts in a test.
     pub(super) fn acts_in(&self, test: usize) -> bool {
-        !self.terms[test].is_empty()
+        self.channel.acts_in(test)
     }
 
     /// The largest absolute value of its basis functions.
     pub fn greatest(&self) -> f64 {
-        let terms = self.terms.iter().flatten();
-        let factors =
-            |term: &EffectTerm| term.factor.as_ref().map_or(1.0, |f| f.iter().fold(0.0_f64, |a, b| a.max(b.abs())));
-        terms
-            .map(|term| {
-                factors(term) * term.basis.iter().flat_map(|basis| basis.iter()).fold(0.0_f64, |a, b| a.max(b.abs()))
-            })
-            .fold(0.0, f64::max)
+        let columns = self.basis.col_iter().flat_map(|column| column.iter());
+        self.channel.greatest_factor * columns.fold(0.0_f64, |a, b| a.max(b.abs()))
     }
 }
 
-/// One term of an effect in a test: a target, and the basis functions by which it moves.
-#[derive(Clone, Debug)]
-pub(super) struct EffectTerm {
-    pub target: TermTarget,
-    /// Factor of the basis functions in each row; 1 if absent.
-    pub factor: Option<Arc<Vec<f64>>>,
-    /// The basis functions, one value per row.
-    pub basis: Arc<Vec<Vec<f64>>>,
-}
-
-/// The target of a term.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum TermTarget {
-    /// A component, through its sensitivity.
-    Slot(usize),
-    /// One coordinate of the reading itself.
-    Reading(usize),
+/// The basis functions of a shape at some samples: samples × coefficients.
+fn basis_of(shape: &Shape, samples: &[DriverSample<f64>]) -> Arc<Mat<f64>> {
+    let columns = shape.columns(samples);
+    Arc::new(Mat::from_fn(samples.len(), columns.len(), |i, k| columns[k][i]))
 }
 
 impl Columns<'_> {
     /// Computes the basis columns of an effect. `None` if the data lack its driver.
     pub fn effect_columns(&self, effect: &Effect) -> Option<EffectColumns> {
-        self.compute(effect, true)
+        let channel = self.channel(effect)?;
+        let key = (Arc::as_ptr(&channel.states) as usize, format!("{:?}", effect.shape));
+        let basis = cached(&self.bases, key, || basis_of(&effect.shape, &channel.states.samples));
+        Some(EffectColumns { count: effect.shape.coefficients(), numbers: effect.shape.numbers(), channel, basis })
     }
 
-    /// Computes the basis columns of an effect that is evaluated once: its basis functions are not cached.
-    pub fn effect_columns_uncached(&self, effect: &Effect) -> Option<EffectColumns> {
-        self.compute(effect, false)
+    /// The columns of an effect on the channel of another, which differs from it in the shape numbers alone.
+    pub fn reshaped(&self, shape: &Shape, channel: &Arc<Channel>) -> EffectColumns {
+        let basis = basis_of(shape, &channel.states.samples);
+        EffectColumns { count: shape.coefficients(), numbers: shape.numbers(), channel: Arc::clone(channel), basis }
     }
 
-    fn compute(&self, effect: &Effect, keep: bool) -> Option<EffectColumns> {
-        let session = &self.problem.session;
-        let mut terms = Vec::new();
-        for (number, test) in self.problem.tests.iter().enumerate() {
-            let mut of_test = Vec::new();
-            if effect.acts_in(&test.name) {
-                let readings = test.readings.as_ref()?;
-                let axis = effect.component.axis(&session.machine);
-                let (follows, samples) = self.driver_samples(number, &effect.driver, axis)?;
-                let make = || Arc::new(effect.shape.columns(&samples));
-                let basis = if keep {
-                    cached(&self.bases, (number, format!("{follows} {:?}", effect.shape)), make)
-                } else {
-                    make()
-                };
-                let parameters = test.station.kind().unknowns();
-                for (slot, factor) in effect.component.slots_in(&session.machine, parameters, readings) {
-                    if self.slot_index[number].contains_key(&slot) {
-                        of_test.push(EffectTerm {
-                            target: TermTarget::Slot(slot),
-                            factor: factor.map(Arc::new),
-                            basis: basis.clone(),
-                        });
+    /// The channel of an effect. `None` if the data lack its driver.
+    fn channel(&self, effect: &Effect) -> Option<Arc<Channel>> {
+        let machine = &self.problem.session.machine;
+        let axis = effect.component.axis(machine);
+        let part = effect.shape.uses();
+        let name = driver_name(&effect.driver, axis);
+        let key = format!("{} {:?} {name} {part:?}", effect.component, effect.tests);
+        cached(&self.channels, key, || {
+            let coordinates = self.problem.coordinates();
+            let mut greatest_factor = 0.0_f64;
+            let mut sensitivity = Vec::new();
+            let mut samples = Vec::new();
+            for (number, test) in self.problem.tests.iter().enumerate() {
+                let mut of_test: Vec<f64> = Vec::new();
+                let mut of_driver = None;
+                if effect.acts_in(&test.name) {
+                    let readings = test.readings.as_ref()?;
+                    of_driver = Some(self.driver_samples(number, &effect.driver, axis)?);
+                    for (slot, factor) in effect.component.slots_in(machine, test.station.kind().unknowns(), readings) {
+                        let Some(slot) = self.slot_index[number].get(&slot) else { continue };
+                        let derivative = &self.sensitivities[number].derivatives[*slot];
+                        of_test.resize(derivative.len(), 0.0);
+                        let of_row = |row: usize| factor.as_ref().map_or(1.0, |factor| factor[row]);
+                        for (i, (sum, derivative)) in of_test.iter_mut().zip(derivative).enumerate() {
+                            *sum += derivative * of_row(i / coordinates);
+                        }
+                        let greatest = factor.as_ref().map_or(1.0, |f| f.iter().fold(0.0_f64, |a, b| a.max(b.abs())));
+                        greatest_factor = greatest_factor.max(greatest);
                     }
                 }
+                samples.push(of_driver.filter(|_| !of_test.is_empty()));
+                sensitivity.push(of_test);
             }
-            terms.push(of_test);
-        }
-        Some(EffectColumns { count: effect.shape.coefficients(), numbers: effect.shape.numbers(), terms })
+            let states = self.states(&name, &samples, part);
+            Some(Arc::new(Channel { sensitivity, states, greatest_factor }))
+        })
     }
 
-    /// The samples of a driver in a test, and its key in the caches. Some drivers, as the moment of gravity, differ
-    /// from axis to axis.
-    fn driver_samples(
-        &self,
-        test: usize,
-        driver: &Driver,
-        axis: Option<usize>,
-    ) -> Option<(String, Arc<Vec<DriverSample<f64>>>)> {
+    /// The states of a driver in the tests with samples.
+    fn states(&self, name: &str, samples: &[Option<SharedSamples>], part: DriverPart) -> Arc<DriverStates> {
+        let tests: Vec<usize> = (0..samples.len()).filter(|test| samples[*test].is_some()).collect();
+        cached(&self.states, format!("{name} {part:?} {tests:?}"), || Arc::new(DriverStates::of(samples, part)))
+    }
+
+    /// The samples of a driver in a test. Some drivers, as the moment of gravity, differ from axis to axis.
+    fn driver_samples(&self, test: usize, driver: &Driver, axis: Option<usize>) -> Option<SharedSamples> {
         let readings = self.problem.tests[test].readings.as_ref()?;
-        let kind = driver.kind();
-        let name = if kind.is_of_component() { format!("{driver} {axis:?}") } else { driver.to_string() };
-        let samples = cached(&self.samples, (test, name.clone()), || {
+        cached(&self.samples, (test, driver_name(driver, axis)), || {
             let input = DriverInput {
                 machine: &self.problem.session.machine,
                 model: &self.problem.models[test],
@@ -121,9 +115,8 @@ impl Columns<'_> {
                 reference: &self.problem.reference,
                 component_axis: axis,
             };
-            kind.samples(&input).map(Arc::new)
-        })?;
-        Some((name, samples))
+            driver.kind().samples(&input).map(Arc::new)
+        })
     }
 
     /// The columns of a term on one coordinate of the readings of a test ([`Component::Reading`]). `by_direction`
@@ -140,17 +133,24 @@ impl Columns<'_> {
             return None;
         };
         let test = self.problem.tests.iter().position(|test| test.name == *name)?;
-        let (_, samples) = self.driver_samples(test, &effect.driver, None)?;
-        let basis = Arc::new(effect.shape.columns(&samples));
-        let factor = (by_direction || rows.is_some()).then(|| {
-            let turned = |sample: &DriverSample<f64>| if by_direction { sample.direction } else { 1.0 };
+        let part = effect.shape.uses();
+        let key = format!("{} {coordinate} {by_direction} {rows:?} {} {part:?}", effect.component, effect.driver);
+        let channel = cached(&self.channels, key, || {
+            let samples = self.driver_samples(test, &effect.driver, None)?;
+            let coordinates = self.problem.coordinates();
+            let turned = |row: usize| if by_direction { samples[row].direction } else { 1.0 };
             let inside = |row: usize| rows.is_none_or(|rows| rows.contains(&row));
-            let factor = |(row, sample)| if inside(row) { turned(sample) } else { 0.0 };
-            Arc::new(samples.iter().enumerate().map(factor).collect())
-        });
-        let mut terms = vec![Vec::new(); self.problem.tests.len()];
-        terms[test].push(EffectTerm { target: TermTarget::Reading(coordinate), factor, basis });
-        Some(EffectColumns { count: effect.shape.coefficients(), numbers: 0, terms })
+            let mut sensitivity = vec![Vec::new(); self.problem.tests.len()];
+            sensitivity[test] = (0..samples.len() * coordinates)
+                .map(|i| (i / coordinates, i % coordinates))
+                .map(|(row, moved)| if moved == coordinate && inside(row) { turned(row) } else { 0.0 })
+                .collect();
+            let mut of_tests = vec![None; self.problem.tests.len()];
+            of_tests[test] = Some(samples);
+            let states = self.states(&effect.driver.to_string(), &of_tests, part);
+            Some(Arc::new(Channel { sensitivity, states, greatest_factor: 1.0 }))
+        })?;
+        Some(EffectColumns { numbers: 0, ..self.reshaped(&effect.shape, &channel) })
     }
 
     /// A nonparametric curve over an axis in the readings of each test in which the axis moves, without a component.
@@ -222,17 +222,22 @@ pub fn chunked(column_sets: &[&EffectColumns]) -> Vec<Range<usize>> {
     chunks
 }
 
-/// The cached value of a key. Computes and stores it if it is absent.
+/// The name of a driver, with the axis of the component if its values differ from axis to axis.
+fn driver_name(driver: &Driver, axis: Option<usize>) -> String {
+    if driver.kind().is_of_component() { format!("{driver} {axis:?}") } else { driver.to_string() }
+}
+
+/// The cached value of a key. Computes and stores it if it is absent. All callers receive the value stored first.
 fn cached<K: std::hash::Hash + Eq, V: Clone>(store: &Mutex<HashMap<K, V>>, key: K, make: impl FnOnce() -> V) -> V {
     let found = store.lock().ok().and_then(|store| store.get(&key).cloned());
     if let Some(value) = found {
         return value;
     }
     let value = make();
-    if let Ok(mut store) = store.lock() {
-        store.insert(key, value.clone());
+    match store.lock() {
+        Ok(mut store) => store.entry(key).or_insert(value).clone(),
+        Err(_) => value,
     }
-    value
 }
 
 #[cfg(test)]
@@ -266,7 +271,14 @@ mod tests {
     #[test]
     fn chunks_are_filled_in_order() {
         let column_sets = |counts: &[usize]| -> Vec<EffectColumns> {
-            let of_count = |&count: &usize| EffectColumns { count, numbers: 0, terms: Vec::new() };
+            let states = Arc::new(DriverStates { samples: Vec::new(), of_reading: Vec::new() });
+            let channel = Arc::new(Channel { sensitivity: Vec::new(), states, greatest_factor: 1.0 });
+            let of_count = |&count: &usize| EffectColumns {
+                count,
+                numbers: 0,
+                channel: Arc::clone(&channel),
+                basis: Arc::new(Mat::zeros(0, count)),
+            };
             counts.iter().map(of_count).collect()
         };
         let ends = |counts: &[usize]| -> Vec<usize> {

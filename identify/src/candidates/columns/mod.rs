@@ -3,10 +3,12 @@
 //! The chain is evaluated once for the sensitivities of every component. Hundreds of candidates need no further
 //! kinematics.
 
+mod adjoint;
 mod basis;
+mod states;
 mod unwhitened;
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
 
@@ -17,8 +19,9 @@ use faer::{Mat, MatMut};
 use crate::error::IdentifyError;
 use crate::numerics::parallel;
 use crate::problem::{Problem, RowBlock};
-use basis::TermTarget;
+pub use adjoint::{Adjoint, TrainingRows};
 pub use basis::{EffectColumns, chunked};
+pub use states::{Channel, DriverStates};
 
 /// Number of readings per evaluation of sensitivities.
 const ROWS_AT_ONCE: usize = 512;
@@ -37,17 +40,18 @@ pub struct Columns<'p> {
     target: Vec<usize>,
     /// The rows of each fold.
     pub fold_rows: Vec<Range<usize>>,
-    /// The tests in each fold.
-    fold_tests: Vec<BTreeSet<usize>>,
     rows: usize,
     /// The samples of each driver, by test and name. `None` if the data have no such column.
-    samples: Mutex<HashMap<(usize, String), SharedSamples>>,
-    /// The basis functions of each shape over a driver, by test and name.
-    bases: Mutex<HashMap<(usize, String), SharedColumns>>,
+    samples: Mutex<HashMap<(usize, String), Option<SharedSamples>>>,
+    /// The distinct states of each driver, by name, the part that shapes use, and tests.
+    states: Mutex<HashMap<String, Arc<DriverStates>>>,
+    /// The channels, by component, driver and tests. `None` if the data lack the driver.
+    channels: Mutex<HashMap<String, Option<Arc<Channel>>>>,
+    /// The basis functions of each shape, by the address of the states and the shape.
+    bases: Mutex<HashMap<(usize, String), Arc<Mat<f64>>>>,
 }
 
-type SharedColumns = Arc<Vec<Vec<f64>>>;
-type SharedSamples = Option<Arc<Vec<DriverSample<f64>>>>;
+type SharedSamples = Arc<Vec<DriverSample<f64>>>;
 
 impl<'p> Columns<'p> {
     /// Computes the sensitivities at the parameter values of a fit.
@@ -59,13 +63,9 @@ impl<'p> Columns<'p> {
             .collect();
         let blocks = problem.blocks();
         let mut fold_of = Vec::new();
-        let mut fold_tests = vec![BTreeSet::new(); problem.folds.count];
         let kept: Vec<Vec<usize>> = blocks.iter().map(|block| problem.kept_rows(block)).collect();
         for (block, kept) in blocks.iter().zip(&kept) {
-            for fold in problem.folds_of(kept, block) {
-                fold_tests[fold].insert(block.test);
-                fold_of.push(fold);
-            }
+            fold_of.extend(problem.folds_of(kept, block));
         }
         let mut next = 0;
         let mut target = vec![0; fold_of.len()];
@@ -87,8 +87,9 @@ impl<'p> Columns<'p> {
             rows: target.len(),
             target,
             fold_rows,
-            fold_tests,
             samples: Default::default(),
+            states: Default::default(),
+            channels: Default::default(),
             bases: Default::default(),
         }
     }
@@ -102,71 +103,23 @@ impl<'p> Columns<'p> {
     fn block_rows(&self, column_sets: &[&EffectColumns], block: &RowBlock) -> Mat<f64> {
         let coordinates = self.problem.coordinates();
         let total: usize = column_sets.iter().map(|column_set| column_set.count).sum();
-        let scalars = block.rows.len() * coordinates;
-        let first = block.rows.start;
-        let mut raw = Mat::<f64>::zeros(scalars, total);
-        let sensitivities = &self.sensitivities[block.test];
+        let mut raw = Mat::<f64>::zeros(block.rows.len() * coordinates, total);
         let mut column = 0;
         for column_set in column_sets {
-            for term in &column_set.terms[block.test] {
-                let derivative = match term.target {
-                    TermTarget::Slot(slot) => {
-                        let whole = &sensitivities.derivatives[self.slot_index[block.test][&slot]];
-                        Some(&whole[first * coordinates..first * coordinates + scalars])
-                    }
-                    TermTarget::Reading(_) => None,
-                };
-                let factor = term.factor.as_ref().map(|factor| &factor[block.rows.clone()]);
+            if column_set.acts_in(block.test) {
+                let Channel { sensitivity, states, .. } = &*column_set.channel;
+                let of_block = block.rows.start * coordinates..block.rows.end * coordinates;
+                let sensitivity = &sensitivity[block.test][of_block];
+                let states = &states.of_reading[block.test][block.rows.clone()];
                 for k in 0..column_set.count {
-                    let basis = &term.basis[k][block.rows.clone()];
-                    let entries = raw.col_as_slice_mut(column + k);
-                    // One coordinate per reading without a factor is the common case. The compiler vectorises it.
-                    if let (1, Some(derivative), None) = (coordinates, derivative, factor) {
-                        let terms = derivative.iter().zip(basis);
-                        entries.iter_mut().zip(terms).for_each(|(entry, (d, b))| *entry += d * b);
-                        continue;
-                    }
-                    for (row, basis) in basis.iter().enumerate() {
-                        let value = factor.map_or(*basis, |factor| basis * factor[row]);
-                        let scalars = row * coordinates..(row + 1) * coordinates;
-                        match (derivative, term.target) {
-                            (None, TermTarget::Reading(moved)) => entries[scalars.start + moved] += value,
-                            (derivative, _) => {
-                                let derivative = derivative.map_or(&[][..], |whole| &whole[scalars.clone()]);
-                                let terms = entries[scalars].iter_mut().zip(derivative);
-                                terms.for_each(|(entry, d)| *entry += d * value);
-                            }
-                        }
-                    }
+                    let basis = column_set.basis.col_as_slice(k);
+                    let entries = raw.col_as_slice_mut(column + k).iter_mut().zip(sensitivity).enumerate();
+                    entries.for_each(|(i, (entry, s))| *entry = s * basis[states[i / coordinates] as usize]);
                 }
             }
             column += column_set.count;
         }
         raw
-    }
-
-    /// For each fold the rows in which any of the effects acts. Empty if none acts in the fold.
-    pub fn moved_rows(&self, column_sets: &[&EffectColumns]) -> Vec<Range<usize>> {
-        let moved = |test: &usize| column_sets.iter().any(|column_set| column_set.acts_in(*test));
-        let folds = self.fold_rows.iter().zip(&self.fold_tests);
-        folds.map(|(rows, tests)| if tests.iter().any(moved) { rows.clone() } else { rows.start..rows.start }).collect()
-    }
-
-    /// The stretches of rows of some folds in which any of the effects acts.
-    pub fn moved_stretches(
-        &self,
-        column_sets: &[&EffectColumns],
-        folds: impl IntoIterator<Item = usize>,
-    ) -> Vec<Range<usize>> {
-        let moved = self.moved_rows(column_sets);
-        let mut stretches: Vec<Range<usize>> = Vec::new();
-        for rows in folds.into_iter().map(|fold| &moved[fold]).filter(|rows| !rows.is_empty()) {
-            match stretches.last_mut() {
-                Some(last) if last.end == rows.start => last.end = rows.end,
-                _ => stretches.push(rows.clone()),
-            }
-        }
-        stretches
     }
 
     /// Fills zero columns with the whitened columns of effects, one after another.

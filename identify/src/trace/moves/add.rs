@@ -20,7 +20,7 @@ impl Move for Add {
         let known = search.tune_near_best(&chosen, &folds)?;
         let (candidate, score) = {
             let model = search.model_of(&chosen, &folds)?;
-            let gains = model.remaining_gains(known);
+            let gains = search.remaining_gains(&model, known)?;
             let Some((best, score)) = search.best_of(&model, &gains, &chosen) else {
                 return Ok(false);
             };

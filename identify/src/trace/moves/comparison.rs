@@ -43,7 +43,7 @@ impl SetComparison {
     /// readings without structure.
     pub fn compare(
         &mut self,
-        search: &mut SearchState<'_>,
+        search: &SearchState<'_>,
         beside: &[usize],
         one: usize,
         added: &[usize],
@@ -52,7 +52,6 @@ impl SetComparison {
         if value <= self.best.1 {
             return Ok(());
         }
-        search.add_to_base(&[one]);
         let set: Vec<usize> = beside.iter().copied().chain([one]).collect();
         for added in added {
             let others: Vec<usize> = set.iter().copied().filter(|c| c != added).collect();

@@ -34,7 +34,7 @@ impl Move for Merge {
 
 /// A group of effects merged into the one effect with the largest objective.
 fn merged(search: &mut SearchState<'_>, branch: usize, group: &[usize]) -> Result<Option<Proposal>, IdentifyError> {
-    let columns: usize = group.iter().map(|c| search.moments.count[*c]).sum();
+    let columns: usize = group.iter().map(|c| search.moments.count(*c)).sum();
     let curves = group.len() > 2 || columns > 2 && search.is_composed(group);
     if group.len() < 2 && !curves {
         return Ok(None);
@@ -46,9 +46,6 @@ fn merged(search: &mut SearchState<'_>, branch: usize, group: &[usize]) -> Resul
     if group.len() > 1 {
         search.tune_near_best(&rest, &folds)?;
     }
-    if curves {
-        search.add_reserve_candidates();
-    }
     let may_be_added = |c: &usize| {
         search.may_be_added(*c, &folds) || curves && search.candidates[*c].last_resort && search.may_be_used(*c, &folds)
     };
@@ -57,8 +54,8 @@ fn merged(search: &mut SearchState<'_>, branch: usize, group: &[usize]) -> Resul
     let without = search.model_of(&rest, &folds)?;
     let variance = search.variance(&without);
     let present = search.objective(group, &rest, &folds)?;
-    let one = |k: usize| search.score(pool[k], &without.gain(pool[k]), variance) - search.choice();
-    let values = parallel::map(pool.len(), &one);
+    let one = |k: usize| Ok(search.score(pool[k], &without.gain(pool[k])?, variance) - search.choice());
+    let values = parallel::map(pool.len(), &one).into_iter().collect::<Result<Vec<f64>, IdentifyError>>()?;
     let best = pool.iter().copied().zip(values).max_by(|a, b| a.1.total_cmp(&b.1));
     let p_value = grouped.iter().map(|selected| selected.p_value).fold(1.0, f64::min);
     Ok(best.map(|(candidate, one)| {

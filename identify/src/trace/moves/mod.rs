@@ -28,12 +28,17 @@ pub mod remove;
 pub mod swap;
 pub mod withdraw;
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::Progress;
+use super::interrupt::Interrupt;
 use super::policy::MoveName;
 use super::state::{ALL, SearchState, SelectedEffect};
 use crate::error::IdentifyError;
+use crate::numerics::parallel;
 
 /// A move of the search.
-pub trait Move {
+pub trait Move: Sync {
     /// Tries the move on one branch. Returns whether its selected effects changed.
     ///
     /// # Errors
@@ -68,8 +73,6 @@ impl Proposal {
     fn accept(self, search: &mut SearchState<'_>, branch: usize) -> bool {
         let accepted = self.increase > self.margin;
         if accepted {
-            let chosen: Vec<usize> = self.selected.iter().map(|selected| selected.candidate).collect();
-            search.add_to_base(&chosen);
             search.selection.branches[branch].selected = self.selected;
         }
         accepted
@@ -86,15 +89,29 @@ pub fn named(name: MoveName) -> &'static dyn Move {
     }
 }
 
-/// Tries a move on every branch. Returns whether the branch on all readings changed.
+/// Tries a move on every branch, on those without a fold at the same time. Returns whether the branch on all readings changed.
 ///
 /// # Errors
 /// See [`Move::try_on`].
 pub fn on_every_branch(tried: &dyn Move, search: &mut SearchState<'_>) -> Result<bool, IdentifyError> {
     let all = tried.try_on(search, ALL)?;
+    search.forget_unselected(ALL);
     if all || !tried.follows_all_readings() {
-        for branch in ALL + 1..search.selection.branches.len() {
-            tried.try_on(search, branch)?;
+        search.prepare_branches()?;
+        let (folds, common) = (search.selection.branches.len() - 1, search.candidates.len());
+        let ended = AtomicUsize::new(0);
+        let tried = parallel::map(folds, &|fold| {
+            let mut own = search.clone();
+            tried.try_on(&mut own, ALL + 1 + fold)?;
+            own.forget_unselected(ALL + 1 + fold);
+            if let Some(Interrupt(progress)) = search.interrupt {
+                progress(Progress::Folds(1 + ended.fetch_add(1, Ordering::Relaxed), folds));
+            }
+            Ok(own)
+        });
+        let tried: Vec<SearchState<'_>> = tried.into_iter().collect::<Result<_, IdentifyError>>()?;
+        for (fold, own) in tried.into_iter().enumerate() {
+            search.adopt(ALL + 1 + fold, &own, common);
         }
     }
     Ok(all)

@@ -26,12 +26,11 @@ impl Move for Pair {
             let base: Vec<usize> = places.clone().filter(|k| *k != i && *k != j).map(|k| chosen[k]).collect();
             let mut firsts = search.ranked(&base, &folds, |candidate| !search.is_tunable(candidate))?;
             firsts.truncate(if i == j { effort.first_of_one } else { effort.first_of_two });
-            search.add_to_base(&firsts);
             for first in firsts {
                 let beside: Vec<usize> = base.iter().copied().chain([first]).collect();
                 let second = {
                     let model = search.model_of(&beside, &folds)?;
-                    let gains = model.gains();
+                    let gains = search.gains(&model)?;
                     let best = search.best_of(&model, &gains, &beside);
                     best.map(|(best, _)| search.simplest_confounded(&model, &gains, best, &beside))
                 };

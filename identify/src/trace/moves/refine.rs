@@ -28,7 +28,6 @@ impl Move for Refine {
                 let kept = |c: &&usize| **c != tunable && Some(**c) != removed;
                 let base: Vec<usize> = chosen.iter().filter(kept).copied().collect();
                 let tried = next_best(search, &base, tunable, &folds)?;
-                search.add_to_base(&tried);
                 for other in tried {
                     let beside: Vec<usize> = base.iter().copied().chain([other]).collect();
                     if let Some(tuned) = search.tuned_again(tunable, &beside, &folds)? {

@@ -33,8 +33,8 @@ fn exchanged(search: &mut SearchState<'_>, branch: usize, k: usize) -> Result<Op
     let tunes = !others.is_empty() && selected.len() < search.policy.swap_tunes_below;
     let known = if tunes { search.tune_near_best(&others, &folds)? } else { Vec::new() };
     let model = search.model_of(&others, &folds)?;
-    let gains = model.remaining_gains(known);
-    let score = search.score(present, &gains[present], search.variance(&model));
+    let gains = search.remaining_gains(&model, known)?;
+    let score = search.score(present, &model.gain(present)?, search.variance(&model));
     let Some((best, most)) = search.best_of(&model, &gains, &others).filter(|(best, _)| *best != present) else {
         return Ok(None);
     };

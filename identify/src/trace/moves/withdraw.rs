@@ -52,6 +52,5 @@ fn objective_of_test_curves(
     if curves.is_empty() {
         return Ok(None);
     }
-    search.add_to_base(&curves);
     Ok(Some(search.evidence_of(&curves, rest, folds)? - search.choice()))
 }

@@ -71,15 +71,15 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
     let variance = residual_variance(findings);
     for (k, taken) in search.selected().iter().enumerate() {
         let model = search.model_without(Some(k))?;
-        let (mut aliases, of_effect) = alias::aliases(search, k, &model, variance);
+        let (mut aliases, of_effect) = alias::aliases(search, k, &model, variance)?;
         predicted.push(prediction::predictions(findings, k, &mut aliases)?);
         competing_effects.push(of_effect);
-        let named = model.with_candidate(taken.candidate).0;
+        let named = model.with_candidate(taken.candidate)?.0;
         let effect_of = |alias: &Alias| search.effect(alias.candidate).clone();
         alias_effects.push(aliases.iter().map(effect_of).collect());
         let in_its_place = |alias: &Alias| moves_by(findings, k, &alias.model_coefficients, &named);
         moves.push(aliases.iter().map(in_its_place).collect::<Vec<_>>());
-        gains.push(model.gain(taken.candidate).gain);
+        gains.push(model.gain(taken.candidate)?.gain);
     }
     cover(&mut after_result.parameters, after, after_fit, &moves);
     after_result.covariance = fit::covariance_of_parameters(after, after_fit, &after_result.parameters);
@@ -106,6 +106,7 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
     let mut result = TraceResult {
         verdict,
         interrupted: false,
+        time_limit_s: None,
         unique,
         noise_um: after.noise.sigma_mm * 1e3,
         noise_source: after.noise.source.word().to_string(),
@@ -275,17 +276,16 @@ fn cover(parameters: &mut [ParameterResult], problem: &Problem, fit: &Fit, moves
 fn moves_by(findings: &TraceFindings<'_>, k: usize, in_place: &[f64], named: &[f64]) -> Vec<f64> {
     let (search, to_unknowns) = (findings.search, &findings.start.to_parameters);
     let by: Vec<f64> = in_place.iter().zip(named).map(|(a, b)| a - b).collect();
-    let (of_declared, of_found) = by.split_at(search.rank);
+    let (of_declared, of_found) = by.split_at(search.moments.rank());
     // The parameters of the declared model come first, then the found effects in their order.
     let mut moves: Vec<f64> = (0..to_unknowns.nrows())
         .map(|j| of_declared.iter().enumerate().map(|(k, by)| to_unknowns[(j, k)] * by).sum())
         .collect();
     let mut of_found = of_found.iter();
     for (l, taken) in search.selected().iter().enumerate() {
-        // Base columns are the columns of the candidate scaled to unit length.
-        for norm in search.norms(taken.candidate) {
+        for _ in 0..search.moments.count(taken.candidate) {
             let by = if l == k { None } else { of_found.next() };
-            moves.push(by.map_or(0.0, |by| by / norm.max(f64::MIN_POSITIVE)));
+            moves.push(by.copied().unwrap_or(0.0));
         }
     }
     debug_assert_eq!(moves.len(), findings.after_fit.beta.len());

@@ -21,6 +21,7 @@ pub(super) fn unsearched_of(problem: &Problem, fit: &Fit, declared: ModelResult)
     TraceResult {
         verdict: String::new(),
         interrupted: false,
+        time_limit_s: None,
         unique: true,
         noise_um: problem.noise.sigma_mm * 1e3,
         noise_source: problem.noise.source.word().to_string(),

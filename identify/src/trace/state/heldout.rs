@@ -4,16 +4,15 @@
 use faer::Mat;
 
 use super::{ALL, SearchBranch, SearchState, SelectedEffect};
-use crate::candidates::gain::TrainedModel;
-use crate::candidates::moments::grow;
+use crate::candidates::columns::EffectColumns;
 use crate::error::IdentifyError;
 use crate::heldout::paired::{HeldOutDecrease, Units};
 use crate::numerics::parallel;
 
-/// The unwhitened base and residual, divided by the noise standard deviation. Held-out errors refer to these.
+/// The unwhitened model columns and residual, divided by the noise standard deviation. Held-out errors refer to these.
 pub struct UnwhitenedModel {
-    /// The base: rows × columns. It grows as candidates are added.
-    pub base: Mat<f64>,
+    /// Rows × rank.
+    pub model: Mat<f64>,
     /// The residual.
     pub residual: Vec<f64>,
     /// The fold of each row.
@@ -22,18 +21,6 @@ pub struct UnwhitenedModel {
     pub units: Units,
     /// Standard deviation of a reading, mm.
     pub sigma_mm: f64,
-}
-
-impl UnwhitenedModel {
-    /// Adds base columns in mm. `norms` are the lengths by which the base divides them.
-    pub(super) fn extend(&mut self, rows: &Mat<f64>, norms: &[f64]) {
-        let old = self.base.ncols();
-        let sigma_mm = self.sigma_mm;
-        grow(&mut self.base, rows.nrows(), old + rows.ncols(), |i, j| {
-            let norm = norms[j - old];
-            if norm > 0.0 { rows[(i, j - old)] / (norm * sigma_mm) } else { 0.0 }
-        });
-    }
 }
 
 /// The selected effects of every branch and their held-out error.
@@ -78,18 +65,28 @@ impl SearchState<'_> {
     /// fold predicts it.
     fn held_out_by_unit(&self) -> Result<Vec<f64>, IdentifyError> {
         let branches = &self.selection.branches[ALL + 1..];
-        let models: Vec<TrainedModel<'_>> =
-            parallel::map(branches.len(), &|k| self.projection_of(&branches[k].chosen(), &branches[k].folds))
-                .into_iter()
-                .collect::<Result<_, _>>()?;
-        let predicted = |model: &TrainedModel<'_>, row: usize| -> f64 {
-            let along = model.base.iter().zip(&model.coefficients);
-            along.map(|(column, c)| self.unwhitened.base[(row, *column)] * c).sum()
+        let squares: Vec<Vec<f64>> = parallel::map(branches.len(), &|fold| self.squares_of_fold(fold, &branches[fold]))
+            .into_iter()
+            .collect::<Result<_, _>>()?;
+        let mut next: Vec<_> = squares.iter().map(|squares| squares.iter()).collect();
+        let in_order = self.unwhitened.folds.iter().map(|fold| next[*fold].next().copied().unwrap_or(0.0));
+        Ok(self.unwhitened.units.sums(in_order))
+    }
+
+    /// The squares of the residuals of one fold as the branch without it predicts them.
+    fn squares_of_fold(&self, fold: usize, branch: &SearchBranch) -> Result<Vec<f64>, IdentifyError> {
+        let UnwhitenedModel { model, residual, folds, sigma_mm, .. } = &*self.unwhitened;
+        let chosen = branch.chosen();
+        let trained = self.model_of(&chosen, &branch.folds)?;
+        let (of_model, of_chosen) = trained.coefficients();
+        let sets: Vec<&EffectColumns> = chosen.iter().map(|candidate| self.moments.set(*candidate)).collect();
+        let columns = if sets.is_empty() { Mat::zeros(folds.len(), 0) } else { self.columns.unwhitened_rows(&sets) };
+        let rows = (0..folds.len()).filter(|row| folds[*row] == fold);
+        let predicted = |row: usize| -> f64 {
+            let by_model: f64 = of_model.iter().enumerate().map(|(j, c)| model[(row, j)] * c).sum();
+            by_model + of_chosen.iter().enumerate().map(|(j, c)| columns[(row, j)] * c).sum::<f64>() / sigma_mm
         };
-        let squares = self.unwhitened.folds.iter().enumerate();
-        let squares =
-            squares.map(|(row, fold)| (self.unwhitened.residual[row] - predicted(&models[*fold], row)).powi(2));
-        Ok(self.unwhitened.units.sums(squares))
+        Ok(rows.map(|row| (residual[row] - predicted(row)).powi(2)).collect())
     }
 
     /// Sum of squares of held-out residuals over the noise variance.

@@ -10,7 +10,7 @@ mod objective;
 mod pool;
 mod tuning;
 
-use std::ops::Range;
+use std::sync::Arc;
 
 use abbe_model::effect::Effect;
 
@@ -19,7 +19,6 @@ use super::interrupt::Interrupt;
 use super::policy::Policy;
 use crate::candidates::candidate::Candidate;
 use crate::candidates::columns::Columns;
-use crate::candidates::gain::PriorMoments;
 use crate::candidates::moments::Moments;
 use crate::error::IdentifyError;
 pub use heldout::{RejectedByHeldOut, Selection, UnwhitenedModel};
@@ -52,37 +51,30 @@ impl SearchBranch {
 /// Index of the branch on all readings. The branch that excludes fold `k` has index `k + 1`.
 pub(super) const ALL: usize = 0;
 
-/// The state of the search.
+/// The state of the search. A clone shares the products with the original and searches on its own.
+#[derive(Clone)]
 pub struct SearchState<'s> {
     /// The policy for the readings.
     pub policy: Policy,
     /// The columns.
     pub columns: &'s Columns<'s>,
     /// The candidates.
-    pub candidates: Vec<Candidate>,
+    pub candidates: Vec<Arc<Candidate>>,
     /// All products.
-    pub moments: Moments,
-    /// The priors.
-    prior: PriorMoments,
-    /// Number of base columns that the fitted model has.
-    pub rank: usize,
+    pub moments: Moments<'s>,
     /// The selected effects.
     pub selection: Selection,
     /// The accepted effects: additions that lowered the held-out error by more than the standard error of the decrease.
     accepted: Selection,
     /// The declared model: no effects.
     declared: Selection,
-    /// For each candidate that was ever added, the range of its columns in the base.
-    added_to_base: Vec<(usize, Range<usize>)>,
     /// For each round, the best score that readings without structure exceed with the probability of the significance
     /// level.
     pub thresholds: Vec<f64>,
     /// Whether candidates of last resort are searched.
     pub last_resort: bool,
-    /// Candidates of last resort whose products are not computed yet.
-    pub reserve: Vec<Candidate>,
-    /// The unwhitened base and residual for the held-out error.
-    unwhitened: UnwhitenedModel,
+    /// The unwhitened model and residual for the held-out error.
+    unwhitened: Arc<UnwhitenedModel>,
     /// Effects that scored better than readings without structure but were not accepted, in order of addition.
     pub rejected: Vec<RejectedByHeldOut>,
     /// Number of the library's detectable effects. A dictionary counts once: its step tables share its identifier, and
@@ -94,40 +86,37 @@ pub struct SearchState<'s> {
 }
 
 impl<'s> SearchState<'s> {
-    /// The state before the first round.
+    /// The state before the first round. `moments` holds the products of the candidates without those of last resort,
+    /// `reserve`.
     ///
     /// # Errors
     /// If products are not finite.
     pub fn new(
         columns: &'s Columns<'s>,
         candidates: Vec<Candidate>,
-        moments: Moments,
-        prior: PriorMoments,
+        reserve: Vec<Candidate>,
+        moments: Moments<'s>,
         unwhitened: UnwhitenedModel,
         policy: Policy,
     ) -> Result<SearchState<'s>, IdentifyError> {
-        let rank = moments.base();
         let none = Selection::none(columns.fold_rows.len());
         let mut search = SearchState {
             policy,
             columns,
-            candidates,
+            candidates: candidates.into_iter().map(Arc::new).collect(),
             moments,
-            prior,
-            rank,
             selection: none.clone(),
             accepted: none.clone(),
             declared: none,
-            added_to_base: Vec::new(),
             thresholds: Vec::new(),
             last_resort: false,
-            reserve: Vec::new(),
-            unwhitened,
+            unwhitened: Arc::new(unwhitened),
             rejected: Vec::new(),
             detectable_effects: 0,
             interrupt: None,
         };
         search.judge_detectability()?;
+        search.append(reserve);
         search.note_held_out()?;
         search.declared = search.selection.clone();
         search.accepted = search.selection.clone();

@@ -9,7 +9,7 @@ use super::{ALL, SearchState};
 use crate::candidates::gain::{Gain, TrainedModel};
 use crate::candidates::step_table::StepTable;
 use crate::error::IdentifyError;
-use crate::numerics::tails::ln_chi_square_tail;
+use crate::numerics::tails::{ln_chi_square_tail, most_evidence};
 use crate::trace::constants::{EQUIVALENT, INDISTINGUISHABLE};
 
 impl SearchState<'_> {
@@ -18,10 +18,8 @@ impl SearchState<'_> {
         if !self.policy.in_residual_variance {
             return 1.0;
         }
-        let sum: f64 = model.folds.iter().map(|fold| model.sum_of_squares_on(*fold)).sum();
-        let rows: usize = model.folds.iter().map(|fold| self.columns.fold_rows[*fold].len()).sum();
-        let freedom = rows.saturating_sub(model.base.len()).max(1) as f64;
-        (sum / freedom).max(f64::MIN_POSITIVE)
+        let (sum, freedom) = model.residual_square();
+        (sum / freedom as f64).max(f64::MIN_POSITIVE)
     }
 
     /// `−ln P` of a gain.
@@ -37,6 +35,16 @@ impl SearchState<'_> {
         self.evidence(gain, variance) - self.candidates[candidate].selection_penalty
     }
 
+    /// An upper bound of the evidence for a candidate, which takes no evaluation of the tail.
+    pub fn most_evidence_for(&self, candidate: usize, gain: &Gain, variance: f64) -> f64 {
+        most_evidence(gain.gain / variance, gain.freedom) - self.candidates[candidate].selection_penalty
+    }
+
+    /// An upper bound of the score of a candidate.
+    fn most_score(&self, candidate: usize, gain: &Gain, variance: f64) -> f64 {
+        self.most_evidence_for(candidate, gain, variance) - self.candidates[candidate].cost
+    }
+
     /// The evidence for a candidate, less its cost.
     pub fn score(&self, candidate: usize, gain: &Gain, variance: f64) -> f64 {
         self.evidence_for(candidate, gain, variance) - self.candidates[candidate].cost
@@ -44,8 +52,8 @@ impl SearchState<'_> {
 
     /// The score of a candidate beside others.
     pub fn score_beside(&self, candidate: usize, others: &[usize], folds: &[usize]) -> Result<f64, IdentifyError> {
-        let model = self.projection_of(others, folds)?;
-        Ok(self.score(candidate, &model.gain(candidate), self.variance(&model)))
+        let model = self.model_of(others, folds)?;
+        Ok(self.score(candidate, &model.gain(candidate)?, self.variance(&model)))
     }
 
     /// Description length of the choice of one effect in the library.
@@ -60,16 +68,16 @@ impl SearchState<'_> {
 
     /// The objective of some candidates and one more, which need not be in the base.
     pub fn objective_with(&self, some: &[usize], one: usize, folds: &[usize]) -> Result<f64, IdentifyError> {
-        let model = self.projection_of(some, folds)?;
+        let model = self.model_of(some, folds)?;
         let all: Vec<usize> = some.iter().copied().chain([one]).collect();
-        let explained = model.explained() + model.gain(one).gain;
+        let explained = model.explained() + model.gain(one)?.gain;
         Ok(self.evidence_of_gain(explained, &all, &[], folds)? - self.description_length(&all))
     }
 
     /// `−ln P` of the joint gain of a group beside other effects.
     pub fn evidence_of(&self, group: &[usize], rest: &[usize], folds: &[usize]) -> Result<f64, IdentifyError> {
         let all: Vec<usize> = rest.iter().chain(group).copied().collect();
-        self.evidence_of_gain(self.projection_of(&all, folds)?.explained(), group, rest, folds)
+        self.evidence_of_gain(self.model_of(&all, folds)?.explained(), group, rest, folds)
     }
 
     fn evidence_of_gain(
@@ -79,10 +87,10 @@ impl SearchState<'_> {
         rest: &[usize],
         folds: &[usize],
     ) -> Result<f64, IdentifyError> {
-        let without = self.projection_of(rest, folds)?;
+        let without = self.model_of(rest, folds)?;
         let gain = Gain {
             gain: explained - without.explained(),
-            freedom: group.iter().map(|c| self.moments.count[*c] + self.moments.numbers[*c]).sum(),
+            freedom: group.iter().map(|c| self.moments.count(*c) + self.moments.numbers(*c)).sum(),
         };
         Ok(self.evidence(&gain, self.variance(&without)))
     }
@@ -97,6 +105,9 @@ impl SearchState<'_> {
         let mut best: Option<(usize, f64)> = None;
         for (candidate, gain) in gains.iter().enumerate() {
             if chosen.contains(&candidate) || !self.may_be_added(candidate, &model.folds) {
+                continue;
+            }
+            if best.is_some_and(|(_, most)| self.most_score(candidate, gain, variance) <= most) {
                 continue;
             }
             let score = self.score(candidate, gain, variance);
@@ -119,7 +130,9 @@ impl SearchState<'_> {
         let least = self.evidence_for(best, &gains[best], variance) - INDISTINGUISHABLE;
         let mut first = best;
         for (candidate, gain) in gains.iter().enumerate() {
-            let passed_over = chosen.contains(&candidate) || !self.may_be_added(candidate, &model.folds);
+            let passed_over = chosen.contains(&candidate)
+                || !self.may_be_added(candidate, &model.folds)
+                || self.most_evidence_for(candidate, gain, variance) < least;
             if passed_over || gain.freedom == 0 || self.evidence_for(candidate, gain, variance) < least {
                 continue;
             }
@@ -142,7 +155,7 @@ impl SearchState<'_> {
     ) -> Result<Vec<usize>, IdentifyError> {
         let model = self.model_of(base, folds)?;
         let variance = self.variance(&model);
-        let gains = model.gains();
+        let gains = self.gains(&model)?;
         let mut scored: Vec<(usize, f64)> = (0..self.candidates.len())
             .filter(|c| self.may_be_added(*c, folds) && !base.contains(c))
             .map(|c| (c, self.score(c, &gains[c], variance)))
@@ -159,17 +172,17 @@ impl SearchState<'_> {
     pub fn best_against_null(&self) -> Result<Option<(f64, f64)>, IdentifyError> {
         let chosen = self.selection.branches[ALL].chosen();
         let model = self.model_without(None)?;
-        let Some((_, score)) = self.best_of(&model, &model.gains(), &chosen) else {
+        let Some((_, score)) = self.best_of(&model, &self.gains(&model)?, &chosen) else {
             return Ok(None);
         };
-        let score = self.step_tables(&model).iter().map(StepTable::score).fold(score, f64::max);
+        let score = self.step_tables(&model)?.iter().map(StepTable::score).fold(score, f64::max);
         let costs: Vec<f64> = (0..self.candidates.len())
             .map(|c| {
                 if self.may_be_added(c, &model.folds) { self.candidates[c].description_length() } else { f64::INFINITY }
             })
             .collect();
-        let null_variance = self.variance(&self.projection_of(&[], &self.selection.branches[ALL].folds)?);
-        let mut null = model.null_best(&costs, null_variance);
+        let null_variance = self.variance(&self.model_of(&[], &self.selection.branches[ALL].folds)?);
+        let mut null = model.null_best(&chosen, &costs, null_variance)?;
         null.sort_by(f64::total_cmp);
         let above = null.iter().filter(|best| **best >= score).count();
         let p_value = (above + 1) as f64 / (null.len() + 1) as f64;

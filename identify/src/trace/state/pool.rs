@@ -1,9 +1,11 @@
 //! The candidates that a search may add: the library's detectable effects, and the effects that it has tuned itself.
 
+use std::collections::HashMap;
+use std::sync::Arc;
+
 use super::SearchState;
 use super::tuning::Tuned;
 use crate::candidates::candidate::Candidate;
-use crate::candidates::columns::EffectColumns;
 use crate::candidates::gain::TrainedModel;
 use crate::candidates::step_table::{StepTable, best_step_table};
 use crate::error::IdentifyError;
@@ -16,22 +18,24 @@ impl SearchState<'_> {
     pub(super) fn judge_detectability(&mut self) -> Result<(), IdentifyError> {
         let model = self.model_without(None)?;
         let detectable: Vec<bool> = parallel::map(self.candidates.len(), &|candidate| {
-            let (d, _, _) = model.projected(candidate);
+            let d = model.projected(candidate)?.d;
             let plausible = self.columns.plausible(self.effect(candidate), &self.candidates[candidate].columns);
             let largest = (0..d.nrows()).map(|k| d[(k, k)]).fold(0.0, f64::max);
-            plausible * largest.max(0.0).sqrt() >= MIN_PLAUSIBLE_SIGMA
-        });
+            Ok(plausible * largest.max(0.0).sqrt() >= MIN_PLAUSIBLE_SIGMA)
+        })
+        .into_iter()
+        .collect::<Result<_, IdentifyError>>()?;
+        drop(model);
         self.detectable_effects = detectable.iter().filter(|detectable| **detectable).count();
-        self.candidates
-            .iter_mut()
-            .zip(detectable)
-            .for_each(|(candidate, detectable)| candidate.detectable = detectable);
+        for (candidate, detectable) in self.candidates.iter_mut().zip(detectable) {
+            Arc::make_mut(candidate).detectable = detectable;
+        }
         Ok(())
     }
 
     /// Whether a branch with some training folds may add a candidate now.
     pub fn may_be_added(&self, candidate: usize, folds: &[usize]) -> bool {
-        let Candidate { detectable, dictionary, last_resort, .. } = self.candidates[candidate];
+        let Candidate { detectable, dictionary, last_resort, .. } = *self.candidates[candidate];
         detectable && !dictionary && (!last_resort || self.last_resort) && self.may_be_used(candidate, folds)
     }
 
@@ -43,7 +47,7 @@ impl SearchState<'_> {
 
     /// Whether a candidate has shape numbers or positions that the search tunes.
     pub fn is_tunable(&self, candidate: usize) -> bool {
-        self.moments.numbers[candidate] > 0 || !self.effect(candidate).shape.positions().is_empty()
+        self.moments.numbers(candidate) > 0 || !self.effect(candidate).shape.positions().is_empty()
     }
 
     /// Whether one of some candidates is a table of more than two steps.
@@ -70,39 +74,68 @@ impl SearchState<'_> {
     }
 
     /// The step tables from the library's dictionaries for addition to a model.
-    pub fn step_tables(&self, model: &TrainedModel<'_>) -> Vec<StepTable> {
+    ///
+    /// # Errors
+    /// If products are not finite.
+    pub fn step_tables(&self, model: &TrainedModel<'_>) -> Result<Vec<StepTable>, IdentifyError> {
         let variance = self.variance(model);
         let dictionaries: Vec<usize> =
             (0..self.candidates.len()).filter(|candidate| self.candidates[*candidate].dictionary).collect();
         let best = |k: usize| best_step_table(model, dictionaries[k], &self.candidates[dictionaries[k]], variance);
-        parallel::map(dictionaries.len(), &best).into_iter().flatten().collect()
+        let tables: Vec<Option<StepTable>> =
+            parallel::map(dictionaries.len(), &best).into_iter().collect::<Result<_, IdentifyError>>()?;
+        Ok(tables.into_iter().flatten().collect())
     }
 
-    /// Adds a tuned effect in addition to the candidate that it was tuned from, for the folds on which it was tuned.
-    /// Returns its index, or `None` if the data lack its driver.
-    pub(super) fn add_tuned(&mut self, tuned: Tuned, folds: &[usize]) -> Option<usize> {
-        let Tuned { original, effect, selection_penalty } = tuned;
-        let columns = self.columns.effect_columns(&effect)?;
-        let (tuned_on, original) = (folds.to_vec(), self.candidates[original].clone());
-        let (dictionary, detectable) = (false, true);
-        self.append([Candidate { effect, columns, selection_penalty, tuned_on, dictionary, detectable, ..original }]);
-        Some(self.candidates.len() - 1)
+    /// Adds tuned effects in addition to the candidates that they were tuned from, for the folds on which they were
+    /// tuned. Returns the index of the first.
+    pub(super) fn add_tuned(&mut self, tuned: Vec<Tuned>, folds: &[usize]) -> usize {
+        let first = self.candidates.len();
+        let candidates = tuned.into_iter().map(|Tuned { original, effect, selection_penalty }| {
+            let original = Candidate::clone(&self.candidates[original]);
+            let columns = self.columns.reshaped(&effect.shape, &original.columns.channel);
+            let (dictionary, detectable) = (false, true);
+            Candidate {
+                effect,
+                columns,
+                selection_penalty,
+                tuned_on: folds.to_vec(),
+                dictionary,
+                detectable,
+                ..original
+            }
+        });
+        let candidates = candidates.collect();
+        self.append(candidates);
+        first
     }
 
-    /// Adds candidates and computes their products.
-    fn append(&mut self, fresh: impl IntoIterator<Item = Candidate>) {
-        let present = self.candidates.len();
-        self.candidates.extend(fresh);
-        if self.candidates.len() > present {
-            let column_sets: Vec<&EffectColumns> = self.candidates.iter().map(|candidate| &candidate.columns).collect();
-            self.moments.append(self.columns, &column_sets);
+    /// Adds candidates. Their products are formed when they are needed.
+    pub(super) fn append(&mut self, fresh: Vec<Candidate>) {
+        if !fresh.is_empty() {
+            self.moments.append(fresh.iter().map(|candidate| candidate.columns.clone()).collect());
+            self.candidates.extend(fresh.into_iter().map(Arc::new));
         }
     }
 
-    /// Computes the products of the candidates of last resort, and adds them to the candidates.
-    pub fn add_reserve_candidates(&mut self) {
-        let reserve = std::mem::take(&mut self.reserve);
-        self.append(reserve);
+    /// Takes over what a clone of this state has selected for a branch, and the effects that it has tuned.
+    /// `common` is the number of candidates that both had when it was cloned.
+    pub fn adopt(&mut self, branch: usize, from: &SearchState<'_>, common: usize) {
+        let present = self.candidates.len();
+        let mut place: HashMap<usize, usize> = HashMap::new();
+        let mut tuned = Vec::new();
+        for (index, candidate) in from.candidates.iter().enumerate().skip(common) {
+            if !candidate.tuned_on.is_empty() {
+                place.insert(index, present + tuned.len());
+                tuned.push(Candidate::clone(candidate));
+            }
+        }
+        self.append(tuned);
+        let mut adopted = from.selection.branches[branch].clone();
+        for selected in &mut adopted.selected {
+            selected.candidate = place.get(&selected.candidate).copied().unwrap_or(selected.candidate);
+        }
+        self.selection.branches[branch] = adopted;
     }
 
     /// Curves over an axis, one for each test, without a component. Their columns are computed at the first call.
@@ -114,7 +147,7 @@ impl SearchState<'_> {
             return present;
         }
         let first = self.candidates.len();
-        self.append(fresh.into_iter().map(|(effect, columns)| Candidate::test_curve(effect, columns)));
+        self.append(fresh.into_iter().map(|(effect, columns)| Candidate::test_curve(effect, columns)).collect());
         (first..self.candidates.len()).collect()
     }
 }

@@ -4,7 +4,7 @@
 //! one, which gains more at its own optimum. Every component near the best is therefore tuned first.
 
 use std::collections::HashMap;
-use std::ops::Range;
+use std::sync::Arc;
 
 use abbe_model::effect::Effect;
 
@@ -12,8 +12,10 @@ use super::SearchState;
 use crate::candidates::candidate::Candidate;
 use crate::candidates::gain::{Gain, TrainedModel};
 use crate::candidates::step_table::{StepTable, best_step_table};
+use crate::candidates::tuned::{TunedChannel, Tuning};
 use crate::error::IdentifyError;
 use crate::numerics::parallel;
+use crate::numerics::tails::most_evidence;
 use crate::trace::constants::{MAX_EVIDENCE_DEFICIT, MIN_EVIDENCE_SHARE};
 
 /// An effect with tuned numbers or positions.
@@ -36,29 +38,30 @@ impl SearchState<'_> {
     /// Adds to the candidates those near the best, with their shape numbers tuned beside some candidates on some folds,
     /// and the step tables near the best. Returns the gains of the candidates that were present before.
     pub fn tune_near_best(&mut self, beside: &[usize], folds: &[usize]) -> Result<Vec<Gain>, IdentifyError> {
-        let can_be_tuned = |candidate: &Candidate| candidate.dictionary || !candidate.brackets().is_empty();
+        let can_be_tuned = |candidate: &Arc<Candidate>| candidate.dictionary || !candidate.brackets().is_empty();
         if !self.candidates.iter().any(can_be_tuned) {
             return Ok(Vec::new());
         }
         let (gains, fresh) = {
             let model = self.model_of(beside, folds)?;
-            let gains = model.gains();
-            let fresh = self.tuned_near_best(&model, &gains);
+            let gains = self.gains(&model)?;
+            let fresh = self.tuned_near_best(&model, &gains)?;
             (gains, fresh)
         };
-        for tuned in fresh {
-            self.add_tuned(tuned, folds);
-        }
+        self.add_tuned(fresh, folds);
         Ok(gains)
     }
 
-    fn tuned_near_best(&self, model: &TrainedModel<'_>, gains: &[Gain]) -> Vec<Tuned> {
+    fn tuned_near_best(&self, model: &TrainedModel<'_>, gains: &[Gain]) -> Result<Vec<Tuned>, IdentifyError> {
         let variance = self.variance(model);
         let most = self.effort(&model.folds).tuned;
         let mut nearest: HashMap<String, (usize, f64)> = HashMap::new();
         let mut best = 0.0_f64;
         for (candidate, gain) in gains.iter().enumerate() {
             if gain.freedom == 0 || !self.may_be_added(candidate, &model.folds) {
+                continue;
+            }
+            if most_evidence(gain.gain / variance, gain.freedom) < MIN_EVIDENCE_SHARE * best {
                 continue;
             }
             let evidence = self.evidence(gain, variance);
@@ -75,32 +78,39 @@ impl SearchState<'_> {
             nearest.into_values().filter(|(_, evidence)| *evidence >= MIN_EVIDENCE_SHARE * best).collect();
         near.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         near.truncate(most);
-        let tuned = |k: usize| self.with_best_numbers(model, near[k].0, gains[near[k].0].gain);
+        let tuning = model.tuning();
+        let tuned = |k: usize| self.with_best_numbers(&tuning, model, near[k].0, gains[near[k].0].gain);
         let mut fresh: Vec<Tuned> = parallel::map(near.len(), &tuned).into_iter().flatten().collect();
-        fresh.extend(self.step_tables_near_best(model, best, most));
+        fresh.extend(self.step_tables_near_best(&tuning, model, best, most)?);
         fresh.retain(|tuned| {
             let present = |c: usize| *self.effect(c) == tuned.effect && self.may_be_used(c, &model.folds);
             !(0..self.candidates.len()).any(present)
         });
-        fresh
+        Ok(fresh)
     }
 
     /// The step tables near the best evidence, with their positions tuned.
-    fn step_tables_near_best(&self, model: &TrainedModel<'_>, best: f64, most: usize) -> Vec<Tuned> {
+    fn step_tables_near_best(
+        &self,
+        tuning: &Tuning<'_>,
+        model: &TrainedModel<'_>,
+        best: f64,
+        most: usize,
+    ) -> Result<Vec<Tuned>, IdentifyError> {
         let variance = self.variance(model);
-        let mut nearest = self.step_tables(model);
+        let mut nearest = self.step_tables(model)?;
         nearest.retain(|table| table.evidence >= MIN_EVIDENCE_SHARE * best);
         nearest.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
         nearest.truncate(most);
         let moved = |k: usize| {
             let table = &nearest[k];
-            let (effect, gain) = self.with_best_positions(model, table);
+            let (effect, gain) = self.with_best_positions(tuning, table);
             let gain = Gain { gain, freedom: effect.shape.coefficients() + effect.shape.numbers() };
             let evidence = self.evidence(&gain, variance);
             let near = evidence >= best - MAX_EVIDENCE_DEFICIT || evidence - table.cost >= MIN_EVIDENCE_SHARE * best;
             near.then(|| Tuned { effect, ..Tuned::of(table.clone()) })
         };
-        parallel::map(nearest.len(), &moved).into_iter().flatten().collect()
+        Ok(parallel::map(nearest.len(), &moved).into_iter().flatten().collect())
     }
 
     /// Adds an effect with the shape numbers or positions that are best beside others. Returns its index: the effect
@@ -111,31 +121,40 @@ impl SearchState<'_> {
         beside: &[usize],
         folds: &[usize],
     ) -> Result<Option<usize>, IdentifyError> {
-        let model = self.projection_of(beside, folds)?;
+        let model = self.model_of(beside, folds)?;
         let fresh = if !self.effect(tunable).shape.positions().is_empty() {
-            self.step_table_of(&model, &self.effect(tunable).id()).map(Tuned::of)
+            self.step_table_of(&model, &self.effect(tunable).id())?.map(Tuned::of)
         } else {
-            match self.with_best_numbers(&model, tunable, model.gain(tunable).gain) {
+            match self.with_best_numbers(&model.tuning(), &model, tunable, model.gain(tunable)?.gain) {
                 None => return Ok(Some(tunable)),
                 fresh => fresh,
             }
         };
-        Ok(fresh.and_then(|fresh| self.add_tuned(fresh, folds)))
+        drop(model);
+        Ok(fresh.map(|fresh| self.add_tuned(vec![fresh], folds)))
     }
 
     /// The best step table of the dictionary of an identifier for addition to a model.
-    fn step_table_of(&self, model: &TrainedModel<'_>, id: &str) -> Option<StepTable> {
-        let has_positions = |candidate: &Candidate| !candidate.effect.shape.positions().is_empty();
-        let own =
-            |candidate: &Candidate| candidate.dictionary && has_positions(candidate) && candidate.effect.id() == id;
-        let dictionary = self.candidates.iter().position(own)?;
+    fn step_table_of(&self, model: &TrainedModel<'_>, id: &str) -> Result<Option<StepTable>, IdentifyError> {
+        let has_positions = |candidate: &Arc<Candidate>| !candidate.effect.shape.positions().is_empty();
+        let own = |candidate: &Arc<Candidate>| {
+            candidate.dictionary && has_positions(candidate) && candidate.effect.id() == id
+        };
+        let Some(dictionary) = self.candidates.iter().position(own) else { return Ok(None) };
         best_step_table(model, dictionary, &self.candidates[dictionary], self.variance(model))
     }
 
     /// Tunes the shape numbers of an effect for the largest gain. `None` if the gain does not increase.
-    fn with_best_numbers(&self, model: &TrainedModel<'_>, original: usize, before: f64) -> Option<Tuned> {
-        let Candidate { selection_penalty, ref effect, .. } = self.candidates[original];
+    fn with_best_numbers(
+        &self,
+        tuning: &Tuning<'_>,
+        model: &TrainedModel<'_>,
+        original: usize,
+        before: f64,
+    ) -> Option<Tuned> {
+        let Candidate { selection_penalty, ref effect, ref columns, .. } = *self.candidates[original];
         let mut effect = effect.clone();
+        let channel = TunedChannel::of(self.columns, tuning, columns);
         let brackets = self.candidates[original].brackets();
         let mut best = before;
         let steps = self.effort(&model.folds).line_search;
@@ -144,8 +163,8 @@ impl SearchState<'_> {
             for (which, [low, high]) in brackets.iter().enumerate() {
                 let value_at = |share: f64| low + (high - low) * share;
                 let gain_at = |share: f64| {
-                    let tuned = Effect { shape: effect.shape.with_number(which, value_at(share)), ..effect.clone() };
-                    (self.tuned_effect(model, &tuned).map_or(0.0, |tuned| tuned.gain(model)), tuned)
+                    let shape = effect.shape.with_number(which, value_at(share));
+                    (channel.gain(&channel.effect(&shape)), Effect { shape, ..effect.clone() })
                 };
                 let (gain, tuned) = highest(gain_at, steps);
                 if gain > best {
@@ -158,36 +177,29 @@ impl SearchState<'_> {
     }
 
     /// Moves each step position by fractions of the grid for the largest joint gain. Returns the effect and its gain.
-    fn with_best_positions(&self, model: &TrainedModel<'_>, table: &StepTable) -> (Effect, f64) {
-        let (original, grid) = (&table.effect, self.candidates[table.dictionary].grid);
-        let Some(mut present) = self.tuned_effect(model, original) else {
-            return (original.clone(), 0.0);
-        };
-        let mut best = present.gain(model);
+    fn with_best_positions(&self, tuning: &Tuning<'_>, table: &StepTable) -> (Effect, f64) {
+        let (original, dictionary) = (&table.effect, &self.candidates[table.dictionary]);
+        let channel = TunedChannel::of(self.columns, tuning, &dictionary.columns);
+        let mut present = channel.effect(&original.shape);
+        let mut best = channel.gain(&present);
         let mut positions = original.shape.positions().to_vec();
-        let with =
-            |positions: &[f64]| Effect { shape: original.shape.with_positions(positions.to_vec()), ..original.clone() };
-        let trained: Vec<Range<usize>> =
-            (model.folds.iter()).map(|fold| self.columns.fold_rows[*fold].clone()).collect();
         for _ in 0..2 {
             for k in 0..positions.len() {
                 let middle = positions[k];
                 for part in -3..=3 {
-                    let position = middle + grid * f64::from(part) / 4.0;
-                    let Some(moved) = self.tuned_effect(model, &with(&[position])) else {
-                        continue;
-                    };
-                    let gain = present.gain_with(k, &moved, &trained, model);
+                    let position = middle + dictionary.grid * f64::from(part) / 4.0;
+                    let moved = channel.effect(&original.shape.with_positions(vec![position]));
+                    let gain = channel.gain_with(&present, k, &moved);
                     if gain > best * (1.0 + 1e-9) {
                         best = gain;
                         positions[k] = position;
-                        present.exchange(k, &moved, &trained);
+                        channel.exchange(&mut present, k, &moved);
                     }
                 }
             }
         }
         positions.sort_by(f64::total_cmp);
-        (with(&positions), best)
+        (Effect { shape: original.shape.with_positions(positions), ..original.clone() }, best)
     }
 }
 

@@ -1,0 +1,114 @@
+//! The products of candidates against least squares on their rows.
+
+use std::path::Path;
+
+use abbe_model::files::{self, ReadOptions};
+use faer::Mat;
+use faer::linalg::solvers::SolveLstsq;
+
+use super::columns::{Columns, EffectColumns};
+use super::gain::TrainedModel;
+use super::library;
+use super::moments::{Moments, PriorMoments};
+use super::tuned::TunedChannel;
+use crate::fit::prepare;
+use crate::problem::Problem;
+
+/// The bundled session with some readings rejected and noise of a given autocorrelation.
+fn problem(ar_coefficients: &[f64]) -> (Problem, Vec<f64>) {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+    let (mut problem, fit) = prepare(&files::session(&file, &ReadOptions::default()).unwrap(), 1).unwrap();
+    problem.noise.ar_coefficients = ar_coefficients.to_vec();
+    for (test, row) in [(0, 3), (0, 40), (1, 41), (2, 0), (3, 77)] {
+        problem.rejected[test][row] = true;
+    }
+    (problem, fit.beta)
+}
+
+/// Orthonormal columns of the fitted model, and its residual: whitened rows in fold order.
+fn model(columns: &Columns<'_>, beta: &[f64]) -> (Mat<f64>, Vec<f64>) {
+    let rows = columns.model_rows(beta).unwrap();
+    let svd = rows.as_ref().subcols(0, beta.len()).thin_svd().unwrap();
+    let rank = svd.S().column_vector().iter().filter(|value| **value > 1e-6 * svd.S().column_vector()[0]).count();
+    let residual = (0..rows.nrows()).map(|i| rows[(i, beta.len())]).collect();
+    (svd.U().subcols(0, rank).to_owned(), residual)
+}
+
+/// The library's candidates, one in `every`, and those with most columns.
+fn candidates(problem: &Problem, columns: &Columns<'_>, every: usize) -> Vec<EffectColumns> {
+    let all = library::candidates(problem).unwrap();
+    let chosen = all.iter().enumerate().filter(|(k, member)| k % every == 0 || member.effect.shape.coefficients() > 2);
+    chosen.filter_map(|(_, member)| columns.effect_columns(&member.effect)).collect()
+}
+
+/// The rows of effects: whitened, in fold order.
+fn rows(columns: &Columns<'_>, sets: &[&EffectColumns]) -> Mat<f64> {
+    let mut rows = Mat::zeros(columns.rows(), sets.iter().map(|set| set.count).sum());
+    columns.fill(sets, rows.as_mut());
+    rows
+}
+
+/// Sum of squares of a residual after least squares on columns at unit length, over the rows of some folds.
+fn left(columns: &Columns<'_>, folds: &[usize], parts: &[&Mat<f64>], residual: &[f64]) -> f64 {
+    let rows: Vec<usize> = folds.iter().flat_map(|fold| columns.fold_rows[*fold].clone()).collect();
+    let width = parts.iter().map(|part| part.ncols()).sum();
+    let mut x = Mat::zeros(rows.len(), width);
+    let mut next = 0;
+    for part in parts {
+        for j in 0..part.ncols() {
+            let length = part.col(j).norm_l2();
+            rows.iter().enumerate().for_each(|(i, row)| x[(i, next + j)] = part[(*row, j)] / length);
+        }
+        next += part.ncols();
+    }
+    let y = Mat::from_fn(rows.len(), 1, |i, _| residual[rows[i]]);
+    let solved = x.col_piv_qr().solve_lstsq(&y);
+    (y - x * solved).squared_norm_l2()
+}
+
+/// The gains of candidates beside chosen effects, on all readings and without one fold, are the decreases of the sum of
+/// squares by least squares. So are the gains of effects with tuned numbers.
+#[test]
+fn gains_are_those_of_least_squares() {
+    for ar_coefficients in [&[][..], &[0.5, 0.2][..]] {
+        let (problem, beta) = problem(ar_coefficients);
+        let columns = Columns::new(&problem, &beta);
+        let (model, residual) = model(&columns, &beta);
+        let sets = candidates(&problem, &columns, 97);
+        let rank = model.ncols();
+        let prior = PriorMoments { base: Mat::zeros(rank, rank), base_y: vec![0.0; rank] };
+        let moments = Moments::new(&columns, sets.clone(), model.clone(), &residual, prior, Vec::new()).unwrap();
+        let all: Vec<usize> = (0..columns.fold_rows.len()).collect();
+        let without: Vec<usize> = all.iter().copied().filter(|fold| *fold != 5).collect();
+        let few: Vec<usize> = (0..sets.len()).filter(|k| sets[*k].count <= 2).collect();
+        let mut compared = 0;
+        for (folds, chosen) in
+            [(&all, vec![]), (&without, vec![]), (&all, vec![few[10], few[30]]), (&without, vec![few[20]])]
+        {
+            let trained = TrainedModel::new(&moments, &chosen, folds).unwrap();
+            let gains = trained.gains(&|_| true).unwrap();
+            let beside: Vec<Mat<f64>> = chosen.iter().map(|k| rows(&columns, &[&sets[*k]])).collect();
+            let parts: Vec<&Mat<f64>> = std::iter::once(&model).chain(&beside).collect();
+            let before = left(&columns, folds, &parts, &residual);
+            let (square, _) = trained.residual_square();
+            assert!((square / before - 1.0).abs() < 1e-8, "{square} {before}");
+            let tuning = trained.tuning();
+            for (k, set) in sets.iter().enumerate().filter(|(k, set)| set.count <= 40 && !chosen.contains(k)) {
+                let own = rows(&columns, &[set]);
+                // Least squares decides differently about nearly collinear columns.
+                if gains[k].freedom < set.count + set.numbers || own.col_iter().any(|column| column.norm_l2() == 0.0) {
+                    continue;
+                }
+                let with: Vec<&Mat<f64>> = parts.iter().copied().chain([&own]).collect();
+                let gain = before - left(&columns, folds, &with, &residual);
+                let found = gains[k].gain;
+                assert!((found - gain).abs() <= 1e-6 * gain + 1e-7 * before, "{k}: {found} {gain} of {before}");
+                let channel = TunedChannel::of(&columns, &tuning, set);
+                let again = channel.gain(&channel.effect_of(&set.basis));
+                assert!((found - again).abs() <= 1e-8 * before, "{k}: {found} {again}");
+                compared += 1;
+            }
+        }
+        assert!(compared > 100, "{compared}");
+    }
+}

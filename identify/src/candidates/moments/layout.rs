@@ -1,0 +1,251 @@
+//! The products of many columns, formed over the states of their drivers.
+//!
+//! With `Z̃ = WᵀZ` ([`Adjoint`]), the products of all columns of a channel with `Z` are
+//!
+//! ```text
+//! G(state) = Σ s(row) Z̃(row)  over the rows of a state,      Cᵀ Z = Bᵀ G
+//! ```
+//!
+//! `G` needs one pass over the readings for each channel. The basis functions `B` of harmonics, periods, steps and
+//! curves have one row for each state. Effects of other components share them, so that `G` of several channels is
+//! multiplied at once.
+
+use std::collections::HashMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, Par};
+
+use super::states::{LocalStates, OwnProducts};
+use crate::candidates::columns::{Adjoint, Channel, DriverStates, EffectColumns, TrainingRows};
+use crate::numerics::parallel;
+
+/// Columns that are copied and multiplied together: they fit into the second cache.
+const CHUNK_COLUMNS: usize = 64;
+/// Chunks of one task, for which the sums over states are formed once.
+const CHUNKS_PER_TASK: usize = 12;
+/// States whose sums are formed and multiplied together.
+const STATES_AT_ONCE: usize = 256;
+/// Largest number of vectors of one task over all its channels, if it has more than one channel.
+const MAX_VECTORS: usize = 512;
+
+/// The candidates of a segment by states, basis and channel.
+pub(super) struct Layout {
+    groups: Vec<Group>,
+    /// First column of each candidate; the last entry is the number of columns.
+    pub first: Vec<usize>,
+    /// Start of each candidate's square of products; the last entry is their total length.
+    pub square: Vec<usize>,
+}
+
+/// The channels that follow the same states, and the basis functions over these.
+struct Group {
+    states: Arc<DriverStates>,
+    channels: Vec<Arc<Channel>>,
+    chunks: Vec<Vec<Member>>,
+}
+
+/// Basis functions and the effects that have them: channel in the group, candidate in the segment.
+struct Member {
+    basis: Arc<Mat<f64>>,
+    users: Vec<(usize, usize)>,
+}
+
+/// Products of the columns of a segment.
+pub(super) struct Products {
+    /// Vectors × columns.
+    pub side: Mat<f64>,
+    /// Each candidate with itself, square after square. Empty if not asked for.
+    pub own: Vec<f64>,
+}
+
+/// One piece of work: some channels of a group, and some of its chunks.
+struct Task {
+    group: usize,
+    channels: Range<usize>,
+    chunks: Range<usize>,
+}
+
+impl Layout {
+    /// Groups the candidates of a segment.
+    pub fn of(sets: &[EffectColumns]) -> Layout {
+        let mut first = vec![0];
+        let mut square = vec![0];
+        for set in sets {
+            first.push(first[first.len() - 1] + set.count);
+            square.push(square[square.len() - 1] + set.count * set.count);
+        }
+        let mut groups: Vec<Group> = Vec::new();
+        let mut members: Vec<Vec<Member>> = Vec::new();
+        let mut of_states: HashMap<usize, usize> = HashMap::new();
+        let mut of_channel: HashMap<usize, usize> = HashMap::new();
+        let mut of_basis: HashMap<(usize, usize), usize> = HashMap::new();
+        for (candidate, set) in sets.iter().enumerate() {
+            let states = &set.channel.states;
+            let group = *of_states.entry(Arc::as_ptr(states) as usize).or_insert_with(|| {
+                groups.push(Group { states: Arc::clone(states), channels: Vec::new(), chunks: Vec::new() });
+                members.push(Vec::new());
+                groups.len() - 1
+            });
+            let channels = &mut groups[group].channels;
+            let channel = *of_channel.entry(Arc::as_ptr(&set.channel) as usize).or_insert_with(|| {
+                channels.push(Arc::clone(&set.channel));
+                channels.len() - 1
+            });
+            let members = &mut members[group];
+            let member = *of_basis.entry((group, Arc::as_ptr(&set.basis) as usize)).or_insert_with(|| {
+                members.push(Member { basis: Arc::clone(&set.basis), users: Vec::new() });
+                members.len() - 1
+            });
+            members[member].users.push((channel, candidate));
+        }
+        for (group, members) in groups.iter_mut().zip(members) {
+            let mut width = CHUNK_COLUMNS;
+            for member in members {
+                if width + member.basis.ncols() > CHUNK_COLUMNS {
+                    group.chunks.push(Vec::new());
+                    width = 0;
+                }
+                width += member.basis.ncols();
+                if let Some(chunk) = group.chunks.last_mut() {
+                    chunk.push(member);
+                }
+            }
+        }
+        Layout { groups, first, square }
+    }
+
+    /// Number of columns.
+    pub fn total(&self) -> usize {
+        self.first[self.first.len() - 1]
+    }
+
+    /// The range of a candidate's columns.
+    pub fn columns(&self, candidate: usize) -> Range<usize> {
+        self.first[candidate]..self.first[candidate + 1]
+    }
+
+    /// The range of a candidate's square.
+    pub fn squares(&self, candidate: usize) -> Range<usize> {
+        self.square[candidate]..self.square[candidate + 1]
+    }
+
+    /// The products of all columns with some vectors and, if `with_own`, of each candidate with itself, over some
+    /// whitened rows. `None` if `go_on` returns `false`.
+    pub fn products(
+        &self,
+        training: &TrainingRows,
+        side: &Adjoint,
+        with_own: bool,
+        go_on: &(dyn Fn() -> bool + Sync),
+    ) -> Option<Products> {
+        let vectors = side.values.nrows();
+        let local =
+            parallel::map(self.groups.len(), &|k| LocalStates::of(&self.groups[k].states, training, &side.rows));
+        let mut tasks = Vec::new();
+        for (number, group) in self.groups.iter().enumerate() {
+            let at_once = (MAX_VECTORS / vectors.max(1)).max(1);
+            for first in (0..group.channels.len()).step_by(at_once) {
+                for chunk in (0..group.chunks.len()).step_by(CHUNKS_PER_TASK) {
+                    tasks.push(Task {
+                        group: number,
+                        channels: first..(first + at_once).min(group.channels.len()),
+                        chunks: chunk..(chunk + CHUNKS_PER_TASK).min(group.chunks.len()),
+                    });
+                }
+            }
+        }
+        let results = parallel::map(tasks.len(), &|k| {
+            go_on().then(|| self.products_of(&tasks[k], &local[tasks[k].group], training, side, with_own))
+        });
+        let mut products = Products {
+            side: Mat::zeros(vectors, self.total()),
+            own: vec![0.0; if with_own { self.square[self.square.len() - 1] } else { 0 }],
+        };
+        for (task, result) in tasks.iter().zip(results) {
+            let (sums, own) = result?;
+            let mut own = own.into_iter();
+            let mut column = 0;
+            for member in self.groups[task.group].chunks[task.chunks.clone()].iter().flatten() {
+                for (channel, candidate) in member.users_of(&task.channels) {
+                    let first = (channel - task.channels.start) * vectors;
+                    for (k, to) in self.columns(candidate).enumerate() {
+                        let from = &sums.col_as_slice(column + k)[first..first + vectors];
+                        products.side.col_as_slice_mut(to).copy_from_slice(from);
+                    }
+                    if with_own {
+                        products.own[self.squares(candidate)].iter_mut().zip(&mut own).for_each(|(to, own)| *to = own);
+                    }
+                }
+                column += member.basis.ncols();
+            }
+        }
+        Some(products)
+    }
+
+    /// The sums of a task (vectors of each channel × columns) and the squares of its candidates.
+    fn products_of(
+        &self,
+        task: &Task,
+        local: &LocalStates,
+        training: &TrainingRows,
+        side: &Adjoint,
+        with_own: bool,
+    ) -> (Mat<f64>, Vec<f64>) {
+        let group = &self.groups[task.group];
+        let vectors = side.values.nrows();
+        let channels = &group.channels[task.channels.clone()];
+        let chunks = &group.chunks[task.chunks.clone()];
+        let widths: Vec<usize> =
+            chunks.iter().map(|chunk| chunk.iter().map(|member| member.basis.ncols()).sum()).collect();
+        let mut sums = Mat::zeros(vectors * channels.len(), widths.iter().sum());
+        let at_once = STATES_AT_ONCE.min(local.count());
+        let mut gathered = Mat::zeros(sums.nrows(), at_once);
+        let mut basis = Mat::zeros(at_once, widths.iter().copied().max().unwrap_or(0));
+        for first in (0..local.count()).step_by(at_once.max(1)) {
+            let states = first..(first + at_once).min(local.count());
+            local.gather(states.clone(), channels, side, gathered.as_mut().subcols_mut(0, states.len()));
+            let gathered = gathered.as_ref().subcols(0, states.len());
+            let mut column = 0;
+            for (chunk, width) in chunks.iter().zip(&widths) {
+                let columns =
+                    chunk.iter().flat_map(|member| (0..member.basis.ncols()).map(|k| member.basis.col_as_slice(k)));
+                for (k, from) in columns.enumerate() {
+                    local.copy(states.clone(), from, basis.col_as_slice_mut(k));
+                }
+                let to = sums.as_mut().subcols_mut(column, *width);
+                let basis = basis.as_ref().submatrix(0, 0, states.len(), *width);
+                matmul(to, Accum::Add, gathered, basis, 1.0, Par::Seq);
+                column += width;
+            }
+        }
+        let mut squares = Vec::new();
+        if with_own {
+            let own: Vec<OwnProducts<'_>> =
+                channels.iter().map(|channel| OwnProducts::of(channel, local, training)).collect();
+            let mut basis = Mat::zeros(0, 0);
+            for member in chunks.iter().flatten() {
+                let count = member.basis.ncols();
+                basis.resize_with(local.count(), basis.ncols().max(count), |_, _| 0.0);
+                for k in 0..count {
+                    local.copy(0..local.count(), member.basis.col_as_slice(k), basis.col_as_slice_mut(k));
+                }
+                for (channel, _) in member.users_of(&task.channels) {
+                    own[channel - task.channels.start].append(
+                        basis.as_ref().subcols(0, count),
+                        &member.basis,
+                        &mut squares,
+                    );
+                }
+            }
+        }
+        (sums, squares)
+    }
+}
+
+impl Member {
+    fn users_of(&self, channels: &Range<usize>) -> impl Iterator<Item = (usize, usize)> {
+        self.users.iter().copied().filter(|(channel, _)| channels.contains(channel))
+    }
+}

@@ -1,0 +1,258 @@
+//! Sums over the states of a driver: of the readings of some rows, and of the products of a column with itself.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatMut, MatRef, Par};
+
+use crate::candidates::columns::{Adjoint, Channel, DriverStates, TrainingRows};
+
+/// Largest distance of two states whose readings one whitened row combines. Beyond it the rows are multiplied.
+const MAX_BAND: usize = 32;
+const NONE: u32 = u32::MAX;
+
+/// The states that occur in some rows.
+pub(super) struct LocalStates {
+    /// The states, ascending.
+    states: Vec<u32>,
+    /// The index among these of each state.
+    place: Vec<u32>,
+    /// The scalar readings that the rows combine, by state: those of state `k` are `by_state[ends[k - 1]..ends[k]]`.
+    by_state: Vec<u32>,
+    ends: Vec<usize>,
+    /// The largest distance of two states that one whitened row combines.
+    band: usize,
+}
+
+impl LocalStates {
+    /// Of some whitened rows. `rows` are the scalar readings that they combine.
+    pub fn of(states: &DriverStates, training: &TrainingRows, rows: &[(usize, usize)]) -> LocalStates {
+        let coordinates = training.coordinates;
+        let mut place = vec![NONE; states.samples.len()];
+        for (test, scalar) in rows.iter().filter(|(test, _)| !states.of_reading[*test].is_empty()) {
+            place[states.of_reading[*test][scalar / coordinates] as usize] = 0;
+        }
+        let mut present = Vec::new();
+        for (state, place) in place.iter_mut().enumerate().filter(|(_, place)| **place != NONE) {
+            *place = present.len() as u32;
+            present.push(state as u32);
+        }
+        let of_row = |(test, scalar): &(usize, usize)| {
+            let of_reading = &states.of_reading[*test];
+            if of_reading.is_empty() { NONE } else { place[of_reading[scalar / coordinates] as usize] }
+        };
+        let of_rows: Vec<u32> = rows.iter().map(of_row).collect();
+        let mut ends = vec![0; present.len() + 1];
+        of_rows.iter().filter(|place| **place != NONE).for_each(|place| ends[*place as usize + 1] += 1);
+        (1..ends.len()).for_each(|k| ends[k] += ends[k - 1]);
+        let mut next = ends.clone();
+        let mut by_state = vec![0; ends[present.len()]];
+        for (row, place) in of_rows.iter().enumerate().filter(|(_, place)| **place != NONE) {
+            by_state[next[*place as usize]] = row as u32;
+            next[*place as usize] += 1;
+        }
+        ends.remove(0);
+        let mut local = LocalStates { states: present, place, by_state, ends, band: 0 };
+        if training.filter.is_pointwise() {
+            return local;
+        }
+        for block in training.blocks.iter().filter(|block| !states.of_reading[block.test].is_empty()) {
+            for (i, _) in &block.rows {
+                let places = training
+                    .filter
+                    .terms(*i)
+                    .map(|(raw, _)| local.of_scalar(&states.of_reading[block.test], block.start + raw, coordinates));
+                let (low, high) = places.fold((usize::MAX, 0), |(low, high), p| (low.min(p), high.max(p)));
+                local.band = local.band.max(high - low);
+            }
+        }
+        local
+    }
+
+    fn of_scalar(&self, of_reading: &[u32], scalar: usize, coordinates: usize) -> usize {
+        self.place[of_reading[scalar / coordinates] as usize] as usize
+    }
+
+    /// Number of these states.
+    pub fn count(&self) -> usize {
+        self.states.len()
+    }
+
+    /// Copies the entries of a basis function at some of these states.
+    pub fn copy(&self, states: Range<usize>, from: &[f64], to: &mut [f64]) {
+        to.iter_mut().zip(&self.states[states]).for_each(|(to, state)| *to = from[*state as usize]);
+    }
+
+    /// Sums `s · z` of some channels over the readings of each of some states: vectors of one channel after another ×
+    /// states.
+    pub fn gather(&self, states: Range<usize>, channels: &[Arc<Channel>], side: &Adjoint, mut sums: MatMut<'_, f64>) {
+        let vectors = side.values.nrows();
+        sums.fill(0.0);
+        for (state, to) in states.zip(sums.col_iter_mut()) {
+            let Some(to) = to.try_as_col_major_mut() else { continue };
+            let to = to.as_slice_mut();
+            let start = if state == 0 { 0 } else { self.ends[state - 1] };
+            for row in &self.by_state[start..self.ends[state]] {
+                let (test, scalar) = side.rows[*row as usize];
+                let values = side.values.col_as_slice(*row as usize);
+                for (channel, to) in channels.iter().zip(to.chunks_exact_mut(vectors.max(1))) {
+                    let sensitivity = channel.sensitivity[test][scalar];
+                    to.iter_mut().zip(values).for_each(|(sum, value)| *sum += sensitivity * value);
+                }
+            }
+        }
+    }
+}
+
+/// The products of a channel's columns with themselves over some rows: `CᵀC = Bᵀ H B`, where `H` has a band. If
+/// states far from each other are combined, the columns themselves are multiplied.
+pub(super) struct OwnProducts<'r> {
+    channel: &'r Channel,
+    training: &'r TrainingRows,
+    /// `H`: for each distance of two states the entries by the lower state. Empty without a band.
+    band: Vec<Vec<f64>>,
+    states: usize,
+}
+
+impl<'r> OwnProducts<'r> {
+    /// Sums the products of the sensitivities by the states that one whitened row combines.
+    pub fn of(channel: &'r Channel, local: &LocalStates, training: &'r TrainingRows) -> OwnProducts<'r> {
+        let states = local.count();
+        let mut band = Vec::new();
+        if local.band <= MAX_BAND {
+            band = vec![vec![0.0; states]; local.band + 1];
+            let mut terms: Vec<(usize, f64)> = Vec::new();
+            for block in training.blocks.iter().filter(|block| channel.acts_in(block.test)) {
+                let (sensitivity, of_reading) =
+                    (&channel.sensitivity[block.test], &channel.states.of_reading[block.test]);
+                for (i, _) in &block.rows {
+                    terms.clear();
+                    terms.extend(training.filter.terms(*i).map(|(raw, factor)| {
+                        let scalar = block.start + raw;
+                        (local.of_scalar(of_reading, scalar, training.coordinates), factor * sensitivity[scalar])
+                    }));
+                    for (k, (p, a)) in terms.iter().enumerate() {
+                        band[0][*p] += a * a;
+                        for (q, b) in &terms[k + 1..] {
+                            // An entry off the diagonal stands for both orders, one on it for two equal terms.
+                            let twice = if p == q { 2.0 } else { 1.0 };
+                            band[p.abs_diff(*q)][*p.min(q)] += twice * a * b;
+                        }
+                    }
+                }
+            }
+        }
+        OwnProducts { channel, training, band, states }
+    }
+
+    /// Appends the square of the products of some columns: `local` at the states of these rows, `basis` at all states.
+    pub fn append(&self, local: MatRef<'_, f64>, basis: &Mat<f64>, squares: &mut Vec<f64>) {
+        let count = local.ncols();
+        let column = |k: usize| local.col(k).try_as_col_major().map_or(&[][..], |column| column.as_slice());
+        if self.band.is_empty() && self.states > 0 {
+            let rows = self.rows(basis);
+            squares
+                .extend((0..count * count).map(|at| dot(rows.col_as_slice(at / count), rows.col_as_slice(at % count))));
+        } else if count <= 2 {
+            let start = squares.len();
+            squares.resize(start + count * count, 0.0);
+            for (k, l) in (0..count).flat_map(|k| (k..count).map(move |l| (k, l))) {
+                let value = self.product(column(k), column(l));
+                squares[start + k * count + l] = value;
+                squares[start + l * count + k] = value;
+            }
+        } else {
+            let mut applied = Mat::zeros(self.states, count);
+            for k in 0..count {
+                self.apply(column(k), applied.col_as_slice_mut(k));
+            }
+            let mut product = Mat::zeros(count, count);
+            matmul(product.as_mut(), Accum::Replace, local.transpose(), applied.as_ref(), 1.0, Par::Seq);
+            squares.extend((0..count * count).map(|at| {
+                let (k, l) = (at / count, at % count);
+                0.5 * (product[(k, l)] + product[(l, k)])
+            }));
+        }
+    }
+
+    /// The product of two columns, given at the states of these rows and at all states.
+    pub fn between(&self, a: (&[f64], &[f64]), b: (&[f64], &[f64])) -> f64 {
+        if !self.band.is_empty() || self.states == 0 {
+            return self.product(a.0, b.0);
+        }
+        let basis = Mat::from_fn(a.1.len(), 2, |i, k| if k == 0 { a.1[i] } else { b.1[i] });
+        let rows = self.rows(&basis);
+        dot(rows.col_as_slice(0), rows.col_as_slice(1))
+    }
+
+    /// `aᵀ H b` with two basis functions at the states of these rows.
+    fn product(&self, a: &[f64], b: &[f64]) -> f64 {
+        let diagonal = self.band.first().map_or(0.0, |band| dot3(band, a, b));
+        let off = self.band.iter().enumerate().skip(1).filter(|(distance, _)| *distance < a.len());
+        off.fold(diagonal, |sum, (distance, band)| sum + dot3(band, a, &b[distance..]) + dot3(band, &a[distance..], b))
+    }
+
+    /// `H b`.
+    fn apply(&self, b: &[f64], to: &mut [f64]) {
+        for (distance, band) in self.band.iter().enumerate() {
+            for (p, h) in band[..band.len().saturating_sub(distance)].iter().enumerate() {
+                to[p] += h * b[p + distance];
+                if distance > 0 {
+                    to[p + distance] += h * b[p];
+                }
+            }
+        }
+    }
+
+    /// The whitened columns of some basis functions.
+    fn rows(&self, basis: &Mat<f64>) -> Mat<f64> {
+        let training = self.training;
+        let rows: usize = training.blocks.iter().map(|block| block.rows.len()).sum();
+        let mut columns = Mat::zeros(rows, basis.ncols());
+        for k in 0..basis.ncols() {
+            let (basis, column) = (basis.col_as_slice(k), columns.col_as_slice_mut(k));
+            let mut next = column.iter_mut();
+            for block in &training.blocks {
+                let acts = self.channel.acts_in(block.test);
+                let (sensitivity, of_reading) =
+                    (&self.channel.sensitivity[block.test], &self.channel.states.of_reading[block.test]);
+                for ((i, _), value) in block.rows.iter().zip(&mut next) {
+                    if acts {
+                        let term = |(raw, factor): (usize, f64)| {
+                            let scalar = block.start + raw;
+                            factor * sensitivity[scalar] * basis[of_reading[scalar / training.coordinates] as usize]
+                        };
+                        *value = training.filter.terms(*i).map(term).sum();
+                    }
+                }
+            }
+        }
+        columns
+    }
+}
+
+/// Number of partial sums, which the compiler keeps in vector registers.
+const LANES: usize = 8;
+
+/// `Σ a b`.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// `Σ h a b` over the shortest of the three.
+fn dot3(h: &[f64], a: &[f64], b: &[f64]) -> f64 {
+    let length = h.len().min(a.len()).min(b.len());
+    let (h, a, b) = (&h[..length], &a[..length], &b[..length]);
+    let mut lanes = [0.0; LANES];
+    let (h, h_rest) = h.as_chunks::<LANES>();
+    let (a, a_rest) = a.as_chunks::<LANES>();
+    let (b, b_rest) = b.as_chunks::<LANES>();
+    for ((h, a), b) in h.iter().zip(a).zip(b) {
+        for k in 0..LANES {
+            lanes[k] += h[k] * a[k] * b[k];
+        }
+    }
+    let rest: f64 = h_rest.iter().zip(a_rest).zip(b_rest).map(|((h, a), b)| h * a * b).sum();
+    lanes.iter().sum::<f64>() + rest
+}
