@@ -57,7 +57,7 @@ pub struct AxisRange {
 /// ranges have nothing in common.
 ///
 /// # Errors
-/// If an error depends on time or temperature, which a grid does not have, or is too large.
+/// If an error depends on what a grid does not have, or is too large.
 pub fn evaluate(models: &[&IdentifiedModel], places: usize) -> Result<Vec<VolumetricSummary>, IdentifyError> {
     let Some(first) = models.first() else { return Ok(Vec::new()) };
     let machine = &first.machine;
@@ -120,11 +120,11 @@ fn of_model(
     axes: Vec<AxisRange>,
 ) -> Result<VolumetricSummary, IdentifyError> {
     let machine = &model.machine;
-    // A grid has neither time nor temperature: the reference values stand for them.
+    // A grid has neither time nor driver columns: the reference values stand for them.
     let rows = grid.rows();
     let grid = Readings {
         time_s: vec![model.reference.time_s; rows],
-        temperature_c: vec![model.reference.temperature_c; rows],
+        drivers: model.reference.means.iter().map(|(name, mean)| (name.clone(), vec![*mean; rows])).collect(),
         ..grid.clone()
     };
     let errors = EstimatedErrors::of_model(model, tool_mm, model.table_mm);

@@ -54,7 +54,8 @@ fn session(toml: &str) -> Session {
     let mut session = files::session(&path, &options).unwrap();
     let planned = planned_session(&session).unwrap();
     for (test, mut readings) in session.tests.iter_mut().zip(planned) {
-        readings.temperature_c = readings.time_s.iter().map(|time_s| 20.0 + time_s / 3600.0).collect();
+        let rises = readings.time_s.iter().map(|time_s| 20.0 + time_s / 3600.0).collect();
+        readings.drivers.insert("temperature_c".to_string(), rises);
         test.readings = Some(Arc::new(readings));
     }
     session
@@ -114,7 +115,7 @@ fn over_time(changes: &Changes, effects: &[Effect], effect: usize, wanted: &dyn 
         Shape::Warmup(Warmup { tau_s }) => 1.0 - (-time_s / tau_s).exp(),
         _ => time_s / 3600.0 - mean_k,
     };
-    if !matches!(own.driver, Driver::Time | Driver::Temperature) {
+    if !matches!(own.driver, Driver::Time | Driver::Column(_)) {
         return None;
     }
     let constant = effects.iter().position(|other| other.component == own.component && other.shape == Shape::Constant);

@@ -79,7 +79,7 @@ impl Columns<'_> {
             if effect.acts_in(&test.name) {
                 let readings = test.readings.as_ref()?;
                 let axis = effect.component.axis(&session.machine);
-                let (follows, samples) = self.driver_samples(number, &effect.driver, axis)?;
+                let (follows, samples) = self.driver_samples(number, &effect.driver, axis, effect.shape.lag_s())?;
                 let make = || Arc::new(effect.shape.columns(&samples));
                 let basis = if keep {
                     cached(&self.bases, (number, format!("{follows} {:?}", effect.shape)), make)
@@ -109,21 +109,25 @@ impl Columns<'_> {
         test: usize,
         driver: &Driver,
         axis: Option<usize>,
+        lag_s: Option<f64>,
     ) -> Option<(String, Arc<Vec<DriverSample<f64>>>)> {
         let readings = self.problem.tests[test].readings.as_ref()?;
         let kind = driver.kind();
         let name = if kind.is_of_component() { format!("{driver} {axis:?}") } else { driver.to_string() };
-        let samples = cached(&self.samples, (test, name.clone()), || {
+        let sampled = || {
             let input = DriverInput {
                 machine: &self.problem.session.machine,
                 model: &self.problem.models[test],
                 readings,
                 reference: &self.problem.reference,
                 component_axis: axis,
+                lag_s,
             };
             kind.samples(&input).map(Arc::new)
-        })?;
-        Some((name, samples))
+        };
+        // A lag is a number that is tuned: its samples are used once.
+        let samples = if lag_s.is_some() { sampled() } else { cached(&self.samples, (test, name.clone()), sampled) };
+        Some((name, samples?))
     }
 
     /// The columns of a term on one coordinate of the readings of a test ([`Component::Reading`]). `by_direction`
@@ -140,7 +144,7 @@ impl Columns<'_> {
             return None;
         };
         let test = self.problem.tests.iter().position(|test| test.name == *name)?;
-        let (_, samples) = self.driver_samples(test, &effect.driver, None)?;
+        let (_, samples) = self.driver_samples(test, &effect.driver, None, effect.shape.lag_s())?;
         let basis = Arc::new(effect.shape.columns(&samples));
         let factor = (by_direction || rows.is_some()).then(|| {
             let turned = |sample: &DriverSample<f64>| if by_direction { sample.direction } else { 1.0 };

@@ -164,7 +164,8 @@ fn shape_parameters_of(problem: &Problem, effect: &Effect) -> Vec<ShapeParameter
     let number = |(name, values): (&str, Vec<f64>)| ShapeParameter {
         name: name.to_string(),
         values: values.into_iter().map(|value| unit.to_display(value)).collect(),
-        unit: unit.result.to_string(),
+        // The number of a lag is its time constant.
+        unit: if effect.shape.lag_s().is_some() { "s" } else { unit.result }.to_string(),
     };
     effect.shape.reported().into_iter().map(number).collect()
 }
