@@ -42,7 +42,7 @@ pub fn found<'r>(outcome: &'r TracedSession, truth: &Injected) -> Option<&'r Eff
                     .is_some_and(|other| oracle.explained_share(truth, &other) > 0.99)
     };
     let effects = &outcome.result.effects;
-    effects.iter().find(|effect| is_truth(&effect.name) || effect.aliases.iter().any(is_truth))
+    effects.iter().find(|effect| is_truth(&effect.name) || effect.aliases.iter().any(|alias| is_truth(&alias.name)))
 }
 
 /// The surplus members of an alias set, the named effect included: effects of the plant that neither belong to the
@@ -55,7 +55,7 @@ pub fn surplus_aliases(
 ) -> Vec<EffectLabel> {
     let oracle = oracle(outcome.kind, outcome.noise);
     let mut surplus_aliases: Vec<EffectLabel> = std::iter::once(&effect.name)
-        .chain(&effect.aliases)
+        .chain(effect.aliases.iter().map(|alias| &alias.name))
         .filter(|name| !is(name, truth))
         .filter_map(|name| {
             let remounted = matches!(truth.shape, Shape::Remount { .. }) && !name.tests.is_empty();
@@ -133,7 +133,7 @@ pub fn summary(outcome: &TracedSession, mark: &str) -> String {
         .effects
         .iter()
         .map(|effect| {
-            let aliases: Vec<String> = effect.aliases.iter().take(6).map(short).collect();
+            let aliases: Vec<String> = effect.aliases.iter().take(6).map(|alias| short(&alias.name)).collect();
             format!(
                 "{} (p {:.3}, {} aliases: {})",
                 short(&effect.name),

@@ -22,6 +22,8 @@ pub(super) struct Alias {
     /// Cosine of the angle between the found effect's signature and the column space of the alias, after projection on
     /// the model.
     pub cosine: f64,
+    /// Increase of χ² if the alias replaces the effect.
+    pub delta_chi2: f64,
     /// Coefficients of the model's base columns if the alias replaces the effect.
     pub model_coefficients: Vec<f64>,
 }
@@ -135,11 +137,12 @@ pub(super) fn aliases(
                     || search.evidence(gain, variance) >= least_unpriced
                     || no_more_said(*candidate) && gain.gain / variance >= least_gain)
         })
-        .filter_map(|(candidate, _)| {
+        .filter_map(|(candidate, gain)| {
             let cosine = model.explained_by_signature(candidate, &signature).sqrt();
             (cosine >= MIN_COSINE).then(|| Alias {
                 candidate,
                 cosine,
+                delta_chi2: (of_named.gain - gain.gain) / variance,
                 model_coefficients: model.with_candidate(candidate).0,
             })
         })
