@@ -1,7 +1,7 @@
 //! Uniqueness of the effects of a trace, and the tests that separate them from their aliases, in words for terminal and
 //! report.
 
-use abbe::identify::results::{AliasResult, EffectResult, SeparatingTestResult, TraceResult};
+use abbe::identify::results::{AliasResult, EffectName, EffectResult, SeparatingTestResult, TraceResult};
 
 use super::number::micrometres;
 

@@ -1,14 +1,18 @@
 //! A displacement that follows the temperature of the spindle with a first-order lag, and one that follows a
 //! temperature collinear with time.
 
+use abbe::identify::results::{EffectName, EffectResult};
+use abbe::identify::trace::{TraceOptions, trace};
+use abbe::model::files::{ReadOptions, session};
+use nalgebra::Vector3;
 use rand::RngExt;
 
 use super::judging::{short, summary};
 use super::rates::Rate;
 use super::sessions::{NOISES, TracedSession, at_multiple, oracle, random, run, sessions, skipped, verbose};
 use crate::plant::families::thermal_components;
+use crate::plant::pose::Pose;
 use crate::plant::{Driver, Injected, Kind, Shape, Spindle};
-use abbe::identify::results::EffectName;
 
 /// The displacement in multiples of the smallest significant one. The uncertainty of the time constant is then some
 /// 5 %.
@@ -84,7 +88,7 @@ fn a_temperature_collinear_with_time_is_an_alias_of_time() {
     let outcomes = study(42, |_| (Spindle::Rises { rate: 0.01 }, Shape::Polynomial { degree: 1 }));
     let mut both = Rate::default();
     for outcome in &outcomes {
-        let names = |effect: &abbe::identify::results::EffectResult| -> Vec<EffectName> {
+        let names = |effect: &EffectResult| -> Vec<EffectName> {
             std::iter::once(&effect.name).chain(effect.aliases.iter().map(|alias| &alias.name)).cloned().collect()
         };
         let hit = outcome
@@ -101,4 +105,57 @@ fn a_temperature_collinear_with_time_is_an_alias_of_time() {
     }
     println!("| temperature and time are named as aliases | {both} |");
     assert!(both.is_consistent_with_at_least(0.95), "{both}");
+}
+
+/// A joint that gives under its torque: 200 poses of an arm with three joints, seen by a tracker.
+#[test]
+fn a_compliance_under_a_measured_torque_is_named_on_poses() {
+    const PER_TORQUE_ARCSEC: f64 = 1.0;
+    let mut random = random(43, 0);
+    let mut uniform = |size: f64| size * (2.0 * random.random::<f64>() - 1.0);
+    let about = |direction, height_mm: f64, angle_rad| {
+        Pose::slide(Vector3::z() * height_mm)
+            .then_inner(Pose::rotation(direction, angle_rad))
+            .then_inner(Pose::slide(-Vector3::z() * height_mm))
+    };
+    let mut data = "J1_deg,J2_deg,J3_deg,driver.torque_j2_nm,px_mm,py_mm,pz_mm\n".to_string();
+    for _ in 0..200 {
+        let [j1, j2, j3] = [uniform(170.0), uniform(100.0), uniform(120.0)];
+        let torque_nm = (10.0 * uniform(100.0)).round() / 10.0;
+        let given_rad = (PER_TORQUE_ARCSEC * torque_nm / 3600.0).to_radians();
+        let tool = about(Vector3::z(), 0.0, j1.to_radians())
+            .then_inner(about(Vector3::y(), 300.0, j2.to_radians() + given_rad))
+            .then_inner(about(Vector3::y(), 700.0, j3.to_radians()));
+        let target = tool.apply(Vector3::new(60.0, 0.0, 1100.0));
+        let seen: Vec<String> = target.iter().map(|mm| format!("{:.4}", mm + uniform(0.02))).collect();
+        data += &format!("{j1:?},{j2:?},{j3:?},{torque_nm},{}\n", seen.join(","));
+    }
+    let axis = |name: &str, direction: &str, z: &str| {
+        format!("[axis.{name}]\nkind = \"rotary\"\ndirection = {direction}\norigin_mm = [0, 0, {z}]\n")
+    };
+    let machine = format!(
+        "name = \"Arm\"\nchain = \"w b J1 J2 J3 t\"\n{}{}{}",
+        axis("J1", "[0, 0, 1]", "0"),
+        axis("J2", "[0, 1, 0]", "300"),
+        axis("J3", "[0, 1, 0]", "700")
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("machine.toml", &machine);
+    write("poses.csv", &data);
+    write(
+        "session.toml",
+        "[machine]\nfile = \"machine.toml\"\n[instrument]\nkind = \"tracker\"\n[unknowns]\nerrors = [\"EB0J2\", \
+         \"EB0J3\"]\n[[test]]\nname = \"poses\"\ndata = \"poses.csv\"\ntarget_mm = [60, 0, 1100]\n",
+    );
+    let read = session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
+    let found = trace(&read, &TraceOptions::default(), &|_| true).unwrap().result;
+    let is_truth = |name: &EffectName| {
+        (name.component.as_str(), name.driver.as_str(), name.order) == ("EB0J2", "torque_j2_nm", Some(1.0))
+    };
+    let effect = found.effects.iter().find(|effect| is_truth(&effect.name));
+    let effect = effect.unwrap_or_else(|| panic!("{:?}", found.effects));
+    let parameter = &effect.parameters[0];
+    assert_eq!(parameter.unit, "arcsec/(N m)");
+    assert!((parameter.value - PER_TORQUE_ARCSEC).abs() < 4.0 * parameter.u, "{parameter:?}");
 }

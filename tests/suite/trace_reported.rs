@@ -203,6 +203,27 @@ fn each_explanation_states_its_separation_by_a_further_test() {
     }
 }
 
+/// The increase of χ² by an alias is that of a fit with the alias in place of the found effect.
+#[test]
+fn an_alias_states_the_increase_of_chi_square() {
+    let file = ready("hermle-c600u/measured/session.toml");
+    let session = files::session(&file, &ReadOptions::default()).unwrap();
+    let trace = trace(&session, &TraceOptions::default(), &|_| true).unwrap();
+    let chi_square = |effect: &Effect| {
+        let mut problem = trace.before.clone();
+        problem.add_effect(effect).unwrap();
+        fit(&problem, None).unwrap().chi_square
+    };
+    let found = chi_square(&trace.effects[0]);
+    let aliases = &trace.result.effects[0].aliases;
+    assert!(!aliases.is_empty());
+    for (alias, effect) in aliases.iter().zip(&trace.alias_effects[0]) {
+        let expected = chi_square(effect) - found;
+        assert!((alias.delta_chi2 - expected).abs() < 0.1 + 0.02 * expected.abs(), "{alias:?}: {expected}");
+        assert_eq!(alias.likelihood_ratio, (-0.5 * alias.delta_chi2).exp());
+    }
+}
+
 #[test]
 fn an_effect_without_an_alias_is_unique() {
     let file = ready("hermle-c600u/measured/session.toml");

@@ -1,9 +1,9 @@
 //! Aliases of a found effect: other effects that explain the residual equally well.
 //!
 //! Two candidates are aliases if the readings do not separate them. The alias replaces the found effect in the same
-//! model. Either its evidence, less the penalty for selected positions, is then at most 2 lower, or χ² is at most 4
-//! higher: 2 in the log-likelihood. Every tuned number of the alias that the found effect does not have has to lower χ²
-//! by 4, so that numbers of its own make no alias. The alias also reproduces at least half of the found effect's signature in the readings. The search reports the
+//! model. Either its evidence is then at most 2 lower, or χ² is at most 4 higher: 2 in the log-likelihood. Every tuned
+//! number of the alias that the found effect does not have has to lower χ² by 4. Selected positions count with their
+//! penalty if the found effect has positions too. The alias also reproduces at least half of the found effect's signature in the readings. The search reports the
 //! candidate with the shortest description. The others are listed, nearest first.
 
 use std::cmp::Ordering;
@@ -110,6 +110,9 @@ pub(super) fn aliases(
     let selected = &search.selected()[k];
     let of_named = model.gain(selected.candidate);
     let least = search.evidence_for(selected.candidate, &of_named, variance) - INDISTINGUISHABLE;
+    let least_unpriced = search.evidence(&of_named, variance) - INDISTINGUISHABLE;
+    // A staircase that the found effect approximates in a shorter description is an alias without its penalty.
+    let has_positions = search.candidates[selected.candidate].selection_penalty > 0.0;
     let numbers = |candidate: usize| search.moments.numbers[candidate];
     let least_gain = |candidate: usize| {
         let more = numbers(candidate).saturating_sub(numbers(selected.candidate)) as f64;
@@ -138,6 +141,7 @@ pub(super) fn aliases(
                 && search.may_be_added(*candidate, &model.folds)
                 && gain.freedom > 0
                 && (search.evidence_for(*candidate, gain, variance) >= least
+                    || !has_positions && search.evidence(gain, variance) >= least_unpriced
                     || no_more_said(*candidate) && gain.gain / variance >= least_gain(*candidate))
         })
         .filter_map(|(candidate, gain)| {
