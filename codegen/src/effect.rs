@@ -32,6 +32,7 @@ impl<N: Nominal> AxisStates<'_, N> {
             held: self.held,
             component_axis: effect.component.axis(self.machine),
             uses: effect.shape.uses(),
+            lag_s: effect.shape.lag_s(),
         };
         let named = |quantity: DriverQuantity| nominal(Variable::Driver(quantity));
         let sample = effect.driver.symbols(&input, &named);

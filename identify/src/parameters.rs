@@ -238,12 +238,13 @@ impl Parameters {
                 readings,
                 reference,
                 component_axis: effect.component.axis(&session.machine),
+                lag_s: effect.shape.lag_s(),
             };
             let samples = driver.samples(&input).ok_or_else(|| IdentifyError::MissingDriver {
                 effect: effect.id(),
                 driver: effect.driver.to_string(),
                 test: test.name.clone(),
-                column: driver.column().map_or_else(|| effect.driver.to_string(), str::to_string),
+                column: driver.missing_column(readings).unwrap_or_else(|| effect.driver.to_string()),
             })?;
             let effective = model.effective_slots();
             let columns: Vec<Arc<Vec<f64>>> = effect.shape.columns(&samples).into_iter().map(Arc::new).collect();

@@ -37,7 +37,7 @@ pub struct Problem {
     pub models: Vec<TestModel>,
     /// The parameters.
     pub parameters: Parameters,
-    /// Reference time and temperature of the session.
+    /// Reference values of the session, from which drivers count.
     pub reference: Reference,
     /// The noise of a reading.
     pub noise: Noise,

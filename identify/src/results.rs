@@ -19,8 +19,8 @@ pub use monte_carlo::{DrawnParameter, FitMonteCarlo, Verdict};
 pub(crate) use parameter::phases_follow_amplitudes;
 pub use parameter::{Combination, Covariance, Interval, NullSpace, ParameterResult, Unobservable};
 pub use trace::{
-    AlternativeResult, ChangedParameter, CurvePoint, EffectName, EffectResult, LargestOrder, ModelResult, PriorResult,
-    RejectedCandidate, Remainder, SeparatingTestResult, SeparationResult, ShapeParameter, TraceResult,
+    AliasResult, AlternativeResult, ChangedParameter, CurvePoint, EffectName, EffectResult, LargestOrder, ModelResult,
+    PriorResult, RejectedCandidate, Remainder, SeparatingTestResult, SeparationResult, ShapeParameter, TraceResult,
 };
 
 /// A reading that was excluded as an outlier.

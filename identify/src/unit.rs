@@ -95,12 +95,12 @@ mod tests {
         let cubic = |scale: f64| Shape::Polynomial(Polynomial { degree: 3, scale });
         let square = |scale: f64| Shape::Power(Power { degree: 2, scale });
         for (k, unit) in ["um/K", "um/K^2", "um/K^3"].into_iter().enumerate() {
-            assert_eq!(name(Millimetre, &Driver::Temperature, None, &cubic(1.0), k), unit);
+            assert_eq!(name(Millimetre, &Driver::parse("temperature"), None, &cubic(1.0), k), unit);
         }
         assert_eq!(name(Radian, &Driver::Gravity, None, &square(1.0), 0), "arcsec/m^2");
         assert_eq!(name(Radian, &Driver::Gravity, None, &cubic(1.0), 0), "arcsec/m");
         // At another scale the coefficient is the value of the component there.
-        assert_eq!(name(Millimetre, &Driver::Temperature, None, &square(5.0), 0), "um");
+        assert_eq!(name(Millimetre, &Driver::parse("temperature"), None, &square(5.0), 0), "um");
         let linear = Some(AxisKind::Linear);
         let rotary = Some(AxisKind::Rotary);
         assert_eq!(name(Millimetre, &axis("X"), linear, &cubic(100.0), 2), "um");

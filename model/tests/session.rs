@@ -129,6 +129,7 @@ fn the_square_of_the_speed_follows_from_the_columns() {
             readings,
             reference: &Reference::default(),
             component_axis: session.machine.axis_index(axis),
+            lag_s: None,
         };
         Driver::parse("speed-squared").kind().samples(&input)
     };

@@ -18,7 +18,7 @@ use super::output::{self, Outputs};
 use crate::present::compensate as present;
 
 /// Examples of `abbe compensate`.
-pub const HELP: &str = "FILE is a CSV with a header line. Columns such as x_mm, c_deg or J1_rad are axis positions; time_s, temperature_c and run are \
+pub const HELP: &str = "FILE is a CSV with a header line. Columns such as x_mm, c_deg or J1_rad are axis positions; time_s, run, temperature_c and driver.NAME_unit are \
 read where errors depend on them. Instead of axis positions it may state the tool's pose in the table frame: px_mm, py_mm, pz_mm \
 with i, j, k (direction of the tool's Z: machines with five axes) or qw, qx, qy, qz (a quaternion: robots). All other columns are kept.
 

@@ -1,7 +1,7 @@
 //! Uniqueness of the effects of a trace, and the tests that separate them from their aliases, in words for terminal and
 //! report.
 
-use abbe::identify::results::{EffectName, EffectResult, SeparatingTestResult, TraceResult};
+use abbe::identify::results::{AliasResult, EffectName, EffectResult, SeparatingTestResult, TraceResult};
 
 use super::number::micrometres;
 
@@ -69,9 +69,18 @@ pub fn worse_prediction(effect: &EffectResult, alias: usize) -> Option<String> {
     (of_alias > WORSE * of_effect).then(words)
 }
 
+/// How equal an alias is: `Δχ² 1.3, likelihood ratio 0.52`.
+pub fn likelihood(alias: &AliasResult) -> String {
+    let ratio = alias.likelihood_ratio;
+    let ratio = if (0.01..1000.0).contains(&ratio) { format!("{ratio:.2}") } else { format!("{ratio:.0e}") };
+    // A difference of rounding is none.
+    let delta = if alias.delta_chi2.abs() < 0.05 { 0.0 } else { alias.delta_chi2 };
+    format!("Δχ² {delta:.1}, likelihood ratio {ratio}").replace('-', "−")
+}
+
 /// The first explanations and the number of the others. A part of the machine is named once where it repeats.
 fn in_short(effect: &EffectResult) -> String {
-    let others = effect.aliases.iter().map(|alias| alias.meaning.as_str());
+    let others = effect.aliases.iter().map(|alias| alias.name.meaning.as_str());
     let mut part = "";
     let mut named: Vec<String> = Vec::new();
     for meaning in std::iter::once(effect.name.meaning.as_str()).chain(others).take(MAX_NAMED) {

@@ -16,6 +16,7 @@
 //! | `Steps { at, heights }` | the sum of the heights of the steps at or below q |
 //! | `Drift` | `t / duration of the session` |
 //! | `Warmup { tau_s }` | `1 − exp(−t / τ)` |
+//! | `FirstOrderLag { tau_s }` | y with `τ dy/dt + y = T`, T the spindle's temperature above 27 °C, in equilibrium at the start |
 //! | `Remount { after_test }` | 1 in every test after that one, 0 until then |
 //! | `Modulated { order, period_s }` | `sin(order · q) · sin(2π t / period)` |
 //! | `Chirp { cycles }` | `sin(2π cycles (q/360°)²)`: frequency rises along the axis |
@@ -24,10 +25,11 @@
 use super::component::{AxisName, Component, unit_size};
 use super::machine::Displacement;
 use super::schedule::Instant;
+use super::spindle::Spindle;
 use std::f64::consts::PI;
 
 /// The driver of an effect.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Driver {
     /// The position, direction of travel or speed of an axis.
     Axis(AxisName),
@@ -35,6 +37,8 @@ pub enum Driver {
     Time,
     /// The temperature column, in kelvin above 20 °C.
     Temperature,
+    /// The temperature of the spindle, in kelvin above 27 °C.
+    Spindle(Spindle),
     /// The moment of a unit weight at the workpiece ball about the A axis.
     Gravity,
     /// No driver: a constant.
@@ -73,6 +77,7 @@ pub enum Shape {
     Steps { at: Vec<f64>, heights: Vec<f64> },
     Drift,
     Warmup { tau_s: f64 },
+    FirstOrderLag { tau_s: f64 },
     Remount { after_test: usize },
     Modulated { order: u32, period_s: f64 },
     Chirp { cycles: f64 },
@@ -157,6 +162,10 @@ impl Injected {
             }
             Shape::Drift => instant.share_of_session,
             Shape::Warmup { tau_s } => 1.0 - (-instant.time_s / tau_s).exp(),
+            Shape::FirstOrderLag { tau_s } => match driver {
+                Driver::Spindle(spindle) => spindle.lagged_k(instant.time_s, *tau_s),
+                _ => 0.0,
+            },
             Shape::Remount { after_test } => f64::from(instant.test > *after_test),
             Shape::Modulated { order, period_s } => {
                 (f64::from(*order) * position(driver, instant)).sin() * (2.0 * PI * instant.time_s / period_s).sin()
@@ -220,6 +229,7 @@ fn position(driver: &Driver, instant: &Instant) -> f64 {
         Driver::Axis(axis) => instant.commanded.position[axis.index()],
         Driver::Time => instant.time_s,
         Driver::Temperature => instant.temperature_c - 20.0,
+        Driver::Spindle(spindle) => spindle.above_k(instant.time_s),
         Driver::Gravity => instant.gravity_moment_mm,
         Driver::Nothing => 0.0,
     }
@@ -230,7 +240,7 @@ fn normalised(driver: &Driver, instant: &Instant) -> f64 {
     let scale = match driver {
         Driver::Axis(axis) if axis.is_rotary() => PI,
         Driver::Axis(_) | Driver::Gravity => 100.0,
-        Driver::Time | Driver::Temperature | Driver::Nothing => 1.0,
+        Driver::Time | Driver::Temperature | Driver::Spindle(_) | Driver::Nothing => 1.0,
     };
     position(driver, instant) / scale
 }

@@ -234,7 +234,7 @@ pub fn catalogue(kind: Kind, like: &Injected) -> Vec<Injected> {
 }
 
 /// Components that can drift: location errors of the moving axes (and squareness of Y), both balls, the bar.
-fn thermal_components(kind: Kind) -> Vec<Component> {
+pub fn thermal_components(kind: Kind) -> Vec<Component> {
     let mut components = vec![Component::Bar];
     for i in 0..3 {
         components.push(Component::WorkpieceBall(Cartesian(i)));

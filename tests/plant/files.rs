@@ -6,26 +6,37 @@ use super::naming::named;
 use super::noise::{Noise, RESOLUTION_UM};
 use super::plan::{Plan, bar_setup};
 use super::recipe::{Row, Truth};
+use super::spindle::Spindle;
 use serde_json::{Value, json};
 use std::fmt::Write;
 
 /// The noise that the session file states, independently of the true noise.
 const STATED_NOISE_UM: f64 = 0.3;
 
+/// The columns of the data files that are no axes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct DriverColumns {
+    /// Whether there is a column of the ambient temperature.
+    pub temperature: bool,
+    /// The temperature of the spindle.
+    pub spindle: Option<Spindle>,
+}
+
 /// `session.toml`, `machine.toml` and one data file per test.
-pub fn session_files(plan: &Plan, rows: &[Row], temperature_column: bool) -> Vec<(String, String)> {
+pub fn session_files(plan: &Plan, rows: &[Row], columns: DriverColumns) -> Vec<(String, String)> {
     let mut files =
         vec![("session.toml".to_string(), session_toml(plan)), ("machine.toml".to_string(), machine_toml(plan.kind))];
     for (index, test) in plan.tests.iter().enumerate() {
         let rows = rows.iter().filter(|row| plan.instants[row.instant].test == index);
-        files.push((format!("{}.csv", test.name), data_csv(plan, rows, temperature_column)));
+        files.push((format!("{}.csv", test.name), data_csv(plan, rows, columns)));
     }
     files
 }
 
-fn data_csv<'a>(plan: &Plan, rows: impl Iterator<Item = &'a Row>, temperature_column: bool) -> String {
-    let temperature = if temperature_column { ",temperature_c" } else { "" };
-    let mut text = format!("time_s,run,x_mm,y_mm,z_mm,a_deg,c_deg{temperature},length_mm\n");
+fn data_csv<'a>(plan: &Plan, rows: impl Iterator<Item = &'a Row>, columns: DriverColumns) -> String {
+    let temperature = if columns.temperature { ",temperature_c" } else { "" };
+    let spindle = columns.spindle.map_or(String::new(), |_| format!(",{}", Spindle::COLUMN));
+    let mut text = format!("time_s,run,x_mm,y_mm,z_mm,a_deg,c_deg{temperature}{spindle},length_mm\n");
     for row in rows {
         let instant = &plan.instants[row.instant];
         let _ = write!(text, "{:.3},{}", instant.time_s, instant.run);
@@ -34,8 +45,11 @@ fn data_csv<'a>(plan: &Plan, rows: impl Iterator<Item = &'a Row>, temperature_co
             let shown = if axis.is_rotary() { position.to_degrees() } else { position };
             let _ = write!(text, ",{shown:.6}");
         }
-        if temperature_column {
+        if columns.temperature {
             let _ = write!(text, ",{:.2}", instant.temperature_c);
+        }
+        if let Some(spindle) = columns.spindle {
+            let _ = write!(text, ",{:.2}", spindle.temperature_c(instant.time_s));
         }
         let _ = writeln!(text, ",{:.4}", row.length_mm);
     }

@@ -32,6 +32,7 @@ pub mod pose;
 pub mod recipe;
 pub mod rtest;
 pub mod schedule;
+pub mod spindle;
 pub mod whitening;
 
 pub use component::{AxisName, Cartesian, Component, Freedom};
@@ -43,6 +44,7 @@ pub use noise::Noise;
 pub use oracle::{Alias, Oracle};
 pub use plan::Plan;
 pub use recipe::{Recipe, SimulatedSession, Truth};
+pub use spindle::Spindle;
 
 mod check_effects;
 mod check_frames;

@@ -23,6 +23,7 @@ pub fn named(effect: &Injected) -> EffectLabel {
         Driver::Axis(axis) => format!("{axis:?}"),
         Driver::Time => "time".to_string(),
         Driver::Temperature => "temperature".to_string(),
+        Driver::Spindle(_) => "spindle_temperature_c".to_string(),
         Driver::Gravity => "gravity".to_string(),
         Driver::Nothing => "none".to_string(),
     };
@@ -38,6 +39,7 @@ pub fn named(effect: &Injected) -> EffectLabel {
         Shape::Steps { .. } | Shape::Remount { .. } => ("steps", None),
         Shape::Drift => ("drift", None),
         Shape::Warmup { .. } => ("warmup", None),
+        Shape::FirstOrderLag { .. } => ("first-order-lag", None),
         Shape::Modulated { .. } | Shape::Chirp { .. } | Shape::Plateaus { .. } => ("outside", None),
     };
     EffectLabel { component: effect.component.to_string(), driver, shape: shape.to_string(), order }
@@ -49,6 +51,7 @@ pub fn named(effect: &Injected) -> EffectLabel {
 pub fn from_name(name: &EffectLabel, like: &Injected) -> Option<Injected> {
     let component = Component::parse(&name.component)?;
     let driver = match name.driver.as_str() {
+        "spindle_temperature_c" => like.driver,
         "time" => Driver::Time,
         "temperature" => Driver::Temperature,
         "gravity" => Driver::Gravity,

@@ -129,7 +129,12 @@ impl Recipe {
             outlier_rows: rows.iter().filter(|row| row.outlier).map(|row| row.instant).collect(),
         };
         let follows_temperature = self.effects.iter().any(|effect| effect.driver == Driver::Temperature);
-        let files = files::session_files(plan, &rows, self.temperature_column || follows_temperature);
+        let spindle = self.effects.iter().find_map(|effect| match effect.driver {
+            Driver::Spindle(spindle) => Some(spindle),
+            _ => None,
+        });
+        let columns = files::DriverColumns { temperature: self.temperature_column || follows_temperature, spindle };
+        let files = files::session_files(plan, &rows, columns);
         SimulatedSession { files, rows, truth }
     }
 }

@@ -1,10 +1,10 @@
 //! Compares a result of trace with the true effects.
 
-use abbe::identify::results::{EffectName, EffectResult, ModelResult};
+use abbe::identify::results::{EffectName, EffectResult, ModelResult, ShapeParameter};
 
 use super::rates::Pulls;
 use super::sessions::{TracedSession, oracle};
-use crate::plant::{EffectLabel, Injected, Shape, from_name, named};
+use crate::plant::{Decay, EffectLabel, Injected, Shape, from_name, named};
 
 /// The name of a found effect, in the notation of the plant.
 pub fn name_in_plant(name: &EffectName) -> EffectLabel {
@@ -42,7 +42,16 @@ pub fn found<'r>(outcome: &'r TracedSession, truth: &Injected) -> Option<&'r Eff
                     .is_some_and(|other| oracle.explained_share(truth, &other) > 0.99)
     };
     let effects = &outcome.result.effects;
-    effects.iter().find(|effect| is_truth(&effect.name) || effect.aliases.iter().any(is_truth))
+    effects.iter().find(|effect| is_truth(&effect.name) || effect.aliases.iter().any(|alias| is_truth(&alias.name)))
+}
+
+/// The numbers with which the oracle judges a member of an alias set.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Numbers {
+    /// The positions, widths and time constants of the truth.
+    OfTruth,
+    /// Those, or the member's own: whichever the oracle separates less.
+    Own,
 }
 
 /// The surplus members of an alias set, the named effect included: effects of the plant that neither belong to the
@@ -52,30 +61,53 @@ pub fn surplus_aliases(
     effect: &EffectResult,
     truth: &Injected,
     sigma: f64,
+    numbers: Numbers,
 ) -> Vec<EffectLabel> {
     let oracle = oracle(outcome.kind, outcome.noise);
-    let mut surplus_aliases: Vec<EffectLabel> = std::iter::once(&effect.name)
-        .chain(&effect.aliases)
-        .filter(|name| !is(name, truth))
-        .filter_map(|name| {
+    let named_effect = (&effect.name, &effect.shape_parameters);
+    let mut surplus_aliases: Vec<EffectLabel> = std::iter::once(named_effect)
+        .chain(effect.aliases.iter().map(|alias| (&alias.name, &alias.shape_parameters)))
+        .filter(|(name, _)| !is(name, truth))
+        .filter_map(|(name, own)| {
             let remounted = matches!(truth.shape, Shape::Remount { .. }) && !name.tests.is_empty();
-            let name = match remounted {
+            let label = match remounted {
                 // A ball that moves between tests is a constant of those tests in the result and a step in time in the
                 // plant.
                 true => EffectLabel { component: name.component.clone(), ..named(truth) },
                 false => name_in_plant(name),
             };
-            let other = from_name(&name, truth)?;
-            let share = with_any_time_constant(&other)
+            let other = from_name(&label, truth)?;
+            let mut share = with_any_time_constant(&other)
                 .iter()
                 .map(|other| oracle.explained_share(truth, other))
                 .fold(0.0, f64::max);
+            if numbers == Numbers::Own && !remounted {
+                share = oracle.explained_share_of(truth, &with_own_numbers(&other, own)).max(share);
+            }
             let behind = oracle.strength_sigma(truth) * (1.0 - share * share).max(0.0).sqrt();
-            (share < 0.95 && behind > sigma).then_some(name)
+            (share < 0.95 && behind > sigma).then_some(label)
         })
         .collect();
     surplus_aliases.dedup();
     surplus_aliases
+}
+
+/// The effects that span an effect with the numbers of a result; steps have free heights.
+fn with_own_numbers(effect: &Injected, numbers: &[ShapeParameter]) -> Vec<Injected> {
+    let values: Vec<f64> = numbers.iter().flat_map(|number| number.values.iter().copied()).collect();
+    let shapes = match (&effect.shape, values.as_slice()) {
+        (Shape::Steps { .. }, at) => at.iter().map(|at| Shape::Steps { at: vec![*at], heights: vec![1.0] }).collect(),
+        (Shape::Local { profile, .. }, [centre, width]) => {
+            vec![Shape::Local { centre: *centre, width: *width, profile: *profile }]
+        }
+        (Shape::Warmup { .. }, [tau_s]) => vec![Shape::Warmup { tau_s: *tau_s }],
+        (Shape::Periodic { phase_deg, .. }, [period]) => {
+            vec![Shape::Periodic { period: *period, phase_deg: *phase_deg }]
+        }
+        (Shape::ReversalSpike { .. }, [width]) => vec![Shape::ReversalSpike { decay: Decay::Way(*width) }],
+        (shape, _) => vec![shape.clone()],
+    };
+    shapes.into_iter().map(|shape| Injected { shape, ..effect.clone() }).collect()
 }
 
 /// Variants of an effect that its name does not distinguish: the name of a warm-up does not state its time constant.
@@ -133,7 +165,7 @@ pub fn summary(outcome: &TracedSession, mark: &str) -> String {
         .effects
         .iter()
         .map(|effect| {
-            let aliases: Vec<String> = effect.aliases.iter().take(6).map(short).collect();
+            let aliases: Vec<String> = effect.aliases.iter().take(6).map(|alias| short(&alias.name)).collect();
             format!(
                 "{} (p {:.3}, {} aliases: {})",
                 short(&effect.name),

@@ -13,6 +13,7 @@ mod sessions;
 
 mod carried;
 mod clean;
+mod columns;
 mod outside;
 mod pairs;
 mod single;

@@ -1,6 +1,6 @@
 //! One undeclared effect at 5 and at 2 times the smallest amplitude that is significant for the oracle.
 
-use super::judging::{found, is, pulls, summary, surplus_aliases};
+use super::judging::{Numbers, found, is, pulls, summary, surplus_aliases};
 use super::rates::{Pulls, Rate};
 use super::sessions::{TracedSession, at_multiple, case, oracle, random, run, sessions, skipped, verbose};
 use crate::plant::named;
@@ -26,6 +26,7 @@ struct Tally {
     named_first: Rate,
     more: Rate,
     surplus: Rate,
+    separable: Rate,
     far: Rate,
     alone: Rate,
     held_out: Vec<f64>,
@@ -45,12 +46,14 @@ fn tally(outcomes: &[TracedSession]) -> Tally {
         tally.more.count(effects.len() > 1);
         if let Some(effect) = hit {
             tally.named_first.count(is(&effect.name, truth));
-            let far = surplus_aliases(outcome, effect, truth, FAR_SIGMA);
-            let surplus_aliases = surplus_aliases(outcome, effect, truth, 2.0);
-            tally.surplus.count(!surplus_aliases.is_empty());
-            tally.far.count(!far.is_empty());
-            if verbose() && !surplus_aliases.is_empty() {
-                println!("SURPLUS in {:?}: {surplus_aliases:?}", named(truth));
+            let surplus = |sigma, numbers| surplus_aliases(outcome, effect, truth, sigma, numbers);
+            let of_truth = surplus(2.0, Numbers::OfTruth);
+            let own = surplus(2.0, Numbers::Own);
+            tally.surplus.count(!of_truth.is_empty());
+            tally.separable.count(!own.is_empty());
+            tally.far.count(!surplus(FAR_SIGMA, Numbers::OfTruth).is_empty());
+            if verbose() && !of_truth.is_empty() {
+                println!("SURPLUS in {:?}: {of_truth:?}, with their own numbers {own:?}", named(truth));
             }
         }
         let best = oracle(outcome.kind, outcome.noise).heldout_rms_um(&outcome.draw, &outcome.draw.truth.effects);
@@ -88,6 +91,7 @@ fn print(factor: f64, tally: &Tally) {
     println!("| truth named first | {} |", tally.named_first);
     println!("| more than one effect claimed | {} |", tally.more);
     println!("| alias sets with a surplus member beyond 2 sigma | {} |", tally.surplus);
+    println!("| the same, members with their own numbers | {} |", tally.separable);
     println!("| alias sets with a surplus member beyond {FAR_SIGMA} sigma | {} |", tally.far);
     println!("| held-out rms within 5 % of the oracle's | {} |", tally.near);
     println!(

@@ -109,7 +109,8 @@ fn mislabelled_runs_cause_neither_false_claims_nor_missed_effects() {
             assert_consistent(&result, &what);
             assert_eq!(result.effects.len(), recipe.effects.len(), "{what}");
             if let Some(effect) = result.effects.first() {
-                let alike = is_axial_motion(&effect.name) || effect.aliases.iter().any(is_axial_motion);
+                let alike =
+                    is_axial_motion(&effect.name) || effect.aliases.iter().any(|alias| is_axial_motion(&alias.name));
                 assert!(alike, "{what}: {:?}", effect.name);
                 assert_eq!(result.verdict, "explained", "{what}");
             } else {

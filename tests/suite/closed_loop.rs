@@ -12,7 +12,7 @@ use serde_json::Value;
 use super::{abbe, text};
 use crate::plant::component::AxisName;
 use crate::plant::effect::{Driver, Injected, Shape};
-use crate::plant::files::session_files;
+use crate::plant::files::{DriverColumns, session_files};
 use crate::plant::kind::Kind;
 use crate::plant::machine::{Displacement, Machine};
 use crate::plant::plan::Plan;
@@ -142,7 +142,7 @@ fn the_machine_is_better_after_compensation_as_predicted() {
         before.truth.unknowns.iter().find(same).map(|value| value.value)
     };
     let again = Recipe { seed: 18, ..recipe.clone() }.draw_of(&standing, kept);
-    let after = written(folder, "after", &session_files(&plan, &again.rows, false));
+    let after = written(folder, "after", &session_files(&plan, &again.rows, DriverColumns::default()));
     let compared = folder.join("compare.json");
     let model_after = folder.join("after.json");
     run(&["trace", text(&after), "--save", text(&model_after), "--quiet"]);

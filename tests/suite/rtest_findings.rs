@@ -204,7 +204,7 @@ fn squareness_and_cyclic_straightness_of_y_are_found_in_bk1() {
             assert_eq!(result.effects.len(), 2);
             // BK1 determines the squareness of Y and Z, not which of the two axes is tilted.
             let square = &result.effects[0];
-            let mut names = std::iter::once(&square.name).chain(&square.aliases);
+            let mut names = std::iter::once(&square.name).chain(square.aliases.iter().map(|alias| &alias.name));
             assert!(names.any(|name| name.component == "EA0Z" && name.shape == "constant"), "{square:?}");
             assert!(square.name.shape == "constant" && square.name.component.starts_with("EA0"));
             let angle = &square.parameters[0];

@@ -29,7 +29,7 @@ fn is(effect: &EffectName, component: &str, shape: &str, order: Option<f64>) -> 
 
 /// Whether an effect is named or is among the aliases of a named effect.
 fn named_or_alias(result: &TraceResult, wanted: &dyn Fn(&EffectName) -> bool) -> bool {
-    result.effects.iter().any(|effect| wanted(&effect.name) || effect.aliases.iter().any(wanted))
+    result.effects.iter().any(|effect| wanted(&effect.name) || effect.aliases.iter().any(|alias| wanted(&alias.name)))
 }
 
 #[test]

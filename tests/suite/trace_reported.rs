@@ -86,7 +86,7 @@ fn the_uncertainty_of_a_declared_harmonic_covers_the_aliases_of_the_found_effect
         name.component == "EAC" && name.shape == "harmonic" && name.order == Some(3.0)
     };
     let effect = &result.effects[0];
-    assert!(effect.aliases.iter().chain([&effect.name]).any(|name| is_truth(&name)));
+    assert!(effect.aliases.iter().map(|alias| &alias.name).chain([&effect.name]).any(|name| is_truth(&name)));
     let found = |id: &str| {
         let mut parameters = result.after.parameters.iter();
         let parameter = parameters.find(|parameter| parameter.id == id).unwrap();
@@ -110,7 +110,7 @@ fn the_uncertainty_of_a_found_harmonic_covers_the_aliases_of_another_effect() {
         result.effects.iter().map(|effect| (effect.name.component.as_str(), effect.name.order)).collect();
     assert_eq!(named, [("EZC", Some(2.0)), ("EZC", Some(4.0))]);
     let fourth = &result.effects[1];
-    assert!(fourth.aliases.iter().any(|name| name.component == "EAC" && name.order == Some(3.0)));
+    assert!(fourth.aliases.iter().any(|alias| alias.name.component == "EAC" && alias.name.order == Some(3.0)));
     for parameters in [&result.after.parameters, &result.effects[0].parameters] {
         let found = |id: &str| {
             let parameter = parameters.iter().find(|parameter| parameter.id == id).unwrap();
@@ -165,14 +165,14 @@ fn each_explanation_states_its_separation_by_a_further_test() {
     assert!(effect.aliases.len() > 4, "{:?}", effect.aliases);
     assert_eq!(effect.name.meaning, "C table: axial motion twice per turn");
     for alias in &effect.aliases {
-        let what = alias.meaning.split_once(": ").unwrap().1;
+        let what = alias.name.meaning.split_once(": ").unwrap().1;
         assert!(effect.explanations.contains(what), "{}: {what}", effect.explanations);
     }
 
     // The first test lists all aliases, nearest first; each further test lists the remaining ones.
     let tests = &effect.separating_tests;
     let named: Vec<&EffectName> = tests[0].alternatives.iter().map(|one| &one.name).collect();
-    assert_eq!(named, effect.aliases.iter().collect::<Vec<_>>());
+    assert_eq!(named, effect.aliases.iter().map(|alias| &alias.name).collect::<Vec<_>>());
     for pair in tests.windows(2) {
         assert_eq!(pair[1].alternative_count, pair[0].alternative_count - pair[0].separated_count);
     }
@@ -200,6 +200,27 @@ fn each_explanation_states_its_separation_by_a_further_test() {
             alike(one.before_sigma, before) && alike(one.after_sigma, after),
             "{one:?}: refitted {before} and {after}"
         );
+    }
+}
+
+/// The increase of χ² by an alias is that of a fit with the alias in place of the found effect.
+#[test]
+fn an_alias_states_the_increase_of_chi_square() {
+    let file = ready("hermle-c600u/measured/session.toml");
+    let session = files::session(&file, &ReadOptions::default()).unwrap();
+    let trace = trace(&session, &TraceOptions::default(), &|_| true).unwrap();
+    let chi_square = |effect: &Effect| {
+        let mut problem = trace.before.clone();
+        problem.add_effect(effect).unwrap();
+        fit(&problem, None).unwrap().chi_square
+    };
+    let found = chi_square(&trace.effects[0]);
+    let aliases = &trace.result.effects[0].aliases;
+    assert!(!aliases.is_empty());
+    for (alias, effect) in aliases.iter().zip(&trace.alias_effects[0]) {
+        let expected = chi_square(effect) - found;
+        assert!((alias.delta_chi2 - expected).abs() < 0.1 + 0.02 * expected.abs(), "{alias:?}: {expected}");
+        assert_eq!(alias.likelihood_ratio, (-0.5 * alias.delta_chi2).exp());
     }
 }
 

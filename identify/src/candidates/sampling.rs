@@ -2,6 +2,19 @@
 
 use crate::problem::Problem;
 
+/// The levels of a driver column.
+pub(crate) struct ColumnSampling {
+    /// `NAME_unit`.
+    pub name: String,
+    /// Number of different values.
+    pub levels: usize,
+    /// Values between the levels, if there are more than two: midpoints between few levels, else deciles.
+    pub between: Vec<f64>,
+}
+
+/// Largest number of levels between each of which a step is a candidate.
+const FEW_LEVELS: usize = 10;
+
 /// The sampling of the axes in a session.
 pub(crate) struct Sampling {
     pub moves: Vec<bool>,
@@ -11,7 +24,8 @@ pub(crate) struct Sampling {
     pub step: Vec<f64>,
     pub has_time: bool,
     pub duration_s: f64,
-    pub has_temperature: bool,
+    /// The driver columns that all readings have and that vary.
+    pub columns: Vec<ColumnSampling>,
     pub reverses_inside_runs: Vec<bool>,
     pub both_directions: Vec<bool>,
 }
@@ -26,14 +40,13 @@ impl Sampling {
             step: vec![0.0; axes],
             has_time: true,
             duration_s: 0.0,
-            has_temperature: true,
+            columns: columns(problem),
             reverses_inside_runs: vec![false; axes],
             both_directions: vec![false; axes],
         };
         for test in &problem.tests {
             let Some(readings) = &test.readings else { continue };
             sampling.has_time &= !readings.time_s.is_empty();
-            sampling.has_temperature &= !readings.temperature_c.is_empty();
             for (axis, column) in readings.positions.iter().enumerate() {
                 for value in column {
                     sampling.low[axis] = sampling.low[axis].min(*value);
@@ -75,4 +88,25 @@ impl Sampling {
     pub fn span(&self, axis: usize) -> f64 {
         self.high[axis] - self.low[axis]
     }
+}
+
+/// The driver columns that all readings have and that vary.
+fn columns(problem: &Problem) -> Vec<ColumnSampling> {
+    let tests: Vec<_> = problem.tests.iter().filter_map(|test| test.readings.as_ref()).collect();
+    let Some(first) = tests.first() else { return Vec::new() };
+    let everywhere = first.drivers.keys().filter(|name| tests.iter().all(|test| test.drivers.contains_key(*name)));
+    let sampled = everywhere.map(|name| {
+        let zero = problem.reference.zero_of(name);
+        let mut values: Vec<f64> = tests.iter().flat_map(|test| &test.drivers[name]).map(|v| v - zero).collect();
+        values.sort_by(f64::total_cmp);
+        let mut levels = values.clone();
+        levels.dedup();
+        let between = match levels.len() {
+            0..3 => Vec::new(),
+            3..=FEW_LEVELS => levels.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect(),
+            _ => (1..FEW_LEVELS).map(|k| values[k * values.len() / FEW_LEVELS]).collect(),
+        };
+        ColumnSampling { name: name.clone(), levels: levels.len(), between }
+    });
+    sampled.filter(|column| column.levels > 1).collect()
 }

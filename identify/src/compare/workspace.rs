@@ -54,7 +54,7 @@ pub struct AxisRange {
 }
 
 /// The volumetric error of each model over a grid with a number of places along each axis that moves. Empty if the
-/// ranges have nothing in common. Time and temperature are the reference values of each model.
+/// ranges have nothing in common. Time and driver columns have the reference values of each model.
 ///
 /// # Errors
 /// If an error cannot be evaluated on the grid.
@@ -120,11 +120,11 @@ fn of_model(
     axes: Vec<AxisRange>,
 ) -> Result<VolumetricSummary, IdentifyError> {
     let machine = &model.machine;
-    // A grid has neither time nor temperature: the reference values stand for them.
+    // A grid has neither time nor driver columns: the reference values stand for them.
     let rows = grid.rows();
     let grid = Readings {
         time_s: vec![model.reference.time_s; rows],
-        temperature_c: vec![model.reference.temperature_c; rows],
+        drivers: model.reference.means.iter().map(|(name, mean)| (name.clone(), vec![*mean; rows])).collect(),
         ..grid.clone()
     };
     let errors = EstimatedErrors::of_model(model, tool_mm, model.table_mm);

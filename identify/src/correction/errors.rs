@@ -20,12 +20,17 @@ pub type ErrorsNear<'a> = Box<dyn Fn(&Readings) -> Result<SlotValues, IdentifyEr
 
 /// The errors of a machine as functions of its axes, and of what else the rows of a file state.
 pub trait MachineErrors: Sync {
-    /// The errors along commanded positions. Direction and speed of travel, time and temperature are those of the
-    /// commands. The result gives the errors at positions that deviate from them by corrections.
+    /// The errors along commanded positions. Direction and speed of travel, time and driver columns are those of
+    /// the commands. The result gives the errors at positions that deviate from them by corrections.
     ///
     /// # Errors
     /// If the rows lack a column that an error depends on.
     fn along<'a>(&'a self, commanded: &'a Readings) -> Result<ErrorsNear<'a>, IdentifyError>;
+
+    /// An effect that depends on all rows before, so that the rows cannot be divided into blocks: a first-order lag.
+    fn with_history(&self) -> Option<String> {
+        None
+    }
 }
 
 /// An effect with its coefficients.
@@ -44,7 +49,7 @@ pub struct EstimatedErrors {
     pub machine: Arc<Machine>,
     /// The instrument as set up: gravity acts at its point.
     pub station: Station<f64>,
-    /// Reference time and temperature.
+    /// Reference values of the drivers.
     pub reference: Reference,
     /// The constant errors by slot of the machine, mm or rad.
     pub constant: Vec<f64>,
@@ -79,7 +84,7 @@ impl EstimatedErrors {
         let effects = effects.collect();
         // A reading that connects both load points is affected by all errors.
         let station = Station::BallBar(BallBar { workpiece_ball: table_mm, spindle_ball: tool_mm, bar: 1.0 });
-        EstimatedErrors { machine, station, reference: model.reference, constant, effects }
+        EstimatedErrors { machine, station, reference: model.reference.clone(), constant, effects }
     }
 
     fn samples(
@@ -95,12 +100,13 @@ impl EstimatedErrors {
             readings: rows,
             reference: &self.reference,
             component_axis: effect.component.axis(&self.machine),
+            lag_s: effect.shape.lag_s(),
         };
         driver.samples(&input).ok_or_else(|| IdentifyError::MissingDriver {
             effect: effect.id(),
             driver: effect.driver.to_string(),
             test: "the commands".to_string(),
-            column: driver.column().map_or_else(|| effect.driver.to_string(), str::to_string),
+            column: driver.missing_column(rows).unwrap_or_else(|| effect.driver.to_string()),
         })
     }
 
@@ -110,6 +116,11 @@ impl EstimatedErrors {
 }
 
 impl MachineErrors for EstimatedErrors {
+    fn with_history(&self) -> Option<String> {
+        let lagged = self.effects.iter().find(|estimated| estimated.effect.shape.lag_s().is_some());
+        lagged.map(|estimated| estimated.effect.id())
+    }
+
     fn along<'a>(&'a self, commanded: &'a Readings) -> Result<ErrorsNear<'a>, IdentifyError> {
         let model = self.model(commanded);
         let parameters = self.station.kind().unknowns();

@@ -95,6 +95,12 @@ pub fn run(
     to: &mut dyn Write,
 ) -> Result<Summary, IdentifyError> {
     check(correction, file.poses())?;
+    if let Some(effect) = correction.errors.with_history() {
+        return Err(IdentifyError::Request(format!(
+            "the effect {effect} follows its driver with a lag, which depends on all commands before; save a model in \
+             which it follows the driver without delay"
+        )));
+    }
     let layout = Layout::of(correction, file, output);
     if let Some(name) = output.columns().iter().find(|name| file.header().iter().any(|own| own == **name)) {
         return Err(IdentifyError::Request(format!(

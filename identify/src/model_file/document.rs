@@ -1,5 +1,7 @@
 //! The JSON form of a model. Keys of machine and effects are those of machine and session files.
 
+use std::collections::BTreeMap;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -182,6 +184,9 @@ pub struct Range {
 pub struct Reference {
     /// Time of the first reading, s.
     pub time_s: f64,
-    /// Mean of the temperatures, °C.
+    /// Mean of the temperatures, °C; 0 without.
     pub temperature_c: f64,
+    /// The mean of each other driver column, by `NAME_unit`, in its unit.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty", default)]
+    pub drivers: BTreeMap<String, f64>,
 }

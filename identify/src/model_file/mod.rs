@@ -94,7 +94,7 @@ pub struct IdentifiedModel {
     pub tool_mm: [f64; 3],
     /// The instrument's point in the table frame there, mm; 0 for instruments without one.
     pub table_mm: [f64; 3],
-    /// Reference time and temperature, from which drivers count.
+    /// Reference values, from which drivers count.
     pub reference: Reference,
     /// Where the model comes from.
     pub provenance: Provenance,

@@ -1,6 +1,7 @@
 //! The model of a fit.
 
 use abbe_model::component::ErrorName;
+use abbe_model::driver::Reference;
 use abbe_model::session::Session;
 
 use super::{IdentifiedModel, ModelParameter, Provenance, Quality, range};
@@ -54,7 +55,7 @@ impl IdentifiedModel {
             ranges: range::of_problem(problem, &problem.parameters.effects),
             tool_mm: problem.models[0].station().tool_point_mm(),
             table_mm: problem.models[0].station().table_point_mm().unwrap_or_default(),
-            reference: problem.reference,
+            reference: Reference::without_history(problem.reference.time_s, problem.reference.means.clone()),
             provenance,
         })
     }

@@ -65,6 +65,8 @@ fn values(problem: &Problem, test: usize, driver: &Driver, component_axis: Optio
         readings,
         reference: &problem.reference,
         component_axis: component_axis.and_then(|axis| problem.session.machine.axis_index(axis)),
+        // The range is that of the column itself.
+        lag_s: None,
     };
     Some(driver.kind().samples(&input)?.iter().map(|sample| sample.value).collect())
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use abbe_model::ModelError;
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
-use abbe_model::driver::{Driver, Reference};
+use abbe_model::driver::{Driver, Reference, TEMPERATURE};
 use abbe_model::effect::Effect;
 use abbe_model::error::Location;
 use abbe_model::files;
@@ -157,7 +157,7 @@ impl File<'_> {
         let noise = self.noise(&document.noise)?;
         Ok(IdentifiedModel {
             locations: locations.collect::<Result<_, IdentifyError>>()?,
-            ranges: document.ranges.iter().map(range).collect(),
+            ranges: document.ranges.iter().map(|of| range(&machine, of)).collect(),
             quality: Quality {
                 readings: document.fit.readings,
                 rms_mm: document.fit.rms_um * 1e-3,
@@ -166,7 +166,7 @@ impl File<'_> {
             },
             tool_mm: document.tool_mm,
             table_mm: document.table_mm,
-            reference: Reference { time_s: document.reference.time_s, temperature_c: document.reference.temperature_c },
+            reference: reference(&document.reference),
             machine,
             instrument,
             effects,
@@ -336,6 +336,13 @@ impl File<'_> {
     }
 }
 
-fn range(range: &document::Range) -> DriverRange {
-    DriverRange { driver: Driver::parse(&range.driver), component_axis: range.axis.clone(), range: range.internal }
+fn range(machine: &Machine, range: &document::Range) -> DriverRange {
+    let driver = Driver::parse_on(machine, &range.driver);
+    DriverRange { driver, component_axis: range.axis.clone(), range: range.internal }
+}
+
+fn reference(stated: &document::Reference) -> Reference {
+    let mut means = stated.drivers.clone();
+    means.insert(TEMPERATURE.to_string(), stated.temperature_c);
+    Reference::without_history(stated.time_s, means)
 }

@@ -1,5 +1,6 @@
 //! A model as a JSON text.
 
+use abbe_model::driver::TEMPERATURE;
 use abbe_model::files::toml::parts;
 use abbe_model::session::Prior;
 use serde_json::Value;
@@ -71,7 +72,14 @@ impl IdentifiedModel {
             table_mm: self.table_mm,
             reference: document::Reference {
                 time_s: self.reference.time_s,
-                temperature_c: self.reference.temperature_c,
+                temperature_c: self.reference.means.get(TEMPERATURE).copied().unwrap_or(0.0),
+                drivers: self
+                    .reference
+                    .means
+                    .iter()
+                    .filter(|(name, _)| *name != TEMPERATURE)
+                    .map(|(name, mean)| (name.clone(), *mean))
+                    .collect(),
             },
         })
     }

@@ -106,7 +106,7 @@ fn ready(
     let mut noise = problem.noise.clone();
     noise.sigma_mm /= (variations.thin.max(1) as f64).sqrt();
     let mut alone = Problem::new(&session, noise, 0)?;
-    alone.reference = problem.reference;
+    alone.reference = problem.reference.clone();
     for effect in &problem.parameters.effects {
         alone.add_effect(effect)?;
     }

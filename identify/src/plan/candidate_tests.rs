@@ -80,10 +80,9 @@ fn finished(session: &Session, variations: &TestVariations, draft: Draft) -> Opt
     let start = start.fold(0.0, f64::max);
     let moving_s = readings.time_s.last().copied().unwrap_or(0.0);
     readings.time_s.iter_mut().for_each(|time| *time += start + variations.test_min * 60.0);
-    if session.tests.iter().any(|test| test.readings.as_ref().is_some_and(|r| !r.temperature_c.is_empty())) {
-        let mean = session.reference().temperature_c;
-        readings.temperature_c = vec![mean; readings.rows()];
-    }
+    let rows = readings.rows();
+    let means = session.reference().means.into_iter();
+    readings.drivers = means.map(|(name, mean)| (name, vec![mean; rows])).collect();
     test.readings = Some(Arc::new(readings));
     let minutes = variations.test_min + moving_s / 60.0 + if new_setup { variations.setup_min } else { 0.0 };
     Some(CandidateTest { name, test, new_setup, minutes })

@@ -130,6 +130,21 @@ pub struct ShapeParameter {
     pub unit: String,
 }
 
+/// An effect that explains the readings as well as a found effect in its place.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct AliasResult {
+    /// Component, driver, shape, order.
+    #[serde(flatten)]
+    pub name: EffectName,
+    /// The numbers of its shape, tuned for the alias.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub shape_parameters: Vec<ShapeParameter>,
+    /// Increase of χ² if the alias replaces the found effect; negative where χ² decreases.
+    pub delta_chi2: f64,
+    /// Likelihood with the alias over likelihood with the found effect: exp(−`delta_chi2`/2).
+    pub likelihood_ratio: f64,
+}
+
 /// An effect that the search has found.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct EffectResult {
@@ -169,7 +184,7 @@ pub struct EffectResult {
     /// `C table: axial motion twice per turn, or tilt about X once per turn`.
     pub explanations: String,
     /// The competing explanations, nearest first. Those that predict left-out tests clearly worse come last.
-    pub aliases: Vec<EffectName>,
+    pub aliases: Vec<AliasResult>,
     /// Rms of the left-out tests that this effect predicts, µm, for an effect with aliases.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left_out_test_rms_um: Option<f64>,

@@ -1,8 +1,9 @@
 //! Aliases of a found effect: other effects that explain the residual equally well.
 //!
 //! Two candidates are aliases if the readings do not separate them. The alias replaces the found effect in the same
-//! model. Its log-likelihood is then at most 2 lower, with or without the penalty for selected shape numbers and
-//! positions. It also reproduces at least half of the found effect's signature in the readings. The search reports the
+//! model. Either its evidence is then at most 2 lower, or χ² is at most 4 higher: 2 in the log-likelihood. Every tuned
+//! number of the alias that the found effect does not have has to lower χ² by 4. Selected positions count with their
+//! penalty if the found effect has positions too. The alias also reproduces at least half of the found effect's signature in the readings. The search reports the
 //! candidate with the shortest description. The others are listed, nearest first.
 
 use std::cmp::Ordering;
@@ -23,6 +24,8 @@ pub(super) struct Alias {
     /// Cosine of the angle between the found effect's signature and the column space of the alias, after projection on
     /// the model.
     pub cosine: f64,
+    /// Increase of χ² if the alias replaces the effect.
+    pub delta_chi2: f64,
     /// Coefficients of the model's base columns if the alias replaces the effect.
     pub model_coefficients: Vec<f64>,
 }
@@ -109,7 +112,13 @@ pub(super) fn aliases(
     let of_named = model.gain(selected.candidate)?;
     let least = search.evidence_for(selected.candidate, &of_named, variance) - INDISTINGUISHABLE;
     let least_unpriced = search.evidence(&of_named, variance) - INDISTINGUISHABLE;
-    let least_gain = of_named.gain / variance - 2.0 * INDISTINGUISHABLE;
+    // A staircase that the found effect approximates in a shorter description is an alias without its penalty.
+    let has_positions = search.candidates[selected.candidate].selection_penalty > 0.0;
+    let numbers = |candidate: usize| search.moments.numbers(candidate);
+    let least_gain = |candidate: usize| {
+        let more = numbers(candidate).saturating_sub(numbers(selected.candidate)) as f64;
+        of_named.gain / variance + 2.0 * INDISTINGUISHABLE * (more - 1.0)
+    };
     let columns = |candidate: usize| search.moments.count(candidate);
     // A harmonic has two columns because its phase is estimated. It still counts as an alias of an effect with one
     // column.
@@ -120,7 +129,7 @@ pub(super) fn aliases(
     let (_, signature) = model.with_candidate(selected.candidate)?;
     let others: Vec<usize> = search.selected().iter().map(|t| t.candidate).collect();
     let gains = search.gains(model)?;
-    let near: Vec<usize> = gains
+    let near: Vec<(usize, f64)> = gains
         .iter()
         .enumerate()
         .filter(|(candidate, gain)| {
@@ -129,16 +138,22 @@ pub(super) fn aliases(
                 && search.may_be_added(*candidate, &model.folds)
                 && gain.freedom > 0
                 && (search.evidence_for(*candidate, gain, variance) >= least
-                    || search.evidence(gain, variance) >= least_unpriced
-                    || no_more_said(*candidate) && gain.gain / variance >= least_gain)
+                    || !has_positions && search.evidence(gain, variance) >= least_unpriced
+                    || no_more_said(*candidate) && gain.gain / variance >= least_gain(*candidate))
         })
-        .map(|(candidate, _)| candidate)
+        .map(|(candidate, gain)| (candidate, gain.gain))
         .collect();
     let mut aliases = Vec::new();
-    for candidate in near {
+    for (candidate, gain) in near {
         let cosine = model.explained_by_signature(candidate, selected.candidate, &signature)?.sqrt();
         if cosine >= MIN_COSINE {
-            aliases.push(Alias { candidate, cosine, model_coefficients: model.with_candidate(candidate)?.0 });
+            let delta_chi2 = (of_named.gain - gain) / variance;
+            aliases.push(Alias {
+                candidate,
+                cosine,
+                delta_chi2,
+                model_coefficients: model.with_candidate(candidate)?.0,
+            });
         }
     }
     aliases.sort_by(|a, b| {

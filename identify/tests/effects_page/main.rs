@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use abbe_model::driver::Driver;
-use abbe_model::effect::shape::Warmup;
+use abbe_model::effect::shape::{FirstOrderLag, Warmup};
 use abbe_model::effect::{Effect, Shape};
 use abbe_model::files::{self, ReadOptions};
 use abbe_model::session::Session;
@@ -54,7 +54,8 @@ fn session(toml: &str) -> Session {
     let mut session = files::session(&path, &options).unwrap();
     let planned = planned_session(&session).unwrap();
     for (test, mut readings) in session.tests.iter_mut().zip(planned) {
-        readings.temperature_c = readings.time_s.iter().map(|time_s| 20.0 + time_s / 3600.0).collect();
+        let rises = readings.time_s.iter().map(|time_s| 20.0 + time_s / 3600.0).collect();
+        readings.drivers.insert("temperature_c".to_string(), rises);
         test.readings = Some(Arc::new(readings));
     }
     session
@@ -112,9 +113,14 @@ fn over_time(changes: &Changes, effects: &[Effect], effect: usize, wanted: &dyn 
     let grows = |time_s: f64, mean_k: f64| match own.shape {
         Shape::Drift => time_s / 3600.0,
         Shape::Warmup(Warmup { tau_s }) => 1.0 - (-time_s / tau_s).exp(),
+        // The response to 1 K per hour that begins at the first reading.
+        Shape::FirstOrderLag(FirstOrderLag { tau_s, .. }) => {
+            (time_s - tau_s * (1.0 - (-time_s / tau_s).exp())) / 3600.0 - mean_k
+        }
+        Shape::Steps(ref steps) => f64::from(time_s / 3600.0 - mean_k >= steps.at[0]),
         _ => time_s / 3600.0 - mean_k,
     };
-    if !matches!(own.driver, Driver::Time | Driver::Temperature) {
+    if !matches!(own.driver, Driver::Time | Driver::Column(_)) {
         return None;
     }
     let constant = effects.iter().position(|other| other.component == own.component && other.shape == Shape::Constant);

@@ -36,7 +36,7 @@ impl DriverKind for AxisDriver<'_> {
     fn phrase(&self) -> String {
         format!("axis {}", self.0)
     }
-    fn is_observable(&self, _: &Recorded, _: Option<AxisKind>) -> bool {
+    fn is_observable(&self, _: &Recorded<'_>, _: Option<AxisKind>) -> bool {
         true
     }
     /// 100 mm for a linear axis, half a revolution for a rotary one.

@@ -36,14 +36,14 @@ impl DriverKind for Gravity {
     fn phrase(&self) -> String {
         "the moment of gravity".to_string()
     }
-    fn is_observable(&self, _: &Recorded, axis: Option<AxisKind>) -> bool {
+    fn is_observable(&self, _: &Recorded<'_>, axis: Option<AxisKind>) -> bool {
         axis == Some(AxisKind::Rotary)
     }
     fn per(&self) -> Option<&'static str> {
         Some("m")
     }
-    fn proportional(&self) -> Option<&'static str> {
-        Some(" under gravity (compliance)")
+    fn proportional(&self) -> Option<String> {
+        Some(" under gravity (compliance)".to_string())
     }
     fn is_of_component(&self) -> bool {
         true

@@ -6,13 +6,15 @@ use super::unit::DriverUnit;
 use super::{Driver, Reference};
 use crate::axis::AxisKind;
 use crate::chain::{AxisPosition, Machine};
+#[cfg(doc)]
+use crate::effect::shape::ShapeKind;
 use crate::scalar::Nominal;
 use crate::sensitivity::TestModel;
 use crate::session::readings::Readings;
 
 /// A driver in the registry.
 pub struct Entry {
-    /// The word in files; `None` for an axis, whose word is its name.
+    /// The word in files; `None` for an axis, whose word is its name. Of columns, the word of one that has its own.
     pub word: Option<&'static str>,
     /// The driver of that word.
     pub driver: fn(&str) -> Driver,
@@ -29,10 +31,12 @@ pub struct DriverInput<'a> {
     pub model: &'a TestModel,
     /// The readings of the test.
     pub readings: &'a Readings,
-    /// Reference time and temperature of the session.
+    /// Reference values of the session.
     pub reference: &'a Reference,
     /// The axis of the effect's component, if it has one.
     pub component_axis: Option<usize>,
+    /// Time constant of the first-order lag by which the effect follows the driver, s: [`ShapeKind::lag_s`].
+    pub lag_s: Option<f64>,
 }
 
 /// A reading in symbols.
@@ -47,15 +51,17 @@ pub struct SymbolInput<'a, N> {
     pub component_axis: Option<usize>,
     /// The quantities of the driver that the shape uses. Only those are named.
     pub uses: DriverPart,
+    /// Time constant of the first-order lag by which the effect follows the driver, s.
+    pub lag_s: Option<f64>,
 }
 
 /// What a session records, as far as drivers depend on it.
 #[derive(Clone, Copy, Debug)]
-pub struct Recorded {
+pub struct Recorded<'a> {
     /// Whether all readings have a time.
     pub time: bool,
-    /// Whether all readings have a temperature.
-    pub temperature: bool,
+    /// The driver columns that all readings have, `NAME_unit`.
+    pub columns: &'a [&'a str],
     /// Whether an axis is swept, so that its speed is known where there is a time.
     pub swept: bool,
 }
@@ -81,7 +87,7 @@ pub trait DriverKind {
     /// The driver as the object of a sentence: `time`, `the temperature`.
     fn phrase(&self) -> String;
     /// Whether a session can have effects of this driver on a component whose axis is of this kind.
-    fn is_observable(&self, recorded: &Recorded, axis: Option<AxisKind>) -> bool;
+    fn is_observable(&self, recorded: &Recorded<'_>, axis: Option<AxisKind>) -> bool;
 
     /// The divisor of the driver in polynomials and powers if a session states no `scale_…`, in the driver's internal
     /// unit. Coefficients of one name are then comparable between tests of different travel.
@@ -89,8 +95,9 @@ pub trait DriverKind {
         let _ = axis;
         1.0
     }
-    /// The column of the data that it needs besides the axis positions.
-    fn column(&self) -> Option<&'static str> {
+    /// A column that it needs besides the axis positions and that some readings may lack.
+    fn missing_column(&self, readings: &Readings) -> Option<String> {
+        let _ = readings;
         None
     }
     /// The unit of powers of the driver in the units of coefficients, at a scale of 1: `um/K`; `None`: coefficients
@@ -99,7 +106,7 @@ pub trait DriverKind {
         None
     }
     /// The words for proportionality to this driver, if it has its own.
-    fn proportional(&self) -> Option<&'static str> {
+    fn proportional(&self) -> Option<String> {
         None
     }
     /// Whether its values differ from component to component, as those of a driver about the component's own axis do.

@@ -8,6 +8,7 @@ mod reference;
 mod sample;
 mod unit;
 
+pub use column::TEMPERATURE;
 pub use kind::{DriverFault, DriverInput, DriverKind, Entry, Recorded, SymbolInput, Symbols};
 pub use quantity::DriverQuantity;
 pub use reference::Reference;
@@ -24,7 +25,7 @@ use crate::scalar::Nominal;
 /// Declares the modules, the enumeration and the list of all drivers.
 macro_rules! drivers {
     ($($module:ident: $driver:ident $(($name:ident))? => $kind:expr,)+) => {
-        $(mod $module;)+
+        $(pub(crate) mod $module;)+
 
         /// The independent variable of an effect.
         #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -66,16 +67,28 @@ drivers! {
     none: None => none::NoDriver,
     axis: Axis(name) => axis::AxisDriver(name),
     time: Time => time::Time,
-    temperature: Temperature => temperature::Temperature,
+    column: Column(name) => column::Column(name),
     gravity: Gravity => gravity::Gravity,
     speed_squared: SpeedSquared => speed_squared::SpeedSquared,
 }
 
 impl Driver {
-    /// Parses the word of a driver, such as `time`; any other text is the name of an axis.
+    /// Parses the word of a driver, such as `time`, or the name of a column, such as `spindle_temperature_c`; any other
+    /// text is the name of an axis.
     pub fn parse(text: &str) -> Driver {
-        let entry = DRIVERS.iter().find(|entry| entry.word == Some(text));
-        entry.map_or_else(|| Driver::Axis(text.to_string()), |entry| (entry.driver)(text))
+        match DRIVERS.iter().find(|entry| entry.word == Some(text)) {
+            Some(entry) => (entry.driver)(text),
+            None if column::is_name(text) => Driver::Column(text.to_string()),
+            None => Driver::Axis(text.to_string()),
+        }
+    }
+
+    /// As [`Driver::parse`], on a machine: an axis of that name comes before a column.
+    pub fn parse_on(machine: &Machine, text: &str) -> Driver {
+        match Driver::parse(text) {
+            Driver::Column(name) if machine.axis_index(&name).is_some() => Driver::Axis(name),
+            driver => driver,
+        }
     }
 
     /// The axis whose position the driver is; `None` for other drivers.
@@ -109,11 +122,12 @@ impl Driver {
 
 impl fmt::Display for Driver {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if let Driver::Axis(name) = self {
-            return formatter.write_str(name);
-        }
         let own = |entry: &&&Entry| entry.word.is_some_and(|word| (entry.driver)(word) == *self);
-        formatter.write_str(DRIVERS.iter().find(own).and_then(|entry| entry.word).unwrap_or_default())
+        let word = DRIVERS.iter().find(own).and_then(|entry| entry.word);
+        match self {
+            Driver::Axis(name) | Driver::Column(name) => formatter.write_str(word.unwrap_or(name)),
+            _ => formatter.write_str(word.unwrap_or_default()),
+        }
     }
 }
 

@@ -23,7 +23,7 @@ impl DriverKind for NoDriver {
     fn phrase(&self) -> String {
         "nothing".to_string()
     }
-    fn is_observable(&self, _: &Recorded, _: Option<AxisKind>) -> bool {
+    fn is_observable(&self, _: &Recorded<'_>, _: Option<AxisKind>) -> bool {
         true
     }
 }

@@ -8,6 +8,7 @@ use super::sample::DriverSample;
 use super::unit::DriverUnit;
 use crate::axis::AxisKind;
 use crate::scalar::Nominal;
+use crate::session::readings::Readings;
 
 /// The square of the speed.
 pub(super) struct SpeedSquared;
@@ -36,15 +37,15 @@ impl DriverKind for SpeedSquared {
     fn phrase(&self) -> String {
         "the square of its speed".to_string()
     }
-    fn is_observable(&self, recorded: &Recorded, axis: Option<AxisKind>) -> bool {
+    fn is_observable(&self, recorded: &Recorded<'_>, axis: Option<AxisKind>) -> bool {
         recorded.time && recorded.swept && axis.is_some()
     }
     /// The square of 100 mm/s, or of 1 rad/s.
     fn default_scale(&self, axis: Option<AxisKind>) -> f64 {
         if axis == Some(AxisKind::Rotary) { ROTARY_SCALE } else { LINEAR_SCALE }
     }
-    fn column(&self) -> Option<&'static str> {
-        Some("time_s")
+    fn missing_column(&self, _: &Readings) -> Option<String> {
+        Some("time_s".to_string())
     }
     fn is_of_component(&self) -> bool {
         true

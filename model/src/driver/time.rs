@@ -7,6 +7,7 @@ use super::sample::{DriverPart, DriverSample};
 use super::unit::DriverUnit;
 use crate::axis::AxisKind;
 use crate::scalar::Nominal;
+use crate::session::readings::Readings;
 
 /// Time.
 pub(super) struct Time;
@@ -29,15 +30,15 @@ impl DriverKind for Time {
     fn phrase(&self) -> String {
         "time".to_string()
     }
-    fn is_observable(&self, recorded: &Recorded, _: Option<AxisKind>) -> bool {
+    fn is_observable(&self, recorded: &Recorded<'_>, _: Option<AxisKind>) -> bool {
         recorded.time
     }
     /// An hour.
     fn default_scale(&self, _: Option<AxisKind>) -> f64 {
         SECONDS_PER_HOUR
     }
-    fn column(&self) -> Option<&'static str> {
-        Some("time_s")
+    fn missing_column(&self, _: &Readings) -> Option<String> {
+        Some("time_s".to_string())
     }
     fn changes_with_feed(&self) -> bool {
         true

@@ -24,6 +24,9 @@ pub struct Sampled {
     pub has_time: bool,
     /// Duration of the session, s.
     pub duration_s: f64,
+    /// Values that separate the levels of a driver column with at least three: midpoints between few levels, else
+    /// deciles. Empty for other drivers.
+    pub between_levels: Vec<f64>,
     /// The divisor of the driver in powers.
     pub default_scale: f64,
     /// The numbers that the library gives for the family: degrees, time constants.

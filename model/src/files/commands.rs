@@ -1,7 +1,7 @@
 //! Files of commanded positions, read in blocks: a file of any length needs the memory of one block.
 //!
 //! A CSV with a header line. Columns that name an axis (`x_mm`, `c_deg`, `J1_rad`) are its positions; `time_s`, `run` and
-//! `temperature_c` are what errors may depend on; `px_mm py_mm pz_mm` are a pose of the tool in the table frame, with
+//! driver columns (`temperature_c`, `driver.NAME_unit`) are what errors may depend on; `px_mm py_mm pz_mm` are a pose of the tool in the table frame, with
 //! `i j k` (the direction of the tool's Z) or `qw qx qy qz` (a quaternion). Every other column is kept as it is. A row
 //! with a cell that is no number is marked and kept.
 
@@ -15,16 +15,18 @@ use super::table::number;
 use super::table::request::Format;
 use crate::axis::AxisKind;
 use crate::chain::Machine;
+use crate::driver::column;
 use crate::error::{Location, ModelError};
 use crate::session::readings::{AxisTravel, Readings};
 
 /// The content of a column.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 enum Meaning {
     Axis(usize, Unit),
     Time,
     Run,
-    Temperature,
+    /// A driver column, `NAME_unit`.
+    Driver(String),
     Pose(usize, Unit),
     Other,
 }
@@ -210,7 +212,7 @@ impl CommandFile {
     /// If the file cannot be read on, or is not text.
     pub fn next_block(&mut self, machine: &Machine, most: usize) -> Result<Option<Block>, ModelError> {
         let has = |wanted: Meaning| self.meanings.contains(&wanted);
-        let (time, run, temperature) = (has(Meaning::Time), has(Meaning::Run), has(Meaning::Temperature));
+        let (time, run) = (has(Meaning::Time), has(Meaning::Run));
         let mut block = Block {
             rows: Readings { positions: vec![Vec::new(); machine.axes.len()], coordinates: 1, ..Readings::default() },
             poses: Vec::new(),
@@ -238,7 +240,12 @@ impl CommandFile {
             };
             block.rows.positions.iter_mut().zip(&row.positions).for_each(|(column, position)| column.push(*position));
             time.then(|| block.rows.time_s.push(row.time_s));
-            temperature.then(|| block.rows.temperature_c.push(row.temperature_c));
+            for (place, meaning) in self.meanings.iter().enumerate() {
+                if let Meaning::Driver(name) = meaning {
+                    let value = row.drivers.get(place).copied().unwrap_or(f64::NAN);
+                    block.rows.drivers.entry(name.clone()).or_default().push(value);
+                }
+            }
             run.then(|| block.rows.run.push(row.run));
             block.poses.push(row.pose);
             block.lines.push(record.position().map_or(0, csv::Position::line));
@@ -247,8 +254,8 @@ impl CommandFile {
         if block.cells.is_empty() {
             return Ok(None);
         }
-        let Readings { positions, time_s, temperature_c, .. } = &mut block.rows;
-        for column in positions.iter_mut().chain([time_s, temperature_c]) {
+        let Readings { positions, time_s, drivers, .. } = &mut block.rows;
+        for column in positions.iter_mut().chain([time_s]).chain(drivers.values_mut()) {
             if let Some(first) = column.get(leading).copied() {
                 column[..leading].fill(first);
             }
@@ -274,7 +281,7 @@ impl CommandFile {
             return Err(format!("{} cells, but the header has {}", record.len(), self.header.len()));
         }
         let mut row = Row { positions: self.at.clone(), ..Row::not_a_number(0, 0) };
-        for ((cell, meaning), name) in record.iter().zip(&self.meanings).zip(&self.header) {
+        for (place, ((cell, meaning), name)) in record.iter().zip(&self.meanings).zip(&self.header).enumerate() {
             if *meaning == Meaning::Other {
                 continue;
             }
@@ -284,7 +291,10 @@ impl CommandFile {
                 Meaning::Time => row.time_s = value,
                 Meaning::Run if value.fract() != 0.0 => return Err(format!("`{name}`: {cell} is no integer")),
                 Meaning::Run => row.run = value as i64,
-                Meaning::Temperature => row.temperature_c = value,
+                Meaning::Driver(_) => {
+                    row.drivers.resize(place + 1, f64::NAN);
+                    row.drivers[place] = value;
+                }
                 Meaning::Pose(part, unit) => row.pose[*part] = unit.to_internal(value),
                 Meaning::Other => {}
             }
@@ -298,14 +308,15 @@ impl CommandFile {
 struct Row {
     positions: Vec<f64>,
     time_s: f64,
-    temperature_c: f64,
+    /// The values of driver columns, by column of the file.
+    drivers: Vec<f64>,
     run: i64,
     pose: [f64; 10],
 }
 
 impl Row {
     fn not_a_number(axes: usize, run: i64) -> Row {
-        Row { positions: vec![f64::NAN; axes], time_s: f64::NAN, temperature_c: f64::NAN, run, pose: [f64::NAN; 10] }
+        Row { positions: vec![f64::NAN; axes], time_s: f64::NAN, drivers: Vec::new(), run, pose: [f64::NAN; 10] }
     }
 }
 
@@ -314,8 +325,10 @@ fn meaning(machine: &Machine, name: &str, first: bool) -> Meaning {
     match name {
         "time_s" => return Meaning::Time,
         "run" => return Meaning::Run,
-        "temperature_c" => return Meaning::Temperature,
         _ => {}
+    }
+    if let Some(own) = column::of_files(name) {
+        return Meaning::Driver(own.to_string());
     }
     if let Some((axis, unit)) = quantity::axis_position(machine, name) {
         return Meaning::Axis(axis, unit);

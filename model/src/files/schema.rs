@@ -69,7 +69,7 @@ fn effect_properties() -> String {
     let words: Vec<String> = SHAPES.iter().map(|entry| format!("\"{}\"", entry.word)).collect();
     let mut properties = vec![format!("\"shape\": {{\"enum\": [{}]}}", words.join(", "))];
     properties.push(format!(
-        "\"driver\": {{\"type\": \"string\", \"description\": \"The driver: an axis, {}.\"}}",
+        "\"driver\": {{\"type\": \"string\", \"description\": \"The driver: an axis, {}, or a column of the data as NAME_unit.\"}}",
         Driver::words().join(", ")
     ));
     let mut known: Vec<&str> = Vec::new();

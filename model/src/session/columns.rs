@@ -1,10 +1,13 @@
 //! Readings that are given in memory, as columns.
 
+use std::collections::BTreeMap;
+
 use super::check::{self, MIN_READINGS, MissingPosition};
 use super::limits;
 use super::motion::{self, Motion};
 use super::readings::Readings;
 use crate::chain::Machine;
+use crate::driver::column;
 use crate::instrument::{Fault, InstrumentKind};
 
 /// Readings as columns, all of the same length but for those that are empty.
@@ -16,8 +19,8 @@ pub struct Columns {
     pub run: Vec<i64>,
     /// Time, s, or empty.
     pub time_s: Vec<f64>,
-    /// Temperature, °C, or empty.
-    pub temperature_c: Vec<f64>,
+    /// Driver columns by `NAME_unit`, in their unit: `temperature_c`, `spindle_speed_rpm`.
+    pub drivers: BTreeMap<String, Vec<f64>>,
     /// The observed values, mm, row by row: one length each (of a ball bar: from ball to ball), or three coordinates.
     pub observed: Vec<f64>,
 }
@@ -78,10 +81,14 @@ impl Columns {
         } else {
             vec![0.0; rows * coordinates]
         };
-        for (what, column) in [("times", &self.time_s), ("temperatures", &self.temperature_c)] {
-            if !column.is_empty() {
-                column_of(what, column, rows)?;
+        if !self.time_s.is_empty() {
+            column_of("times", &self.time_s, rows)?;
+        }
+        for (name, column) in &self.drivers {
+            if !column::is_name(name) {
+                return Err((format!("the driver column `{name}`"), column::help_on_name()));
             }
+            column_of(&format!("values of {name}"), column, rows)?;
         }
         if !self.run.is_empty() && self.run.len() != rows {
             return Err(wrong_count("run numbers", self.run.len(), rows));
@@ -95,7 +102,7 @@ impl Columns {
             origin: None,
             run: self.run.clone(),
             time_s: self.time_s.clone(),
-            temperature_c: self.temperature_c.clone(),
+            drivers: self.drivers.clone(),
             positions,
             coordinates,
             observed,

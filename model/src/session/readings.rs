@@ -1,5 +1,6 @@
 //! Readings as columns, with the driver quantities of effects: time, direction of travel, speed.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use crate::axis::AxisKind;
@@ -24,8 +25,8 @@ pub struct Readings {
     pub run: Vec<i64>,
     /// Time of each row, s; empty without such a column.
     pub time_s: Vec<f64>,
-    /// Temperature of each row, °C; empty without such a column.
-    pub temperature_c: Vec<f64>,
+    /// The driver columns by `NAME_unit`, in their unit, such as `temperature_c`; one value per row.
+    pub drivers: BTreeMap<String, Vec<f64>>,
     /// Position of every axis of the machine: `positions[axis][row]`.
     pub positions: Vec<Vec<f64>>,
     /// Number of scalar coordinates of a reading: 1 or 3.
@@ -88,7 +89,7 @@ impl Readings {
                 .map(|origin| Origin { file: origin.file.clone(), line: of(&origin.line, rows) }),
             run: of(&self.run, rows),
             time_s: of(&self.time_s, rows),
-            temperature_c: of(&self.temperature_c, rows),
+            drivers: self.drivers.iter().map(|(name, values)| (name.clone(), of(values, rows))).collect(),
             positions: self.positions.iter().map(|column| of(column, rows)).collect(),
             coordinates: self.coordinates,
             observed: rows

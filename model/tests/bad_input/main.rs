@@ -1,6 +1,7 @@
 //! Tests of user errors in a session, one test each. The message names the file, the line and what to do.
 
 mod document;
+mod driver_columns;
 mod foreign;
 mod hostile;
 mod instrument;

@@ -56,7 +56,9 @@ fn readings(machine: &Machine, rows: &[Vec<f64>]) -> Readings {
     Readings {
         run: (0..count).map(|row| 1 + row as i64 / 3).collect(),
         time_s: (0..count).map(|row| 0.25 * row as f64).collect(),
-        temperature_c: rows.iter().map(|row| 20.0 + row[9]).collect(),
+        drivers: [("temperature_c", 9), ("spindle_speed_rpm", 8)]
+            .map(|(name, column)| (name.to_string(), rows.iter().map(|row| 20.0 + row[column]).collect()))
+            .into(),
         positions: machine
             .axes
             .iter()
@@ -143,7 +145,8 @@ proptest! {
         let pairs = [
             (&found.observed, &readings.observed),
             (&found.time_s, &readings.time_s),
-            (&found.temperature_c, &readings.temperature_c),
+            (&found.drivers["temperature_c"], &readings.drivers["temperature_c"]),
+            (&found.drivers["spindle_speed_rpm"], &readings.drivers["spindle_speed_rpm"]),
         ];
         let positions = found.positions.iter().zip(&readings.positions);
         for (found, written) in pairs.into_iter().chain(positions) {

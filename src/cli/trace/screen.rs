@@ -1,7 +1,7 @@
 //! The first screen of `abbe trace`: verdict and uniqueness, the residual before and after, the effects with their
 //! aliases, the next measurement.
 
-use abbe::identify::results::{EffectName, EffectResult, TraceResult};
+use abbe::identify::results::{AliasResult, EffectResult, TraceResult};
 use abbe::identify::trace::TraceOutcome;
 use abbe::model::words::counted;
 
@@ -71,12 +71,13 @@ fn print_effect(number: usize, effect: &EffectResult, screened: usize, all: bool
     say!("   explains {} rms; {}", micrometres(effect.rms_gain_um), p_value(effect.p_value));
     say!("   {}", uniqueness::standing(effect, screened));
     let aliases = effect.aliases.iter();
-    let line = |(place, alias): (usize, &EffectName)| {
+    let line = |(place, alias): (usize, &AliasResult)| {
         let predicted = uniqueness::worse_prediction(effect, place);
         format!(
-            "or {}  ({}){}",
-            alias.meaning,
-            name(alias),
+            "or {}  ({}); {}{}",
+            alias.name.meaning,
+            name(&alias.name),
+            uniqueness::likelihood(alias),
             predicted.map_or(String::new(), |words| format!("; {words}"))
         )
     };

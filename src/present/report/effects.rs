@@ -139,16 +139,18 @@ fn alternatives(effect: &EffectResult, screened: usize) -> Markup {
                 thead {
                     tr {
                         th class="word-column" { "explanation" }
+                        th class="word-column" { "in place of the selected effect" }
                         @if effect.left_out_test_rms_um.is_some() { th class="word-column" { "left-out test" } }
                         @for number in 1..=tests.len() { th class="word-column" { "with test " (number) } }
                     }
                 }
                 tbody {
                     @let selected = vec!["selected".to_string(); tests.len()];
-                    (explanation(&effect.name, &with_prediction(effect, None, selected)))
+                    (explanation(&effect.name, "selected", &with_prediction(effect, None, selected)))
                     @for (place, alias) in effect.aliases.iter().enumerate() {
-                        @let separations = tests.iter().map(|test| separation(alias, test)).collect();
-                        (explanation(alias, &with_prediction(effect, Some(place), separations)))
+                        @let separations = tests.iter().map(|test| separation(&alias.name, test)).collect();
+                        @let cells = with_prediction(effect, Some(place), separations);
+                        (explanation(&alias.name, &uniqueness::likelihood(alias), &cells))
                     }
                 }
             }
@@ -178,11 +180,12 @@ fn with_prediction(effect: &EffectResult, alias: Option<usize>, mut cells: Vec<S
     cells
 }
 
-/// A row of the table of explanations: the effect, and what each test achieves.
-fn explanation(effect: &EffectName, outcomes: &[String]) -> Markup {
+/// A row of the table of explanations: the effect, its likelihood, and what each test achieves.
+fn explanation(effect: &EffectName, likelihood: &str, outcomes: &[String]) -> Markup {
     html! {
         tr {
             td class="word-column long" { (effect.meaning) br; span class="note" { (name(effect)) } }
+            td class="word-column" { (likelihood) }
             @for outcome in outcomes { td class="word-column" { (outcome) } }
         }
     }

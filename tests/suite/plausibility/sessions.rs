@@ -7,7 +7,7 @@ use abbe::model::session::Session;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
-use crate::plant::files::session_files;
+use crate::plant::files::{DriverColumns, session_files};
 use crate::plant::noise::{normal, traversal};
 use crate::plant::recipe::Row;
 use crate::plant::schedule::{Motion, with};
@@ -120,7 +120,7 @@ pub fn write(folder: &Path, step_deg: f64, mistake: Mistake, noise: Noise, seed:
             _ => {}
         }
     }
-    for (name, text) in session_files(&plan, &rows, false) {
+    for (name, text) in session_files(&plan, &rows, DriverColumns::default()) {
         std::fs::write(folder.join(name), mistaken(&text, mistake, wrong_bar_mm)).unwrap();
     }
 }

@@ -50,14 +50,22 @@ impl Columns<'_> {
     pub fn effect_columns(&self, effect: &Effect) -> Option<EffectColumns> {
         let channel = self.channel(effect)?;
         let key = (Arc::as_ptr(&channel.states) as usize, format!("{:?}", effect.shape));
-        let basis = cached(&self.bases, key, || basis_of(&effect.shape, &channel.states.samples));
+        let basis = cached(&self.bases, key, || self.basis(&effect.shape, &channel));
         Some(EffectColumns { count: effect.shape.coefficients(), numbers: effect.shape.numbers(), channel, basis })
     }
 
     /// The columns of an effect on the channel of another, which differs from it in the shape numbers alone.
     pub fn reshaped(&self, shape: &Shape, channel: &Arc<Channel>) -> EffectColumns {
-        let basis = basis_of(shape, &channel.states.samples);
+        let basis = self.basis(shape, channel);
         EffectColumns { count: shape.coefficients(), numbers: shape.numbers(), channel: Arc::clone(channel), basis }
+    }
+
+    /// The basis functions of a shape at the states of a channel.
+    fn basis(&self, shape: &Shape, channel: &Channel) -> Arc<Mat<f64>> {
+        let Some(driver) = &channel.lagging else { return basis_of(shape, &channel.states.samples) };
+        let acting = (0..channel.sensitivity.len()).filter(|test| channel.acts_in(*test));
+        let samples = acting.filter_map(|test| self.driver_samples(test, driver, None, shape.lag_s()));
+        basis_of(shape, &samples.flat_map(|of_test| of_test.to_vec()).collect::<Vec<_>>())
     }
 
     /// The channel of an effect. `None` if the data lack its driver.
@@ -66,7 +74,8 @@ impl Columns<'_> {
         let axis = effect.component.axis(machine);
         let part = effect.shape.uses();
         let name = driver_name(&effect.driver, axis);
-        let key = format!("{} {:?} {name} {part:?}", effect.component, effect.tests);
+        let lag_s = effect.shape.lag_s();
+        let key = format!("{} {:?} {name} {part:?} {}", effect.component, effect.tests, lag_s.is_some());
         cached(&self.channels, key, || {
             let coordinates = self.problem.coordinates();
             let mut greatest_factor = 0.0_f64;
@@ -77,7 +86,7 @@ impl Columns<'_> {
                 let mut of_driver = None;
                 if effect.acts_in(&test.name) {
                     let readings = test.readings.as_ref()?;
-                    of_driver = Some(self.driver_samples(number, &effect.driver, axis)?);
+                    of_driver = Some(self.driver_samples(number, &effect.driver, axis, lag_s)?);
                     for (slot, factor) in effect.component.slots_in(machine, test.station.kind().unknowns(), readings) {
                         let Some(slot) = self.slot_index[number].get(&slot) else { continue };
                         let derivative = &self.sensitivities[number].derivatives[*slot];
@@ -93,30 +102,47 @@ impl Columns<'_> {
                 samples.push(of_driver.filter(|_| !of_test.is_empty()));
                 sensitivity.push(of_test);
             }
-            let states = self.states(&name, &samples, part);
-            Some(Arc::new(Channel { sensitivity, states, greatest_factor }))
+            let lagging = lag_s.map(|_| effect.driver.clone());
+            let states = self.states(&name, &samples, part, lagging.is_some());
+            Some(Arc::new(Channel { sensitivity, states, greatest_factor, lagging }))
         })
     }
 
     /// The states of a driver in the tests with samples.
-    fn states(&self, name: &str, samples: &[Option<SharedSamples>], part: DriverPart) -> Arc<DriverStates> {
+    fn states(
+        &self,
+        name: &str,
+        samples: &[Option<SharedSamples>],
+        part: DriverPart,
+        lagging: bool,
+    ) -> Arc<DriverStates> {
         let tests: Vec<usize> = (0..samples.len()).filter(|test| samples[*test].is_some()).collect();
-        cached(&self.states, format!("{name} {part:?} {tests:?}"), || Arc::new(DriverStates::of(samples, part)))
+        let distinct = || if lagging { DriverStates::of_readings(samples) } else { DriverStates::of(samples, part) };
+        cached(&self.states, format!("{name} {part:?} {tests:?} {lagging}"), || Arc::new(distinct()))
     }
 
     /// The samples of a driver in a test. Some drivers, as the moment of gravity, differ from axis to axis.
-    fn driver_samples(&self, test: usize, driver: &Driver, axis: Option<usize>) -> Option<SharedSamples> {
+    fn driver_samples(
+        &self,
+        test: usize,
+        driver: &Driver,
+        axis: Option<usize>,
+        lag_s: Option<f64>,
+    ) -> Option<SharedSamples> {
         let readings = self.problem.tests[test].readings.as_ref()?;
-        cached(&self.samples, (test, driver_name(driver, axis)), || {
+        let sampled = || {
             let input = DriverInput {
                 machine: &self.problem.session.machine,
                 model: &self.problem.models[test],
                 readings,
                 reference: &self.problem.reference,
                 component_axis: axis,
+                lag_s,
             };
             driver.kind().samples(&input).map(Arc::new)
-        })
+        };
+        // A lag is a number that is tuned: its samples are used once.
+        if lag_s.is_some() { sampled() } else { cached(&self.samples, (test, driver_name(driver, axis)), sampled) }
     }
 
     /// The columns of a term on one coordinate of the readings of a test ([`Component::Reading`]). `by_direction`
@@ -134,9 +160,14 @@ impl Columns<'_> {
         };
         let test = self.problem.tests.iter().position(|test| test.name == *name)?;
         let part = effect.shape.uses();
-        let key = format!("{} {coordinate} {by_direction} {rows:?} {} {part:?}", effect.component, effect.driver);
+        let key = format!(
+            "{} {coordinate} {by_direction} {rows:?} {} {part:?} {}",
+            effect.component,
+            effect.driver,
+            effect.shape.lag_s().is_some()
+        );
         let channel = cached(&self.channels, key, || {
-            let samples = self.driver_samples(test, &effect.driver, None)?;
+            let samples = self.driver_samples(test, &effect.driver, None, effect.shape.lag_s())?;
             let coordinates = self.problem.coordinates();
             let turned = |row: usize| if by_direction { samples[row].direction } else { 1.0 };
             let inside = |row: usize| rows.is_none_or(|rows| rows.contains(&row));
@@ -147,8 +178,9 @@ impl Columns<'_> {
                 .collect();
             let mut of_tests = vec![None; self.problem.tests.len()];
             of_tests[test] = Some(samples);
-            let states = self.states(&effect.driver.to_string(), &of_tests, part);
-            Some(Arc::new(Channel { sensitivity, states, greatest_factor: 1.0 }))
+            let lagging = effect.shape.lag_s().map(|_| effect.driver.clone());
+            let states = self.states(&effect.driver.to_string(), &of_tests, part, lagging.is_some());
+            Some(Arc::new(Channel { sensitivity, states, greatest_factor: 1.0, lagging }))
         })?;
         Some(EffectColumns { numbers: 0, ..self.reshaped(&effect.shape, &channel) })
     }
@@ -272,7 +304,7 @@ mod tests {
     fn chunks_are_filled_in_order() {
         let column_sets = |counts: &[usize]| -> Vec<EffectColumns> {
             let states = Arc::new(DriverStates { samples: Vec::new(), of_reading: Vec::new() });
-            let channel = Arc::new(Channel { sensitivity: Vec::new(), states, greatest_factor: 1.0 });
+            let channel = Arc::new(Channel { sensitivity: Vec::new(), states, greatest_factor: 1.0, lagging: None });
             let of_count = |&count: &usize| EffectColumns {
                 count,
                 numbers: 0,

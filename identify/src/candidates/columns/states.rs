@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use abbe_model::driver::{DriverPart, DriverSample};
+use abbe_model::driver::{Driver, DriverPart, DriverSample};
 
 /// The distinct states of a driver, as far as the shapes that use one part of them can tell.
 #[derive(Debug)]
@@ -48,6 +48,19 @@ impl DriverStates {
         }
         DriverStates { samples: distinct, of_reading }
     }
+
+    /// A state for each reading, in the order of tests and readings: what an effect that lags behind its driver has
+    /// been following depends on all readings before.
+    pub fn of_readings(samples: &[Option<Arc<Vec<DriverSample<f64>>>>]) -> DriverStates {
+        let mut states = DriverStates { samples: Vec::new(), of_reading: Vec::new() };
+        for of_test in samples {
+            let rows = of_test.as_ref().map_or(&[][..], |samples| samples.as_slice());
+            let first = states.samples.len() as u32;
+            states.samples.extend_from_slice(rows);
+            states.of_reading.push((0..rows.len() as u32).map(|row| first + row).collect());
+        }
+        states
+    }
 }
 
 /// What moves the readings and what it follows. Effects that differ in their shapes alone share a channel.
@@ -60,6 +73,8 @@ pub struct Channel {
     pub states: Arc<DriverStates>,
     /// The largest absolute value of what multiplies the basis functions, other than the sensitivity of the component.
     pub greatest_factor: f64,
+    /// The driver of effects that lag behind it. Their samples depend on the time constant.
+    pub lagging: Option<Driver>,
 }
 
 impl Channel {

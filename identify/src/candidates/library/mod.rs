@@ -15,8 +15,10 @@ use shapes::shapes;
 
 const LIBRARY: &str = include_str!("library.toml");
 
-/// The words of the library for axes as drivers.
-const AXIS_DRIVERS: [&str; 4] = ["own", "own-rotary", "own-linear", "other"];
+/// The words of the library for drivers that a session names: axes, and columns of the data.
+const NAMED_DRIVERS: [&str; 5] = ["own", "own-rotary", "own-linear", "other", COLUMN];
+/// The word for each driver column of the data.
+const COLUMN: &str = "column";
 
 /// A family of effects in the library.
 #[derive(Clone, Debug, Deserialize)]
@@ -81,8 +83,8 @@ pub fn families() -> Result<Vec<Family>, IdentifyError> {
     let library: Library = toml::from_str(LIBRARY)
         .map_err(|fault| IdentifyError::Request(format!("the library of effects cannot be read: {fault}")))?;
     for family in &library.family {
-        let is_axis = matches!(Driver::parse(&family.driver), Driver::Axis(_));
-        if is_axis && !AXIS_DRIVERS.contains(&family.driver.as_str()) || !shapes::is_known(&family.shape) {
+        let is_named = matches!(Driver::parse(&family.driver), Driver::Axis(_));
+        if is_named && !NAMED_DRIVERS.contains(&family.driver.as_str()) || !shapes::is_known(&family.shape) {
             let fault = format!("the library of effects has an unknown driver or shape in \"{}\"", family.name);
             return Err(IdentifyError::Request(fault));
         }
@@ -226,13 +228,11 @@ fn drivers(problem: &Problem, sampling: &Sampling, choice: &str, component: &Com
             .filter(|axis| sampling.moves[*axis] && Some(*axis) != own)
             .map(|axis| Driver::Axis(machine.axes[axis].name.clone()))
             .collect(),
+        COLUMN => sampling.columns.iter().map(|column| Driver::Column(column.name.clone())).collect(),
         word => {
             let driver = Driver::parse(word);
-            let recorded = Recorded {
-                time: sampling.has_time,
-                temperature: sampling.has_temperature,
-                swept: !sampling.is_poses(),
-            };
+            let columns: Vec<&str> = sampling.columns.iter().map(|column| column.name.as_str()).collect();
+            let recorded = Recorded { time: sampling.has_time, columns: &columns, swept: !sampling.is_poses() };
             let kind = own.map(|axis| machine.axes[axis].kind);
             let observable = driver.kind().is_observable(&recorded, kind);
             observable.then_some(driver).into_iter().collect()

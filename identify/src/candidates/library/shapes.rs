@@ -9,7 +9,7 @@ use abbe_model::effect::{Component, Shape};
 use abbe_model::instrument::SharedBy;
 
 use super::Family;
-use crate::candidates::sampling::Sampling;
+use crate::candidates::sampling::{ColumnSampling, Sampling};
 use crate::problem::Problem;
 
 /// A constant in the tests of one mount of a set-up component.
@@ -18,6 +18,8 @@ const CONSTANT_PER_MOUNT: &str = "constant-per-mount";
 /// [`LOW_ORDER`].
 const HARMONIC_LOW: &str = "harmonic-low";
 const LOW_ORDER: usize = 2;
+/// A power of the driver.
+const POWER: &str = "power";
 
 /// A shape, the tests to which it is confined, and its cost in addition to that of its family.
 type Member = (Shape, Vec<String>, f64);
@@ -46,14 +48,24 @@ pub(super) fn shapes(
     };
     let members = if family.shape != HARMONIC_LOW {
         sampled.numbers.clone_from(&family.numbers);
+        if let Some(column) = column(sampling, driver) {
+            // A power that distinguishes no more levels than a lower one is the same effect.
+            sampled.numbers.retain(|number| family.shape != POWER || *number < column.levels as f64);
+        }
         members_of(&family.shape, &sampled)
     } else if sampled.rotary {
         Harmonic::up_to(LOW_ORDER)
     } else {
         sampled.numbers = (1..=LOW_ORDER).map(|degree| degree as f64).collect();
-        members_of("power", &sampled)
+        members_of(POWER, &sampled)
     };
     members.into_iter().map(|(shape, cost)| (shape, Vec::new(), cost)).collect()
+}
+
+/// The sampling of a column; `None` for other drivers.
+fn column<'s>(sampling: &'s Sampling, driver: &Driver) -> Option<&'s ColumnSampling> {
+    let Driver::Column(name) = driver else { return None };
+    sampling.columns.iter().find(|column| column.name == *name)
 }
 
 /// The sampling of a driver.
@@ -71,6 +83,7 @@ fn sampled(problem: &Problem, sampling: &Sampling, component: &Component, driver
         duration_s: sampling.duration_s,
         default_scale: driver.kind().default_scale(driver.kind_of_axis(machine, component.axis(machine))),
         numbers: Vec::new(),
+        between_levels: column(sampling, driver).map_or_else(Vec::new, |column| column.between.clone()),
     }
 }
 

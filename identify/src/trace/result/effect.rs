@@ -12,8 +12,13 @@ use crate::fit::Fit;
 use crate::fit::families::effective_parameters;
 use crate::parameters::{Parameter, Role};
 use crate::problem::Problem;
-use crate::results::{EffectName, EffectResult, LargestOrder, ParameterResult, PriorResult, ShapeParameter};
+use crate::results::{
+    AliasResult, EffectName, EffectResult, LargestOrder, ParameterResult, PriorResult, ShapeParameter,
+};
 use abbe_model::effect::description::{explanations, meaning};
+
+/// Largest exponent of a likelihood ratio that is a finite number.
+const LARGEST_EXPONENT: f64 = 700.0;
 
 /// The name of an effect in results.
 pub fn effect_name(machine: &Machine, effect: &Effect) -> EffectName {
@@ -39,6 +44,8 @@ pub(super) struct Found<'f> {
     pub rms_gain_um: f64,
     /// The effects with which it is confounded.
     pub alias_effects: &'f [Effect],
+    /// Increase of χ² by each of these in its place.
+    pub delta_chi2: &'f [f64],
     /// The left-out tests that the effect and its aliases predict.
     pub predicted: &'f Predictions,
 }
@@ -57,6 +64,12 @@ pub(super) fn result(
     let machine = &after.session.machine;
     let alike = std::iter::once(&candidate.effect).chain(found.alias_effects);
     let meanings: Vec<_> = alike.map(|effect| meaning(machine, effect)).collect();
+    let alias = |(effect, delta_chi2): (&Effect, &f64)| AliasResult {
+        name: effect_name(machine, effect),
+        shape_parameters: shape_parameters_of(after, effect),
+        delta_chi2: *delta_chi2,
+        likelihood_ratio: (-0.5 * delta_chi2).min(LARGEST_EXPONENT).exp(),
+    };
     EffectResult {
         family: families.get(candidate.family).map(|family| family.name.clone()).unwrap_or_default(),
         p_value: taken.p_value,
@@ -65,7 +78,7 @@ pub(super) fn result(
         unique: found.alias_effects.is_empty(),
         explanation_count: meanings.len(),
         explanations: explanations(&meanings),
-        aliases: (found.alias_effects.iter()).map(|effect| effect_name(machine, effect)).collect(),
+        aliases: found.alias_effects.iter().zip(found.delta_chi2).map(alias).collect(),
         left_out_test_rms_um: found.predicted.found_um,
         aliases_left_out_test_rms_um: match found.predicted.found_um {
             Some(_) => found.predicted.aliases_um.clone(),
@@ -164,7 +177,8 @@ fn shape_parameters_of(problem: &Problem, effect: &Effect) -> Vec<ShapeParameter
     let number = |(name, values): (&str, Vec<f64>)| ShapeParameter {
         name: name.to_string(),
         values: values.into_iter().map(|value| unit.to_display(value)).collect(),
-        unit: unit.result.to_string(),
+        // The number of a lag is its time constant.
+        unit: if effect.shape.lag_s().is_some() { "s" } else { unit.result }.to_string(),
     };
     effect.shape.reported().into_iter().map(number).collect()
 }

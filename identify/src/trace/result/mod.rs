@@ -68,6 +68,7 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
     let mut gains = Vec::new();
     let mut moves = Vec::new();
     let mut predicted = Vec::new();
+    let mut delta_chi2 = Vec::new();
     let variance = residual_variance(findings);
     for (k, taken) in search.selected().iter().enumerate() {
         let model = search.model_without(Some(k))?;
@@ -77,6 +78,7 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
         let named = model.with_candidate(taken.candidate)?.0;
         let effect_of = |alias: &Alias| search.effect(alias.candidate).clone();
         alias_effects.push(aliases.iter().map(effect_of).collect());
+        delta_chi2.push(aliases.iter().map(|alias| alias.delta_chi2).collect::<Vec<_>>());
         let in_its_place = |alias: &Alias| moves_by(findings, k, &alias.model_coefficients, &named);
         moves.push(aliases.iter().map(in_its_place).collect::<Vec<_>>());
         gains.push(model.gain(taken.candidate)?.gain);
@@ -92,6 +94,7 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
                 moves: &moves,
                 rms_gain_um: (gains[k] / held_out.rows).sqrt() * before.noise.sigma_mm * 1e3,
                 alias_effects: &alias_effects[k],
+                delta_chi2: &delta_chi2[k],
                 predicted: &predicted[k],
             };
             effect::result(findings, &families, &held_out, &reported)

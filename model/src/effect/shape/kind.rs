@@ -42,6 +42,8 @@ pub enum Follows {
     RotaryAxis,
     /// Time.
     Time,
+    /// A column of the data.
+    Column,
 }
 
 impl Follows {
@@ -59,6 +61,9 @@ impl Follows {
             }
             Follows::Axis if kind.is_none() => Err("its driver must be an axis"),
             Follows::Time if *driver != Driver::Time => Err("its driver must be \"time\""),
+            Follows::Column if !matches!(driver, Driver::Column(_)) => {
+                Err("its driver must be a column of the data, such as \"spindle_temperature_c\"")
+            }
             _ => Ok(()),
         }
     }
@@ -68,7 +73,7 @@ impl Follows {
         match self {
             Follows::Time => Some(Driver::Time),
             Follows::Nothing => Some(Driver::None),
-            Follows::Anything | Follows::Axis | Follows::RotaryAxis => None,
+            Follows::Anything | Follows::Axis | Follows::RotaryAxis | Follows::Column => None,
         }
     }
 }
@@ -134,6 +139,11 @@ pub trait ShapeKind {
     /// The quantities of the driver that its basis functions use.
     fn uses(&self) -> DriverPart {
         DriverPart::Value
+    }
+    /// Time constant of the first-order lag by which the effect follows its driver, s; `None` for an effect that follows
+    /// it without delay.
+    fn lag_s(&self) -> Option<f64> {
+        None
     }
     /// The dimension of coefficient `k`.
     fn per(&self, k: usize) -> Per {

@@ -82,6 +82,7 @@ shapes! {
     reversal_spike: ReversalSpike(ReversalSpike),
     drift: Drift,
     warmup: Warmup(Warmup),
+    first_order_lag: FirstOrderLag(FirstOrderLag),
     steps: Steps(Steps),
     local: Local(Local),
 }

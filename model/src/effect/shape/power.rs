@@ -47,7 +47,7 @@ impl ShapeKind for Power {
     }
     fn describe(&self, words: &EffectWords) -> String {
         let EffectWords { motion, driver, .. } = words;
-        match (self.degree, words.proportional) {
+        match (self.degree, &words.proportional) {
             (1, Some(proportional)) => format!("{motion}{proportional}"),
             (1, None) => format!("{motion} in proportion to {driver}"),
             (2, _) => format!("{motion} with the square of {driver}"),

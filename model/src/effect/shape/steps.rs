@@ -28,8 +28,12 @@ pub(super) const ENTRY: Entry = Entry {
     members,
 };
 
-/// A single step at each position, and the dictionary of all positions, from which a search composes a table.
+/// A single step between the levels of a driver column; along an axis at each position, with the dictionary of all positions, from which a search composes a table.
 fn members(sampled: &Sampled) -> Vec<(Shape, f64)> {
+    if !sampled.between_levels.is_empty() {
+        let single = |position: &f64| (Shape::Steps(Steps { at: vec![*position] }), 0.0);
+        return sampled.between_levels.iter().map(single).collect();
+    }
     let Some([low, _]) = sampled.ends.filter(|_| !sampled.poses && sampled.step > 0.0) else {
         return Vec::new();
     };

@@ -12,7 +12,7 @@ pub struct Warmup {
     pub tau_s: f64,
 }
 
-const TAU_S: Key = Key { name: "tau_s", form: KeyForm::Positive, meaning: "time constant, s" };
+pub(super) const TAU_S: Key = Key { name: "tau_s", form: KeyForm::Positive, meaning: "time constant, s" };
 
 pub(super) const ENTRY: Entry = Entry {
     word: "warmup",

@@ -12,7 +12,7 @@ pub struct EffectWords {
     /// ` of the X slide` if the effect follows another axis, else empty.
     pub of_another_axis: String,
     /// The words for proportionality to this driver, if it has its own: ` under gravity (compliance)`.
-    pub proportional: Option<&'static str>,
+    pub proportional: Option<String>,
     /// Whether the component is the positioning error of the axis that it follows.
     pub is_positioning: bool,
     /// The unit of the driver.

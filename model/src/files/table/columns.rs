@@ -6,17 +6,19 @@ use super::encoding::name_of;
 use super::number::number;
 use super::request::{ColumnMapping, ForeignColumn, Request};
 use super::row::Row;
+use crate::driver::column;
 use crate::error::{Location, ModelError};
 use crate::files::quantity::{self, Unit};
 use crate::files::spelling::suggestion;
 use crate::instrument::column::Quantity;
 
 /// The content of a column.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) enum Role {
     Time,
     Run,
-    Temperature,
+    /// A driver column, `NAME_unit`.
+    Driver(String),
     Axis(usize, Unit),
     /// A column of the instrument's readings.
     Reading(Quantity, Unit),
@@ -39,8 +41,10 @@ impl Role {
         match name {
             "time_s" => return Some(Role::Time),
             "run" => return Some(Role::Run),
-            "temperature_c" => return Some(Role::Temperature),
             _ => {}
+        }
+        if let Some(own) = column::of_files(name) {
+            return Some(Role::Driver(own.to_string()));
         }
         let own = request.test.station.columns();
         if own.iter().any(|column| column.unit.is_empty() && column.stem == name) {
@@ -56,7 +60,7 @@ impl Role {
     }
 
     /// Whether two columns contain the same quantity.
-    fn same_as(self, other: Role) -> bool {
+    fn same_as(&self, other: &Role) -> bool {
         match (self, other) {
             (Role::Axis(a, _), Role::Axis(b, _)) => a == b,
             (Role::Reading(Quantity::Coordinate(a), _), Role::Reading(Quantity::Coordinate(b), _)) => a == b,
@@ -73,7 +77,8 @@ pub(super) fn known(request: &Request<'_>) -> Vec<String> {
         let unit = axis.kind.unit();
         known.push(format!("{}_{unit}", axis.name.to_lowercase()));
     }
-    known.push("temperature_c".into());
+    known.push(column::TEMPERATURE.into());
+    known.push(format!("{}NAME_unit", column::PREFIX));
     known.extend(request.test.station.columns().iter().map(|column| column.name(column.unit)));
     known
 }
@@ -100,7 +105,7 @@ pub(super) fn columns(
         None => own_columns(request, file, header)?,
     };
     for (index, column) in columns.iter().enumerate() {
-        if let Some(other) = columns[..index].iter().find(|other| other.role.same_as(column.role)) {
+        if let Some(other) = columns[..index].iter().find(|other| other.role.same_as(&column.role)) {
             return Err(ModelError::Input {
                 location: Location::line(file, line),
                 message: format!("columns `{}` and `{}` have the same meaning", other.name, column.name),
@@ -150,6 +155,9 @@ fn unknown_column_help(request: &Request<'_>, name: &str, header: &[String], kno
     if name.parse::<f64>().is_ok() {
         return NO_HEADER.into();
     }
+    if name.starts_with(column::PREFIX) {
+        return column::help_on_name();
+    }
     let id_stem = name.rsplit_once('_').map_or(name, |(id_stem, _)| id_stem);
     if let Some(help) = request.test.station.help_on_column(id_stem) {
         return help.into();
@@ -180,10 +188,11 @@ fn mapped_columns(
         };
         let Some(role) = Role::of(&entry.own, request).or_else(|| Role::of(&entry.own.to_lowercase(), request)) else {
             let known = known(request);
-            return Err(fault(
-                format!("[columns] has the unknown column `{}`", entry.own),
-                format!("{}valid names are {}", suggestion(&entry.own, &known), listed(&known)),
-            ));
+            let help = match entry.own.starts_with(column::PREFIX) {
+                true => column::help_on_name(),
+                false => format!("{}valid names are {}", suggestion(&entry.own, &known), listed(&known)),
+            };
+            return Err(fault(format!("[columns] has the unknown column `{}`", entry.own), help));
         };
         let index = match &entry.foreign {
             ForeignColumn::Number(number) => number_in(*number, file, first.cells.len()),

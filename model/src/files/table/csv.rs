@@ -10,6 +10,7 @@ use super::lines::Lines;
 use super::request::Request;
 use super::row::Row;
 use crate::chain::Machine;
+use crate::driver::column;
 use crate::error::ModelError;
 use crate::instrument::Station;
 use crate::instrument::column::{Column, Quantity};
@@ -98,9 +99,7 @@ pub fn text(machine: &Machine, station: &Station<f64>, readings: &Readings) -> S
     for axis in &machine.axes {
         header.push(axis.column(""));
     }
-    if !readings.temperature_c.is_empty() {
-        header.push("temperature_c".into());
-    }
+    header.extend(readings.drivers.keys().map(|name| column::in_files(name).into_owned()));
     let is_reading = |column: &&Column| matches!(column.quantity, Quantity::Length | Quantity::Coordinate(_));
     header.extend(station.columns().iter().filter(is_reading).map(|column| column.name("mm")));
     let mut text = header.join(",");
@@ -116,9 +115,7 @@ pub fn text(machine: &Machine, station: &Station<f64>, readings: &Readings) -> S
         for (axis, column) in machine.axes.iter().zip(&readings.positions) {
             cells.push(decimal(axis.kind.to_display(column[row])));
         }
-        if let Some(temperature) = readings.temperature_c.get(row) {
-            cells.push(decimal(*temperature));
-        }
+        cells.extend(readings.drivers.values().filter_map(|values| values.get(row)).map(|value| decimal(*value)));
         if station.kind().entry().has_readings {
             let start = row * readings.coordinates;
             for k in start..start + readings.coordinates {

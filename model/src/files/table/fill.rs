@@ -146,7 +146,7 @@ impl<'a> ReadingColumns<'a> {
                 help: Some(help.to_string()),
             };
             let value = number(cell, &self.request.format).map_err(|(message, help)| fault(message, help))?;
-            match column.role {
+            match &column.role {
                 Role::Time => {
                     if let Some(&before) = readings.time_s.last()
                         && let Some(message) = check::decreasing_time(before, value)
@@ -167,9 +167,12 @@ impl<'a> ReadingColumns<'a> {
                     }
                     readings.run.push(value as i64);
                 }
-                Role::Temperature => readings.temperature_c.push(value),
+                Role::Driver(name) => match readings.drivers.get_mut(name) {
+                    Some(values) => values.push(value),
+                    None => _ = readings.drivers.insert(name.clone(), vec![value]),
+                },
                 Role::Axis(axis, unit) => {
-                    if let Some(last) = readings.positions[axis].last_mut() {
+                    if let Some(last) = readings.positions[*axis].last_mut() {
                         *last = unit.to_internal(value);
                     }
                 }
@@ -179,7 +182,7 @@ impl<'a> ReadingColumns<'a> {
                         Quantity::Length => observed[0] = value,
                         Quantity::Deviation => observed[0] = self.request.bar_mm() + value,
                         Quantity::Outward => observed[0] = -value,
-                        Quantity::Coordinate(i) => observed[i] = value,
+                        Quantity::Coordinate(i) => observed[*i] = value,
                         Quantity::Socket => {}
                     }
                 }

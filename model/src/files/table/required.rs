@@ -16,7 +16,7 @@ pub(super) fn required(
     columns: &[Column],
     header: Option<&[String]>,
 ) -> Result<(), ModelError> {
-    let has = |accepted: &dyn Fn(Role) -> bool| columns.iter().any(|column| accepted(column.role));
+    let has = |accepted: &dyn Fn(&Role) -> bool| columns.iter().any(|column| accepted(&column.role));
     let found = || match header {
         Some(header) => format!("; found: {}", listed(header)),
         None => String::new(),
@@ -29,8 +29,8 @@ pub(super) fn required(
         })
     };
     let reads = |quantity: Quantity| match quantity {
-        Quantity::Socket => request.test.socket.is_some() || has(&|role| role == Role::Socket),
-        quantity => has(&|role| matches!(role, Role::Reading(own, _) if own == quantity)),
+        Quantity::Socket => request.test.socket.is_some() || has(&|role| *role == Role::Socket),
+        quantity => has(&|role| matches!(role, Role::Reading(own, _) if *own == quantity)),
     };
     if let Some((what, help)) = request.test.station.missing(&reads) {
         return missing(what, help);
@@ -39,7 +39,7 @@ pub(super) fn required(
         request.machine,
         request.instrument(),
         |axis| request.at_listed.get(axis).copied().unwrap_or(false),
-        |axis| has(&|role| matches!(role, Role::Axis(i, _) if i == axis)),
+        |axis| has(&|role| matches!(role, Role::Axis(i, _) if *i == axis)),
         &request.moved(),
     );
     match missed {

@@ -1,9 +1,11 @@
 //! Reader of `[[effect]]`: component × driver × shape.
 
+use std::collections::BTreeSet;
+
 use super::shape::ShapeKeys;
 use super::{Context, Declared, prior, quantity};
 use crate::component::ErrorKind;
-use crate::driver::Driver;
+use crate::driver::{Driver, column};
 use crate::effect::shape::{Entry, SHAPES};
 use crate::effect::{Component, Effect, Shape};
 use crate::error::ModelError;
@@ -11,13 +13,20 @@ use crate::files::spelling::known_names;
 use crate::files::toml::document::{Table, Value};
 
 /// Reads one `[[effect]]`.
-pub(super) fn effect(context: &Context<'_>, declared: &[Declared], item: Value<'_>) -> Result<Effect, ModelError> {
+///
+/// `columns` are the driver columns of the data, `NAME_unit`.
+pub(super) fn effect(
+    context: &Context<'_>,
+    declared: &[Declared],
+    columns: &BTreeSet<String>,
+    item: Value<'_>,
+) -> Result<Effect, ModelError> {
     let mut table = item.table("[[effect]]".into())?;
     let component = component(context, &mut table)?;
     let word_value = table.require("shape", "the dependence of the component on the driver, such as \"harmonic\"")?;
     let word = word_value.text()?;
     let entry = Shape::entry_of(&word);
-    let driver = driver(context, &mut table, &component, entry)?;
+    let driver = driver(context, &mut table, &component, entry, columns)?;
     let Some(entry) = entry else {
         let words: Vec<&str> = SHAPES.iter().map(|entry| entry.word).collect();
         return Err(word_value.error(format!("\"{word}\" is not a shape"), Some(known_names(&word, &words))));
@@ -89,6 +98,7 @@ fn driver(
     table: &mut Table<'_>,
     component: &Component,
     shape: Option<&Entry>,
+    columns: &BTreeSet<String>,
 ) -> Result<Driver, ModelError> {
     let Some(value) = table.take("driver") else {
         return match (shape.and_then(|entry| entry.follows.default_driver()), component) {
@@ -102,16 +112,20 @@ fn driver(
         };
     };
     let text = value.text()?;
-    let driver = match Driver::parse(&text) {
-        Driver::Axis(name) => match quantity::axis_index(context.machine, &name) {
-            Some(index) => Driver::Axis(context.machine.axes[index].name.clone()),
-            None => {
-                let (message, help) = quantity::no_axis(context.machine, &name);
-                let help = format!("{help}; other drivers are {}", listed(&Driver::words(), "and"));
-                return Err(value.error(format!("effect driven by \"{text}\": {message}"), Some(help)));
-            }
-        },
-        other => other,
+    let axis = quantity::axis_index(context.machine, &text);
+    // A column may be named without its unit if no other column has its name.
+    let of_quantity: Vec<&String> = columns.iter().filter(|name| column::quantity(name) == text).collect();
+    let driver = match (Driver::parse(&text), axis, &of_quantity[..]) {
+        (Driver::Axis(_) | Driver::Column(_), Some(index), _) => Driver::Axis(context.machine.axes[index].name.clone()),
+        (Driver::Axis(_), None, [name]) => Driver::Column((*name).clone()),
+        (Driver::Axis(_), None, _) => {
+            let (message, help) = quantity::no_axis(context.machine, &text);
+            let columns = columns.iter().map(String::as_str);
+            let others: Vec<&str> = Driver::words().into_iter().chain(columns).collect();
+            let help = format!("{help}; other drivers are {}, and columns as NAME_unit", listed(&others, "and"));
+            return Err(value.error(format!("effect driven by \"{text}\": {message}"), Some(help)));
+        }
+        (other, ..) => other,
     };
     let own = component.axis(context.machine).map(|axis| context.machine.axes[axis].kind);
     let checked = driver.kind().check_component(&component.to_string(), own);

@@ -1,5 +1,6 @@
 //! Reader of `[format]` and `[columns]`: the layout of foreign files.
 
+use crate::driver::column;
 use crate::error::ModelError;
 use crate::files::table::encoding;
 use crate::files::table::request::{ColumnMapping, ForeignColumn, Format};
@@ -67,13 +68,23 @@ fn one_of(value: &Value<'_>, known: &[u8]) -> Result<u8, ModelError> {
 /// Reads `[columns]`: own name = foreign name or number.
 pub(super) fn columns(mut table: Table<'_>) -> Result<Vec<ColumnMapping>, ModelError> {
     let mut columns = Vec::new();
+    let mut entries = Vec::new();
     for entry in table.remaining_values()? {
+        if format!("{}.", entry.key) != column::PREFIX {
+            entries.push((entry.key.clone(), entry));
+            continue;
+        }
+        // An unquoted `driver.NAME_unit` is a table in TOML.
+        let own = entry.table("[columns.driver]".into())?.remaining_values()?;
+        entries.extend(own.into_iter().map(|entry| (format!("{}{}", column::PREFIX, entry.key), entry)));
+    }
+    for (own, entry) in entries {
         let foreign = match entry.as_text() {
             Some(text) => ForeignColumn::Name(text.trim().to_string()),
             None => ForeignColumn::Number(entry.count(1, 1_000_000)?),
         };
         columns.push(ColumnMapping {
-            own: entry.key.clone(),
+            own,
             foreign,
             location: entry.source.location(entry.key_span.start..entry.span.end),
         });

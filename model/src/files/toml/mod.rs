@@ -18,6 +18,7 @@ mod test;
 mod unknowns;
 pub mod write;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -28,6 +29,7 @@ use super::source_map::SourceMap;
 use super::stamp::FileStamp;
 use super::table::request::{ColumnMapping, Format};
 use crate::chain::Machine;
+use crate::driver::column;
 use crate::error::{Location, ModelError};
 use crate::instrument::InstrumentKind;
 use crate::session::expression::{Constant, Length};
@@ -158,11 +160,12 @@ pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Sessi
     for (index, test) in tests.iter().enumerate() {
         found.warnings.extend(setups::differing(&tests[..index], test));
     }
+    let columns = driver_columns(&context, &tests);
     let effects = match root.take("effect") {
         Some(value) => value
             .list("tables [[effect]]")?
             .into_iter()
-            .map(|item| effect::effect(&context, &declared, item))
+            .map(|item| effect::effect(&context, &declared, &columns, item))
             .collect::<Result<Vec<_>, _>>()?,
         None => Vec::new(),
     };
@@ -195,6 +198,13 @@ pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Sessi
         machine: Arc::new(machine),
     };
     Ok((session, sources))
+}
+
+/// The driver columns of the data, and those that `[columns]` names.
+fn driver_columns(context: &Context<'_>, tests: &[Test]) -> BTreeSet<String> {
+    let recorded = tests.iter().filter_map(|test| test.readings.as_ref()).flat_map(|readings| readings.drivers.keys());
+    let named = context.columns.iter().flatten().filter_map(|entry| column::of_files(&entry.own));
+    recorded.cloned().chain(named.map(str::to_string)).collect()
 }
 
 /// What was found while the tests were read, beside the tests.

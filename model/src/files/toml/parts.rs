@@ -3,6 +3,7 @@
 //! Files of other formats (a saved model) hold machines and effects with the same keys. They convert their values to
 //! TOML and back, so that there is one writer and one reader.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -109,7 +110,7 @@ pub fn effects_of_text(
         Some(value) => value.list("tables [[effect]]")?,
         None => Vec::new(),
     };
-    let effects = effects.into_iter().map(|item| effect::effect(&context, &declared, item)).collect();
+    let effects = effects.into_iter().map(|item| effect::effect(&context, &declared, &BTreeSet::new(), item)).collect();
     root.finish()?;
     effects
 }
