@@ -8,10 +8,12 @@
 //! - [`test_variations`], [`candidate_tests`], [`criterion`], [`mod@improve`], [`separate`]: the next test;
 //!   [`mod@range`]: how far a sweep can shrink;
 //! - [`states`], [`linear`], [`sensitivity`], [`budget`], [`identifiability`], [`indices`]: the parts of the analysis;
+//! - [`bias`]: the bias by each undeclared effect; [`structure`]: ranks and base parameters;
 //! - [`results`]: the results, as they are written to JSON.
 
 mod analysis;
 mod ball_positions;
+pub mod bias;
 pub mod budget;
 pub(crate) mod candidate_information;
 mod candidate_layout;
@@ -31,6 +33,7 @@ pub mod results;
 pub mod sensitivity;
 pub mod separate;
 pub mod states;
+pub mod structure;
 mod sweep;
 pub mod test_variations;
 
