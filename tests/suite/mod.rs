@@ -31,6 +31,7 @@ mod model_commands;
 mod new;
 mod nist;
 mod one_answer;
+mod paper;
 mod patterns;
 mod plan_command;
 mod plan_help;

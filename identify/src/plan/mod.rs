@@ -9,6 +9,7 @@
 //!   [`mod@range`]: how far a sweep can shrink;
 //! - [`states`], [`linear`], [`sensitivity`], [`budget`], [`identifiability`], [`indices`]: the parts of the analysis;
 //! - [`bias`]: the bias by each undeclared effect; [`structure`]: ranks and base parameters;
+//! - [`mod@global`]: Sobol' indices of the estimates;
 //! - [`results`]: the results, as they are written to JSON.
 
 mod analysis;
@@ -22,6 +23,7 @@ pub mod clearance;
 pub mod criterion;
 pub(crate) mod detectability;
 pub mod effects;
+pub mod global;
 pub mod identifiability;
 pub mod improve;
 pub mod indices;

@@ -12,7 +12,7 @@
 //! ball on an axis, two axes that intersect.
 //!
 //! A base parameter is an identifiable combination. Where the null space has the combination `Σ n_j β_j` with pivot `p`
-//! and `n_p = 1`, the parameters `β_j − n_j β_p` are identifiable (Khalil & Gautier, Proc. IEEE ICRA (1991) 576).
+//! and `n_p = 1`, the parameters `β_j − n_j β_p` are identifiable (Khalil & Gautier, Proc. IFAC Identification (1991) 576).
 
 use std::collections::HashMap;
 use std::sync::Arc;
