@@ -80,8 +80,8 @@ pub struct PaperArguments {
     /// Two columns.
     #[arg(long)]
     two_column: bool,
-    /// Undeclared effects of the bias table, by their identifiers [default: of location errors that are not estimated and
-    /// harmonics of orders 1 and 2 of error motions, those with the largest bias].
+    /// Undeclared effects of the bias table, by their identifiers [default: of location errors that are not estimated
+    /// and harmonics of orders 1 and 2 of error motions, those with the largest bias].
     ///
     /// Example: --effects EZC~C:h2,EAC~C:h1
     #[arg(long, value_name = "EFFECT,…", value_delimiter = ',')]

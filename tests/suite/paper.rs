@@ -1,5 +1,5 @@
-//! `abbe paper`: the folder compiles without a warning in every class, its numbers are those of the library, and invalid
-//! requests are refused.
+//! `abbe paper`: the folder compiles without a warning in every class, its numbers are those of the library, and
+//! invalid requests are refused.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -75,7 +75,8 @@ impl BiasRow {
 }
 
 impl BiasTable {
-    /// The rows of the `count` effects with the largest bias, in descending order. An effect keeps all its coefficients.
+    /// The rows of the `count` effects with the largest bias, in descending order. An effect keeps all its
+    /// coefficients.
     pub fn largest(mut self, count: usize) -> BiasTable {
         let mut largest: BTreeMap<&str, f64> = BTreeMap::new();
         for row in &self.rows {
@@ -92,8 +93,8 @@ impl BiasTable {
     }
 }
 
-/// The effects that a bias table usually lists: location errors that the plan does not estimate, and harmonics of orders
-/// 1 and 2 of each error motion over its own axis. Only those that the library has for this plan.
+/// The effects that a bias table usually lists: location errors that the plan does not estimate, and harmonics of
+/// orders 1 and 2 of each error motion over its own axis. Only those that the library has for this plan.
 ///
 /// # Errors
 /// If the library cannot be read.
@@ -179,8 +180,8 @@ mod tests {
     use crate::quantity::Given;
     use crate::simulate::{Simulation, simulate};
 
-    /// A session is simulated with 1 µm (1″) of each usual effect of a plan and fitted without it. The estimates are the
-    /// biases of the table, and the residual is what the table says remains, both within 1 %.
+    /// A session is simulated with 1 µm (1″) of each usual effect of a plan and fitted without it. The estimates are
+    /// the biases of the table, and the residual is what the table says remains, both within 1 %.
     #[test]
     fn biases_are_those_of_fits_of_simulated_sessions() {
         for (name, count) in [("hermle-c600u/chapter5.toml", 8), ("r-test/plan.toml", 3)] {

@@ -8,11 +8,12 @@
 //! | numerical | of the plan | of the plan | of the plan |
 //!
 //! The structural rank is the maximum over the lengths of the set-up (Bellman & Åström, Math. Biosci. 7 (1970) 329). It
-//! is that of almost every geometry, so a few random ones decide it. A plan whose rank is lower has a special geometry: a
-//! ball on an axis, two axes that intersect.
+//! is that of almost every geometry, so a few random ones decide it. A plan whose rank is lower has a special geometry:
+//! a ball on an axis, two axes that intersect.
 //!
 //! A base parameter is an identifiable combination. Where the null space has the combination `Σ n_j β_j` with pivot `p`
-//! and `n_p = 1`, the parameters `β_j − n_j β_p` are identifiable (Khalil & Gautier, Proc. IFAC Identification (1991) 576).
+//! and `n_p = 1`, the parameters `β_j − n_j β_p` are identifiable (Khalil & Gautier, Proc. IFAC Identification (1991)
+//! 576).
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -198,9 +199,9 @@ mod tests {
         states::problem_by_test(&plan, Noise::white(3e-4, NoiseSource::Stated)).unwrap()
     }
 
-    /// A test of A alone with known balls. `L²` is a constant, a cosine and a sine of A whatever the errors of A, so that
-    /// no geometry has more than three identifiable combinations. With the bar in the plane of the circle (D = 0), Eq. 3.20
-    /// of Jiang (2014) has no angle of A to first order, and two positions remain.
+    /// A test of A alone with known balls. `L²` is a constant, a cosine and a sine of A whatever the errors of A, so
+    /// that no geometry has more than three identifiable combinations. With the bar in the plane of the circle (D = 0),
+    /// Eq. 3.20 of Jiang (2014) has no angle of A to first order, and two positions remain.
     #[test]
     fn a_special_geometry_has_a_lower_rank_than_a_generic_one() {
         let only = |session: &mut Session| {

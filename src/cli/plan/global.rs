@@ -12,8 +12,8 @@ use crate::present::plan::global as present;
 /// Global sensitivity.
 #[derive(Args)]
 pub struct GlobalArguments {
-    /// Sobol' indices of each identified error by set-up errors, noise and undeclared effects, with the full fit, beside
-    /// the linear prediction.
+    /// Sobol' indices of each identified error by set-up errors, noise and undeclared effects, with the full fit,
+    /// beside the linear prediction.
     #[arg(long, conflicts_with_all = ["improve", "separate", "range", "patterns", "report", "plots", "clearance_mm"])]
     global: bool,
     /// Size of an input of --global: half the range of an undeclared effect, or the standard deviation of a set-up

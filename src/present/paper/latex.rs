@@ -30,8 +30,8 @@ fn character(c: char) -> String {
         '|' => "$|$",
         '"' => "''",
         '\u{a0}' => "~",
-        'µ' | 'μ' => r"\textmu{}",
-        '°' => r"\textdegree{}",
+        'µ' | 'μ' => r"$\mu$",
+        '°' => r"$^\circ$",
         '″' => "$''$",
         '′' => "$'$",
         '−' => "$-$",
@@ -109,7 +109,7 @@ impl Typesetter for Latex {
         let notes: String = table.notes.iter().map(|note| format!("\n\\par\\smallskip {}", escaped(note))).collect();
         let label = if part.part[0] == 1 { format!("\\label{{tab:{name}}}") } else { String::new() };
         format!(
-            "\\begin{{{environment}}}[!htbp]\n\\centering\\footnotesize\\setlength{{\\tabcolsep}}{{4pt}}\n\
+            "\\begin{{{environment}}}[!htbp]\n\\centering\\footnotesize\\setlength{{\\tabcolsep}}{{4pt}}\\setlength{{\\belowcaptionskip}}{{3pt}}\n\
              \\caption{{{}}}{label}\n\\begin{{tabular}}{{{}}}\n\\toprule\n{}\\midrule\n{}\\bottomrule\n\\end{{tabular}}\
              {notes}\n\\end{{{environment}}}\n\n",
             escaped(&caption(&table.title, part)),
@@ -138,8 +138,10 @@ impl Typesetter for Latex {
         let (title, summary) = (escaped(title), self.text(summary));
         let [class, front, style] = match layout.class {
             Class::Elsarticle => [
+                // The footer of the first page in this class is 2 pt wider than the page.
                 if layout.two_column { "[final,5p,twocolumn]{elsarticle}" } else { "[final,3p]{elsarticle}" }
-                    .to_string(),
+                    .to_string()
+                    + "\n\\makeatletter\\let\\ps@pprintTitle\\ps@plain\\makeatother",
                 format!(
                     "\\begin{{frontmatter}}\n\\title{{{title}}}\n\\author{{Author}}\n\\begin{{abstract}}\n{summary}\n\
                      \\end{{abstract}}\n\\end{{frontmatter}}\n"

@@ -114,13 +114,14 @@ pub fn files(
     Ok(files)
 }
 
-/// A cell, a negative number with a minus sign.
+/// A cell, its negative numbers with minus signs.
 fn minus(cell: &Cell) -> String {
-    let text = cell.to_string();
-    match text.strip_prefix('-') {
+    let words = cell.to_string();
+    let signed = |word: &str| match word.strip_prefix('-') {
         Some(digits) if digits.starts_with(|c: char| c.is_ascii_digit()) => format!("−{digits}"),
-        _ => text,
-    }
+        _ => word.to_string(),
+    };
+    words.split(' ').map(signed).collect::<Vec<_>>().join(" ")
 }
 
 /// A text as pieces: words, and the keys of the citations after them.
@@ -178,7 +179,7 @@ mod tests {
         };
         let latex = text("tables/t-1.tex");
         assert!(latex.contains(r"EX0C\textasciitilde{}C:h0\_\allowbreak{}x"), "{latex}");
-        assert!(latex.contains(r"0.5 \& 3 \% of \#1 \textmu{}m$^2$"), "{latex}");
+        assert!(latex.contains(r"0.5 \& 3 \% of \#1 $\mu$m$^2$"), "{latex}");
         assert!(latex.contains(r"\{braces\} and $\sigma$ $\le$ 2 (part 1 of 2)"), "{latex}");
         assert!(text("sections/bias.tex").contains(r"50 \% of A\_\allowbreak{}B~\cite{jcgm100}"));
         assert!(text("sections/bias.typ").contains("#cite(<jcgm100>)"));

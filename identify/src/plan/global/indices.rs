@@ -182,7 +182,8 @@ mod tests {
         }
     }
 
-    /// SALib's `analyze` on the outputs of the same samples gives the same indices. Skipped without a Python with SALib.
+    /// SALib's `analyze` on the outputs of the same samples gives the same indices. Skipped without a Python with
+    /// SALib.
     #[test]
     fn indices_are_those_of_salib() {
         let python = std::env::var("ABBE_PYTHON").unwrap_or_else(|_| "python3".into());

@@ -1,5 +1,5 @@
-//! Global sensitivity of the estimates: Sobol' indices of each identified error with respect to set-up errors, noise and
-//! undeclared effects, by the exact chain and the full fit, beside the linear prediction.
+//! Global sensitivity of the estimates: Sobol' indices of each identified error with respect to set-up errors, noise
+//! and undeclared effects, by the exact chain and the full fit, beside the linear prediction.
 //!
 //! The machine has no errors. A sample draws the true set-up, the noise and the coefficients of effects that the model
 //! lacks. The estimate of the plan's least-squares problem is then the error of the estimate. It is found by the chord
@@ -15,8 +15,8 @@
 //! | noise of all readings together | normal, with the noise of the plan |
 //! | coefficient of an undeclared effect | uniform between plus and minus the stated size |
 //!
-//! The first-order part of the response gives the linear share of each input ([`super::budget`], [`super::bias`]). Where
-//! the shares differ from the indices by more than their confidence intervals, the response is not linear.
+//! The first-order part of the response gives the linear share of each input ([`super::budget`], [`super::bias`]).
+//! Where the shares differ from the indices by more than their confidence intervals, the response is not linear.
 
 mod indices;
 mod sequence;

@@ -10,8 +10,8 @@ pub const MAX_DIMENSIONS: usize = 128;
 const BITS: usize = 32;
 const NUMBERS: &str = include_str!("direction-numbers.txt");
 
-/// The first `count` points in `dimensions` dimensions, each coordinate between 0 and 1. `shift` is the digital shift of
-/// each dimension; absent ones are zero.
+/// The first `count` points in `dimensions` dimensions, each coordinate between 0 and 1. `shift` is the digital shift
+/// of each dimension; absent ones are zero.
 ///
 /// # Errors
 /// If there are more than [`MAX_DIMENSIONS`].

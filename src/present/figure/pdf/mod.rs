@@ -1,8 +1,8 @@
 //! Figures as PDF for LaTeX: the drawing without a title, as vector paths on a page of its size.
 //!
-//! The SVG drawing of a figure is a few elements (`g`, `path`, `rect`, `circle`, `text`) with CSS classes. Text is drawn
-//! as outlines of the bundled font, so that no font has to be embedded and every computer draws the same page (ISO
-//! 32000-1, 8.5).
+//! The SVG drawing of a figure is a few elements (`g`, `path`, `rect`, `circle`, `text`) with CSS classes. Text is
+//! drawn as outlines of the bundled font, so that no font has to be embedded and every computer draws the same page
+//! (ISO 32000-1, 8.5).
 
 mod page;
 mod style;
