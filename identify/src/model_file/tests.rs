@@ -1,5 +1,8 @@
 use std::path::{Path, PathBuf};
 
+use abbe_model::driver::Driver;
+use abbe_model::effect::shape::Shape;
+use abbe_model::effect::{Component, Effect};
 use abbe_model::files::{self, ReadOptions};
 use abbe_model::session::Session;
 use serde_json::Value;
@@ -80,6 +83,16 @@ fn errors_at_states_are_those_of_the_effects() {
     assert!(contributions.iter().all(|contribution| contribution.parameter < carried.len()));
 }
 
+/// The delay of a trigger shifts readings, not the machine: no command is corrected by it.
+#[test]
+fn effects_on_the_instrument_do_not_belong_to_the_machine() {
+    let effect = |id: &str| Effect::new(Component::parse(id).unwrap(), Driver::None, Shape::Constant);
+    assert!(IdentifiedModel::is_carried(&effect("EXX")));
+    for id in ["trigger", "bar", "workpiece_ball.x"] {
+        assert!(!IdentifiedModel::is_carried(&effect(id)), "{id}");
+    }
+}
+
 /// The text with one value changed and the checksum renewed or left.
 fn changed(path: &str, value: Value, renew: bool) -> String {
     let mut document: Value = serde_json::from_str(&text()).unwrap();
@@ -107,6 +120,10 @@ fn a_file_that_cannot_be_used_is_refused_with_its_key() {
         (changed("/schema_version", json!(2), true), "a newer program saved the model"),
         (changed("/parameters/0/internal", json!(1e-3), false), "the file was changed after it was saved"),
         (changed("/parameters/2/internal", json!("1"), true), "`parameters[2].internal`: invalid type: string"),
+        (
+            changed("/parameters/2/id", json!("EX0C"), true),
+            "`parameters[4]` (EX0C): another parameter has the same name",
+        ),
         (changed("/covariance/3/3", json!(-1.0), true), "the variance of EC0A is negative"),
         (changed("/covariance/3/2", json!(1.0), true), "`covariance` is not positive semidefinite"),
         (changed("/covariance/3", json!([1.0]), true), "`covariance` is no lower triangle"),
