@@ -239,11 +239,11 @@ fn base(structure: &Structure) -> Table {
 /// Bias of each error by undeclared effects.
 pub fn bias(study: &Study) -> Section {
     let found = &study.bias;
-    let number = |value: f64| if value == 0.0 { "0".to_string() } else { three_digits(value) };
+    let number = |value: f64| if value.abs() < 5e-6 { "0".to_string() } else { three_digits(value) };
     let rows = found.rows.iter().map(|row| {
         let mut cells = cells![format!("{}, {}", row.id, unit(&row.unit))];
         cells.extend(row.bias.iter().map(|bias| number(*bias).into()));
-        cells.extend([row.signal_um, row.residual_um].map(|um| three_digits(um).into()));
+        cells.extend([row.signal_um, row.residual_um].map(|um| number(um).into()));
         cells
     });
     let right = |heading: String| Column { heading, align: Align::Right };
