@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::failure::Failure;
 
-/// A file to write: its name in the folder and its contents.
+/// A file to write: its name in the folder, with the names of folders within it, and its contents.
 pub type NewFile = (String, String);
 
 /// Writes files into a folder. They are first written into a temporary folder beside it, where `check_files` reads
@@ -29,7 +29,9 @@ pub fn write(
     let made = tempfile::Builder::new().prefix(".abbe-").tempdir_in(parent).map_err(fault)?;
     let whole = made.path().join("whole");
     std::fs::create_dir(&whole).map_err(fault)?;
+    let make_folder_of = |file: &Path| file.parent().map_or(Ok(()), std::fs::create_dir_all).map_err(fault);
     for (name, contents) in files {
+        make_folder_of(&whole.join(name))?;
         // An error names the final path, not the temporary one.
         super::output::write_whole(&whole.join(name), contents.as_ref()).map_err(|failure| match failure {
             Failure::Write { source, .. } => self::fault(&folder.join(name), source),
@@ -39,6 +41,7 @@ pub fn write(
     check_files(&whole)?;
     if present {
         for (name, _) in files {
+            make_folder_of(&folder.join(name))?;
             std::fs::rename(whole.join(name), folder.join(name)).map_err(fault)?;
         }
     } else {

@@ -21,6 +21,7 @@ mod message;
 mod nc;
 mod new;
 mod output;
+mod paper;
 mod plan;
 mod repeated;
 mod report;
@@ -105,6 +106,9 @@ enum Command {
     /// Estimate errors from readings, with uncertainties.
     #[command(after_help = fit::HELP)]
     Fit(fit::FitArguments),
+    /// Write text, tables and figures of sessions for LaTeX and Typst.
+    #[command(after_help = paper::HELP)]
+    Paper(paper::PaperArguments),
     /// Analyse identifiability and predicted uncertainty of planned tests.
     #[command(after_help = plan::HELP)]
     Plan(Box<plan::PlanArguments>),
@@ -197,6 +201,7 @@ pub fn run() -> ExitCode {
         Command::Export(arguments) => export::run(&arguments, quiet),
         Command::Nc(arguments) => nc::run(&arguments, quiet),
         Command::Fit(arguments) => fit::run(&arguments),
+        Command::Paper(arguments) => paper::run(&arguments, quiet),
         Command::Plan(arguments) => plan::run(&arguments),
         Command::New(arguments) => new::run(&arguments, quiet),
         Command::Completions { shell } => {
@@ -273,7 +278,7 @@ mod tests {
             for example in text.lines().filter_map(|line| line.strip_prefix("Example: ")) {
                 let required: &[&str] = match command.get_name() {
                     "equation" => &["SESSION", "--test", "T"],
-                    "simulate" => &["SESSION", "--out", "DIR"],
+                    "simulate" | "paper" => &["SESSION", "--out", "DIR"],
                     "volumetric" => &["MACHINE"],
                     "new" => &["DIR"],
                     "export" if example.contains("--as") => &["MODEL", "--out", "OUT"],

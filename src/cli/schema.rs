@@ -3,6 +3,7 @@
 use abbe::identify::correction::stream;
 use abbe::identify::geometric::Comparison;
 use abbe::identify::model_file;
+use abbe::identify::plan::global::GlobalAnalysis;
 use abbe::identify::plan::results::PlanAnalysis;
 use abbe::identify::repeated::Repeated;
 use abbe::identify::results::{FitResult, TraceResult};
@@ -52,6 +53,8 @@ enum Subject {
     Plan,
     /// `abbe plan --improve|--separate|--range --json`
     NextTest,
+    /// `abbe plan --global --json`
+    Global,
     /// `abbe plan --patterns --json`
     Patterns,
     /// `abbe simulate --json`
@@ -88,6 +91,7 @@ pub fn run(arguments: &SchemaArguments) -> Result<(), Failure> {
         Subject::Model => model(),
         Subject::Plan => of::<PlanAnalysis>(),
         Subject::NextTest => of::<plan::NextTest>(),
+        Subject::Global => of::<GlobalAnalysis>(),
         Subject::Patterns => of::<plan::patterns::PatternSizes>(),
         Subject::Simulate => of::<simulate::SimulationResult>(),
         Subject::Map => of::<Summary>(),

@@ -6,7 +6,7 @@
 //!   [`simulation`], [`patterns`], [`volumetric`], [`compensation`];
 //! - parts of several results: [`parameters`], [`confounded`], [`cross_validation`], [`circular`], [`plausibility`],
 //!   [`effect`], [`uniqueness`], [`readings`];
-//! - [`report`]: the pages of `--report`.
+//! - [`report`]: the pages of `--report`; [`paper`]: the folder of `abbe paper`.
 
 pub mod base;
 pub mod circular;
@@ -24,6 +24,7 @@ pub mod html;
 pub mod method;
 pub mod next_test;
 pub mod number;
+pub mod paper;
 pub mod parameters;
 pub mod patterns;
 pub mod plan;

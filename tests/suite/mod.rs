@@ -32,6 +32,7 @@ mod nc;
 mod new;
 mod nist;
 mod one_answer;
+mod paper;
 mod patterns;
 mod plan_command;
 mod plan_help;

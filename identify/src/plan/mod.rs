@@ -8,10 +8,13 @@
 //! - [`test_variations`], [`candidate_tests`], [`criterion`], [`mod@improve`], [`separate`]: the next test;
 //!   [`mod@range`]: how far a sweep can shrink;
 //! - [`states`], [`linear`], [`sensitivity`], [`budget`], [`identifiability`], [`indices`]: the parts of the analysis;
+//! - [`bias`]: the bias by each undeclared effect; [`structure`]: ranks and base parameters;
+//! - [`mod@global`]: Sobol' indices of the estimates;
 //! - [`results`]: the results, as they are written to JSON.
 
 mod analysis;
 mod ball_positions;
+pub mod bias;
 pub mod budget;
 pub(crate) mod candidate_information;
 mod candidate_layout;
@@ -20,6 +23,7 @@ pub mod clearance;
 pub mod criterion;
 pub(crate) mod detectability;
 pub mod effects;
+pub mod global;
 pub mod identifiability;
 pub mod improve;
 pub mod indices;
@@ -31,6 +35,7 @@ pub mod results;
 pub mod sensitivity;
 pub mod separate;
 pub mod states;
+pub mod structure;
 mod sweep;
 pub mod test_variations;
 

@@ -11,6 +11,7 @@
 //! the last term.
 
 pub mod abscissa;
+pub mod paths;
 pub mod sensitivities;
 pub mod spectrum;
 

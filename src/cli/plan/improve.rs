@@ -6,6 +6,7 @@ use abbe::identify::plan::criterion::Goal;
 use abbe::identify::plan::improve::{ImproveOptions, Improvement, improve};
 use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::problem::Problem;
+use abbe::model::effect::Effect;
 use abbe::model::words::counted;
 use clap::{Args, ValueEnum};
 
@@ -211,6 +212,11 @@ fn add(problem: &mut Problem, id: &str) -> Result<(), IdentifyError> {
     if problem.parameters.effects.iter().any(|effect| effect.id() == id) {
         return Ok(());
     }
+    problem.add_effect(&effect(problem, id)?)
+}
+
+/// An effect of the library by its identifier.
+pub fn effect(problem: &Problem, id: &str) -> Result<Effect, IdentifyError> {
     let candidates = library::candidates(problem)?;
     let Some(candidate) = candidates.iter().find(|candidate| candidate.effect.id() == id) else {
         let before_shape = id.split(':').next().unwrap_or(id);
@@ -225,7 +231,7 @@ fn add(problem: &mut Problem, id: &str) -> Result<(), IdentifyError> {
         };
         return Err(IdentifyError::Request(format!("`{id}` is not in the library of effects for this plan; {hint}")));
     };
-    problem.add_effect(&candidate.effect)
+    Ok(candidate.effect.clone())
 }
 
 /// Prints the proposed tests.

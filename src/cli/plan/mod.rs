@@ -1,5 +1,6 @@
 //! `abbe plan`: analyse identifiability and predicted uncertainty of planned tests.
 
+pub mod global;
 pub mod improve;
 pub mod patterns;
 mod screen;
@@ -60,6 +61,8 @@ pub struct PlanArguments {
     improve: improve::ImproveArguments,
     #[command(flatten)]
     patterns: patterns::PatternArguments,
+    #[command(flatten)]
+    global: global::GlobalArguments,
     /// Find the smallest range of each sweep that does not double an uncertainty.
     #[arg(long)]
     range: bool,
@@ -76,6 +79,7 @@ pub const HELP: &str = "Examples:
   abbe plan sessions/hermle-c600u/chapter5.toml --patterns patterns.csv \\
       --error EY0A=10um --error EB0A=0.01deg
   abbe plan sessions/hermle-c600u/chapter5.toml --range
+  abbe plan sessions/hermle-c600u/chapter5.toml --global --vary EZC~C:h2=2um --samples 64
 
 The first screen answers in this order: identifiable errors and rank; predicted standard uncertainty u and expanded \
 uncertainty U = 2u; what is confounded; what to do next; the verdict, which names the worst determined error and what \
@@ -103,6 +107,15 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
         effects: !arguments.no_effects,
         reach_mm: arguments.improve.reach_mm()?,
     };
+    if arguments.global.asked() {
+        let (complete, noise) = plan::prepared(&session, &options)?;
+        let problem = plan::states::problem_by_test(&complete, noise)?;
+        let found = arguments.global.run(&problem, arguments.common.seed)?;
+        if tables {
+            global::print(&found);
+        }
+        return arguments.common.write_json(&sources, &found);
+    }
     if arguments.improve.asked() || arguments.range {
         return next_test(arguments, (&session, &sources), &options, tables);
     }

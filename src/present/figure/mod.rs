@@ -1,18 +1,21 @@
 //! Figures as data: what a chart shows, with its title, caption and units. Nothing here draws.
 //!
-//! One file per kind of chart ([`lines`], [`bars`], [`matrix`], [`polar`], [`chain`]) holds the data of the kind, its
+//! One file per kind of chart ([`lines`], [`bars`], [`matrix`], [`polar`], [`chain`],
+//! [`set_up`]) holds the data of the kind, its
 //! table and its drawing. Printers: [`svg`] draws a figure inside the report or as a file; `png` (feature `png`) draws
-//! that file as pixels; [`Figure::table`] gives the data as one tidy table, which [`super::csv`] writes. A further kind
-//! is one file and one variant of [`Chart`].
+//! that file as pixels; [`pdf`] draws it for LaTeX; [`Figure::table`] gives the data as one tidy table, which
+//! [`super::csv`] writes. A further kind is one file and one variant of [`Chart`].
 
 pub mod bars;
 pub mod chain;
 pub mod lines;
 pub mod matrix;
+pub mod pdf;
 #[cfg(feature = "png")]
 pub mod png;
 pub mod polar;
 pub mod scale;
+pub mod set_up;
 pub mod svg;
 
 use super::number;
@@ -51,6 +54,8 @@ pub enum Chart {
     Panels(polar::Panels),
     /// The kinematic chain of a machine.
     Chain(chain::Chain),
+    /// The set-ups of tests in space.
+    SetUps(set_up::SetUps),
 }
 
 /// What a kind of chart provides.
@@ -76,6 +81,7 @@ impl Figure {
             Chart::Polar(kind) => kind,
             Chart::Panels(kind) => kind,
             Chart::Chain(kind) => kind,
+            Chart::SetUps(kind) => kind,
         }
     }
 

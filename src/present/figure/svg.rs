@@ -49,16 +49,25 @@ pub fn element(figure: &Figure) -> (f64, Markup) {
 
 /// A separate SVG file on a white background, with the title above the drawing.
 pub fn file(figure: &Figure) -> String {
+    let width = figure.kind().drawing().size[0];
+    document(figure, &wrapped(&figure.title, ((width - 16.0) / 7.4) as usize))
+}
+
+/// A separate SVG file without a title, for documents with captions.
+pub fn untitled(figure: &Figure) -> String {
+    document(figure, &[])
+}
+
+fn document(figure: &Figure, title: &[String]) -> String {
     let Drawing { size: [width, height], inner, .. } = figure.kind().drawing();
-    let lines = wrapped(&figure.title, ((width - 16.0) / 7.4) as usize);
-    let above = 12.0 + 18.0 * lines.len() as f64;
+    let above = if title.is_empty() { 0.0 } else { 12.0 + 18.0 * title.len() as f64 };
     let all = height + above;
     html! {
         svg xmlns="http://www.w3.org/2000/svg" class="plot" width=(width) height=(all)
-            viewBox=(format!("0 {} {width} {all}", -above)) {
+            viewBox=(format!("0 {} {width} {all}", 0.0 - above)) {
             style { (PreEscaped(light_style())) }
-            rect class="paper" x="0" y=(-above) width=(width) height=(all) {}
-            @for (number, line) in lines.iter().enumerate() {
+            rect class="paper" x="0" y=(0.0 - above) width=(width) height=(all) {}
+            @for (number, line) in title.iter().enumerate() {
                 text class="title" x="8" y=(18.0 * (number as f64 + 1.0) - above) { (line) }
             }
             (inner)
@@ -68,7 +77,7 @@ pub fn file(figure: &Figure) -> String {
 }
 
 /// Replaces CSS variables by the light colours, because many SVG programs do not support variables.
-fn light_style() -> String {
+pub(super) fn light_style() -> String {
     let mut style = STYLE.to_string();
     for (name, colour) in LIGHT {
         style = style.replace(&format!("var(--{name})"), colour);

@@ -1,6 +1,7 @@
 //! The analysis of a plan: predicted uncertainties, sensitivities, budgets, correlation, observability indices.
 
 pub mod effects;
+pub mod global;
 pub mod verdict;
 
 use abbe::identify::plan::results::{ErrorAnalysis, Indices, PlanAnalysis};

@@ -8,10 +8,8 @@ use abbe::identify::series::spectrum::Spectrum;
 use abbe::model::effect::shape::Harmonic;
 use abbe::model::effect::{Effect, Shape};
 use abbe::model::words::counted;
-use maud::Markup;
 
 use super::decimate;
-use super::document::Document;
 use super::plots::{MAX_TESTS, SessionPlots};
 use crate::present::figure::bars::{Bars, Fill};
 use crate::present::figure::lines::{Axis, Lines, Mark, Name, Series};
@@ -176,11 +174,10 @@ pub fn spectrum_plot(spectrum: &Spectrum, maximum: f64, effects: &[Effect]) -> F
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn sensitivities(document: &mut Document, problem: &Problem, beta: &[f64]) -> Result<Markup, IdentifyError> {
+pub fn sensitivities(problem: &Problem, beta: &[f64]) -> Result<Vec<Figure>, IdentifyError> {
     const DIVISION_UM: f64 = 5.0;
     if problem.folds.kind.is_poses() {
-        let plots = pose_sensitivities(&sensitivity::over_poses(problem, beta)?);
-        return Ok(document.show(plots));
+        return Ok(pose_sensitivities(&sensitivity::over_poses(problem, beta)?));
     }
     let mut plots = Vec::new();
     let found = sensitivity::sensitivities(problem, beta)?;
@@ -197,7 +194,7 @@ pub fn sensitivities(document: &mut Document, problem: &Problem, beta: &[f64]) -
             plots.push(curves(test, chunk));
         }
     }
-    Ok(document.show(plots))
+    Ok(plots)
 }
 
 /// RMS sensitivity of the readings of separate poses to each error, by unit, in descending order.

@@ -62,7 +62,8 @@ pub fn document(problem: &Problem, fit: &Fit, result: &FitResult) -> Result<Docu
         "Correlation and confounding",
         html! { (section) (sections::confounded(&result.unobservable)) (sections::outliers(&result.outliers)) },
     );
-    let section = curves::sensitivities(&mut document, problem, &fit.beta)?;
+    let plots = curves::sensitivities(problem, &fit.beta)?;
+    let section = document.show(plots);
     document.section("Sensitivity of each test", section);
     let section = readings::machine(&mut document, problem);
     document.section("Machine", section);

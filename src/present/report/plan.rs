@@ -64,7 +64,8 @@ pub fn document(problem: &Problem, analysis: &PlanAnalysis) -> Result<Document, 
     document.section("Correlation and confounding", section);
     document.section("Next test", next(analysis, candidate_tests::has_candidates(problem)));
     let beta = vec![0.0; problem.parameters.list.len()];
-    let section = curves::sensitivities(&mut document, problem, &beta)?;
+    let plots = curves::sensitivities(problem, &beta)?;
+    let section = document.show(plots);
     document.section("Sensitivity of each test", section);
     let section = readings::machine(&mut document, problem);
     document.section("Machine", section);
@@ -126,7 +127,7 @@ fn limit(analysis: &PlanAnalysis) -> String {
 }
 
 /// Plots of the predicted standard uncertainties, one for each unit.
-fn uncertainties(errors: &[ErrorAnalysis]) -> Vec<Figure> {
+pub fn uncertainties(errors: &[ErrorAnalysis]) -> Vec<Figure> {
     units(errors.iter().map(|error| error.unit.as_str()))
         .into_iter()
         .map(|name| {

@@ -100,7 +100,8 @@ pub fn document(trace: &TraceOutcome) -> Result<Document, IdentifyError> {
         "Correlation and confounding",
         html! { (section) (sections::confounded(&result.unobservable)) (sections::outliers(&result.outliers)) },
     );
-    let section = curves::sensitivities(&mut document, problem, &trace.after_fit.beta)?;
+    let plots = curves::sensitivities(problem, &trace.after_fit.beta)?;
+    let section = document.show(plots);
     document.section("Sensitivity of each test", section);
     let section = readings::machine(&mut document, problem);
     document.section("Machine", section);

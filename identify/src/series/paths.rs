@@ -1,0 +1,85 @@
+//! The set-up of each test in R: the nominal paths of the instrument's points, and the lines of the rotary axes.
+//!
+//! `P_w` is the point that the table frame carries, `P_s` the point that the tool frame carries, both by the nominal
+//! chain at the states of the first run.
+
+use abbe_model::axis::AxisKind;
+use abbe_model::chain::BodyErrors;
+use abbe_model::frames::Point;
+use abbe_model::session::placing;
+
+use crate::problem::Problem;
+
+/// Maximum number of points of a path.
+const MAX_POINTS: usize = 121;
+
+/// The set-up of one test, in R, mm.
+#[derive(Clone, Debug)]
+pub struct SetUpPath {
+    /// The test.
+    pub test: String,
+    /// The point that the table frame carries, state by state; empty if the instrument has none.
+    pub workpiece_mm: Vec<[f64; 3]>,
+    /// The point that the tool frame carries, state by state.
+    pub tool_mm: Vec<[f64; 3]>,
+    /// The rotary axes at the first state: name, a point, direction.
+    pub axes: Vec<(String, [f64; 3], [f64; 3])>,
+    /// Whether the states follow one another on a path; else they are separate poses.
+    pub is_path: bool,
+}
+
+/// The set-ups of all tests that have states.
+pub fn set_ups(problem: &Problem) -> Vec<SetUpPath> {
+    let machine = &problem.session.machine;
+    let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
+    let tests = problem.tests.iter().zip(&problem.models).filter_map(|(test, model)| {
+        let readings = test.readings.as_ref()?;
+        let run = readings.runs().first().cloned()?;
+        let station = model.station();
+        let (mut workpiece_mm, mut tool_mm, mut state) = (Vec::new(), Vec::new(), Vec::new());
+        let first: Vec<f64> = readings.positions.iter().map(|positions| positions[run.start]).collect();
+        let is_path = !readings.run.is_empty();
+        for row in run.clone().step_by(run.len().div_ceil(MAX_POINTS)).chain([run.end - 1]) {
+            readings.state(machine, row, &mut state);
+            let on_table = station.table_point_mm();
+            workpiece_mm.extend(on_table.map(|point| machine.workpiece_point(&state, &none, Point(point)).0));
+            tool_mm.push(machine.tool_point(&state, &none, Point(station.tool_point_mm())).0);
+        }
+        let rotary = (0..machine.axes.len()).filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary);
+        let line = |axis: usize| {
+            let (point, direction) = placing::axis_line(machine, &first, axis);
+            (machine.axes[axis].name.clone(), point, direction)
+        };
+        Some(SetUpPath { test: test.name.clone(), workpiece_mm, tool_mm, axes: rotary.map(line).collect(), is_path })
+    });
+    tests.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use abbe_model::files::{self, ReadOptions};
+
+    use super::*;
+    use crate::noise::{Noise, NoiseSource};
+    use crate::plan::states;
+
+    /// The C tests of Jiang (2014): the pivot turns on a circle of 100 mm about Z, and the spindle ball stays where the
+    /// extended bar reaches it, √(R_e² − R²) above.
+    #[test]
+    fn the_pivot_turns_about_the_spindle_ball() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/chapter5.toml");
+        let session = files::session(&file, &ReadOptions::default()).unwrap();
+        let plan = states::complete(&session, true).unwrap();
+        let problem = states::problem_by_test(&plan, Noise::white(3e-4, NoiseSource::Stated)).unwrap();
+        let found = set_ups(&problem);
+        let c150 = found.iter().find(|path| path.test == "C150").unwrap();
+        for (workpiece, tool) in c150.workpiece_mm.iter().zip(&c150.tool_mm) {
+            assert!((workpiece[0].hypot(workpiece[1]) - 100.0).abs() < 1e-9 && workpiece[2].abs() < 1e-9);
+            assert!(tool[0].abs() < 1e-9 && (tool[2] - (149.9946_f64.powi(2) - 1e4).sqrt()).abs() < 1e-9);
+        }
+        let names: Vec<&str> = c150.axes.iter().map(|axis| axis.0.as_str()).collect();
+        assert_eq!((names, c150.is_path), (vec!["C", "A"], true));
+    }
+}

@@ -1,0 +1,60 @@
+//! `abbe plan --global`: Sobol' indices of the estimates.
+
+use abbe::identify::plan::global::{GlobalAnalysis, GlobalOptions, global};
+use abbe::identify::problem::Problem;
+use abbe::identify::quantity::Given;
+use clap::Args;
+
+use crate::cli::failure::Failure;
+use crate::cli::output;
+use crate::present::plan::global as present;
+
+/// Global sensitivity.
+#[derive(Args)]
+pub struct GlobalArguments {
+    /// Sobol' indices of each identified error by set-up errors, noise and undeclared effects, with the full fit,
+    /// beside the linear prediction.
+    #[arg(long, conflicts_with_all = ["improve", "separate", "range", "patterns", "report", "plots", "clearance_mm"])]
+    global: bool,
+    /// Size of an input of --global: half the range of an undeclared effect, or the standard deviation of a set-up
+    /// parameter instead of its prior; may be repeated.
+    ///
+    /// Example: --global --vary EZC~C:h2=2um --vary bar=5um
+    #[arg(long = "vary", value_name = "NAME=SIZE", requires = "global")]
+    vary: Vec<String>,
+    /// Number of samples of --global, a power of two.
+    ///
+    /// Example: --global --samples 1024
+    #[arg(long, value_name = "N", default_value_t = 256, requires = "global")]
+    samples: usize,
+}
+
+/// Largest number of samples.
+const MAX_SAMPLES: usize = 1 << 16;
+
+impl GlobalArguments {
+    /// Whether the analysis is requested.
+    pub fn asked(&self) -> bool {
+        self.global
+    }
+
+    /// Analyses a plan.
+    pub fn run(&self, problem: &Problem, seed: u64) -> Result<GlobalAnalysis, Failure> {
+        if !self.samples.is_power_of_two() || !(8..=MAX_SAMPLES).contains(&self.samples) {
+            return Err(Failure::Other(format!(
+                "`--samples {}`: a power of two from 8 to {MAX_SAMPLES} is expected",
+                self.samples
+            )));
+        }
+        let vary = self.vary.iter().map(|text| Given::parse(text)).collect::<Result<_, _>>()?;
+        Ok(global(problem, &GlobalOptions { samples: self.samples, seed, vary })?)
+    }
+}
+
+/// Prints the indices.
+pub fn print(found: &GlobalAnalysis) {
+    say!("{} samples, {} fits, {} inputs", found.samples, found.evaluations, found.inputs.len());
+    output::print(&present::errors(found));
+    output::print(&present::indices(found));
+    output::print(&present::convergence(found));
+}
