@@ -139,11 +139,12 @@ pub fn run(arguments: &CompareArguments) -> Result<(), Failure> {
 }
 
 fn read(file: &Path, arguments: &CompareArguments, outputs: &Outputs, origin: &mut Origin) -> Result<Input, Failure> {
-    let is_model = file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json"));
-    if is_model {
+    let text = files::text(file, "the session or model")?;
+    // A model is JSON; no session begins with a brace.
+    if text.trim_start().starts_with('{') {
         outputs.refuse_overwrite([file])?;
         origin.add(Origin::of_files(&[file])?);
-        return Ok(Input::Model(Box::new(model_file::read(file)?)));
+        return Ok(Input::Model(Box::new(model_file::read_text(file, &text)?)));
     }
     let options =
         ReadOptions { data_directory: arguments.data.clone(), read_data: true, allow_outside: arguments.allow_outside };

@@ -12,6 +12,7 @@ use abbe::model::session::limits::LARGEST;
 use clap::Args;
 
 use super::failure::Failure;
+use super::interrupt::Interrupts;
 use super::json::{self, Origin};
 use super::output::{self, Outputs};
 use crate::present::compensate as present;
@@ -83,11 +84,16 @@ pub fn run(arguments: &CompensateArguments, quiet: bool) -> Result<(), Failure> 
     let correction = Correction { machine, errors: &errors, tool_mm, aim: Aim::of(machine) };
     let wanted = if arguments.inverse { Output::Error } else { Output::Command };
     let mut summary = Summary::default();
-    output::write_streaming(&arguments.out, |to| {
-        let mut to = BufWriter::new(to);
+    let interrupts = Interrupts::noticed();
+    let written = output::write_streaming(&arguments.out, |to| {
+        let mut to = BufWriter::new(UntilInterrupted { to, interrupts: &interrupts });
         summary = stream::run(&correction, &mut file, wanted, &at, &mut to)?;
         to.flush().map_err(|source| Failure::Write { path: arguments.out.display().to_string(), source })
-    })?;
+    });
+    if interrupts.came() && written.is_err() {
+        return Err(Failure::Interrupted("interrupted; nothing is written".into()));
+    }
+    written?;
     if outputs.tables(quiet) {
         say!("{}: {}", arguments.out.display(), present::headline(&summary, correction.aim));
         output::print(&present::states(&summary));
@@ -101,6 +107,25 @@ pub fn run(arguments: &CompensateArguments, quiet: bool) -> Result<(), Failure> 
             json::write(path, Origin::of_files(&read)?, None, &summary)
         }
         None => Ok(()),
+    }
+}
+
+/// A writer that fails after Ctrl-C, so that the temporary file behind it is removed.
+struct UntilInterrupted<'w> {
+    to: &'w mut dyn Write,
+    interrupts: &'w Interrupts,
+}
+
+impl Write for UntilInterrupted<'_> {
+    fn write(&mut self, contents: &[u8]) -> std::io::Result<usize> {
+        if self.interrupts.came() {
+            return Err(std::io::Error::other("interrupted"));
+        }
+        self.to.write(contents)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.to.flush()
     }
 }
 

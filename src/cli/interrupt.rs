@@ -30,6 +30,22 @@ impl Interrupts {
         interrupts
     }
 
+    /// From now on the first Ctrl-C only sets the state that [`Interrupts::came`] returns; a second one ends the program.
+    pub fn noticed() -> Interrupts {
+        let interrupts =
+            Interrupts { came: Arc::new(AtomicBool::new(false)), at_once: Arc::new(AtomicBool::new(false)) };
+        let came = Arc::clone(&interrupts.came);
+        let handler = move || {
+            if came.swap(true, Ordering::Relaxed) {
+                std::process::exit(i32::from(INTERRUPTED));
+            }
+        };
+        if ctrlc::set_handler(handler).is_err() {
+            tell(Kind::Warning, "Ctrl-C cannot be handled; it may leave a temporary file");
+        }
+        interrupts
+    }
+
     fn handle(&self, bar: &ProgressBar) {
         let second = self.came.swap(true, Ordering::Relaxed);
         if second || self.at_once.load(Ordering::Relaxed) {

@@ -38,7 +38,7 @@ pub fn write_streaming(
     let fault = |source| Failure::Write { path: path.display().to_string(), source };
     check(path)?;
     if is_standard_output(path) {
-        return contents(&mut std::io::stdout().lock());
+        return contents(&mut StandardOutput);
     }
     if is_stream(path) {
         let mut stream = OpenOptions::new().append(true).open(path).map_err(fault)?;
@@ -189,6 +189,20 @@ fn write_out(contents: &[u8]) {
         }
         tell(Kind::Error, &format!("standard output: cannot be written: {fault}"));
         std::process::exit(1);
+    }
+}
+
+/// Standard output as [`write_out`] writes to it.
+struct StandardOutput;
+
+impl Write for StandardOutput {
+    fn write(&mut self, contents: &[u8]) -> std::io::Result<usize> {
+        write_out(contents);
+        Ok(contents.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
     }
 }
 

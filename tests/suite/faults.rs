@@ -132,6 +132,24 @@ fn a_closed_pipe_ends_without_a_message() {
     let place = TestFolder::new();
     let output = place.shell("abbe fit session.toml | head -n 1");
     assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
+    place.put("commands.csv", &format!("x_mm\n{}", "1\n".repeat(20_000)));
+    let output = place.shell(
+        "abbe fit session.toml --save model.json --quiet && abbe compensate model.json commands.csv --out - | head -n 1",
+    );
+    assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn an_interrupted_compensation_leaves_no_file() {
+    let place = TestFolder::new();
+    place.put("commands.csv", &format!("x_mm\n{}", "1\n".repeat(4_000_000)));
+    let before = place.names().len();
+    let output = place.shell(
+        "abbe fit session.toml --save model.json --quiet; abbe compensate model.json commands.csv --out out.csv & \
+         until ls -A | grep -q '^.tmp'; do :; done; kill -INT $!; wait $!",
+    );
+    assert_eq!(output.status.code(), Some(130), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(place.names().len(), before + 1, "{:?}", place.names());
 }
 
 #[test]

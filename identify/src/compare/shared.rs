@@ -11,21 +11,24 @@ use abbe_model::session::Prior;
 use faer::Mat;
 
 use crate::error::IdentifyError;
-use crate::model_file::IdentifiedModel;
+use crate::model_file::{IdentifiedModel, ModelParameter};
 use crate::numerics::symmetric::pseudo_inverse;
 use crate::parameters::Role;
+
+/// The word that states that nothing is shared.
+const NOTHING: &str = "none";
 
 /// The difference B − A over the common parameters, its covariance, and the identifiers of the shared set-up.
 ///
 /// # Errors
-/// If a covariance has no inverse.
+/// If a covariance has no inverse, or a stated quantity is not estimated in both.
 pub(super) fn difference(
     a: &IdentifiedModel,
     b: &IdentifiedModel,
     common: &[(usize, usize)],
     things: Option<&[String]>,
 ) -> Result<(Vec<f64>, Mat<f64>, Vec<String>), IdentifyError> {
-    let shared = shared(a, b, things);
+    let shared = shared(a, b, things)?;
     if shared.is_empty() {
         let delta = common.iter().map(|(i, j)| b.parameters[*j].value - a.parameters[*i].value).collect();
         let covariance = Mat::from_fn(common.len(), common.len(), |k, l| {
@@ -85,19 +88,34 @@ fn inverse(model: &IdentifiedModel) -> Result<Mat<f64>, IdentifyError> {
 }
 
 /// The set-up quantities that are the same object in both sessions, by index in each.
-fn shared(a: &IdentifiedModel, b: &IdentifiedModel, things: Option<&[String]>) -> Vec<(usize, usize)> {
-    let stated = |id: &str| {
-        let thing = id.split(['[', '.']).next().unwrap_or(id);
-        things.map_or(thing == "bar", |things| things.iter().any(|stated| stated == thing))
-    };
-    let setups = a.parameters.iter().enumerate().filter(|(_, p)| p.role == Role::Setup && !p.held && stated(&p.id));
-    setups
-        .filter_map(|(i, p)| {
-            let same = |q: &crate::model_file::ModelParameter| {
-                q.id == p.id && q.role == Role::Setup && !q.held && q.prior == p.prior
-            };
-            let is_object = matches!(p.prior, Prior::Gaussian(_)) || things.is_some();
-            b.parameters.iter().position(same).filter(|_| is_object).map(|j| (i, j))
-        })
-        .collect()
+///
+/// # Errors
+/// If a stated quantity is not estimated, with the same prior, in both.
+fn shared(
+    a: &IdentifiedModel,
+    b: &IdentifiedModel,
+    things: Option<&[String]>,
+) -> Result<Vec<(usize, usize)>, IdentifyError> {
+    let is_setup = |p: &ModelParameter| p.role == Role::Setup && !p.held;
+    let of_both = a.parameters.iter().enumerate().filter(|(_, p)| is_setup(p)).filter_map(|(i, p)| {
+        let same = |q: &ModelParameter| q.id == p.id && is_setup(q) && q.prior == p.prior;
+        b.parameters.iter().position(same).map(|j| (i, j))
+    });
+    let mut of_both: Vec<(usize, usize)> = of_both.collect();
+    let thing = |i: usize| a.parameters[i].id.split(['[', '.']).next().unwrap_or_default();
+    for stated in things.unwrap_or_default().iter().filter(|stated| *stated != NOTHING) {
+        if !of_both.iter().any(|(i, _)| thing(*i) == stated) {
+            let mut known: Vec<&str> = of_both.iter().map(|(i, _)| thing(*i)).collect();
+            known.dedup();
+            let known = if known.is_empty() { NOTHING.to_string() } else { known.join(", ") };
+            return Err(IdentifyError::Request(format!(
+                "the shared set-up quantity \"{stated}\" is not estimated with the same prior in both; these are: {known}"
+            )));
+        }
+    }
+    of_both.retain(|(i, _)| match things {
+        Some(things) => things.iter().any(|stated| stated == thing(*i)),
+        None => thing(*i) == "bar" && matches!(a.parameters[*i].prior, Prior::Gaussian(_)),
+    });
+    Ok(of_both)
 }

@@ -113,6 +113,9 @@ fn differences_do_not_depend_on_the_gauge() {
     let named = [Named { name: "A".into(), model: &a }, Named { name: "B".into(), model: &moved }];
     let none = Some(vec!["none".to_string()]);
     let options = CompareOptions { places: 0, shared: none, ..CompareOptions::default() };
+    let unknown = CompareOptions { shared: Some(vec!["ball".to_string()]), ..options.clone() };
+    let refused = compare(&named, &unknown).unwrap_err().to_string();
+    assert!(refused.contains("\"ball\" is not estimated"), "{refused}");
     let again = compare(&named, &options).unwrap();
     let reference =
         compare(&[Named { name: "A".into(), model: &a }, Named { name: "B".into(), model: &b }], &options).unwrap();

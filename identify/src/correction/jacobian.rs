@@ -6,7 +6,7 @@
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, Machine};
-use nalgebra::{Matrix6, SMatrix, Vector3, Vector6};
+use nalgebra::{Matrix6, SMatrix, SVector, Vector3, Vector6};
 use num_dual::Dual64;
 
 use super::pose::{Aim, points};
@@ -15,6 +15,8 @@ use super::pose::{Aim, points};
 pub(super) const MAX_AXES: usize = 12;
 /// Radius at which angles count as arcs, mm.
 const LEVER_MM: f64 = 1000.0;
+/// Share of a step in its prediction below which a step teaches nothing.
+const LEAST_SHARE: f64 = 1e-3;
 /// Ratio of singular values below which a direction is lost.
 const LOST: f64 = 1e-6;
 
@@ -28,7 +30,7 @@ pub(super) fn lever_mm(kind: AxisKind) -> f64 {
 
 /// The pseudoinverse of the Jacobian at a position.
 pub(super) struct Inverse {
-    /// Axes × components; mm or rad per mm.
+    /// Axes × components; mm per mm, rotations as arcs.
     by_component: SMatrix<f64, MAX_AXES, 6>,
     /// Ratio of the largest to the smallest singular value; infinite if a direction is lost.
     pub condition: f64,
@@ -56,11 +58,7 @@ impl Inverse {
             }
         }
         let condition = if smallest > LOST * LOST * largest { (largest / smallest).sqrt() } else { f64::INFINITY };
-        let mut by_component = columns.transpose() * inverse;
-        for (row, axis) in axes.iter().enumerate().take(MAX_AXES) {
-            by_component.row_mut(row).scale_mut(1.0 / lever_mm(machine.axes[*axis].kind));
-        }
-        Inverse { by_component, condition }
+        Inverse { by_component: columns.transpose() * inverse, condition }
     }
 
     /// Whether the axes cannot move the tool in some direction.
@@ -68,13 +66,29 @@ impl Inverse {
         !self.condition.is_finite()
     }
 
-    /// The change of each axis that makes a deviation, in the order of the axes, mm or rad.
-    pub fn step(&self, deviation: &Vector6<f64>) -> [f64; MAX_AXES] {
-        let mut arcs = *deviation;
-        arcs.fixed_rows_mut::<3>(3).scale_mut(LEVER_MM);
-        let step = self.by_component * arcs;
-        std::array::from_fn(|axis| step[axis])
+    /// The change of each axis that makes a deviation, in the order of the axes, mm and mm of arc.
+    pub fn step(&self, deviation: &Vector6<f64>) -> SVector<f64, MAX_AXES> {
+        self.by_component * arcs(deviation)
     }
+
+    /// Corrects the pseudoinverse by an observed step: the axes changed by `step`, mm and mm of arc, and the deviation by
+    /// `change`. Broyden's update `H ← H + (s − H y)·sᵀH / (sᵀH y)` (Broyden, Math. Comp. 19 (1965) 577) takes in the
+    /// slopes of the errors, which matter where small errors need large motions.
+    pub fn observe(&mut self, step: &SVector<f64, MAX_AXES>, change: &Vector6<f64>) {
+        let predicted = self.by_component * arcs(change);
+        let scale = predicted.dot(step);
+        if scale > LEAST_SHARE * step.norm_squared() {
+            let row = step.transpose() * self.by_component;
+            self.by_component += (step - predicted) * row / scale;
+        }
+    }
+}
+
+/// A deviation as lengths: angles as arcs.
+fn arcs(deviation: &Vector6<f64>) -> Vector6<f64> {
+    let mut arcs = *deviation;
+    arcs.fixed_rows_mut::<3>(3).scale_mut(LEVER_MM);
+    arcs
 }
 
 /// The derivative of the pose by an axis: mm and mm of arc, per mm or rad.

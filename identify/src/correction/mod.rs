@@ -7,8 +7,8 @@
 //! ```
 //!
 //! `r` is the deviation of position and orientation, `J` its derivative by the axes, from dual numbers through the
-//! chain. `J` is taken once at the commanded position: errors change by a few parts in 10⁵ of the travel, so each step
-//! gains about four digits. The errors are evaluated again at every `q′`.
+//! chain. `J⁺` is that of the machine without errors at the commanded position. The slopes of the errors, a few parts in
+//! 10⁵ of the travel, follow from the steps themselves (Broyden). The errors are evaluated again at every `q′`.
 //!
 //! - [`pose`]: the tool in the table frame, and what a machine can correct of it;
 //! - [`errors`]: the errors of a machine along a sequence of positions;
@@ -24,7 +24,7 @@ pub mod stream;
 use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
 use abbe_model::sensitivity::SlotValues;
 use abbe_model::session::readings::Readings;
-use nalgebra::Vector6;
+use nalgebra::{SVector, Vector6};
 
 use crate::error::IdentifyError;
 pub use errors::{EstimatedErrors, MachineErrors};
@@ -34,7 +34,7 @@ pub use pose::{Aim, Pose};
 /// Maximum number of iterations.
 const MAX_STEPS: usize = 30;
 /// Remaining position error at which the iteration ends, mm.
-const CONVERGENCE_MM: f64 = 1e-9;
+const CONVERGENCE_MM: f64 = 1e-10;
 /// Remaining angular error at which the iteration ends, rad.
 const CONVERGENCE_RAD: f64 = 1e-12;
 /// Remaining position error beyond which a command is not corrected, mm.
@@ -46,6 +46,8 @@ const TOLERANCE_RAD: f64 = 1e-9;
 pub const NEAR_SINGULAR: f64 = 1e3;
 /// Largest correction of an axis, mm or mm at a radius of 1 m. A larger one is no correction of geometric errors.
 const LARGEST_CORRECTION_MM: f64 = 50.0;
+/// Distance from the command at which the iteration ends, mm or mm at a radius of 1 m: it may pass the limit on its way.
+const LARGEST_DISTANCE_MM: f64 = 1000.0;
 
 /// What became of a commanded position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -193,6 +195,8 @@ impl Correction<'_> {
                 remaining: [f64::INFINITY; 2],
                 number,
                 inverse,
+                step: SVector::zeros(),
+                deviation: Vector6::zeros(),
             });
         }
         let mut positions = commanded.clone();
@@ -226,7 +230,7 @@ impl Correction<'_> {
         &self,
         commanded: &Readings,
         mut positions: Readings,
-        rows: Vec<Row>,
+        mut rows: Vec<Row>,
         errors: &dyn Fn(&Readings) -> Result<SlotValues, IdentifyError>,
     ) -> Result<Vec<Corrected>, IdentifyError> {
         let machine = self.machine;
@@ -234,9 +238,16 @@ impl Correction<'_> {
             let [mm, rad] = row.remaining;
             row.state == Progress::Failed || mm.is_nan() || mm > TOLERANCE_MM || rad > TOLERANCE_RAD
         };
-        for (number, _) in rows.iter().enumerate().filter(|(_, row)| failed(row)) {
-            for (column, command) in positions.positions.iter_mut().zip(&commanded.positions) {
-                column[number] = command[number];
+        for (number, row) in rows.iter_mut().enumerate() {
+            let columns = || machine.axes.iter().zip(positions.positions.iter().zip(&commanded.positions));
+            let too_long = columns().any(|(axis, (column, command))| {
+                (column[number] - command[number]).abs() * jacobian::lever_mm(axis.kind) > LARGEST_CORRECTION_MM
+            });
+            if too_long || failed(row) {
+                row.state = Progress::Failed;
+                for (column, command) in positions.positions.iter_mut().zip(&commanded.positions) {
+                    column[number] = command[number];
+                }
             }
         }
         let partly = |row: &Row| failed(row) || row.aim != self.aim;
@@ -294,6 +305,9 @@ struct Row {
     /// What is corrected: that of the machine, or near a singularity the position alone.
     aim: Aim,
     inverse: Inverse,
+    /// The last step of the axes, mm and mm of arc, and the deviation before it.
+    step: SVector<f64, MAX_AXES>,
+    deviation: Vector6<f64>,
     remaining: [f64; 2],
     state: Progress,
     number: bool,
@@ -322,13 +336,17 @@ impl Row {
             self.state = Progress::Done;
             return;
         }
-        let step = self.inverse.step(&deviation);
-        for (axis, change) in axes.iter().zip(step) {
+        if before[0].is_finite() {
+            self.inverse.observe(&self.step, &(deviation - self.deviation));
+        }
+        self.step = -self.inverse.step(&deviation);
+        self.deviation = deviation;
+        for (axis, change) in axes.iter().zip(self.step.iter()) {
             let column = &mut positions.positions[*axis];
-            column[number] -= change;
-            let correction = (column[number] - commanded.positions[*axis][number]).abs();
-            let arc = correction * jacobian::lever_mm(machine.axes[*axis].kind);
-            if arc.is_nan() || arc > LARGEST_CORRECTION_MM {
+            let lever_mm = jacobian::lever_mm(machine.axes[*axis].kind);
+            column[number] += change / lever_mm;
+            let arc = (column[number] - commanded.positions[*axis][number]).abs() * lever_mm;
+            if arc.is_nan() || arc > LARGEST_DISTANCE_MM {
                 self.state = Progress::Failed;
             }
         }

@@ -82,11 +82,10 @@ fn newton(
             return Some(positions);
         }
         let step = Inverse::at(machine, &state, tool_mm, aim, axes).step(&deviation);
-        let arc = |(axis, change): (&usize, f64)| (change * lever_mm(machine.axes[*axis].kind)).abs();
-        let longest = axes.iter().zip(step).map(arc).fold(0.0, f64::max);
+        let longest = step.iter().fold(0.0_f64, |longest, arc| longest.max(arc.abs()));
         let share = if longest > LONGEST_STEP_MM { LONGEST_STEP_MM / longest } else { 1.0 };
-        for (axis, change) in axes.iter().zip(step) {
-            positions[*axis] -= share * change;
+        for (axis, arc) in axes.iter().zip(step.iter()) {
+            positions[*axis] -= share * arc / lever_mm(machine.axes[*axis].kind);
         }
         if positions.iter().any(|position| !position.is_finite()) {
             return None;

@@ -8,6 +8,7 @@ use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::driver::{Driver, Reference};
 use abbe_model::effect::shape::{Harmonic, Polynomial, Shape};
 use abbe_model::effect::{Component, Effect};
+use abbe_model::files::commands::CommandFile;
 use abbe_model::instrument::Station;
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::session::readings::Readings;
@@ -179,27 +180,8 @@ fn a_five_axis_machine_is_corrected_to_a_picometre() {
 }
 
 fn ur10() -> Machine {
-    let mut machine = Machine {
-        name: "UR10".into(),
-        axes: Vec::new(),
-        workpiece_side: 0,
-        rotation: abbe_model::frames::Rotation::Exact,
-        gravity: [0.0, 0.0, -1.0],
-    };
-    let rows = [
-        ([0.0, 0.0, 1.0], [0.0, 0.0, 0.0]),
-        ([0.0, -1.0, 0.0], [0.0, 0.0, 127.3]),
-        ([0.0, -1.0, 0.0], [-612.0, 0.0, 127.3]),
-        ([0.0, -1.0, 0.0], [-1184.3, 0.0, 127.3]),
-        ([0.0, 0.0, -1.0], [-1184.3, -163.941, 127.3]),
-        ([0.0, -1.0, 0.0], [-1184.3, -163.941, 11.6]),
-    ];
-    for (number, (direction, origin_mm)) in rows.into_iter().enumerate() {
-        let name = format!("J{}", number + 1);
-        let travel = Some([-std::f64::consts::TAU, std::f64::consts::TAU]);
-        machine.axes.push(Axis { name, kind: AxisKind::Rotary, direction, origin_mm, travel });
-    }
-    machine
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    abbe_model::files::machine(&folder.join("../sessions/ur10/machine.toml")).unwrap()
 }
 
 #[test]
@@ -287,4 +269,40 @@ fn rows_that_cannot_be_corrected_keep_their_command() {
     assert_eq!(found[0].positions, vec![0.0; 6]);
     assert!(found[0].remaining_mm > 0.01 && found[0].condition.is_infinite());
     assert_eq!(found[1].state, State::NotANumber);
+}
+
+/// Lost motion follows the direction of travel, which a block takes over from the block before.
+#[test]
+fn blocks_of_a_file_continue_the_travel() {
+    let machine = Arc::new(Machine::from_code("w C A b Y X Z t").unwrap());
+    let mut random = rand_pcg::Pcg64::seed_from_u64(11);
+    let effects = vec![effect("EXX", Driver::Axis("X".into()), Shape::Backlash, &[0.01])];
+    let station = Station::BallBar(BallBar { workpiece_ball: [0.0; 3], spindle_ball: [0.0; 3], bar: 1.0 });
+    let reference = Reference::default();
+    let constant = vec![0.0; machine.error_slots()];
+    let errors = EstimatedErrors { machine: Arc::clone(&machine), station, reference, constant, effects };
+    let correction = Correction { machine: &machine, errors: &errors, tool_mm: [0.0; 3], aim: Aim::of(&machine) };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("commands.csv");
+    // Stretches at rest are longer than a block: the direction of travel is that of the last motion.
+    let rests = (0..60).flat_map(|_| [random.random_range(-9..9); 10]);
+    // A block that begins at rest with nothing before it knows no direction: the file begins with a motion.
+    let positions: Vec<i32> = [-20, -10].into_iter().chain(rests).collect();
+    let lines: Vec<String> = positions.iter().map(|mm| format!("{mm}\n")).collect();
+    std::fs::write(&path, format!("x_mm\n{}", lines.concat())).unwrap();
+    let x_mm = |most: usize| -> Vec<f64> {
+        let mut file = CommandFile::open(&path, &machine, vec![0.0; 5]).unwrap();
+        let blocks = std::iter::from_fn(|| file.next_block(&machine, most).unwrap());
+        blocks.flat_map(|block| correction.pose_errors(&block.rows).unwrap()).map(|error| error[0]).collect()
+    };
+    let whole = x_mm(1000);
+    assert!(whole == x_mm(7));
+    // Half of it behind the motion.
+    let mut direction = 0;
+    for (row, pair) in positions.windows(2).enumerate() {
+        direction = if pair[1] == pair[0] { direction } else { (pair[1] - pair[0]).signum() };
+        if direction != 0 {
+            assert!((whole[row + 1] + 0.005 * f64::from(direction)).abs() < 1e-12, "row {row}: {}", whole[row + 1]);
+        }
+    }
 }

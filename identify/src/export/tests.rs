@@ -1,8 +1,7 @@
 //! Exported descriptions, read by kinematics that know the format and not its writer.
 
-use abbe_model::axis::{Axis, AxisKind};
 use abbe_model::chain::{AxisPosition, Machine};
-use abbe_model::frames::{Point, Rotation};
+use abbe_model::frames::Point;
 use abbe_model::instrument::InstrumentKind;
 use abbe_model::session::Prior;
 use faer::Mat;
@@ -50,24 +49,8 @@ fn model(machine: Machine, errors: &[(String, f64)]) -> IdentifiedModel {
 }
 
 fn robot() -> Machine {
-    let rows = [
-        ([0.0, 0.0, 1.0], [0.0, 0.0, 0.0]),
-        ([0.0, -1.0, 0.0], [0.0, 0.0, 127.3]),
-        ([0.0, -1.0, 0.0], [-612.0, 0.0, 127.3]),
-        ([0.0, -1.0, 0.0], [-1184.3, 0.0, 127.3]),
-        ([0.0, 0.0, -1.0], [-1184.3, -163.941, 127.3]),
-        ([0.0, -1.0, 0.0], [-1184.3, -163.941, 11.6]),
-    ];
-    let axes = rows.into_iter().enumerate().map(|(number, (direction, origin_mm))| Axis {
-        name: format!("J{}", number + 1),
-        kind: AxisKind::Rotary,
-        direction,
-        origin_mm,
-        travel: None,
-    });
-    let axes = axes.collect();
-    let gravity = [0.0, 0.0, -1.0];
-    Machine { name: "UR10".into(), axes, workpiece_side: 0, rotation: Rotation::Exact, gravity }
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    abbe_model::files::machine(&folder.join("../sessions/ur10/machine.toml")).unwrap()
 }
 
 fn random_errors(machine: &Machine, random: &mut impl Rng) -> Vec<(String, f64)> {

@@ -52,7 +52,7 @@ pub fn read_text(path: &Path, text: &str) -> Result<IdentifiedModel, IdentifyErr
              was saved",
             document.sha256
         );
-        return Err(file.error(message, "save the model again with `abbe fit --save` or `abbe trace --save`"));
+        return Err(file.error(message, SAVE_AGAIN));
     }
     file.model(document)
 }
@@ -78,22 +78,26 @@ impl File<'_> {
         if is_toml {
             return self.error(
                 "this is a session or machine file, not a model",
-                "the model comes first: `abbe validate MODEL SESSION`; `abbe fit SESSION --save MODEL` makes one",
+                "name a file in which a fit was saved as a model",
             );
         }
         let message = format!("not valid JSON: {cause}");
-        self.error_in(Location::line(self.path, cause.line()), message, "a model is a file of `abbe fit --save`")
+        self.error_in(
+            Location::line(self.path, cause.line()),
+            message,
+            "name a file in which a fit was saved as a model",
+        )
     }
 
     fn check_header(&self, value: &Value) -> Result<(), IdentifyError> {
-        let help = "`abbe fit SESSION --save MODEL` makes a model";
+        let help = "name a file in which a fit was saved as a model";
         match value.get("schema").and_then(Value::as_str) {
             Some(SCHEMA) => {}
             Some(other) => {
                 return Err(self.error(format!("`schema` is \"{other}\"; \"{SCHEMA}\" is expected"), help));
             }
             None if value.get("command").is_some() => {
-                return Err(self.error("this is the result of a command (`--json`), not a model", help));
+                return Err(self.error("this is the result of a command, not a model", help));
             }
             None => return Err(self.error(format!("the file has no `schema`; \"{SCHEMA}\" is expected"), help)),
         }
@@ -223,6 +227,15 @@ impl File<'_> {
         let mut parameters = Vec::with_capacity(entries.len());
         for (j, entry) in entries.iter().enumerate() {
             let fault = |message: &str| self.error(format!("`parameters[{j}]` ({}): {message}", entry.id), SAVE_AGAIN);
+            if entries[..j].iter().any(|other| other.id == entry.id) {
+                return Err(fault("another parameter has the same name"));
+            }
+            let same = |other: &&document::Parameter| {
+                entry.effect.is_some() && (other.effect, other.coefficient) == (entry.effect, entry.coefficient)
+            };
+            if let Some(other) = entries[..j].iter().find(same) {
+                return Err(fault(&format!("it is the coefficient of an effect that {} is too", other.id)));
+            }
             let role = match (entry.role.as_str(), entry.effect, entry.coefficient) {
                 ("location", None, None) => {
                     let known = ErrorName::parse(&entry.id).is_some_and(|name| machine.error_slot(&name).is_some());

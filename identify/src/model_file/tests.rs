@@ -107,6 +107,10 @@ fn a_file_that_cannot_be_used_is_refused_with_its_key() {
         (changed("/schema_version", json!(2), true), "a newer program saved the model"),
         (changed("/parameters/0/internal", json!(1e-3), false), "the file was changed after it was saved"),
         (changed("/parameters/2/internal", json!("1"), true), "`parameters[2].internal`: invalid type: string"),
+        (
+            changed("/parameters/2/id", json!("EX0C"), true),
+            "`parameters[4]` (EX0C): another parameter has the same name",
+        ),
         (changed("/covariance/3/3", json!(-1.0), true), "the variance of EC0A is negative"),
         (changed("/covariance/3/2", json!(1.0), true), "`covariance` is not positive semidefinite"),
         (changed("/covariance/3", json!([1.0]), true), "`covariance` is no lower triangle"),

@@ -5,10 +5,7 @@
 //! e(q) = T_w(q, E(q))⁻¹ T_t(q, E(q)) p − T_w(q)⁻¹ T_t(q) p
 //! ```
 //!
-//! The errors `E` are functions of the axes. Compensation computes commands `q′` at which the machine with errors is
-//! where the error-free machine is at `q`. Newton's iteration on the chain is `q′ ← q′ − J⁻¹ r`. `J` holds the motions
-//! of the tool over the table per motion of the linear axes, without errors. The errors change by a few parts in 10⁵ of
-//! the travel, so each step gains about four digits.
+//! The errors `E` are functions of the axes. Compensation is that of [`crate::correction`], by the linear axes.
 
 pub mod functions;
 mod results;
@@ -16,24 +13,21 @@ mod results;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, BodyErrors, ERRORS_PER_AXIS, Machine};
 use abbe_model::frames::Point;
+use abbe_model::sensitivity::SlotValues;
 use abbe_model::session::limits::LARGEST;
-use faer::Mat;
+use abbe_model::session::readings::Readings;
 use nalgebra::Vector3;
 
 pub use functions::{ErrorFunction, Form};
 pub use results::{AxisShare, Coordinates, MapPosition, Size, Summary};
 
+use crate::correction::errors::ErrorsNear;
+use crate::correction::{Aim, Correction, MachineErrors, State};
 use crate::error::IdentifyError;
 use crate::numerics::parallel;
-use crate::numerics::solve::Directions;
-use crate::numerics::tolerances::COLLINEAR;
 
 /// Maximum number of points of a map.
 pub const MAX_POINTS: usize = 1_000_000;
-/// Maximum number of iterations of a compensation.
-const MAX_STEPS: usize = 20;
-/// Residual at which the iteration ends, mm.
-const CONVERGENCE_MM: f64 = 1e-10;
 
 /// A machine with errors.
 #[derive(Clone, Debug)]
@@ -116,42 +110,39 @@ impl MachineWithErrors<'_> {
     /// The commands of the linear axes that bring the tool to its nominal position.
     ///
     /// # Errors
-    /// If the linear axes do not span the space, or the iteration does not converge.
+    /// If the linear axes do not span the space, or the errors are too large.
     pub fn compensate(&self, positions: &[f64]) -> Result<Compensated, IdentifyError> {
-        let linear: Vec<usize> =
-            (0..self.machine.axes.len()).filter(|axis| self.machine.axes[*axis].kind == AxisKind::Linear).collect();
-        let wanted = self.point(positions, false, None);
-        // The nominal point is affine in the linear axes, so a difference over one millimetre is the derivative.
-        let columns: Vec<Vector3<f64>> = linear
-            .iter()
-            .map(|axis| {
-                let mut moved = positions.to_vec();
-                moved[*axis] += 1.0;
-                self.point(&moved, false, None) - wanted
-            })
-            .collect();
-        let jacobian = Mat::from_fn(3, linear.len(), |i, j| columns[j][i]);
-        let directions = Directions::of(jacobian.as_ref())?;
-        if directions.rank(COLLINEAR) < 3 {
-            return Err(IdentifyError::Request(format!(
+        let correction = Correction { machine: self.machine, errors: self, tool_mm: self.tool_mm, aim: Aim::Position };
+        let columns = positions.iter().map(|position| vec![*position]).collect();
+        let commanded = Readings { positions: columns, coordinates: 1, ..Readings::default() };
+        let corrected = correction.correct(&commanded)?.into_iter().next();
+        match corrected.map(|row| (row.state, row.condition, row.positions)) {
+            Some((State::Corrected | State::BeyondTravel, _, commands)) => {
+                let error_mm = self.point(&commands, true, None) - self.point(positions, false, None);
+                Ok(Compensated { positions: commands, error_mm: error_mm.into() })
+            }
+            Some((_, condition, _)) if condition.is_infinite() => Err(IdentifyError::Request(format!(
                 "compensation: the {} linear axes of the machine do not span the space",
-                linear.len()
-            )));
+                Aim::Position.axes(self.machine).len()
+            ))),
+            _ => Err(IdentifyError::Request("compensation: no convergence; the errors are too large".to_string())),
         }
-        let mut commands = positions.to_vec();
-        for _ in 0..MAX_STEPS {
-            let residual = self.point(&commands, true, None) - wanted;
-            if residual.norm() <= CONVERGENCE_MM {
-                return Ok(Compensated { positions: commands, error_mm: residual.into() });
+    }
+}
+
+impl MachineErrors for MachineWithErrors<'_> {
+    fn along<'a>(&'a self, _: &'a Readings) -> Result<ErrorsNear<'a>, IdentifyError> {
+        Ok(Box::new(|positions| {
+            let mut values = SlotValues::zero(self.machine.error_slots());
+            for function in self.functions {
+                let column = positions.positions[function.over].iter().map(|q| function.form.at(*q));
+                match values.varying.iter_mut().find(|(slot, _)| *slot == function.slot) {
+                    Some((_, sum)) => sum.iter_mut().zip(column).for_each(|(sum, value)| *sum += value),
+                    None => values.varying.push((function.slot, column.collect())),
+                }
             }
-            let step = directions.solve(residual.as_slice(), 0.0);
-            for (axis, change) in linear.iter().zip(step.iter()) {
-                commands[*axis] -= change;
-            }
-        }
-        Err(IdentifyError::Request(format!(
-            "compensation: no convergence within {MAX_STEPS} iterations; the errors are too large"
-        )))
+            Ok(values)
+        }))
     }
 }
 

@@ -99,6 +99,10 @@ impl CommandFile {
             help: Some(help),
         };
         let expected = || {
+            if header.len() == 1 && header.iter().any(|cell| cell.contains([';', '\t'])) {
+                return "the cells of a file of commands are separated by commas, and its decimal sign is a point"
+                    .into();
+            }
             let axes: Vec<String> = machine.axes.iter().map(|axis| axis.column("")).collect();
             format!(
                 "the header names axis positions ({}) or a pose (px_mm, py_mm, pz_mm with i, j, k or qw, qx, qy, qz)",
