@@ -6,7 +6,7 @@ use std::path::Path;
 use abbe_identify::model_file::{InputFile, Provenance};
 use abbe_model::files::SourceMap;
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use crate::present::report::provenance::{self, Input};
@@ -31,7 +31,7 @@ pub struct Call {
 }
 
 /// The session file and the files that it names.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct SessionFile {
     /// Path of the session file.
     file: String,
@@ -42,7 +42,7 @@ pub struct SessionFile {
 }
 
 /// The files from which a result follows.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Origin {
     session: Option<SessionFile>,
     inputs: Vec<InputFile>,

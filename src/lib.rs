@@ -8,7 +8,7 @@
 //! | the machine, instruments, effects, sessions and their files | [`model`] |
 //! | estimates, uncertainty, plans, the trace of unmodelled effects | [`identify`] |
 //! | closed forms and their languages | [`codegen`] |
-//! | results as JSON documents | [`document`] |
+//! | results as JSON documents, parameters of equations by name | [`document`], [`equation`] |
 //!
 //! The change that a simulated error of 10 µm makes is what the equation of the same test says, −R·sin C/L₀:
 //!
@@ -43,6 +43,7 @@ pub use abbe_identify as identify;
 pub use abbe_model as model;
 
 pub mod document;
+pub mod equation;
 #[doc(hidden)]
 pub mod present;
 
