@@ -131,6 +131,5 @@ pub fn is_outlier<'py>(
 
 /// The model of a fit, with the text that `--save` writes.
 pub fn model_of(state: &State, problem: &Problem, fit: &Estimated, call: Call, seed: u64) -> Result<Model, Failed> {
-    let model = IdentifiedModel::of_fit(problem, fit, state.origin.provenance(call, seed))?;
-    Ok(Model::of(model, Default::default()))
+    Model::of(IdentifiedModel::of_fit(problem, fit, state.origin.provenance(call, seed))?)
 }

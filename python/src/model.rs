@@ -8,6 +8,7 @@ use abbe::identify::correction::{Aim, Correction, EstimatedErrors};
 use abbe::identify::model_file::{self, IdentifiedModel};
 use abbe::identify::unit::ARCSEC;
 use abbe::identify::validate::{self, validate};
+use abbe::model::files;
 use abbe::model::session::readings::Readings;
 use abbe::present::report;
 use abbe::present::validate as present;
@@ -25,13 +26,15 @@ use crate::work;
 #[pyclass(frozen, module = "abbe._abbe")]
 pub struct Model {
     model: Arc<IdentifiedModel>,
+    /// Its file. Numbers of a model that is read are rounded by their units.
+    text: String,
     origin: Origin,
 }
 
 impl Model {
-    /// A model with the file that it comes from.
-    pub fn of(model: IdentifiedModel, origin: Origin) -> Model {
-        Model { model: Arc::new(model), origin }
+    /// A new model.
+    pub fn of(model: IdentifiedModel) -> Result<Model, Failed> {
+        Ok(Model { text: model.to_text()?, model: Arc::new(model), origin: Origin::default() })
     }
 }
 
@@ -43,17 +46,19 @@ type Corrected<'py> =
 impl Model {
     #[staticmethod]
     fn read(path: PathBuf) -> Result<Model, Failed> {
-        let model = model_file::read(&path)?;
-        Ok(Model::of(model, Origin::of_files(&[&path])?))
+        let text = files::text(&path, "the model file")?;
+        let model = Arc::new(model_file::read_text(&path, &text)?);
+        Ok(Model { model, text, origin: Origin::of_files(&[&path])? })
     }
 
     #[staticmethod]
     fn from_text(text: &str) -> Result<Model, Failed> {
-        Ok(Model::of(model_file::read_text("model.json".as_ref(), text)?, Origin::default()))
+        let model = Arc::new(model_file::read_text("model.json".as_ref(), text)?);
+        Ok(Model { model, text: text.to_string(), origin: Origin::default() })
     }
 
-    fn text(&self) -> Result<String, Failed> {
-        Ok(self.model.to_text()?)
+    fn text(&self) -> &str {
+        &self.text
     }
 
     #[getter]

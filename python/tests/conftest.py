@@ -15,7 +15,7 @@ MEASURED = [
     "table-and-head/measured/session.toml",
     "tilting-head/measured/session.toml",
 ]
-PLANS = ["hermle-c600u/chapter4.toml", "hermle-c600u/chapter5.toml", "r-test/plan.toml", "ur10/session.toml"]
+PLANS = ["hermle-c600u/chapter4.toml", "hermle-c600u/chapter5.toml", "r-test/plan.toml"]
 
 
 def find_command() -> str:

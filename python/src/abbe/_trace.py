@@ -34,11 +34,8 @@ class Trace(Shown, TraceResult):
     ) -> None:
         self._session = session
         self._options = (max_effects, only, exclude, seed)
-        self._known: _abbe.Trace | None = None
-        if source is None:
-            self._known = _abbe.Trace.of(session._handle, progress, *self._options)
-            source = json.loads(self._known.json())
-        TraceResult.__init__(self, source)
+        self._known = None if source is not None else _abbe.Trace.of(session._handle, progress, *self._options)
+        TraceResult.__init__(self, json.loads(self._handle.json()) if source is None else source)
 
     @property
     def _handle(self) -> _abbe.Trace:
