@@ -375,7 +375,12 @@ fn jacobian(problem: &Problem, beta: &[f64]) -> Result<Vec<f64>, Failed> {
 /// The display unit of a parameter: one of the session, or any error of an axis.
 fn unit_of(state: &State, id: &str) -> Result<String, Failed> {
     let problem = state.problem()?;
-    if let Some(parameter) = problem.parameters.list.iter().find(|parameter| parameter.id == id) {
+    // Results state harmonics by amplitude and phase.
+    if id.ends_with(".phase") {
+        return Ok("deg".to_string());
+    }
+    let known = id.strip_suffix(".amplitude").map_or(id.to_string(), |effect| format!("{effect}.cos"));
+    if let Some(parameter) = problem.parameters.list.iter().find(|parameter| parameter.id == known) {
         return Ok(parameter.unit.name.clone());
     }
     let component = ErrorName::parse(id).map(Component::Axis);

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
+from types import FunctionType, SimpleNamespace
 from typing import Any
 
 from . import _abbe
@@ -55,6 +57,53 @@ class Equation:
     def latex(self) -> str:
         """Return the equation as LaTeX."""
         return self.print("latex")
+
+    def numpy(self, *, gradient: bool = False) -> Callable[..., Any]:
+        """Return the equation as a function of NumPy arrays: the program of ``print("python")``.
+
+        Parameters
+        ----------
+        gradient : bool
+            Return value and derivatives.
+
+        Returns
+        -------
+        callable
+            The function. ``help`` on its module lists the arguments with their units: ``print("python")``.
+        """
+        return self._functions(gradient)["gradient" if gradient else "value"]
+
+    def sympy(self) -> Any:
+        """Return the equation as a SymPy expression. Needs SymPy.
+
+        Its symbols are lengths in mm, positions of axes (angles in rad) and errors in mm and rad, with the names of
+        ``print("python")``.
+        """
+        import sympy
+
+        value = self._functions(False)["value"]
+        arguments: dict[str, list[Any]] = {}
+        listed = re.findall(r"^ +(\w+)\[\d+\] +(\w+)", self.print("python"), re.MULTILINE)
+        for group, name in listed:
+            turn = re.fullmatch(r"(sin|cos)_(\w+)", name)
+            symbol = sympy.Symbol(turn[2] if turn else name, real=True)
+            arguments.setdefault(group, []).append(getattr(sympy, turn[1])(symbol) if turn else symbol)
+        # The program with the functions of SymPy in place of those of NumPy.
+        value.__globals__["np"] = SimpleNamespace(
+            **{name: getattr(sympy, name) for name in ("sqrt", "sin", "cos", "exp", "sign", "pi")},
+            abs=sympy.Abs,
+            shape=lambda argument: (),
+            broadcast_shapes=lambda *shapes: (),
+            broadcast_to=lambda value, shape: value,
+        )
+        names = value.__code__.co_varnames[: value.__code__.co_argcount]
+        return sympy.nsimplify(value(*(arguments.get(name, []) for name in names)), rational=True)
+
+    def _functions(self, gradient: bool) -> dict[str, FunctionType]:
+        namespace: dict[str, Any] = {}
+        exec(compile(self.print("python", gradient=gradient), f"<equation of {self.test}>", "exec"), namespace)
+        functions = [item for item in namespace.values() if isinstance(item, FunctionType)]
+        return {"gradient" if item.__name__.endswith("_gradient") else "value": item for item in functions}
 
     def _repr_html_(self) -> str:
         return f"<pre>{self.text()}</pre>"

@@ -10,6 +10,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+_HEAD = ("schema_version", "tool_version", "command", "session", "inputs", "seed", "options")
+"""The keys of a document before its result."""
+
 
 class Record:
     """A JSON object with its keys as attributes.
@@ -27,7 +30,11 @@ class Record:
 
     def __init__(self, source: Mapping[str, Any]) -> None:
         self.__dict__["_source"] = source
+        # A whole document has a head before the result.
+        head = _HEAD if "schema_version" in source else ()
         for name, value in source.items():
+            if name in head:
+                continue
             self.__dict__[name + "_" * keyword.iskeyword(name)] = _wrapped(value, self._nested.get(name))
 
     def __setattr__(self, name: str, value: object) -> None:
