@@ -14,7 +14,12 @@ import sys
 from pathlib import Path
 
 import maturin
-from maturin import get_requires_for_build_editable, get_requires_for_build_sdist, get_requires_for_build_wheel
+from maturin import (
+    get_requires_for_build_editable,
+    get_requires_for_build_sdist,
+    get_requires_for_build_wheel,
+    prepare_metadata_for_build_wheel,
+)
 
 __all__ = [
     "build_editable",
@@ -23,6 +28,7 @@ __all__ = [
     "get_requires_for_build_editable",
     "get_requires_for_build_sdist",
     "get_requires_for_build_wheel",
+    "prepare_metadata_for_build_wheel",
 ]
 
 HERE = Path(__file__).resolve().parent.parent
@@ -31,11 +37,11 @@ PROFILE = os.environ.get("ABBE_PROFILE", "release")
 
 def prepare() -> None:
     """Builds the command, and puts it and the classes of results where maturin takes them."""
-    # The environment of maturin, so that nothing is built twice.
-    environment = {**os.environ, "PYO3_BUILD_EXTENSION_MODULE": "1", "PYO3_PYTHON": sys.executable}
-    packages = ["--package", "abbe", "--package", "abbe-python"]
+    # Both packages are named, so that the crates of the command have the features that they have in the module, and are
+    # built once.
+    packages = ["--package", "abbe", "--package", "abbe-python", "--bin", "abbe"]
     build = ["cargo", "build", "--locked", "--profile", PROFILE, *packages, "--message-format", "json-render-diagnostics"]
-    built = subprocess.run(build, cwd=HERE, env=environment, stdout=subprocess.PIPE, text=True)
+    built = subprocess.run(build, cwd=HERE, stdout=subprocess.PIPE, text=True)
     if built.returncode != 0:
         raise SystemExit(
             "abbe cannot be built: it needs Rust 1.95 or later (https://rustup.rs) and its workspace beside `python`"
