@@ -40,7 +40,6 @@ pub fn equation(
             gradient,
             unknowns: parameters.instrument,
             effects: parameters.effects,
-            ..Options::default()
         };
         let source = SessionTest::new(session, test)?;
         let equation = Equation::of(&session.machine, &source, &parameters.errors, &options)?;

@@ -40,3 +40,19 @@ def test_notebooks(notebook, tmp_path):
     nbclient.NotebookClient(cells, timeout=120, kernel_name="python3", resources=resources).execute()
     outputs = [output for cell in cells.cells for output in cell.get("outputs", [])]
     assert any("image/png" in output.get("data", {}) for output in outputs), "no figure"
+
+
+def test_notebooks_have_types(tmp_path):
+    """The code of the notebooks passes mypy --strict."""
+    for module in ("mypy", "nbformat"):
+        pytest.importorskip(module)
+    import nbformat
+
+    for notebook in NOTEBOOKS:
+        cells = nbformat.read(notebook, as_version=4).cells
+        code = "\n".join(cell.source for cell in cells if cell.cell_type == "code")
+        lines = [line for line in code.splitlines() if not line.startswith("%")]
+        (tmp_path / f"{notebook.stem}.py").write_text("\n".join(lines))
+    checked = [sys.executable, "-m", "mypy", "--strict", "--ignore-missing-imports", *tmp_path.glob("*.py")]
+    done = subprocess.run(checked, capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0, done.stdout
