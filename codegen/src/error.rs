@@ -54,6 +54,14 @@ pub enum CodegenError {
         /// The languages that carry it.
         languages: String,
     },
+    /// A test that cannot be an NC program as asked for.
+    #[error("{message}; {help}")]
+    Nc {
+        /// What was found.
+        message: String,
+        /// What to do.
+        help: String,
+    },
     /// A word that names no language.
     #[error("no output language is called `{word}`; the languages are {known}")]
     NoSuchLanguage {

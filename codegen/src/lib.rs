@@ -9,7 +9,8 @@
 //! - [`Tree`], [`program`]: an equation as a sequence of steps; [`vectors`], [`touch`]: its named quantities;
 //! - [`Source`], [`SessionTest`]: where a reading comes from; [`form`], [`equation`]: its closed form, as data;
 //! - [`check`](mod@check): the comparison with dual numbers; [`print`](mod@print): the languages in which a checked
-//!   equation is printed.
+//!   equation is printed;
+//! - [`nc`]: NC programs of planned tests.
 //!
 //! The sensitivity of the C test with the extension bar to the location error EX0C, to first order: ∂L/∂EX0C = −R·sin
 //! C/L₀.
@@ -42,6 +43,7 @@ mod error;
 pub mod evaluate;
 pub mod first_order;
 pub mod form;
+pub mod nc;
 pub mod normal_form;
 pub mod polynomial;
 pub mod print;

@@ -18,6 +18,7 @@ mod interrupt;
 mod json;
 mod map;
 mod message;
+mod nc;
 mod new;
 mod output;
 mod plan;
@@ -98,6 +99,9 @@ enum Command {
     /// Export the calibrated machine: URDF, Denavit-Hartenberg parameters, kinematic parameters of controls.
     #[command(after_help = export::HELP)]
     Export(export::ExportArguments),
+    /// Write the NC programs of the planned tests.
+    #[command(after_help = nc::HELP)]
+    Nc(nc::NcArguments),
     /// Estimate errors from readings, with uncertainties.
     #[command(after_help = fit::HELP)]
     Fit(fit::FitArguments),
@@ -191,6 +195,7 @@ pub fn run() -> ExitCode {
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Compensate(arguments) => compensate::run(&arguments, quiet),
         Command::Export(arguments) => export::run(&arguments, quiet),
+        Command::Nc(arguments) => nc::run(&arguments, quiet),
         Command::Fit(arguments) => fit::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),
         Command::New(arguments) => new::run(&arguments, quiet),
@@ -273,6 +278,8 @@ mod tests {
                     "new" => &["DIR"],
                     "export" if example.contains("--as") => &["MODEL", "--out", "OUT"],
                     "export" => &["MODEL", "--as", "urdf", "--out", "OUT"],
+                    "nc" if example.contains("--control") => &["SESSION", "--out", "OUT"],
+                    "nc" => &["SESSION", "--control", "linuxcnc", "--out", "OUT"],
                     "compare" => &["A", "B"],
                     "compensate" => &["MODEL", "FILE", "--out", "OUT"],
                     "validate" => &["MODEL", "SESSION"],

@@ -28,6 +28,7 @@ mod limits;
 mod measured;
 mod messages;
 mod model_commands;
+mod nc;
 mod new;
 mod nist;
 mod one_answer;

@@ -8,6 +8,7 @@ mod compiled;
 mod effects;
 mod forms;
 mod julia;
+mod nc;
 mod operators;
 mod probe;
 mod programs;

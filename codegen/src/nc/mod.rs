@@ -1,0 +1,111 @@
+//! NC programs of planned tests: the motion of a plan as data, written for a control.
+//!
+//! A program moves the axes through the states of the session's `sweep` or `path`, so that the readings belong to the
+//! positions that the session states. Before and after the measured path the motion continues by an overshoot, which
+//! keeps acceleration out of the readings. What the interpreters of controls make of a path that no single block
+//! describes is a polyline, whose chord error is bounded:
+//!
+//! ```text
+//! | ‖P_w − P_s‖ at the middle of a segment − ‖P_w − P_s‖ at its ends |  ≤  chord error
+//! ```
+//!
+//! - [`program`]: the blocks of a test, and where they come from; [`options`]: what the user may choose;
+//! - [`iso`]: controls that read G codes, after ISO 6983-1; [`heidenhain`]: plain text of the TNC;
+//! - [`CONTROLS`]: all of them.
+
+mod heidenhain;
+mod iso;
+pub mod options;
+mod path;
+pub mod program;
+
+use abbe_model::session::Session;
+
+pub use options::NcOptions;
+pub use program::Program;
+
+use crate::error::CodegenError;
+
+/// A control that programs are written for.
+pub trait Control: Sync {
+    /// Its name in options.
+    fn word(&self) -> &'static str;
+    /// The ending of its files.
+    fn extension(&self) -> &'static str;
+    /// The source of its syntax.
+    fn source(&self) -> &'static str;
+    /// Decimals of a position, mm or degrees.
+    fn decimals(&self) -> usize;
+    /// Whether an interpreter of this control has run its programs in the project's tests.
+    fn is_run(&self) -> bool;
+    /// Whether circles are possible in a plane of these two axes.
+    fn has_arc(&self, plane: Plane) -> bool;
+    /// Whether the control moves the tool point over the table while rotary axes turn.
+    fn has_tool_point(&self) -> bool;
+    /// The name of a program by its number from 1 and the name of its test, without the ending.
+    fn name(&self, number: usize, test: &str) -> String;
+    /// The text of a program.
+    fn text(&self, number: usize, program: &Program) -> String;
+    /// The program that calls the others, by name and title.
+    fn main(&self, calls: &[(String, String)]) -> String;
+}
+
+/// A plane of two linear axes, in the order in which a counterclockwise turn goes from the first to the second.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Plane {
+    /// X to Y.
+    Xy,
+    /// Z to X.
+    Zx,
+    /// Y to Z.
+    Yz,
+}
+
+/// The controls.
+pub static CONTROLS: [&dyn Control; 4] = [&iso::LINUXCNC, &iso::FANUC, &iso::SIEMENS, &heidenhain::Heidenhain];
+
+/// The control of a name.
+///
+/// # Errors
+/// If there is none.
+pub fn control(word: &str) -> Result<&'static dyn Control, CodegenError> {
+    CONTROLS.into_iter().find(|control| control.word() == word).ok_or_else(|| {
+        let known: Vec<&str> = CONTROLS.iter().map(|control| control.word()).collect();
+        CodegenError::Nc {
+            message: format!("no control is called `{word}`"),
+            help: format!("the controls are {}", known.join(", ")),
+        }
+    })
+}
+
+/// A file of a program: its name and its text.
+pub type NcFile = (String, String);
+
+/// The programs of every test of a session, and `main`, which calls them.
+///
+/// # Errors
+/// If a test has no motion, an axis has no letter, an axis would leave its travel, or the control lacks what the
+/// options ask for.
+pub fn files(session: &Session, control: &dyn Control, options: &NcOptions) -> Result<Vec<NcFile>, CodegenError> {
+    options.check(control)?;
+    let mut files = Vec::new();
+    let mut calls: Vec<(String, String)> = Vec::new();
+    let mut seen: Vec<&str> = Vec::new();
+    for (number, test) in session.tests.iter().enumerate() {
+        // The workpiece ball is centred once for each of its places.
+        let centred = seen.contains(&test.setup.as_str());
+        seen.push(&test.setup);
+        let program = Program::of(session, test, control, options, centred)?;
+        let mut name = control.name(number + 1, &test.name);
+        if name == "main" || calls.iter().any(|(other, _)| *other == name) {
+            name = format!("{name}{}", number + 1);
+        }
+        files.push((
+            format!("{name}.{}", control.extension()),
+            control.text(number + 1, &Program { name: name.clone(), ..program }),
+        ));
+        calls.push((name, test.name.clone()));
+    }
+    files.insert(0, (format!("main.{}", control.extension()), control.main(&calls)));
+    Ok(files)
+}

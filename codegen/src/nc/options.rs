@@ -1,0 +1,69 @@
+//! What the user may choose of NC programs.
+
+use super::Control;
+use crate::error::CodegenError;
+
+/// Options of NC programs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NcOptions {
+    /// Overshoot of an angle before and after the measured path, degrees; `None`: 180° on full circles, 2° otherwise.
+    pub overshoot_deg: Option<f64>,
+    /// Overshoot of a linear axis, mm.
+    pub overshoot_mm: f64,
+    /// Length by which the bar is longer at the feed-in than at the start, mm.
+    pub feed_in_mm: f64,
+    /// Distance along the tool from which a position is approached, mm.
+    pub clearance_mm: f64,
+    /// Pause between two traversals, s.
+    pub dwell_s: f64,
+    /// Feed of approach and retreat, mm/min and °/min.
+    pub approach_feed: f64,
+    /// Largest chord error of a segment in the distance of the balls, mm.
+    pub chord_error_mm: f64,
+    /// Whether paths of rotary and linear axes are written for the tool point over the table, by a function of the
+    /// control.
+    pub tool_point: bool,
+}
+
+impl Default for NcOptions {
+    fn default() -> Self {
+        NcOptions {
+            overshoot_deg: None,
+            overshoot_mm: 2.0,
+            feed_in_mm: 1.0,
+            clearance_mm: 50.0,
+            dwell_s: 3.0,
+            approach_feed: 1000.0,
+            chord_error_mm: 0.5e-3,
+            tool_point: false,
+        }
+    }
+}
+
+impl NcOptions {
+    pub(super) fn check(&self, control: &dyn Control) -> Result<(), CodegenError> {
+        let fault = |what: &str, value: f64, least: f64, most: f64| {
+            if value >= least && value <= most {
+                return Ok(());
+            }
+            Err(CodegenError::Nc {
+                message: format!("{what} is {value}"),
+                help: format!("a value from {least} to {most} is expected"),
+            })
+        };
+        fault("the overshoot in degrees", self.overshoot_deg.unwrap_or(0.0), 0.0, 360.0)?;
+        fault("the overshoot in mm", self.overshoot_mm, 0.0, 1e3)?;
+        fault("the feed-in in mm", self.feed_in_mm, 0.0, 10.0)?;
+        fault("the clearance in mm", self.clearance_mm, 0.0, 1e3)?;
+        fault("the dwell in s", self.dwell_s, 0.0, 600.0)?;
+        fault("the feed of approach", self.approach_feed, 1.0, 1e5)?;
+        fault("the chord error in mm", self.chord_error_mm, 1e-5, 1e-2)?;
+        if self.tool_point && !control.has_tool_point() {
+            return Err(CodegenError::Nc {
+                message: format!("{} has no function that moves the tool point over the table", control.word()),
+                help: "write the motion of the axes".into(),
+            });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,318 @@
+//! The path of a test in legs: overshoot, measured path, overshoot.
+
+use std::f64::consts::{PI, TAU};
+
+use abbe_model::axis::AxisKind;
+use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
+use abbe_model::frames::Point;
+use abbe_model::instrument::ballbar::BallBar;
+use abbe_model::session::Test;
+use abbe_model::session::motion::Motion;
+use abbe_model::session::placing::balls;
+use abbe_model::session::planned::planned;
+
+use super::program::Block;
+use super::{Control, NcOptions, Plane};
+use crate::error::CodegenError;
+
+/// Overshoot of a full circle, degrees: half a turn before and after (ISO 230-4 leaves it to the user).
+const FULL_CIRCLE_DEG: f64 = 180.0;
+/// Overshoot of a part of a circle or of a turn, degrees.
+const PART_DEG: f64 = 2.0;
+/// Largest number of segments of a leg.
+const MOST_SEGMENTS: usize = 100_000;
+
+/// The path of a test: legs that follow each other.
+pub(super) struct Path {
+    pub legs: Vec<Leg>,
+    pub runs: usize,
+    pub both_directions: bool,
+    /// What the operator must know of it.
+    pub remarks: Vec<String>,
+}
+
+/// A part of the path, through states of all axes in mm and rad.
+pub(super) struct Leg {
+    pub vertices: Vec<Vec<f64>>,
+    pub measured: bool,
+    shape: Shape,
+}
+
+enum Shape {
+    /// One axis moves, at a feed in mm/min or °/min.
+    Line(f64),
+    /// Two linear axes move on a circle about a centre, at a feed in mm/min.
+    Arc { plane: Plane, axes: [usize; 2], centre: [f64; 2], counterclockwise: bool, feed: f64 },
+    /// A polyline; the duration of a segment, s, and the tool point over the table, mm, if it is to be written.
+    Segments { seconds: f64, tool_points: Option<Vec<[f64; 3]>> },
+}
+
+impl Path {
+    /// # Errors
+    /// If the test has no motion, or an axis would leave its travel.
+    pub fn of(
+        machine: &Machine,
+        test: &Test,
+        control: &dyn Control,
+        options: &NcOptions,
+    ) -> Result<Path, CodegenError> {
+        let (range, runs, both_directions) = match &test.motion {
+            Some(
+                Motion::Sweep { from, to, runs, both_directions, .. }
+                | Motion::Circle { from, to, runs, both_directions, .. }
+                | Motion::Follow { from, to, runs, both_directions, .. },
+            ) => ([*from, *to], *runs, *both_directions),
+            Some(Motion::List) | None => {
+                return Err(CodegenError::Nc {
+                    message: format!("test \"{}\" states no motion", test.name),
+                    help: "add `sweep = { … }` or `path = { kind = \"circle\" | \"follow\", … }`".into(),
+                });
+            }
+        };
+        let mut remarks = Vec::new();
+        let ends = overshot(machine, test, range, options, &mut remarks)?;
+        let [from, to] = range;
+        let mut legs = Vec::new();
+        for (range, measured) in [([ends[0], from], false), ([from, to], true), ([to, ends[1]], false)] {
+            if range[0] != range[1] {
+                legs.push(Leg::of(machine, test, range, measured, control, options)?);
+            }
+        }
+        if legs.iter().any(|leg| matches!(leg.shape, Shape::Segments { .. })) {
+            remarks.push(format!("Segments with a chord error of at most {} um", options.chord_error_mm * 1e3));
+        }
+        Ok(Path { legs, runs, both_directions, remarks })
+    }
+
+    /// The first state, with overshoot.
+    pub fn start(&self) -> &[f64] {
+        self.legs.first().and_then(|leg| leg.vertices.first()).map_or(&[], Vec::as_slice)
+    }
+
+    /// The last state of a forward traversal, with overshoot.
+    pub fn end(&self) -> &[f64] {
+        self.legs.last().and_then(|leg| leg.vertices.last()).map_or(&[], Vec::as_slice)
+    }
+}
+
+/// The test with another range of its motion, traversed once with this many steps.
+fn with_range(test: &Test, range: [f64; 2], steps: usize) -> Test {
+    let mut test = test.clone();
+    let [new_from, new_to] = range;
+    if let Some(
+        Motion::Sweep { from, to, step, runs, both_directions, .. }
+        | Motion::Circle { from, to, step, runs, both_directions, .. }
+        | Motion::Follow { from, to, step, runs, both_directions, .. },
+    ) = &mut test.motion
+    {
+        (*from, *to, *step) = (new_from, new_to, (new_to - new_from).abs() / steps as f64);
+        (*runs, *both_directions) = (1, false);
+    }
+    test
+}
+
+/// The states of a range in equal steps.
+fn states(machine: &Machine, test: &Test, range: [f64; 2], steps: usize) -> Result<Vec<Vec<f64>>, CodegenError> {
+    let readings = planned(machine, &with_range(test, range, steps)).map_err(|error| CodegenError::Nc {
+        message: error.to_string(),
+        help: error.help().unwrap_or("plan within the travel of the machine").to_string(),
+    })?;
+    Ok((0..readings.rows()).map(|row| readings.positions.iter().map(|column| column[row]).collect()).collect())
+}
+
+/// The range with its overshoot, mm or rad.
+fn overshot(
+    machine: &Machine,
+    test: &Test,
+    [from, to]: [f64; 2],
+    options: &NcOptions,
+    remarks: &mut Vec<String>,
+) -> Result<[f64; 2], CodegenError> {
+    let sign = (to - from).signum();
+    let driven = match &test.motion {
+        Some(Motion::Sweep { axis, .. } | Motion::Follow { axis, .. }) => Some(&machine.axes[*axis]),
+        _ => None,
+    };
+    let linear = driven.is_some_and(|axis| axis.kind == AxisKind::Linear);
+    let full = !linear && (to - from).abs() > TAU - 1e-9;
+    let stated = if linear { Some(options.overshoot_mm) } else { options.overshoot_deg.map(f64::to_radians) };
+    let usual = if full { FULL_CIRCLE_DEG } else { PART_DEG }.to_radians();
+    let wanted = stated.unwrap_or(usual);
+    let with = |before: f64, after: f64| [from - sign * before, to + sign * after];
+    let whole = with(wanted, wanted);
+    let reached = states(machine, test, whole, 64);
+    if reached.is_ok() || stated.is_some() {
+        return reached.map(|_| whole);
+    }
+    // Less where the travel of the axis, or of an axis that follows it, ends.
+    let room = |end: f64, sign: f64| match driven.and_then(|axis| axis.travel) {
+        Some([low, high]) => if sign > 0.0 { high - end } else { end - low }.clamp(0.0, wanted),
+        None => wanted,
+    };
+    let less = with(room(from, -sign), room(to, sign));
+    let range = if states(machine, test, less, 64).is_ok() { less } else { [from, to] };
+    states(machine, test, range, 64)?;
+    let [before, after] = [(from - range[0]).abs().to_degrees(), (range[1] - to).abs().to_degrees()];
+    remarks.push(format!(
+        "Overshoot {before:.3} deg before and {after:.3} deg after the measured path: the travel ends there"
+    ));
+    Ok(range)
+}
+
+impl Leg {
+    fn of(
+        machine: &Machine,
+        test: &Test,
+        range: [f64; 2],
+        measured: bool,
+        control: &dyn Control,
+        options: &NcOptions,
+    ) -> Result<Leg, CodegenError> {
+        let span = (range[1] - range[0]).abs();
+        let (speed, radius) = match &test.motion {
+            Some(Motion::Sweep { axis, speed, .. }) => {
+                let feed = 60.0 * machine.axes[*axis].kind.to_display(*speed);
+                return Ok(Leg { vertices: states(machine, test, range, 1)?, measured, shape: Shape::Line(feed) });
+            }
+            Some(Motion::Circle { first, second, radius, speed, .. }) => {
+                // Half a turn at most: a block with equal ends means nothing or a whole turn, as the control has it.
+                let vertices = states(machine, test, range, (span / (0.9 * PI)).ceil().max(1.0) as usize)?;
+                let whole = states(machine, test, [0.0, PI], 1);
+                let axes = [*first, *second];
+                if let (Some((plane, order)), Ok(whole)) = (plane(machine, axes), whole) {
+                    let centre = axes.map(|axis| 0.5 * (whole[0][axis] + whole[1][axis]));
+                    let round = vertices.iter().all(|state| {
+                        let [x, y] = [0, 1].map(|i| state[axes[i]] - centre[i]);
+                        (x.hypot(y) - radius).abs() < 1e-6
+                    });
+                    if round && control.has_arc(plane) {
+                        let forward = range[1] > range[0];
+                        let swapped = order == [1, 0];
+                        let shape = Shape::Arc {
+                            plane,
+                            axes: order.map(|i| axes[i]),
+                            centre: order.map(|i| centre[i]),
+                            counterclockwise: forward != swapped,
+                            feed: 60.0 * speed,
+                        };
+                        return Ok(Leg { vertices, measured, shape });
+                    }
+                }
+                (*speed, *radius)
+            }
+            Some(Motion::Follow { speed, .. }) => (*speed, 1.0),
+            _ => return Err(CodegenError::Nc { message: "no motion".into(), help: "state one".into() }),
+        };
+        let mut steps = (span / 2_f64.to_radians()).ceil().max(1.0) as usize;
+        let vertices = loop {
+            let vertices = states(machine, test, range, steps)?;
+            let error_mm = chord_error_mm(machine, test, &vertices);
+            if error_mm <= options.chord_error_mm {
+                break vertices;
+            }
+            // The error falls with the square of the step.
+            let factor = (error_mm / options.chord_error_mm).sqrt() * 1.02;
+            steps = ((steps as f64 * factor).ceil() as usize).max(steps + 1);
+            if steps > MOST_SEGMENTS {
+                return Err(CodegenError::Nc {
+                    message: format!("test \"{}\" needs more than {MOST_SEGMENTS} segments", test.name),
+                    help: "allow a larger chord error".into(),
+                });
+            }
+        };
+        let seconds = span * radius / speed / (vertices.len() - 1) as f64;
+        let follows = matches!(test.motion, Some(Motion::Follow { .. }));
+        let tool_points = (options.tool_point && follows)
+            .then(|| vertices.iter().map(|state| tool_over_table(machine, test, state)).collect());
+        Ok(Leg { vertices, measured, shape: Shape::Segments { seconds, tool_points } })
+    }
+
+    /// The blocks of the leg, from its first state to its last or back.
+    pub fn blocks(&self, letters: &[char], machine: &Machine, back: bool) -> Vec<Block> {
+        let order: Vec<usize> =
+            if back { (0..self.vertices.len()).rev().collect() } else { (0..self.vertices.len()).collect() };
+        let display = |axis: usize, state: &[f64]| (letters[axis], machine.axes[axis].kind.to_display(state[axis]));
+        let pairs = order.windows(2).map(|pair| (&self.vertices[pair[0]], &self.vertices[pair[1]]));
+        match &self.shape {
+            Shape::Line(feed) => pairs
+                .map(|(from, to)| {
+                    let moved = (0..letters.len()).filter(|axis| from[*axis] != to[*axis]);
+                    Block::Line { to: moved.map(|axis| display(axis, to)).collect(), feed: *feed }
+                })
+                .collect(),
+            Shape::Arc { plane, axes, centre, counterclockwise, feed } => pairs
+                .map(|(from, to)| Block::Arc {
+                    plane: *plane,
+                    to: axes.map(|axis| display(axis, to)),
+                    centre: std::array::from_fn(|i| centre[i] - from[axes[i]]),
+                    centre_at: *centre,
+                    counterclockwise: *counterclockwise != back,
+                    feed: *feed,
+                })
+                .collect(),
+            Shape::Segments { seconds, tool_points: None } => {
+                let moves = |axis: &usize| self.vertices.iter().any(|state| state[*axis] != self.vertices[0][*axis]);
+                let moving: Vec<usize> = (0..letters.len()).filter(moves).collect();
+                let end = |to: &Vec<f64>| (moving.iter().map(|axis| display(*axis, to)).collect(), *seconds);
+                vec![Block::Segments { ends: pairs.map(|(_, to)| end(to)).collect(), tool_point: false }]
+            }
+            Shape::Segments { seconds, tool_points: Some(points) } => {
+                let rotary: Vec<usize> =
+                    (0..letters.len()).filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary).collect();
+                let end = |number: usize, seconds: f64| {
+                    let linear = ['X', 'Y', 'Z'].into_iter().zip(points[number]);
+                    let turned = rotary.iter().map(|axis| display(*axis, &self.vertices[number]));
+                    (linear.chain(turned).collect::<Vec<_>>(), seconds)
+                };
+                let same = |p: &[f64; 3]| (0..3).all(|i| (p[i] - points[0][i]).abs() < 1e-7);
+                let count = order.len() - 1;
+                // A tool point that stays over its place of the table needs one block.
+                let ends = match points.iter().all(same) {
+                    true => vec![end(order[count], seconds * count as f64)],
+                    false => order[1..].iter().map(|number| end(*number, *seconds)).collect(),
+                };
+                vec![Block::Segments { ends, tool_point: true }]
+            }
+        }
+    }
+}
+
+/// The plane of two axes, and the order in which a counterclockwise turn goes through them.
+fn plane(machine: &Machine, axes: [usize; 2]) -> Option<(Plane, [usize; 2])> {
+    match axes.map(|axis| machine.axes[axis].name.as_str()) {
+        ["X", "Y"] => Some((Plane::Xy, [0, 1])),
+        ["Y", "X"] => Some((Plane::Xy, [1, 0])),
+        ["Z", "X"] => Some((Plane::Zx, [0, 1])),
+        ["X", "Z"] => Some((Plane::Zx, [1, 0])),
+        ["Y", "Z"] => Some((Plane::Yz, [0, 1])),
+        ["Z", "Y"] => Some((Plane::Yz, [1, 0])),
+        _ => None,
+    }
+}
+
+/// The largest deviation of the distance of the balls at the middle of a segment from that at its ends, mm.
+fn chord_error_mm(machine: &Machine, test: &Test, vertices: &[Vec<f64>]) -> f64 {
+    let bar = BallBar {
+        workpiece_ball: test.station.table_point_mm().unwrap_or_default(),
+        spindle_ball: test.station.tool_point_mm(),
+        bar: 0.0,
+    };
+    let distance = |at: &[f64]| {
+        let (workpiece, spindle) = balls(machine, &bar, at);
+        (0..3).map(|i| (spindle[i] - workpiece[i]).powi(2)).sum::<f64>().sqrt()
+    };
+    let of_segment = |pair: &[Vec<f64>]| {
+        let middle: Vec<f64> = pair[0].iter().zip(&pair[1]).map(|(a, b)| 0.5 * (a + b)).collect();
+        (distance(&middle) - 0.5 * (distance(&pair[0]) + distance(&pair[1]))).abs()
+    };
+    vertices.windows(2).map(of_segment).fold(0.0, f64::max)
+}
+
+/// The tool point in the table frame, mm.
+fn tool_over_table(machine: &Machine, test: &Test, state: &[f64]) -> [f64; 3] {
+    let states: Vec<AxisPosition<f64>> =
+        machine.axes.iter().zip(state).map(|(axis, q)| AxisPosition::new(axis.kind, *q)).collect();
+    let none = vec![BodyErrors::<f64>::NONE; state.len()];
+    let tool = machine.tool_point::<f64>(&states, &none, Point(test.station.tool_point_mm()));
+    machine.table_point::<f64>(&states, &none, tool).0
+}

@@ -1,0 +1,288 @@
+//! The program of a test as data: approach, centring, feed-in, traversals, feed-out, retreat.
+
+use abbe_model::axis::AxisKind;
+use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
+use abbe_model::frames::Point;
+use abbe_model::instrument::ballbar::BallBar;
+use abbe_model::instrument::{InstrumentKind, Station};
+use abbe_model::session::placing::{balls, positions_for_bar};
+use abbe_model::session::{Session, Test};
+
+use super::path::{Leg, Path};
+use super::{Control, NcOptions, Plane};
+use crate::error::CodegenError;
+
+/// One block of a program. Positions in mm and degrees.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Block {
+    /// A remark.
+    Comment(String),
+    /// The program stops; the operator does what the text says.
+    Stop(String),
+    /// A pause, s.
+    Dwell(f64),
+    /// A straight motion of these axes at a feed: mm/min if a linear axis moves, otherwise °/min.
+    Line {
+        /// Letter and end position of each axis.
+        to: Vec<(char, f64)>,
+        /// The feed.
+        feed: f64,
+    },
+    /// A circle of two linear axes.
+    Arc {
+        /// The plane.
+        plane: Plane,
+        /// Letter and end position of both axes.
+        to: [(char, f64); 2],
+        /// Centre less start, mm, in the order of the axes.
+        centre: [f64; 2],
+        /// The centre, mm.
+        centre_at: [f64; 2],
+        /// Counterclockwise in the plane.
+        counterclockwise: bool,
+        /// The feed, mm/min.
+        feed: f64,
+    },
+    /// Segments of rotary and linear axes together, each with its duration.
+    Segments {
+        /// End positions and duration in s of each segment.
+        ends: Vec<(Vec<(char, f64)>, f64)>,
+        /// The positions of X, Y, Z are those of the tool point over the table.
+        tool_point: bool,
+    },
+}
+
+/// The program of one test.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Program {
+    /// Name of its file without the ending.
+    pub name: String,
+    /// What it is for, a line each.
+    pub title: Vec<String>,
+    /// Its blocks.
+    pub blocks: Vec<Block>,
+}
+
+impl Program {
+    /// The program of a test. If it is `centred`, the workpiece ball has its place from a test before.
+    ///
+    /// # Errors
+    /// As [`files`](super::files).
+    pub fn of(
+        session: &Session,
+        test: &Test,
+        control: &dyn Control,
+        options: &NcOptions,
+        centred: bool,
+    ) -> Result<Program, CodegenError> {
+        let machine = &*session.machine;
+        let writer = Writer { machine, test, letters: letters(machine)?, options };
+        let path = Path::of(machine, test, control, options)?;
+        let mut blocks = Vec::new();
+        writer.approach(&path, centred, &mut blocks)?;
+        let start = path.start().to_vec();
+        writer.traversals(&path, &mut blocks);
+        writer.retreat(&path, &start, &mut blocks)?;
+        let kind = session.instrument.word();
+        let mut title = vec![
+            format!("{}: test {} ({kind})", machine.name, test.name),
+            "Positions are those of the axes in the session. The active work offset".into(),
+            "and tool length must give them. This program changes neither.".into(),
+        ];
+        title.extend(path.remarks.iter().cloned());
+        if !control.is_run() {
+            title.push(format!("This form has not been run on a control. Syntax: {}", control.source()));
+        }
+        Ok(Program { name: test.name.clone(), title, blocks })
+    }
+}
+
+/// The letters of the axes.
+fn letters(machine: &Machine) -> Result<Vec<char>, CodegenError> {
+    let letter = |name: &String| {
+        let mut letters = name.chars();
+        letters.next().filter(|letter| letters.next().is_none() && "ABCXYZUVW".contains(*letter))
+    };
+    machine
+        .axes
+        .iter()
+        .map(|axis| {
+            letter(&axis.name).ok_or_else(|| CodegenError::Nc {
+                message: format!("axis `{}` has no letter of NC programs", axis.name),
+                help: "axes are called A, B, C, X, Y, Z, U, V or W in a program".into(),
+            })
+        })
+        .collect()
+}
+
+struct Writer<'s> {
+    machine: &'s Machine,
+    test: &'s Test,
+    letters: Vec<char>,
+    options: &'s NcOptions,
+}
+
+impl Writer<'_> {
+    /// The axes of a kind that differ, with their positions in mm and degrees.
+    fn moved(&self, from: &[f64], to: &[f64], kind: AxisKind) -> Vec<(char, f64)> {
+        let axes = self.machine.axes.iter().zip(&self.letters).zip(from.iter().zip(to));
+        axes.filter(|((axis, _), (a, b))| axis.kind == kind && a != b)
+            .map(|((axis, letter), (_, b))| (*letter, axis.kind.to_display(*b)))
+            .collect()
+    }
+
+    /// All axes of a kind.
+    fn all(&self, to: &[f64], kind: AxisKind) -> Vec<(char, f64)> {
+        let axes = self.machine.axes.iter().zip(&self.letters).zip(to);
+        axes.filter(|((axis, _), _)| axis.kind == kind)
+            .map(|((axis, letter), q)| (*letter, axis.kind.to_display(*q)))
+            .collect()
+    }
+
+    fn line(&self, to: Vec<(char, f64)>, blocks: &mut Vec<Block>) {
+        if !to.is_empty() {
+            blocks.push(Block::Line { to, feed: self.options.approach_feed });
+        }
+    }
+
+    /// The balls of the instrument: where a bar, or a sensor and a ball, stand.
+    fn bar(&self) -> Option<BallBar<f64>> {
+        Some(BallBar {
+            workpiece_ball: self.test.station.table_point_mm()?,
+            spindle_ball: self.test.station.tool_point_mm(),
+            bar: self.test.station.reference_mm(),
+        })
+    }
+
+    /// The positions with the tool retracted along itself; `None` if the linear axes or their travel do not allow it.
+    fn retracted(&self, at: &[f64]) -> Option<Vec<f64>> {
+        let bar = self.bar()?;
+        let states: Vec<AxisPosition<f64>> =
+            self.machine.axes.iter().zip(at).map(|(axis, q)| AxisPosition::new(axis.kind, *q)).collect();
+        let none = vec![BodyErrors::<f64>::NONE; at.len()];
+        let point = |z: f64| self.machine.tool_point::<f64>(&states, &none, Point([0.0, 0.0, z])).0;
+        let (near, far) = (point(0.0), point(self.options.clearance_mm));
+        let (workpiece, spindle) = balls(self.machine, &bar, at);
+        let requested = std::array::from_fn(|i| spindle[i] - workpiece[i] + far[i] - near[i]);
+        self.within(positions_for_bar(self.machine, &bar, at, requested)?)
+    }
+
+    /// The positions at which the bar is longer by the feed-in.
+    fn fed_in(&self, at: &[f64]) -> Option<Vec<f64>> {
+        let bar = self.bar()?;
+        let (workpiece, spindle) = balls(self.machine, &bar, at);
+        let apart: [f64; 3] = std::array::from_fn(|i| spindle[i] - workpiece[i]);
+        let length = apart.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let longer = (length > 1.0).then(|| apart.map(|x| x * (1.0 + self.options.feed_in_mm / length)))?;
+        self.within(positions_for_bar(self.machine, &bar, at, longer)?)
+    }
+
+    fn within(&self, at: Vec<f64>) -> Option<Vec<f64>> {
+        let inside = self
+            .machine
+            .axes
+            .iter()
+            .zip(&at)
+            .all(|(axis, q)| axis.travel.is_none_or(|[low, high]| *q >= low - 1e-9 && *q <= high + 1e-9));
+        inside.then_some(at)
+    }
+
+    /// To the start of the path, by way of the centre of the workpiece ball if it has no place yet.
+    fn approach(&self, path: &Path, centred: bool, blocks: &mut Vec<Block>) -> Result<(), CodegenError> {
+        let start = path.start();
+        let ball_bar = matches!(self.test.station, Station::BallBar(_));
+        blocks.push(Block::Stop(
+            "Take the bar off. Move the tool clear of table and fixtures. The axes turn to the start".into(),
+        ));
+        self.line(self.all(start, AxisKind::Rotary), blocks);
+        let mut here: Option<Vec<f64>> = None;
+        let centre = self.bar().filter(|_| ball_bar && !centred).and_then(|bar| {
+            let centre = self.within(positions_for_bar(self.machine, &bar, start, [0.0; 3])?)?;
+            Some((self.retracted(&centre)?, centre))
+        });
+        if let Some((above, centre)) = centre {
+            blocks.push(Block::Comment(format!("Centring of the workpiece ball, setup {}", self.test.setup)));
+            self.line(self.all(&above, AxisKind::Linear), blocks);
+            blocks
+                .push(Block::Stop("Mount the spindle cup, and the workpiece ball with its base loose below it".into()));
+            self.line(self.moved(&above, &centre, AxisKind::Linear), blocks);
+            blocks.push(Block::Stop("Let the cup take the workpiece ball. Lock its base".into()));
+            self.line(self.moved(&centre, &above, AxisKind::Linear), blocks);
+            here = Some(above);
+        } else if ball_bar && !centred {
+            blocks.push(Block::Comment(format!(
+                "The centre of the workpiece ball, setup {}, cannot be reached: place it by measurement",
+                self.test.setup
+            )));
+        }
+        let first = self.fed_in(start).filter(|_| ball_bar).unwrap_or_else(|| start.to_vec());
+        if let Some(above) = self.retracted(&first) {
+            // Across at the clearance, then down along the tool.
+            self.line(
+                here.map_or_else(
+                    || self.all(&above, AxisKind::Linear),
+                    |here| self.moved(&here, &above, AxisKind::Linear),
+                ),
+                blocks,
+            );
+            self.line(self.moved(&above, &first, AxisKind::Linear), blocks);
+        } else {
+            blocks.push(Block::Comment("The start cannot be approached along the tool within the travel".into()));
+            self.line(self.all(&first, AxisKind::Linear), blocks);
+        }
+        let mount = match self.test.station.kind() {
+            InstrumentKind::BallBar => format!("Mount the bar of {} mm", self.test.station.reference_mm()),
+            _ => "Bring the instrument into its measuring range".to_string(),
+        };
+        blocks.push(Block::Stop(format!("{mount}. Start recording")));
+        if first != start {
+            blocks.push(Block::Comment("Feed-in".into()));
+            self.line(self.moved(&first, start, AxisKind::Linear), blocks);
+        }
+        Ok(())
+    }
+
+    fn traversals(&self, path: &Path, blocks: &mut Vec<Block>) {
+        let count = path.runs * if path.both_directions { 2 } else { 1 };
+        for run in 0..count {
+            let back = path.both_directions && run % 2 == 1;
+            if run > 0 {
+                if !path.both_directions {
+                    blocks.push(Block::Comment("Back to the start; not a run".into()));
+                    path.legs.iter().rev().for_each(|leg| blocks.extend(leg.blocks(&self.letters, self.machine, true)));
+                }
+                blocks.push(Block::Dwell(self.options.dwell_s));
+            }
+            let direction = if back { "backward" } else { "forward" };
+            blocks.push(Block::Comment(format!("Run {}, {direction}", run + 1)));
+            let legs: Box<dyn Iterator<Item = &Leg>> =
+                if back { Box::new(path.legs.iter().rev()) } else { Box::new(path.legs.iter()) };
+            for leg in legs {
+                if leg.measured {
+                    blocks.push(Block::Comment("Measured path begins".into()));
+                }
+                blocks.extend(leg.blocks(&self.letters, self.machine, back));
+                if leg.measured {
+                    blocks.push(Block::Comment("Measured path ends".into()));
+                }
+            }
+        }
+    }
+
+    /// From where the traversals end: feed-out, and away along the tool.
+    fn retreat(&self, path: &Path, start: &[f64], blocks: &mut Vec<Block>) -> Result<(), CodegenError> {
+        let end = if path.both_directions { start } else { path.end() };
+        let ball_bar = matches!(self.test.station, Station::BallBar(_));
+        let last = self.fed_in(end).filter(|_| ball_bar).unwrap_or_else(|| end.to_vec());
+        if last != end {
+            blocks.push(Block::Comment("Feed-out".into()));
+            self.line(self.moved(end, &last, AxisKind::Linear), blocks);
+        }
+        blocks.push(Block::Stop("Stop recording. Take the instrument off, and hold it".into()));
+        match self.retracted(&last) {
+            Some(above) => self.line(self.moved(&last, &above, AxisKind::Linear), blocks),
+            None => blocks.push(Block::Comment("Retreat along the tool by hand".into())),
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,267 @@
+//! NC programs, read by an interpreter of LinuxCNC and by parsers that share no code with the writer.
+
+mod decode;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use abbe_codegen::nc::{self, NcOptions};
+use abbe_model::axis::{Axis, AxisKind};
+use abbe_model::chain::Machine;
+use abbe_model::files::{self, ReadOptions};
+use abbe_model::instrument::ballbar::BallBar;
+use abbe_model::session::placing::balls;
+use abbe_model::session::planned::planned;
+use abbe_model::session::{Session, Test};
+use nalgebra::DVector;
+
+use crate::tools::{self, folder};
+use decode::{Move, Positions, canonical, of_g_codes, of_plain_text};
+
+fn bar_of(test: &Test) -> BallBar<f64> {
+    BallBar {
+        workpiece_ball: test.station.table_point_mm().unwrap(),
+        spindle_ball: test.station.tool_point_mm(),
+        bar: test.station.reference_mm(),
+    }
+}
+
+fn at(machine: &Machine, positions: &Positions) -> Vec<f64> {
+    let position = |axis: &Axis| axis.kind.to_internal(positions[&axis.name.chars().next().unwrap()]);
+    machine.axes.iter().map(position).collect()
+}
+
+fn distance_mm(machine: &Machine, bar: &BallBar<f64>, at: &[f64]) -> f64 {
+    let (workpiece, spindle) = balls(machine, bar, at);
+    (0..3).map(|i| (spindle[i] - workpiece[i]).powi(2)).sum::<f64>().sqrt()
+}
+
+/// The measured path keeps the distance of the balls and passes the planned states in their order, within the travel.
+fn holds_the_plan(session: &Session, test: &Test, moves: &[Move], rounding: f64) {
+    let (machine, bar) = (&*session.machine, bar_of(test));
+    let plan = planned(machine, test).unwrap();
+    let state = |row: usize| -> Vec<f64> { plan.positions.iter().map(|column| column[row]).collect() };
+    let nominal = distance_mm(machine, &bar, &state(0));
+    let runs = plan.runs();
+    let measured: Vec<&Move> = moves.iter().filter(|own| own.run.is_some()).collect();
+    for point in moves.iter().flat_map(|own| &own.points) {
+        let at = at(machine, point);
+        for (axis, q) in machine.axes.iter().zip(&at) {
+            let inside = axis.travel.is_none_or(|[low, high]| *q >= low - 1e-5 && *q <= high + 1e-5);
+            assert!(inside, "{}: axis {} goes to {q}", test.name, axis.name);
+        }
+    }
+    for point in measured.iter().flat_map(|own| &own.points) {
+        let off = distance_mm(machine, &bar, &at(machine, point)) - nominal;
+        assert!(off.abs() < 1e-3, "{}: {off} mm at {point:?}", test.name);
+    }
+    // Each run is one stretch of measured blocks, which begins where the block before ends.
+    let mut stretches: Vec<Vec<Vec<f64>>> = Vec::new();
+    for (number, own) in moves.iter().enumerate() {
+        let Some(run) = own.run else { continue };
+        if run == stretches.len() {
+            stretches.push(moves[number - 1].points.last().map(|point| at(machine, point)).into_iter().collect());
+        }
+        stretches[run].extend(own.points.iter().map(|point| at(machine, point)));
+    }
+    assert_eq!(stretches.len(), runs.len(), "{}", test.name);
+    for (stretch, run) in stretches.iter().zip(&runs) {
+        let mut first = 0;
+        for row in run.clone() {
+            let wanted = state(row);
+            let found = (first..stretch.len() - 1)
+                .find(|k| apart(machine, &wanted, &stretch[*k], &stretch[*k + 1]) < 0.02 + rounding);
+            assert!(found.is_some(), "{}: row {row} is not on the path", test.name);
+            first = found.unwrap();
+        }
+    }
+}
+
+/// Distance of a state from the straight motion between two others, mm, with angles as arcs of 100 mm.
+fn apart(machine: &Machine, state: &[f64], from: &[f64], to: &[f64]) -> f64 {
+    let lever = |axis: usize| if machine.axes[axis].kind == AxisKind::Rotary { 100.0 } else { 1.0 };
+    let scaled = |values: &[f64]| DVector::from_fn(values.len(), |axis, _| lever(axis) * values[axis]);
+    let (state, from, to) = (scaled(state), scaled(from), scaled(to));
+    let along = &to - &from;
+    let share = ((&state - &from).dot(&along) / along.norm_squared().max(1e-30)).clamp(0.0, 1.0);
+    (state - from - along * share).norm()
+}
+
+fn session(path: &Path) -> Session {
+    files::session(path, &ReadOptions { read_data: false, ..ReadOptions::default() }).unwrap()
+}
+
+/// Circles in three planes and two synchronous paths beside the bundled plans.
+fn circles(folder: &Path) -> PathBuf {
+    let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions");
+    std::fs::copy(sessions.join("hermle-c600u/machine.toml"), folder.join("machine.toml")).unwrap();
+    let mut text = String::from(
+        "[machine]\nfile = \"machine.toml\"\n[instrument]\nkind = \"ballbar\"\nnoise_um = 0.3\n[unknowns]\nerrors = [\"EC0Y\"]\n",
+    );
+    let circle = |plane: &str, range: &str| {
+        format!(
+            "[[test]]\nname = \"{plane}\"\nbar_mm = 100.0\nworkpiece_ball_mm = [0, 0, 50]\nspindle_ball_mm = [0, 0, 0]\n\
+             path = {{ kind = \"circle\", plane = \"{plane}\", radius_mm = 100{range}, centre_mm = [0, 0, 0], step_deg = 0.5, \
+             feed_mm_min = 1000, runs = 2, both_directions = true }}\n"
+        )
+    };
+    text += &(circle("XY", "")
+        + &circle("ZX", ", from_deg = -20, to_deg = 200")
+        + &circle("YZ", ", from_deg = 10, to_deg = 170"));
+    for offset in ["radial", "axial", "tangential"] {
+        text += &format!(
+            "[[test]]\nname = \"{offset}\"\nbar_mm = 100.0\nworkpiece_ball_mm = [0, 100, 50]\nspindle_ball_mm = [0, 0, 0]\n\
+             path = {{ kind = \"follow\", axis = \"C\", from_deg = 0, to_deg = 360, step_deg = 1, feed_deg_min = 300, \
+             offset = \"{offset}\", runs = 1, both_directions = true }}\n"
+        );
+    }
+    let path = folder.join("circles.toml");
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+const PLANS: [&str; 7] = [
+    "hermle-c600u/chapter4.toml",
+    "hermle-c600u/chapter5.toml",
+    "hermle-c600u/chapter6.toml",
+    "r-test/plan.toml",
+    "self-calibration/session.toml",
+    "table-and-head/session.toml",
+    "tilting-head/session.toml",
+];
+
+fn plans(folder: &Path) -> Vec<PathBuf> {
+    let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions");
+    PLANS.iter().map(|plan| sessions.join(plan)).chain([circles(folder)]).collect()
+}
+
+/// What LinuxCNC's interpreter prints.
+fn rs274(program: &Path, folder: &Path, file: &str) -> String {
+    let mut yes = Command::new("yes").stdout(Stdio::piped()).spawn().unwrap();
+    let input = yes.stdout.take().unwrap();
+    let output = Command::new(program).args(["-g", file]).current_dir(folder).stdin(input).output().unwrap();
+    yes.kill().unwrap();
+    yes.wait().unwrap();
+    let messages = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && messages.trim() == "executing", "{file}: {messages}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[test]
+fn the_interpreter_of_linuxcnc_keeps_the_bar() {
+    let Some(interpreter) = tools::find("nc", &["rs274"], &[]) else { return };
+    let place = folder("linuxcnc");
+    for plan in plans(&place) {
+        let session = session(&plan);
+        let files = nc::files(&session, nc::control("linuxcnc").unwrap(), &NcOptions::default()).unwrap();
+        for (name, text) in &files {
+            std::fs::write(place.join(name), text).unwrap();
+        }
+        let mut all = 0;
+        for ((name, text), test) in files[1..].iter().zip(&session.tests) {
+            let moves = canonical(&rs274(&interpreter, &place, name));
+            holds_the_plan(&session, test, &moves, 1e-4);
+            // The parser of this file sees the same motions.
+            let own = of_g_codes(text);
+            assert_eq!(own.len(), moves.len(), "{name}");
+            all += moves.len();
+        }
+        assert_eq!(canonical(&rs274(&interpreter, &place, &files[0].0)).len(), all, "main calls every program");
+    }
+    std::fs::remove_dir_all(place).unwrap();
+}
+
+#[test]
+fn the_other_controls_get_the_same_motion() {
+    let place = folder("controls");
+    for plan in plans(&place) {
+        let session = session(&plan);
+        for control in nc::CONTROLS {
+            let files = nc::files(&session, control, &NcOptions::default()).unwrap();
+            assert_eq!(files.len(), session.tests.len() + 1);
+            assert_eq!(files[0].0, format!("main.{}", control.extension()));
+            for ((name, text), test) in files[1..].iter().zip(&session.tests) {
+                let moves = if control.word() == "heidenhain" { of_plain_text(text) } else { of_g_codes(text) };
+                holds_the_plan(&session, test, &moves, 0.1_f64.powi(control.decimals() as i32));
+                let called = name.split_once('.').unwrap().0;
+                let number =
+                    format!("G65 P{}", 1001 + session.tests.iter().position(|own| own.name == test.name).unwrap());
+                assert!(files[0].1.contains(called) || files[0].1.contains(&number), "{}", files[0].1);
+            }
+        }
+    }
+    std::fs::remove_dir_all(place).unwrap();
+}
+
+#[test]
+fn programs_as_they_are_printed() {
+    let place = folder("printed");
+    let session = session(&circles(&place));
+    for control in nc::CONTROLS {
+        let options = NcOptions { overshoot_deg: Some(5.0), chord_error_mm: 0.01, ..NcOptions::default() };
+        let files = nc::files(&session, control, &options).unwrap();
+        let text = format!("{}\n{}", files[0].1, files[2].1);
+        let mut settings = insta::Settings::clone_current();
+        settings.set_snapshot_path("../../../snapshots");
+        settings.set_prepend_module_to_snapshot(false);
+        settings.set_omit_expression(true);
+        settings.bind(|| insta::assert_snapshot!(format!("codegen__nc_{}", control.word()), text));
+    }
+    std::fs::remove_dir_all(place).unwrap();
+}
+
+#[test]
+fn what_cannot_be_a_program_is_refused() {
+    let place = folder("refused");
+    let session = session(&circles(&place));
+    let refused = |session: &Session, word: &str, options: NcOptions, expected: &str| {
+        let message = nc::files(session, nc::control(word).unwrap(), &options).unwrap_err().to_string();
+        assert!(message.contains(expected), "{message}\nexpected {expected}");
+    };
+    let usual = NcOptions::default();
+    refused(&session, "linuxcnc", NcOptions { tool_point: true, ..usual }, "no function that moves the tool point");
+    refused(&session, "fanuc", NcOptions { dwell_s: f64::NAN, ..usual }, "the dwell in s is NaN");
+    refused(&session, "fanuc", NcOptions { chord_error_mm: 0.0, ..usual }, "the chord error in mm is 0");
+    let mut short = session.clone();
+    let mut machine = (*short.machine).clone();
+    let c = machine.axis_index("C").unwrap();
+    machine.axes[c].travel = Some([-0.1, std::f64::consts::TAU]);
+    short.machine = std::sync::Arc::new(machine);
+    refused(&short, "siemens", NcOptions { overshoot_deg: Some(90.0), ..usual }, "its travel is");
+    // Without a stated overshoot the travel limits it, and the program says so.
+    let files = nc::files(&short, nc::control("siemens").unwrap(), &usual).unwrap();
+    assert!(files[4].1.contains("Overshoot 5.730 deg before and 0.000 deg after"), "{}", files[4].1);
+    let mut none = session;
+    none.tests[0].motion = None;
+    refused(&none, "fanuc", usual, "test \"XY\" states no motion");
+    assert!(nc::control("mazak").is_err());
+    std::fs::remove_dir_all(place).unwrap();
+}
+
+/// A radial bar that turns with the table: the spindle ball stays at one place of the table.
+#[test]
+fn the_tool_point_stays_over_its_place_of_the_table() {
+    let place = folder("tool-point");
+    let session = session(&circles(&place));
+    let options = NcOptions { tool_point: true, ..NcOptions::default() };
+    for (word, first, last) in [
+        ("siemens", "TRAORI", "TRAFOOF"),
+        ("fanuc", "G43.4 H#4111", "G49"),
+        ("heidenhain", "FUNCTION TCPM F CONT AXIS POS PATHCTRL AXIS", "FUNCTION RESET TCPM"),
+    ] {
+        let files = nc::files(&session, nc::control(word).unwrap(), &options).unwrap();
+        let (name, text) = &files[4];
+        assert!(name.starts_with("radial") || name.starts_with("RADIAL"), "{name}");
+        // Lines of the TNC begin with their number.
+        let is = |line: &&str, code: &str| *line == code || line.split_once(' ').is_some_and(|(_, own)| own == code);
+        let inside: Vec<&str> =
+            text.lines().skip_while(|line| !is(line, first)).take_while(|line| !is(line, last)).collect();
+        let motion = inside.iter().find(|line| line.contains(" X")).unwrap().replace('+', "");
+        for position in [" X0.", " Y200.", " Z50."] {
+            assert!(motion.contains(position), "{word}: {motion}");
+        }
+        let count = |code: &str| text.lines().filter(|line| is(line, code)).count();
+        assert_eq!(count(first), count(last));
+    }
+    std::fs::remove_dir_all(place).unwrap();
+}

@@ -1,0 +1,125 @@
+//! `abbe nc`: NC programs of the planned tests.
+
+use std::path::PathBuf;
+
+use abbe::codegen::nc::{self, NcOptions};
+use abbe::model::files::{self, ReadOptions};
+use clap::Args;
+
+use super::failure::Failure;
+use super::{SessionArguments, folder, output};
+use crate::present::table::{Table, cells};
+
+/// Examples of `abbe nc`.
+pub const HELP: &str = "A program for each test and `main`, which calls them in the order of the session: approach along the tool, centring of the workpiece \
+ball, a stop to mount the bar, feed-in, the path with overshoot before and after, every run in both directions, feed-out, retreat. The \
+positions are those of the session's `sweep` or `path`: the recorded readings belong to them as they are. Positions count from R with \
+the tool length of the session; no work offset and no tool length is changed. Travel limits of the machine are checked before a file \
+is written.
+
+Rotary and linear axes together move in segments at inverse time (G93; heidenhain: the feed of each segment). --tool-point writes these \
+paths for the tool point over the table: TRAORI, G43.4, TCPM.
+
+The programs for linuxcnc run in its interpreter in the project's tests. Those for fanuc, siemens and heidenhain have not been run on a \
+control; each says so. Try every program in single block, without the bar, before it is trusted.
+
+Examples:
+  abbe nc sessions/hermle-c600u/chapter5.toml --control linuxcnc --out programs
+  abbe nc sessions/hermle-c600u/chapter5.toml --control heidenhain --out programs --overshoot-deg 10
+  abbe nc sessions/r-test/plan.toml --control siemens --out programs --tool-point";
+
+/// `abbe nc SESSION --control C --out DIR`
+#[derive(Args)]
+pub struct NcArguments {
+    #[command(flatten)]
+    session: SessionArguments,
+    /// The control: linuxcnc, fanuc, siemens, heidenhain.
+    ///
+    /// Example: --control linuxcnc
+    #[arg(long, value_name = "CONTROL")]
+    control: String,
+    /// New folder for the programs.
+    ///
+    /// Example: --out programs
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Overshoot before and after the measured path, degrees [default: 180 on full circles as far as the travel goes, 2
+    /// otherwise].
+    ///
+    /// Example: --overshoot-deg 10
+    #[arg(long, value_name = "DEG")]
+    overshoot_deg: Option<f64>,
+    /// Overshoot of a sweep of a linear axis, mm.
+    ///
+    /// Example: --overshoot-mm 5
+    #[arg(long, value_name = "MM", default_value_t = NcOptions::default().overshoot_mm)]
+    overshoot_mm: f64,
+    /// Length by which the bar is longer at the feed-in, mm; 0 for no feed-in.
+    ///
+    /// Example: --feed-in-mm 1.5
+    #[arg(long, value_name = "MM", default_value_t = NcOptions::default().feed_in_mm)]
+    feed_in_mm: f64,
+    /// Distance along the tool from which positions are approached, mm.
+    ///
+    /// Example: --clearance-mm 80
+    #[arg(long, value_name = "MM", default_value_t = NcOptions::default().clearance_mm)]
+    clearance_mm: f64,
+    /// Pause between two runs, s.
+    ///
+    /// Example: --dwell-s 5
+    #[arg(long, value_name = "S", default_value_t = NcOptions::default().dwell_s)]
+    dwell_s: f64,
+    /// Feed of approach and retreat, mm/min and °/min.
+    ///
+    /// Example: --approach-mm-min 500
+    #[arg(long, value_name = "F", default_value_t = NcOptions::default().approach_feed)]
+    approach_mm_min: f64,
+    /// Largest error of a segment in the distance of the balls, µm.
+    ///
+    /// Example: --chord-um 0.2
+    #[arg(long, value_name = "UM", default_value_t = NcOptions::default().chord_error_mm * 1e3)]
+    chord_um: f64,
+    /// Write paths of rotary and linear axes for the tool point over the table.
+    #[arg(long)]
+    tool_point: bool,
+    /// Replace files in an existing folder.
+    #[arg(long)]
+    force: bool,
+}
+
+/// Runs `abbe nc`.
+pub fn run(arguments: &NcArguments, quiet: bool) -> Result<(), Failure> {
+    let control = nc::control(&arguments.control)?;
+    let options = NcOptions {
+        overshoot_deg: arguments.overshoot_deg,
+        overshoot_mm: arguments.overshoot_mm,
+        feed_in_mm: arguments.feed_in_mm,
+        clearance_mm: arguments.clearance_mm,
+        dwell_s: arguments.dwell_s,
+        approach_feed: arguments.approach_mm_min,
+        chord_error_mm: arguments.chord_um * 1e-3,
+        tool_point: arguments.tool_point,
+    };
+    let reading = ReadOptions { read_data: false, ..arguments.session.options() };
+    let (session, sources) = files::session_with_sources(&arguments.session.session, &reading)?;
+    let written = nc::files(&session, control, &options)?;
+    output::Outputs::in_folder(&arguments.out, written.iter().map(|(name, _)| name))
+        .refuse_overwrite_of_sources(&sources)?;
+    folder::write(&arguments.out, &written, arguments.force, |_| Ok(()))?;
+    if !quiet {
+        let mut rows = vec![cells![&written[0].0, "all tests", written[0].1.lines().count().to_string()]];
+        rows.extend(
+            written
+                .iter()
+                .skip(1)
+                .zip(&session.tests)
+                .map(|((name, text), test)| cells![name, &test.name, text.lines().count().to_string()]),
+        );
+        output::print(&Table::new(["program", "test", ">lines"], rows));
+        if !control.is_run() {
+            say!("\nThe form for {} has not been run on a control.", control.word());
+        }
+        say!("\nTry each program in single block and without the bar before it is trusted.");
+    }
+    Ok(())
+}
