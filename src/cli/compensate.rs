@@ -80,6 +80,15 @@ pub fn run(arguments: &CompensateArguments, quiet: bool) -> Result<(), Failure> 
     };
     let at = positions(machine, &arguments.at)?;
     let mut file = CommandFile::open(&arguments.commands, machine, at.clone())?;
+    let columns = file.axis_columns();
+    for text in &arguments.at {
+        let name = text.split('=').next().unwrap_or_default().trim();
+        if machine.axis_index(name).is_some_and(|axis| columns.contains(&Some(axis))) {
+            return Err(Failure::Other(format!(
+                "--at {text}: the commands have a column for the positions of {name}; remove one of the two"
+            )));
+        }
+    }
     let errors = EstimatedErrors::of_model(&model, tool_mm, model.table_mm);
     let correction = Correction { machine, errors: &errors, tool_mm, aim: Aim::of(machine) };
     let wanted = if arguments.inverse { Output::Error } else { Output::Command };

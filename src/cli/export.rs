@@ -8,7 +8,7 @@ use abbe::identify::export::dh::{self, DhTable};
 use abbe::identify::export::{left_out, urdf};
 use abbe::identify::model_file::{self, IdentifiedModel};
 use abbe::identify::parameters::Role;
-use abbe::model::component::ErrorName;
+use abbe::model::component::{ErrorKind, ErrorName};
 use abbe::model::session::limits::LARGEST;
 use clap::{Args, ValueEnum};
 use schemars::JsonSchema;
@@ -127,7 +127,7 @@ pub fn run(arguments: &ExportArguments, quiet: bool) -> Result<(), Failure> {
             let [calibrated, nominal] = dh::tables(&model, tool_mm)?;
             let table = present::dh(&calibrated, &nominal);
             (result.calibrated, result.nominal) = (Some(calibrated), Some(nominal));
-            (output::csv(&table)?, vec![table])
+            ([present::dh_header(&table).into_bytes(), output::csv(&table)?].concat(), vec![table])
         }
         Format::Beckhoff => {
             let (text, missing) = beckhoff(&model)?;
@@ -159,8 +159,11 @@ pub fn run(arguments: &ExportArguments, quiet: bool) -> Result<(), Failure> {
 
 /// The location errors in the format of the control, and what it does not hold.
 fn beckhoff(model: &IdentifiedModel) -> Result<(Vec<u8>, Vec<String>), Failure> {
-    let errors = model.parameters.iter().filter(|parameter| parameter.role == Role::Error && !parameter.held);
-    let locations = errors.filter_map(|parameter| Some((ErrorName::parse(&parameter.id)?, parameter.value))).collect();
+    let errors = model.parameters.iter().enumerate().filter(|(_, parameter)| parameter.role == Role::Error);
+    let named = errors
+        .filter(|(index, _)| model.is_estimated(*index))
+        .filter_map(|(_, parameter)| Some((ErrorName::parse(&parameter.id)?, parameter.value)));
+    let locations = named.filter(|(name, _)| name.kind == ErrorKind::Location).collect();
     let compensation = Compensation { locations, left_out: left_out(model), ..Compensation::default() };
     let control: Option<&Control> =
         compensation::CONTROLS.iter().find(|control| control.word == Format::Beckhoff.control());

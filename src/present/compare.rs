@@ -44,8 +44,9 @@ fn probability(p: f64) -> String {
 
 /// The differences of a pair, the most significant first.
 pub fn differences(comparison: &Comparison, pair: &Pair, all: bool) -> Table {
-    let own: Vec<&Difference> =
-        comparison.differences.iter().filter(|d| d.from == pair.from && d.to == pair.to).collect();
+    // An input that is given twice has two pairs of the same names.
+    let of_pair = comparison.differences.iter().filter(|d| d.from == pair.from && d.to == pair.to);
+    let own: Vec<&Difference> = of_pair.take(pair.compared).collect();
     let shown = if all { own.len() } else { (pair.significant + FOLDED).min(own.len()) };
     let rows = own[..shown].iter().map(|d| {
         let verdict = if d.significant { "significant" } else { "" };

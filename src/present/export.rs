@@ -30,6 +30,11 @@ pub fn dh(calibrated: &DhTable, nominal: &DhTable) -> Table {
     table
 }
 
+/// What the file of the parameters states beside the joints, as comments: the product, and the poses at its ends.
+pub fn dh_header(table: &Table) -> String {
+    table.notes.iter().map(|note| format!("# {note}\n")).collect()
+}
+
 /// What the file of a control's parameters states about itself, as comments.
 pub fn kinematics_header(table: &KinematicTable) -> String {
     let mut text = format!(
@@ -53,4 +58,19 @@ pub fn kinematics(table: &KinematicTable) -> Table {
         ]
     });
     Table::new([Column::from("field"), Column::from("meaning"), numbers("change_mm"), numbers("u_mm")], rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Without the poses at the ends of the product the joints give no position of the tool.
+    #[test]
+    fn the_file_of_a_robot_holds_the_poses_of_base_and_tool() {
+        let base = FixedPose { xyz_mm: [0.0, 0.0, 127.3], ..FixedPose::default() };
+        let header = dh_header(&dh(&DhTable { base, ..DhTable::default() }, &DhTable::default()));
+        assert!(header.contains("# B: xyz 0.000000000 0.000000000 127.300000000 mm"), "{header}");
+        assert!(header.contains("# nominal F: xyz"), "{header}");
+        assert!(header.lines().all(|line| line.starts_with("# ")), "{header}");
+    }
 }

@@ -141,9 +141,12 @@ fn a_file_that_cannot_be_compensated_is_refused_before_anything_is_written() {
     refused(&run(&file("both.csv", "x_mm,px_mm,py_mm,pz_mm,i,j,k\n1,2,3,4,5,6,7\n")), "both axis positions and poses");
     refused(&run(&file("part.csv", "px_mm,py_mm\n1,2\n")), "incomplete");
     refused(&run(&file("point.csv", "px_mm,py_mm,pz_mm\n1,2,3\n")), "direction of the tool's Z");
+    refused(&run(&file("corrected.csv", "x_mm,state\n1,corrected\n")), "may be corrected already");
     refused(&run(&folder.path().join("absent.csv")), "cannot be read");
-    assert!(!out.exists());
     let commands = file("program.csv", "x_mm\n1\n");
+    let at = ["compensate", text(&model), text(&commands), "--out", text(&out), "--at", "X=5"];
+    refused(&abbe(&at), "--at X=5: the commands have a column for the positions of X");
+    assert!(!out.exists());
     let over = abbe(&["compensate", text(&model), text(&commands), "--out", text(&commands)]);
     refused(&over, "one of the files that are read");
     assert_eq!(std::fs::read_to_string(&commands).unwrap(), "x_mm\n1\n");
@@ -182,9 +185,32 @@ fn a_comparison_names_what_has_changed() {
     let again: Value = serde_json::from_str(&std::fs::read_to_string(&again).unwrap()).unwrap();
     let same = again["differences"][0]["value"].as_f64().unwrap();
     assert!((same - value).abs() < 1e-6 * value.abs(), "{same} {value}");
+    // An input that is given twice has two tables, each with every difference once.
+    let twice = success(&abbe(&["compare", text(&models[0]), text(&models[1]), text(&models[1]), "--all"]));
+    assert_eq!(twice.lines().filter(|line| line.trim_start().starts_with("EX0C")).count(), 2, "{twice}");
     assert_eq!(abbe(&["compare", text(&before)]).status.code(), Some(2));
     let other = ready("r-test/measured/session.toml");
     refused(&abbe(&["compare", text(&before), text(&other)]), "one machine");
+}
+
+/// A constant error motion is no location error: it is listed as left out, and not written.
+#[test]
+fn an_error_motion_is_not_exported_as_a_location_error() {
+    let folder = folder();
+    let bundled = ready("hermle-c600u/measured/session.toml");
+    for entry in std::fs::read_dir(bundled.parent().unwrap()).unwrap() {
+        let path = entry.unwrap().path();
+        std::fs::copy(&path, folder.path().join(path.file_name().unwrap())).unwrap();
+    }
+    let session = folder.path().join("session.toml");
+    let declared = std::fs::read_to_string(&session).unwrap() + "\n[unknowns]\nerrors = [\"EY0C\", \"EXC\"]\n";
+    std::fs::write(&session, declared).unwrap();
+    let (model, out) = (folder.path().join("model.json"), folder.path().join("table.csv"));
+    success(&abbe(&["fit", text(&session), "--save", text(&model), "--quiet"]));
+    let printed = success(&abbe(&["export", text(&model), "--as", "beckhoff", "--out", text(&out)]));
+    assert!(printed.contains("left out: EXC"), "{printed}");
+    let table = std::fs::read_to_string(&out).unwrap();
+    assert!(table.contains("Y0C") && !table.contains("XC"), "{table}");
 }
 
 /// MuJoCo reads the exported chain and moves the tool as the model does. Skipped by name where it is not installed.

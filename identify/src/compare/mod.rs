@@ -144,6 +144,13 @@ fn pair(a: &Named<'_>, b: &Named<'_>, options: &CompareOptions) -> Result<Compar
     }
     holm(&mut differences, options.significance);
     let kept: Vec<usize> = (0..common.len()).filter(|k| !held.contains(k) && covariance[(*k, *k)] > 0.0).collect();
+    if kept.is_empty() {
+        return Err(IdentifyError::Request(format!(
+            "no parameter of the machine is determined by both {} and {}, so nothing can be compared: measure what \
+             separates the errors, or identify fewer of them",
+            a.name, b.name
+        )));
+    }
     let (chi_square, degrees_of_freedom) = chi_square(&delta, &covariance, &kept)?;
     let only = |own: &IdentifiedModel, of: &Named<'_>, side: fn(&(usize, usize)) -> usize| -> Vec<OnlyIn> {
         let missing = own.carried_parameters().into_iter().filter(|j| !common.iter().any(|pair| side(pair) == *j));

@@ -4,8 +4,12 @@
 //! deviation `s` is one parameter with one prior:
 //!
 //! ```text
-//! Λ = Λ_A(a, s) + Λ_B(b, s) − 1/u_s²,    Λ·(a, b, s) = Λ_A·(a, s)_A + Λ_B·(b, s)_B
+//! Λ = Λ_A(a, s) + Λ_B(b, s) − 1/(f·u_s)²,    Λ·(a, b, s) = Λ_A·(a, s)_A + Λ_B·(b, s)_B
 //! ```
+//!
+//! A fit whose residual exceeds its noise enlarges all its uncertainties by a factor, those of its priors included. `f`
+//! is the larger factor of the two: each model contains at least that prior, so that `Λ` stays positive semidefinite,
+//! and the prior that remains is the narrower one.
 
 use abbe_model::session::Prior;
 use faer::Mat;
@@ -58,9 +62,10 @@ pub(super) fn difference(
     };
     add(a, &|i| i)?;
     add(b, &place_b)?;
+    let enlargement = a.quality.u_enlargement.max(b.quality.u_enlargement);
     for (i, _) in &shared {
         if let Prior::Gaussian(u) = a.parameters[*i].prior {
-            information[(*i, *i)] -= 1.0 / (u * u);
+            information[(*i, *i)] -= (enlargement * u).powi(-2);
         }
     }
     let scale: Vec<f64> =
@@ -90,7 +95,7 @@ fn inverse(model: &IdentifiedModel) -> Result<Mat<f64>, IdentifyError> {
 /// The set-up quantities that are the same object in both sessions, by index in each.
 ///
 /// # Errors
-/// If a stated quantity is not estimated, with the same prior, in both.
+/// If a stated quantity is not estimated, with the same prior, in both, or if nothing is stated beside others.
 fn shared(
     a: &IdentifiedModel,
     b: &IdentifiedModel,
@@ -103,9 +108,16 @@ fn shared(
     });
     let mut of_both: Vec<(usize, usize)> = of_both.collect();
     let thing = |i: usize| a.parameters[i].id.split(['[', '.']).next().unwrap_or_default();
-    for stated in things.unwrap_or_default().iter().filter(|stated| *stated != NOTHING) {
+    let things_stated = things.unwrap_or_default();
+    if things_stated.len() > 1 && things_stated.iter().any(|stated| stated == NOTHING) {
+        return Err(IdentifyError::Request(format!(
+            "shared set-up quantities are stated beside \"{NOTHING}\", which says that there are none; state either"
+        )));
+    }
+    for stated in things_stated.iter().filter(|stated| *stated != NOTHING) {
         if !of_both.iter().any(|(i, _)| thing(*i) == stated) {
             let mut known: Vec<&str> = of_both.iter().map(|(i, _)| thing(*i)).collect();
+            known.sort_unstable();
             known.dedup();
             let known = if known.is_empty() { NOTHING.to_string() } else { known.join(", ") };
             return Err(IdentifyError::Request(format!(

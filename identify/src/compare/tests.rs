@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use abbe_model::files::{self, ReadOptions};
-use abbe_model::session::Session;
+use abbe_model::session::{Prior, Session};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
 use crate::fit;
-use crate::model_file::Provenance;
+use crate::model_file::{ModelParameter, Provenance};
 use crate::quantity::Given;
 use crate::simulate::{Simulation, simulate};
 
@@ -116,6 +116,9 @@ fn differences_do_not_depend_on_the_gauge() {
     let unknown = CompareOptions { shared: Some(vec!["ball".to_string()]), ..options.clone() };
     let refused = compare(&named, &unknown).unwrap_err().to_string();
     assert!(refused.contains("\"ball\" is not estimated"), "{refused}");
+    assert!(refused.ends_with("these are: bar, spindle_ball, workpiece_ball"), "{refused}");
+    let both = CompareOptions { shared: Some(vec!["bar".to_string(), "none".to_string()]), ..options.clone() };
+    assert!(compare(&named, &both).unwrap_err().to_string().contains("state either"));
     let again = compare(&named, &options).unwrap();
     let reference =
         compare(&[Named { name: "A".into(), model: &a }, Named { name: "B".into(), model: &b }], &options).unwrap();
@@ -124,4 +127,51 @@ fn differences_do_not_depend_on_the_gauge() {
         // The null directions of the two sessions differ in second order of the errors.
         assert!((difference.value - other.value).abs() < 1e-3 * difference.u, "{difference:?} {other:?}");
     }
+}
+
+/// Models whose readings determine no error of the machine: no difference is not "no significant difference".
+#[test]
+fn models_without_a_common_estimate_are_refused() {
+    let mut a = model(&plan(), &[], &[], 9);
+    for j in a.carried_parameters() {
+        a.parameters[j].held = true;
+        a.parameters[j].value = 0.0;
+        (0..a.parameters.len()).for_each(|i| (a.covariance[(i, j)], a.covariance[(j, i)]) = (0.0, 0.0));
+        let direction = (0..a.parameters.len()).map(|i| if i == j { a.parameters[j].size } else { 0.0 });
+        a.null_directions.push(direction.collect());
+    }
+    let named = [Named { name: "A".into(), model: &a }, Named { name: "B".into(), model: &a }];
+    let refused = compare(&named, &CompareOptions::default()).unwrap_err().to_string();
+    assert!(refused.contains("nothing can be compared"), "{refused}");
+}
+
+/// A reading `error + bar` in one session and `error + 2·bar` in the other, with uncertainties that are enlarged by 2
+/// and by 3. The readings do not determine the bar: it stays at its narrower prior, and enters the difference once.
+#[test]
+fn a_shared_bar_keeps_one_prior_under_enlarged_uncertainties() {
+    let fitted = model(&plan(), &[], &[], 10);
+    let own = |id: &str| fitted.parameters.iter().find(|parameter| parameter.id == id).unwrap().clone();
+    let (noise, bar) = (1e-3, 2e-3);
+    let of = |reading_mm: f64, bars: f64, enlargement: f64| {
+        let mut model = fitted.clone();
+        model.parameters = vec![
+            ModelParameter { value: reading_mm, held: false, ..own("EX0C") },
+            ModelParameter { value: 0.0, held: false, prior: Prior::Gaussian(bar), ..own("bar[C100]") },
+        ];
+        let square = Mat::from_fn(2, 2, |i, j| match (i, j) {
+            (0, 0) => noise * noise + (bars * bar).powi(2),
+            (1, 1) => bar * bar,
+            _ => -bars * bar * bar,
+        });
+        model.covariance = square * faer::Scale(enlargement * enlargement);
+        model.null_directions = Vec::new();
+        model.quality.u_enlargement = enlargement;
+        model
+    };
+    let found = compared(&of(0.005, 1.0, 2.0), &of(0.017, 2.0, 3.0));
+    assert_eq!(found.pairs[0].shared_setup, ["bar[C100]"]);
+    let difference = &found.differences[0];
+    assert!((difference.value - 12.0).abs() < 1e-6, "{difference:?}");
+    // 2² + 3² of the noises of 1 µm, and (2·2)² of the bar.
+    assert!((difference.u / 29.0_f64.sqrt() - 1.0).abs() < 1e-6, "{difference:?}");
 }

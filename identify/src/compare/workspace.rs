@@ -54,10 +54,10 @@ pub struct AxisRange {
 }
 
 /// The volumetric error of each model over a grid with a number of places along each axis that moves. Empty if the
-/// ranges have nothing in common.
+/// ranges have nothing in common. Time and temperature are the reference values of each model.
 ///
 /// # Errors
-/// If an error depends on time or temperature, which a grid does not have, or is too large.
+/// If an error cannot be evaluated on the grid.
 pub fn evaluate(models: &[&IdentifiedModel], places: usize) -> Result<Vec<VolumetricSummary>, IdentifyError> {
     let Some(first) = models.first() else { return Ok(Vec::new()) };
     let machine = &first.machine;

@@ -91,7 +91,8 @@ pub struct Corrected {
     pub positions: Vec<f64>,
     /// Distance of the tool point from its nominal position at that command, mm.
     pub remaining_mm: f64,
-    /// Angle between the tool and its nominal orientation at that command, rad; 0 where the machine cannot correct it.
+    /// Angle between the tool and its nominal orientation at that command, rad, whether the machine corrects it or not;
+    /// without the rotation about the tool's axis where that is free.
     pub remaining_rad: f64,
     /// Ratio of the largest to the smallest singular value of the Jacobian; angles as arcs at a radius of 1 m.
     pub condition: f64,
@@ -250,7 +251,9 @@ impl Correction<'_> {
                 }
             }
         }
-        let partly = |row: &Row| failed(row) || row.aim != self.aim;
+        // The orientation that the machine leaves as it is counts too.
+        let reported = if self.aim == Aim::Position { Aim::Pose } else { self.aim };
+        let partly = |row: &Row| failed(row) || row.aim != reported;
         let values = rows.iter().any(partly).then(|| errors(&positions)).transpose()?;
         let block = values.as_ref().map(|values| Rows::of(values, machine.error_slots()));
         let mut state = Vec::new();
@@ -265,12 +268,11 @@ impl Correction<'_> {
                 });
                 let corrected = !failed(&row);
                 let [mut remaining_mm, mut remaining_rad] = row.remaining;
-                // The orientation that a row leaves as it is counts too.
-                let whole = corrected && row.aim == self.aim;
+                let whole = corrected && row.aim == reported;
                 if let (false, true, Some(block)) = (whole, row.number, &block) {
                     positions.state(machine, number, &mut state);
                     let actual = Pose::of(machine, &state, &block.bodies(machine, number), self.tool_mm);
-                    [remaining_mm, remaining_rad] = size(&self.aim.deviation(&actual, &row.wanted));
+                    [remaining_mm, remaining_rad] = size(&reported.deviation(&actual, &row.wanted));
                 }
                 let condition = row.inverse.condition;
                 let state = match () {

@@ -2,7 +2,6 @@
 
 use std::io::Write;
 
-use abbe_model::axis::AxisKind;
 use abbe_model::files::commands::{Block, CommandFile, PoseColumns};
 use abbe_model::session::readings::Readings;
 use csv::StringRecord;
@@ -32,6 +31,16 @@ pub enum Output {
     Error,
 }
 
+impl Output {
+    /// The columns that are added to those of the file.
+    fn columns(self) -> &'static [&'static str] {
+        match self {
+            Output::Command => &["remaining_um", "remaining_arcsec", "condition", "state"],
+            Output::Error => &["dx_um", "dy_um", "dz_um", "da_arcsec", "db_arcsec", "dc_arcsec", "state"],
+        }
+    }
+}
+
 /// What became of the rows of a file.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Summary {
@@ -45,7 +54,8 @@ pub struct Summary {
     pub largest_error_arcsec: f64,
     /// Largest remaining error of the position among corrected rows, µm; `null` for errors.
     pub largest_remaining_um: Option<f64>,
-    /// Largest remaining error of the orientation among rows whose orientation is corrected, arcsec; `null` for errors.
+    /// Largest remaining error of the orientation among the same rows without those in the state `position-only`,
+    /// arcsec; `null` for errors.
     pub largest_remaining_arcsec: Option<f64>,
     /// The first rows that are not simply corrected.
     pub marked: Vec<MarkedRow>,
@@ -75,8 +85,8 @@ pub struct MarkedRow {
 /// axes replaced, and columns for what remains. Axes without a column get one.
 ///
 /// # Errors
-/// If the file cannot be read, lacks a column that an error depends on, or states what the machine cannot correct, or
-/// if a row cannot be written.
+/// If the file cannot be read, lacks a column that an error depends on, has a column of the output, or states what the
+/// machine cannot correct, or if a row cannot be written.
 pub fn run(
     correction: &Correction<'_>,
     file: &mut CommandFile,
@@ -86,16 +96,32 @@ pub fn run(
 ) -> Result<Summary, IdentifyError> {
     check(correction, file.poses())?;
     let layout = Layout::of(correction, file, output);
+    if let Some(name) = output.columns().iter().find(|name| file.header().iter().any(|own| own == **name)) {
+        return Err(IdentifyError::Request(format!(
+            "the commands have a column `{name}`, which the output adds: the file may be corrected already; remove the \
+             column or give it another name"
+        )));
+    }
     write(to, layout.header(file).as_bytes())?;
     let mut summary = Summary::default();
     let mut last = start.to_vec();
+    let mut waiting: Option<(Block, Vec<bool>)> = None;
     loop {
-        let mut blocks = Vec::with_capacity(BLOCKS);
-        while blocks.len() < BLOCKS {
-            let Some(mut block) = file.next_block(correction.machine, BLOCK_ROWS)? else { break };
+        let mut blocks: Vec<(Block, Vec<bool>)> = waiting.take().into_iter().collect();
+        let mut ended = false;
+        while blocks.len() <= BLOCKS && !ended {
+            let Some(mut block) = file.next_block(correction.machine, BLOCK_ROWS)? else {
+                ended = true;
+                continue;
+            };
             let unreachable = reach_poses(correction, file, &mut block, &mut last);
+            if let Some((before, _)) = blocks.last_mut() {
+                before.rows.continue_with(&block.rows);
+            }
             blocks.push((block, unreachable));
         }
+        // The speed at the last row of a block depends on the row after it.
+        waiting = if ended { None } else { blocks.pop() };
         if blocks.is_empty() {
             return Ok(summary);
         }
@@ -156,7 +182,7 @@ fn reach_poses(
             *last = found;
         }
         for (column, position) in block.rows.positions.iter_mut().zip(last.iter()) {
-            column[row] = if faulty { f64::NAN } else { *position };
+            column[row] = *position;
         }
     }
     file.follow(&mut block.rows, machine);
@@ -211,11 +237,7 @@ impl Layout {
     fn header(&self, file: &CommandFile) -> String {
         let mut names: Vec<String> = file.header().iter().map(quoted).collect();
         names.extend(self.added.iter().map(|axis| file.column_of(*axis)));
-        let results: &[&str] = match self.output {
-            Output::Command => &["remaining_um", "remaining_arcsec", "condition", "state"],
-            Output::Error => &["dx_um", "dy_um", "dz_um", "da_arcsec", "db_arcsec", "dc_arcsec", "state"],
-        };
-        names.extend(results.iter().map(ToString::to_string));
+        names.extend(self.output.columns().iter().map(ToString::to_string));
         names.join(",") + "\n"
     }
 
@@ -350,11 +372,5 @@ impl Summary {
     }
 }
 
-/// Start positions of axes without a stated position: the middle of the travel, or zero.
-pub fn middle_of_travel(machine: &abbe_model::chain::Machine) -> Vec<f64> {
-    let middle = |axis: &abbe_model::axis::Axis| match axis.travel {
-        Some([low, high]) if axis.kind == AxisKind::Linear || (low > 0.0 || high < 0.0) => 0.5 * (low + high),
-        _ => 0.0,
-    };
-    machine.axes.iter().map(middle).collect()
-}
+#[cfg(test)]
+mod tests;

@@ -306,3 +306,22 @@ fn blocks_of_a_file_continue_the_travel() {
         }
     }
 }
+
+/// Three linear axes put the tool where it belongs and leave its tilt as it is: the tilt remains, and is stated.
+#[test]
+fn an_orientation_that_linear_axes_leave_is_stated() {
+    let machine = Arc::new(Machine::from_code("w b Y X Z t").unwrap());
+    let tilt = Shape::Polynomial(Polynomial { degree: 1, scale: 100.0 });
+    let effects = vec![effect("EBX", Driver::Axis("X".into()), tilt, &[5e-5])];
+    let tool_mm = [0.0, 0.0, -150.0];
+    let station = Station::BallBar(BallBar { workpiece_ball: [0.0; 3], spindle_ball: tool_mm, bar: 1.0 });
+    let reference = Reference::default();
+    let constant = vec![0.0; machine.error_slots()];
+    let errors = EstimatedErrors { machine: Arc::clone(&machine), station, reference, constant, effects };
+    let correction = Correction { machine: &machine, errors: &errors, tool_mm, aim: Aim::of(&machine) };
+    assert_eq!(correction.aim, Aim::Position);
+    let found = correction.correct(&readings(vec![vec![10.0], vec![-80.0], vec![30.0]])).unwrap();
+    assert_eq!(found[0].state, State::Corrected);
+    assert!(found[0].remaining_mm < 1e-9);
+    assert!((found[0].remaining_rad / (5e-5 * 0.8) - 1.0).abs() < 1e-3, "{:e}", found[0].remaining_rad);
+}

@@ -132,7 +132,7 @@ pub struct KinematicTable {
     pub source: String,
     /// The entries.
     pub parameters: Vec<KinematicParameter>,
-    /// Identified errors that these entries cannot hold, with the reason.
+    /// Entries that the readings do not determine, and identified errors that the entries cannot hold, with the reason.
     pub left_out: Vec<String>,
 }
 
@@ -158,30 +158,47 @@ pub fn table(model: &IdentifiedModel, word: &str) -> Result<KinematicTable, Iden
     })?;
     let axes = [first, second].map(|axis| model.machine.axes[axis].name.clone());
     let letter = if model.machine.axes[first].direction[0].abs() == 1.0 { 'A' } else { 'B' };
+    let name = |axis: usize, freedom: Freedom| {
+        ErrorName { kind: ErrorKind::Location, freedom, axis: axes[axis].clone() }.to_string()
+    };
     let index = |axis: usize, freedom: Freedom| {
-        let name = ErrorName { kind: ErrorKind::Location, freedom, axis: axes[axis].clone() }.to_string();
-        model.parameters.iter().position(|parameter| parameter.role == Role::Error && parameter.id == name)
+        let own = |id: &str| model.parameters.iter().position(|p| p.role == Role::Error && p.id == id);
+        own(&name(axis, freedom)).filter(|index| model.is_estimated(*index))
     };
     let mut used: Vec<usize> = Vec::new();
     let mut parameters = Vec::new();
+    let mut left_out: Vec<String> = Vec::new();
     for entry in (control.entries)(letter) {
         let terms: Vec<(f64, usize)> =
             entry.terms.iter().filter_map(|(share, axis, freedom)| Some((*share, index(*axis, *freedom)?))).collect();
+        if terms.is_empty() && !entry.terms.is_empty() {
+            let names: Vec<String> = entry.terms.iter().map(|(_, axis, freedom)| name(*axis, *freedom)).collect();
+            let names = names.join(" or ");
+            left_out.push(format!("{}: {}: the readings do not determine {names}", entry.field, entry.meaning));
+            continue;
+        }
         used.extend(terms.iter().map(|(_, parameter)| *parameter));
         let variance: f64 =
             terms.iter().map(|(a, i)| terms.iter().map(|(b, j)| a * b * model.covariance[(*i, *j)]).sum::<f64>()).sum();
         parameters.push(KinematicParameter {
             field: entry.field.to_string(),
             meaning: entry.meaning.to_string(),
-            change_mm: terms.iter().map(|(share, i)| share * model.parameters[*i].value).sum(),
+            change_mm: terms.iter().fold(0.0, |sum, (share, i)| sum + share * model.parameters[*i].value),
             u_mm: variance.max(0.0).sqrt(),
         });
     }
+    if used.is_empty() {
+        return Err(IdentifyError::Request(format!(
+            "{} has no entry for an error that the readings of the model determine",
+            control.about
+        )));
+    }
     let errors = model.parameters.iter().enumerate().filter(|(_, parameter)| parameter.role == Role::Error);
-    let mut left_out: Vec<String> = errors
-        .filter(|(index, parameter)| !used.contains(index) && !parameter.held)
-        .map(|(_, parameter)| format!("{}: the control's model has no entry for it", parameter.id))
-        .collect();
+    left_out.extend(
+        errors
+            .filter(|(index, _)| !used.contains(index) && model.is_estimated(*index))
+            .map(|(_, parameter)| format!("{}: the control's model has no entry for it", parameter.id)),
+    );
     let effects = model.effects.iter().map(|effect| format!("{}: not a fixed geometry", effect.id()));
     left_out.extend(effects);
     Ok(KinematicTable { control: control.about.to_string(), source: control.source.to_string(), parameters, left_out })

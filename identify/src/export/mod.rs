@@ -5,7 +5,8 @@
 //!   angle for parallel axes;
 //! - [`control`]: kinematic parameters of controls, as far as their models are publicly documented.
 //!
-//! A description of fixed geometry holds location errors and constant errors only. Effects are listed as left out.
+//! A description of fixed geometry holds location errors only. Effects and constant error motions are listed as left
+//! out.
 
 pub mod control;
 pub mod dh;

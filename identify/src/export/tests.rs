@@ -218,3 +218,28 @@ fn tables_of_controls_give_the_tool_positions_of_the_model() {
     assert!(control::table(&model, "siemens").unwrap_err().to_string().contains("no sign is guessed"));
     assert!(control::table(&self::model(robot(), &[]), "fanuc").is_err());
 }
+
+/// An entry without an identified error has no change of 0 with an uncertainty of 0: it is not in the table.
+#[test]
+fn entries_that_the_readings_do_not_determine_are_left_out() {
+    let machine = || Machine::from_code("w C A b Y X Z t").unwrap();
+    let errors = [("EX0C", 0.044), ("EY0C", -0.017), ("EZ0A", 0.0), ("EC0C", 1e-4)];
+    let errors: Vec<(String, f64)> = errors.iter().map(|(id, value)| (id.to_string(), *value)).collect();
+    let mut model = model(machine(), &errors);
+    model.parameters[2].held = true;
+    model.covariance[(2, 2)] = 0.0;
+    let table = control::table(&model, "fanuc").unwrap();
+    let fields: Vec<&str> = table.parameters.iter().map(|parameter| parameter.field.as_str()).collect();
+    assert_eq!(fields, ["19700", "19703", "19704", "19705"]);
+    assert!(table.parameters.iter().all(|parameter| parameter.change_mm.is_sign_positive() || parameter.u_mm > 0.0));
+    assert_eq!(
+        table.left_out,
+        [
+            "19701: rotary table position, Y: the readings do not determine EY0A",
+            "19702: rotary table position, Z: the readings do not determine EZ0A",
+            "EC0C: the control's model has no entry for it",
+        ]
+    );
+    let angle = self::model(machine(), &errors[3..]);
+    assert!(control::table(&angle, "fanuc").unwrap_err().to_string().contains("no entry"));
+}

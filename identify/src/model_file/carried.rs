@@ -1,7 +1,8 @@
 //! The part of a model that another session of the same machine shares, and the errors of the machine at any state.
 //!
 //! Location errors, and effects on errors of axes in all tests, belong to the machine. Set-up quantities, effects on
-//! the set-up, and effects of single tests belong to the session of the model.
+//! the set-up or on the instrument (a gain, a delay of its trigger), and effects of single tests belong to the session
+//! of the model.
 
 use std::sync::Arc;
 
@@ -35,7 +36,7 @@ pub struct States {
 impl IdentifiedModel {
     /// Whether an effect belongs to the machine, so that another session shares it.
     pub fn is_carried(effect: &Effect) -> bool {
-        effect.tests.is_empty() && matches!(effect.component, Component::Axis(_) | Component::TriggerDelay)
+        effect.tests.is_empty() && matches!(effect.component, Component::Axis(_))
     }
 
     /// The effects that belong to the machine, by index in [`IdentifiedModel::effects`].

@@ -105,6 +105,11 @@ impl IdentifiedModel {
     pub fn u(&self, parameter: usize) -> f64 {
         self.covariance[(parameter, parameter)].max(0.0).sqrt()
     }
+
+    /// Whether the readings determine a parameter, alone or in a combination. The others stay at nominal.
+    pub fn is_estimated(&self, parameter: usize) -> bool {
+        !self.parameters[parameter].held && self.u(parameter) > 0.0
+    }
 }
 
 #[cfg(test)]

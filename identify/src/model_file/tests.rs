@@ -1,5 +1,8 @@
 use std::path::{Path, PathBuf};
 
+use abbe_model::driver::Driver;
+use abbe_model::effect::shape::Shape;
+use abbe_model::effect::{Component, Effect};
 use abbe_model::files::{self, ReadOptions};
 use abbe_model::session::Session;
 use serde_json::Value;
@@ -78,6 +81,16 @@ fn errors_at_states_are_those_of_the_effects() {
     let contributions = model.contributions(&states).unwrap();
     let carried = model.carried_parameters();
     assert!(contributions.iter().all(|contribution| contribution.parameter < carried.len()));
+}
+
+/// The delay of a trigger shifts readings, not the machine: no command is corrected by it.
+#[test]
+fn effects_on_the_instrument_do_not_belong_to_the_machine() {
+    let effect = |id: &str| Effect::new(Component::parse(id).unwrap(), Driver::None, Shape::Constant);
+    assert!(IdentifiedModel::is_carried(&effect("EXX")));
+    for id in ["trigger", "bar", "workpiece_ball.x"] {
+        assert!(!IdentifiedModel::is_carried(&effect(id)), "{id}");
+    }
 }
 
 /// The text with one value changed and the checksum renewed or left.

@@ -100,7 +100,7 @@ impl<'m> KnownErrors<'m> {
         }
         let left_out = model.effects.iter().filter(|effect| !IdentifiedModel::is_carried(effect));
         let not_carried = left_out.map(|effect| match effect.tests.is_empty() {
-            true => format!("{} (an effect on the set-up of its session)", effect.id()),
+            true => format!("{} (an effect on the instrument or the set-up of its session)", effect.id()),
             false => format!("{} (an effect of single tests of its session)", effect.id()),
         });
         Ok(KnownErrors { model, not_carried: not_carried.collect(), full, set_up, carried, columns, noise_source })
@@ -326,7 +326,10 @@ fn first_noise(model: &IdentifiedModel, session: &Session) -> (Noise, &'static s
         NoiseSource::Residual => {
             Noise::white(model.quality.heldout_rms_mm.max(model.noise.sigma_mm), NoiseSource::Residual)
         }
-        NoiseSource::Stated | NoiseSource::Repeats => Noise { source: NoiseSource::Residual, ..model.noise.clone() },
+        // The inflation belongs to the likelihood of the model's families; it is no noise.
+        NoiseSource::Stated | NoiseSource::Repeats => {
+            Noise { source: NoiseSource::Residual, inflation: 1.0, ..model.noise.clone() }
+        }
     };
     (noise, "model")
 }

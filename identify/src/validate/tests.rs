@@ -86,3 +86,23 @@ fn a_session_that_the_model_does_not_affect_is_refused() {
     let error = validate(&empty, &session(&["A100"])).err().unwrap().to_string();
     assert!(error.contains("nothing in common"), "{error}");
 }
+
+/// A family inflates the likelihood of its readings. Another session without a noise of its own has the noise of the
+/// model, not the inflated one, which would make any residual look as predicted.
+#[test]
+fn the_inflation_of_families_is_no_noise() {
+    let mut second = session(&["C100", "C150"]);
+    let model = model(&second);
+    second.noise_mm = None;
+    for readings in second.tests.iter_mut().filter_map(|test| test.readings.as_mut()).map(std::sync::Arc::make_mut) {
+        // One traversal, so that nothing repeats.
+        let first: Vec<usize> = readings.runs().into_iter().next().unwrap().collect();
+        *readings = readings.of_rows(&first);
+    }
+    let mut inflated = model.clone();
+    inflated.noise.inflation = 40.0;
+    let [plain, inflated] = [&model, &inflated].map(|model| validate(model, &second).unwrap().result);
+    assert_eq!(plain.noise_source, "model");
+    assert_eq!(inflated.model, plain.model);
+    assert_eq!(inflated.verdict, plain.verdict);
+}

@@ -48,7 +48,9 @@ pub enum PoseColumns {
 /// A block of rows.
 #[derive(Debug)]
 pub struct Block {
-    /// The positions with the quantities that errors depend on; NaN in rows with a fault. There are no observed values.
+    /// The positions with the quantities that errors depend on. A row with a fault has those of the row before it, or
+    /// of the first row of numbers, so that it changes no direction of travel and no speed. There are no observed
+    /// values.
     pub rows: Readings,
     /// The poses, row by row: a point in mm, a direction, a quaternion; NaN where the file has no such column.
     pub poses: Vec<[f64; 10]>,
@@ -72,6 +74,8 @@ pub struct CommandFile {
     poses: PoseColumns,
     travel: Vec<AxisTravel>,
     last_run: i64,
+    /// The last row without a fault.
+    last: Option<Row>,
 }
 
 impl CommandFile {
@@ -159,6 +163,7 @@ impl CommandFile {
             poses,
             travel: Vec::new(),
             last_run: 0,
+            last: None,
         })
     }
 
@@ -214,16 +219,23 @@ impl CommandFile {
             faults: Vec::new(),
         };
         let mut record = StringRecord::new();
+        // Rows with a fault before the first row of numbers.
+        let mut leading = 0;
         while block.cells.len() < most {
             if !self.reader.read_record(&mut record).map_err(|cause| unreadable(&self.path, &cause))? {
                 break;
             }
             let last_run = block.rows.run.last().copied().unwrap_or(self.last_run);
-            let row = self.row(&record);
-            let row = row.unwrap_or_else(|fault| {
-                block.faults.push((block.cells.len(), fault));
-                Row::not_a_number(machine.axes.len(), last_run)
-            });
+            let row = match self.row(&record) {
+                Ok(row) => self.last.insert(row).clone(),
+                Err(fault) => {
+                    block.faults.push((block.cells.len(), fault));
+                    leading += usize::from(self.last.is_none());
+                    let nothing = Row::not_a_number(machine.axes.len(), last_run);
+                    let last = self.last.clone().unwrap_or_else(|| nothing.clone());
+                    Row { run: last_run, pose: nothing.pose, ..last }
+                }
+            };
             block.rows.positions.iter_mut().zip(&row.positions).for_each(|(column, position)| column.push(*position));
             time.then(|| block.rows.time_s.push(row.time_s));
             temperature.then(|| block.rows.temperature_c.push(row.temperature_c));
@@ -234,6 +246,12 @@ impl CommandFile {
         }
         if block.cells.is_empty() {
             return Ok(None);
+        }
+        let Readings { positions, time_s, temperature_c, .. } = &mut block.rows;
+        for column in positions.iter_mut().chain([time_s, temperature_c]) {
+            if let Some(first) = column.get(leading).copied() {
+                column[..leading].fill(first);
+            }
         }
         if self.poses == PoseColumns::None {
             self.follow(&mut block.rows, machine);
@@ -247,7 +265,7 @@ impl CommandFile {
         if rows.run.first().is_none_or(|run| *run == self.last_run) {
             rows.travel_before = before;
         }
-        self.travel = rows.travel_after(machine);
+        self.travel = if self.last.is_some() { rows.travel_after(machine) } else { Vec::new() };
         self.last_run = rows.run.last().copied().unwrap_or(self.last_run);
     }
 
@@ -276,6 +294,7 @@ impl CommandFile {
 }
 
 /// The numbers of one row.
+#[derive(Clone)]
 struct Row {
     positions: Vec<f64>,
     time_s: f64,

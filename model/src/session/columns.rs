@@ -100,6 +100,7 @@ impl Columns {
             coordinates,
             observed,
             travel_before: Vec::new(),
+            row_after: None,
         })
     }
 }

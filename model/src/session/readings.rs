@@ -34,6 +34,17 @@ pub struct Readings {
     pub observed: Vec<f64>,
     /// The travel of every axis before the first row, if the rows continue others of the same run; otherwise empty.
     pub travel_before: Vec<AxisTravel>,
+    /// The row after the last one, if others of the same run continue these rows.
+    pub row_after: Option<RowAfter>,
+}
+
+/// A row that continues others.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RowAfter {
+    /// Position of every axis, mm or rad.
+    pub positions: Vec<f64>,
+    /// Time of the row, s; 0 without a time column.
+    pub time_s: f64,
 }
 
 /// How an axis has travelled up to a row.
@@ -41,6 +52,8 @@ pub struct Readings {
 pub struct AxisTravel {
     /// Its position there, mm or rad.
     pub position: f64,
+    /// Time of the row, s; 0 without a time column.
+    pub time_s: f64,
     /// Direction of its last movement: −1, 0 or 1.
     pub direction: f64,
     /// Its position at the last reversal.
@@ -87,7 +100,18 @@ impl Readings {
                 .copied()
                 .collect(),
             travel_before: Vec::new(),
+            row_after: None,
         }
+    }
+
+    /// States that other rows continue these, which gives the speed at the last row. They change nothing if another run
+    /// begins with them.
+    pub fn continue_with(&mut self, others: &Readings) {
+        let is_continued = others.rows() > 0 && self.run.last() == others.run.first();
+        self.row_after = is_continued.then(|| RowAfter {
+            positions: others.positions.iter().map(|column| column[0]).collect(),
+            time_s: others.time_s.first().copied().unwrap_or(0.0),
+        });
     }
 
     /// Writes the positions of the axes in a row to `state`.
@@ -120,7 +144,7 @@ impl Readings {
     ///
     /// The direction is the sign of the backward difference of the positions within a run; the first row uses the
     /// second. An axis at rest keeps its last direction. The speed is the central difference over time, 0 without a
-    /// time column.
+    /// time column. Rows before and after these, if they are known, count as rows of the run.
     pub fn axis_samples(&self, axis: usize, kind: AxisKind) -> Vec<DriverSample<f64>> {
         let positions = &self.positions[axis];
         // Positions in a file are rounded; a smaller change is not a movement.
@@ -133,6 +157,7 @@ impl Readings {
         for (number, run) in self.runs().into_iter().enumerate() {
             let (first, end) = (run.start, run.end);
             let before = self.travel_before.get(axis).filter(|_| number == 0);
+            let after = self.row_after.as_ref().filter(|_| end == positions.len());
             let step = |row: usize| match before {
                 Some(travel) if row == first => positions[row] - travel.position,
                 _ if row == first => 0.0,
@@ -143,14 +168,15 @@ impl Readings {
             let start = AxisTravel { turned_at: positions[first], turned_at_s: time_s(first), ..AxisTravel::default() };
             let mut travel = before.copied().unwrap_or(start);
             if travel.direction == 0.0 {
-                travel.direction = (first..end).find(moves).map_or(0.0, |row| step(row).signum());
+                let last_step = after.map_or(0.0, |after| after.positions[axis] - positions[end - 1]);
+                let moves_after = if last_step.abs() > still { last_step.signum() } else { 0.0 };
+                travel.direction = (first..end).find(moves).map_or(moves_after, |row| step(row).signum());
             }
             for row in first..end {
                 if moves(&row) && step(row).signum() != travel.direction {
                     travel.direction = step(row).signum();
-                    // Between two blocks of rows the position before is known, but not its time.
                     (travel.turned_at, travel.turned_at_s) = match before {
-                        Some(before) if row == first => (before.position, time_s(first)),
+                        Some(before) if row == first => (before.position, before.time_s),
                         _ => (positions[row - 1], time_s(row - 1)),
                     };
                 }
@@ -160,10 +186,17 @@ impl Readings {
                 if !self.time_s.is_empty() {
                     let time = &self.time_s;
                     sample.since_reversal_s = time[row] - travel.turned_at_s;
-                    let (before, after) = (row.max(first + 1) - 1, (row + 1).min(end - 1));
-                    let elapsed = time[after] - time[before];
-                    if elapsed > 0.0 {
-                        sample.rate = (positions[after] - positions[before]) / elapsed;
+                    let at = |row: usize| (positions[row], time[row]);
+                    let (from, start_s) = match before {
+                        Some(before) if row == first => (before.position, before.time_s),
+                        _ => at(row.max(first + 1) - 1),
+                    };
+                    let (to, end_s) = match after {
+                        Some(after) if row + 1 == end => (after.positions[axis], after.time_s),
+                        _ => at((row + 1).min(end - 1)),
+                    };
+                    if end_s > start_s {
+                        sample.rate = (to - from) / (end_s - start_s);
                     }
                 }
             }
@@ -181,6 +214,7 @@ impl Readings {
             };
             AxisTravel {
                 position: last.value,
+                time_s: self.time_s.last().copied().unwrap_or(0.0),
                 direction: last.direction,
                 turned_at: last.value - last.direction * last.since_reversal,
                 turned_at_s: self.time_s.last().map_or(0.0, |time| time - last.since_reversal_s),
