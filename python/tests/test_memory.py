@@ -86,6 +86,17 @@ def test_a_deviation_is_from_the_bar():
     assert session.readings("C")["reading_mm"] == pytest.approx(np.full(360, 125.002), abs=1e-12)
 
 
+def test_copied_rows_are_removed_as_in_files():
+    """Rows that are copied in every column are no repeats."""
+    c = np.repeat(np.arange(0.0, 360.0), np.where(np.arange(360) == 7, 2, 1))
+    length = 125.0 + 1e-4 * np.sin(c)
+    columns = {"time_s": c, "run": np.ones(361), "c_deg": c, "length_mm": length}
+    session = abbe.Session(abbe.Machine.from_code("w C A b Y X Z t"), noise_um=0.3)
+    session.add_test("C", z_mm=75, **columns, **BAR)
+    assert session.readings("C")["c_deg"].size == 360
+    assert any("copy" in warning and "line 9" in warning for warning in session.warnings)
+
+
 def test_read_only_arrays_are_read():
     c, length = np.arange(0.0, 360.0), np.full(360, 125.0)
     c.flags.writeable = length.flags.writeable = False
