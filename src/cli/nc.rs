@@ -25,8 +25,8 @@ control; each says so. Try every program in single block, without the bar, befor
 
 Examples:
   abbe nc sessions/hermle-c600u/chapter5.toml --control linuxcnc --out programs
-  abbe nc sessions/hermle-c600u/chapter5.toml --control heidenhain --out programs --overshoot-deg 10
-  abbe nc sessions/r-test/plan.toml --control siemens --out programs --tool-point";
+  abbe nc sessions/hermle-c600u/chapter5.toml --control heidenhain --out klartext --overshoot-deg 10
+  abbe nc sessions/r-test/plan.toml --control siemens --out r-test --tool-point";
 
 /// `abbe nc SESSION --control C --out DIR`
 #[derive(Args)]
