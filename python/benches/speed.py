@@ -2,7 +2,8 @@
 
     python python/benches/speed.py ABBE [KERNEL]
 
-ABBE is the command. KERNEL prints the times of the library on the same session: `cargo bench --quiet --bench session --`.
+ABBE is the command. KERNEL prints the times of the library on the same session:
+`cargo bench --quiet --bench session --`.
 """
 
 import json

@@ -1,7 +1,7 @@
 //! Keywords of Python as the keys of a session file, and as columns of readings.
 //!
-//! A keyword whose value is an array is a column, unless it is a key of the set-up such as `workpiece_ball_mm`. A number
-//! for the position of an axis is where the test holds the axis. Everything else is a key of `[[test]]`.
+//! A keyword whose value is an array is a column, unless it is a key of the set-up such as `workpiece_ball_mm`. A
+//! number for the position of an axis is where the test holds the axis. Everything else is a key of `[[test]]`.
 
 use abbe::model::files::table::memory::{MemoryColumn, Values};
 use abbe::model::session::Session;

@@ -40,14 +40,15 @@ def prepare() -> None:
     # Both packages are named, so that the crates of the command have the features that they have in the module, and are
     # built once.
     packages = ["--package", "abbe", "--package", "abbe-python", "--bin", "abbe"]
-    build = ["cargo", "build", "--locked", "--profile", PROFILE, *packages, "--message-format", "json-render-diagnostics"]
+    messages = ["--message-format", "json-render-diagnostics"]
+    build = ["cargo", "build", "--locked", "--profile", PROFILE, *packages, *messages]
     built = subprocess.run(build, cwd=HERE, stdout=subprocess.PIPE, text=True)
     if built.returncode != 0:
         raise SystemExit(
             "abbe cannot be built: it needs Rust 1.95 or later (https://rustup.rs) and its workspace beside `python`"
         )
-    messages = map(json.loads, built.stdout.splitlines())
-    binaries = [message["executable"] for message in messages if message.get("executable")]
+    lines = map(json.loads, built.stdout.splitlines())
+    binaries = [line["executable"] for line in lines if line.get("executable")]
     scripts = HERE / "data" / "scripts"
     scripts.mkdir(parents=True, exist_ok=True)
     (binary,) = (Path(path) for path in binaries if Path(path).stem == "abbe")

@@ -15,8 +15,8 @@ TARGET = Path(__file__).parent.parent.parent / "docs" / "python" / "reference.md
 
 HEAD = """# Reference of the Python module
 
-*Reader: the researcher and the engineer who call Abbe from Python. `python/tools/reference.py` writes this page from the
-docstrings.*
+*Reader: the researcher and the engineer who call Abbe from Python. `python/tools/reference.py` writes this page from
+the docstrings.*
 
 Results have the keys of the [JSON output](../reference/json.md) as attributes: `fit.rms_um`,
 `trace.effects[0].aliases[0].component`. `to_dict()` returns the JSON document.
@@ -94,7 +94,9 @@ def documented_class(name: str, node: ast.ClassDef, known: dict[str, ast.AST]) -
         if isinstance(member, ast.FunctionDef) and not member.name.startswith("_"):
             if docstring := ast.get_docstring(member):
                 text += f"### {signature(member, name)}\n\n{markdown(docstring)}\n"
-        elif isinstance(member, ast.AnnAssign) and isinstance(following, ast.Expr) and name in ("SessionParameter", "ModelParameter", "Compensated"):
+        elif isinstance(member, ast.AnnAssign) and isinstance(following, ast.Expr) and "NamedTuple" in map(
+            ast.unparse, node.bases
+        ):
             described = ast.literal_eval(following.value)
             text += f"- `{ast.unparse(member)}`: {markdown(described)}"
     return text.rstrip() + "\n\n"

@@ -19,7 +19,8 @@ from ._fit import ByTest, Fit
 from ._machine import Machine
 from ._model import Compensated, Model, ModelParameter, Validation
 from ._plan import Plan
-from ._session import Session, SessionParameter
+from ._predicting import SessionParameter
+from ._session import Session
 from ._shown import Figure, Figures, Table
 from ._trace import Trace
 
