@@ -113,7 +113,8 @@ fn unpickled_test(declared: &[Test], pickled: &Bound<'_, PyDict>, axes: usize) -
         positions,
         coordinates: test.station.kind().coordinates(),
         observed: numbers(&item("observed")?)?,
-        travel_before: Vec::new(),
+        // Whole tests: nothing comes before or after them.
+        ..Readings::default()
     };
     let rows = readings.rows();
     let fits = |length: usize| length == 0 || length == rows;
