@@ -8,6 +8,7 @@
 //! | the machine, instruments, effects, sessions and their files | [`model`] |
 //! | estimates, uncertainty, plans, the trace of unmodelled effects | [`identify`] |
 //! | closed forms and their languages | [`codegen`] |
+//! | results as JSON documents, parameters of equations by name | [`document`], [`equation`] |
 //!
 //! The change that a simulated error of 10 µm makes is what the equation of the same test says, −R·sin C/L₀:
 //!
@@ -34,9 +35,17 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+// The printers name this library as the command does.
+extern crate self as abbe;
+
 pub use abbe_codegen as codegen;
 pub use abbe_identify as identify;
 pub use abbe_model as model;
+
+pub mod document;
+pub mod equation;
+#[doc(hidden)]
+pub mod present;
 
 /// What a program needs to build or read a session, to simulate, fit, plan and trace it, and to print an equation.
 pub mod prelude {

@@ -1,9 +1,10 @@
 //! The command `abbe`.
 
 mod cli;
-mod present;
 
 use std::process::ExitCode;
+
+use abbe::present;
 
 fn main() -> ExitCode {
     cli::run()

@@ -5,15 +5,10 @@ mod style;
 use std::path::PathBuf;
 
 use abbe::codegen::print::{LANGUAGES, OutputLanguage, TestEquations, language};
-use abbe::codegen::{
-    Arrangement, Checked, Equation, Options, Order, SessionTest, Source, Symbols, ToolPoint, Variable, check,
-};
-use abbe::model::chain::Machine;
-use abbe::model::component::ErrorName;
-use abbe::model::effect::{Component, Effect};
+use abbe::codegen::{Arrangement, Checked, Equation, Options, Order, SessionTest, Source, Symbols, ToolPoint, check};
+use abbe::equation::EquationParameters;
 use abbe::model::files::{self, ReadOptions, SourceMap};
 use abbe::model::frames::Rotation;
-use abbe::model::instrument::InstrumentParameter;
 use abbe::model::pattern;
 use abbe::model::session::{Session, Test};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -155,85 +150,6 @@ pub struct VolumetricArguments {
     map: super::map::MapArguments,
 }
 
-/// The parameters of an equation.
-#[derive(Default)]
-struct EquationParameters {
-    errors: Vec<ErrorName>,
-    /// Indices in the list of parameters of the instrument.
-    instrument: Vec<usize>,
-    effects: Vec<Effect>,
-}
-
-impl EquationParameters {
-    /// Reads names and patterns of errors, parameters of the instrument and effects.
-    fn parse(
-        names: &[String],
-        machine: &Machine,
-        of_instrument: &[InstrumentParameter],
-        effects: &[Effect],
-    ) -> Result<EquationParameters, Failure> {
-        let mut parameters = EquationParameters::default();
-        for name in names {
-            if pattern::is_pattern(name) {
-                let found = pattern::matching(machine, name);
-                if found.is_empty() {
-                    return Err(Failure::Other(format!(
-                        "`{name}` matches no error of the machine; `?` stands for one character, `*` for any number of them"
-                    )));
-                }
-                for error in found {
-                    if !parameters.errors.contains(&error) {
-                        parameters.errors.push(error);
-                    }
-                }
-                continue;
-            }
-            if name.contains('~') {
-                parameters.effects.extend(named(name, effects)?);
-                continue;
-            }
-            match Component::parse(name) {
-                Some(Component::Axis(error)) => parameters.errors.push(error),
-                Some(Component::Instrument { thing, coordinate }) => {
-                    let place = of_instrument.iter().position(|u| u.thing == thing && u.coordinate == coordinate);
-                    let name_of = |u: &InstrumentParameter| Variable::Instrument(*u).name();
-                    parameters.instrument.push(place.ok_or_else(|| {
-                        let has = match of_instrument {
-                            [] => "an error vector has no parameters of an instrument".to_string(),
-                            some => format!(
-                                "this instrument has {}",
-                                some.iter().map(name_of).collect::<Vec<_>>().join(", ")
-                            ),
-                        };
-                        Failure::Other(format!("`{name}` is a parameter of another instrument; {has}"))
-                    })?);
-                }
-                Some(Component::TriggerDelay | Component::Reading(_)) | None => {
-                    return Err(Failure::Other(format!(
-                        "`{name}` is no parameter of an equation; errors have names of ISO 230-1, as EX0C or EZC, or of the literature, as e_x0c"
-                    )));
-                }
-            }
-        }
-        Ok(parameters)
-    }
-}
-
-/// The declared effects with a name such as `EZC~C:h2`. Effects that differ only in the numbers of their shapes share a
-/// name.
-fn named(name: &str, effects: &[Effect]) -> Result<Vec<Effect>, Failure> {
-    let found: Vec<Effect> = effects.iter().filter(|effect| effect.id() == name).cloned().collect();
-    if found.is_empty() {
-        let declared: Vec<String> = effects.iter().map(Effect::id).collect();
-        let has = match declared.as_slice() {
-            [] => "no declared effect acts here".to_string(),
-            declared => format!("declared here: {}", declared.join(", ")),
-        };
-        return Err(Failure::Other(format!("no effect is called `{name}`; {has}")));
-    }
-    Ok(found)
-}
-
 impl FormArguments {
     fn options(&self, parameters: &EquationParameters) -> Options {
         Options {
@@ -269,14 +185,7 @@ impl FormArguments {
         first: bool,
     ) -> Result<(Equation, SessionTest<'s>), Failure> {
         let source = SessionTest::new(session, test)?;
-        let effects = session.effects.iter().filter(|effect| effect.acts_in(&test.name)).cloned();
-        let effects: Vec<Effect> = effects.collect();
-        let mut parameters =
-            EquationParameters::parse(&self.errors, &session.machine, session.instrument.unknowns(), &effects)?;
-        if self.errors.is_empty() {
-            parameters.errors.clone_from(&session.unknowns);
-            parameters.effects = effects;
-        }
+        let parameters = EquationParameters::of_test(session, test, &self.errors)?;
         let mut options = self.options(&parameters);
         if first {
             options = Options { order: Order::First, gradient: false, ..options };

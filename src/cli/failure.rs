@@ -51,6 +51,12 @@ impl From<IdentifyError> for Failure {
     }
 }
 
+impl From<String> for Failure {
+    fn from(message: String) -> Self {
+        Failure::Other(message)
+    }
+}
+
 impl Failure {
     /// The exit status: 1 for input that cannot be used, 2 for a wrong command line, 130 for an interruption.
     pub fn status(&self) -> u8 {

@@ -33,7 +33,11 @@ impl SaveArguments {
         let Some(path) = &self.save else {
             return Ok(());
         };
-        let model = IdentifiedModel::of_fit(problem, fit, json::provenance(sources, seed)?)?;
+        let model = IdentifiedModel::of_fit(
+            problem,
+            fit,
+            json::Origin::of_session(sources)?.provenance(json::command_line(), seed),
+        )?;
         output::write_whole(path, model.to_text()?.as_bytes())
     }
 }

@@ -98,10 +98,12 @@ impl std::fmt::Display for Cell {
 }
 
 /// Cells of anything that is a cell.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! cells {
     ($($cell:expr),* $(,)?) => { vec![$($crate::present::table::Cell::from($cell)),*] };
 }
-pub(crate) use cells;
+pub use crate::cells;
 
 /// A table.
 #[derive(Clone, Debug, Default)]

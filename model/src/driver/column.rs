@@ -96,7 +96,7 @@ pub(crate) fn quantity(name: &str) -> &str {
 }
 
 /// The name in data files: `temperature_c`, `driver.NAME_unit`.
-pub(crate) fn in_files(name: &str) -> Cow<'static, str> {
+pub fn in_files(name: &str) -> Cow<'static, str> {
     if name == TEMPERATURE { Cow::Borrowed(TEMPERATURE) } else { Cow::Owned(format!("{PREFIX}{name}")) }
 }
 

@@ -8,7 +8,7 @@ mod reference;
 mod sample;
 mod unit;
 
-pub use column::TEMPERATURE;
+pub use column::{TEMPERATURE, in_files as name_in_files};
 pub use kind::{DriverFault, DriverInput, DriverKind, Entry, Recorded, SymbolInput, Symbols};
 pub use quantity::DriverQuantity;
 pub use reference::Reference;

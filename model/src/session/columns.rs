@@ -128,7 +128,7 @@ fn wrong_count(what: &str, found: usize, expected: usize) -> Fault {
 }
 
 /// Checks that a number is finite and within [`limits::LARGEST`].
-pub(super) fn number(what: &str, value: f64) -> Result<(), Fault> {
+pub(crate) fn number(what: &str, value: f64) -> Result<(), Fault> {
     let fault = if value.is_finite() { limits::too_large(value) } else { Some(value.to_string()) };
     match fault {
         None => Ok(()),

@@ -60,7 +60,7 @@ impl Role {
     }
 
     /// Whether two columns contain the same quantity.
-    fn same_as(&self, other: &Role) -> bool {
+    pub fn same_as(&self, other: &Role) -> bool {
         match (self, other) {
             (Role::Axis(a, _), Role::Axis(b, _)) => a == b,
             (Role::Reading(Quantity::Coordinate(a), _), Role::Reading(Quantity::Coordinate(b), _)) => a == b,

@@ -22,8 +22,16 @@ pub(super) fn hash_of(cells: &[String]) -> u64 {
     hasher.finish()
 }
 
+/// Whether every reading has a time of its own: no row is a copy of another.
+pub(super) fn cannot_occur(readings: &Readings) -> bool {
+    !readings.time_s.is_empty() && readings.time_s.windows(2).all(|pair| pair[0] < pair[1])
+}
+
 /// The rows without copies; `None` if there are no copies. `cells` has the hash of the cells of each row.
 pub(super) fn kept(readings: &Readings, cells: &[u64]) -> Option<Vec<usize>> {
+    if cannot_occur(readings) {
+        return None;
+    }
     let closed_runs = closed_runs(readings);
     if readings.time_s.is_empty() && (readings.run.is_empty() || has_repeats(readings, cells, &closed_runs)) {
         return None;

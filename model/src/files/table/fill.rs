@@ -9,6 +9,7 @@ use super::request::{Format, Request};
 use super::row::Row;
 use super::{duplicates, required};
 use crate::error::{Location, ModelError};
+use crate::instrument::Fault;
 use crate::instrument::column::Quantity;
 use crate::session::check;
 use crate::session::readings::{Origin, Readings};
@@ -136,8 +137,12 @@ impl<'a> ReadingColumns<'a> {
         for column in &self.columns {
             let cell = row.cells[column.index].as_str();
             if column.role == Role::Socket {
-                let location = Location::line(&self.file, row.line);
-                self.socket.push(socket_index(&mut self.sockets, cell, location)?);
+                let index = socket_index(&mut self.sockets, cell).map_err(|(message, help)| ModelError::Input {
+                    location: Location::line(&self.file, row.line),
+                    message,
+                    help: Some(help),
+                })?;
+                self.socket.push(index);
                 continue;
             }
             let fault = |message: String, help: &str| ModelError::Input {
@@ -159,13 +164,12 @@ impl<'a> ReadingColumns<'a> {
                     readings.time_s.push(value);
                 }
                 Role::Run => {
-                    if value.fract() != 0.0 || value.abs() > 1e9 {
-                        return Err(fault(
+                    readings.run.push(run_number(value).ok_or_else(|| {
+                        fault(
                             format!("`{cell}` is not a run number"),
                             "run numbers are integers, one for each traversal in one direction",
-                        ));
-                    }
-                    readings.run.push(value as i64);
+                        )
+                    })?);
                 }
                 Role::Driver(name) => match readings.drivers.get_mut(name) {
                     Some(values) => values.push(value),
@@ -177,14 +181,8 @@ impl<'a> ReadingColumns<'a> {
                     }
                 }
                 Role::Reading(quantity, unit) => {
-                    let value = unit.to_internal(value);
-                    match quantity {
-                        Quantity::Length => observed[0] = value,
-                        Quantity::Deviation => observed[0] = self.request.bar_mm() + value,
-                        Quantity::Outward => observed[0] = -value,
-                        Quantity::Coordinate(i) => observed[*i] = value,
-                        Quantity::Socket => {}
-                    }
+                    let coordinate = if let Quantity::Coordinate(i) = quantity { *i } else { 0 };
+                    observed[coordinate] = self::observed(*quantity, unit.to_internal(value), self.request);
                 }
                 Role::Socket => {}
             }
@@ -198,33 +196,52 @@ impl<'a> ReadingColumns<'a> {
     /// The readings, split by socket if a column names it.
     fn by_socket(self) -> BySocket {
         let all = Readings { origin: Some(Origin { file: self.file, line: self.line }), ..self.readings };
-        if self.sockets.is_empty() {
-            return vec![(None, all)];
-        }
-        self.sockets
-            .into_iter()
-            .enumerate()
-            .map(|(index, name)| {
-                let rows: Vec<usize> = (0..self.socket.len()).filter(|&row| self.socket[row] == index).collect();
-                (Some(name), all.of_rows(&rows))
-            })
-            .collect()
+        by_socket(all, self.sockets, &self.socket)
+    }
+}
+
+/// Readings by socket; `socket` has the index of the socket of each row, and nothing if no column names sockets.
+pub(super) fn by_socket(all: Readings, sockets: Vec<String>, socket: &[usize]) -> BySocket {
+    if sockets.is_empty() {
+        return vec![(None, all)];
+    }
+    sockets
+        .into_iter()
+        .enumerate()
+        .map(|(index, name)| {
+            let rows: Vec<usize> = (0..socket.len()).filter(|&row| socket[row] == index).collect();
+            (Some(name), all.of_rows(&rows))
+        })
+        .collect()
+}
+
+/// A run number, if the number is one.
+pub(super) fn run_number(value: f64) -> Option<i64> {
+    (value.fract() == 0.0 && value.abs() <= 1e9).then_some(value as i64)
+}
+
+/// The observed value of a cell in the internal unit.
+pub(super) fn observed(quantity: Quantity, value: f64, request: &Request<'_>) -> f64 {
+    match quantity {
+        Quantity::Length | Quantity::Coordinate(_) => value,
+        Quantity::Deviation => request.bar_mm() + value,
+        Quantity::Outward => -value,
+        Quantity::Socket => 0.0,
     }
 }
 
 /// The index of a socket among those found so far in the file.
-fn socket_index(sockets: &mut Vec<String>, name: &str, location: Location) -> Result<usize, ModelError> {
+pub(super) fn socket_index(sockets: &mut Vec<String>, name: &str) -> Result<usize, Fault> {
     if let Some(known) = sockets.iter().position(|socket| socket == name) {
         return Ok(known);
     }
-    let fault = |message: String, help: &str| ModelError::Input { location, message, help: Some(help.into()) };
     if sockets.len() == MAX_SOCKETS {
         let message = format!("more than {MAX_SOCKETS} sockets in column `socket`");
-        return Err(fault(message, "a socket has many poses; does the column contain the socket's name?"));
+        return Err((message, "a socket has many poses; does the column contain the socket's name?".into()));
     }
     if let Some(control) = name.chars().find(|c| c.is_control()) {
         let message = format!("a socket's name contains the control character U+{:04X}", control as u32);
-        return Err(fault(message, "remove it"));
+        return Err((message, "remove it".into()));
     }
     sockets.push(name.to_string());
     Ok(sockets.len() - 1)

@@ -5,6 +5,7 @@
 //!   `json_lines`;
 //! - `request`: what a test requires of its file; `columns`, `required`: roles of columns; `fill`: readings
 //!   from rows;
+//! - [`memory`]: columns in memory in place of a file;
 //! - `lines`, `encoding`, `row`, `number`: lines of a text, rows and cells.
 
 mod ballbar_xml;
@@ -17,6 +18,7 @@ mod format;
 mod formats;
 mod json_lines;
 mod lines;
+pub mod memory;
 pub(crate) mod number;
 pub(crate) mod request;
 mod required;

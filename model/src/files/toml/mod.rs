@@ -6,6 +6,7 @@ pub(crate) mod document;
 mod effect;
 mod format;
 mod machine;
+pub mod memory;
 mod movement;
 pub mod parts;
 mod prior;
@@ -20,13 +21,13 @@ pub mod write;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 pub use machine::machine;
 
 use super::quantity::{self, MICROMETRE};
 use super::source_map::SourceMap;
 use super::stamp::FileStamp;
+use super::table::memory::MemoryColumn;
 use super::table::request::{ColumnMapping, Format};
 use crate::chain::Machine;
 use crate::driver::column;
@@ -64,6 +65,8 @@ struct Context<'a> {
     constants: &'a [Constant],
     format: Format,
     columns: Option<Vec<ColumnMapping>>,
+    /// Readings in memory, in place of a data file.
+    memory: Option<&'a [MemoryColumn<'a>]>,
     options: &'a ReadOptions,
 }
 
@@ -133,10 +136,7 @@ pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Sessi
     let source = Source::read(path, "the session file")?;
     let mut root = source.parse()?;
     let SessionMachine { machine, source: machine_source } = session_machine(path, options, &mut root)?;
-    let constants = constants::constants(&mut root)?;
-    let instrument = Instrument::read(&mut root)?;
-    let about = about(&mut root)?;
-    let unknowns = unknowns::unknowns(&machine, instrument.kind, &mut root)?;
+    let head = head(machine, &mut root)?;
 
     let format = match root.take("format") {
         Some(value) => format::format(value.table("[format]".into())?)?,
@@ -148,11 +148,12 @@ pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Sessi
     };
     let context = Context {
         file: path,
-        machine: &machine,
-        instrument: instrument.kind,
-        constants: &constants,
+        machine: &head.machine,
+        instrument: head.instrument,
+        constants: &head.constants,
         format,
         columns,
+        memory: None,
         options,
     };
     let mut found = Found::default();
@@ -169,7 +170,7 @@ pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Sessi
             .collect::<Result<Vec<_>, _>>()?,
         None => Vec::new(),
     };
-    let socket_distances = sockets::socket_distances(instrument.kind, &tests, &mut root, options.read_data)?;
+    let socket_distances = sockets::socket_distances(head.instrument, &tests, &mut root, options.read_data)?;
     root.finish()?;
     let mut files: Vec<FileStamp> = Vec::new();
     let own = source.stamp.iter().chain(machine_source.iter().filter_map(|source| source.stamp.as_ref()));
@@ -184,20 +185,24 @@ pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Sessi
         machine_text: machine_source.map(|source| source.text),
         files,
     };
-    let session = Session {
+    let session = Session { effects, tests, socket_distances, warnings: found.warnings, ..head };
+    Ok((session, sources))
+}
+
+/// What a session states before its tests.
+fn head(machine: Machine, root: &mut Table<'_>) -> Result<Session, ModelError> {
+    let constants = constants::constants(root)?;
+    let instrument = Instrument::read(root)?;
+    let about = about(root)?;
+    let unknowns = unknowns::unknowns(&machine, instrument.kind, root)?;
+    Ok(Session {
         constants,
-        instrument: instrument.kind,
         noise_mm: instrument.noise_mm,
         resolution_mm: instrument.resolution_mm,
         unknowns,
-        effects,
-        tests,
-        socket_distances,
-        warnings: found.warnings,
         about,
-        machine: Arc::new(machine),
-    };
-    Ok((session, sources))
+        ..Session::new(machine, instrument.kind)
+    })
 }
 
 /// The driver columns of the data, and those that `[columns]` names.

@@ -102,6 +102,7 @@ pub fn effects_of_text(
         constants: &[],
         format: Format::default(),
         columns: None,
+        memory: None,
         options: &ReadOptions::default(),
     };
     let declared: Vec<Declared> =

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::{Context, Declared, Found, data_folder, format, movement, quantity, station};
 use crate::axis::AxisKind;
 use crate::error::ModelError;
-use crate::files::table::{self, request::Request};
+use crate::files::table::{self, memory, request::Request};
 use crate::files::toml::document::{Table, Value};
 use crate::instrument::SharedBy;
 use crate::instrument::set_up::SetUp;
@@ -97,7 +97,6 @@ pub(super) fn tests(
     if !context.options.read_data {
         return Ok(vec![test]);
     }
-    let file = data_file(context, &data)?;
     let request = Request {
         machine: context.machine,
         test: &test,
@@ -106,11 +105,17 @@ pub(super) fn tests(
         // An empty table maps no column: the file has the default names.
         columns: columns.as_deref().filter(|columns| !columns.is_empty()),
     };
-    let data = table::read(&file, &request)?;
-    found.warnings.extend(data.warnings);
-    found.stamps.push(data.stamp);
+    let (by_socket, warnings) = match context.memory {
+        Some(columns) => memory::read(columns, &request)?,
+        None => {
+            let data = table::read(&data_file(context, &data)?, &request)?;
+            found.stamps.push(data.stamp);
+            (data.by_socket, data.warnings)
+        }
+    };
+    found.warnings.extend(warnings);
     let mut tests = Vec::new();
-    for (socket, readings) in data.by_socket {
+    for (socket, readings) in by_socket {
         let doubts = check::readings(context.machine, &test, &readings).map_err(here)?;
         found.warnings.extend(doubts);
         let Some(socket) = socket else {

@@ -1,0 +1,116 @@
+"""Fits."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _abbe
+from ._model import Model
+from ._shown import Shown, Table, rows_of
+from .results import FitResult, ParameterResult
+
+if TYPE_CHECKING:
+    from ._session import Session
+
+
+class ByTest(Mapping[str, NDArray[Any]]):
+    """An array for each test, made when it is asked for."""
+
+    def __init__(self, tests: tuple[str, ...], of: Callable[[str], NDArray[Any]]) -> None:
+        self._tests = tests
+        self._of = of
+
+    def __getitem__(self, test: str) -> NDArray[Any]:
+        if test not in self._tests:
+            raise KeyError(f"no test {test!r}; the tests are {', '.join(self._tests)}")
+        return self._of(test)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._tests)
+
+    def __len__(self) -> int:
+        return len(self._tests)
+
+
+def by_test(session: Session, of: Callable[[str], NDArray[Any]]) -> ByTest:
+    """An array for each test with readings, with one row for each reading."""
+    measured = {name: coordinates for name, rows, coordinates in session._handle.tests() if rows}
+    return ByTest(tuple(measured), lambda test: rows_of(of(test), measured[test]))
+
+
+def parameter(parameters: tuple[ParameterResult, ...], id: str) -> ParameterResult:
+    """The parameter of this identifier."""
+    for found in parameters:
+        if found.id == id:
+            return found
+    known = ", ".join(found.id for found in parameters)
+    raise KeyError(f"no estimate of {id!r}; there are estimates of {known}")
+
+
+class Fit(Shown, FitResult):
+    """A fitted session: the result of ``abbe fit``, with its arrays. :meth:`Session.fit` makes it.
+
+    ``fit["EX0C"]`` is the estimate of a parameter.
+    """
+
+    def __init__(self, session: Session, seed: int, source: dict[str, Any] | None = None) -> None:
+        self._session = session
+        self._seed = seed
+        self._known: _abbe.Fit | None = None
+        FitResult.__init__(self, json.loads(self._handle.json()) if source is None else source)
+
+    @property
+    def _handle(self) -> _abbe.Fit:
+        # A fit from another process is repeated when an array or a figure is needed: it is deterministic.
+        if self._known is None:
+            self._known = _abbe.Fit.of(self._session._handle, self._seed)
+        return self._known
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (Fit, (self._session, self._seed, dict(self._source)))
+
+    def __getitem__(self, id: str) -> ParameterResult:
+        return parameter(self.parameters, id)
+
+    @property
+    def estimates(self) -> NDArray[np.float64]:
+        """Estimates of all parameters of the session in the order of ``Session.parameters``, each in its unit.
+
+        The part of a parameter in a null-space direction is its nominal value.
+        """
+        return self._handle.estimates()
+
+    @property
+    def residuals(self) -> ByTest:
+        """Residuals observed less model in µm by test: one row for each reading, outliers included."""
+        return by_test(self._session, self._handle.residuals_um)
+
+    @property
+    def is_outlier(self) -> ByTest:
+        """Whether each reading is excluded as an outlier, by test."""
+        return ByTest(self.residuals._tests, self._handle.is_outlier)
+
+    def residual_table(self) -> Table:
+        """Return the table of ``--residuals``: one row for each reading."""
+        return Table(self._handle.residual_table())
+
+    def model(self) -> Model:
+        """Return the identified model, which other sessions can validate."""
+        return Model(self._handle.model())
+
+    def _tables(self) -> list[_abbe.Table]:
+        return self._handle.tables()
+
+    def _figures(self) -> list[_abbe.Figure]:
+        return self._handle.figures()
+
+    def _page(self) -> str:
+        return self._handle.page()
+
+    def __repr__(self) -> str:
+        return f"<abbe.Fit: {len(self.parameters)} estimates, residual {self.rms_um:.3g} µm rms>"

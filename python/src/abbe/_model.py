@@ -1,0 +1,224 @@
+"""Identified models."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _abbe
+from ._errors import SessionError
+from ._machine import Machine
+from ._shown import Shown, rows_of, write_whole
+from .results import ValidationResult
+
+if TYPE_CHECKING:
+    from ._session import Session
+
+
+class ModelParameter(NamedTuple):
+    """A parameter of an identified model."""
+
+    id: str
+    """Identifier: ``EX0C``, ``EZC~C:h2.cos``."""
+    value: float
+    """Its value, in ``unit``."""
+    u: float
+    """Standard uncertainty, in ``unit``."""
+    unit: str
+    """Its unit."""
+    held: bool
+    """Whether it is held at nominal, since the readings do not separate it from other parameters."""
+
+
+class Compensated(NamedTuple):
+    """Corrected commands."""
+
+    positions: NDArray[np.float64]
+    """Positions to command: one column for each axis, mm or degrees."""
+    states: tuple[str, ...]
+    """What became of each command: ``corrected``, ``position-only``, ``near-singular``, ``beyond-travel``, ..."""
+    remaining_um: NDArray[np.float64]
+    """Distance of the tool point from its nominal place at the corrected command."""
+    remaining_arcsec: NDArray[np.float64]
+    """Angle of the tool from its nominal orientation at the corrected command."""
+
+
+class Model:
+    """An identified model: machine, errors with covariance, effects, noise and range.
+
+    :meth:`Fit.model`, :meth:`Trace.model` and :meth:`read` make it.
+    """
+
+    def __init__(self, handle: _abbe.Model) -> None:
+        self._handle = handle
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> Model:
+        """Read a file of ``--save``.
+
+        Parameters
+        ----------
+        path : path-like
+            The file.
+        """
+        return cls(_abbe.Model.read(path))
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the model as ``--save`` does.
+
+        Parameters
+        ----------
+        path : path-like
+            The file. It is replaced if it exists.
+        """
+        write_whole(path, self._handle.text())
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the model file as a dict."""
+        model: dict[str, Any] = json.loads(self._handle.text())
+        return model
+
+    @property
+    def machine(self) -> Machine:
+        """The machine."""
+        return Machine(self._handle.machine)
+
+    @property
+    def parameters(self) -> tuple[ModelParameter, ...]:
+        """The parameters."""
+        return tuple(ModelParameter(*row) for row in self._handle.parameters())
+
+    def validate(self, session: Session) -> Validation:
+        """Test the model on readings that it never saw, as ``abbe validate``.
+
+        Parameters
+        ----------
+        session : Session
+            A session of the same machine. Only its set-up is estimated.
+        """
+        return Validation(self, session)
+
+    def compensate(
+        self,
+        positions: Mapping[str, ArrayLike] | ArrayLike,
+        *,
+        tool_mm: tuple[float, float, float] | None = None,
+        time_s: ArrayLike | None = None,
+        temperature_c: ArrayLike | None = None,
+    ) -> Compensated:
+        """Return commands that cancel the errors of the machine, as ``abbe compensate``.
+
+        Parameters
+        ----------
+        positions : mapping or array
+            Commanded positions: by name (``{"x_mm": ..., "c_deg": ...}``; other axes are at zero), or one column for
+            each axis in the order of ``machine.axes``; mm and degrees.
+        tool_mm : tuple of three floats, optional
+            The tool point in the tool frame; that of the instrument by default.
+        time_s, temperature_c : array, optional
+            Time and temperature, if errors depend on them.
+        """
+        found = self._handle.correct(self._positions(positions), tool_mm, _column(time_s), _column(temperature_c))
+        return Compensated(found[0], tuple(found[1]), found[2], found[3])
+
+    def pose_errors(
+        self,
+        positions: Mapping[str, ArrayLike] | ArrayLike,
+        *,
+        tool_mm: tuple[float, float, float] | None = None,
+        time_s: ArrayLike | None = None,
+        temperature_c: ArrayLike | None = None,
+    ) -> NDArray[np.float64]:
+        """Return the errors of the tool's pose in the table frame, as ``abbe compensate --inverse``.
+
+        Parameters
+        ----------
+        positions, tool_mm, time_s, temperature_c
+            As in :meth:`compensate`.
+
+        Returns
+        -------
+        ndarray
+            Six columns: displacements along X, Y, Z in µm, rotations about them in arcsec.
+        """
+        return self._handle.pose_errors(
+            self._positions(positions), tool_mm, _column(time_s), _column(temperature_c)
+        )
+
+    def _positions(self, positions: Mapping[str, ArrayLike] | ArrayLike) -> NDArray[np.float64]:
+        if not isinstance(positions, Mapping):
+            return np.atleast_2d(np.asarray(positions, dtype=np.float64))
+        known = [name.lower() for name in self._handle.columns()]
+        columns = [np.zeros(1) for _ in known]
+        for name, values in positions.items():
+            if name.lower() not in known:
+                raise SessionError(f"no axis position `{name}`", help=f"known: {', '.join(known)}")
+            columns[known.index(name.lower())] = np.atleast_1d(np.asarray(values, dtype=np.float64))
+        return np.stack(np.broadcast_arrays(*columns), axis=1)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (_of_text, (self._handle.text(),))
+
+    def __repr__(self) -> str:
+        return f"<abbe.Model of {self.machine.name!r}: {len(self.parameters)} parameters>"
+
+
+def _of_text(text: str) -> Model:
+    return Model(_abbe.Model.from_text(text))
+
+
+def _column(values: ArrayLike | None) -> NDArray[np.float64] | None:
+    return None if values is None else np.asarray(values, dtype=np.float64)
+
+
+class Validation(Shown, ValidationResult):
+    """A validated model: the result of ``abbe validate``. :meth:`Model.validate` makes it."""
+
+    def __init__(self, model: Model, session: Session, source: dict[str, Any] | None = None) -> None:
+        self._model = model
+        self._session = session
+        self._known: _abbe.Validation | None = None
+        ValidationResult.__init__(self, json.loads(self._handle.json(1)) if source is None else source)
+
+    @property
+    def _handle(self) -> _abbe.Validation:
+        if self._known is None:
+            self._known = self._model._handle.validate(self._session._handle)
+        return self._known
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (Validation, (self._model, self._session, dict(self._source)))
+
+    def residuals(self, test: str) -> NDArray[np.float64]:
+        """Return the residuals of the model.
+
+        Parameters
+        ----------
+        test : str
+            The test.
+
+        Returns
+        -------
+        ndarray
+            Observed less predicted in µm, one row for each reading.
+        """
+        coordinates = next((count for name, _, count in self._session._handle.tests() if name == test), 1)
+        residuals: NDArray[np.float64] = rows_of(self._handle.residuals_um(test), coordinates)
+        return residuals
+
+    def _tables(self) -> list[_abbe.Table]:
+        return self._handle.tables()
+
+    def _figures(self) -> list[_abbe.Figure]:
+        return self._handle.figures()
+
+    def _page(self) -> str:
+        return self._handle.page(1)
+
+    def __repr__(self) -> str:
+        return f"<abbe.Validation: {self.verdict}>"

@@ -1,0 +1,166 @@
+//! Keywords of Python as the keys of a session file, and as columns of readings.
+//!
+//! A keyword whose value is an array is a column, unless it is a key of the set-up such as `workpiece_ball_mm`. A
+//! number for the position of an axis is where the test holds the axis. Everything else is a key of `[[test]]`.
+
+use abbe::model::files::table::memory::{MemoryColumn, Values};
+use abbe::model::session::Session;
+use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
+use toml::{Table, Value};
+
+use crate::failed::Failed;
+
+/// Keys of `[[test]]` that no instrument states.
+const TEST_KEYS: [&str; 6] = ["setup", "spindle_setup", "at", "sweep", "path", "name"];
+
+/// The keywords of a test.
+pub struct Keywords<'py> {
+    /// The keys of `[[test]]`.
+    pub table: Table,
+    columns: Vec<(String, Held<'py>)>,
+}
+
+/// The values of a column, for as long as they are read.
+enum Held<'py> {
+    /// An array of the caller, as it is.
+    Array(PyReadonlyArray1<'py, f64>),
+    /// Numbers of another kind or layout.
+    Numbers(Vec<f64>),
+    Words(Vec<String>),
+}
+
+impl<'py> Keywords<'py> {
+    /// Sorts the keywords of a test.
+    pub fn of_test(session: &Session, keywords: &Bound<'py, PyDict>) -> PyResult<Keywords<'py>> {
+        let set_up: Vec<&str> = session.instrument.entry().keys.iter().map(|key| key.name).collect();
+        let is_key = |name: &str| TEST_KEYS.contains(&name) || set_up.contains(&name);
+        let mut sorted = Keywords { table: Table::new(), columns: Vec::new() };
+        let mut at = Table::new();
+        for (name, value) in keywords.iter() {
+            let name: String = name.extract()?;
+            if is_key(&name) {
+                sorted.table.insert(name.clone(), toml_value(&name, &value)?);
+            } else if is_sequence(&value) {
+                let held = column(&name, &value)?;
+                sorted.columns.push((name, held));
+            } else if is_position(session, &name) {
+                at.insert(name.clone(), toml_value(&name, &value)?);
+            } else {
+                let known: Vec<&str> = TEST_KEYS.iter().chain(&set_up).copied().collect();
+                return Err(Failed::argument(
+                    format!("`{name}` is neither the position of an axis nor a key of a test"),
+                    format!("columns are arrays; keys of a test are {}", known.join(", ")),
+                )
+                .into());
+            }
+        }
+        if !at.is_empty() {
+            if let Some(Value::Table(stated)) = sorted.table.remove("at") {
+                at.extend(stated);
+            }
+            sorted.table.insert("at".to_string(), Value::Table(at));
+        }
+        Ok(sorted)
+    }
+
+    /// The columns of readings.
+    pub fn columns(&self) -> PyResult<Vec<MemoryColumn<'_>>> {
+        self.columns
+            .iter()
+            .map(|(name, held)| {
+                let values = match held {
+                    Held::Array(array) => Values::Numbers(array.as_slice()?),
+                    Held::Numbers(numbers) => Values::Numbers(numbers),
+                    Held::Words(words) => Values::Words(words),
+                };
+                Ok(MemoryColumn { name, values })
+            })
+            .collect()
+    }
+
+    /// Whether there are readings.
+    pub fn has_columns(&self) -> bool {
+        !self.columns.is_empty()
+    }
+}
+
+/// Whether a name could be the position of an axis: the reader decides on the unit.
+fn is_position(session: &Session, name: &str) -> bool {
+    let axes = &session.machine.axes;
+    name.rsplit_once('_').is_some_and(|(axis, _)| axes.iter().any(|known| known.name.eq_ignore_ascii_case(axis)))
+}
+
+fn is_sequence(value: &Bound<'_, PyAny>) -> bool {
+    let array = value.cast::<PyUntypedArray>().is_ok_and(|array| array.ndim() > 0);
+    let number = value.is_instance_of::<PyFloat>() || value.is_instance_of::<PyInt>();
+    let text = value.is_instance_of::<PyString>() || value.is_instance_of::<PyDict>();
+    array || (!number && !text && value.len().is_ok())
+}
+
+/// A column: an array of float64 without gaps as it is, anything else as numbers or words.
+fn column<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Held<'py>> {
+    let py = value.py();
+    if let Ok(array) = value.extract::<PyReadonlyArray1<'py, f64>>()
+        && array.as_slice().is_ok()
+    {
+        return Ok(Held::Array(array));
+    }
+    let array = py.import("numpy")?.call_method1("asarray", (value,))?;
+    let array = array.cast::<PyUntypedArray>()?;
+    if array.ndim() != 1 {
+        let message = format!("`{name}` has {} dimensions; an array of one is expected", array.ndim());
+        return Err(Failed::argument(message, "one value for each reading").into());
+    }
+    let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
+    match kind.as_str() {
+        "f" | "i" | "u" | "b" => {
+            let numbers = array.call_method1("astype", ("float64",))?;
+            Ok(Held::Numbers(numbers.cast::<PyArrayDyn<f64>>()?.to_vec()?))
+        }
+        "U" => Ok(Held::Words(array.call_method0("tolist")?.extract()?)),
+        _ => {
+            let found: String = array.getattr("dtype")?.str()?.extract()?;
+            let message = format!("`{name}` has the dtype {found}; numbers are expected");
+            Err(Failed::argument(message, "convert it with `.astype(float)`").into())
+        }
+    }
+}
+
+/// A value of Python as a value of TOML.
+pub fn toml_value(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
+    if let Ok(table) = value.cast::<PyDict>() {
+        let mut converted = Table::new();
+        for (key, value) in table.iter() {
+            let key: String = key.extract()?;
+            let value = toml_value(&key, &value)?;
+            converted.insert(key, value);
+        }
+        return Ok(Value::Table(converted));
+    }
+    if value.is_instance_of::<PyBool>() {
+        return Ok(Value::Boolean(value.extract()?));
+    }
+    if value.is_instance_of::<PyInt>() {
+        let message = || Failed::argument(format!("`{name}`: {value} is too large"), "state a number of moderate size");
+        return Ok(Value::Integer(value.extract().map_err(|_| message())?));
+    }
+    if let Ok(number) = value.cast::<PyFloat>() {
+        return Ok(Value::Float(number.extract()?));
+    }
+    if let Ok(text) = value.cast::<PyString>() {
+        return Ok(Value::String(text.extract()?));
+    }
+    // Numbers and arrays of NumPy become those of Python.
+    if let Ok(plain) = value.call_method0("tolist") {
+        return toml_value(name, &plain);
+    }
+    if value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>() {
+        let items = value.try_iter()?.map(|item| toml_value(name, &item?));
+        return Ok(Value::Array(items.collect::<PyResult<_>>()?));
+    }
+    let found: String = value.get_type().name()?.extract()?;
+    let message = format!("`{name}` is a {found}; a number, a text, a list or a dict is expected");
+    Err(Failed::argument(message, "see the keys of session files").into())
+}

@@ -1,0 +1,43 @@
+//! The native part of the Python module `abbe`: handles on the library's types, NumPy arrays in and out, results as the
+//! JSON documents of the command. The package in `src/abbe` gives them their Python form.
+//!
+//! - [`machine`], [`session`], [`fit`], [`trace`], [`plan`], [`equation`], [`model`]: one file per handle;
+//! - [`keywords`]: keywords as the keys of a session file; [`pickle`]: the state of a session;
+//! - [`work`]: computations without the GIL, with Ctrl-C, progress and a bound on the threads;
+//! - [`show`]: tables, figures and reports; [`failed`]: errors as exceptions.
+
+mod equation;
+mod failed;
+mod fit;
+mod keywords;
+mod machine;
+mod model;
+mod pickle;
+mod plan;
+mod session;
+mod show;
+mod trace;
+mod work;
+
+use pyo3::prelude::*;
+
+/// The native part of `abbe`.
+#[pymodule]
+fn _abbe(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<machine::Machine>()?;
+    module.add_class::<session::Session>()?;
+    module.add_class::<fit::Fit>()?;
+    module.add_class::<trace::Trace>()?;
+    module.add_class::<plan::Plan>()?;
+    module.add_class::<model::Model>()?;
+    module.add_class::<model::Validation>()?;
+    module.add_class::<show::Table>()?;
+    module.add_class::<show::Figure>()?;
+    module.add_function(wrap_pyfunction!(equation::equation, module)?)?;
+    module.add_function(wrap_pyfunction!(pickle::pickled, module)?)?;
+    module.add_function(wrap_pyfunction!(pickle::unpickled, module)?)?;
+    module.add_function(wrap_pyfunction!(work::set_threads, module)?)?;
+    module.add_function(wrap_pyfunction!(work::threads, module)?)?;
+    Ok(())
+}

@@ -1,0 +1,64 @@
+//! A machine, with the text of its file.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use abbe::model;
+use abbe::model::files;
+use abbe::model::files::toml::parts;
+use pyo3::prelude::*;
+
+use crate::failed::Failed;
+
+/// A kinematic chain.
+#[pyclass(frozen, module = "abbe._abbe")]
+pub struct Machine {
+    /// The chain.
+    pub machine: Arc<model::chain::Machine>,
+}
+
+#[pymethods]
+impl Machine {
+    #[staticmethod]
+    fn read(path: PathBuf) -> Result<Machine, Failed> {
+        Ok(Machine { machine: Arc::new(files::machine(&path)?) })
+    }
+
+    #[staticmethod]
+    fn from_code(code: &str) -> Result<Machine, Failed> {
+        Ok(Machine { machine: Arc::new(model::chain::Machine::from_code(code)?) })
+    }
+
+    #[staticmethod]
+    fn from_toml(text: &str) -> Result<Machine, Failed> {
+        Ok(Machine { machine: Arc::new(parts::machine_of_text("machine.toml".as_ref(), text)?) })
+    }
+
+    fn to_toml(&self) -> String {
+        parts::machine_text(&self.machine)
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        &self.machine.name
+    }
+
+    #[getter]
+    fn code(&self) -> String {
+        self.machine.code()
+    }
+
+    #[getter]
+    fn axes(&self) -> Vec<String> {
+        self.machine.axes.iter().map(|axis| axis.name.clone()).collect()
+    }
+
+    /// The names of all errors of the axes.
+    fn errors(&self) -> Vec<String> {
+        model::pattern::errors(&self.machine).iter().map(ToString::to_string).collect()
+    }
+
+    fn __eq__(&self, other: &Machine) -> bool {
+        self.machine == other.machine
+    }
+}

@@ -1,0 +1,226 @@
+//! An identified model: validated on other sessions, and used to correct commands.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use abbe::document::{Document, Origin};
+use abbe::identify::correction::{Aim, Correction, EstimatedErrors};
+use abbe::identify::model_file::{self, IdentifiedModel};
+use abbe::identify::unit::ARCSEC;
+use abbe::identify::validate::{self, validate};
+use abbe::model::files;
+use abbe::model::session::readings::Readings;
+use abbe::present::report;
+use abbe::present::validate as present;
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+
+use crate::failed::Failed;
+use crate::fit::call;
+use crate::machine::Machine;
+use crate::session::{Session, State};
+use crate::show::{self, Figure, Table};
+use crate::work;
+
+/// An identified model.
+#[pyclass(frozen, module = "abbe._abbe")]
+pub struct Model {
+    model: Arc<IdentifiedModel>,
+    /// Its file. Numbers of a model that is read are rounded by their units.
+    text: String,
+    origin: Origin,
+}
+
+impl Model {
+    /// A new model.
+    pub fn of(model: IdentifiedModel) -> Result<Model, Failed> {
+        Ok(Model { text: model.to_text()?, model: Arc::new(model), origin: Origin::default() })
+    }
+}
+
+/// Corrected positions in mm and degrees, what became of each, the remaining error in µm and arcsec.
+type Corrected<'py> =
+    (Bound<'py, PyArray2<f64>>, Vec<&'static str>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
+
+#[pymethods]
+impl Model {
+    #[staticmethod]
+    fn read(path: PathBuf) -> Result<Model, Failed> {
+        let text = files::text(&path, "the model file")?;
+        let model = Arc::new(model_file::read_text(&path, &text)?);
+        Ok(Model { model, text, origin: Origin::of_files(&[&path])? })
+    }
+
+    #[staticmethod]
+    fn from_text(text: &str) -> Result<Model, Failed> {
+        let model = Arc::new(model_file::read_text("model.json".as_ref(), text)?);
+        Ok(Model { model, text: text.to_string(), origin: Origin::default() })
+    }
+
+    fn text(&self) -> &str {
+        &self.text
+    }
+
+    #[getter]
+    fn machine(&self) -> Machine {
+        Machine { machine: Arc::new(self.model.machine.clone()) }
+    }
+
+    /// The names of the positions of the axes in a data file.
+    fn columns(&self) -> Vec<String> {
+        self.model.machine.axes.iter().map(|axis| axis.column("")).collect()
+    }
+
+    /// Identifier, value, standard uncertainty, unit and whether it is held at nominal, of each parameter.
+    fn parameters(&self) -> Vec<(String, f64, f64, String, bool)> {
+        let parameters = self.model.parameters.iter().enumerate();
+        let row = |(j, parameter): (usize, &model_file::ModelParameter)| {
+            let scale = parameter.unit.display_per_internal;
+            let name = parameter.unit.name.clone();
+            (parameter.id.clone(), parameter.value * scale, self.model.u(j) * scale, name, parameter.held)
+        };
+        parameters.map(row).collect()
+    }
+
+    fn validate(&self, py: Python<'_>, session: &Session) -> PyResult<Validation> {
+        let state = session.state();
+        let (model, own) = (Arc::clone(&self.model), Arc::clone(&state));
+        let validation = work::run(py, None, move |_| Ok(validate(&model, &own.session)?))?;
+        let mut origin = state.origin.clone();
+        origin.add(self.origin.clone());
+        Ok(Validation { state, origin, validation })
+    }
+
+    /// Corrected commands; `positions` has one column for each axis, mm or degrees.
+    fn correct<'py>(
+        &self,
+        py: Python<'py>,
+        positions: PyReadonlyArray2<'py, f64>,
+        tool_mm: Option<[f64; 3]>,
+        time_s: Option<PyReadonlyArray1<'py, f64>>,
+        temperature_c: Option<PyReadonlyArray1<'py, f64>>,
+    ) -> PyResult<Corrected<'py>> {
+        let commands = self.commands(&positions, time_s, temperature_c)?;
+        let corrected =
+            work::at_once(py, || Ok(self.correction(tool_mm, |correction| correction.correct(&commands))?))?;
+        let machine = &self.model.machine;
+        let display = corrected.iter().flat_map(|row| {
+            machine.axes.iter().zip(&row.positions).map(|(axis, position)| axis.kind.to_display(*position))
+        });
+        let display: Vec<f64> = display.collect();
+        let states = corrected.iter().map(|row| row.state.word()).collect();
+        let um: Vec<f64> = corrected.iter().map(|row| row.remaining_mm * 1e3).collect();
+        let arcsec: Vec<f64> = corrected.iter().map(|row| row.remaining_rad * ARCSEC).collect();
+        let positions = display.into_pyarray(py).reshape([corrected.len(), machine.axes.len()])?;
+        Ok((positions, states, um.into_pyarray(py), arcsec.into_pyarray(py)))
+    }
+
+    /// The errors of the tool's pose at commands: µm and arcsec, six for each row.
+    fn pose_errors<'py>(
+        &self,
+        py: Python<'py>,
+        positions: PyReadonlyArray2<'py, f64>,
+        tool_mm: Option<[f64; 3]>,
+        time_s: Option<PyReadonlyArray1<'py, f64>>,
+        temperature_c: Option<PyReadonlyArray1<'py, f64>>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let commands = self.commands(&positions, time_s, temperature_c)?;
+        let errors =
+            work::at_once(py, || Ok(self.correction(tool_mm, |correction| correction.pose_errors(&commands))?))?;
+        let display = errors
+            .iter()
+            .flat_map(|[x, y, z, a, b, c]| [x * 1e3, y * 1e3, z * 1e3, a * ARCSEC, b * ARCSEC, c * ARCSEC]);
+        display.collect::<Vec<f64>>().into_pyarray(py).reshape([errors.len(), 6])
+    }
+}
+
+impl Model {
+    /// Commands as readings without observed values.
+    fn commands(
+        &self,
+        positions: &PyReadonlyArray2<'_, f64>,
+        time_s: Option<PyReadonlyArray1<'_, f64>>,
+        temperature_c: Option<PyReadonlyArray1<'_, f64>>,
+    ) -> PyResult<Readings> {
+        let axes = &self.model.machine.axes;
+        let array = positions.as_array();
+        let (rows, columns) = array.dim();
+        if columns != axes.len() {
+            let names: Vec<String> = axes.iter().map(|axis| axis.column("")).collect();
+            let message = format!("`positions` has {columns} columns; {} are expected", axes.len());
+            return Err(Failed::argument(message, format!("in this order: {}", names.join(", "))).into());
+        }
+        let column = |(place, axis): (usize, &abbe::model::axis::Axis)| {
+            array.column(place).iter().map(|position| axis.kind.to_internal(*position)).collect::<Vec<f64>>()
+        };
+        let of_rows = |name: &str, values: Option<PyReadonlyArray1<'_, f64>>| {
+            let values = values.map_or(Ok(Vec::new()), |values| {
+                values.as_array().iter().copied().map(Ok).collect::<PyResult<Vec<f64>>>()
+            })?;
+            if values.is_empty() || values.len() == rows {
+                return Ok(values);
+            }
+            let message = format!("`{name}` has {} values, `positions` has {rows} rows", values.len());
+            Err::<_, PyErr>(Failed::argument(message, "one value for each row").into())
+        };
+        let temperature_c = temperature_c.map(|values| of_rows("temperature_c", Some(values))).transpose()?;
+        let temperature_c = temperature_c.map(|values| ("temperature_c".to_string(), values));
+        Ok(Readings {
+            positions: axes.iter().enumerate().map(column).collect(),
+            time_s: of_rows("time_s", time_s)?,
+            drivers: temperature_c.into_iter().collect(),
+            ..Readings::default()
+        })
+    }
+
+    fn correction<T>(&self, tool_mm: Option<[f64; 3]>, with: impl FnOnce(&Correction<'_>) -> T) -> T {
+        let machine = &self.model.machine;
+        let tool_mm = tool_mm.unwrap_or(self.model.tool_mm);
+        let errors = EstimatedErrors::of_model(&self.model, tool_mm, self.model.table_mm);
+        with(&Correction { machine, errors: &errors, tool_mm, aim: Aim::of(machine) })
+    }
+}
+
+/// A validated model.
+#[pyclass(frozen, module = "abbe._abbe")]
+pub struct Validation {
+    state: Arc<State>,
+    origin: Origin,
+    validation: validate::Validation,
+}
+
+#[pymethods]
+impl Validation {
+    fn json(&self, seed: u64) -> Result<String, Failed> {
+        Ok(Document::new(call("validate"), self.origin.clone(), Some(seed), &self.validation.result).text()?)
+    }
+
+    fn residuals_um<'py>(&self, py: Python<'py>, test: &str) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let number = self.validation.tests.iter().position(|known| known == test);
+        let number = number.ok_or_else(|| crate::session::no_test(&self.state, test))?;
+        let um: Vec<f64> = self.validation.residuals[number].iter().map(|mm| mm * 1e3).collect();
+        Ok(um.into_pyarray(py))
+    }
+
+    fn tables(&self) -> Vec<Table> {
+        let result = &self.validation.result;
+        let mut tables = vec![present::residuals(result)];
+        if !result.moved.is_empty() {
+            tables.push(present::moved(result));
+        }
+        if !result.without.is_empty() {
+            tables.push(present::without(result));
+        }
+        tables.into_iter().map(Table).collect()
+    }
+
+    fn figures(&self) -> Vec<Figure> {
+        show::figures(report::validate::document(&self.state.session, &self.validation))
+    }
+
+    fn page(&self, py: Python<'_>, seed: u64) -> PyResult<String> {
+        let read = (&self.state.session, &self.state.sources);
+        let document = report::validate::document(&self.state.session, &self.validation);
+        work::at_once(py, || show::page(&document, read, "abbe.Model.validate", seed))
+    }
+}

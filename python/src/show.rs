@@ -1,0 +1,121 @@
+//! Tables and figures of a result as the command prints them, and its report.
+
+use std::path::PathBuf;
+
+use abbe::model::files::SourceMap;
+use abbe::model::session::Session;
+use abbe::present::figure::svg;
+use abbe::present::report::document::Document;
+use abbe::present::report::page;
+use abbe::present::report::provenance::Provenance;
+use abbe::present::table::{self, Cell};
+use abbe::present::{csv, figure, html, terminal};
+use pyo3::IntoPyObjectExt;
+use pyo3::prelude::*;
+
+use crate::failed::Failed;
+
+/// A table.
+#[pyclass(frozen, module = "abbe._abbe")]
+pub struct Table(pub table::Table);
+
+#[pymethods]
+impl Table {
+    #[getter]
+    fn title(&self) -> &str {
+        &self.0.title
+    }
+
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.0.notes.clone()
+    }
+
+    /// The headings with the cells below each: numbers as numbers, with all digits.
+    fn columns<'py>(&self, py: Python<'py>) -> PyResult<Vec<(String, Vec<Bound<'py, PyAny>>)>> {
+        let cell = |cell: Option<&Cell>| match cell {
+            Some(Cell::Text(text)) => text.into_bound_py_any(py),
+            Some(Cell::Number(value, _)) => value.into_bound_py_any(py),
+            None => "".into_bound_py_any(py),
+        };
+        let column = |(place, column): (usize, &table::Column)| {
+            let cells = self.0.rows.iter().map(|row| cell(row.get(place)));
+            Ok((column.heading.clone(), cells.collect::<PyResult<_>>()?))
+        };
+        self.0.columns.iter().enumerate().map(column).collect()
+    }
+
+    fn html(&self) -> String {
+        html::table(&self.0).into_string()
+    }
+
+    fn text(&self) -> String {
+        let title = if self.0.title.is_empty() { String::new() } else { format!("{}:\n", self.0.title) };
+        title + &terminal::text(&self.0)
+    }
+
+    fn csv(&self) -> Result<Vec<u8>, Failed> {
+        Ok(csv::text(&self.0)?)
+    }
+}
+
+/// A figure of a report.
+#[pyclass(frozen, module = "abbe._abbe")]
+pub struct Figure(figure::Figure);
+
+#[pymethods]
+impl Figure {
+    #[getter]
+    fn name(&self) -> &str {
+        &self.0.name
+    }
+
+    #[getter]
+    fn title(&self) -> &str {
+        &self.0.title
+    }
+
+    #[getter]
+    fn caption(&self) -> &str {
+        &self.0.caption
+    }
+
+    /// The kind of chart.
+    #[getter]
+    fn kind(&self) -> &'static str {
+        match self.0.chart {
+            figure::Chart::Lines(_) => "lines",
+            figure::Chart::Values(_) => "values",
+            figure::Chart::Bars(_) => "bars",
+            figure::Chart::Matrix(_) => "matrix",
+            figure::Chart::Polar(_) | figure::Chart::Panels(_) => "polar",
+            figure::Chart::Chain(_) => "chain",
+            figure::Chart::SetUps(_) => "set-ups",
+        }
+    }
+
+    fn table(&self) -> Table {
+        Table(self.0.table())
+    }
+
+    fn svg(&self) -> String {
+        svg::file(&self.0)
+    }
+}
+
+/// The figures of a report.
+pub fn figures(document: Document) -> Vec<Figure> {
+    document.figures.into_iter().map(Figure).collect()
+}
+
+/// The page of a report; `call` is what was called in Python.
+///
+/// # Errors
+/// If a file of the session has changed since it was read.
+pub fn page(document: &Document, read: (&Session, &SourceMap), call: &str, seed: u64) -> Result<String, Failed> {
+    let changed = |(path, cause): (PathBuf, String)| {
+        Failed::new(format!("{}: cannot be read again for its checksum in the report: {cause}", path.display()))
+    };
+    let provenance = Provenance { command: call.to_string(), ..Provenance::of(read, seed).map_err(changed)? };
+    Ok(page::html(document, &provenance)?)
+}

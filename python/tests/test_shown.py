@@ -1,0 +1,66 @@
+"""Tables, figures, and the exchange with other packages."""
+
+import numpy as np
+import pytest
+
+import abbe
+
+
+@pytest.fixture(scope="module")
+def results():
+    from conftest import MEASURED, PLANS, SESSIONS
+
+    session = abbe.Session.read(SESSIONS / MEASURED[0])
+    fit, trace = session.fit(), session.trace(only=["EZC"], max_effects=1)
+    plan = abbe.Session.read(SESSIONS / PLANS[1]).plan(effects=False)
+    return [fit, trace, plan, trace.model().validate(session)]
+
+
+def test_tables(results):
+    pandas, polars, pyarrow = map(pytest.importorskip, ("pandas", "polars", "pyarrow"))
+    for result in results:
+        assert "<table>" in result._repr_html_() and str(result)
+        table = result.table
+        frame = table.to_pandas()
+        assert isinstance(frame, pandas.DataFrame) and len(frame) == len(table) > 0
+        assert pyarrow.table(table).num_rows == len(table)
+        assert polars.DataFrame(table).height == len(table)
+    estimates = results[0].table.to_pandas().set_index("parameter")
+    assert estimates.loc["EX0C", "value"] == results[0]["EX0C"].value
+    rows = results[0].residual_table().to_pandas()
+    assert len(rows) == sum(results[0].residuals[test].shape[0] for test in results[0].residuals)
+
+
+def test_figures(results):
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("agg")
+    import matplotlib.pyplot as plt
+
+    for result in results:
+        assert result.figures
+        for figure in {figure._handle.kind: figure for figure in result.figures}.values():
+            assert figure._repr_html_().startswith("<figure>") and "<svg" in figure.svg()
+            axes = figure.plot()
+            assert axes.get_title() == figure.title
+            axes.figure.canvas.draw()
+            plt.close(axes.figure)
+        assert result.plot(result.figures[0].name).get_title() == result.figures[0].title
+        plt.close("all")
+    with pytest.raises(KeyError, match="no figure"):
+        results[0].plot("nothing")
+
+
+def test_reports(results, tmp_path):
+    for number, result in enumerate(results):
+        result.report(tmp_path / f"{number}.html")
+        assert (tmp_path / f"{number}.html").read_text().rstrip().endswith("</html>")
+    assert len(list(tmp_path.iterdir())) == len(results)
+
+
+def test_matrices(results):
+    fit = results[0]
+    covariance = np.asarray(fit.covariance)
+    assert covariance.shape == (len(fit.parameters),) * 2
+    assert np.asarray(fit.null_space).shape[1:] in ((0,), (len(fit.null_space.ids),), ())
+    plan = results[2]
+    assert plan.uncertainty.shape == plan.identifiable.shape == (len(plan.ids),)

@@ -1,0 +1,162 @@
+//! Results as JSON documents: the result of a command with its inputs and options, so that a program can repeat the
+//! command and check what it reads.
+
+use std::path::Path;
+
+use abbe_identify::model_file::{InputFile, Provenance};
+use abbe_model::files::SourceMap;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use crate::present::report::provenance::{self, Input};
+
+/// Version of the schemas of all documents.
+pub const SCHEMA_VERSION: u32 = 2;
+
+impl From<Input> for InputFile {
+    fn from(input: Input) -> InputFile {
+        InputFile { file: input.path, sha256: Some(input.sha256) }
+    }
+}
+
+/// What was called: the command and its options.
+#[derive(Clone, Debug, Default)]
+pub struct Call {
+    /// The command: `fit`, `trace`, `plan`, …
+    pub command: String,
+    /// The options, by their long names with `_`: `true` for a flag, a number, a string, or an array of them for a
+    /// repeated option.
+    pub options: Map<String, Value>,
+}
+
+/// The session file and the files that it names.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct SessionFile {
+    /// Path of the session file.
+    file: String,
+    /// SHA-256 of the session file, in hexadecimal; `null` for a pipe.
+    sha256: Option<String>,
+    /// All files that were read: session, machine and data files, also of further sessions.
+    inputs: Vec<InputFile>,
+}
+
+/// The files from which a result follows.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Origin {
+    session: Option<SessionFile>,
+    inputs: Vec<InputFile>,
+}
+
+impl Origin {
+    /// The files of a session.
+    ///
+    /// # Errors
+    /// If a file has changed since it was read, in words.
+    pub fn of_session(sources: &SourceMap) -> Result<Origin, String> {
+        let mut inputs = Vec::with_capacity(sources.files.len());
+        for stamp in &sources.files {
+            inputs.push(if stamp.is_regular() {
+                provenance::stamped(stamp).map_err(|fault| unreadable(&stamp.file, &fault))?.into()
+            } else {
+                InputFile { file: stamp.file.display().to_string(), sha256: None }
+            });
+        }
+        let file = sources.file.display().to_string();
+        let own = inputs.iter().find(|input| input.file == file);
+        Ok(Origin {
+            session: Some(SessionFile { sha256: own.and_then(|input| input.sha256.clone()), file, inputs }),
+            inputs: Vec::new(),
+        })
+    }
+
+    /// Files that belong to no session.
+    ///
+    /// # Errors
+    /// If a file cannot be read again, in words.
+    pub fn of_files(files: &[&Path]) -> Result<Origin, String> {
+        let inputs = files.iter().map(|file| {
+            provenance::input(file.to_path_buf())
+                .map(InputFile::from)
+                .map_err(|fault| unreadable(file, &fault.to_string()))
+        });
+        Ok(Origin { session: None, inputs: inputs.collect::<Result<_, _>>()? })
+    }
+
+    /// Adds the files of a further session.
+    pub fn add(&mut self, other: Origin) {
+        match (&mut self.session, other.session) {
+            (Some(session), Some(other)) => session.inputs.extend(other.inputs),
+            (session @ None, Some(other)) => *session = Some(other),
+            (_, None) => self.inputs.extend(other.inputs),
+        }
+    }
+
+    /// Where a model comes from: a call and these files.
+    pub fn provenance(&self, call: Call, seed: u64) -> Provenance {
+        Provenance {
+            tool_version: env!("CARGO_PKG_VERSION").to_string(),
+            command: call.command,
+            options: call.options,
+            seed,
+            inputs: self.session.iter().flat_map(|session| session.inputs.clone()).collect(),
+            session: self.session.as_ref().map_or(String::new(), |session| session.file.clone()),
+        }
+    }
+}
+
+fn unreadable(file: &Path, fault: &str) -> String {
+    format!("{}: cannot be read again for its checksum in the JSON document: {fault}", file.display())
+}
+
+/// The document of a command: what it was, and its result.
+#[derive(Serialize, JsonSchema)]
+pub struct Document<'r, T> {
+    /// Version of this schema.
+    #[schemars(extend("const" = SCHEMA_VERSION))]
+    schema_version: u32,
+    /// Version of the program.
+    tool_version: String,
+    /// The command: `fit`, `trace`, `plan`, …
+    command: String,
+    /// The session, with checksums of all files that were read.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    session: Option<SessionFile>,
+    /// The input files beside those of a session.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    inputs: Vec<InputFile>,
+    /// Seed of all random numbers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seed: Option<u64>,
+    /// The options on the command line, by their long names: `true` for a flag, a number, a string, or an array of them
+    /// for a repeated option.
+    options: Map<String, Value>,
+    /// The result.
+    #[serde(flatten)]
+    result: &'r T,
+}
+
+impl<'r, T: Serialize> Document<'r, T> {
+    /// The document of a call with its result.
+    pub fn new(call: Call, origin: Origin, seed: Option<u64>, result: &'r T) -> Self {
+        Document {
+            schema_version: SCHEMA_VERSION,
+            tool_version: env!("CARGO_PKG_VERSION").to_string(),
+            command: call.command,
+            session: origin.session,
+            inputs: origin.inputs,
+            seed,
+            options: call.options,
+            result,
+        }
+    }
+
+    /// The document as text.
+    ///
+    /// # Errors
+    /// If the result is no JSON, in words.
+    pub fn text(&self) -> Result<String, String> {
+        let text = serde_json::to_string_pretty(self);
+        text.map(|text| text + "\n").map_err(|error| format!("the result cannot be written as JSON: {error}"))
+    }
+}

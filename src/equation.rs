@@ -1,0 +1,111 @@
+//! The parameters of an equation by their names.
+
+use abbe_codegen::Variable;
+use abbe_model::chain::Machine;
+use abbe_model::component::ErrorName;
+use abbe_model::effect::{Component, Effect};
+use abbe_model::instrument::InstrumentParameter;
+use abbe_model::pattern;
+use abbe_model::session::{Session, Test};
+
+/// The parameters of an equation; all others are zero.
+#[derive(Clone, Debug, Default)]
+pub struct EquationParameters {
+    /// Errors of axes.
+    pub errors: Vec<ErrorName>,
+    /// Parameters of the instrument, by their indices in its list.
+    pub instrument: Vec<usize>,
+    /// Declared effects.
+    pub effects: Vec<Effect>,
+}
+
+impl EquationParameters {
+    /// The parameters of the readings of a test by their names; without names, the errors and declared effects of the
+    /// session.
+    ///
+    /// # Errors
+    /// As [`EquationParameters::parse`].
+    pub fn of_test(session: &Session, test: &Test, names: &[String]) -> Result<EquationParameters, String> {
+        let effects: Vec<Effect> =
+            session.effects.iter().filter(|effect| effect.acts_in(&test.name)).cloned().collect();
+        if names.is_empty() {
+            return Ok(EquationParameters {
+                errors: session.unknowns.clone(),
+                effects,
+                ..EquationParameters::default()
+            });
+        }
+        EquationParameters::parse(names, &session.machine, session.instrument.unknowns(), &effects)
+    }
+
+    /// Reads names and patterns of errors, parameters of the instrument and effects.
+    ///
+    /// # Errors
+    /// If a name is no parameter of such an equation, in words.
+    pub fn parse(
+        names: &[String],
+        machine: &Machine,
+        of_instrument: &[InstrumentParameter],
+        effects: &[Effect],
+    ) -> Result<EquationParameters, String> {
+        let mut parameters = EquationParameters::default();
+        for name in names {
+            if pattern::is_pattern(name) {
+                let found = pattern::matching(machine, name);
+                if found.is_empty() {
+                    return Err(format!(
+                        "`{name}` matches no error of the machine; `?` stands for one character, `*` for any number of them"
+                    ));
+                }
+                for error in found {
+                    if !parameters.errors.contains(&error) {
+                        parameters.errors.push(error);
+                    }
+                }
+                continue;
+            }
+            if name.contains('~') {
+                parameters.effects.extend(named(name, effects)?);
+                continue;
+            }
+            match Component::parse(name) {
+                Some(Component::Axis(error)) => parameters.errors.push(error),
+                Some(Component::Instrument { thing, coordinate }) => {
+                    let place = of_instrument.iter().position(|u| u.thing == thing && u.coordinate == coordinate);
+                    let name_of = |u: &InstrumentParameter| Variable::Instrument(*u).name();
+                    parameters.instrument.push(place.ok_or_else(|| {
+                        let has = match of_instrument {
+                            [] => "an error vector has no parameters of an instrument".to_string(),
+                            some => format!(
+                                "this instrument has {}",
+                                some.iter().map(name_of).collect::<Vec<_>>().join(", ")
+                            ),
+                        };
+                        format!("`{name}` is a parameter of another instrument; {has}")
+                    })?);
+                }
+                Some(Component::TriggerDelay | Component::Reading(_)) | None => {
+                    return Err(format!(
+                        "`{name}` is no parameter of an equation; errors have names of ISO 230-1, as EX0C or EZC, or of the literature, as e_x0c"
+                    ));
+                }
+            }
+        }
+        Ok(parameters)
+    }
+}
+
+/// The declared effects with a name such as `EZC~C:h2`. Effects that differ only in the numbers of their shapes share a
+/// name.
+fn named(name: &str, effects: &[Effect]) -> Result<Vec<Effect>, String> {
+    let found: Vec<Effect> = effects.iter().filter(|effect| effect.id() == name).cloned().collect();
+    if found.is_empty() {
+        let declared: Vec<String> = effects.iter().map(Effect::id).collect();
+        let has = match declared.as_slice() {
+            [] => "no declared effect acts here".to_string(),
+            declared => format!("declared here: {}", declared.join(", ")),
+        };
+        return Err(format!("no effect is called `{name}`; {has}"));
+    }
+    Ok(found)
+}
