@@ -143,7 +143,7 @@ pub fn run(arguments: &PaperArguments, quiet: bool) -> Result<(), Failure> {
         let names: Vec<&str> = sections.iter().map(|section| section.name).collect();
         say!("{}: {} in {}", arguments.out.display(), counted(files.len(), "file"), counted(names.len(), "section"));
         say!("  {}", names.join(", "));
-        say!("typeset: pdflatex main, bibtex main, pdflatex main (twice); or typst compile main.typ");
+        say!("typeset: pdflatex main, bibtex main, pdflatex main (three times); or typst compile main.typ");
     }
     Ok(())
 }
@@ -256,7 +256,7 @@ fn readme(
     text.push_str(
         "\nEach table is there for LaTeX, Typst and as CSV. Each figure is there as PDF, as SVG, and its data as CSV, which \
          pgfplots reads: `\\addplot table [col sep=comma] {figures/NAME.csv};`.\n\n## Typeset\n\n```sh\npdflatex main && \
-         bibtex main && pdflatex main && pdflatex main\ntypst compile main.typ\n```\n\n## Files that were read\n\n",
+         bibtex main && pdflatex main && pdflatex main && pdflatex main\ntypst compile main.typ\n```\n\n## Files that were read\n\n",
     );
     Ok(text + &inputs)
 }

@@ -18,6 +18,7 @@ const COMMANDS: [(&str, &str); 12] = [
     ("abbe fit and abbe trace --save", "model"),
     ("abbe plan", "plan"),
     ("abbe plan --improve, --separate or --range", "next-test"),
+    ("abbe plan --global", "global"),
     ("abbe plan --patterns", "patterns"),
     ("abbe simulate", "simulate"),
     ("abbe volumetric --map", "map"),

@@ -53,6 +53,7 @@ fn latex_complaints(folder: &Path) -> Vec<String> {
     run("pdflatex", &once);
     run("bibtex", &["main"]);
     run("pdflatex", &once);
+    run("pdflatex", &once);
     run("pdflatex", &["-interaction=nonstopmode", "-halt-on-error", "main"]);
     let complains = |line: &&str| ["Warning", "Overfull"].iter().any(|word| line.contains(word));
     let logs = ["main.log", "main.blg"].map(|name| std::fs::read(folder.join(name)).unwrap());
