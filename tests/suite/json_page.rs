@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 use super::{abbe, workspace};
 
 /// The commands, and the subject of `abbe schema` for each.
-const COMMANDS: [(&str, &str); 12] = [
+const COMMANDS: [(&str, &str); 13] = [
     ("abbe fit", "fit"),
     ("abbe fit --repeat", "repeat"),
     ("abbe fit --method circle, cone or two-plane", "geometric"),

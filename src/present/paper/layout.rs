@@ -128,19 +128,34 @@ fn wrapped(table: &Table, natural: &[f64], columns: &[usize], limit: f64, min_sh
     if total <= limit {
         return Some(columns.iter().map(|column| (*column, None)).collect());
     }
-    let wraps = |column: usize| table.columns[column].align == Align::Left && natural[column] > MIN_WRAPPED;
-    let of_words: f64 = columns.iter().filter(|column| wraps(**column)).map(|column| natural[*column]).sum();
+    let least = |column: usize| {
+        let cells = table.rows.iter().filter_map(|row| row.get(column)).map(ToString::to_string);
+        cells.map(|cell| longest_word_pt(&cell)).fold(MIN_WRAPPED, f64::max)
+    };
+    let wrapping: Vec<(usize, f64)> = columns
+        .iter()
+        .filter(|column| table.columns[**column].align == Align::Left)
+        .map(|column| (*column, least(*column)))
+        .filter(|(column, least)| natural[*column] > *least)
+        .collect();
+    let of_words: f64 = wrapping.iter().map(|(column, _)| natural[*column]).sum();
+    let at_least: f64 = wrapping.iter().map(|(_, least)| least).sum();
     let room = limit - (total - of_words);
-    let share = room / of_words.max(1.0);
-    let count = columns.iter().filter(|column| wraps(**column)).count();
-    if count == 0 || share < min_share || room < MIN_WRAPPED * count as f64 {
+    if wrapping.is_empty() || room / of_words < min_share || room < at_least {
         return None;
     }
-    // Columns at their least width leave less for the others.
-    let spare = room - MIN_WRAPPED * count as f64;
-    let above = of_words - MIN_WRAPPED * count as f64;
-    let width = |column: usize| MIN_WRAPPED + (natural[column] - MIN_WRAPPED) * spare / above.max(1.0);
-    Some(columns.iter().map(|column| (*column, wraps(*column).then(|| width(*column)))).collect())
+    // What is above the least widths is shared in proportion.
+    let share = (room - at_least) / (of_words - at_least);
+    let width = |column: usize| {
+        let (_, least) = wrapping.iter().find(|(wrapped, _)| *wrapped == column)?;
+        Some(least + (natural[column] - least) * share)
+    };
+    Some(columns.iter().map(|column| (*column, width(*column))).collect())
+}
+
+/// Estimated width of the longest part of a text within which no line breaks.
+fn longest_word_pt(text: &str) -> f64 {
+    text.split_inclusive([' ', '_']).map(|word| width_pt(word.trim_end())).fold(0.0, f64::max)
 }
 
 /// Groups of columns that fit a page, each with the first column in front.
