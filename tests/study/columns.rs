@@ -99,7 +99,7 @@ fn a_temperature_collinear_with_time_is_an_alias_of_time() {
             .any(|names| names.iter().any(follows_spindle) && names.iter().any(|name| name.driver == "time"));
         both.count(hit);
         if verbose() {
-            let found: Vec<String> = outcome.result.effects.iter().flat_map(|e| names(e)).map(|n| short(&n)).collect();
+            let found: Vec<String> = outcome.result.effects.iter().flat_map(names).map(|n| short(&n)).collect();
             println!("{} {found:?}", summary(outcome, if hit { "ok" } else { "MISS" }));
         }
     }
