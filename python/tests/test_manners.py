@@ -31,7 +31,7 @@ def test_interrupts_end_a_trace():
             # The module works on.
             print("interrupted, rank", session.plan(effects=False).rank, flush=True)
     """)
-    for delay in (0.02, 0.3, 1.0):
+    for delay in (0.02, 0.1, 0.3):
         with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as child:
             assert child.stdout.readline() == "ready\n"
             time.sleep(delay)

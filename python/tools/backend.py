@@ -18,7 +18,6 @@ from maturin import (
     get_requires_for_build_editable,
     get_requires_for_build_sdist,
     get_requires_for_build_wheel,
-    prepare_metadata_for_build_wheel,
 )
 
 __all__ = [
@@ -35,6 +34,13 @@ HERE = Path(__file__).resolve().parent.parent
 PROFILE = os.environ.get("ABBE_PROFILE", "release")
 
 
+def data_folder() -> Path:
+    """The folder of the command. Maturin asks for it even where it only states metadata."""
+    folder = HERE / "data"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
 def prepare() -> None:
     """Builds the command, and puts it and the classes of results where maturin takes them."""
     # Both packages are named, so that the crates of the command have the features that they have in the module, and are
@@ -49,8 +55,8 @@ def prepare() -> None:
         )
     lines = map(json.loads, built.stdout.splitlines())
     binaries = [line["executable"] for line in lines if line.get("executable")]
-    scripts = HERE / "data" / "scripts"
-    scripts.mkdir(parents=True, exist_ok=True)
+    scripts = data_folder() / "scripts"
+    scripts.mkdir(exist_ok=True)
     (binary,) = (Path(path) for path in binaries if Path(path).stem == "abbe")
     command = shutil.copy2(binary, scripts / binary.name)
     if shutil.which("strip"):
@@ -64,6 +70,12 @@ def with_profile(settings):
     arguments = given.get("build-args", "")
     given["build-args"] = f"{arguments} --profile {PROFILE}".strip()
     return given
+
+
+def prepare_metadata_for_build_wheel(metadata_directory, config_settings=None):
+    """States the metadata of the wheel."""
+    data_folder()
+    return maturin.prepare_metadata_for_build_wheel(metadata_directory, config_settings)
 
 
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
@@ -80,4 +92,5 @@ def build_editable(wheel_directory, config_settings=None, metadata_directory=Non
 
 def build_sdist(sdist_directory, config_settings=None):
     """Builds the archive of sources, with the crates of the workspace."""
+    data_folder()
     return maturin.build_sdist(sdist_directory, config_settings)
