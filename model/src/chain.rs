@@ -12,6 +12,7 @@
 //! in the same order, and ω0 the squareness errors `(EA0k, EB0k, EC0k)` of a linear axis.
 
 use crate::axis::{Axis, AxisKind};
+use crate::body::Body;
 use crate::code::StructuralCode;
 use crate::component::{ErrorKind, ErrorName};
 use crate::error::ModelError;
@@ -34,6 +35,8 @@ pub struct Machine {
     pub rotation: Rotation,
     /// Direction of gravity in R, a unit vector.
     pub gravity: [f64; 3],
+    /// Bodies that can collide.
+    pub bodies: Vec<Body>,
 }
 
 /// Position of an axis; for a rotary axis with its sine and cosine, computed once.
@@ -106,6 +109,7 @@ impl Machine {
             axes,
             rotation: Rotation::Exact,
             gravity: [0.0, 0.0, -1.0],
+            bodies: Vec::new(),
         })
     }
 

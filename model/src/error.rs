@@ -23,6 +23,13 @@ impl Location {
     pub fn line(file: &std::path::Path, line: usize) -> Location {
         Location { line, ..Location::file(file) }
     }
+
+    /// The column, from 1, in the content of the file: characters from the start of the line.
+    pub fn column(&self, contents: &[u8]) -> Option<usize> {
+        let before = contents.get(..self.span.as_ref()?.start)?;
+        let line = before.rsplit(|byte| *byte == b'\n').next().unwrap_or(before);
+        Some(String::from_utf8_lossy(line).chars().count() + 1)
+    }
 }
 
 impl std::fmt::Display for Location {

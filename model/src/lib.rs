@@ -61,6 +61,7 @@
 //! ```
 
 pub mod axis;
+pub mod body;
 pub mod chain;
 pub mod code;
 pub mod component;

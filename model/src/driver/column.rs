@@ -140,8 +140,8 @@ impl DriverKind for Column<'_> {
             None => Cow::Borrowed(input.readings.drivers.get(self.0)?),
             Some(tau_s) => Cow::Owned(input.reference.lagged(self.0, input.readings, tau_s)?),
         };
-        let zero = input.reference.zero_of(self.0);
-        Some(values.iter().map(|value| DriverSample::plain(value - zero, 0.0)).collect())
+        let counted = |value: &f64| DriverSample::plain(input.reference.counted(self.0, *value), 0.0);
+        Some(values.iter().map(counted).collect())
     }
     fn phrase(&self) -> String {
         format!("the {}", self.words())

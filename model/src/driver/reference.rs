@@ -2,7 +2,7 @@
 //!
 //! An effect that follows a column q through a first-order lag follows the solution of `τ dy/dt + y = q`. Between
 //! recorded values q is linear in time, so that each step of y is exact: with a = Δt/τ and f = (1 − e⁻ᵃ)/a,
-//! `y₁ = e⁻ᵃ y₀ + (f − e⁻ᵃ) q₀ + (1 − f) q₁`. At the first recorded value y = q: the equilibrium.
+//! `y₁ − q₁ = e⁻ᵃ (y₀ − q₀) + f (q₀ − q₁)`. At the first recorded value y = q: the equilibrium.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -22,6 +22,22 @@ pub struct Reference {
     recordings: Arc<Vec<Recording>>,
 }
 
+/// Values that differ by less than this share of themselves are equal but for rounding.
+const ROUNDING: f64 = 16.0 * f64::EPSILON;
+
+/// The sum of a column, counted from its first value, so that the mean of equal values is that value exactly.
+struct Deviations {
+    first: f64,
+    sum: f64,
+    count: usize,
+}
+
+impl Deviations {
+    fn mean(&self) -> f64 {
+        self.first + self.sum / self.count as f64
+    }
+}
+
 /// The driver columns of the tests that one file holds.
 #[derive(Debug)]
 struct Recording {
@@ -36,15 +52,16 @@ impl Reference {
     /// The reference values of a session, from the readings of its tests.
     pub fn of<'a>(readings: impl Iterator<Item = &'a Readings> + Clone) -> Reference {
         let first = readings.clone().flat_map(|r| r.time_s.first().copied()).fold(f64::INFINITY, f64::min);
-        let mut sums: BTreeMap<String, (f64, usize)> = BTreeMap::new();
+        let mut columns: BTreeMap<String, Deviations> = BTreeMap::new();
         for (name, values) in readings.clone().flat_map(|r| &r.drivers) {
-            let (sum, count) = sums.entry(name.clone()).or_default();
-            *sum += values.iter().sum::<f64>();
-            *count += values.len();
+            let Some(first) = values.first() else { continue };
+            let of_column = columns.entry(name.clone()).or_insert(Deviations { first: *first, sum: 0.0, count: 0 });
+            of_column.sum += values.iter().map(|value| value - of_column.first).sum::<f64>();
+            of_column.count += values.len();
         }
         Reference {
             time_s: if first.is_finite() { first } else { 0.0 },
-            means: sums.into_iter().map(|(name, (sum, count))| (name, sum / count.max(1) as f64)).collect(),
+            means: columns.into_iter().map(|(name, column)| (name, column.mean())).collect(),
             recordings: Arc::new(recordings(readings)),
         }
     }
@@ -54,10 +71,15 @@ impl Reference {
         Reference { time_s, means, recordings: Arc::default() }
     }
 
-    /// The value of a column from which an effect counts: the mean for units whose zero is a convention, else 0.
-    pub fn zero_of(&self, column: &str) -> f64 {
+    /// A value of a column as an effect counts it: from the mean for units whose zero is a convention, else from 0.
+    /// A difference that is no more than the rounding of the value is 0, so that a constant column determines nothing.
+    pub fn counted(&self, column: &str, value: f64) -> f64 {
+        if !column::counts_from_mean(column) {
+            return value;
+        }
         let mean = self.means.get(column).copied().unwrap_or(0.0);
-        if column::counts_from_mean(column) { mean } else { 0.0 }
+        let difference = value - mean;
+        if difference.abs() <= ROUNDING * mean.abs() { 0.0 } else { difference }
     }
 
     /// A column of some readings after a first-order lag of time constant τ. It starts at the first value that the
@@ -75,17 +97,15 @@ impl Reference {
         let mut points: Vec<(f64, f64, Option<usize>)> = before.chain(own).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (mut time_s, mut value, _) = *points.first()?;
-        let mut response = value;
+        let mut behind = 0.0;
         let mut lagged = vec![0.0; values.len()];
         for (next_s, next, row) in points {
             let elapsed = (next_s - time_s) / tau_s;
-            if elapsed > 0.0 {
-                let (decay, mean_decay) = ((-elapsed).exp(), -(-elapsed).exp_m1() / elapsed);
-                response = decay * response + (mean_decay - decay) * value + (1.0 - mean_decay) * next;
-            }
+            let mean_decay = if elapsed > 0.0 { -(-elapsed).exp_m1() / elapsed } else { 1.0 };
+            behind = (-elapsed).exp() * behind + mean_decay * (value - next);
             (time_s, value) = (next_s, next);
             if let Some(row) = row {
-                lagged[row] = response;
+                lagged[row] = next + behind;
             }
         }
         Some(lagged)

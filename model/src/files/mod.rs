@@ -3,6 +3,7 @@
 //! - [`toml`]: machine and session files; [`table`]: data files, one module per data format;
 //! - [`with_readings()`]: a copy of a session with other readings;
 //! - [`template`]: files of a new machine from its structural code;
+//! - [`store`]: files on the disk or in memory;
 //! - [`SourceMap`]: the files and texts of a session that was read;
 //! - [`schema`]: JSON Schema of machine and session files; [`stamp`]: state of the files that were read.
 
@@ -12,6 +13,7 @@ pub mod schema;
 pub mod source_map;
 mod spelling;
 pub mod stamp;
+pub mod store;
 pub mod table;
 pub mod template;
 pub mod toml;

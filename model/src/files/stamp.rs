@@ -1,9 +1,8 @@
 //! State of input files when they were read, so that a result refers to exactly these inputs.
 
-use std::fs::{File, Metadata};
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
 
+use super::store::{FileState, OpenFile, Store};
 use crate::error::{Location, ModelError};
 
 /// The state of a file when it was opened.
@@ -11,30 +10,32 @@ use crate::error::{Location, ModelError};
 pub struct FileStamp {
     /// The file as named by the user or a session.
     pub file: PathBuf,
-    bytes: u64,
-    modified: Option<SystemTime>,
-    regular: bool,
+    state: FileState,
+    store: Store,
 }
 
 impl FileStamp {
-    pub(crate) fn of(file: &Path, found: &Metadata) -> FileStamp {
-        FileStamp {
-            file: file.to_path_buf(),
-            bytes: found.len(),
-            modified: found.modified().ok(),
-            regular: found.is_file(),
-        }
+    pub(crate) fn of(file: &Path, state: FileState, store: &Store) -> FileStamp {
+        FileStamp { file: file.to_path_buf(), state, store: store.clone() }
+    }
+
+    /// The content of the file.
+    ///
+    /// # Errors
+    /// If it cannot be read.
+    pub fn read(&self) -> std::io::Result<Vec<u8>> {
+        self.store.read(&self.file)
     }
 
     /// Whether it is a regular file, not a pipe or a device whose bytes can be read only once.
     pub fn is_regular(&self) -> bool {
-        self.regular
+        self.state.regular
     }
 
     /// Returns an error if the open file has changed since it was opened.
-    pub(crate) fn check(&self, opened: &File) -> Result<(), ModelError> {
-        match opened.metadata() {
-            Ok(found) if FileStamp::of(&self.file, &found) == *self || !self.regular => Ok(()),
+    pub(crate) fn check(&self, opened: &OpenFile) -> Result<(), ModelError> {
+        match opened.state() {
+            Ok(found) if found == self.state || !self.state.regular => Ok(()),
             _ => Err(ModelError::Input {
                 location: Location::file(&self.file),
                 message: "the file changed while it was read".into(),
@@ -45,10 +46,10 @@ impl FileStamp {
 
     /// A description of the change if the file has changed since it was read.
     pub fn changed(&self) -> Option<String> {
-        match std::fs::metadata(&self.file) {
-            _ if !self.regular => Some("it is a pipe or a device, which can be read only once".into()),
+        match self.store.state(&self.file) {
+            _ if !self.state.regular => Some("it is a pipe or a device, which can be read only once".into()),
             Err(cause) => Some(format!("it no longer exists: {cause}")),
-            Ok(found) if FileStamp::of(&self.file, &found) == *self => None,
+            Ok(found) if found == self.state => None,
             Ok(_) => Some("it has changed since it was read".into()),
         }
     }

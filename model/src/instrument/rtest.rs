@@ -366,6 +366,7 @@ mod tests {
             workpiece_side: 0,
             rotation: Rotation::Exact,
             gravity: [0.0, 0.0, -1.0],
+            bodies: Vec::new(),
         };
         let [x, y, z] = [0.03, -0.05, 0.07];
         let vectors =

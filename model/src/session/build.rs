@@ -58,6 +58,8 @@ impl Session {
             effects: Vec::new(),
             tests: Vec::new(),
             socket_distances: Vec::new(),
+            tolerance: None,
+            clearance: None,
             warnings: Vec::new(),
             about: Vec::new(),
         }

@@ -15,10 +15,12 @@ pub(crate) mod plausibility;
 pub mod readings;
 mod runs;
 pub(crate) mod setups;
+pub mod tolerance;
 pub(crate) mod trajectory;
 
 use std::sync::Arc;
 
+use crate::body::ClearanceSizes;
 use crate::chain::Machine;
 use crate::component::ErrorName;
 use crate::driver::Reference;
@@ -26,6 +28,7 @@ use crate::effect::Effect;
 use crate::instrument::{Entry, InstrumentKind, SharedBy, Station};
 use expression::Constant;
 use readings::Readings;
+use tolerance::Tolerance;
 
 /// A validated session. Lengths in mm, angles in rad.
 #[derive(Clone, Debug)]
@@ -48,6 +51,10 @@ pub struct Session {
     pub tests: Vec<Test>,
     /// Known distances between sockets.
     pub socket_distances: Vec<SocketDistance>,
+    /// Limits of the results, for a decision of conformity.
+    pub tolerance: Option<Tolerance>,
+    /// Sizes of the instrument for checks of clearance.
+    pub clearance: Option<ClearanceSizes>,
     /// Warnings about a usable session.
     pub warnings: Vec<String>,
     /// Notes of `[about]` on the measurement, by name in the order of the file: `serial_number`, `operator`, `date`,

@@ -65,6 +65,20 @@ fn a_lagged_ramp_has_its_closed_form() {
     }
 }
 
+/// A constant column is exactly 0 in every state, so that rank sees that it determines nothing. Values that differ by
+/// their last digit only are constant.
+#[test]
+fn a_constant_column_determines_nothing() {
+    let next = |value: f64| f64::from_bits(value.to_bits() + 1);
+    for stated in [[21.7; 4], [21.7, next(21.7), 21.7, next(next(21.7))], [0.1; 4], [-3e5 / 7.0; 4]] {
+        let read = session(MACHINE, SESSION, Some(&with_column("driver.spindle_c", stated))).unwrap();
+        let driver = Driver::parse("spindle_c");
+        for lag_s in [None, Some(0.3), Some(7.0), Some(1e4)] {
+            assert_eq!(values(&read, &driver, lag_s), [0.0; 4], "{stated:?} {lag_s:?}");
+        }
+    }
+}
+
 /// The history of a column continues from one file to the next, with the column linear between.
 #[test]
 fn a_lag_continues_from_test_to_test() {

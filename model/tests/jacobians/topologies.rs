@@ -73,6 +73,7 @@ pub fn robot() -> Machine {
         workpiece_side: 0,
         rotation: Rotation::Exact,
         gravity: [0.0, 0.0, -1.0],
+        bodies: Vec::new(),
     }
 }
 

@@ -152,8 +152,14 @@ pub fn machines() -> impl Strategy<Value = Drawn> {
             errors.extend(slots.map(|(slot, size)| size * if is_angle(slot) { 2e-3 } else { 0.1 }));
             machine.push(axis);
         }
-        let machine =
-            Machine { name: "drawn".into(), axes: machine, workpiece_side, rotation, gravity: [0.0, 0.0, -1.0] };
+        let machine = Machine {
+            name: "drawn".into(),
+            axes: machine,
+            workpiece_side,
+            rotation,
+            gravity: [0.0, 0.0, -1.0],
+            bodies: Vec::new(),
+        };
         Drawn { machine, positions, errors }
     })
 }

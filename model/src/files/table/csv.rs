@@ -25,7 +25,7 @@ impl DataFormat for Csv {
     }
 
     fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, ModelError> {
-        let lines = Lines::open(file, &request.format)?;
+        let lines = Lines::open(request.store, file, &request.format)?;
         Ok(Content::Table(Table {
             stamp: lines.stamp().clone(),
             has_header: request.format.header,

@@ -1,6 +1,5 @@
 //! Lines of a text file, read one at a time within the limits of a data file.
 
-use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -11,6 +10,7 @@ use super::encoding;
 use super::request::Format;
 use crate::error::{Location, ModelError};
 use crate::files::stamp::FileStamp;
+use crate::files::store::{OpenFile, Store};
 
 /// Largest length of one line, bytes.
 const LONGEST_LINE: u64 = 1 << 20;
@@ -49,7 +49,7 @@ pub(super) struct Lines {
     encoding: Option<&'static Encoding>,
     /// Number of lines of the file still to be skipped.
     skip: usize,
-    reader: BufReader<File>,
+    reader: BufReader<OpenFile>,
     stamp: FileStamp,
     limits: Limits,
     line: usize,
@@ -60,34 +60,34 @@ pub(super) struct Lines {
 
 impl Lines {
     /// Opens a file.
-    pub fn open(file: &Path, format: &Format) -> Result<Lines, ModelError> {
-        Self::within(file, format, LIMITS)
+    pub fn open(store: &Store, file: &Path, format: &Format) -> Result<Lines, ModelError> {
+        Self::within(store, file, format, LIMITS)
     }
 
     /// Opens a file with other limits.
-    pub fn within(file: &Path, format: &Format, limits: Limits) -> Result<Lines, ModelError> {
+    pub fn within(store: &Store, file: &Path, format: &Format, limits: Limits) -> Result<Lines, ModelError> {
         let fault = |message: String, help: &str| ModelError::Input {
             location: Location::file(file),
             message,
             help: Some(help.into()),
         };
-        let opened = File::open(file).and_then(|opened| {
-            let found = opened.metadata()?;
-            if found.is_dir() {
+        let opened = store.open(file).and_then(|opened| {
+            let found = opened.state()?;
+            if found.folder {
                 return Err(std::io::Error::other("it is a folder"));
             }
             Ok((opened, found))
         });
         let (opened, found) = opened
             .map_err(|cause| fault(format!("the data file cannot be read: {cause}"), "check `data` and the file"))?;
-        if found.len() > limits.bytes {
-            return Err(fault(format!("a data file of {} bytes; the limit is {}", found.len(), limits.bytes), SPLIT));
+        if found.bytes > limits.bytes {
+            return Err(fault(format!("a data file of {} bytes; the limit is {}", found.bytes, limits.bytes), SPLIT));
         }
         Ok(Lines {
             file: file.to_path_buf(),
             encoding: format.encoding,
             skip: format.skip_lines,
-            stamp: FileStamp::of(file, &found),
+            stamp: FileStamp::of(file, found, store),
             limits,
             reader: BufReader::with_capacity(1 << 16, opened),
             line: 0,

@@ -4,6 +4,7 @@ use encoding_rs::Encoding;
 
 use crate::chain::Machine;
 use crate::error::Location;
+use crate::files::store::Store;
 use crate::instrument::InstrumentKind;
 use crate::session::{Test, motion};
 
@@ -66,6 +67,8 @@ pub(crate) struct Request<'a> {
     pub machine: &'a Machine,
     /// The test, without its readings.
     pub test: &'a Test,
+    /// Where its file lies.
+    pub store: &'a Store,
     /// Which positions in [`Test::at`] the session states.
     pub at_listed: &'a [bool],
     /// The layout of the rows.

@@ -3,12 +3,11 @@
 //! The first row that is not empty is the header; a row whose first cell begins with `#` is a comment. The display
 //! format of a cell is ignored: a number is read with all its digits, a formula by its last value.
 
-use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{Cursor, Read};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-use calamine::{Data, Reader, Sheets, XlsxError, open_workbook_auto};
+use calamine::{Data, Error, Ods, Reader, Sheets, Xls, Xlsb, Xlsx, XlsxError, open_workbook_from_rs};
 use zip::ZipArchive;
 
 use super::format::{Content, DataFormat, Rows, Table, has_extension};
@@ -16,6 +15,7 @@ use super::request::{Format, Request};
 use super::row::Row;
 use crate::error::{Location, ModelError};
 use crate::files::stamp::FileStamp;
+use crate::files::store::Store;
 
 /// The format, recognised by the extension of the file.
 pub(super) struct Spreadsheet;
@@ -26,7 +26,7 @@ impl DataFormat for Spreadsheet {
     }
 
     fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, ModelError> {
-        let (stamp, rows) = rows(file, &request.format)?;
+        let (stamp, rows) = rows(request.store, file, &request.format)?;
         Ok(Content::Table(Table {
             stamp,
             has_header: request.format.header,
@@ -54,33 +54,36 @@ const MAX_COLUMNS: u32 = 1000;
 const MAX_CELLS: usize = 20_000_000;
 
 /// The rows of a sheet, and the state of the file.
-fn rows(file: &Path, format: &Format) -> Result<(FileStamp, Vec<Row>), ModelError> {
+fn rows(store: &Store, file: &Path, format: &Format) -> Result<(FileStamp, Vec<Row>), ModelError> {
     let fault =
         |message: String, help: String| ModelError::Input { location: Location::file(file), message, help: Some(help) };
-    let broken = |cause: calamine::Error| {
+    let broken = |cause: Error| {
         fault(
             format!("the spreadsheet cannot be read: {cause}"),
             "check that it opens in a spreadsheet program, or export it as CSV".into(),
         )
     };
-    let found = std::fs::metadata(file).map_err(|cause| broken(cause.into()))?;
-    if !found.is_file() {
+    let found = store.state(file).map_err(|cause| broken(cause.into()))?;
+    if !found.regular {
         return Err(broken(std::io::Error::other("it is not a file").into()));
     }
-    if found.len() > MAX_BYTES {
+    if found.bytes > MAX_BYTES {
         return Err(fault(
-            format!("a spreadsheet of {} bytes; the limit is {MAX_BYTES}", found.len()),
+            format!("a spreadsheet of {} bytes; the limit is {MAX_BYTES}", found.bytes),
             "export it as CSV".into(),
         ));
     }
-    if unpacks_beyond(file, MAX_UNPACKED) {
+    let mut contents = Vec::new();
+    let opened = store.open(file).map_err(|cause| broken(cause.into()))?;
+    opened.take(MAX_BYTES).read_to_end(&mut contents).map_err(|cause| broken(cause.into()))?;
+    if unpacks_beyond(&contents, MAX_UNPACKED) {
         return Err(fault(
             format!("a spreadsheet that unpacks to more than {MAX_UNPACKED} bytes, which is the limit"),
             "export it as CSV".into(),
         ));
     }
-    let stamp = FileStamp::of(file, &found);
-    let mut book = catch_panic(|| open_workbook_auto(file)).map_err(broken)?;
+    let stamp = FileStamp::of(file, found, store);
+    let mut book = catch_panic(|| workbook(file, contents)).map_err(broken)?;
     let names = book.sheet_names();
     let sheets_to_read: Vec<String> = match &format.sheet {
         Some(name) if names.contains(name) => vec![name.clone()],
@@ -112,12 +115,28 @@ fn rows(file: &Path, format: &Format) -> Result<(FileStamp, Vec<Row>), ModelErro
     }
 }
 
+/// A spreadsheet in memory.
+type Book = Sheets<Cursor<Vec<u8>>>;
+
+/// The spreadsheet of a file, in the format that its extension states.
+fn workbook(file: &Path, contents: Vec<u8>) -> Result<Book, Error> {
+    let contents = Cursor::new(contents);
+    Ok(if has_extension(file, &["xls"]) {
+        Sheets::Xls(open_workbook_from_rs::<Xls<_>, _>(contents)?)
+    } else if has_extension(file, &["xlsb"]) {
+        Sheets::Xlsb(open_workbook_from_rs::<Xlsb<_>, _>(contents)?)
+    } else if has_extension(file, &["ods"]) {
+        Sheets::Ods(open_workbook_from_rs::<Ods<_>, _>(contents)?)
+    } else {
+        Sheets::Xlsx(open_workbook_from_rs::<Xlsx<_>, _>(contents)?)
+    })
+}
+
 /// Whether the parts of a ZIP file unpack to more than this number of bytes. The sizes stated in the file are not
 /// trusted.
-fn unpacks_beyond(file: &Path, most: u64) -> bool {
-    let archive = File::open(file).ok().and_then(|opened| ZipArchive::new(opened).ok());
+fn unpacks_beyond(contents: &[u8], most: u64) -> bool {
     // A file that is not ZIP is not packed.
-    let Some(mut archive) = archive else { return false };
+    let Ok(mut archive) = ZipArchive::new(Cursor::new(contents)) else { return false };
     let mut left = most;
     for part in 0..archive.len() {
         let Ok(part) = archive.by_index(part) else {
@@ -134,7 +153,7 @@ fn unpacks_beyond(file: &Path, most: u64) -> bool {
 
 /// Calls the library. It may panic on a contradictory file (a row number beyond 32 bits, in builds with overflow
 /// checks); the panic becomes an ordinary error.
-fn catch_panic<T>(read: impl FnOnce() -> Result<T, calamine::Error>) -> Result<T, calamine::Error> {
+fn catch_panic<T>(read: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
     let contradicts = || std::io::Error::other("its content is contradictory").into();
     catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(|_| Err(contradicts()))
 }
@@ -146,7 +165,7 @@ type PlacedCell = (u32, u32, Data);
 ///
 /// Cells that the file lists one by one are read one by one: the rectangle around two cells in opposite corners would
 /// not fit in memory.
-fn cells(book: &mut Sheets<BufReader<File>>, name: &str) -> Result<Vec<PlacedCell>, calamine::Error> {
+fn cells(book: &mut Book, name: &str) -> Result<Vec<PlacedCell>, Error> {
     let mut cells = Vec::new();
     match book {
         Sheets::Xlsx(book) => {

@@ -24,10 +24,9 @@ pub(super) fn check(session: &Path, options: &ReadOptions, named: &Value<'_>, fo
     }
     let folders = std::iter::once(folder(session)).chain(options.data_directory.as_deref());
     // A path that cannot be resolved (a pipe in /proc) lies in no folder.
-    let real: Option<PathBuf> = found.canonicalize().ok();
-    let inside = real.as_ref().is_some_and(|real| {
-        folders.filter_map(|folder| folder.canonicalize().ok()).any(|folder| real.starts_with(folder))
-    });
+    let canonical = |path: &Path| options.store.canonical(path).ok();
+    let real: Option<PathBuf> = canonical(found);
+    let inside = real.as_ref().is_some_and(|real| folders.filter_map(canonical).any(|folder| real.starts_with(folder)));
     if inside {
         return Ok(());
     }

@@ -4,7 +4,6 @@
 mod value;
 
 use std::borrow::Cow;
-use std::fs::File;
 use std::io::Read;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -14,6 +13,7 @@ use toml::de::DeTable;
 use crate::error::{Location, ModelError};
 use crate::files::spelling::known_names;
 use crate::files::stamp::FileStamp;
+use crate::files::store::Store;
 pub(crate) use value::Value;
 
 /// Largest size of a machine or session file, bytes.
@@ -38,13 +38,13 @@ pub(crate) struct Source {
 
 impl Source {
     /// Reads a text file; `what` names its content in messages.
-    pub fn read(file: &Path, what: &str) -> Result<Source, ModelError> {
+    pub fn read(store: &Store, file: &Path, what: &str) -> Result<Source, ModelError> {
         let fault = |message: String, help: &str| ModelError::Input {
             location: Location::file(file),
             message,
             help: Some(help.to_string()),
         };
-        if file.is_dir() {
+        if store.state(file).is_ok_and(|found| found.folder) {
             return Err(fault(format!("this is a folder; {what} must be a file"), "name the .toml file in it"));
         }
         let unreadable = |cause: std::io::Error| {
@@ -52,11 +52,11 @@ impl Source {
                 "check the name; a relative name starts from the file that contains it, or from the working directory";
             fault(format!("{what} cannot be read: {cause}"), help)
         };
-        let opened = File::open(file).map_err(unreadable)?;
-        let stamp = FileStamp::of(file, &opened.metadata().map_err(unreadable)?);
+        let mut opened = store.open(file).map_err(unreadable)?;
+        let stamp = FileStamp::of(file, opened.state().map_err(unreadable)?, store);
         let mut bytes = Vec::new();
         // The length of a pipe is unknown in advance.
-        (&opened).take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+        opened.by_ref().take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
         if bytes.len() as u64 > MAX_BYTES {
             return Err(fault(
                 format!("{what} has more than {MAX_BYTES} bytes, which is the limit"),

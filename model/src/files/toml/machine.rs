@@ -2,12 +2,13 @@
 
 use std::path::Path;
 
-use super::quantity;
+use super::{body, quantity};
 use crate::axis::{Axis, AxisKind};
 use crate::chain::Machine;
 use crate::code::StructuralCode;
 use crate::error::ModelError;
 use crate::files::spelling::known_names;
+use crate::files::store::Store;
 use crate::files::toml::document::{Source, Table};
 use crate::frames::Rotation;
 
@@ -16,12 +17,12 @@ use crate::frames::Rotation;
 /// # Errors
 /// If the file cannot be read or does not describe a machine, with its line and what to do.
 pub fn machine(path: &Path) -> Result<Machine, ModelError> {
-    from_table(source(path)?.parse()?)
+    from_table(source(&Store::Disk, path)?.parse()?)
 }
 
 /// The text of a machine file.
-pub(super) fn source(path: &Path) -> Result<Source, ModelError> {
-    Source::read(path, "the machine file")
+pub(super) fn source(store: &Store, path: &Path) -> Result<Source, ModelError> {
+    Source::read(store, path, "the machine file")
 }
 
 /// A machine from the tables `name`, `chain`, `[axis.…]`.
@@ -74,8 +75,11 @@ pub(super) fn from_table(mut table: Table<'_>) -> Result<Machine, ModelError> {
         let (_, table) = tables.remove(index);
         axes.push(axis(name, table)?);
     }
+    let mut machine =
+        Machine { name, workpiece_side: code.workpiece_side.len(), axes, rotation, gravity, bodies: Vec::new() };
+    machine.bodies = body::bodies(&machine, &mut table)?;
     table.finish()?;
-    Ok(Machine { name, workpiece_side: code.workpiece_side.len(), axes, rotation, gravity })
+    Ok(machine)
 }
 
 fn axis(name: &str, mut table: Table<'_>) -> Result<Axis, ModelError> {

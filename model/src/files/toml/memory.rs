@@ -22,7 +22,9 @@
 use std::path::Path;
 
 use super::document::{Source, Table};
-use super::{Context, Declared, Found, ReadOptions, driver_columns, effect, head, machine, sockets, test};
+use super::{
+    Context, Declared, Found, ReadOptions, body, driver_columns, effect, head, machine, sockets, test, tolerance,
+};
 use crate::error::ModelError;
 use crate::files::table::memory::MemoryColumn;
 use crate::files::table::request::Format;
@@ -72,7 +74,7 @@ fn add_tables(
 ) -> Result<(), ModelError> {
     let options = ReadOptions { read_data: columns.is_some(), ..ReadOptions::default() };
     let mut found = Found::default();
-    let (tests, effects, distances) = {
+    let (tests, effects, distances, tolerance, clearance) = {
         let context = Context {
             file: Path::new(""),
             machine: &session.machine,
@@ -100,11 +102,15 @@ fn add_tables(
         let effects = effects.into_iter().map(|item| effect::effect(&context, &declared, &columns, item));
         let effects = effects.collect::<Result<Vec<_>, _>>()?;
         let distances = sockets::socket_distances(session.instrument, &tests, root, options.read_data)?;
-        (tests, effects, distances)
+        let names: Vec<&str> = tests.iter().map(|test| test.name.as_str()).collect();
+        let tolerance = tolerance::tolerance(&session.machine, &session.unknowns, &names, root)?;
+        (tests, effects, distances, tolerance, body::clearance(root)?)
     };
     session.tests = tests;
     session.effects.extend(effects);
     session.socket_distances.extend(distances);
+    session.clearance = clearance.or(session.clearance);
+    session.tolerance = tolerance.or(session.tolerance.take());
     session.warnings.extend(found.warnings);
     Ok(())
 }

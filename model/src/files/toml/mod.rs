@@ -1,5 +1,6 @@
 //! Reader of machine and session files.
 
+mod body;
 mod constants;
 mod data_folder;
 pub(crate) mod document;
@@ -16,8 +17,10 @@ mod shape;
 mod sockets;
 mod station;
 mod test;
+mod tolerance;
 mod unknowns;
 pub mod write;
+pub mod write_test;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -27,6 +30,7 @@ pub use machine::machine;
 use super::quantity::{self, MICROMETRE};
 use super::source_map::SourceMap;
 use super::stamp::FileStamp;
+use super::store::Store;
 use super::table::memory::MemoryColumn;
 use super::table::request::{ColumnMapping, Format};
 use crate::chain::Machine;
@@ -47,12 +51,14 @@ pub struct ReadOptions {
     pub read_data: bool,
     /// Whether the session may read files outside its own folder, the folders below and the data directory.
     pub allow_outside: bool,
+    /// Where the session, its machine and its data lie.
+    pub store: Store,
 }
 
 impl Default for ReadOptions {
     /// Data are read, from the session's folder and below.
     fn default() -> Self {
-        ReadOptions { data_directory: None, read_data: true, allow_outside: false }
+        ReadOptions { data_directory: None, read_data: true, allow_outside: false, store: Store::Disk }
     }
 }
 
@@ -117,7 +123,7 @@ impl Context<'_> {
 /// # Errors
 /// If the file cannot be read or is not such a text, with its name and what to do.
 pub fn text(path: &Path, what: &str) -> Result<String, ModelError> {
-    Ok(Source::read(path, what)?.text)
+    Ok(Source::read(&Store::Disk, path, what)?.text)
 }
 
 /// Reads a session file, its machine and, if requested, its data.
@@ -133,7 +139,7 @@ pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError
 /// # Errors
 /// As [`session`].
 pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Session, SourceMap), ModelError> {
-    let source = Source::read(path, "the session file")?;
+    let source = Source::read(&options.store, path, "the session file")?;
     let mut root = source.parse()?;
     let SessionMachine { machine, source: machine_source } = session_machine(path, options, &mut root)?;
     let head = head(machine, &mut root)?;
@@ -170,6 +176,9 @@ pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Sessi
             .collect::<Result<Vec<_>, _>>()?,
         None => Vec::new(),
     };
+    let names: Vec<&str> = tests.iter().map(|test| test.name.as_str()).collect();
+    let tolerance = tolerance::tolerance(&head.machine, &head.unknowns, &names, &mut root)?;
+    let clearance = body::clearance(&mut root)?;
     let socket_distances = sockets::socket_distances(head.instrument, &tests, &mut root, options.read_data)?;
     root.finish()?;
     let mut files: Vec<FileStamp> = Vec::new();
@@ -185,7 +194,7 @@ pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Sessi
         machine_text: machine_source.map(|source| source.text),
         files,
     };
-    let session = Session { effects, tests, socket_distances, warnings: found.warnings, ..head };
+    let session = Session { effects, tests, socket_distances, tolerance, clearance, warnings: found.warnings, ..head };
     Ok((session, sources))
 }
 
@@ -236,13 +245,13 @@ fn session_machine(path: &Path, options: &ReadOptions, root: &mut Table<'_>) -> 
     };
     let named = file.text()?;
     let found = path.parent().unwrap_or(Path::new("")).join(&named);
-    if !found.exists() {
+    if !options.store.exists(&found) {
         let message = format!("the machine file `{named}` does not exist; looked for {}", found.display());
         return Err(file.error(message, Some("its name is relative to the session file".into())));
     }
     data_folder::check(path, options, &file, &found)?;
     table.finish()?;
-    let source = machine::source(&found)?;
+    let source = machine::source(&options.store, &found)?;
     Ok(SessionMachine { machine: machine::from_table(source.parse()?)?, source: Some(source) })
 }
 

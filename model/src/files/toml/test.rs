@@ -100,6 +100,7 @@ pub(super) fn tests(
     let request = Request {
         machine: context.machine,
         test: &test,
+        store: &context.options.store,
         at_listed: &listed,
         format,
         // An empty table maps no column: the file has the default names.
@@ -180,7 +181,7 @@ fn data_file(context: &Context<'_>, data: &Value<'_>) -> Result<PathBuf, ModelEr
     let named = data.text()?;
     let beside = context.file.parent().unwrap_or(Path::new("")).join(&named);
     let elsewhere = context.options.data_directory.as_ref().map(|folder| folder.join(&named));
-    if let Some(found) = elsewhere.iter().chain([&beside]).find(|file| file.exists()) {
+    if let Some(found) = elsewhere.iter().chain([&beside]).find(|file| context.options.store.exists(file)) {
         data_folder::check(context.file, context.options, data, found)?;
         return Ok(found.clone());
     }

@@ -30,13 +30,19 @@ use crate::error::ModelError;
 /// # Ok::<(), abbe_model::ModelError>(())
 /// ```
 pub fn with_effects(original: &str, effects: &[Effect], machine: &Machine) -> String {
+    with_blocks(original, effects.iter().map(|effect| effect_table(effect, machine)))
+}
+
+/// A session's text with additional blocks, such as `[[test]]`, at its end; the existing text and its comments are
+/// unchanged.
+pub fn with_blocks(original: &str, blocks: impl IntoIterator<Item = String>) -> String {
     let mut text = original.to_string();
     if !text.is_empty() && !text.ends_with('\n') {
         text.push('\n');
     }
-    for effect in effects {
+    for block in blocks {
         text.push('\n');
-        text.push_str(&effect_table(effect, machine));
+        text.push_str(&block);
     }
     text
 }

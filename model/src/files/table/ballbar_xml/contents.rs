@@ -1,7 +1,6 @@
 //! Content of a ball-bar file in XML: its runs, its plane, and the names of all other elements.
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
@@ -12,6 +11,7 @@ use quick_xml::events::{BytesStart, Event};
 use super::super::encoding;
 use crate::error::{Location, ModelError};
 use crate::files::stamp::FileStamp;
+use crate::files::store::Store;
 
 /// Largest file size, bytes.
 const MAX_BYTES: u64 = 64 << 20;
@@ -50,17 +50,17 @@ struct OpenElement {
 }
 
 /// The state of a file and its text.
-fn decoded(file: &Path, stated: Option<&'static Encoding>) -> Result<(FileStamp, String), ModelError> {
+fn decoded(store: &Store, file: &Path, stated: Option<&'static Encoding>) -> Result<(FileStamp, String), ModelError> {
     let fault = |message: String| ModelError::Input {
         location: Location::file(file),
         message,
         help: Some("check `data` and the file".into()),
     };
     let unreadable = |cause: std::io::Error| fault(format!("the data file cannot be read: {cause}"));
-    let opened = File::open(file).map_err(unreadable)?;
-    let stamp = FileStamp::of(file, &opened.metadata().map_err(unreadable)?);
+    let mut opened = store.open(file).map_err(unreadable)?;
+    let stamp = FileStamp::of(file, opened.state().map_err(unreadable)?, store);
     let mut bytes = Vec::new();
-    (&opened).take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    opened.by_ref().take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
     if bytes.len() as u64 > MAX_BYTES {
         return Err(fault(format!("more than {MAX_BYTES} bytes, the limit of a ball-bar file in XML")));
     }
@@ -76,8 +76,12 @@ fn decoded(file: &Path, stated: Option<&'static Encoding>) -> Result<(FileStamp,
 ///
 /// # Errors
 /// If it is not XML.
-pub(super) fn parse(file: &Path, encoding: Option<&'static Encoding>) -> Result<(FileStamp, Contents), ModelError> {
-    let (stamp, text) = decoded(file, encoding)?;
+pub(super) fn parse(
+    store: &Store,
+    file: &Path,
+    encoding: Option<&'static Encoding>,
+) -> Result<(FileStamp, Contents), ModelError> {
+    let (stamp, text) = decoded(store, file, encoding)?;
     let mut reader = Reader::from_str(&text);
     let mut contents = Contents::default();
     let mut open: Vec<OpenElement> = Vec::new();

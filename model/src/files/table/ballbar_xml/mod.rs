@@ -44,7 +44,7 @@ impl DataFormat for BallBarXml {
 fn read(file: &Path, request: &Request<'_>) -> Result<WholeReadings, ModelError> {
     let test = request.test;
     let role = value_role(file, request)?;
-    let (stamp, contents) = contents::parse(file, request.format.encoding)?;
+    let (stamp, contents) = contents::parse(request.store, file, request.format.encoding)?;
     let fault = |line: usize, message: String, help: String| ModelError::Input {
         location: if line == 0 { Location::file(file) } else { Location::line(file, line) },
         message,

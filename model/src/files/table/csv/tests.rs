@@ -4,9 +4,10 @@ use super::super::encoding;
 use super::super::lines::{LIMITS, Limits};
 use super::super::request::Format;
 use super::*;
+use crate::files::store::Store;
 
 fn opened(file: &Path, format: &Format, limits: Limits) -> Result<CsvRows, ModelError> {
-    let lines = Lines::within(file, format, limits)?;
+    let lines = Lines::within(&Store::Disk, file, format, limits)?;
     Ok(CsvRows::new(lines, format.separator))
 }
 
