@@ -81,14 +81,23 @@ pub fn control(word: &str) -> Result<&'static dyn Control, CodegenError> {
 /// A file of a program: its name and its text.
 pub type NcFile = (String, String);
 
+/// The programs of a session.
+#[derive(Clone, Debug)]
+pub struct NcFiles {
+    /// `main`, then the programs of the tests in their order.
+    pub files: Vec<NcFile>,
+    /// What the programs remark about their tests, each with the name of the test.
+    pub warnings: Vec<String>,
+}
+
 /// The programs of every test of a session, and `main`, which calls them.
 ///
 /// # Errors
 /// If a test has no motion, an axis has no letter, an axis would leave its travel, or the control lacks what the
 /// options ask for.
-pub fn files(session: &Session, control: &dyn Control, options: &NcOptions) -> Result<Vec<NcFile>, CodegenError> {
+pub fn files(session: &Session, control: &dyn Control, options: &NcOptions) -> Result<NcFiles, CodegenError> {
     options.check(control)?;
-    let mut files = Vec::new();
+    let (mut files, mut warnings) = (Vec::new(), Vec::new());
     let mut calls: Vec<(String, String)> = Vec::new();
     let mut seen: Vec<&str> = Vec::new();
     for (number, test) in session.tests.iter().enumerate() {
@@ -96,6 +105,7 @@ pub fn files(session: &Session, control: &dyn Control, options: &NcOptions) -> R
         let centred = seen.contains(&test.setup.as_str());
         seen.push(&test.setup);
         let program = Program::of(session, test, control, options, centred)?;
+        warnings.extend(program.warnings.iter().map(|warning| format!("test \"{}\": {warning}", test.name)));
         let mut name = control.name(number + 1, &test.name);
         if name == "main" || calls.iter().any(|(other, _)| *other == name) {
             name = format!("{name}{}", number + 1);
@@ -107,5 +117,5 @@ pub fn files(session: &Session, control: &dyn Control, options: &NcOptions) -> R
         calls.push((name, test.name.clone()));
     }
     files.insert(0, (format!("main.{}", control.extension()), control.main(&calls)));
-    Ok(files)
+    Ok(NcFiles { files, warnings })
 }

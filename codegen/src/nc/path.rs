@@ -29,6 +29,8 @@ pub(super) struct Path {
     pub both_directions: bool,
     /// What the operator must know of it.
     pub remarks: Vec<String>,
+    /// Where it is less than is usual.
+    pub warnings: Vec<String>,
 }
 
 /// A part of the path, through states of all axes in mm and rad.
@@ -69,8 +71,8 @@ impl Path {
                 });
             }
         };
-        let mut remarks = Vec::new();
-        let ends = overshot(machine, test, range, options, &mut remarks)?;
+        let (mut remarks, mut warnings) = (Vec::new(), Vec::new());
+        let ends = overshot(machine, test, range, options, &mut warnings)?;
         let [from, to] = range;
         let mut legs = Vec::new();
         for (range, measured) in [([ends[0], from], false), ([from, to], true), ([to, ends[1]], false)] {
@@ -81,7 +83,7 @@ impl Path {
         if legs.iter().any(|leg| matches!(leg.shape, Shape::Segments { .. })) {
             remarks.push(format!("Segments with a chord error of at most {} um", options.chord_error_mm * 1e3));
         }
-        Ok(Path { legs, runs, both_directions, remarks })
+        Ok(Path { legs, runs, both_directions, remarks, warnings })
     }
 
     /// The first state, with overshoot.
@@ -126,7 +128,7 @@ fn overshot(
     test: &Test,
     [from, to]: [f64; 2],
     options: &NcOptions,
-    remarks: &mut Vec<String>,
+    warnings: &mut Vec<String>,
 ) -> Result<[f64; 2], CodegenError> {
     let sign = (to - from).signum();
     let driven = match &test.motion {
@@ -153,7 +155,7 @@ fn overshot(
     let range = if states(machine, test, less, 64).is_ok() { less } else { [from, to] };
     states(machine, test, range, 64)?;
     let [before, after] = [(from - range[0]).abs().to_degrees(), (range[1] - to).abs().to_degrees()];
-    remarks.push(format!(
+    warnings.push(format!(
         "Overshoot {before:.3} deg before and {after:.3} deg after the measured path: the travel ends there"
     ));
     Ok(range)

@@ -22,6 +22,8 @@ pub struct Program {
     pub title: Vec<String>,
     /// Its blocks.
     pub blocks: Vec<Block>,
+    /// What the operator must know before it runs; the remarks of the program say the same.
+    pub warnings: Vec<String>,
 }
 
 impl Program {
@@ -39,22 +41,22 @@ impl Program {
         let machine = &*session.machine;
         let writer = Writer { machine, test, letters: letters(machine)?, options };
         let path = Path::of(machine, test, control, options)?;
-        let mut blocks = Vec::new();
-        writer.approach(&path, centred, &mut blocks)?;
+        let (mut blocks, mut warnings) = (Vec::new(), path.warnings.clone());
+        writer.approach(&path, centred, &mut blocks, &mut warnings);
         let start = path.start().to_vec();
         writer.traversals(&path, &mut blocks);
-        writer.retreat(&path, &start, &mut blocks)?;
+        writer.retreat(&path, &start, &mut blocks, &mut warnings);
         let kind = session.instrument.word();
         let mut title = vec![
             format!("{}: test {} ({kind})", machine.name, test.name),
             "Positions are those of the axes in the session. The active work offset".into(),
             "and tool length must give them. This program changes neither.".into(),
         ];
-        title.extend(path.remarks.iter().cloned());
+        title.extend(path.warnings.iter().chain(&path.remarks).cloned());
         if !control.is_run() {
             title.push(format!("This form has not been run on a control. Syntax: {}", control.source()));
         }
-        Ok(Program { name: test.name.clone(), title, blocks })
+        Ok(Program { name: test.name.clone(), title, blocks, warnings })
     }
 }
 
@@ -149,7 +151,7 @@ impl Writer<'_> {
     }
 
     /// To the start of the path, by way of the centre of the workpiece ball if it has no place yet.
-    fn approach(&self, path: &Path, centred: bool, blocks: &mut Vec<Block>) -> Result<(), CodegenError> {
+    fn approach(&self, path: &Path, centred: bool, blocks: &mut Vec<Block>, warnings: &mut Vec<String>) {
         let start = path.start();
         let ball_bar = matches!(self.test.station, Station::BallBar(_));
         blocks.push(Block::Stop(
@@ -171,10 +173,11 @@ impl Writer<'_> {
             self.line(self.moved(&centre, &above, AxisKind::Linear), blocks);
             here = Some(above);
         } else if ball_bar && !centred {
-            blocks.push(Block::Comment(format!(
+            let warning = format!(
                 "The centre of the workpiece ball, setup {}, cannot be reached: place it by measurement",
                 self.test.setup
-            )));
+            );
+            warn(warning, blocks, warnings);
         }
         let first = self.fed_in(start).filter(|_| ball_bar).unwrap_or_else(|| start.to_vec());
         if let Some(above) = self.retracted(&first) {
@@ -188,7 +191,7 @@ impl Writer<'_> {
             );
             self.line(self.moved(&above, &first, AxisKind::Linear), blocks);
         } else {
-            blocks.push(Block::Comment("The start cannot be approached along the tool within the travel".into()));
+            warn("The start cannot be approached along the tool within the travel".into(), blocks, warnings);
             self.line(self.all(&first, AxisKind::Linear), blocks);
         }
         let mount = match self.test.station.kind() {
@@ -200,7 +203,6 @@ impl Writer<'_> {
             blocks.push(Block::Comment("Feed-in".into()));
             self.line(self.moved(&first, start, AxisKind::Linear), blocks);
         }
-        Ok(())
     }
 
     fn traversals(&self, path: &Path, blocks: &mut Vec<Block>) {
@@ -231,7 +233,7 @@ impl Writer<'_> {
     }
 
     /// From where the traversals end: feed-out, and away along the tool.
-    fn retreat(&self, path: &Path, start: &[f64], blocks: &mut Vec<Block>) -> Result<(), CodegenError> {
+    fn retreat(&self, path: &Path, start: &[f64], blocks: &mut Vec<Block>, warnings: &mut Vec<String>) {
         let end = if path.both_directions { start } else { path.end() };
         let ball_bar = matches!(self.test.station, Station::BallBar(_));
         let last = self.fed_in(end).filter(|_| ball_bar).unwrap_or_else(|| end.to_vec());
@@ -242,8 +244,15 @@ impl Writer<'_> {
         blocks.push(Block::Stop("Stop recording. Take the instrument off, and hold it".into()));
         match self.retracted(&last) {
             Some(above) => self.line(self.moved(&last, &above, AxisKind::Linear), blocks),
-            None => blocks.push(Block::Comment("Retreat along the tool by hand".into())),
+            None => {
+                warn("Retreat along the tool by hand: the travel ends before the clearance".into(), blocks, warnings)
+            }
         }
-        Ok(())
     }
+}
+
+/// A remark of the program, which is also told to whoever writes it.
+fn warn(text: String, blocks: &mut Vec<Block>, warnings: &mut Vec<String>) {
+    warnings.push(text.clone());
+    blocks.push(Block::Comment(text));
 }

@@ -153,7 +153,7 @@ fn the_interpreter_of_linuxcnc_keeps_the_bar() {
     let place = folder("linuxcnc");
     for plan in plans(&place) {
         let session = session(&plan);
-        let files = nc::files(&session, nc::control("linuxcnc").unwrap(), &NcOptions::default()).unwrap();
+        let files = nc::files(&session, nc::control("linuxcnc").unwrap(), &NcOptions::default()).unwrap().files;
         for (name, text) in &files {
             std::fs::write(place.join(name), text).unwrap();
         }
@@ -177,7 +177,7 @@ fn the_other_controls_get_the_same_motion() {
     for plan in plans(&place) {
         let session = session(&plan);
         for control in nc::CONTROLS {
-            let files = nc::files(&session, control, &NcOptions::default()).unwrap();
+            let files = nc::files(&session, control, &NcOptions::default()).unwrap().files;
             assert_eq!(files.len(), session.tests.len() + 1);
             assert_eq!(files[0].0, format!("main.{}", control.extension()));
             for ((name, text), test) in files[1..].iter().zip(&session.tests) {
@@ -199,7 +199,7 @@ fn programs_as_they_are_printed() {
     let session = session(&circles(&place));
     for control in nc::CONTROLS {
         let options = NcOptions { overshoot_deg: Some(5.0), chord_error_mm: 0.01, ..NcOptions::default() };
-        let files = nc::files(&session, control, &options).unwrap();
+        let files = nc::files(&session, control, &options).unwrap().files;
         let text = format!("{}\n{}", files[0].1, files[2].1);
         let mut settings = insta::Settings::clone_current();
         settings.set_snapshot_path("../../../snapshots");
@@ -229,7 +229,7 @@ fn what_cannot_be_a_program_is_refused() {
     short.machine = std::sync::Arc::new(machine);
     refused(&short, "siemens", NcOptions { overshoot_deg: Some(90.0), ..usual }, "its travel is");
     // Without a stated overshoot the travel limits it, and the program says so.
-    let files = nc::files(&short, nc::control("siemens").unwrap(), &usual).unwrap();
+    let files = nc::files(&short, nc::control("siemens").unwrap(), &usual).unwrap().files;
     assert!(files[4].1.contains("Overshoot 5.730 deg before and 0.000 deg after"), "{}", files[4].1);
     let mut none = session;
     none.tests[0].motion = None;
@@ -249,7 +249,7 @@ fn the_tool_point_stays_over_its_place_of_the_table() {
         ("fanuc", "G43.4 H#4111", "G49"),
         ("heidenhain", "FUNCTION TCPM F CONT AXIS POS PATHCTRL AXIS", "FUNCTION RESET TCPM"),
     ] {
-        let files = nc::files(&session, nc::control(word).unwrap(), &options).unwrap();
+        let files = nc::files(&session, nc::control(word).unwrap(), &options).unwrap().files;
         let (name, text) = &files[4];
         assert!(name.starts_with("radial") || name.starts_with("RADIAL"), "{name}");
         // Lines of the TNC begin with their number.

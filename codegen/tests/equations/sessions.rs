@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use abbe_codegen::print::{LANGUAGES, Style, TestEquations};
+use abbe_codegen::print::{LANGUAGES, Layout, Style, TestEquations};
 use abbe_codegen::{Equation, Kind, Options, Order, SessionTest, check};
 use abbe_model::files;
 
@@ -68,6 +68,32 @@ fn every_test_of_the_bundled_plans() {
                     assert!(!language.print(&checked, &Style::default()).expect("a page").is_empty());
                 }
             }
+        }
+    }
+}
+
+/// Printed code asks only for those lengths of the session that its equation contains.
+#[test]
+fn every_named_argument_is_used() {
+    let style = Style { layout: Layout::Named, ..Style::default() };
+    for chapter in ["chapter4", "chapter5", "chapter6"] {
+        let path = file(&format!("hermle-c600u/{chapter}.toml"));
+        let session = files::session(&path, &files::ReadOptions::default()).expect("a session");
+        for test in &session.tests {
+            let source = SessionTest::new(&session, test).expect("a plan");
+            let equation = Equation::of(&session.machine, &source, &session.unknowns, &Options::default());
+            let equation = equation.expect("an equation");
+            let checked = check(&equation, &source).expect("agreement");
+            let printed = abbe_codegen::language("python").and_then(|python| python.print(&checked, &style));
+            let printed = printed.expect("a program");
+            let (signature, body) = printed.split_once(") -> ").expect("a function");
+            let (body, _) = body.split_once("\ndef ").unwrap_or((body, ""));
+            let (_, body) = body.split_once("shape = ").expect("the shape");
+            let (_, body) = body.split_once('\n').expect("a body");
+            let words: Vec<&str> = body.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').collect();
+            let arguments = signature.lines().filter_map(|line| line.trim().strip_suffix(": ArrayLike,"));
+            let unused: Vec<&str> = arguments.filter(|name| !words.contains(name)).collect();
+            assert!(unused.is_empty(), "{chapter}, {}: {unused:?}\n{printed}", test.name);
         }
     }
 }
