@@ -1,0 +1,131 @@
+//! What a history reports, as JSON has it. Days count from 1970-01-01 UTC.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::events::ChangeEvent;
+
+/// The parameters of machines over time.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct History {
+    /// False discovery rate over all series of all machines.
+    pub false_discovery_rate: f64,
+    /// The p value below which a series has a change, by the procedure of Benjamini and Hochberg; 0 if none has.
+    pub p_value_threshold: f64,
+    /// Number of series that were tested.
+    pub tested_series: usize,
+    /// The machines.
+    pub machines: Vec<MachineHistory>,
+}
+
+/// Whether a next check is due, by the drift and its uncertainty.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Due {
+    /// On a date within ten years.
+    Date,
+    /// More than ten years ahead.
+    BeyondTenYears,
+    /// There are too few sessions or dates to bound a drift.
+    NotDetermined,
+}
+
+/// A machine over time.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct MachineHistory {
+    /// Identifier of the machine.
+    pub machine_id: String,
+    /// Its name.
+    pub name: String,
+    /// Its structural code.
+    pub code: String,
+    /// Number of sessions.
+    pub sessions: usize,
+    /// Day of the first session.
+    pub first_days: f64,
+    /// Day of the last session.
+    pub last_days: f64,
+    /// Changes between sessions, over all parameters.
+    pub changes: Vec<ChangeEvent>,
+    /// Whether a next check is due, by the parameters of the latest session.
+    pub due: Due,
+    /// Day on which the next check is due; `null` without a date.
+    pub due_days: Option<f64>,
+    /// The parameter that determines it.
+    pub due_parameter: Option<String>,
+    /// The parameters.
+    pub parameters: Vec<ParameterHistory>,
+}
+
+/// A value with its standard uncertainty.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Estimate {
+    /// Estimate.
+    pub value: f64,
+    /// Standard uncertainty.
+    pub u: f64,
+}
+
+/// A parameter of a machine over time.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ParameterHistory {
+    /// Identifier.
+    pub id: String,
+    /// Unit of all values.
+    pub unit: String,
+    /// What the parameter is, in words.
+    pub meaning: String,
+    /// The sessions that identify it.
+    pub points: Vec<PointResult>,
+    /// Probability of a change as large as the largest one if there is none. All positions of a step are counted.
+    pub p_value: f64,
+    /// Scatter between neighbouring sessions over that which the uncertainties predict.
+    pub scatter_ratio: f64,
+    /// Factor by which `u` is enlarged: the scatter of all parameters of the machine together where it is above 1, or
+    /// `scatter_ratio` where that is significantly above 1; else 1.
+    pub u_enlargement: f64,
+    /// Level: at the mean date of a series with drift, before the first step; `null` if the model is not separable.
+    pub level: Option<Estimate>,
+    /// Drift per year; `null` without a significant one.
+    pub drift_per_year: Option<Estimate>,
+    /// Significant steps.
+    pub steps: Vec<ChangeResult>,
+    /// Reference of the control charts: the weighted mean of the first sessions after the last step.
+    pub reference: f64,
+    /// Whether a next check is due by this parameter.
+    pub due: Due,
+    /// Day on which it is due; `null` without a date.
+    pub due_days: Option<f64>,
+}
+
+/// A session of a parameter.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct PointResult {
+    /// Day of the session.
+    pub days: f64,
+    /// Estimate.
+    pub value: f64,
+    /// Standard uncertainty, with `u_enlargement`.
+    pub u: f64,
+    /// Deviation from the reference, standard deviations. 0 in sessions of the reference.
+    pub shewhart: f64,
+    /// Exponentially weighted moving average, standard deviations.
+    pub ewma: f64,
+    /// Whether one of the two is beyond its limit.
+    pub out_of_control: bool,
+}
+
+/// A step of a parameter.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ChangeResult {
+    /// Day of the last session before the step.
+    pub after_days: f64,
+    /// Day of the first session after it.
+    pub before_days: f64,
+    /// The change.
+    pub value: f64,
+    /// Its standard uncertainty.
+    pub u: f64,
+    /// Probability of such a change at this position if there is none.
+    pub p_value: f64,
+}
