@@ -18,7 +18,9 @@
 //!   with units;
 //! - [`series`]: the columns of a session, reading by reading, for plots;
 //! - [`model_file`]: the identified model as a value and as a file;
+//! - [`tolerance`]: decisions of conformity by ISO 14253-1;
 //! - [`validate`](mod@validate): a model against readings that it never saw;
+//! - [`history`]: the parameters of machines over time: drifts, steps, control charts;
 //! - [`results`]: the reported results, in the form of the JSON output.
 //!
 //! The example fits a bundled session as declared, then traces it. Beside noise of 0.3 µm the readings contain one
@@ -58,6 +60,7 @@ pub mod export;
 pub mod fit;
 pub mod geometric;
 pub mod heldout;
+pub mod history;
 pub mod model_file;
 pub mod monte_carlo;
 pub mod noise;
@@ -77,6 +80,7 @@ pub mod separating_tests;
 pub mod series;
 pub mod simulate;
 mod start;
+pub mod tolerance;
 pub mod trace;
 pub mod unit;
 pub mod validate;

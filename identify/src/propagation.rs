@@ -22,6 +22,7 @@ use crate::monte_carlo::{self, Distribution, Draws, MonteCarlo};
 use crate::numerics::tails::normal_quantile;
 use crate::problem::Problem;
 use crate::results::{DrawnParameter, FitMonteCarlo, FitResult, Verdict, phases_follow_amplitudes};
+use crate::tolerance::conformity;
 use refit::Refit;
 
 /// Runs the Monte Carlo and adds it to the result. Parameters for which the two methods disagree report the `u` of the
@@ -66,6 +67,7 @@ pub fn add_monte_carlo(
         }
     }
     phases_follow_amplitudes(&mut result.parameters);
+    result.conformity = conformity(&problem.session, &result.parameters, &result.circular, result.noise_um);
     result.covariance = fit::covariance_of_parameters(problem, fit, &result.parameters);
     if unconverged > 0 {
         result

@@ -13,6 +13,7 @@ use serde::Serialize;
 
 use crate::circular::CircularTest;
 use crate::plausibility::Plausibility;
+use crate::tolerance::Conformity;
 pub use base::BaseResult;
 pub use cross_validation::{CrossValidation, TestNotLeftOut};
 pub use monte_carlo::{DrawnParameter, FitMonteCarlo, Verdict};
@@ -91,6 +92,9 @@ pub struct FitResult {
     /// Ball-bar figures of the tests whose path is a circle.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub circular: Vec<CircularTest>,
+    /// Decisions of conformity, if the session states limits.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub conformity: Option<Conformity>,
     /// Statements of the session that the readings contradict, and what may be wrong.
     #[serde(flatten)]
     pub plausibility: Plausibility,

@@ -4,6 +4,7 @@ use abbe_model::effect::Effect;
 
 use crate::error::IdentifyError;
 use crate::parameters::Role;
+use crate::plan::proposal::{Proposal, proposal};
 use crate::plan::separate::{AlternativeSeparation, SeparatingTest, separating_tests};
 use crate::plan::test_variations::TestVariations;
 use crate::results::{AlternativeResult, EffectResult, SeparatingTestResult, SeparationResult};
@@ -29,9 +30,21 @@ pub fn separate_aliases(
         return Ok(());
     }
     let interrupt = Interrupt(progress);
+    let mut taken = Vec::new();
     for k in 0..trace.effects.len() {
         match interrupt.check().and_then(|()| tests_for(trace, k, variations)) {
-            Ok(tests) => fill_in(&mut trace.result.effects[k], &trace.alias_effects[k], &trace.after.session, tests),
+            Ok(tests) => {
+                let propose = |test: &SeparatingTest| {
+                    proposal(&trace.after.session, &test.planned, &test.test, variations, &mut taken)
+                };
+                let proposals: Vec<Option<Proposal>> = tests.iter().map(propose).collect();
+                let (effect, aliases) = (&mut trace.result.effects[k], &trace.alias_effects[k]);
+                fill_in(effect, aliases, &trace.after.session, tests);
+                for (test, proposal) in effect.separating_tests.iter_mut().zip(proposals) {
+                    (test.name, test.session_toml) =
+                        proposal.map_or_else(Default::default, |proposal| (proposal.name, proposal.block));
+                }
+            }
             Err(IdentifyError::Request(_)) => break,
             Err(IdentifyError::Interrupted) => break,
             Err(error) => return Err(error),
@@ -90,6 +103,8 @@ fn fill_in(
         separated_count: test.separates(),
         alternative_count: test.alternatives.len(),
         alternatives: test.alternatives.iter().map(alternative).collect(),
+        name: String::new(),
+        session_toml: String::new(),
     };
     effect.separating_tests = tests.iter().map(result).collect();
 }

@@ -96,8 +96,8 @@ fn columns(problem: &Problem) -> Vec<ColumnSampling> {
     let Some(first) = tests.first() else { return Vec::new() };
     let everywhere = first.drivers.keys().filter(|name| tests.iter().all(|test| test.drivers.contains_key(*name)));
     let sampled = everywhere.map(|name| {
-        let zero = problem.reference.zero_of(name);
-        let mut values: Vec<f64> = tests.iter().flat_map(|test| &test.drivers[name]).map(|v| v - zero).collect();
+        let recorded = tests.iter().flat_map(|test| &test.drivers[name]);
+        let mut values: Vec<f64> = recorded.map(|value| problem.reference.counted(name, *value)).collect();
         values.sort_by(f64::total_cmp);
         let mut levels = values.clone();
         levels.dedup();

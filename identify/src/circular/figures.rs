@@ -10,9 +10,11 @@
 
 use std::f64::consts::{PI, TAU};
 
+use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::session::Test;
 
+use super::names;
 use super::path::{MovingAxes, Path};
 use super::results::{CircularTest, DirectionFigures};
 use crate::numerics::circle;
@@ -27,6 +29,9 @@ pub(super) fn figures(machine: &Machine, test: &Test, path: &Path) -> CircularTe
         MovingAxes::Linear { axes, radius_mm, .. } => (axes.map(name).concat(), Some(radius_mm)),
         MovingAxes::Rotary(axis) => (name(axis), None),
     };
+    // Otherwise the readings still contain the set-up of the balls, or errors of the linear axes.
+    let is_error_motion =
+        matches!(path.moves, MovingAxes::Rotary(_)) && path.arc() >= TAU * 0.99 && linear_axes_rest(machine, test);
     let traces = [1.0, -1.0].map(|direction| mean(path, direction));
     let mut not_identifiable = Vec::new();
     let arc = path.arc();
@@ -38,8 +43,8 @@ pub(super) fn figures(machine: &Machine, test: &Test, path: &Path) -> CircularTe
     }
     let directions = traces
         .iter()
-        .zip(["+", "-"])
-        .filter_map(|(trace, direction)| {
+        .zip([("+", 1.0), ("-", -1.0)])
+        .filter_map(|(trace, (direction, sign))| {
             let (trace, runs) = trace.as_ref()?;
             let around = about(path, trace);
             let (least, most) = range(&around.deviations_mm);
@@ -49,12 +54,16 @@ pub(super) fn figures(machine: &Machine, test: &Test, path: &Path) -> CircularTe
                 circular_deviation_um: (most - least) * 1e3,
                 radial_deviation_max_um: most * 1e3,
                 radial_deviation_min_um: least * 1e3,
+                synchronous_error_motion_um: is_error_motion.then_some((most - least) * 1e3),
+                asynchronous_error_motion_um: width_mm(path, sign).filter(|_| is_error_motion).map(|width| width * 1e3),
             })
         })
         .collect();
     let mut result = CircularTest {
         test: test.name.clone(),
         axes,
+        iso_10791_6: names::iso_10791_6(machine, test).map(str::to_string),
+        bar_direction: names::bar_direction(test).map(str::to_string),
         radius_mm,
         feed_mm_min: path.feed_mm_s.map(|feed| feed * 60.0),
         arc_deg: arc.to_degrees(),
@@ -81,20 +90,44 @@ pub(super) fn figures(machine: &Machine, test: &Test, path: &Path) -> CircularTe
     result
 }
 
+/// Whether no linear axis moves during a test.
+fn linear_axes_rest(machine: &Machine, test: &Test) -> bool {
+    const REST_MM: f64 = 1e-3;
+    let Some(readings) = &test.readings else { return false };
+    machine.axes.iter().zip(&readings.positions).filter(|(axis, _)| axis.kind == AxisKind::Linear).all(|(_, column)| {
+        let (least, most) = range(column);
+        most - least <= REST_MM
+    })
+}
+
+/// The runs in one direction.
+fn in_direction(path: &Path, direction: f64) -> Vec<PolarPath> {
+    let runs = path.runs.iter().filter(|run| run.direction == direction);
+    runs.map(|run| {
+        let kept = run.rows.clone().filter(|row| !path.left_out.get(*row).copied().unwrap_or(false));
+        let mut points: Vec<[f64; 3]> =
+            kept.map(|row| [path.angle[row], path.deviation_mm[row], path.nominal_mm[row]]).collect();
+        points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        PolarPath(points)
+    })
+    .collect()
+}
+
+/// The greatest range of the runs in one direction at one angle of the first run, mm; `None` for a single run.
+fn width_mm(path: &Path, direction: f64) -> Option<f64> {
+    let runs = in_direction(path, direction);
+    let (first, others) = runs.split_first().filter(|(_, others)| !others.is_empty())?;
+    let widths = first.0.iter().map(|p| {
+        let deviations: Vec<f64> = others.iter().filter_map(|run| run.at(p[0])).chain([p[1]]).collect();
+        let (least, most) = range(&deviations);
+        most - least
+    });
+    widths.reduce(f64::max)
+}
+
 /// The mean path of the runs in one direction, at the angles of the first run, and the number of these runs.
 fn mean(path: &Path, direction: f64) -> Option<(PolarPath, usize)> {
-    let runs: Vec<PolarPath> = path
-        .runs
-        .iter()
-        .filter(|run| run.direction == direction)
-        .map(|run| {
-            let kept = run.rows.clone().filter(|row| !path.left_out.get(*row).copied().unwrap_or(false));
-            let mut points: Vec<[f64; 3]> =
-                kept.map(|row| [path.angle[row], path.deviation_mm[row], path.nominal_mm[row]]).collect();
-            points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-            PolarPath(points)
-        })
-        .collect();
+    let runs = in_direction(path, direction);
     let first = runs.first()?;
     let points = first.0.iter().map(|p| {
         let others: Vec<f64> = runs[1..].iter().filter_map(|run| run.at(p[0])).collect();

@@ -8,6 +8,7 @@
 mod diagnosis;
 mod fault;
 mod figures;
+mod names;
 mod path;
 mod results;
 mod search;

@@ -12,6 +12,13 @@ pub struct CircularTest {
     pub test: String,
     /// The axes of the path: `XY` for a circle of two linear axes, `C` for a rotary axis.
     pub axes: String,
+    /// Name in ISO 10791-6 of the synchronous motion of a rotary axis of a table and two linear axes: `BK1` for A or B,
+    /// `BK2` for C, if both rotary axes are on the table. Absent for every other path.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub iso_10791_6: Option<String>,
+    /// Direction of the bar in a synchronous motion: `radial`, `tangential`, `axial`. Absent for every other path.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bar_direction: Option<String>,
     /// Radius of the path, mm; absent for a rotary axis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius_mm: Option<f64>,
@@ -56,6 +63,14 @@ pub struct DirectionFigures {
     pub radial_deviation_max_um: f64,
     /// Smallest radial deviation F, µm.
     pub radial_deviation_min_um: f64,
+    /// Synchronous error motion of a rotary axis, µm (ISO 230-7): radial range of the mean of the runs without its
+    /// first harmonic. Absent unless a rotary axis makes a full turn with the linear axes at rest.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub synchronous_error_motion_um: Option<f64>,
+    /// Asynchronous error motion of a rotary axis, µm (ISO 230-7): greatest range of the runs at one angle. Absent
+    /// for a single run, and unless a rotary axis makes a full turn with the linear axes at rest.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub asynchronous_error_motion_um: Option<f64>,
 }
 
 /// Contribution of one classical fault.

@@ -39,7 +39,7 @@ fn model(machine: Machine, errors: &[(String, f64)]) -> IdentifiedModel {
         null_directions: Vec::new(),
         locations: Vec::new(),
         noise: Noise::white(1e-4, NoiseSource::Stated),
-        quality: Quality { readings: 1, rms_mm: 0.0, heldout_rms_mm: 0.0, u_enlargement: 1.0 },
+        quality: Quality { readings: 1, rms_um: 0.0, heldout_rms_um: 0.0, u_enlargement: 1.0 },
         ranges: Vec::new(),
         tool_mm: [0.0; 3],
         table_mm: [0.0; 3],

@@ -14,6 +14,7 @@ use crate::parameter_description::parameter_meaning;
 use crate::plausibility;
 use crate::problem::Problem;
 use crate::results::{FitResult, Outlier, ParameterResult, Unobservable, phases_follow_amplitudes};
+use crate::tolerance::conformity;
 
 /// The fit in its reported form.
 ///
@@ -31,8 +32,10 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> 
     warnings.extend(mislabelled_runs(&problem.tests));
     warnings.extend(enlargement_warning(fit.u_enlargement));
     let parameters = parameters(problem, fit);
+    let noise_um = problem.noise.sigma_mm * 1e3;
+    let circular = circular::of_session(&problem.session, problem.noise.sigma_mm, &problem.rejected);
     Ok(FitResult {
-        noise_um: problem.noise.sigma_mm * 1e3,
+        noise_um,
         noise_source: problem.noise.source.word().to_string(),
         noise_ar_coefficients: problem.noise.ar_coefficients.clone(),
         readings: problem.readings(),
@@ -50,11 +53,12 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> 
         u_enlargement: fit.u_enlargement,
         identifiable: ids(&parameters),
         covariance: covariance::of_parameters(problem, fit, &parameters),
-        parameters,
         unobservable: unobservable(problem, &fit.rank),
         null_space: covariance::null_space(problem, &fit.rank),
         outliers: outliers(problem, fit),
-        circular: circular::of_session(&problem.session, problem.noise.sigma_mm, &problem.rejected),
+        conformity: conformity(&problem.session, &parameters, &circular, noise_um),
+        circular,
+        parameters,
         plausibility,
         warnings,
         about: problem.session.about.iter().cloned().collect(),

@@ -57,10 +57,10 @@ pub struct ModelParameter {
 pub struct Quality {
     /// Number of readings.
     pub readings: usize,
-    /// Rms of the residual over scalar readings, mm.
-    pub rms_mm: f64,
-    /// Rms over held-out scalar readings, mm.
-    pub heldout_rms_mm: f64,
+    /// Rms of the residual over scalar readings, µm as in the file, so that a model reads back to the same bits.
+    pub rms_um: f64,
+    /// Rms over held-out scalar readings, µm.
+    pub heldout_rms_um: f64,
     /// Factor on the uncertainties, which the covariance contains.
     pub u_enlargement: f64,
 }

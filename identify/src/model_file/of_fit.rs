@@ -48,8 +48,8 @@ impl IdentifiedModel {
             noise: problem.noise.clone(),
             quality: Quality {
                 readings: problem.readings(),
-                rms_mm: rms_mm(problem, &fit.residuals),
-                heldout_rms_mm: fit.held_out.rms_mm,
+                rms_um: rms_mm(problem, &fit.residuals) * 1e3,
+                heldout_rms_um: fit.held_out.rms_mm * 1e3,
                 u_enlargement: fit.u_enlargement,
             },
             ranges: range::of_problem(problem, &problem.parameters.effects),

@@ -160,8 +160,8 @@ impl File<'_> {
             ranges: document.ranges.iter().map(|of| range(&machine, of)).collect(),
             quality: Quality {
                 readings: document.fit.readings,
-                rms_mm: document.fit.rms_um * 1e-3,
-                heldout_rms_mm: document.fit.heldout_rms_um * 1e-3,
+                rms_um: document.fit.rms_um,
+                heldout_rms_um: document.fit.heldout_rms_um,
                 u_enlargement: document.fit.u_enlargement,
             },
             tool_mm: document.tool_mm,

@@ -63,8 +63,8 @@ impl IdentifiedModel {
             },
             fit: document::FitQuality {
                 readings: self.quality.readings,
-                rms_um: self.quality.rms_mm * 1e3,
-                heldout_rms_um: self.quality.heldout_rms_mm * 1e3,
+                rms_um: self.quality.rms_um,
+                heldout_rms_um: self.quality.heldout_rms_um,
                 u_enlargement: self.quality.u_enlargement,
             },
             ranges: self.ranges.iter().map(|range| self.range(range)).collect(),

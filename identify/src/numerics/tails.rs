@@ -1,8 +1,8 @@
-//! Tails and quantiles of the χ² and the normal distribution.
+//! Tails and quantiles of the χ², the normal and the t distribution.
 //!
 //! At real effect sizes the tail of χ² underflows, so that a search compares its logarithm.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
 use statrs::function::gamma::{gamma_ur, ln_gamma};
 
 /// `P(χ² > x)` for so many degrees of freedom; 1 for none.
@@ -23,6 +23,11 @@ pub fn chi_square_quantile(probability: f64, freedom: f64) -> f64 {
 /// The probability that a standard normal variable exceeds a value.
 pub fn normal_tail(x: f64) -> f64 {
     Normal::standard().sf(x)
+}
+
+/// The probability that a variable of Student's t distribution exceeds a value; normal for infinite degrees of freedom.
+pub fn student_tail(x: f64, freedom: f64) -> f64 {
+    if freedom.is_finite() { StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |law| law.sf(x)) } else { normal_tail(x) }
 }
 
 /// The value that a standard normal variable exceeds with a probability.

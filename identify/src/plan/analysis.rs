@@ -6,7 +6,7 @@ use abbe_model::session::Session;
 
 use super::linear::{Linearisation, is_of_interest};
 use super::results::{Correlation, ErrorAnalysis, LeaveOneOut, PlanAnalysis, TestSummary, VarianceInflation};
-use super::{budget, effects, identifiability, indices, sensitivity, states};
+use super::{budget, collision, effects, identifiability, indices, sensitivity, states};
 use crate::error::IdentifyError;
 use crate::noise::{Noise, NoiseSource};
 use crate::parameter_description::parameter_meaning;
@@ -114,6 +114,8 @@ fn analyse_problem(problem: &Problem, travel_mm: f64) -> Result<PlanAnalysis, Id
             ));
         }
     }
+    let clearances = collision::clearances(&problem.session);
+    warnings.extend(collision::warnings(&problem.session, &clearances));
     Ok(PlanAnalysis {
         noise_um: problem.noise.sigma_mm * 1e3,
         readings: problem.readings(),
@@ -135,6 +137,7 @@ fn analyse_problem(problem: &Problem, travel_mm: f64) -> Result<PlanAnalysis, Id
         )?,
         leave_one_out: leave_one_out(problem, &linear, &of_interest)?,
         effects: None,
+        clearances,
         warnings,
     })
 }

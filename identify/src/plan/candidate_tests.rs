@@ -13,6 +13,7 @@ use abbe_model::instrument::Station;
 use abbe_model::session::{Session, Test};
 
 use super::candidate_layout::{Draft, drafts};
+use super::collision::Parts;
 use super::states;
 use super::test_variations::TestVariations;
 use crate::error::IdentifyError;
@@ -59,7 +60,7 @@ pub fn candidate_tests(session: &Session, variations: &TestVariations) -> Result
     let tests: Vec<CandidateTest> = finished.into_iter().flatten().collect();
     if tests.is_empty() {
         return Err(IdentifyError::Request(
-            "no candidate test is feasible on this machine: no bar reaches, or the travel is too short".to_string(),
+            "no candidate test is feasible on this machine: no bar reaches, the travel is too short, or no test clears the bodies of the machine".to_string(),
         ));
     }
     Ok(tests)
@@ -74,6 +75,10 @@ fn finished(session: &Session, variations: &TestVariations, draft: Draft) -> Opt
     let length = bar.bar;
     let mut readings = states::planned(session, &test).ok()?;
     if readings.observed.iter().any(|reading| (reading - length).abs() > variations.reach_mm) {
+        return None;
+    }
+    // Only tests that clear are proposed.
+    if Parts::of(session, &test).is_some_and(|parts| !parts.clears_all(&readings)) {
         return None;
     }
     let start = session.tests.iter().filter_map(|test| test.readings.as_ref()?.time_s.last().copied());

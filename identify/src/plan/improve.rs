@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::candidate_information::PreparedCandidates;
 use super::criterion::{Goal, figure, reported, targets};
 use super::information::{Root, SharedParameters};
+use super::proposal::{Proposal, proposal};
 use super::ranking::smallest_first;
 use super::test_variations::TestVariations;
 use crate::error::IdentifyError;
@@ -71,6 +72,10 @@ pub struct ProposedTest {
     pub spindle_ball_mm: [f64; 3],
     /// Calibrated length of the bar, mm.
     pub bar_mm: f64,
+    /// Name of the test in `session_toml`.
+    pub name: String,
+    /// The test as a `[[test]]` block of a session file.
+    pub session_toml: String,
 }
 
 /// An error and its standard uncertainty.
@@ -164,7 +169,18 @@ pub fn improve(
             })
             .collect()
     };
-    let steps = (0..chosen.len()).map(|k| step(&prepared, &chosen[..=k], &outside, &with_units)).collect();
+    let mut taken = Vec::new();
+    let steps = (0..chosen.len())
+        .map(|k| {
+            let candidate = &prepared.candidates[chosen[k]].test;
+            let proposal = proposal(&problem.session, &candidate.test, &candidate.name, variations, &mut taken);
+            let step = step(&prepared, &chosen[..=k], &outside, &with_units);
+            match proposal {
+                Some(Proposal { name, block }) => ProposedTest { name, session_toml: block, ..step },
+                None => step,
+            }
+        })
+        .collect();
     Ok(Improvement {
         criterion: match options.goal {
             Goal::WorstUncertainty => "worst standard uncertainty, um or arcsec".to_string(),
@@ -287,6 +303,8 @@ fn step(
         workpiece_ball_mm,
         spindle_ball_mm,
         bar_mm,
+        name: String::new(),
+        session_toml: String::new(),
     }
 }
 

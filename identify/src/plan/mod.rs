@@ -5,11 +5,13 @@
 //!
 //! - [`analyse`]: uncertainties, budgets, identifiability, indices, and the contribution of each test;
 //! - [`effects`]: detectability and bias of undeclared effects;
-//! - [`test_variations`], [`candidate_tests`], [`criterion`], [`mod@improve`], [`separate`]: the next test;
+//! - [`test_variations`], [`candidate_tests`], [`criterion`], [`mod@improve`], [`separate`], [`mod@proposal`]: the next test;
 //!   [`mod@range`]: how far a sweep can shrink;
 //! - [`states`], [`linear`], [`sensitivity`], [`budget`], [`identifiability`], [`indices`]: the parts of the analysis;
 //! - [`bias`]: the bias by each undeclared effect; [`structure`]: ranks and base parameters;
 //! - [`mod@global`]: Sobol' indices of the estimates;
+//! - [`collision`]: clearance of bar, holders and bodies along every test; [`poses`]: poses for a tracker;
+//! - [`sheet`]: what an operator sets up;
 //! - [`results`]: the results, as they are written to JSON.
 
 mod analysis;
@@ -20,6 +22,7 @@ pub(crate) mod candidate_information;
 mod candidate_layout;
 pub mod candidate_tests;
 pub mod clearance;
+pub mod collision;
 pub mod criterion;
 pub(crate) mod detectability;
 pub mod effects;
@@ -29,11 +32,14 @@ pub mod improve;
 pub mod indices;
 pub(crate) mod information;
 pub mod linear;
+pub mod poses;
+pub mod proposal;
 pub mod range;
 mod ranking;
 pub mod results;
 pub mod sensitivity;
 pub mod separate;
+pub mod sheet;
 pub mod states;
 pub mod structure;
 mod sweep;

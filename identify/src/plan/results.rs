@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::collision::TestClearance;
 use crate::results::{Combination, Unobservable};
 
 /// Identifiability and predicted uncertainties of planned tests.
@@ -39,6 +40,9 @@ pub struct PlanAnalysis {
     /// Detectability of undeclared effects and the biases by them; absent where it was not requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub effects: Option<EffectsAnalysis>,
+    /// Least clearance of every test, if machine or session state what can collide.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub clearances: Vec<TestClearance>,
     /// Warnings in words.
     pub warnings: Vec<String>,
 }

@@ -6,6 +6,7 @@
 //! removed from the root. One evaluation of the candidate tests therefore serves all alternatives.
 
 use abbe_model::effect::Effect;
+use abbe_model::session::Test;
 use faer::Mat;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -44,12 +45,14 @@ pub struct SeparationAnalysis {
 }
 
 /// A test that separates an effect from some of its alternatives.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct SeparatingTest {
     /// Description, for example `C150 with the workpiece ball at radius 50 mm`.
     pub test: String,
     /// Duration, min.
     pub minutes: f64,
+    /// The test with its planned states.
+    pub planned: Test,
     /// The alternatives that no previous test separates, in their order.
     pub alternatives: Vec<AlternativeSeparation>,
 }
@@ -148,6 +151,7 @@ pub fn separating_tests(
         let test = SeparatingTest {
             test: candidate.name.clone(),
             minutes: candidate.minutes,
+            planned: candidate.test.clone(),
             alternatives: remaining.iter().zip(&before).zip(&sigmas[best]).map(of).collect(),
         };
         // Alternatives that the readings separate already need no test.

@@ -9,6 +9,7 @@ use super::Outlier;
 use super::cross_validation::CrossValidation;
 use super::parameter::{Covariance, NullSpace, ParameterResult, Unobservable};
 use crate::plausibility::Plausibility;
+use crate::tolerance::Conformity;
 
 /// Residual and parameters of a model.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
@@ -229,6 +230,10 @@ pub struct SeparatingTestResult {
     pub alternative_count: usize,
     /// The aliases that no test before this one separates, nearest first.
     pub alternatives: Vec<AlternativeResult>,
+    /// Name of the test in `session_toml`.
+    pub name: String,
+    /// The test as a `[[test]]` block of a session file.
+    pub session_toml: String,
 }
 
 /// Separation of a found effect from one alternative by a test.
@@ -333,6 +338,9 @@ pub struct TraceResult {
     pub null_space: NullSpace,
     /// Readings excluded as outliers.
     pub outliers: Vec<Outlier>,
+    /// Decisions of conformity about the model with the found effects, if the session states limits.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub conformity: Option<Conformity>,
     /// Statements of the session that the readings contradict, and what may be wrong.
     #[serde(flatten)]
     pub plausibility: Plausibility,

@@ -4,9 +4,11 @@
 //! chain at the states of the first run.
 
 use abbe_model::axis::AxisKind;
-use abbe_model::chain::BodyErrors;
+use abbe_model::chain::{BodyErrors, Machine};
 use abbe_model::frames::Point;
+use abbe_model::instrument::Station;
 use abbe_model::session::placing;
+use abbe_model::session::readings::Readings;
 
 use crate::problem::Problem;
 
@@ -31,28 +33,32 @@ pub struct SetUpPath {
 /// The set-ups of all tests that have states.
 pub fn set_ups(problem: &Problem) -> Vec<SetUpPath> {
     let machine = &problem.session.machine;
-    let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let tests = problem.tests.iter().zip(&problem.models).filter_map(|(test, model)| {
         let readings = test.readings.as_ref()?;
-        let run = readings.runs().first().cloned()?;
-        let station = model.station();
-        let (mut workpiece_mm, mut tool_mm, mut state) = (Vec::new(), Vec::new(), Vec::new());
-        let first: Vec<f64> = readings.positions.iter().map(|positions| positions[run.start]).collect();
-        let is_path = !readings.run.is_empty();
-        for row in run.clone().step_by(run.len().div_ceil(MAX_POINTS)).chain([run.end - 1]) {
-            readings.state(machine, row, &mut state);
-            let on_table = station.table_point_mm();
-            workpiece_mm.extend(on_table.map(|point| machine.workpiece_point(&state, &none, Point(point)).0));
-            tool_mm.push(machine.tool_point(&state, &none, Point(station.tool_point_mm())).0);
-        }
-        let rotary = (0..machine.axes.len()).filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary);
-        let line = |axis: usize| {
-            let (point, direction) = placing::axis_line(machine, &first, axis);
-            (machine.axes[axis].name.clone(), point, direction)
-        };
-        Some(SetUpPath { test: test.name.clone(), workpiece_mm, tool_mm, axes: rotary.map(line).collect(), is_path })
+        set_up(machine, &test.name, model.station(), readings)
     });
     tests.collect()
+}
+
+/// The set-up of a test at these states; `None` without states.
+pub fn set_up(machine: &Machine, test: &str, station: &Station<f64>, readings: &Readings) -> Option<SetUpPath> {
+    let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
+    let run = readings.runs().first().cloned()?;
+    let (mut workpiece_mm, mut tool_mm, mut state) = (Vec::new(), Vec::new(), Vec::new());
+    let first: Vec<f64> = readings.positions.iter().map(|positions| positions[run.start]).collect();
+    let is_path = !readings.run.is_empty();
+    for row in run.clone().step_by(run.len().div_ceil(MAX_POINTS)).chain([run.end - 1]) {
+        readings.state(machine, row, &mut state);
+        let on_table = station.table_point_mm();
+        workpiece_mm.extend(on_table.map(|point| machine.workpiece_point(&state, &none, Point(point)).0));
+        tool_mm.push(machine.tool_point(&state, &none, Point(station.tool_point_mm())).0);
+    }
+    let rotary = (0..machine.axes.len()).filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary);
+    let line = |axis: usize| {
+        let (point, direction) = placing::axis_line(machine, &first, axis);
+        (machine.axes[axis].name.clone(), point, direction)
+    };
+    Some(SetUpPath { test: test.to_string(), workpiece_mm, tool_mm, axes: rotary.map(line).collect(), is_path })
 }
 
 #[cfg(test)]

@@ -37,11 +37,13 @@ use abbe_model::session::Session;
 
 use crate::candidates::columns::{Columns, EffectColumns};
 use crate::candidates::moments::Moments;
+use crate::circular;
 use crate::error::IdentifyError;
 use crate::fit::{Fit, fit, prepare};
 use crate::numerics::parallel;
 use crate::problem::Problem;
 use crate::results::TraceResult;
+use crate::tolerance::conformity;
 use constants::{BLOCK, SINGLE};
 use families::AcceptedFamilies;
 use implausible::Contradicted;
@@ -161,6 +163,19 @@ pub fn trace(
         goes_on
     };
     progress(Progress::Fitting);
+    let mut found = without_conformity(session, options, progress)?;
+    let (after, noise_um) = (&found.after, found.result.noise_um);
+    let circular = circular::of_session(&after.session, after.noise.sigma_mm, &after.rejected);
+    found.result.conformity = conformity(&after.session, &found.result.after.parameters, &circular, noise_um);
+    Ok(found)
+}
+
+/// The trace without its decisions of conformity.
+fn without_conformity(
+    session: &Session,
+    options: &TraceOptions,
+    progress: &(dyn Fn(Progress) -> bool + Sync),
+) -> Result<TraceOutcome, IdentifyError> {
     let (problem, fitted) = prepare(session, options.seed)?;
     let contradicted = Contradicted::of(&problem, &fitted)?;
     if contradicted.forbids_search() {

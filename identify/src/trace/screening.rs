@@ -1,6 +1,7 @@
 //! Screens the library for a session: which effects apply to its readings, and which are observable in addition to the
 //! declared parameters.
 
+use abbe_model::effect::Effect;
 use abbe_model::session::Session;
 
 use super::TraceOptions;
@@ -20,6 +21,8 @@ use crate::problem::Problem;
 pub struct ScreenedEffect {
     /// Its identifier.
     pub id: String,
+    /// The effect.
+    pub effect: Effect,
     /// Index of its family in the library.
     pub family: usize,
     /// Whether the effect is observable in addition to the declared parameters.
@@ -45,6 +48,7 @@ pub fn screened_effects(session: &Session, options: &TraceOptions) -> Result<Vec
         .zip(trained.gains(&|_| true)?)
         .map(|(candidate, gain)| ScreenedEffect {
             id: candidate.effect.id(),
+            effect: candidate.effect.clone(),
             family: candidate.family,
             observable: gain.freedom > 0,
         })

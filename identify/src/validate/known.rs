@@ -186,7 +186,7 @@ impl<'m> KnownErrors<'m> {
         }
         if self.model.noise.source == NoiseSource::Residual {
             // The model's own residual contains what the model lacks, and so does the residual here.
-            let lacking = self.model.quality.heldout_rms_mm;
+            let lacking = self.model.quality.heldout_rms_um * 1e-3;
             if problem.noise.sigma_mm < lacking {
                 problem.noise = Noise::white(lacking, NoiseSource::Residual);
                 self.noise_source = "model";
@@ -324,7 +324,7 @@ fn first_noise(model: &IdentifiedModel, session: &Session) -> (Noise, &'static s
     let noise = match model.noise.source {
         // A residual contains what the model lacks; on readings that it has not seen, that is the held-out error.
         NoiseSource::Residual => {
-            Noise::white(model.quality.heldout_rms_mm.max(model.noise.sigma_mm), NoiseSource::Residual)
+            Noise::white((model.quality.heldout_rms_um * 1e-3).max(model.noise.sigma_mm), NoiseSource::Residual)
         }
         // The inflation belongs to the likelihood of the model's families; it is no noise.
         NoiseSource::Stated | NoiseSource::Repeats => {

@@ -136,6 +136,7 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
         unobservable: fit::unobservable(after, &after_fit.rank),
         null_space: fit::null_space(after, &after_fit.rank),
         outliers: fit::outliers(after, after_fit),
+        conformity: None,
         plausibility: Plausibility::default(),
         warnings,
         about: before.session.about.iter().cloned().collect(),

@@ -41,6 +41,7 @@ pub(super) fn unsearched_of(problem: &Problem, fit: &Fit, declared: ModelResult)
         null_space: fit::null_space(problem, &fit.rank),
         outliers: fit::outliers(problem, fit),
         about: problem.session.about.iter().cloned().collect(),
+        conformity: None,
         plausibility: Plausibility::default(),
         warnings,
     }
