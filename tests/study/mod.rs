@@ -14,6 +14,7 @@ mod sessions;
 mod carried;
 mod clean;
 mod columns;
+mod fleet;
 mod outside;
 mod pairs;
 mod single;

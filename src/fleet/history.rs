@@ -1,0 +1,368 @@
+//! The history of the machines of a folder of records.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::path::Path;
+
+use abbe_identify::history::events::{Compensation, KnownChange};
+use abbe_identify::history::faults::{Fault, FoundEffect, faults};
+use abbe_identify::history::results::History;
+use abbe_identify::history::{HistoryOptions, MachineSessions, SessionValues, analyse};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::FleetError;
+use super::date;
+use super::record::Record;
+use super::store::{Pointer, Store};
+
+/// The machines of a folder over time, and their faults.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct FleetHistory {
+    /// Drifts, steps and control charts.
+    #[serde(flatten)]
+    pub history: History,
+    /// The effects of all sessions, by alias set, the most frequent first.
+    pub faults: Vec<Fault>,
+    /// Sessions, notes and rows of known compensations that the history does not use.
+    pub not_used: Vec<NotUsed>,
+}
+
+/// A session, a note or a row of known compensations that the history does not use.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct NotUsed {
+    /// The session file, the damaged note, or the file of compensations with the line.
+    pub file: String,
+    /// Why, and what to do.
+    pub reason: String,
+}
+
+/// A usable session.
+struct Dated {
+    days: f64,
+    until_days: f64,
+    number: Option<f64>,
+    pointer: Pointer,
+    record: Record,
+}
+
+/// The history of all machines of a folder, or of one.
+///
+/// # Errors
+/// If the folder cannot be read, or has no session of the machine.
+pub fn history(store: &Store, machine_id: Option<&str>, options: &HistoryOptions) -> Result<FleetHistory, FleetError> {
+    let (records, missing) = store.records()?;
+    let mut not_used: Vec<NotUsed> = missing
+        .into_iter()
+        .map(|file| NotUsed {
+            file,
+            reason: "its result is missing or of another version of the schema: run `abbe run` again".to_string(),
+        })
+        .collect();
+    let all = records.len();
+    let known: BTreeSet<String> = records.iter().map(|(_, record)| record.machine_id.clone()).collect();
+    let records = records.into_iter().filter(|(pointer, _)| machine_id.is_none_or(|id| pointer.machine_id == id));
+    let records: Vec<(Pointer, Record)> = records.collect();
+    if let Some(id) = machine_id.filter(|_| records.is_empty()) {
+        return Err(FleetError::Request(format!(
+            "no session of the machine `{id}` among {all}: the identifier is `serial_number` of [about], or the name \
+            of \
+             the machine"
+        )));
+    }
+    let mut machines: BTreeMap<String, Vec<Dated>> = BTreeMap::new();
+    for dated in usable(records, &mut not_used) {
+        machines.entry(dated.record.machine_id.clone()).or_default().push(dated);
+    }
+    let mut series = Vec::new();
+    let mut effects = Vec::new();
+    for (id, sessions) in machines {
+        let sessions = in_order(of_one_machine(sessions, &mut not_used), &mut not_used);
+        effects.extend(sessions.iter().flat_map(found_effects));
+        series.push(machine_sessions(id, &sessions));
+    }
+    not_used.sort_by(|a, b| a.file.cmp(&b.file));
+    check_units(&series, &options.compensations)?;
+    not_used.extend(unknown_rows(&known, &series, &options.compensations));
+    Ok(FleetHistory { history: analyse(&series, options), faults: faults(&effects), not_used })
+}
+
+/// # Errors
+/// If a compensation states a change in another unit than the parameter has.
+fn check_units(machines: &[MachineSessions], compensations: &[Compensation]) -> Result<(), FleetError> {
+    for known in compensations {
+        let of_machine = machines.iter().filter(|machine| machine.machine_id == known.machine_id);
+        for (id, unit, _) in of_machine.flat_map(|machine| &machine.parameters) {
+            if let Some(stated) = known.changes.iter().find(|known| known.id == *id && known.unit != *unit) {
+                return Err(FleetError::Request(format!(
+                    "{}: compensation of {}: the change of {id} is stated in `{}`; state it in {unit}",
+                    stated.source, known.machine_id, stated.unit
+                )));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The rows of compensations whose machine or parameter no session has.
+fn unknown_rows(
+    known: &BTreeSet<String>,
+    machines: &[MachineSessions],
+    compensations: &[Compensation],
+) -> Vec<NotUsed> {
+    let mut unknown = Vec::new();
+    for compensation in compensations {
+        let id = &compensation.machine_id;
+        let machine = machines.iter().find(|machine| machine.machine_id == *id);
+        for row in &compensation.changes {
+            let reason = match machine {
+                None if !known.contains(id) => format!("no session is of the machine `{id}`: correct `machine_id`"),
+                Some(machine) if machine.parameters.iter().all(|(name, ..)| *name != row.id) => {
+                    format!("no session of `{id}` identifies the parameter `{}`: correct `parameter`", row.id)
+                }
+                _ => continue,
+            };
+            unknown.push(NotUsed { file: row.source.clone(), reason });
+        }
+    }
+    unknown
+}
+
+/// The sessions with a result, a date and an identifier of their own. A copy of a session counts once.
+fn usable(records: Vec<(Pointer, Record)>, not_used: &mut Vec<NotUsed>) -> Vec<Dated> {
+    let mut keys_of: HashMap<String, HashSet<String>> = HashMap::new();
+    for (_, record) in &records {
+        if let Some(id) = &record.session_id {
+            keys_of.entry(id.clone()).or_default().insert(record.key.clone());
+        }
+    }
+    let mut known = HashSet::new();
+    let mut found = Vec::new();
+    for (pointer, record) in records {
+        let shared = record.session_id.as_ref().filter(|id| keys_of.get(*id).is_some_and(|keys| keys.len() > 1));
+        let text = record.date.as_deref();
+        let reason = if let Some(error) = &record.error {
+            Some(format!("it has no result: {}", error.message.lines().next().unwrap_or_default()))
+        } else if let Some(id) = shared {
+            Some(format!(
+                "several sessions of different content have its identifier `{id}`: give each a `session_id` of its own"
+            ))
+        } else if !known.insert(record.key.clone()) {
+            Some("it is a copy of another session".to_string())
+        } else {
+            match (text, text.and_then(date::interval)) {
+                (None, _) => Some("it has no date: state `date` in [about]".to_string()),
+                (Some(text), None) => Some(format!("its date `{text}` has another form than 2026-11-23T08:00:00")),
+                (Some(_), Some([days, until_days])) => {
+                    let number = record.about.get("session_number").and_then(|text| text.trim().parse().ok());
+                    found.push(Dated { days, until_days, number, pointer: pointer.clone(), record });
+                    None
+                }
+            }
+        };
+        not_used.extend(reason.map(|reason| NotUsed { file: pointer.file, reason }));
+    }
+    found
+}
+
+/// The sessions of a machine with the axes of its latest session, by time.
+fn of_one_machine(mut sessions: Vec<Dated>, not_used: &mut Vec<NotUsed>) -> Vec<Dated> {
+    sessions.sort_by(|a, b| a.days.total_cmp(&b.days).then_with(|| a.pointer.file.cmp(&b.pointer.file)));
+    let axes = |dated: &Dated| dated.record.machine.as_ref().map(|machine| machine.sha256.clone());
+    let latest = sessions.last().and_then(axes);
+    let (kept, others): (Vec<Dated>, Vec<Dated>) = sessions.into_iter().partition(|dated| axes(dated) == latest);
+    not_used.extend(others.into_iter().map(|dated| NotUsed {
+        file: dated.pointer.file,
+        reason: "the axes of the machine differ from those of its latest session: parameters are not comparable".into(),
+    }));
+    kept
+}
+
+/// The sessions whose dates agree with their numbers: the longest part in which both increase.
+fn in_order(sessions: Vec<Dated>, not_used: &mut Vec<NotUsed>) -> Vec<Dated> {
+    let numbers: Vec<f64> = sessions.iter().filter_map(|dated| dated.number).collect();
+    let keeps = longest_increasing(&numbers);
+    let mut next = 0;
+    let mut kept = Vec::with_capacity(sessions.len());
+    for dated in sessions {
+        let keep = dated.number.is_none_or(|_| {
+            next += 1;
+            keeps[next - 1]
+        });
+        if keep {
+            kept.push(dated);
+        } else {
+            not_used.push(NotUsed {
+                reason: format!(
+                    "its date {} contradicts its `session_number`: correct the clock or the date",
+                    dated.record.date.as_deref().unwrap_or_default()
+                ),
+                file: dated.pointer.file,
+            });
+        }
+    }
+    kept
+}
+
+/// Which numbers belong to the longest part that does not decrease.
+fn longest_increasing(numbers: &[f64]) -> Vec<bool> {
+    // Length of the longest part that ends with each number, and the number before it.
+    let mut ends: Vec<(usize, Option<usize>)> = Vec::with_capacity(numbers.len());
+    for (i, number) in numbers.iter().enumerate() {
+        let before = (0..i).filter(|j| numbers[*j] <= *number).max_by_key(|j| (ends[*j].0, std::cmp::Reverse(*j)));
+        ends.push((1 + before.map_or(0, |j| ends[j].0), before));
+    }
+    let mut keeps = vec![false; numbers.len()];
+    let mut at = (0..numbers.len()).max_by_key(|i| (ends[*i].0, std::cmp::Reverse(*i)));
+    while let Some(i) = at {
+        keeps[i] = true;
+        at = ends[i].1;
+    }
+    keeps
+}
+
+/// Whether a parameter belongs to the machine, not to the set-up of a test, and has a value without a jump: a phase
+/// has one at a full turn.
+fn is_of_machine(id: &str) -> bool {
+    (id.contains('~') || !id.contains('[')) && !id.ends_with(".phase")
+}
+
+fn machine_sessions(machine_id: String, sessions: &[Dated]) -> MachineSessions {
+    let mut parameters: Vec<(String, String, String)> = Vec::new();
+    let mut place: HashMap<String, usize> = HashMap::new();
+    for parameter in sessions.iter().flat_map(|dated| &dated.record.parameters) {
+        if parameter.identifiable && is_of_machine(&parameter.id) && !place.contains_key(&parameter.id) {
+            place.insert(parameter.id.clone(), parameters.len());
+            let text = |text: &Option<String>| text.clone().unwrap_or_default();
+            parameters.push((parameter.id.clone(), text(&parameter.unit), text(&parameter.meaning)));
+        }
+    }
+    let count = parameters.len();
+    let values = sessions.iter().map(|dated| {
+        let record = &dated.record;
+        let mut values = vec![None; count];
+        let mut covariance = vec![vec![0.0; count]; count];
+        let known: Vec<(usize, usize)> = record
+            .parameters
+            .iter()
+            .enumerate()
+            .filter(|(_, parameter)| parameter.identifiable)
+            .filter_map(|(own, parameter)| Some((own, *place.get(&parameter.id)?)))
+            .collect();
+        for (own, at) in &known {
+            values[*at] = record.parameters[*own].value.zip(record.parameters[*own].u);
+            for (other, across) in &known {
+                covariance[*at][*across] = record.covariance_of(*own, *other).unwrap_or(0.0);
+            }
+        }
+        SessionValues {
+            days: dated.days,
+            until_days: dated.until_days,
+            file: dated.pointer.file.clone(),
+            values,
+            covariance,
+        }
+    });
+    let values = values.collect();
+    let machine = sessions.last().and_then(|dated| dated.record.machine.clone());
+    let (name, code) = machine.map_or((String::new(), String::new()), |machine| (machine.name, machine.code));
+    MachineSessions { machine_id, name, code, parameters, sessions: values }
+}
+
+fn found_effects(dated: &Dated) -> impl Iterator<Item = FoundEffect> {
+    dated.record.effects.iter().map(|effect| FoundEffect {
+        machine_id: dated.record.machine_id.clone(),
+        kind: dated.record.machine.as_ref().map_or(String::new(), |machine| machine.code.clone()),
+        days: dated.days,
+        id: effect.id.clone(),
+        family: (effect.family.clone(), effect.component.clone(), effect.driver.clone()),
+        meaning: effect.meaning.clone(),
+        rms_gain_um: effect.rms_gain_um,
+        aliases: effect.aliases.clone(),
+    })
+}
+
+/// Reads known compensations: a CSV file with the columns `machine_id`, `date`, `parameter`, `change` and `unit`, one
+/// row for each parameter. The unit is that of the parameter: `um`, `arcsec`.
+///
+/// # Errors
+/// If the file cannot be read; with the line of what cannot be used.
+pub fn compensations(file: &Path) -> Result<Vec<Compensation>, FleetError> {
+    #[derive(serde::Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Row {
+        machine_id: String,
+        date: String,
+        parameter: String,
+        change: f64,
+        unit: String,
+    }
+    let name = file.display();
+    let fault = |line: usize, what: String| FleetError::Request(format!("{name}:{line}: {what}"));
+    let contents = std::fs::read(file).map_err(|source| FleetError::Read { path: name.to_string(), source })?;
+    let mut found: Vec<Compensation> = Vec::new();
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(contents.as_slice());
+    for (row, read) in reader.deserialize::<Row>().enumerate() {
+        let line = row + 2;
+        let row = read.map_err(|error| {
+            let expected = "columns machine_id, date, parameter, change, unit are expected";
+            fault(line, format!("{error}; {expected}"))
+        })?;
+        let days = date::interval(&row.date)
+            .ok_or_else(|| fault(line, format!("date `{}`: the form 2026-11-23T08:00:00 is expected", row.date)))?;
+        if !row.change.is_finite() {
+            return Err(fault(line, format!("change `{}`: a number is expected", row.change)));
+        }
+        let known = found.iter_mut().find(|known| known.machine_id == row.machine_id && known.days == days);
+        let change =
+            KnownChange { id: row.parameter, value: row.change, unit: row.unit, source: format!("{name}:{line}") };
+        match known {
+            Some(known) => known.changes.push(change),
+            None => found.push(Compensation { machine_id: row.machine_id, days, changes: vec![change] }),
+        }
+    }
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_of_unknown_machines_and_parameters_are_named() {
+        let row = |id: &str, line: usize| KnownChange {
+            id: id.into(),
+            source: format!("c.csv:{line}"),
+            ..KnownChange::default()
+        };
+        let table = |machine: &str, changes: Vec<KnownChange>| Compensation {
+            machine_id: machine.into(),
+            days: [0.0; 2],
+            changes,
+        };
+        let parameters = vec![("EX0C".to_string(), String::new(), String::new())];
+        let machine = MachineSessions { machine_id: "M".into(), parameters, ..MachineSessions::default() };
+        let known = BTreeSet::from(["M".to_string(), "OTHER".to_string()]);
+        let tables = [
+            table("M", vec![row("EX0C", 2), row("EX0B", 3)]),
+            table("MM", vec![row("EX0C", 4)]),
+            table("OTHER", vec![row("EX0C", 5)]),
+        ];
+        let found: Vec<String> = unknown_rows(&known, &[machine], &tables).into_iter().map(|row| row.file).collect();
+        assert_eq!(found, ["c.csv:3", "c.csv:4"]);
+    }
+
+    #[test]
+    fn a_clock_that_runs_backwards_takes_out_the_fewest_sessions() {
+        assert_eq!(longest_increasing(&[1.0, 2.0, 9.0, 3.0, 4.0]), [true, true, false, true, true]);
+        assert_eq!(longest_increasing(&[1.0, 1.0, 2.0]), [true; 3]);
+        assert!(longest_increasing(&[]).is_empty());
+    }
+
+    #[test]
+    fn set_up_parameters_and_phases_have_no_history() {
+        for (id, is) in [("EX0C", true), ("bar[A100]", false), ("EZC~C:h2.amplitude", true), ("EZC~C:h2.phase", false)]
+        {
+            assert_eq!(is_of_machine(id), is, "{id}");
+        }
+    }
+}

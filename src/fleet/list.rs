@@ -1,0 +1,68 @@
+//! Session files from files, folders and lists.
+
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use super::FleetError;
+
+/// The name of a session file in a folder that is searched.
+const SESSION_FILE: &str = "session.toml";
+
+/// Session files: each file itself, and every `session.toml` in or below each folder, in the order of their names. A
+/// file that is named twice counts once.
+///
+/// # Errors
+/// If a folder cannot be read or holds no `session.toml`.
+pub fn sessions(paths: &[PathBuf]) -> Result<Vec<PathBuf>, FleetError> {
+    let mut found = Vec::new();
+    for path in paths {
+        if path.is_dir() {
+            let before = found.len();
+            below(path, &mut found)?;
+            if found.len() == before {
+                return Err(FleetError::Request(format!(
+                    "{}: no {SESSION_FILE} lies in this folder or below; name session files",
+                    path.display()
+                )));
+            }
+        } else {
+            found.push(path.clone());
+        }
+    }
+    let mut known = std::collections::HashSet::new();
+    found.retain(|path| known.insert(path.clone()));
+    Ok(found)
+}
+
+/// The paths of a file with one path in each line; `-` is standard input. Empty lines and lines that begin with `#` do
+/// not count.
+///
+/// # Errors
+/// If the file cannot be read or is no UTF-8.
+pub fn listed(file: &Path) -> Result<Vec<PathBuf>, FleetError> {
+    let fault = |source| FleetError::Read { path: file.display().to_string(), source };
+    let mut text = String::new();
+    if file.as_os_str() == "-" {
+        std::io::stdin().read_to_string(&mut text).map_err(fault)?;
+    } else {
+        text = std::fs::read_to_string(file).map_err(fault)?;
+    }
+    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
+    Ok(lines.map(PathBuf::from).collect())
+}
+
+/// Adds the session files of a folder. A link to a folder is not followed, so that no circle is walked.
+fn below(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), FleetError> {
+    let fault = |source| FleetError::Read { path: folder.display().to_string(), source };
+    let mut entries = std::fs::read_dir(folder).map_err(fault)?.collect::<Result<Vec<_>, _>>().map_err(fault)?;
+    entries.sort_by_key(std::fs::DirEntry::file_name);
+    for entry in entries {
+        let kind = entry.file_type().map_err(fault)?;
+        if kind.is_dir() {
+            below(&entry.path(), found)?;
+        } else if entry.file_name() == SESSION_FILE {
+            found.push(entry.path());
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,47 @@
+//! Many sessions of many machines: the analysis of one session as the unit of work, and the folder of results.
+//!
+//! - [`unit`](mod@unit): fit, trace and validation of one session, with its [`options`]; its key is the SHA-256 of all inputs and
+//!   options;
+//! - [`record`]: the result of one session, as JSON has it;
+//! - [`store`]: a folder of records, each written completely or not at all;
+//! - [`study`]: simulated sessions and their analysis;
+//! - [`list`]: session files from files, folders and lists;
+//! - [`history`]: the machines of a folder over time; [`date`]: the date of a session.
+//!
+//! The unit of work depends on nothing but its inputs: any process may do it, at any time and in any order.
+
+pub mod date;
+pub mod history;
+pub mod list;
+pub mod options;
+pub mod record;
+pub mod store;
+pub mod study;
+pub mod unit;
+
+/// Why the results of a fleet cannot be read or written. A session that cannot be analysed is a record, not an error.
+#[derive(Debug, thiserror::Error)]
+pub enum FleetError {
+    /// A file or folder that cannot be read.
+    #[error("{path}: cannot be read: {source}")]
+    Read {
+        /// The file.
+        path: String,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A file or folder that cannot be written. Records that were written before remain.
+    #[error("{path}: cannot be written: {source}; free space and run again: finished results are kept")]
+    Write {
+        /// The file.
+        path: String,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The caller ended the work before the session was done.
+    #[error("interrupted before the session was done")]
+    Interrupted,
+    /// A request that cannot be met.
+    #[error("{0}")]
+    Request(String),
+}

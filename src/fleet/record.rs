@@ -1,0 +1,229 @@
+//! The result of one session, as JSON has it: what the tables of a data set and the history of a machine need.
+
+use std::collections::BTreeMap;
+
+use abbe_identify::results::{Covariance, EffectName, ParameterResult, Unobservable};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::options::Options;
+
+/// Version of the schema of records and of the tables that are made from them.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// The result of one session. It depends on the contents of the input files, the options and the version of the program
+/// alone.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Record {
+    /// Version of this schema.
+    pub schema_version: u32,
+    /// SHA-256 of all inputs, all options and the version of the program, in hexadecimal.
+    pub key: String,
+    /// Version of the program.
+    pub tool_version: String,
+    /// The options of the analysis.
+    pub options: Options,
+    /// Seed of all random numbers; it follows from `key`.
+    pub seed: u64,
+    /// Identifier of the session: `session_id` of `[about]`; `null` without one.
+    pub session_id: Option<String>,
+    /// Identifier of the machine: `serial_number` of `[about]`, else the name of the machine.
+    pub machine_id: String,
+    /// The machine; `null` if the session cannot be read.
+    pub machine: Option<MachineRecord>,
+    /// Date of the measurement: `date` of `[about]`; `null` without one.
+    pub date: Option<String>,
+    /// All notes of `[about]`.
+    pub about: BTreeMap<String, String>,
+    /// The input files: name relative to the folder of the session file, and SHA-256.
+    pub inputs: Vec<InputRecord>,
+    /// Why there is no result; `null` if there is one.
+    pub error: Option<ErrorRecord>,
+    /// Instrument: `ballbar`, `r-test`, …
+    pub instrument: Option<String>,
+    /// Number of readings without outliers.
+    pub readings: Option<usize>,
+    /// Number of readings excluded as outliers.
+    pub outliers: Option<usize>,
+    /// Standard deviation of one scalar reading, µm.
+    pub noise_um: Option<f64>,
+    /// Source of `noise_um`: `stated`, `repeats` or `residual`.
+    pub noise_source: Option<String>,
+    /// Verdict of the trace; `null` without a trace.
+    pub verdict: Option<String>,
+    /// Rms of the residual of the declared model, µm.
+    pub rms_before_um: Option<f64>,
+    /// Rms of the residual of the final model, µm: with the found effects if there was a trace.
+    pub rms_um: Option<f64>,
+    /// Rms of the residual over held-out readings of the final model, µm.
+    pub heldout_rms_um: Option<f64>,
+    /// Numerical rank of the final model.
+    pub rank: Option<usize>,
+    /// Number of parameters of the final model, set-up parameters included.
+    pub parameter_count: Option<usize>,
+    /// Number of set-up conflicts.
+    pub conflicts: Option<usize>,
+    /// The parameters of the final model: the identifiable ones in the order of `covariance`, then the others.
+    pub parameters: Vec<ParameterRecord>,
+    /// Covariance of the identifiable parameters: the lower triangle, row by row.
+    pub covariance: Vec<f64>,
+    /// The effects that the trace found.
+    pub effects: Vec<EffectRecord>,
+    /// The validation of the machine's model; `null` without a model.
+    pub validation: Option<ValidationRecord>,
+    /// Warnings in words.
+    pub warnings: Vec<String>,
+}
+
+/// The machine of a session.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MachineRecord {
+    /// Its name.
+    pub name: String,
+    /// Its structural code.
+    pub code: String,
+    /// SHA-256 of its axes with their geometry, in hexadecimal. Parameters of machines with different axes are not
+    /// comparable.
+    pub sha256: String,
+}
+
+/// An input file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct InputRecord {
+    /// Its name relative to the folder of the session file.
+    pub file: String,
+    /// SHA-256 of its contents, in hexadecimal; `null` if it cannot be read.
+    pub sha256: Option<String>,
+}
+
+/// Why a session has no result.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ErrorRecord {
+    /// Where it failed: `read`, `fit`, `trace` or `validate`.
+    pub stage: String,
+    /// What was found and what was expected.
+    pub message: String,
+}
+
+/// A parameter of the final model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ParameterRecord {
+    /// Identifier: `EX0C`, `bar[A100]`, `EZC~C:h2.amplitude`.
+    pub id: String,
+    /// Estimate, in `unit`; `null` if it is not identifiable.
+    pub value: Option<f64>,
+    /// Standard uncertainty, in `unit`; `null` if the parameter is not identifiable.
+    pub u: Option<f64>,
+    /// Unit of `value` and `u`: `um`, `arcsec`, …
+    pub unit: Option<String>,
+    /// What the parameter is, in words.
+    pub meaning: Option<String>,
+    /// Whether the readings identify it.
+    pub identifiable: bool,
+}
+
+/// A found effect.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct EffectRecord {
+    /// Identifier: `EZC~C:h2`.
+    pub id: String,
+    /// What moves.
+    pub component: String,
+    /// The quantity that the effect follows.
+    pub driver: String,
+    /// Shape of the dependence.
+    pub shape: String,
+    /// Order of a harmonic, degree of a polynomial.
+    pub order: Option<f64>,
+    /// The tests to which the effect is confined; empty for all tests.
+    pub tests: Vec<String>,
+    /// What the effect is, in words.
+    pub meaning: String,
+    /// Family of the effect in the library.
+    pub family: String,
+    /// Probability that the whole search finds as much in readings without structure.
+    pub p_value: f64,
+    /// Rms of what the effect explains in addition to the rest of the model, µm.
+    pub rms_gain_um: f64,
+    /// Whether no other effect of the library explains the readings equally well.
+    pub unique: bool,
+    /// Identifiers of the effects that explain the readings equally well, nearest first.
+    pub aliases: Vec<String>,
+}
+
+/// The validation of the machine's model on the session.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ValidationRecord {
+    /// SHA-256 of the model file, in hexadecimal.
+    pub model_sha256: String,
+    /// `holds`, `holds-in-range`, `degraded` or `does-not-hold`.
+    pub verdict: String,
+    /// Rms of the residual of the model, µm.
+    pub rms_um: f64,
+    /// The parameters that have moved, the most significant first.
+    pub moved: Vec<String>,
+}
+
+impl EffectRecord {
+    /// An effect with its aliases, by their identifiers.
+    pub fn new(id: String, result: &abbe_identify::results::EffectResult, aliases: Vec<String>) -> EffectRecord {
+        let EffectName { component, driver, shape, order, tests, meaning } = result.name.clone();
+        EffectRecord {
+            id,
+            component,
+            driver,
+            shape,
+            order,
+            tests,
+            meaning,
+            family: result.family.clone(),
+            p_value: result.p_value,
+            rms_gain_um: result.rms_gain_um,
+            unique: result.unique,
+            aliases,
+        }
+    }
+}
+
+impl Record {
+    /// Sets the parameters with their covariance. Parameters of a null-space direction that are not among the
+    /// identifiable ones have no value.
+    pub fn set_parameters(
+        &mut self,
+        parameters: &[ParameterResult],
+        covariance: &Covariance,
+        unobservable: &[Unobservable],
+    ) {
+        self.parameters = parameters
+            .iter()
+            .map(|parameter| ParameterRecord {
+                id: parameter.id.clone(),
+                value: Some(parameter.value),
+                u: Some(parameter.u),
+                unit: Some(parameter.unit.clone()),
+                meaning: Some(parameter.meaning.clone()),
+                identifiable: true,
+            })
+            .collect();
+        for id in unobservable.iter().flat_map(|direction| direction.combination.keys()) {
+            if !self.parameters.iter().any(|known| known.id == *id) {
+                self.parameters.push(ParameterRecord {
+                    id: id.clone(),
+                    value: None,
+                    u: None,
+                    unit: None,
+                    meaning: None,
+                    identifiable: false,
+                });
+            }
+        }
+        let lower = covariance.matrix.iter().enumerate().flat_map(|(row, entries)| entries.iter().take(row + 1));
+        self.covariance = lower.copied().collect();
+    }
+
+    /// Covariance of two identifiable parameters by their positions in `parameters`.
+    pub fn covariance_of(&self, a: usize, b: usize) -> Option<f64> {
+        let (low, high) = (a.min(b), a.max(b));
+        self.covariance.get(high * (high + 1) / 2 + low).copied()
+    }
+}

@@ -1,0 +1,244 @@
+//! A folder of records.
+//!
+//! `results/KEY.json` is the record of the inputs with this key. `sessions/HASH.json` names a session file and the key
+//! of its present contents; HASH is that of its absolute path. Each file is written beside its place and renamed, so
+//! that a reader finds the whole file or none, whoever writes at the same time. A file that is damaged counts as
+//! missing.
+
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::FleetError;
+use super::record::{Record, SCHEMA_VERSION};
+use super::study::draw::Draw;
+
+/// A folder of records.
+#[derive(Clone, Debug)]
+pub struct Store {
+    folder: PathBuf,
+}
+
+/// A session file and the record of its present contents.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Pointer {
+    /// Version of this schema.
+    pub schema_version: u32,
+    /// The session file, as it was named.
+    pub file: String,
+    /// Key of its record.
+    pub key: String,
+    /// Identifier of the session: `session_id` of `[about]`, else the session file.
+    pub session_id: String,
+    /// Identifier of the machine.
+    pub machine_id: String,
+    /// Why there is no result; `null` if there is one.
+    pub error: Option<String>,
+}
+
+impl Pointer {
+    /// A session file with its record.
+    pub fn new(file: &Path, record: &Record) -> Pointer {
+        let file = file.display().to_string();
+        Pointer {
+            schema_version: SCHEMA_VERSION,
+            session_id: record.session_id.clone().unwrap_or_else(|| file.clone()),
+            file,
+            key: record.key.clone(),
+            machine_id: record.machine_id.clone(),
+            error: record.error.as_ref().map(|error| error.message.clone()),
+        }
+    }
+}
+
+impl Store {
+    /// The folder, made if it does not exist.
+    ///
+    /// # Errors
+    /// If it cannot be made, or is a file.
+    pub fn open(folder: impl Into<PathBuf>) -> Result<Store, FleetError> {
+        let folder = folder.into();
+        std::fs::create_dir_all(&folder)
+            .map_err(|source| FleetError::Write { path: folder.display().to_string(), source })?;
+        Ok(Store { folder })
+    }
+
+    /// An existing folder of records.
+    ///
+    /// # Errors
+    /// If the folder holds no records.
+    pub fn existing(folder: impl Into<PathBuf>) -> Result<Store, FleetError> {
+        let folder = folder.into();
+        if !folder.join("sessions").is_dir() {
+            return Err(FleetError::Request(format!(
+                "{}: no results of `abbe run` are there; name its folder of --out",
+                folder.display()
+            )));
+        }
+        Ok(Store { folder })
+    }
+
+    /// The record of a key; `None` if it is missing, damaged or of another schema.
+    ///
+    /// # Errors
+    /// If an existing file cannot be read.
+    pub fn record(&self, key: &str) -> Result<Option<Record>, FleetError> {
+        let Some(contents) = read(&self.place("results", key))? else {
+            return Ok(None);
+        };
+        let record: Option<Record> = serde_json::from_slice(&contents).ok();
+        Ok(record.filter(|record| record.key == key && record.schema_version == SCHEMA_VERSION))
+    }
+
+    /// Writes a record.
+    ///
+    /// # Errors
+    /// If it cannot be written. Nothing is left of it then.
+    pub fn write(&self, record: &Record) -> Result<(), FleetError> {
+        self.put(&self.place("results", &record.key), record)
+    }
+
+    /// A draw of a study; `None` if it is missing or damaged.
+    ///
+    /// # Errors
+    /// If an existing file cannot be read.
+    pub fn draw(&self, study: &str, number: usize) -> Result<Option<Draw>, FleetError> {
+        let contents = read(&self.place_of_draw(study, number))?;
+        Ok(contents.and_then(|contents| serde_json::from_slice(&contents).ok()))
+    }
+
+    /// Writes a draw of a study.
+    ///
+    /// # Errors
+    /// If it cannot be written. Nothing is left of it then.
+    pub fn write_draw(&self, study: &str, draw: &Draw) -> Result<(), FleetError> {
+        self.put(&self.place_of_draw(study, draw.number), draw)
+    }
+
+    fn place_of_draw(&self, study: &str, number: usize) -> PathBuf {
+        let study = study.get(..16).unwrap_or(study);
+        self.folder.join("studies").join(study).join(format!("{:04}", number / 1000)).join(format!("{number:07}.json"))
+    }
+
+    /// Notes the record of a session file, unless the same note is there. A file has one note, whether it is named by
+    /// its relative or its absolute path.
+    ///
+    /// # Errors
+    /// If the note cannot be read or written.
+    pub fn note(&self, pointer: &Pointer) -> Result<(), FleetError> {
+        let file = std::path::absolute(&pointer.file).unwrap_or_else(|_| PathBuf::from(&pointer.file));
+        let digest = Sha256::digest(file.as_os_str().as_encoded_bytes());
+        let hash: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
+        let place = self.place("sessions", &hash);
+        let known = read(&place)?.and_then(|contents| serde_json::from_slice::<Pointer>(&contents).ok());
+        if known.as_ref() == Some(pointer) {
+            return Ok(());
+        }
+        self.put(&place, pointer)
+    }
+
+    /// The sessions of the folder, by file, and the notes that are damaged or of another version.
+    ///
+    /// # Errors
+    /// If the folder cannot be read.
+    pub fn sessions(&self) -> Result<(Vec<Pointer>, Vec<String>), FleetError> {
+        let (mut found, mut damaged) = (Vec::new(), Vec::new());
+        // A file system or its browser may leave files of its own (.DS_Store).
+        for shard in entries(&self.folder.join("sessions"))?.into_iter().filter(|shard| shard.is_dir()) {
+            for file in entries(&shard)? {
+                if file.extension().is_some_and(|extension| extension == "json") {
+                    let contents = read(&file)?.unwrap_or_default();
+                    let note: Option<Pointer> = serde_json::from_slice(&contents).ok();
+                    match note.filter(|note| note.schema_version == SCHEMA_VERSION) {
+                        Some(note) => found.push(note),
+                        None => damaged.push(file.display().to_string()),
+                    }
+                }
+            }
+        }
+        found.sort_by(|a, b| a.file.cmp(&b.file));
+        damaged.sort();
+        Ok((found, damaged))
+    }
+
+    /// The records of all sessions, by file, and the files whose record is missing (a killed run left them) with the
+    /// damaged notes.
+    ///
+    /// # Errors
+    /// If the folder cannot be read.
+    pub fn records(&self) -> Result<(Vec<(Pointer, Record)>, Vec<String>), FleetError> {
+        let (sessions, mut missing) = self.sessions()?;
+        let mut records = Vec::with_capacity(sessions.len());
+        for pointer in sessions {
+            match self.record(&pointer.key)? {
+                Some(record) => records.push((pointer, record)),
+                None => missing.push(pointer.file),
+            }
+        }
+        Ok((records, missing))
+    }
+
+    fn place(&self, kind: &str, name: &str) -> PathBuf {
+        self.folder.join(kind).join(name.get(..2).unwrap_or("00")).join(format!("{name}.json"))
+    }
+
+    fn put(&self, place: &Path, contents: &impl Serialize) -> Result<(), FleetError> {
+        let fault = |source| FleetError::Write { path: place.display().to_string(), source };
+        let mut text = serde_json::to_vec(contents).map_err(|error| fault(error.into()))?;
+        text.push(b'\n');
+        let folder = place.parent().unwrap_or(&self.folder);
+        std::fs::create_dir_all(folder).map_err(fault)?;
+        let mut builder = tempfile::Builder::new();
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(std::fs::Permissions::from_mode(0o666));
+        }
+        let mut file = builder.prefix(".").suffix(".part").tempfile_in(folder).map_err(fault)?;
+        file.write_all(&text).map_err(fault)?;
+        file.persist(place).map_err(|error| fault(error.error))?;
+        Ok(())
+    }
+}
+
+/// The contents of a file; `None` if there is none.
+fn read(file: &Path) -> Result<Option<Vec<u8>>, FleetError> {
+    match std::fs::read(file) {
+        Ok(contents) => Ok(Some(contents)),
+        Err(source) if source.kind() == ErrorKind::NotFound => Ok(None),
+        Err(source) => Err(FleetError::Read { path: file.display().to_string(), source }),
+    }
+}
+
+fn entries(folder: &Path) -> Result<Vec<PathBuf>, FleetError> {
+    let fault = |source| FleetError::Read { path: folder.display().to_string(), source };
+    std::fs::read_dir(folder).map_err(fault)?.map(|entry| entry.map(|entry| entry.path()).map_err(fault)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_has_one_note_and_stray_files_do_no_harm() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(folder.path()).unwrap();
+        let own = std::path::absolute("session.toml").unwrap();
+        for file in ["session.toml", "./session.toml", own.to_str().unwrap()] {
+            let (file, session_id) = (file.to_string(), file.to_string());
+            let (key, machine_id) = ("00".to_string(), "M".to_string());
+            let note = Pointer { schema_version: SCHEMA_VERSION, file, key, session_id, machine_id, error: None };
+            store.note(&note).unwrap();
+        }
+        std::fs::write(folder.path().join("sessions/.DS_Store"), "x").unwrap();
+        std::fs::create_dir_all(folder.path().join("sessions/zz")).unwrap();
+        std::fs::write(folder.path().join("sessions/zz/note.json"), "{").unwrap();
+        let (sessions, damaged) = store.sessions().unwrap();
+        assert_eq!((sessions.len(), damaged.len()), (1, 1));
+        let (records, missing) = store.records().unwrap();
+        assert_eq!((records.len(), missing.len()), (0, 2));
+    }
+}

@@ -1,0 +1,294 @@
+//! One draw of a study: a simulated session, and what the analysis makes of it.
+
+use abbe_identify::IdentifyError;
+use abbe_identify::fit;
+use abbe_identify::noise::{Noise as NoiseModel, NoiseSource};
+use abbe_identify::parameters::Role;
+use abbe_identify::problem::Problem;
+use abbe_identify::quantity::Given;
+use abbe_identify::results::ParameterResult;
+use abbe_identify::simulate::{Simulation, simulate};
+use abbe_identify::trace::screening::screened_effects;
+use abbe_identify::trace::{Progress, TraceOptions, trace};
+use abbe_model::effect::Effect;
+use abbe_model::session::Session;
+use rand::{Rng, RngExt, SeedableRng};
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::file::{Analysis, Combinations, Noise, Study};
+
+/// The smallest significant size, standard deviations: 0.5 % two-sided.
+const SIGNIFICANT: f64 = 2.807;
+/// Least share of the squared change of the readings that the plan's parameters do not absorb. Below it, the effect is
+/// confounded with them.
+const SURVIVES: f64 = 1e-4;
+/// Half of a 95 % interval, standard deviations.
+const INTERVAL: f64 = 1.96;
+/// Smallest and largest outlier, µm.
+const OUTLIER_UM: [f64; 2] = [5.0, 30.0];
+
+/// A draw.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Draw {
+    /// Its number.
+    pub number: usize,
+    /// Name of the plan.
+    pub plan: String,
+    /// Name of the effect.
+    pub effect: String,
+    /// Name of the noise.
+    pub noise: String,
+    /// Identifier of the true effect; `null` without one.
+    pub truth: Option<String>,
+    /// Why there is no result; `null` if there is one.
+    pub error: Option<String>,
+    /// Verdict of the trace.
+    pub verdict: Option<String>,
+    /// Whether the true effect was found: named, or among the aliases of a found effect.
+    pub found: bool,
+    /// Whether the found effect has the name of the true one.
+    pub named: bool,
+    /// Effects that were claimed beside the true one.
+    pub false_claims: usize,
+    /// 95 % intervals of the location errors that contain the true value.
+    pub covered: usize,
+    /// 95 % intervals of the location errors.
+    pub intervals: usize,
+    /// Sum of the squares of (estimate − true value)/u of the location errors.
+    pub pull_squares: f64,
+    /// Mean standard uncertainty of the location errors, whatever their units.
+    pub mean_u: f64,
+    /// Rms of the residual, µm.
+    pub rms_um: f64,
+}
+
+impl Study {
+    /// Number of draws.
+    pub fn draws(&self) -> usize {
+        let file = &self.file;
+        match file.study.combinations {
+            Combinations::Grid => file.study.draws * file.plan.len() * file.effect.len() * file.noise.len(),
+            Combinations::Random => file.study.draws,
+        }
+    }
+
+    /// Makes a draw. `goes_on` returns whether to continue; a draw that was interrupted is `None`.
+    pub fn draw(&self, number: usize, goes_on: &(dyn Fn() -> bool + Sync)) -> Option<Draw> {
+        // The key holds the seed of the study. Streams of one seed are correlated; hashes are not.
+        let mut digest = Sha256::new();
+        digest.update(&self.key);
+        digest.update((number as u64).to_le_bytes());
+        let mut random = Pcg64::from_seed(digest.finalize().into());
+        let [plan, effect, noise] = self.combination(number, &mut random);
+        let mut draw = Draw {
+            number,
+            plan: self.file.plan[plan].name.clone(),
+            effect: self.file.effect[effect].name.clone(),
+            noise: self.file.noise[noise].name.clone(),
+            ..Draw::default()
+        };
+        let made = self.made(&mut draw, [plan, effect, noise], &mut random, goes_on);
+        if !goes_on() {
+            return None;
+        }
+        draw.error = made.err().map(|error| error.to_string());
+        Some(draw)
+    }
+
+    fn combination(&self, number: usize, random: &mut impl Rng) -> [usize; 3] {
+        let counts = [self.file.plan.len(), self.file.effect.len(), self.file.noise.len()];
+        match self.file.study.combinations {
+            Combinations::Random => counts.map(|count| random.random_range(0..count)),
+            Combinations::Grid => {
+                let cell = number / self.file.study.draws;
+                [cell / (counts[1] * counts[2]), cell / counts[2] % counts[1], cell % counts[2]]
+            }
+        }
+    }
+
+    fn made(
+        &self,
+        draw: &mut Draw,
+        [plan, effect, noise]: [usize; 3],
+        random: &mut Pcg64,
+        goes_on: &(dyn Fn() -> bool + Sync),
+    ) -> Result<(), IdentifyError> {
+        let session = &self.plans[plan];
+        let (stated, noise) = (&self.file.effect[effect], &self.file.noise[noise]);
+        let truth =
+            if stated.library { Some(of_library(session, random)?) } else { self.effects[plan][effect].clone() };
+        let mut given: Vec<Given> = Vec::new();
+        for parameter in parameters(session)?.iter().filter(|parameter| parameter.role == Role::Error) {
+            let sigma = match parameter.unit.name.as_str() {
+                "arcsec" => self.file.study.location_arcsec,
+                _ => self.file.study.location_um,
+            };
+            let normal: f64 = StandardNormal.sample(random);
+            given.push(value(&parameter.id, sigma * normal, &parameter.unit.name));
+        }
+        let locations = given.clone();
+        let mut machine = session.clone();
+        if let Some(truth) = &truth {
+            draw.truth = Some(truth.id());
+            machine.effects.push(truth.clone());
+            given.extend(coefficients(session, &machine, stated.size, noise, random)?);
+        }
+        let exact = Simulation { given, noise_mm: Some(0.0), draw_setups: true, seed: random.random() };
+        machine.resolution_mm = None;
+        let mut simulated = simulate(&machine, &exact)?;
+        for readings in &mut simulated.readings {
+            add_noise(readings, noise, session.resolution_mm, random);
+        }
+        let measured = session.clone().with_readings(simulated.readings);
+        self.analyse(draw, &measured, &locations, random.random::<u32>().into(), goes_on)
+    }
+
+    fn analyse(
+        &self,
+        draw: &mut Draw,
+        session: &Session,
+        truth: &[Given],
+        seed: u64,
+        goes_on: &(dyn Fn() -> bool + Sync),
+    ) -> Result<(), IdentifyError> {
+        match self.file.study.analysis {
+            Analysis::Fit => {
+                let (problem, found) = fit::prepare(session, seed)?;
+                let result = fit::report(&problem, &found)?;
+                draw.rms_um = result.rms_um;
+                draw.compare(&result.parameters, truth);
+            }
+            Analysis::Trace => {
+                let options = TraceOptions { seed, ..TraceOptions::default() };
+                let found = trace(session, &options, &|_: Progress| goes_on())?;
+                draw.verdict = Some(found.result.verdict.clone());
+                draw.rms_um = found.result.after.rms_um;
+                draw.compare(&found.result.after.parameters, truth);
+                let is_truth = |effect: &Effect| draw.truth.as_ref().is_some_and(|truth| *truth == effect.id());
+                draw.named = found.effects.iter().any(is_truth);
+                let hits = found.effects.iter().zip(&found.alias_effects);
+                let hit = hits.filter(|(effect, aliases)| is_truth(effect) || aliases.iter().any(is_truth)).count();
+                draw.found = hit > 0;
+                draw.false_claims = found.effects.len() - hit.min(1);
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Draw {
+    /// Compares estimates with the true values.
+    fn compare(&mut self, parameters: &[ParameterResult], truth: &[Given]) {
+        for truth in truth {
+            let Some(found) = parameters.iter().find(|found| found.id == truth.id && found.u > 0.0) else { continue };
+            let pull = (found.value - truth.value) / found.u;
+            self.intervals += 1;
+            self.covered += usize::from(pull.abs() <= INTERVAL);
+            self.pull_squares += pull * pull;
+            self.mean_u += found.u;
+        }
+        self.mean_u /= self.intervals.max(1) as f64;
+    }
+}
+
+fn value(id: &str, value: f64, unit: &str) -> Given {
+    Given { id: id.to_string(), value, unit: unit.to_string() }
+}
+
+/// The parameters of a session.
+fn parameters(session: &Session) -> Result<Vec<abbe_identify::parameters::Parameter>, IdentifyError> {
+    // No parameter depends on the noise.
+    Ok(Problem::new(session, NoiseModel::white(1e-3, NoiseSource::Stated), 1)?.parameters.list)
+}
+
+/// An effect of the library that the plan observes.
+fn of_library(session: &Session, random: &mut impl Rng) -> Result<Effect, IdentifyError> {
+    let mut effects = screened_effects(session, &TraceOptions::default())?;
+    effects.retain(|effect| effect.observable);
+    if effects.is_empty() {
+        return Err(IdentifyError::Request("the plan observes no effect of the library".into()));
+    }
+    // Families are equally probable, whatever their number of effects.
+    let mut families: Vec<usize> = effects.iter().map(|effect| effect.family).collect();
+    families.sort_unstable();
+    families.dedup();
+    let family = families[random.random_range(0..families.len())];
+    effects.retain(|effect| effect.family == family);
+    Ok(effects.swap_remove(random.random_range(0..effects.len())).effect)
+}
+
+/// Coefficients of the last effect of a machine, in a random direction and of the stated size: the χ² that it adds to
+/// the residual of the plan's parameters.
+fn coefficients(
+    plan: &Session,
+    machine: &Session,
+    size: f64,
+    noise: &Noise,
+    random: &mut impl Rng,
+) -> Result<Vec<Given>, IdentifyError> {
+    let own = machine.effects.len() - 1;
+    let coefficients: Vec<(String, f64, String)> = parameters(machine)?
+        .into_iter()
+        .filter(|parameter| matches!(parameter.role, Role::Coefficient { effect, .. } if effect == own))
+        .map(|parameter| {
+            let normal: f64 = StandardNormal.sample(random);
+            (parameter.id, normal * parameter.unit.display_per_internal * 1e-3, parameter.unit.name)
+        })
+        .collect();
+    let scaled = |factor: f64| -> Vec<Given> {
+        coefficients.iter().map(|(id, number, unit)| value(id, factor * number, unit)).collect()
+    };
+    let exact = Simulation { given: scaled(1.0), noise_mm: Some(0.0), ..Simulation::default() };
+    let mut exact_machine = machine.clone();
+    exact_machine.resolution_mm = None;
+    let readings = simulate(&exact_machine, &exact)?.readings;
+    let observed = readings.iter().flat_map(|readings| &readings.observed);
+    let nominal = plan.tests.iter().flat_map(|test| test.readings.iter().flat_map(|readings| &readings.observed));
+    let change: f64 = observed.zip(nominal).map(|(with, without)| (with - without).powi(2)).sum();
+    let measured = Session { resolution_mm: None, ..plan.clone().with_readings(readings) };
+    // The model has no noise to estimate: that of the study is stated.
+    let noise_mm = noise.um.max(1e-3) * 1e-3;
+    let problem = Problem::new(&measured, NoiseModel::white(noise_mm, NoiseSource::Stated), 1)?;
+    let chi_square = fit::fit(&problem, None)?.chi_square;
+    // Slow structure stands out less from autocorrelated noise: by the spectral density at frequency zero.
+    let inflation = (1.0 + noise.autocorrelation) / (1.0 - noise.autocorrelation);
+    let strength = (chi_square / inflation).sqrt();
+    if strength.is_nan() || chi_square <= SURVIVES * change / (noise_mm * noise_mm) || strength <= 0.0 {
+        return Err(IdentifyError::Request("the plan does not observe the effect".into()));
+    }
+    Ok(scaled(size * SIGNIFICANT / strength))
+}
+
+/// Adds noise to the readings of a test, run by run, and rounds them.
+fn add_noise(
+    readings: &mut abbe_model::session::readings::Readings,
+    noise: &Noise,
+    resolution_mm: Option<f64>,
+    random: &mut impl Rng,
+) {
+    let coordinates = readings.coordinates.max(1);
+    let innovation = (1.0 - noise.autocorrelation * noise.autocorrelation).sqrt();
+    let mut last = vec![0.0; coordinates];
+    for row in 0..readings.observed.len() / coordinates {
+        let begins = row == 0 || readings.run.get(row) != readings.run.get(row - 1);
+        let outlier = random.random::<f64>() < noise.outlier_share;
+        for (coordinate, last) in last.iter_mut().enumerate() {
+            let normal: f64 = StandardNormal.sample(random);
+            *last = if begins { normal } else { noise.autocorrelation * *last + innovation * normal };
+            let mut um = noise.um * *last;
+            if outlier {
+                let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
+                um += sign * random.random_range(OUTLIER_UM[0]..OUTLIER_UM[1]);
+            }
+            let value = &mut readings.observed[row * coordinates + coordinate];
+            *value += um * 1e-3;
+            if let Some(step) = resolution_mm {
+                *value = (*value / step).round() * step;
+            }
+        }
+    }
+}

@@ -1,0 +1,215 @@
+//! The study file.
+
+use std::path::{Path, PathBuf};
+
+use abbe_identify::simulate::{Simulation, simulate};
+use abbe_model::effect::Effect;
+use abbe_model::files::toml::parts;
+use abbe_model::files::{self, ReadOptions};
+use abbe_model::session::Session;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::fleet::FleetError;
+
+/// A study as its file has it.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StudyFile {
+    /// What is simulated and analysed.
+    pub study: Head,
+    /// The set-ups.
+    pub plan: Vec<Plan>,
+    /// The effects that the simulated machine has.
+    pub effect: Vec<TrueEffect>,
+    /// The noise.
+    pub noise: Vec<Noise>,
+}
+
+/// What is simulated and analysed.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Head {
+    /// The analysis.
+    pub analysis: Analysis,
+    /// Draws of each combination of plan, effect and noise (`grid`), or of all together (`random`).
+    pub draws: usize,
+    /// Whether all combinations are drawn, or each draw chooses one.
+    #[serde(default)]
+    pub combinations: Combinations,
+    /// Seed of all random numbers.
+    #[serde(default = "one")]
+    pub seed: u64,
+    /// Standard deviation of the drawn position errors, µm.
+    #[serde(default)]
+    pub location_um: f64,
+    /// Standard deviation of the drawn orientation errors, arcsec.
+    #[serde(default)]
+    pub location_arcsec: f64,
+}
+
+fn one() -> u64 {
+    1
+}
+
+/// The analysis of a study.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Analysis {
+    /// The fit of the plan's parameters.
+    Fit,
+    /// The search for effects.
+    Trace,
+}
+
+/// The combinations that are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Combinations {
+    /// All of them.
+    #[default]
+    Grid,
+    /// One at random for each draw.
+    Random,
+}
+
+/// A set-up.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    /// Its name in the results.
+    pub name: String,
+    /// The session file, relative to the study file. Tests without data are simulated at their planned states.
+    pub session: PathBuf,
+}
+
+/// An effect of the simulated machine. Only a name: no effect.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TrueEffect {
+    /// Its name in the results.
+    pub name: String,
+    /// Size over the smallest significant one: the root of the χ² that the effect adds to the residual of the plan's
+    /// parameters, over 2.807 (0.5 % two-sided).
+    #[serde(default)]
+    pub size: f64,
+    /// `true`: each draw chooses an effect of the library that the plan can observe.
+    #[serde(default)]
+    pub library: bool,
+    /// The effect otherwise, with the keys of `[[effect]]` of a session file.
+    #[serde(default)]
+    #[schemars(with = "Option<serde_json::Value>")]
+    pub effect: Option<toml::Table>,
+}
+
+/// The noise of simulated readings.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Noise {
+    /// Its name in the results.
+    pub name: String,
+    /// Standard deviation of a reading, µm.
+    pub um: f64,
+    /// Correlation of neighbouring readings of a run.
+    #[serde(default)]
+    pub autocorrelation: f64,
+    /// Share of outliers: 5 to 30 µm of either sign.
+    #[serde(default)]
+    pub outlier_share: f64,
+}
+
+/// A study with its plans.
+pub struct Study {
+    /// The file.
+    pub file: StudyFile,
+    /// The plans with the readings of the nominal machine.
+    pub plans: Vec<Session>,
+    /// The declared effect of each entry of `effect` in each plan; `None` for no effect or one of the library.
+    pub effects: Vec<Vec<Option<Effect>>>,
+    /// SHA-256 of the study file, the plans and the version of the program, in hexadecimal.
+    pub key: String,
+}
+
+/// Reads a study and its plans.
+///
+/// # Errors
+/// With file and line or key of what cannot be used.
+pub fn read(path: &Path) -> Result<Study, FleetError> {
+    let text = std::fs::read_to_string(path)
+        .map_err(|source| FleetError::Read { path: path.display().to_string(), source })?;
+    let fault = |what: String| FleetError::Request(format!("{}: {what}", path.display()));
+    let file: StudyFile = toml::from_str(&text).map_err(|error| fault(error.to_string()))?;
+    check(&file).map_err(fault)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut digest = Sha256::new();
+    digest.update(concat!("abbe study 2 ", env!("CARGO_PKG_VERSION"), "\n"));
+    digest.update(&text);
+    let (mut plans, mut effects) = (Vec::new(), Vec::new());
+    for plan in &file.plan {
+        let place = folder.join(&plan.session);
+        let options = ReadOptions { allow_outside: true, ..ReadOptions::default() };
+        let (session, sources) =
+            files::session_with_sources(&place, &options).map_err(|error| FleetError::Request(error.to_string()))?;
+        for stamp in &sources.files {
+            let contents = std::fs::read(&stamp.file)
+                .map_err(|source| FleetError::Read { path: stamp.file.display().to_string(), source })?;
+            digest.update(Sha256::digest(contents));
+        }
+        effects.push(file.effect.iter().map(|effect| declared(path, effect, &session)).collect::<Result<_, _>>()?);
+        let nominal = Simulation { noise_mm: Some(0.0), ..Simulation::default() };
+        let drawn = simulate(&session, &nominal).map_err(|error| fault(format!("plan `{}`: {error}", plan.name)))?;
+        plans.push(session.with_readings(drawn.readings));
+    }
+    let key = digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+    Ok(Study { file, plans, effects, key })
+}
+
+/// The declared effect of an entry in a plan.
+fn declared(path: &Path, effect: &TrueEffect, session: &Session) -> Result<Option<Effect>, FleetError> {
+    let Some(keys) = &effect.effect else { return Ok(None) };
+    let table = toml::Table::from_iter([("effect".to_string(), toml::Value::Array(vec![keys.clone().into()]))]);
+    let tests: Vec<String> = session.tests.iter().map(|test| test.name.clone()).collect();
+    let read = parts::effects_of_text(path, &table.to_string(), &session.machine, session.instrument, &tests);
+    let wrong = |what: String| FleetError::Request(format!("{}: effect `{}`: {what}", path.display(), effect.name));
+    let mut effects = read.map_err(|error| wrong(error.to_string()))?;
+    Ok(effects.pop())
+}
+
+fn check(file: &StudyFile) -> Result<(), String> {
+    let head = &file.study;
+    if !(1..=10_000_000).contains(&head.draws) {
+        return Err(format!("draws = {}: 1 to 10,000,000 are expected", head.draws));
+    }
+    for (name, list) in [("plan", file.plan.len()), ("effect", file.effect.len()), ("noise", file.noise.len())] {
+        if list == 0 {
+            return Err(format!("no [[{name}]]: at least one is expected"));
+        }
+    }
+    for (name, value) in [("location_um", head.location_um), ("location_arcsec", head.location_arcsec)] {
+        if !(0.0..=1e6).contains(&value) {
+            return Err(format!("{name} = {value}: 0 to 1e6 is expected"));
+        }
+    }
+    for noise in &file.noise {
+        let usable = (0.0..=1e6).contains(&noise.um)
+            && (0.0..1.0).contains(&noise.autocorrelation)
+            && (0.0..1.0).contains(&noise.outlier_share);
+        if !usable {
+            return Err(format!(
+                "noise `{}`: um from 0 to 1e6, autocorrelation and outlier_share from 0 to below 1 are expected",
+                noise.name
+            ));
+        }
+    }
+    for effect in &file.effect {
+        if effect.library && effect.effect.is_some() {
+            return Err(format!("effect `{}`: either library = true or a table `effect` is expected", effect.name));
+        }
+        let has_effect = effect.library || effect.effect.is_some();
+        if has_effect != (effect.size > 0.0) || !(0.0..=1e6).contains(&effect.size) {
+            return Err(format!("effect `{}`: an effect has a size above 0, and no effect has none", effect.name));
+        }
+    }
+    Ok(())
+}

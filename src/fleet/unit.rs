@@ -1,0 +1,278 @@
+//! The unit of work: fit, trace and validation of one session.
+//!
+//! Its key is the SHA-256 of the contents of all inputs, of the options and of the version of the program. Seeds follow
+//! from the key. A record is therefore the same whoever computes it, and is computed once.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+
+use abbe_identify::IdentifyError;
+use abbe_identify::results::{FitResult, TraceResult};
+use abbe_identify::trace::{Progress, TraceOptions, trace};
+use abbe_identify::validate::validate;
+use abbe_identify::{fit, model_file};
+use abbe_model::files::toml::parts::machine_text;
+use abbe_model::files::{self, ReadOptions, SourceMap};
+use abbe_model::session::Session;
+use sha2::{Digest, Sha256};
+
+use super::FleetError;
+use super::options::Options;
+use super::record::{EffectRecord, ErrorRecord, InputRecord, MachineRecord, Record, SCHEMA_VERSION, ValidationRecord};
+use super::store::{Pointer, Store};
+use crate::present::report::provenance;
+
+/// Bits of a seed: every reader of JSON keeps an integer of this size.
+const SEED_BITS: u32 = 52;
+
+/// Where the unit of work finds its inputs.
+#[derive(Clone, Debug, Default)]
+pub struct Places {
+    /// Folder of the models: `MACHINE.json` is the model of the machine with this identifier.
+    pub models: Option<PathBuf>,
+    /// Allow sessions to read files outside their own folders.
+    pub allow_outside: bool,
+}
+
+/// What became of a session.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Done {
+    /// Its record was computed.
+    Computed,
+    /// Its record was there.
+    Kept,
+}
+
+/// A session as it was read, or why it was not.
+struct Inputs {
+    read: Result<(Session, SourceMap), String>,
+    record: Record,
+    model: Option<(PathBuf, String)>,
+}
+
+/// Analyses a session if the store has no record of it, and notes it in the store.
+///
+/// # Errors
+/// If the store cannot be read or written, or `goes_on` returned `false`. A session that cannot be analysed is a record
+/// with its error.
+pub fn run(
+    file: &Path,
+    options: &Options,
+    places: &Places,
+    store: &Store,
+    goes_on: &(dyn Fn() -> bool + Sync),
+) -> Result<(Done, Pointer), FleetError> {
+    let inputs = inputs(file, options, places);
+    let key = inputs.record.key.clone();
+    let (done, record) = match store.record(&key)? {
+        Some(record) => (Done::Kept, record),
+        None => {
+            let record = record(inputs, goes_on)?;
+            store.write(&record)?;
+            (Done::Computed, record)
+        }
+    };
+    let pointer = Pointer::new(file, &record);
+    store.note(&pointer)?;
+    Ok((done, pointer))
+}
+
+/// The record of a session, without a store.
+///
+/// # Errors
+/// [`FleetError::Interrupted`] if `goes_on` returned `false`.
+pub fn analyse(
+    file: &Path,
+    options: &Options,
+    places: &Places,
+    goes_on: &(dyn Fn() -> bool + Sync),
+) -> Result<Record, FleetError> {
+    record(inputs(file, options, places), goes_on)
+}
+
+fn hexadecimal(digest: impl AsRef<[u8]>) -> String {
+    digest.as_ref().iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Reads a session and what its key follows from.
+fn inputs(file: &Path, options: &Options, places: &Places) -> Inputs {
+    let read_options = ReadOptions { allow_outside: places.allow_outside, ..ReadOptions::default() };
+    let mut record = Record {
+        schema_version: SCHEMA_VERSION,
+        tool_version: env!("CARGO_PKG_VERSION").to_string(),
+        options: options.clone(),
+        ..Record::default()
+    };
+    let mut model = None;
+    let mut read = files::session_with_sources(file, &read_options).map_err(|error| error.to_string());
+    if let Ok((session, sources)) = &read {
+        describe(&mut record, session);
+        match input_records(sources) {
+            Ok(inputs) => record.inputs = inputs,
+            Err(fault) => read = Err(fault),
+        }
+        model = model_of(&record.machine_id, places);
+    }
+    if record.inputs.is_empty() {
+        // A session that cannot be read is known by its own text and by what is wrong with it, so that a change of
+        // another file is noticed.
+        let sha256 = std::fs::read(file).ok().map(|contents| hexadecimal(Sha256::digest(contents)));
+        record.inputs = vec![InputRecord { file: name_of(file), sha256 }];
+    }
+    let stated = serde_json::json!({
+        "schema_version": SCHEMA_VERSION,
+        "tool_version": record.tool_version,
+        "options": options,
+        "inputs": record.inputs,
+        "model": model.as_ref().map(|(_, sha256)| sha256),
+        "error": read.as_ref().err(),
+    });
+    let digest = Sha256::digest(stated.to_string());
+    record.seed = digest.iter().take(8).fold(0, |seed, byte| seed << 8 | u64::from(*byte)) >> (64 - SEED_BITS);
+    record.key = hexadecimal(digest);
+    Inputs { read, record, model }
+}
+
+fn name_of(file: &Path) -> String {
+    file.file_name().map_or_else(|| file.display().to_string(), |name| name.to_string_lossy().into_owned())
+}
+
+/// The files of a session with their checksums, by names that do not depend on where the folder lies.
+fn input_records(sources: &SourceMap) -> Result<Vec<InputRecord>, String> {
+    let folder = sources.file.parent().unwrap_or(Path::new(""));
+    let record = |stamp| {
+        let input = provenance::stamped(stamp)?;
+        let name = Path::new(&input.path).strip_prefix(folder).map(|name| name.display().to_string());
+        Ok(InputRecord { file: name.unwrap_or_else(|_| name_of(input.path.as_ref())), sha256: Some(input.sha256) })
+    };
+    sources.files.iter().map(record).collect()
+}
+
+/// Notes machine, date and identifiers of a session.
+fn describe(record: &mut Record, session: &Session) {
+    record.about = session.about.iter().cloned().collect();
+    let note = |name: &str| record.about.get(name).filter(|text| !text.trim().is_empty()).cloned();
+    let machine = &session.machine;
+    record.machine_id = note("serial_number").unwrap_or_else(|| machine.name.clone());
+    record.date = note("date");
+    record.session_id = note("session_id");
+    // Other names of the same axes are the same machine.
+    let geometry = machine_text(machine);
+    let geometry: Vec<&str> = geometry.lines().filter(|line| !line.starts_with("name")).collect();
+    record.machine = Some(MachineRecord {
+        name: machine.name.clone(),
+        code: machine.code(),
+        sha256: hexadecimal(Sha256::digest(geometry.join("\n"))),
+    });
+    record.instrument = Some(session.instrument.word().to_string());
+}
+
+/// The model of a machine and its checksum. Signs that no file name should have are `_`.
+fn model_of(machine_id: &str, places: &Places) -> Option<(PathBuf, String)> {
+    let plain = |sign: char| if sign.is_alphanumeric() || "-_. ".contains(sign) { sign } else { '_' };
+    let file = places.models.as_ref()?.join(format!("{}.json", machine_id.chars().map(plain).collect::<String>()));
+    let contents = std::fs::read(&file).ok()?;
+    Some((file, hexadecimal(Sha256::digest(contents))))
+}
+
+/// Analyses what was read.
+fn record(inputs: Inputs, goes_on: &(dyn Fn() -> bool + Sync)) -> Result<Record, FleetError> {
+    let Inputs { read, mut record, model } = inputs;
+    let failed = |record: Record, stage: &str, message: String| {
+        let error = Some(ErrorRecord { stage: stage.to_string(), message });
+        Ok(Record { error, ..record })
+    };
+    let session = match read {
+        Ok((session, _)) => session,
+        Err(message) => return failed(record, "read", message),
+    };
+    let stage = if record.options.no_trace { "fit" } else { "trace" };
+    // A fault of the program in one session must not end the others.
+    let analysed = catch_unwind(AssertUnwindSafe(|| identify(&mut record, &session, goes_on)));
+    match analysed {
+        _ if !goes_on() => return Err(FleetError::Interrupted),
+        Ok(Ok(())) => {}
+        Ok(Err(error)) => return failed(record, stage, error.to_string()),
+        Err(_) => return failed(record, stage, FAULT.to_string()),
+    }
+    if let Some((file, sha256)) = model {
+        let validated = catch_unwind(AssertUnwindSafe(|| validate(&model_file::read(&file)?, &session)));
+        match validated {
+            Ok(Ok(validation)) => {
+                let result = validation.result;
+                record.validation = Some(ValidationRecord {
+                    model_sha256: sha256,
+                    verdict: result.verdict,
+                    rms_um: result.model.rms.rms_um,
+                    moved: result.moved.into_iter().map(|moved| moved.id).collect(),
+                });
+                record.warnings.extend(result.warnings);
+            }
+            // The estimates do not depend on the model: they stay.
+            Ok(Err(error)) => return failed(record, "validate", error.to_string()),
+            Err(_) => return failed(record, "validate", FAULT.to_string()),
+        }
+    }
+    Ok(record)
+}
+
+const FAULT: &str = "a fault of abbe: the computation broke off; please report it with the session";
+
+/// Fit and trace.
+fn identify(record: &mut Record, session: &Session, goes_on: &(dyn Fn() -> bool + Sync)) -> Result<(), IdentifyError> {
+    if record.options.no_trace {
+        let (problem, found) = fit::prepare(session, record.seed)?;
+        set_fit(record, &fit::report(&problem, &found)?);
+        return Ok(());
+    }
+    let options = TraceOptions {
+        seed: record.seed,
+        max_effects: record.options.max_effects,
+        only: record.options.only.clone(),
+        exclude: record.options.exclude.clone(),
+        ..TraceOptions::default()
+    };
+    let found = trace(session, &options, &|_: Progress| goes_on())?;
+    record.effects = found
+        .effects
+        .iter()
+        .zip(&found.alias_effects)
+        .zip(&found.result.effects)
+        .map(|((effect, aliases), result)| {
+            EffectRecord::new(effect.id(), result, aliases.iter().map(abbe_model::effect::Effect::id).collect())
+        })
+        .collect();
+    set_trace(record, &found.result);
+    Ok(())
+}
+
+fn set_fit(record: &mut Record, fit: &FitResult) {
+    record.readings = Some(fit.readings);
+    record.outliers = Some(fit.outliers.len());
+    record.noise_um = Some(fit.noise_um);
+    record.noise_source = Some(fit.noise_source.clone());
+    record.rms_before_um = Some(fit.rms_um);
+    record.rms_um = Some(fit.rms_um);
+    record.heldout_rms_um = Some(fit.heldout_rms_um);
+    record.rank = Some(fit.rank);
+    record.parameter_count = Some(fit.parameter_count);
+    record.conflicts = Some(fit.plausibility.conflicts.len());
+    record.warnings.clone_from(&fit.warnings);
+    record.set_parameters(&fit.parameters, &fit.covariance, &fit.unobservable);
+}
+
+fn set_trace(record: &mut Record, trace: &TraceResult) {
+    record.readings = Some(trace.readings);
+    record.outliers = Some(trace.outliers.len());
+    record.noise_um = Some(trace.noise_um);
+    record.noise_source = Some(trace.noise_source.clone());
+    record.verdict = Some(trace.verdict.clone());
+    record.rms_before_um = Some(trace.before.rms_um);
+    record.rms_um = Some(trace.after.rms_um);
+    record.heldout_rms_um = Some(trace.after.heldout_rms_um);
+    record.rank = Some(trace.after.rank);
+    record.parameter_count = Some(trace.after.parameter_count);
+    record.conflicts = Some(trace.plausibility.conflicts.len());
+    record.warnings.clone_from(&trace.warnings);
+    record.set_parameters(&trace.after.parameters, &trace.after.covariance, &trace.unobservable);
+}
