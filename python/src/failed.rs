@@ -81,9 +81,5 @@ fn exception(py: Python<'_>, failed: &Failed) -> PyResult<PyErr> {
 
 /// The column of a location, from 1, if its file still has such a line.
 fn column(location: &Location) -> Option<usize> {
-    let start = location.span.as_ref()?.start;
-    let text = std::fs::read(&location.file).ok()?;
-    let before = text.get(..start)?;
-    let line = before.rsplit(|byte| *byte == b'\n').next().unwrap_or(before);
-    Some(String::from_utf8_lossy(line).chars().count() + 1)
+    location.column(&std::fs::read(&location.file).ok()?)
 }

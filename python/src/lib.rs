@@ -4,11 +4,13 @@
 //! - [`machine`], [`session`], [`fit`], [`trace`], [`plan`], [`equation`], [`model`]: one file per handle;
 //! - [`keywords`]: keywords as the keys of a session file; [`pickle`]: the state of a session;
 //! - [`work`]: computations without the GIL, with Ctrl-C, progress and a bound on the threads;
+//! - [`fleet`]: units of work of many sessions;
 //! - [`show`]: tables, figures and reports; [`failed`]: errors as exceptions.
 
 mod equation;
 mod failed;
 mod fit;
+mod fleet;
 mod keywords;
 mod machine;
 mod model;
@@ -37,6 +39,14 @@ fn _abbe(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(equation::equation, module)?)?;
     module.add_function(wrap_pyfunction!(pickle::pickled, module)?)?;
     module.add_function(wrap_pyfunction!(pickle::unpickled, module)?)?;
+    module.add_function(wrap_pyfunction!(fleet::run_session, module)?)?;
+    module.add_function(wrap_pyfunction!(fleet::analyse_session, module)?)?;
+    module.add_function(wrap_pyfunction!(fleet::session_files, module)?)?;
+    module.add_function(wrap_pyfunction!(fleet::fleet_records, module)?)?;
+    module.add_function(wrap_pyfunction!(fleet::fleet_history, module)?)?;
+    module.add_function(wrap_pyfunction!(fleet::study_draws, module)?)?;
+    module.add_function(wrap_pyfunction!(fleet::run_draws, module)?)?;
+    module.add_function(wrap_pyfunction!(fleet::study_summary, module)?)?;
     module.add_function(wrap_pyfunction!(work::set_threads, module)?)?;
     module.add_function(wrap_pyfunction!(work::threads, module)?)?;
     Ok(())

@@ -104,7 +104,7 @@ impl Session {
     #[pyo3(signature = (path, data=None, allow_outside=false))]
     fn read(py: Python<'_>, path: PathBuf, data: Option<PathBuf>, allow_outside: bool) -> PyResult<Session> {
         let state = work::run(py, None, move |_| {
-            let options = ReadOptions { data_directory: data, read_data: true, allow_outside };
+            let options = ReadOptions { data_directory: data, allow_outside, ..ReadOptions::default() };
             let (session, sources) = files::session_with_sources(&path, &options)?;
             let origin = Origin::of_session(&sources)?;
             Ok(State::new(session, sources, origin))

@@ -24,21 +24,22 @@ Results have the keys of the [JSON output](../reference/json.md) as attributes: 
 """
 
 
-def definitions() -> dict[str, ast.AST]:
-    """The public classes and functions by name."""
+def definitions(package: Path) -> dict[str, ast.AST]:
+    """The public classes and functions of a package by name."""
     found: dict[str, ast.AST] = {}
-    for file in [*sorted(PACKAGE.glob("_*.py")), PACKAGE / "_abbe.pyi"]:
+    for file in [*sorted(package.glob("_*.py")), *package.glob("_abbe.pyi")]:
         for node in ast.parse(file.read_text(encoding="utf-8")).body:
             if isinstance(node, (ast.ClassDef, ast.FunctionDef)) and not node.name.startswith("_"):
                 found.setdefault(node.name, node)
     return found
 
 
-def exported() -> list[str]:
-    """The names in `__all__`."""
-    tree = ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8"))
+def exported(package: Path) -> list[str]:
+    """The names in `__all__` of a package."""
+    tree = ast.parse((package / "__init__.py").read_text(encoding="utf-8"))
     (names,) = (node.value for node in tree.body if isinstance(node, ast.Assign))
-    return [name for name in ast.literal_eval(names) if not name.startswith("_")]
+    known = definitions(package)
+    return [name for name in ast.literal_eval(names) if name in known]
 
 
 def markdown(docstring: str | None) -> str:
@@ -84,33 +85,38 @@ def signature(node: ast.FunctionDef, owner: str) -> str:
     return f"`{name}({arguments}){returns}`"
 
 
-def documented_class(name: str, node: ast.ClassDef, known: dict[str, ast.AST]) -> str:
+def is_record(node: ast.ClassDef) -> bool:
+    """Whether the fields of a class are its documentation."""
+    decorators = [ast.unparse(decorator) for decorator in node.decorator_list]
+    return "NamedTuple" in map(ast.unparse, node.bases) or any(name.startswith("dataclass") for name in decorators)
+
+
+def documented_class(owner: str, name: str, node: ast.ClassDef, known: dict[str, ast.AST]) -> str:
     """The section of a class, with what it inherits from the package."""
-    text = f"## {name}\n\n" + markdown(ast.get_docstring(node)) + "\n"
+    text = f"## {owner}{name}\n\n" + markdown(ast.get_docstring(node)) + "\n"
     bases = [known[base.id] for base in node.bases if isinstance(base, ast.Name) and base.id in known]
-    members = [member for owner in [node, *bases] for member in getattr(owner, "body", [])]
+    members = [member for part in [node, *bases] for member in getattr(part, "body", [])]
     for place, member in enumerate(members):
         following = members[place + 1] if place + 1 < len(members) else None
         if isinstance(member, ast.FunctionDef) and not member.name.startswith("_"):
             if docstring := ast.get_docstring(member):
                 text += f"### {signature(member, name)}\n\n{markdown(docstring)}\n"
-        elif isinstance(member, ast.AnnAssign) and isinstance(following, ast.Expr) and "NamedTuple" in map(
-            ast.unparse, node.bases
-        ):
+        elif isinstance(member, ast.AnnAssign) and isinstance(following, ast.Expr) and is_record(node):
             described = ast.literal_eval(following.value)
             text += f"- `{ast.unparse(member)}`: {markdown(described)}"
     return text.rstrip() + "\n\n"
 
 
 def main() -> None:
-    known = definitions()
     text = HEAD
-    for name in exported():
-        node = known[name]
-        if isinstance(node, ast.ClassDef):
-            text += documented_class(name, node, known)
-        else:
-            text += f"## {signature(node, '')}\n\n{markdown(ast.get_docstring(node))}\n"
+    for package, owner in [(PACKAGE, ""), (PACKAGE / "fleet", "fleet.")]:
+        known = definitions(package)
+        for name in exported(package):
+            node = known[name]
+            if isinstance(node, ast.ClassDef):
+                text += documented_class(owner, name, node, known)
+            else:
+                text += f"## {signature(node, owner.rstrip('.'))}\n\n{markdown(ast.get_docstring(node))}\n"
     text = text.rstrip() + "\n"
     if "--check" not in sys.argv[1:]:
         TARGET.parent.mkdir(exist_ok=True)

@@ -1,0 +1,128 @@
+//! Units of work of a fleet, and the history of its machines.
+
+use std::path::PathBuf;
+
+use abbe::fleet::history;
+use abbe::fleet::options::Options;
+use abbe::fleet::store::Store;
+use abbe::fleet::unit::{self, Done, Places};
+use abbe::fleet::{FleetError, list, study};
+use abbe::identify::history::HistoryOptions;
+use pyo3::prelude::*;
+use serde::Serialize;
+
+use crate::failed::Failed;
+use crate::work;
+
+impl From<FleetError> for Failed {
+    fn from(error: FleetError) -> Failed {
+        Failed::new(error.to_string())
+    }
+}
+
+fn json(result: &impl Serialize) -> Result<String, Failed> {
+    serde_json::to_string(result).map_err(|cause| Failed::new(format!("the result cannot be written: {cause}")))
+}
+
+fn options(text: &str) -> Result<Options, Failed> {
+    serde_json::from_str(text).map_err(|cause| Failed::argument(format!("an option cannot be used: {cause}"), ""))
+}
+
+/// Analyses a session if the folder has no record of it: whether it was computed, and the note of the folder as JSON.
+#[pyfunction]
+pub fn run_session(
+    py: Python<'_>,
+    file: PathBuf,
+    out: PathBuf,
+    options_json: &str,
+    models: Option<PathBuf>,
+    allow_outside: bool,
+) -> PyResult<(bool, String)> {
+    let options = options(options_json)?;
+    work::run(py, None, move |caller| {
+        let store = Store::open(out)?;
+        let places = Places { models, allow_outside };
+        let (done, pointer) = unit::run(&file, &options, &places, &store, &|| caller.goes_on())?;
+        Ok((done == Done::Computed, json(&pointer)?))
+    })
+}
+
+/// The record of a session as JSON, without a folder.
+#[pyfunction]
+pub fn analyse_session(
+    py: Python<'_>,
+    file: PathBuf,
+    options_json: &str,
+    models: Option<PathBuf>,
+    allow_outside: bool,
+) -> PyResult<String> {
+    let options = options(options_json)?;
+    work::run(py, None, move |caller| {
+        let places = Places { models, allow_outside };
+        json(&unit::analyse(&file, &options, &places, &|| caller.goes_on())?)
+    })
+}
+
+/// Session files from files and folders.
+#[pyfunction]
+pub fn session_files(paths: Vec<PathBuf>) -> Result<Vec<PathBuf>, Failed> {
+    Ok(list::sessions(&paths)?)
+}
+
+/// The notes and records of a folder as JSON texts, and the files whose record is missing.
+#[pyfunction]
+pub fn fleet_records(py: Python<'_>, out: PathBuf) -> PyResult<(Vec<(String, String)>, Vec<String>)> {
+    work::run(py, None, move |_| {
+        let (records, missing) = Store::existing(out)?.records()?;
+        let texts = records.iter().map(|(pointer, record)| Ok((json(pointer)?, json(record)?)));
+        Ok((texts.collect::<Result<_, Failed>>()?, missing))
+    })
+}
+
+/// The history of the machines of a folder as JSON.
+#[pyfunction]
+pub fn fleet_history(
+    py: Python<'_>,
+    out: PathBuf,
+    machine_id: Option<String>,
+    false_discovery_rate: f64,
+    tolerance_u: f64,
+    compensations: Option<PathBuf>,
+) -> PyResult<String> {
+    work::run(py, None, move |_| {
+        let compensations = compensations.map(|file| history::compensations(&file)).transpose()?.unwrap_or_default();
+        let options = HistoryOptions { false_discovery_rate, tolerance_u, compensations };
+        json(&history::history(&Store::existing(out)?, machine_id.as_deref(), &options)?)
+    })
+}
+
+/// The number of draws of a study.
+#[pyfunction]
+pub fn study_draws(py: Python<'_>, file: PathBuf) -> PyResult<usize> {
+    work::run(py, None, move |_| Ok(study::file::read(&file)?.draws()))
+}
+
+/// Makes draws of a study that the folder does not have; returns how many it made.
+#[pyfunction]
+pub fn run_draws(py: Python<'_>, file: PathBuf, out: PathBuf, numbers: Vec<usize>) -> PyResult<usize> {
+    work::run(py, None, move |caller| {
+        let (study, store) = (study::file::read(&file)?, Store::open(out)?);
+        let mut computed = 0;
+        for number in numbers {
+            let (done, _) = study::run(&study, number, &store, &|| caller.goes_on())?;
+            computed += usize::from(done == Done::Computed);
+        }
+        Ok(computed)
+    })
+}
+
+/// The summary of the draws of a study as JSON, and the number of draws that are missing.
+#[pyfunction]
+pub fn study_summary(py: Python<'_>, file: PathBuf, out: PathBuf) -> PyResult<(String, usize)> {
+    work::run(py, None, move |_| {
+        let (study, store) = (study::file::read(&file)?, Store::open(out)?);
+        let draws = (0..study.draws()).map(|number| store.draw(&study.key, number));
+        let draws: Vec<_> = draws.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
+        Ok((json(&study::summary::summary(&draws))?, study.draws() - draws.len()))
+    })
+}
