@@ -1,0 +1,31 @@
+// The sessions of the repository, inside the page.
+
+import type { FileMap } from "./files";
+
+const texts = import.meta.glob<string>("../../sessions/**/*.{toml,csv}", {
+  query: "?raw",
+  import: "default",
+  eager: true,
+});
+
+const ABOUT: Record<string, string> = {
+  "hermle-c600u/measured/session.toml": "Five-axis machine, ball bar: four tests with an effect to trace",
+  "hermle-c600u/chapter5.toml": "The plan of these tests",
+  "r-test/measured/session.toml": "R-test on a B, C machine: steps of a pitch compensation to trace",
+  "self-calibration/measured/session.toml": "Rotary table, touch probe on a cylinder",
+  "table-and-head/measured/session.toml": "Rotary table and tilting head, ball bar",
+  "tilting-head/measured/session.toml": "Tilting head, ball bar",
+};
+
+/** Names and descriptions of the bundled sessions. */
+export const bundled = Object.entries(ABOUT);
+
+/** The files of the folder of a bundled session. */
+export function filesOf(session: string): FileMap {
+  const folder = session.slice(0, session.lastIndexOf("/") + 1);
+  const encode = new TextEncoder();
+  const own = Object.entries(texts)
+    .map(([path, text]) => [path.replace("../../sessions/", ""), text] as const)
+    .filter(([path]) => path.startsWith(folder) && !path.slice(folder.length).includes("/"));
+  return new Map(own.map(([path, text]) => [path.slice(folder.length), encode.encode(text)]));
+}

@@ -1,0 +1,77 @@
+// The library in a worker: one request at a time, progress in words, and an end at any moment.
+
+import { moduleBytes, startWorker } from "#assets";
+import { type Answer, BROKEN, type Fault } from "./protocol";
+
+export class EngineError extends Error {
+  constructor(readonly fault: Fault) {
+    super(fault.message);
+  }
+}
+
+interface Waiting {
+  resolve: (result: never) => void;
+  reject: (fault: EngineError) => void;
+  progress?: (words: string) => void;
+}
+
+let compiled: Promise<WebAssembly.Module> | undefined;
+
+/** The module is compiled once; every worker has an instance of it. */
+function compiledModule(): Promise<WebAssembly.Module> {
+  compiled ??= moduleBytes().then((bytes) => WebAssembly.compile(bytes));
+  return compiled;
+}
+
+export class Engine {
+  private worker?: Worker;
+  private waiting: Waiting[] = [];
+
+  /** Calls a method of the worker. */
+  async call<T>(method: string, args: unknown[] = [], progress?: (words: string) => void): Promise<T> {
+    const worker = await this.started();
+    return new Promise<T>((resolve, reject) => {
+      this.waiting.push({ resolve: resolve as (result: never) => void, reject, progress });
+      worker.postMessage({ method, args });
+    });
+  }
+
+  /** Ends the worker, whatever it does. The next call starts another. */
+  stop(why = "stopped"): void {
+    this.worker?.terminate();
+    this.worker = undefined;
+    const waiting = this.waiting.splice(0);
+    for (const one of waiting) one.reject(new EngineError({ message: why }));
+  }
+
+  private async started(): Promise<Worker> {
+    if (this.worker) return this.worker;
+    const module = await compiledModule();
+    if (this.worker) return this.worker;
+    const worker = startWorker();
+    worker.postMessage({ module });
+    worker.onmessage = ({ data }: MessageEvent<Answer>) => this.answered(data);
+    worker.onerror = (event) => {
+      event.preventDefault();
+      this.stop(`the computation failed: ${event.message}`);
+    };
+    this.worker = worker;
+    return worker;
+  }
+
+  private answered(answer: Answer): void {
+    if ("progress" in answer) {
+      this.waiting[0]?.progress?.(answer.progress);
+      return;
+    }
+    const one = this.waiting.shift();
+    if (!one) return;
+    if ("result" in answer) {
+      one.resolve(answer.result as never);
+      return;
+    }
+    one.reject(new EngineError(answer.fault));
+    // After a fault of the module itself its memory is not trusted.
+    if (answer.fault.message.startsWith(BROKEN)) this.stop(answer.fault.message);
+  }
+}

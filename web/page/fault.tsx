@@ -1,0 +1,24 @@
+// A fault with its place and what to do.
+
+import { EngineError } from "./engine";
+import { FileFault } from "./files";
+import type { Fault } from "./protocol";
+
+/** What went wrong, as a fault. */
+export function faultOf(error: unknown): Fault {
+  if (error instanceof EngineError) return error.fault;
+  if (error instanceof FileFault) return { message: error.message };
+  return { message: error instanceof Error ? error.message : String(error) };
+}
+
+export function FaultBox({ fault, go }: { fault: Fault; go?: (fault: Fault) => void }) {
+  const place = [fault.file, fault.line, fault.column].filter((part) => part != null).join(":");
+  return (
+    <div class="fault" role="alert">
+      <strong>Error</strong>{" "}
+      {place && (go && fault.line ? <button onClick={() => go(fault)}>{place}</button> : <code>{place}</code>)}{" "}
+      {fault.message}
+      {fault.help && <p>{fault.help}</p>}
+    </div>
+  );
+}

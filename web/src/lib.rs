@@ -1,0 +1,13 @@
+//! The WebAssembly module of the page: a folder of files in memory, and what the command does with it. Results are the
+//! JSON documents and the reports of the command.
+//!
+//! - [`folder`]: files, and the sessions in them; [`fit`], [`trace`]: results;
+//! - [`plan`]: a plan that changes while it is looked at;
+//! - [`failed`]: errors with file, line and column.
+
+mod failed;
+mod fit;
+mod folder;
+mod output;
+mod plan;
+mod trace;

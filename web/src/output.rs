@@ -1,0 +1,47 @@
+//! What every result gives: its document, its report, its files.
+
+use std::path::PathBuf;
+
+use abbe::document::{Call, Document};
+use abbe::identify::fit::Fit;
+use abbe::identify::model_file::IdentifiedModel;
+use abbe::identify::problem::Problem;
+use abbe::present::csv;
+use abbe::present::report::document::Document as Report;
+use abbe::present::report::page;
+use abbe::present::report::provenance::Provenance;
+use abbe::present::table::Table;
+use serde::Serialize;
+use serde_json::Map;
+
+use crate::failed::Failed;
+use crate::folder::Read;
+
+/// The command that gives the same result, without options.
+fn call(command: &str) -> Call {
+    Call { command: command.to_string(), options: Map::new() }
+}
+
+/// The JSON document of a result.
+pub fn json<T: Serialize>(command: &str, read: &Read, seed: u64, result: &T) -> Result<String, Failed> {
+    Ok(Document::new(call(command), read.origin.clone(), Some(seed), result).text()?)
+}
+
+/// The page of a report.
+pub fn report(command: &str, read: &Read, seed: u64, document: &Report) -> Result<String, Failed> {
+    let changed = |(path, cause): (PathBuf, String)| Failed::from(format!("{}: {cause}", path.display()));
+    let provenance = Provenance::of((&read.session, &read.sources), seed).map_err(changed)?;
+    let command = format!("abbe {command} {}", read.sources.file.display());
+    Ok(page::html(document, &Provenance { command, ..provenance })?)
+}
+
+/// The file of an identified model.
+pub fn model(command: &str, read: &Read, seed: u64, problem: &Problem, fit: &Fit) -> Result<String, Failed> {
+    let provenance = read.origin.provenance(call(command), seed);
+    Ok(IdentifiedModel::of_fit(problem, fit, provenance)?.to_text()?)
+}
+
+/// A table as CSV.
+pub fn table(table: &Table) -> Result<String, Failed> {
+    Ok(String::from_utf8_lossy(&csv::text(table)?).into_owned())
+}

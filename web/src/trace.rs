@@ -1,0 +1,90 @@
+//! A trace.
+
+use abbe::identify::plan::test_variations::TestVariations;
+use abbe::identify::separating_tests::separate_aliases;
+use abbe::identify::trace::{self, Progress, TraceOptions, TraceOutcome};
+use abbe::model::files::toml::write;
+use abbe::model::words::counted;
+use abbe::present::{readings, report, trace as present};
+use wasm_bindgen::prelude::*;
+
+use crate::failed::Failed;
+use crate::folder::{Folder, Read};
+use crate::output;
+
+/// A traced session.
+#[wasm_bindgen]
+pub struct Trace {
+    read: Read,
+    seed: u64,
+    trace: TraceOutcome,
+}
+
+#[wasm_bindgen]
+impl Trace {
+    /// Traces a session of a folder. `abbeProgress` of the worker is called with words.
+    ///
+    /// # Errors
+    /// If the session cannot be used or its parameters cannot be estimated.
+    pub fn of(folder: &Folder, session: &str, seed: u32) -> Result<Trace, Failed> {
+        let read = folder.read(session, true)?;
+        let seed = u64::from(seed);
+        let options = TraceOptions { seed, ..TraceOptions::default() };
+        let mut trace = trace::trace(&read.session, &options, &|progress| tell(&progress))?;
+        say("comparing candidate tests");
+        separate_aliases(&mut trace, &TestVariations::short(), &|progress| tell(&progress))?;
+        Ok(Trace { read, seed, trace })
+    }
+
+    /// The document of `--json`.
+    pub fn json(&self) -> Result<String, Failed> {
+        output::json("trace", &self.read, self.seed, &self.trace.result)
+    }
+
+    /// The page of `--report`.
+    pub fn report(&self) -> Result<String, Failed> {
+        output::report("trace", &self.read, self.seed, &report::trace::document(&self.trace)?)
+    }
+
+    /// The table of `--csv`.
+    pub fn csv(&self) -> Result<String, Failed> {
+        output::table(&present::figures(&self.trace.result))
+    }
+
+    /// The table of `--residuals`.
+    pub fn residuals(&self) -> Result<String, Failed> {
+        output::table(&readings::residuals(&self.trace.after, &self.trace.after_fit))
+    }
+
+    /// The file of `--save`.
+    pub fn model(&self) -> Result<String, Failed> {
+        output::model("trace", &self.read, self.seed, &self.trace.after, &self.trace.after_fit)
+    }
+
+    /// The session of `--write`: the same with the found effects declared.
+    pub fn session(&self) -> String {
+        write::with_effects(&self.read.sources.text, &self.trace.effects, &self.read.session.machine)
+    }
+}
+
+#[wasm_bindgen]
+extern "C" {
+    /// The function of the worker that hears of progress.
+    #[wasm_bindgen(js_name = abbeProgress)]
+    fn say(words: &str);
+}
+
+/// Tells what is done now. The work goes on until the page ends the worker.
+fn tell(progress: &Progress) -> bool {
+    match progress {
+        Progress::Working => {}
+        Progress::Fitting => say("fitting the declared model"),
+        Progress::Screening(candidates) => say(&format!("screening {}", counted(*candidates, "candidate"))),
+        Progress::SelectedEffect(number, id, rms_um) => {
+            say(&format!("{}: {id}, held out {rms_um:.3} µm", counted(*number, "effect")));
+        }
+        Progress::Folds(ended, folds) => say(&format!("searching without one fold: {ended} of {folds}")),
+        Progress::Judging => say("refitting and judging"),
+    }
+    true
+}

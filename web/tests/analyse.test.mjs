@@ -1,0 +1,297 @@
+// Analyse: the results of the command, in the browser; faults as messages.
+
+import assert from "node:assert/strict";
+import { readdirSync, readFileSync } from "node:fs";
+import { join } from "node:path";
+import { after, before, test } from "node:test";
+import { zipSync } from "fflate";
+import { browser, command, differences, give, opened, root, saved, served, single } from "./page.mjs";
+
+let chromium, server;
+before(async () => {
+  chromium = await browser();
+  server = await served();
+});
+after(async () => {
+  await chromium.close();
+  server.end();
+});
+
+const SESSIONS = ["hermle-c600u", "r-test", "self-calibration", "table-and-head", "tilting-head"].map((name) =>
+  join(root, "sessions", name, "measured"),
+);
+const hermle = SESSIONS[0];
+
+const filesOf = (folder) =>
+  Object.fromEntries(readdirSync(folder).map((name) => [name, readFileSync(join(folder, name))]));
+
+async function result(page, kind) {
+  await page.getByRole("button", { name: kind, exact: true }).click();
+  await page.locator("[data-seconds]").waitFor({ timeout: 300_000 });
+  return JSON.parse(await saved(page, "JSON"));
+}
+
+/**
+ * The R-test has directions that only priors determine, which amplify the rounding of sines and cosines. Verdict,
+ * effects and residuals are compared, and estimates by their uncertainty.
+ */
+function ofRTest(ours, theirs) {
+  const effects = ({ effects }) =>
+    effects?.map(({ component, driver, shape, parameters }) => [
+      component,
+      driver,
+      shape,
+      parameters.map(({ id }) => id),
+    ]);
+  const states = (one) => [one, one.before, one.after].filter(Boolean);
+  const rms = (one) => states(one).map(({ rms_um, heldout_rms_um }) => [rms_um, heldout_rms_um]);
+  const far = states(ours).flatMap((state, k) =>
+    (state.parameters ?? []).flatMap((one, j) => {
+      const other = states(theirs)[k].parameters[j];
+      return one.id === other.id && Math.abs(one.value - other.value) <= 1e-6 * other.u
+        ? []
+        : [`${one.id}: ${one.value} is not ${other.value}`];
+    }),
+  );
+  return [
+    ...(ours.verdict === theirs.verdict ? [] : ["verdict"]),
+    ...differences(effects(ours) ?? [], effects(theirs) ?? [], "/effects"),
+    ...differences(rms(ours), rms(theirs), "/rms"),
+    ...far,
+  ];
+}
+
+for (const folder of SESSIONS) {
+  for (const kind of ["Fit", "Trace"]) {
+    test(`${kind} of ${folder.slice(root.length + 1)} gives the JSON of the command`, async (context) => {
+      const { page, wrong } = await opened(chromium, server.address);
+      await give(page, filesOf(folder));
+      const ours = await result(page, kind);
+      context.diagnostic(`${await page.locator("[data-seconds]").getAttribute("data-seconds")} s`);
+      const theirs = command(folder, kind.toLowerCase(), "session.toml");
+      const found = folder.includes("r-test") ? ofRTest(ours, theirs) : differences(ours, theirs);
+      assert.equal(found.length, 0, `${found.length} differences:\n${found.slice(0, 20).join("\n")}`);
+      assert.deepEqual(wrong, []);
+      await page.close();
+    });
+  }
+}
+
+test("the single file does the same from the disk, and the report is that of the command", async () => {
+  const { page, wrong } = await opened(chromium, single);
+  await give(page, {
+    "session.zip": zipSync(
+      Object.fromEntries(
+        Object.entries(filesOf(hermle)).map(([name, bytes]) => [`folder/${name}`, new Uint8Array(bytes)]),
+      ),
+    ),
+  });
+  const ours = await result(page, "Trace");
+  assert.deepEqual(differences(ours, command(hermle, "trace", "session.toml")), []);
+  const report = page.frameLocator("iframe");
+  await report.getByText("explained").first().waitFor();
+  // The script of the report runs in its frame.
+  await report.locator("#download").waitFor();
+  assert.match(
+    await saved(page, "Continued session"),
+    /\[\[effect\]\]\ncomponent = "EZC"\ndriver = "C"\nshape = "harmonic"\norder = 2/,
+  );
+  assert.deepEqual(wrong, []);
+  await page.close();
+});
+
+test("Stop ends a trace, and the next computation works", async () => {
+  const { page } = await opened(chromium, server.address);
+  await give(page, filesOf(hermle));
+  await page.getByRole("button", { name: "Trace", exact: true }).click();
+  await page.getByText(/screening/).waitFor();
+  await page.getByRole("button", { name: "Stop" }).click();
+  await page.getByRole("alert").getByText("stopped").waitFor();
+  assert.ok((await result(page, "Fit")).rms_um > 0.5);
+  await page.close();
+});
+
+test("a fault is shown with file, line and column, and marked in the text", async () => {
+  const { page } = await opened(chromium, server.address);
+  const files = filesOf(hermle);
+  files["session.toml"] = files["session.toml"].toString().replace("noise_um", "noise_umm");
+  const line = 1 + files["session.toml"].split("noise_umm")[0].split("\n").length - 1;
+  await give(page, files);
+  const alert = page.getByRole("alert");
+  await alert.getByText(`session.toml:${line}:1`).waitFor();
+  assert.equal(await page.locator(".editor .marked").textContent(), `${line}\n`);
+  // The corrected text is read again.
+  const text = page.getByLabel("Text of session.toml");
+  await text.fill((await text.inputValue()).replace("noise_umm", "noise_um"));
+  await page.getByText("2416 readings").waitFor();
+  assert.equal(await alert.count(), 0);
+  // A cell of a data file.
+  files["session.toml"] = files["session.toml"].replace("noise_umm", "noise_um");
+  files["A100.csv"] = files["A100.csv"].toString().replace(/\n([^\n]*),[^,\n]*\n/, "\n$1,what\n");
+  await give(page, files);
+  await alert.getByText(/A100\.csv:\d+:\d+/).waitFor();
+  await page.close();
+});
+
+/** A ZIP file whose entry unpacks to many zeros. */
+function bomb(mebibytes) {
+  return zipSync({ "session.toml": [new Uint8Array(mebibytes << 20), { level: 9 }] });
+}
+
+test("what cannot be used is refused with a message", async () => {
+  const { page, wrong } = await opened(chromium, server.address);
+  const alert = page.getByRole("alert");
+  const refused = async (files, words) => {
+    await give(page, files);
+    await alert.getByText(words).waitFor();
+  };
+  await refused({ "notes.txt": "nothing" }, "no session file");
+  await refused({ "session.zip": "this is no ZIP file" }, "no ZIP file");
+  await refused({ "session.zip": bomb(150) }, "more than 100 MiB");
+  await refused(
+    {
+      "session.zip": zipSync(
+        Object.fromEntries(Array.from({ length: 3000 }, (_, k) => [`${k}.csv`, new Uint8Array(1)])),
+      ),
+    },
+    "more than 2000 files",
+  );
+  await refused({ "session.toml": "[[test]]\nname = [" }, "not valid TOML");
+  await refused(
+    { "session.toml": '[[test]]\nname = "A"\n[machine]\nfile = "machine.toml"\n' },
+    "the machine file `machine.toml` does not exist",
+  );
+  await refused(
+    { "session.toml": '[[test]]\n[machine]\nfile = "../../etc/passwd"\n', "machine.toml": "" },
+    "does not exist",
+  );
+  const broken = filesOf(hermle);
+  broken["session.toml"] = broken["session.toml"].toString().replace("A100.csv", "A100.xlsx");
+  broken["A100.xlsx"] = Buffer.from("PK\u0003\u0004 no spreadsheet");
+  await refused(broken, "the spreadsheet cannot be read");
+  // The page still works.
+  await give(page, filesOf(hermle));
+  assert.ok((await result(page, "Fit")).rms_um > 0.5);
+  assert.deepEqual(wrong, []);
+  await page.close();
+});
+
+test("a damaged ZIP file is refused, and an undamaged one with a comment is not", async () => {
+  const { page, wrong } = await opened(chromium, server.address);
+  const alert = page.getByRole("alert");
+  const plain = Object.fromEntries(
+    Object.entries(filesOf(hermle)).map(([name, bytes]) => [`séance/${name}`, new Uint8Array(bytes)]),
+  );
+  for (const level of [0, 6]) {
+    const whole = Buffer.from(zipSync(plain, { level }));
+    const damaged = Buffer.from(whole);
+    // Within the readings of a test, which would be other readings.
+    const at = whole.indexOf("C150.csv") + 4000;
+    damaged[at] ^= 1;
+    await give(page, { "session.zip": damaged });
+    await alert.getByText(/is damaged|cannot be unpacked/).waitFor();
+    await give(page, { "session.zip": whole });
+    await page.getByText("2416 readings").waitFor();
+    assert.equal(await alert.count(), 0);
+    for (const part of [0.5, 0.8, 0.999].map((share) => whole.subarray(0, Math.floor(share * whole.length)))) {
+      await give(page, { "session.zip": part });
+      await alert.getByText(/is damaged|cannot be unpacked/).waitFor();
+      await give(page, { "session.zip": whole });
+      await page.waitForFunction(() => !document.querySelector('[role="alert"]'));
+    }
+    // A directory that lists one entry less.
+    const fewer = Buffer.from(whole);
+    const end = fewer.length - 22;
+    fewer.writeUInt16LE(fewer.readUInt16LE(end + 10) - 1, end + 10);
+    await give(page, { "session.zip": fewer });
+    await alert.getByText("is damaged").waitFor();
+    const commented = Buffer.concat([whole, Buffer.from("of the machine")]);
+    commented.writeUInt16LE(14, end + 20);
+    await give(page, { "session.zip": commented });
+    await page.waitForFunction(() => !document.querySelector('[role="alert"]'));
+    await page.getByText("2416 readings").waitFor();
+  }
+  assert.deepEqual(wrong, []);
+  await page.close();
+});
+
+test("many blank lines do not stop the page", async () => {
+  const { page, wrong } = await opened(chromium, server.address);
+  const folder = join(root, "sessions/hermle-c600u");
+  const [machine, plan] = ["machine.toml", "chapter5.toml"].map((name) => readFileSync(join(folder, name), "utf8"));
+  await give(page, { "machine.toml": machine, "chapter5.toml": "\n".repeat(80_000) + plan });
+  await page.getByText("a plan without readings").waitFor();
+  assert.ok((await page.locator(".editor pre > *").count()) <= 1);
+  await page.getByRole("button", { name: "Explore", exact: true }).click();
+  await page.getByText(/Rank \d+ of/).waitFor({ timeout: 60_000 });
+  assert.deepEqual(wrong, []);
+  await page.close();
+});
+
+test("views keep their work, and a trace runs on while others are looked at", async () => {
+  const { page, wrong } = await opened(chromium, server.address);
+  await give(page, filesOf(hermle));
+  await page.getByText("2416 readings").waitFor();
+  await page.getByRole("button", { name: "Trace", exact: true }).click();
+  await page.getByText(/screening/).waitFor();
+  await page.getByRole("button", { name: "Explore", exact: true }).click();
+  await page.getByLabel("Template").selectOption("hermle-c600u/chapter5.toml");
+  await page.getByText(/Rank \d+ of/).waitFor({ timeout: 60_000 });
+  await page.getByLabel("EX0C", { exact: true }).fill("7");
+  await page.getByRole("tab", { name: "Analyse" }).click();
+  await page.getByRole("button", { name: "Import readings" }).click();
+  await page.getByLabel("Import", { exact: true }).getByLabel("Test", { exact: true }).selectOption("C150");
+  await page.getByRole("tab", { name: "Explore" }).click();
+  assert.equal(await page.getByLabel("EX0C", { exact: true }).inputValue(), "7");
+  await page.getByRole("tab", { name: "Import" }).click();
+  const test = page.getByLabel("Import", { exact: true }).getByLabel("Test", { exact: true });
+  assert.equal(await test.locator("option:checked").textContent(), "C150");
+  await page.getByRole("tab", { name: "Analyse" }).click();
+  await page.locator('[data-kind="trace"]').waitFor({ timeout: 300_000 });
+  assert.equal(await page.getByRole("alert").count(), 0);
+  assert.deepEqual(wrong, []);
+  await page.close();
+});
+
+test("a file of 300 MB is refused before it is read", async (context) => {
+  const { page } = await opened(chromium, server.address);
+  const { mkdtempSync, truncateSync, writeFileSync, rmSync } = await import("node:fs");
+  const { tmpdir } = await import("node:os");
+  const folder = mkdtempSync(join(tmpdir(), "abbe-web-"));
+  context.after(() => rmSync(folder, { recursive: true }));
+  const file = join(folder, "session.csv");
+  writeFileSync(file, "");
+  truncateSync(file, 300_000_000);
+  await page.getByLabel("Analyse", { exact: true }).locator('input[type="file"]').first().setInputFiles(file);
+  await page.getByRole("alert").getByText("more than 100 MiB").waitFor();
+  await page.close();
+});
+
+test("markup in names is text, in the page and in the report", async () => {
+  const { page, wrong } = await opened(chromium, server.address);
+  const name = "<img src=x onerror=alert(1)>";
+  const files = filesOf(hermle);
+  files["session.toml"] = `${files["session.toml"]}`
+    .replaceAll('"A100"', `"${name}"`)
+    .replace('data = "A100.csv"', 'data = "<script>alert(2)</script>.csv"');
+  files["<script>alert(2)</script>.csv"] = files["A100.csv"];
+  files["machine.toml"] = `${files["machine.toml"]}`.replace("Hermle C600U", "<script>alert(3)</script>");
+  // A file of a real folder cannot have a slash in its name; one in a ZIP file can have anything.
+  await give(page, {
+    "session.zip": zipSync(
+      Object.fromEntries(
+        Object.entries(files).map(([path, bytes]) => [
+          path.replace("</script>", "<script>"),
+          new Uint8Array(Buffer.from(`${bytes}`.replaceAll("alert(2)</script>", "alert(2)<script>"))),
+        ]),
+      ),
+    ),
+  });
+  await page.getByText(name).first().waitFor();
+  await result(page, "Fit");
+  await page.frameLocator("iframe").getByText("alert(3)").first().waitFor();
+  assert.equal(await page.locator("img").count(), 0);
+  assert.equal(await page.frameLocator("iframe").locator("img").count(), 0);
+  assert.deepEqual(wrong, []);
+  await page.close();
+});

@@ -1,0 +1,74 @@
+// Draws the pictures of docs/guide/browser.md: `node tests/pictures.mjs` in web/, after the build.
+
+import { readdirSync, readFileSync } from "node:fs";
+import { join } from "node:path";
+import { browser, give, opened, root, served } from "./page.mjs";
+
+const folder = join(root, "sessions/hermle-c600u/measured");
+const pictures = join(root, "docs/pictures");
+const chromium = await browser();
+const server = await served();
+
+const VIEWS = {
+  async analyse(page) {
+    await give(page, Object.fromEntries(readdirSync(folder).map((name) => [name, readFileSync(join(folder, name))])));
+    await page.getByText("2416 readings").waitFor();
+  },
+  async report(page) {
+    await VIEWS.analyse(page);
+    await page.getByRole("button", { name: "Trace", exact: true }).click();
+    await page.locator("[data-seconds]").waitFor({ timeout: 300_000 });
+    await page.frameLocator("iframe").getByText("explained").first().waitFor();
+    await page.locator("iframe").evaluate((frame) => frame.scrollIntoView());
+    await page.evaluate(() => scrollBy(0, -60));
+  },
+  async explore(page) {
+    await page.getByRole("tab", { name: "Explore" }).click();
+    await page.getByText(/Rank \d+ of/).waitFor({ timeout: 60_000 });
+    for (const [error, value] of Object.entries({ EX0C: 10, EY0A: -8, EB0C: 5 })) {
+      await page.getByLabel(error, { exact: true }).fill(String(value));
+    }
+    await page.waitForTimeout(1500);
+    if (page.viewportSize().width < 600)
+      await page.getByText("Show", { exact: false }).first().scrollIntoViewIfNeeded();
+  },
+  async import(page) {
+    await page.getByRole("tab", { name: "Import" }).click();
+    const view = page.getByLabel("Import", { exact: true });
+    await view.getByLabel("Session", { exact: true }).selectOption("hermle-c600u/measured/session.toml");
+    await view.getByLabel("Test", { exact: true }).selectOption("C150");
+    const rows = readFileSync(join(folder, "C150.csv"), "utf8").trim().split("\n").slice(1);
+    const foreign = [
+      "Zeit [s];Run;X [mm];Y [mm];Z [mm];A [deg];C-Achse [°];Länge [mm]",
+      ...rows.map((row) => row.replaceAll(",", ";").replaceAll(".", ",")),
+    ];
+    const buffer = Buffer.from(foreign.join("\r\n"), "latin1");
+    await view.locator('input[type="file"]').setInputFiles({ name: "export.csv", mimeType: "text/csv", buffer });
+    await view.getByRole("button", { name: /^Fit/ }).click();
+    await view.locator("tbody").last().getByText("decimal point", { exact: true }).waitFor({ timeout: 60_000 });
+    await page.waitForFunction(
+      () =>
+        [...document.querySelectorAll("button")].some(
+          (button) => /^Fit, and/.test(button.textContent) && !button.disabled,
+        ),
+      undefined,
+      { timeout: 120_000 },
+    );
+  },
+};
+
+for (const [name, show] of Object.entries(VIEWS)) {
+  for (const [width, height, colorScheme] of [
+    [1280, 860, "light"],
+    [360, 720, name === "explore" ? "dark" : "light"],
+  ]) {
+    const { page } = await opened(chromium, server.address, { viewport: { width, height }, colorScheme });
+    await show(page);
+    const overflow = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+    if (overflow > 0) throw new Error(`${name} at ${width} px is ${overflow} px too wide`);
+    await page.screenshot({ path: join(pictures, `browser-${name}-${width}.png`) });
+    await page.close();
+  }
+}
+await chromium.close();
+server.end();
