@@ -9,6 +9,7 @@
 //! | estimates, uncertainty, plans, the trace of unmodelled effects | [`identify`] |
 //! | closed forms and their languages | [`codegen`] |
 //! | results as JSON documents, parameters of equations by name | [`document`], [`equation`] |
+//! | many sessions of many machines | [`fleet`] |
 //!
 //! The change that a simulated error of 10 µm makes is what the equation of the same test says, −R·sin C/L₀:
 //!
@@ -44,6 +45,8 @@ pub use abbe_model as model;
 
 pub mod document;
 pub mod equation;
+#[cfg(feature = "fleet")]
+pub mod fleet;
 #[doc(hidden)]
 pub mod present;
 

@@ -146,8 +146,11 @@ fn read(file: &Path, arguments: &CompareArguments, outputs: &Outputs, origin: &m
         origin.add(Origin::of_files(&[file])?);
         return Ok(Input::Model(Box::new(model_file::read_text(file, &text)?)));
     }
-    let options =
-        ReadOptions { data_directory: arguments.data.clone(), read_data: true, allow_outside: arguments.allow_outside };
+    let options = ReadOptions {
+        data_directory: arguments.data.clone(),
+        allow_outside: arguments.allow_outside,
+        ..ReadOptions::default()
+    };
     let (session, sources) = files::session_with_sources(file, &options)?;
     outputs.refuse_overwrite_of_sources(&sources)?;
     origin.add(Origin::of_session(&sources)?);

@@ -17,6 +17,9 @@ pub enum Failure {
     /// The equation cannot be made.
     #[error(transparent)]
     Codegen(#[from] abbe::codegen::CodegenError),
+    /// The results of a fleet cannot be read or written.
+    #[error(transparent)]
+    Fleet(#[from] abbe::fleet::FleetError),
     /// A file that cannot be written.
     #[error("{path}: cannot be written: {source}")]
     Write {

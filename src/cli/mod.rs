@@ -14,22 +14,27 @@ mod failure;
 mod fit;
 mod folder;
 mod geometric;
+mod history;
 mod interrupt;
 mod json;
 mod map;
 mod message;
 mod nc;
 mod new;
+mod next_session;
 mod output;
 mod paper;
 mod plan;
 mod repeated;
 mod report;
+mod run;
 mod save;
 mod schema;
 mod screen;
 mod self_calibration;
+mod sheet;
 mod simulate;
+mod study;
 mod trace;
 mod validate;
 
@@ -121,12 +126,24 @@ enum Command {
         /// The shell.
         shell: clap_complete::Shell,
     },
+    /// Analyse many sessions and keep the results: a second run computes only what is missing or changed.
+    #[command(after_help = run::HELP)]
+    Run(run::RunArguments),
+    /// Show the parameters of machines over time: drifts, steps, control charts, the next check.
+    #[command(after_help = history::HELP)]
+    History(history::HistoryArguments),
     /// Print the JSON Schema of a file or a result.
     #[command(after_help = schema::HELP)]
     Schema(schema::SchemaArguments),
+    /// Write set-up sheets of the planned tests, to be printed.
+    #[command(after_help = sheet::HELP)]
+    Sheet(sheet::SheetArguments),
     /// Simulate readings of planned tests with given errors.
     #[command(after_help = simulate::HELP)]
     Simulate(Box<simulate::SimulateArguments>),
+    /// Simulate and analyse many sessions: power, false claims, coverage, ranking of set-ups.
+    #[command(after_help = study::HELP)]
+    Study(study::StudyArguments),
     /// Find the unmodelled effect behind the residual.
     #[command(after_help = trace::HELP)]
     Trace(trace::TraceArguments),
@@ -153,7 +170,7 @@ pub struct SessionArguments {
 impl SessionArguments {
     /// Options of the reader.
     fn options(&self) -> ReadOptions {
-        ReadOptions { data_directory: self.data.clone(), read_data: true, allow_outside: self.allow_outside }
+        ReadOptions { data_directory: self.data.clone(), allow_outside: self.allow_outside, ..ReadOptions::default() }
     }
 }
 
@@ -210,8 +227,12 @@ pub fn run() -> ExitCode {
             say!("{}", String::from_utf8_lossy(&script).trim_end());
             Ok(())
         }
+        Command::History(arguments) => history::run(&arguments, quiet),
+        Command::Run(arguments) => run::run(&arguments, quiet),
         Command::Schema(arguments) => schema::run(&arguments),
+        Command::Sheet(arguments) => sheet::run(&arguments, quiet),
         Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Study(arguments) => study::run(&arguments, quiet),
         Command::Trace(arguments) => trace::run(&arguments),
         Command::Validate(arguments) => validate::run(&arguments),
     };
@@ -278,7 +299,11 @@ mod tests {
             for example in text.lines().filter_map(|line| line.strip_prefix("Example: ")) {
                 let required: &[&str] = match command.get_name() {
                     "equation" => &["SESSION", "--test", "T"],
-                    "simulate" | "paper" => &["SESSION", "--out", "DIR"],
+                    "history" => &["DIR"],
+                    "study" if example.contains("--out") => &["STUDY"],
+                    "study" => &["STUDY", "--out", "DIR"],
+                    "run" if example.contains("--list") => &["--out", "DIR"],
+                    "simulate" | "paper" | "run" | "sheet" => &["SESSION", "--out", "OUT"],
                     "volumetric" => &["MACHINE"],
                     "new" => &["DIR"],
                     "export" if example.contains("--as") => &["MODEL", "--out", "OUT"],

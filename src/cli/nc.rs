@@ -2,11 +2,14 @@
 
 use std::path::PathBuf;
 
-use abbe::codegen::nc::{self, NcOptions};
+use abbe::codegen::nc::{self, NcFiles, NcOptions};
+use abbe::identify::plan::{collision, states};
 use abbe::model::files::{self, ReadOptions};
+use abbe::model::session::Session;
 use clap::Args;
 
 use super::failure::Failure;
+use super::message::print_warnings;
 use super::{SessionArguments, folder, output};
 use crate::present::table::{Table, cells};
 
@@ -87,6 +90,12 @@ pub struct NcArguments {
     force: bool,
 }
 
+/// Tests with less clearance than the session asks for.
+fn collisions(session: &Session) -> Result<Vec<String>, Failure> {
+    let complete = states::complete(session, true)?;
+    Ok(collision::warnings(&complete, &collision::clearances(&complete)))
+}
+
 /// Runs `abbe nc`.
 pub fn run(arguments: &NcArguments, quiet: bool) -> Result<(), Failure> {
     let control = nc::control(&arguments.control)?;
@@ -102,10 +111,12 @@ pub fn run(arguments: &NcArguments, quiet: bool) -> Result<(), Failure> {
     };
     let reading = ReadOptions { read_data: false, ..arguments.session.options() };
     let (session, sources) = files::session_with_sources(&arguments.session.session, &reading)?;
-    let written = nc::files(&session, control, &options)?;
+    let NcFiles { files: written, warnings } = nc::files(&session, control, &options)?;
     output::Outputs::in_folder(&arguments.out, written.iter().map(|(name, _)| name))
         .refuse_overwrite_of_sources(&sources)?;
     folder::write(&arguments.out, &written, arguments.force, |_| Ok(()))?;
+    print_warnings(&warnings);
+    print_warnings(&collisions(&session)?);
     if !quiet {
         let mut rows = vec![cells![&written[0].0, "all tests", written[0].1.lines().count().to_string()]];
         rows.extend(

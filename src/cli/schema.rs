@@ -4,6 +4,7 @@ use abbe::identify::correction::stream;
 use abbe::identify::geometric::Comparison;
 use abbe::identify::model_file;
 use abbe::identify::plan::global::GlobalAnalysis;
+use abbe::identify::plan::poses::PoseSelection;
 use abbe::identify::plan::results::PlanAnalysis;
 use abbe::identify::repeated::Repeated;
 use abbe::identify::results::{FitResult, TraceResult};
@@ -55,6 +56,8 @@ enum Subject {
     NextTest,
     /// `abbe plan --global --json`
     Global,
+    /// `abbe plan --poses --json`
+    Poses,
     /// `abbe plan --patterns --json`
     Patterns,
     /// `abbe simulate --json`
@@ -67,6 +70,16 @@ enum Subject {
     Compare,
     /// `abbe compensate --json`
     Compensate,
+    /// `abbe run --json`
+    Run,
+    /// `abbe history --json`
+    History,
+    /// `abbe study --json`
+    Study,
+    /// The study file of `abbe study`, as JSON
+    StudyFile,
+    /// The result of a session in the folder of `abbe run`
+    Record,
 }
 
 /// `abbe schema SUBJECT`
@@ -88,16 +101,22 @@ pub fn run(arguments: &SchemaArguments) -> Result<(), Failure> {
         Subject::SelfCalibration => of::<SelfCalibration>(),
         Subject::Trace => of::<TraceResult>(),
         Subject::Validate => of::<ValidationResult>(),
-        Subject::Model => model(),
+        Subject::Model => plain::<model_file::document::Document>(),
         Subject::Plan => of::<PlanAnalysis>(),
         Subject::NextTest => of::<plan::NextTest>(),
         Subject::Global => of::<GlobalAnalysis>(),
+        Subject::Poses => of::<PoseSelection>(),
         Subject::Patterns => of::<plan::patterns::PatternSizes>(),
         Subject::Simulate => of::<simulate::SimulationResult>(),
         Subject::Map => of::<Summary>(),
         Subject::Compare => of::<abbe::identify::compare::results::Comparison>(),
         Subject::Export => of::<super::export::ExportResult>(),
         Subject::Compensate => of::<stream::Summary>(),
+        Subject::Run => of::<super::run::RunResult>(),
+        Subject::History => of::<abbe::fleet::history::FleetHistory>(),
+        Subject::Study => of::<abbe::fleet::study::summary::StudyResult>(),
+        Subject::StudyFile => plain::<abbe::fleet::study::file::StudyFile>(),
+        Subject::Record => plain::<abbe::fleet::record::Record>(),
     };
     let text = serde_json::to_string_pretty(&schema)
         .map_err(|error| Failure::Other(format!("the schema cannot be written: {error}")))?;
@@ -121,10 +140,10 @@ fn session() -> Result<Value, Failure> {
     Ok(session)
 }
 
-/// The schema of a model file.
-fn model() -> Value {
+/// The schema of a file that has no head of a command.
+fn plain<T: JsonSchema>() -> Value {
     let generator = SchemaSettings::draft2020_12().for_serialize().into_generator();
-    let mut schema = generator.into_root_schema_for::<model_file::document::Document>().to_value();
+    let mut schema = generator.into_root_schema_for::<T>().to_value();
     close(&mut schema);
     schema
 }

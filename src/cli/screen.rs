@@ -5,13 +5,14 @@ use std::path::Path;
 use abbe::identify::circular::CircularTest;
 use abbe::identify::plausibility::Plausibility;
 use abbe::identify::results::{Outlier, Unobservable};
+use abbe::identify::tolerance::Conformity;
 use abbe::model::words::counted;
 
 use super::{SessionArguments, output};
 use crate::present::parameters::{self, Estimates};
 use crate::present::plausibility::conflicts;
 use crate::present::table::Table;
-use crate::present::{circular, confounded};
+use crate::present::{circular, conformity, confounded};
 
 /// Entries of a long list that the first screen shows.
 const MAX_LISTED: usize = 3;
@@ -84,6 +85,14 @@ pub fn print_circular(tests: &[CircularTest], all: bool) {
         say!("\n{}", circular::heading(test));
         circular::tables(test).iter().for_each(output::print);
         test.not_identifiable.iter().for_each(|line| say!("  limitation: {line}"));
+    }
+}
+
+/// Prints the decisions of conformity, if the session states limits.
+pub fn print_conformity(found: Option<&Conformity>) {
+    if let Some(found) = found {
+        say!("\nConformity: {}", conformity::sentence(found));
+        output::print(&conformity::table(found));
     }
 }
 

@@ -9,9 +9,10 @@ use std::time::Duration;
 
 use abbe::identify::candidates::library;
 use abbe::identify::plan::test_variations::TestVariations;
+use abbe::identify::results::TraceResult;
 use abbe::identify::separating_tests::separate_aliases;
 use abbe::identify::trace::{Progress, TraceOptions};
-use abbe::model::files::toml::{rewrite, write};
+use abbe::model::files::toml::write;
 use abbe::model::words::counted;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -20,10 +21,9 @@ use clock::{Clock, seconds};
 
 use super::failure::Failure;
 use super::interrupt::Interrupts;
-use super::message::{Kind, tell};
 use super::report::ReportArguments;
 use super::save::SaveArguments;
-use super::{CommonArguments, SessionArguments, compensation, message, output, read_session};
+use super::{CommonArguments, SessionArguments, compensation, message, next_session, output, read_session};
 use crate::present::{readings, trace as present};
 
 /// Examples of `abbe trace`.
@@ -32,6 +32,7 @@ pub const HELP: &str = "Examples:
   abbe trace sessions/hermle-c600u/measured/session.toml --all
   abbe trace sessions/hermle-c600u/measured/session.toml --json trace.json --csv trace.csv
   abbe trace sessions/hermle-c600u/measured/session.toml --report trace.html --write next.toml
+  abbe trace sessions/hermle-c600u/measured/session.toml --write next.toml --with-tests
   abbe trace sessions/hermle-c600u/measured/session.toml --save model.json
   abbe trace sessions/hermle-c600u/measured/session.toml --only EZC \\
       --exclude ~time --max-effects 2
@@ -87,6 +88,9 @@ pub struct TraceArguments {
     /// Example: --write next.toml
     #[arg(long, value_name = "FILE")]
     write: Option<PathBuf>,
+    /// Append the tests that separate the effects from their aliases to the written session, with all positions.
+    #[arg(long, requires = "write")]
+    with_tests: bool,
     /// Write the result as CSV, one row per value.
     ///
     /// Example: --csv trace.csv
@@ -166,22 +170,19 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     message::print_warnings(&trace.result.warnings);
     arguments.common.write_json(&sources, &trace.result)?;
     if let Some(path) = &arguments.write {
-        let data = arguments.session.data.as_deref();
-        let text = rewrite::relocated(&sources.text, &sources.file, output::folder_of(path), data)?;
-        let mut next = write::with_effects(&text, &trace.effects, &session.machine);
-        if trace.result.interrupted {
-            let interruption = trace.result.interruption();
-            next = format!("# The trace was {interruption}: effects may be missing.\n{next}");
-        }
-        output::write_whole(path, next.as_bytes())?;
-        let [own, there] = [&sources.file, path].map(|file| output::folder_of(file).canonicalize().ok());
-        if own != there {
-            let note = format!(
-                "{} refers to its machine and data in another folder; commands read it with --allow-outside",
-                path.display()
-            );
-            tell(Kind::Note, &note);
-        }
+        next_session::write(path, &sources, &arguments.session, |text| {
+            let mut next = write::with_effects(text, &trace.effects, &session.machine);
+            if arguments.with_tests {
+                next = write::with_blocks(&next, proposals(&trace.result));
+            }
+            match trace.result.interrupted {
+                true => {
+                    let interruption = trace.result.interruption();
+                    format!("# The trace was {interruption}: effects may be missing.\n{next}")
+                }
+                false => next,
+            }
+        })?;
     }
     if let Some(path) = &arguments.csv {
         output::write_figures(path, &present::figures(&trace.result))?;
@@ -207,6 +208,19 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     }
     arguments.save.run(&trace.after, &trace.after_fit, &sources, arguments.common.seed)?;
     arguments.compensation.run(&trace.after, &trace.after_fit, tables)
+}
+
+/// The proposed tests as blocks of a session, each once.
+fn proposals(result: &TraceResult) -> Vec<String> {
+    let mut seen: Vec<&str> = Vec::new();
+    let mut blocks = Vec::new();
+    for test in result.effects.iter().flat_map(|effect| &effect.separating_tests) {
+        if !test.session_toml.is_empty() && !seen.contains(&test.test.as_str()) {
+            seen.push(&test.test);
+            blocks.push(test.session_toml.clone());
+        }
+    }
+    blocks
 }
 
 fn progress_bar(quiet: bool) -> ProgressBar {

@@ -13,7 +13,9 @@ pub fn heading(test: &CircularTest) -> String {
     let radius = test.radius_mm.map_or(String::new(), |radius| format!(", radius {radius:.1} mm"));
     let feed = test.feed_mm_min.map_or(String::new(), |feed| format!(", {feed:.0} mm/min"));
     let arc = if test.arc_deg < 359.0 { format!(", {:.0}°", test.arc_deg) } else { String::new() };
-    format!("{}: circular path of {}{radius}{feed}{arc}", test.test, test.axes)
+    let name = test.iso_10791_6.as_ref().map_or(String::new(), |name| format!(", motion {name} of ISO 10791-6"));
+    let bar = test.bar_direction.as_ref().map_or(String::new(), |direction| format!(", bar {direction}"));
+    format!("{}: circular path of {}{name}{bar}{radius}{feed}{arc}", test.test, test.axes)
 }
 
 fn figure(um: Option<f64>) -> Cell {
@@ -59,6 +61,8 @@ fn directions(test: &CircularTest) -> Table {
             figure(Some(direction.circular_deviation_um)),
             figure(Some(direction.radial_deviation_max_um)),
             figure(Some(direction.radial_deviation_min_um)),
+            figure(direction.synchronous_error_motion_um),
+            figure(direction.asynchronous_error_motion_um),
         ]
     });
     let columns = [
@@ -67,8 +71,11 @@ fn directions(test: &CircularTest) -> Table {
         ">circular error (G), µm",
         ">maximum radial error (F max), µm",
         ">minimum radial error (F min), µm",
+        ">synchronous error motion, µm",
+        ">asynchronous error motion, µm",
     ];
-    Table::new(columns, rows)
+    let is_rotary = test.directions.iter().any(|direction| direction.synchronous_error_motion_um.is_some());
+    Table::new(columns, rows).first_columns(if is_rotary { columns.len() } else { columns.len() - 2 })
 }
 
 /// The figures of both directions together that the test has.

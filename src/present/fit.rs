@@ -2,6 +2,7 @@
 
 use abbe::identify::circular::CircularTest;
 use abbe::identify::results::{CrossValidation, FitMonteCarlo, FitResult, ParameterResult, Verdict};
+use abbe::identify::tolerance::Conformity;
 use abbe::model::words::counted;
 
 use super::cross_validation;
@@ -91,6 +92,7 @@ impl Figures {
         figures.held_out("residual", result.heldout_rms_um, &result.cross_validation);
         figures.parameters("parameters", &result.parameters);
         result.circular.iter().for_each(|test| figures.circular(test));
+        figures.conformity(result.conformity.as_ref());
         figures.0
     }
 
@@ -124,6 +126,14 @@ impl Figures {
                 .iter()
                 .map(|p| cells![section, &p.id, &p.meaning, Cell::exact(p.value), Cell::exact(p.u), &p.unit]),
         );
+    }
+
+    /// The decision about each item; its value is the probability that it is within its limits.
+    pub fn conformity(&mut self, conformity: Option<&Conformity>) {
+        for item in conformity.iter().flat_map(|conformity| &conformity.items) {
+            let probability = item.conformance_probability.map_or("".into(), Cell::exact);
+            self.0.rows.push(cells!["conformity", &item.id, item.decision.word(), probability, "", ""]);
+        }
     }
 
     fn circular(&mut self, test: &CircularTest) {

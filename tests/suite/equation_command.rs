@@ -323,7 +323,7 @@ fn printed_code_runs_unchanged() {
     let script = "
 import math, c100
 for c in [0.0, 0.7, 2.0, -2.5]:
-    value, gradient = c100.bar_length_gradient(R=100.0, H=75.0, Z_CA=75.0, R_c=99.9881, C_rad=c, EX0C=0.3)
+    value, gradient = c100.bar_length_gradient(R=100.0, H=75.0, Z_CA=75.0, C_rad=c, EX0C=0.3)
     expected = math.sqrt(100.0**2 + 0.09 - 2 * 0.3 * 100.0 * math.sin(c))
     slope = (0.3 - 100.0 * math.sin(c)) / expected
     assert abs(float(value) - expected) < 1e-12 * expected, (value, expected)

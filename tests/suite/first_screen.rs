@@ -103,9 +103,11 @@ fn a_plan_ends_in_its_worst_error_and_what_limits_it() {
         } else {
             let setup = parts.iter().filter(|part| part["source"] != "noise");
             let share = |part: &&Value| part["share"].as_f64().unwrap();
-            let largest = setup.max_by(|a, b| share(a).total_cmp(&share(b))).unwrap();
-            let named = format!("The set-up limits it: {} ", largest["source"].as_str().unwrap());
-            assert!(verdict.contains(&named), "{named}");
+            let largest = setup.clone().map(|part| share(&part)).fold(0.0, f64::max);
+            // Rounding decides nothing among equal shares.
+            let named = setup.filter(|part| share(part) > largest * (1.0 - 1e-9));
+            let mut named = named.map(|part| format!("The set-up limits it: {} ", part["source"].as_str().unwrap()));
+            assert!(named.any(|named| verdict.contains(&named)), "{verdict}");
         }
     }
     let (screen, _) = printed("plan", "hermle-c600u/chapter5.toml", &[]);

@@ -77,7 +77,9 @@ fn every_example_of_the_help_runs() {
     }
     lines.extend(later);
     let folder = tempfile::tempdir().unwrap();
-    copy(&workspace().join("sessions"), &folder.path().join("sessions"));
+    for ready in ["sessions", "studies"] {
+        copy(&workspace().join(ready), &folder.path().join(ready));
+    }
     // Files of the user that examples read.
     std::fs::write(folder.path().join("program.csv"), "x_mm,y_mm,z_mm,a_deg,c_deg\n10,20,30,40,50\n").unwrap();
     std::fs::write(folder.path().join("poses.csv"), "px_mm,py_mm,pz_mm,i,j,k\n10,20,30,0,0.6,0.8\n").unwrap();

@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 use super::{abbe, workspace};
 
 /// The commands, and the subject of `abbe schema` for each.
-const COMMANDS: [(&str, &str); 13] = [
+const COMMANDS: [(&str, &str); 18] = [
     ("abbe fit", "fit"),
     ("abbe fit --repeat", "repeat"),
     ("abbe fit --method circle, cone or two-plane", "geometric"),
@@ -19,9 +19,14 @@ const COMMANDS: [(&str, &str); 13] = [
     ("abbe plan", "plan"),
     ("abbe plan --improve, --separate or --range", "next-test"),
     ("abbe plan --global", "global"),
+    ("abbe plan --poses", "poses"),
     ("abbe plan --patterns", "patterns"),
     ("abbe simulate", "simulate"),
     ("abbe volumetric --map", "map"),
+    ("abbe run", "run"),
+    ("The result of a session in the folder of abbe run", "record"),
+    ("abbe history", "history"),
+    ("abbe study", "study"),
 ];
 
 const HEAD: &str = "# JSON results

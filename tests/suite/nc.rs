@@ -37,3 +37,33 @@ fn programs_are_written_together_or_not_at_all() {
     assert_eq!(names, ["A100.h", "A150.h", "C100.h", "C150.h", "main.h"]);
     assert!(String::from_utf8_lossy(&output.stdout).contains("has not been run on a control"));
 }
+
+/// What the programs only remark, the terminal says too: an overshoot that the travel cuts short, a ball that no axis
+/// reaches, a start without room above it.
+#[test]
+fn remarks_of_the_programs_are_warnings() {
+    let place = tempfile::tempdir().unwrap();
+    let machine = "name = \"short\"\nchain = \"w C A b Y X Z t\"\n[axis.C]\ntravel_deg = [-360, 360]\n\
+                   [axis.A]\ntravel_deg = [-21, 100]\n[axis.X]\ntravel_mm = [-300, 300]\n\
+                   [axis.Y]\ntravel_mm = [-300, 300]\n[axis.Z]\ntravel_mm = [-300, 10]\n";
+    let session = "[machine]\nfile = \"machine.toml\"\n[instrument]\nkind = \"ballbar\"\n[[test]]\nname = \"A\"\n\
+                   bar_mm = 150\nworkpiece_ball_mm = [0, 0, 0]\nspindle_ball_mm = [0, 0, 0]\nat = { x_mm = 150 }\n\
+                   sweep = { axis = \"A\", from_deg = -20, to_deg = 70, step_deg = 1 }\n";
+    std::fs::write(place.path().join("machine.toml"), machine).unwrap();
+    let plan = place.path().join("plan.toml");
+    std::fs::write(&plan, session).unwrap();
+    let out = place.path().join("programs");
+    let output = abbe(&["nc", text(&plan), "--control", "linuxcnc", "--out", text(&out), "--quiet"]);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{message}");
+    for expected in [
+        "warning: test \"A\": Overshoot 1.000 deg before and 2.000 deg after the measured path: the travel ends there",
+        "warning: test \"A\": The centre of the workpiece ball, setup A, cannot be reached",
+        "warning: test \"A\": The start cannot be approached along the tool within the travel",
+        "warning: test \"A\": Retreat along the tool by hand",
+    ] {
+        assert!(message.contains(expected), "{message}");
+    }
+    let program = std::fs::read_to_string(out.join("a.ngc")).unwrap();
+    assert!(program.contains("The start cannot be approached along the tool"), "{program}");
+}

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use super::{abbe, ready, text, workspace};
 
 /// A schema as the command prints it.
-fn schema(subject: &str) -> Value {
+pub fn schema(subject: &str) -> Value {
     let printed = abbe(&["schema", subject]);
     assert!(printed.status.success(), "{}", String::from_utf8_lossy(&printed.stderr));
     serde_json::from_slice(&printed.stdout).unwrap()
@@ -79,7 +79,7 @@ fn bundled_files_hold_and_misspelt_keys_do_not() {
 }
 
 /// The keys that the reader names when it meets one that it does not know.
-fn known_to_the_reader(session: &str) -> BTreeSet<String> {
+pub fn known_to_the_reader(session: &str) -> BTreeSet<String> {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("session.toml");
     std::fs::write(&file, session).unwrap();
@@ -94,7 +94,7 @@ fn known_to_the_reader(session: &str) -> BTreeSet<String> {
         .collect()
 }
 
-fn properties(schema: &Value) -> BTreeSet<String> {
+pub fn properties(schema: &Value) -> BTreeSet<String> {
     schema["properties"].as_object().unwrap().keys().cloned().collect()
 }
 
@@ -113,7 +113,7 @@ EFFECT
 ";
 
 /// A session that has `zz` where `place` says.
-fn with(place: &str, instrument: &str, test: &str, effect: &str) -> String {
+pub fn with(place: &str, instrument: &str, test: &str, effect: &str) -> String {
     let mut session = SESSION.to_string();
     let at = |mark: &str| if mark == place { "zz = 1\n" } else { "" };
     for (mark, contents) in [
@@ -131,12 +131,12 @@ fn with(place: &str, instrument: &str, test: &str, effect: &str) -> String {
     session.replacen("[machine.axis.C]", "axis.X = {}\naxis.Y = {}\naxis.Z = {}\n[machine.axis.C]", 1)
 }
 
-const BAR: &str = "bar_mm = 100\nworkpiece_ball_mm = [100, 0, 0]\nspindle_ball_mm = [0, 0, 0]";
+pub const BAR: &str = "bar_mm = 100\nworkpiece_ball_mm = [100, 0, 0]\nspindle_ball_mm = [0, 0, 0]";
 const TARGET: &str = "target_mm = [0, 0, 0]";
 const BALL: &str = "ball_mm = [0, 0, 0]\nsocket = \"0\"";
 const PROBE: &str = "artefact_mm = [50, 0, 0]\nradius_mm = 10\nstylus_mm = [0, 0, 0]";
 const NEST: &str = "setting = \"E\"\nworkpiece_ball_mm = [100, 0, 0]\nspindle_ball_mm = [0, 0, 0]";
-const SWEEP: &str = "sweep = { axis = \"C\", from_deg = 0, to_deg = 90, step_deg = 10 }";
+pub const SWEEP: &str = "sweep = { axis = \"C\", from_deg = 0, to_deg = 90, step_deg = 10 }";
 
 #[test]
 fn the_session_schema_has_the_keys_that_the_reader_knows() {

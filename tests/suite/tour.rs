@@ -79,7 +79,7 @@ fn run_in(command: &str, folder: &Path) -> (Vec<String>, bool) {
 fn the_tour_shows_the_output_of_its_commands() {
     let document = std::fs::read_to_string(workspace().join("docs/guide/tour.md")).unwrap();
     let steps = steps(&document);
-    let commands = ["new", "plan", "simulate", "fit", "trace"];
+    let commands = ["new", "plan", "nc", "sheet", "simulate", "fit", "trace"];
     for command in commands.map(|command| format!("abbe {command} ")) {
         assert!(steps.iter().any(|step| step.command.starts_with(&command)), "{command}");
     }
@@ -95,7 +95,7 @@ fn the_tour_shows_the_output_of_its_commands() {
         let fails = shown.iter().any(|line| line.to_lowercase().starts_with("error:"));
         assert_eq!(success, !fails, "docs/guide/tour.md:{line}: {command}");
     }
-    for file in ["trace.html", "export/next.toml"] {
+    for file in ["programs/main.ngc", "sheets.html", "trace.html", "export/next.toml"] {
         assert!(folder.path().join(file).exists(), "{file}");
     }
 }

@@ -29,6 +29,7 @@ pub fn print(problem: &Problem, fit: &Fit, result: &FitResult, session: &Session
         say!("{}", base_statement(base));
     }
     screen::print_circular(&result.circular, all);
+    screen::print_conformity(result.conformity.as_ref());
     screen::print_missing(&result.unobservable, &result.outliers, all);
     screen::print_next(&next(problem, result, session));
 }

@@ -1,5 +1,7 @@
 //! `abbe plan --improve`, `--separate`, `--range`.
 
+use std::path::PathBuf;
+
 use abbe::identify::IdentifyError;
 use abbe::identify::candidates::library;
 use abbe::identify::plan::criterion::Goal;
@@ -7,11 +9,13 @@ use abbe::identify::plan::improve::{ImproveOptions, Improvement, improve};
 use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::problem::Problem;
 use abbe::model::effect::Effect;
+use abbe::model::files::SourceMap;
+use abbe::model::files::toml::write;
 use abbe::model::words::counted;
 use clap::{Args, ValueEnum};
 
 use crate::cli::failure::Failure;
-use crate::cli::output;
+use crate::cli::{SessionArguments, next_session, output};
 use crate::present::next_test as present;
 use crate::present::number::three_digits;
 
@@ -97,12 +101,31 @@ pub struct ImproveArguments {
     /// Example: --improve 1 --test-min 1
     #[arg(long, value_name = "MIN", requires = "next_test")]
     test_min: Option<f64>,
+    /// Write the session with the proposed tests at its end, with all positions.
+    ///
+    /// Example: --improve 2 --write next.toml
+    #[arg(long, value_name = "FILE", requires = "next_test")]
+    write: Option<PathBuf>,
 }
 
 impl ImproveArguments {
     /// Whether a next test is requested.
     pub fn asked(&self) -> bool {
         self.improve.is_some() || self.separate.is_some()
+    }
+
+    /// The file of the session with the proposed tests.
+    pub fn file(&self) -> Option<&PathBuf> {
+        self.write.as_ref()
+    }
+
+    /// Writes the session with the proposed tests, if requested.
+    pub fn write(&self, found: &Improvement, sources: &SourceMap, session: &SessionArguments) -> Result<(), Failure> {
+        let Some(path) = &self.write else {
+            return Ok(());
+        };
+        let blocks = found.steps.iter().map(|step| step.session_toml.clone()).filter(|block| !block.is_empty());
+        next_session::write(path, sources, session, |text| write::with_blocks(text, blocks))
     }
 
     /// Travel of the sensor in the bar, in each direction, mm.

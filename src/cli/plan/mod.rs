@@ -3,11 +3,12 @@
 pub mod global;
 pub mod improve;
 pub mod patterns;
+mod poses;
 mod screen;
 
 use abbe::identify::plan::clearance::Clearance;
 use abbe::identify::plan::{self, PlanOptions};
-use abbe::model::files::SourceMap;
+use abbe::model::files::{self, ReadOptions, SourceMap};
 use abbe::model::instrument::Station;
 use abbe::model::instrument::rtest::Setting;
 use abbe::model::session::limits::{LARGEST, MIN_UM};
@@ -60,6 +61,8 @@ pub struct PlanArguments {
     #[command(flatten)]
     improve: improve::ImproveArguments,
     #[command(flatten)]
+    poses: poses::PoseArguments,
+    #[command(flatten)]
     patterns: patterns::PatternArguments,
     #[command(flatten)]
     global: global::GlobalArguments,
@@ -75,10 +78,12 @@ pub const HELP: &str = "Examples:
   abbe plan sessions/hermle-c600u/chapter5.toml --noise-um 0.5 --no-effects
   abbe plan sessions/hermle-c600u/chapter5.toml --setup-um 1 --no-effects --json plan.json
   abbe plan sessions/hermle-c600u/chapter5.toml --improve 2 --bars-mm 50,100,150,300
+  abbe plan sessions/hermle-c600u/chapter5.toml --improve 2 --write next.toml
   abbe plan sessions/hermle-c600u/chapter5.toml --separate EZC~C:h2,EAC~C:h1
   abbe plan sessions/hermle-c600u/chapter5.toml --patterns patterns.csv \\
       --error EY0A=10um --error EB0A=0.01deg
   abbe plan sessions/hermle-c600u/chapter5.toml --range
+  abbe plan sessions/ur10/session.toml --poses 30 --noise-um 50 --poses-csv ur10.csv
   abbe plan sessions/hermle-c600u/chapter5.toml --global --vary EZC~C:h2=2um --samples 64
 
 The first screen answers in this order: identifiable errors and rank; predicted standard uncertainty u and expanded \
@@ -88,8 +93,20 @@ limits it. --all adds sensitivities, budgets, correlations, observability indice
 /// Runs `abbe plan`.
 pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
     arguments.report.check()?;
-    let outputs = arguments.common.outputs(&[arguments.patterns.file(), arguments.report.file()])?;
+    let others = [arguments.patterns.file(), arguments.report.file(), arguments.improve.file(), arguments.poses.file()];
+    let outputs = arguments.common.outputs(&others)?;
     let tables = outputs.tables(arguments.common.quiet);
+    if arguments.poses.asked() {
+        return poses(arguments, &outputs, tables);
+    }
+    // The written session has the mounts and the priors of the file, not those of the command line.
+    if arguments.improve.file().is_some() && (arguments.one_spindle_ball || arguments.setup_um.is_some()) {
+        return Err(Failure::Other(
+            "`--write` with `--one-spindle-ball` or `--setup-um` would write a session that is not the planned one: \
+             state the mount or the uncertainties in the session file, then plan without these options"
+                .to_string(),
+        ));
+    }
     let (mut session, sources) = read_session(&arguments.session, &outputs)?;
     if arguments.patterns.asked() {
         return arguments.patterns.run((&session, &sources), &arguments.common, tables);
@@ -140,6 +157,17 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Poses, without the data of the session.
+fn poses(arguments: &PlanArguments, outputs: &output::Outputs, tables: bool) -> Result<(), Failure> {
+    let reading = ReadOptions { read_data: false, ..arguments.session.options() };
+    let (session, sources) = files::session_with_sources(&arguments.session.session, &reading)?;
+    outputs.refuse_overwrite_of_sources(&sources)?;
+    let noise_mm = arguments.noise_um.map(|um| positive("--noise-um", um)).transpose()?;
+    let found = arguments.poses.run(&session, noise_mm, arguments.common.seed, tables)?;
+    print_warnings(&session.warnings);
+    arguments.common.write_json(&sources, &found)
+}
+
 /// Proposed tests, and ranges that suffice.
 #[derive(serde::Serialize, schemars::JsonSchema)]
 pub struct NextTest {
@@ -164,6 +192,7 @@ fn next_test(
         if tables {
             improve::print(&improvement);
         }
+        arguments.improve.write(&improvement, sources, &arguments.session)?;
         Some(improvement)
     } else {
         None

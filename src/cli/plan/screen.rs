@@ -15,6 +15,9 @@ pub fn print(analysis: &PlanAnalysis, session: &SessionArguments, improvable: bo
     header(analysis);
     output::print(&present::uncertainties(&analysis.errors));
     unidentifiable(analysis, all);
+    if !analysis.clearances.is_empty() {
+        output::print(&present::clearances(&analysis.clearances));
+    }
     if all {
         details(analysis);
     } else if let Some(found) = &analysis.effects {

@@ -35,6 +35,7 @@ pub fn print(trace: &TraceOutcome, session: &SessionArguments, all: bool) {
         say!("  u covers the change of the parameter if an alias takes the place of an effect");
     }
     changes(result, all);
+    screen::print_conformity(result.conformity.as_ref());
     screen::print_missing(&result.unobservable, &result.outliers, all);
     measure_next(result);
     screen::print_next(&next(result, session));

@@ -8,10 +8,6 @@ use super::scale::{coordinate, dots, polyline, span};
 use super::svg::{Drawing, WIDTH, legend, shortened};
 use crate::present::table::{Cell, Table, cells, numbers, words};
 
-/// Panels in a row.
-const PER_ROW: usize = 2;
-/// Side of a panel, SVG units.
-const SIDE: f64 = WIDTH / PER_ROW as f64;
 /// Space around the drawing of a panel, SVG units.
 const MARGIN: f64 = 26.0;
 /// Length of the arrows of R, as a share of the extent of the set-up.
@@ -21,7 +17,12 @@ const AXIS: f64 = 0.45;
 
 /// The set-ups of some tests, one panel each.
 #[derive(Clone, Debug)]
-pub struct SetUps(pub Vec<SetUpPath>);
+pub struct SetUps {
+    /// The tests.
+    pub panels: Vec<SetUpPath>,
+    /// Panels in a row.
+    pub per_row: usize,
+}
 
 /// Right and down on the paper, for a point in R. Z points up.
 fn projected([x, y, z]: [f64; 3]) -> [f64; 2] {
@@ -35,6 +36,8 @@ fn along([x, y, z]: [f64; 3], [dx, dy, dz]: [f64; 3], by: f64) -> [f64; 3] {
 
 /// The projection of one set-up onto its panel.
 struct Panel {
+    /// Side of the panel, SVG units.
+    side: f64,
     per_mm: f64,
     offset: [f64; 2],
     /// Largest extent of the points, mm.
@@ -42,7 +45,7 @@ struct Panel {
 }
 
 impl Panel {
-    fn of(path: &SetUpPath) -> Panel {
+    fn of(path: &SetUpPath, side: f64) -> Panel {
         let own: Vec<[f64; 3]> = path.workpiece_mm.iter().chain(&path.tool_mm).copied().chain([[0.0; 3]]).collect();
         let spans = [0, 1, 2].map(|k| span(own.iter().map(|point| point[k])));
         let extent = spans.iter().map(|[low, high]| high - low).fold(1.0, f64::max);
@@ -50,9 +53,9 @@ impl Panel {
         let frame = [0, 1, 2].map(|k| std::array::from_fn(|i| if i == k { FRAME * extent } else { 0.0 }));
         let all: Vec<[f64; 2]> = own.iter().copied().chain(lines).chain(frame).map(projected).collect();
         let [across, down] = [0, 1].map(|k| span(all.iter().map(|point| point[k])));
-        let per_mm = (SIDE - 2.0 * MARGIN) / (across[1] - across[0]).max(down[1] - down[0]).max(1e-9);
-        let offset = [across, down].map(|[low, high]| SIDE / 2.0 - per_mm * (low + high) / 2.0);
-        Panel { per_mm, offset, extent }
+        let per_mm = (side - 2.0 * MARGIN) / (across[1] - across[0]).max(down[1] - down[0]).max(1e-9);
+        let offset = [across, down].map(|[low, high]| side / 2.0 - per_mm * (low + high) / 2.0);
+        Panel { side, per_mm, offset, extent }
     }
 
     fn at(&self, point: [f64; 3]) -> (f64, f64) {
@@ -83,8 +86,8 @@ impl Panel {
     }
 }
 
-fn panel(path: &SetUpPath) -> Markup {
-    let panel = Panel::of(path);
+fn panel(path: &SetUpPath, side: f64) -> Markup {
+    let panel = Panel::of(path, side);
     let length = FRAME * panel.extent;
     html! {
         @for (name, at, direction) in &path.axes {
@@ -104,14 +107,16 @@ fn panel(path: &SetUpPath) -> Markup {
         }
         @if let Some(tool) = path.tool_mm.first() { (panel.ball("dot-before", *tool)) }
         @if let Some(workpiece) = path.workpiece_mm.first() { (panel.ball("dot-after", *workpiece)) }
-        text class="middle" x=(SIDE / 2.0) y=(SIDE + 4.0) { (shortened(&path.test, 26)) }
+        text class="middle" x=(panel.side / 2.0) y=(panel.side + 4.0) { (shortened(&path.test, 26)) }
     }
 }
 
 impl Kind for SetUps {
     fn drawing(&self) -> Drawing {
-        let row_height = SIDE + 16.0;
-        let rows = self.0.len().div_ceil(PER_ROW).max(1);
+        let per_row = self.per_row.max(1);
+        let side = WIDTH / per_row as f64;
+        let row_height = side + 16.0;
+        let rows = self.panels.len().div_ceil(per_row).max(1);
         let entries = [
             ("after", "point of the table frame"),
             ("before", "point of the tool frame"),
@@ -122,9 +127,9 @@ impl Kind for SetUps {
         let entries = entries.map(|(class, label)| (class, label.to_string()));
         let (keys, bottom) = legend(&entries, 10.0, row_height * rows as f64 + 16.0, WIDTH - 20.0);
         let inner = html! {
-            @for (number, path) in self.0.iter().enumerate() {
-                @let (x, y) = ((number % PER_ROW) as f64 * SIDE, (number / PER_ROW) as f64 * row_height);
-                g transform=(format!("translate({x} {y})")) { (panel(path)) }
+            @for (number, path) in self.panels.iter().enumerate() {
+                @let (x, y) = ((number % per_row) as f64 * side, (number / per_row) as f64 * row_height);
+                g transform=(format!("translate({x} {y})")) { (panel(path, side)) }
             }
             (keys)
         };
@@ -133,7 +138,7 @@ impl Kind for SetUps {
 
     /// One row per point.
     fn table(&self) -> Table {
-        let rows = self.0.iter().flat_map(|path| {
+        let rows = self.panels.iter().flat_map(|path| {
             let bodies = [("table", &path.workpiece_mm), ("tool", &path.tool_mm)];
             let point = |body: &str, point: &[f64; 3]| {
                 let mut row = cells![&path.test, body];

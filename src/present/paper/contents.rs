@@ -60,7 +60,8 @@ pub fn set_up(study: &Study) -> Section {
     if all > MAX_SET_UPS {
         caption.push_str(&format!(" The first {MAX_SET_UPS} of {all} tests."));
     }
-    let drawing = Figure::new("set-up", "Set-up of each test", caption, Chart::SetUps(set_up::SetUps(set_ups)));
+    let panels = set_up::SetUps { panels: set_ups, per_row: 2 };
+    let drawing = Figure::new("set-up", "Set-up of each test", caption, Chart::SetUps(panels));
     let rows = study.analysis.tests.iter().map(|test| {
         let minutes = test.moving_min.map_or("–".to_string(), |min| format!("{min:.1}"));
         cells![&test.name, &test.setup, test.readings.to_string(), minutes]

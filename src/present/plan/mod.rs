@@ -4,6 +4,7 @@ pub mod effects;
 pub mod global;
 pub mod verdict;
 
+use abbe::identify::plan::collision::TestClearance;
 use abbe::identify::plan::results::{ErrorAnalysis, Indices, PlanAnalysis};
 use abbe::model::words::counted;
 
@@ -48,6 +49,15 @@ pub fn uncertainties(errors: &[ErrorAnalysis]) -> Table {
         "Predicted standard uncertainty u and expanded uncertainty U = 2u; parts of u from noise and from the set-up;\n\
          conditional u (all other errors known); the largest contribution to the variance",
     )
+}
+
+/// The least clearance of every test, and where it is.
+pub fn clearances(found: &[TestClearance]) -> Table {
+    let rows = found.iter().map(|found| {
+        let at: Vec<String> = found.at.iter().map(|(name, q)| format!("{name} {q:.1}")).collect();
+        cells![&found.test, Cell::fixed(found.clearance_mm, 1), found.between.join(", "), at.join(", ")]
+    });
+    Table::new(["test", ">clearance, mm", "between", "at"], rows).titled("Least clearance (0 or less: collision)")
 }
 
 /// How far each error moves the readings.

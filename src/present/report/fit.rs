@@ -48,6 +48,7 @@ pub fn document(problem: &Problem, fit: &Fit, result: &FitResult) -> Result<Docu
     sections::conflicts(&mut document, &result.plausibility);
     let section = values::section(&mut document, &Estimates::new(problem, fit, &result.parameters), None);
     document.section("Values", section);
+    sections::conformity(&mut document, result.conformity.as_ref());
     let before = if session.is_polar() { "nominal machine and set-up" } else { "nominal machine, fitted set-up" };
     let section = residuals::section(&mut document, &session, &spectra, [before, "fit"]);
     document.section("Residuals", section);

@@ -3,7 +3,7 @@
 //!
 //! - [`document`], [`page`]: contents of a report, and the page around them. [`provenance`]: inputs, version and
 //!   command line. [`embed`]: data in the page.
-//! - [`fit`], [`trace`], [`validate`](mod@validate), [`plan`], [`method`], [`next_test`]: the report of each command.
+//! - [`fit`], [`trace`], [`validate`](mod@validate), [`plan`], [`method`], [`next_test`], [`history`]: the report of each command.
 //! - [`summary`], [`values`], [`residuals`], [`effects`], [`readings`], [`sections`]: sections.
 //! - [`plots`], [`curves`]: plots of readings and of derived quantities. [`abscissae`]: what they are plotted against.
 //!   [`decimate`]: decimation that keeps extremes.
@@ -18,6 +18,8 @@ pub mod document;
 pub mod effects;
 pub mod embed;
 pub mod fit;
+#[cfg(feature = "fleet")]
+pub mod history;
 pub mod method;
 pub mod next_test;
 pub mod page;

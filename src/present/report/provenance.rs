@@ -1,6 +1,6 @@
 //! Provenance of a report: input files with checksums, version, command line and seed.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use abbe::model::files::SourceMap;
 use abbe::model::files::stamp::FileStamp;
@@ -61,9 +61,9 @@ impl Provenance {
 pub fn stamped(stamp: &FileStamp) -> Result<Input, String> {
     let unchanged = || stamp.changed().map_or(Ok(()), Err);
     unchanged()?;
-    let input = input(stamp.file.clone()).map_err(|cause| cause.to_string())?;
+    let contents = stamp.read().map_err(|cause| cause.to_string())?;
     unchanged()?;
-    Ok(input)
+    Ok(of_contents(&stamp.file, &contents))
 }
 
 /// A file with its checksum.
@@ -72,11 +72,16 @@ pub fn stamped(stamp: &FileStamp) -> Result<Input, String> {
 /// If it cannot be read.
 pub fn input(path: PathBuf) -> std::io::Result<Input> {
     let contents = std::fs::read(&path)?;
-    Ok(Input {
+    Ok(of_contents(&path, &contents))
+}
+
+/// A file with this content.
+fn of_contents(path: &Path, contents: &[u8]) -> Input {
+    Input {
         path: path.display().to_string(),
         bytes: contents.len(),
-        sha256: Sha256::digest(&contents).iter().map(|byte| format!("{byte:02x}")).collect(),
-    })
+        sha256: Sha256::digest(contents).iter().map(|byte| format!("{byte:02x}")).collect(),
+    }
 }
 
 /// Quotes an argument for a shell.

@@ -4,12 +4,13 @@
 use abbe::identify::circular::CircularTest;
 use abbe::identify::plausibility::Plausibility;
 use abbe::identify::results::{Outlier, Unobservable};
+use abbe::identify::tolerance::Conformity;
 use abbe::model::words::counted;
 use maud::{Markup, html};
 
 use super::document::Document;
 use crate::present::html::{capitalised, folded_beyond, list, table};
-use crate::present::{circular, confounded, plausibility};
+use crate::present::{circular, conformity, confounded, plausibility};
 
 /// Longer lists are folded.
 const MAX_LISTED: usize = 12;
@@ -28,6 +29,15 @@ pub fn conflicts(document: &mut Document, plausibility: &Plausibility) {
             @if !found.causes.is_empty() { (list(found.causes)) }
         },
     );
+}
+
+/// Adds the decisions of conformity, if the session states limits.
+pub fn conformity(document: &mut Document, found: Option<&Conformity>) {
+    let Some(found) = found else {
+        return;
+    };
+    let contents = html! { p { (capitalised(&conformity::sentence(found))) "." } (table(&conformity::table(found))) };
+    document.section("Conformity", contents);
 }
 
 /// Confounded parameters: one sentence for each null-space direction.

@@ -77,6 +77,7 @@ pub fn document(trace: &TraceOutcome) -> Result<Document, IdentifyError> {
     let before = (!result.effects.is_empty()).then_some(result.before.parameters.as_slice());
     let section = values::section(&mut document, &estimates, before);
     document.section("Values", html! { (section) (changes(&estimates, result)) });
+    sections::conformity(&mut document, result.conformity.as_ref());
     let section = residuals::section(
         &mut document,
         &session,

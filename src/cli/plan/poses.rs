@@ -1,0 +1,154 @@
+//! `abbe plan --poses`: poses for a tracker, an R-test or a ball bar at rest.
+
+use std::path::PathBuf;
+
+use abbe::identify::plan::poses::candidates::{LineOfSight, PoseLimits};
+use abbe::identify::plan::poses::{PoseCriterion, PoseOptions, PoseSelection, select};
+use abbe::model::session::Session;
+use clap::{Args, ValueEnum};
+
+use crate::cli::failure::Failure;
+use crate::cli::output;
+use crate::present::poses as present;
+
+/// Maximum number of poses.
+const MAX_POSES: usize = 1000;
+/// Maximum number of candidate poses.
+const MAX_CANDIDATES: usize = 20_000;
+/// Noise of a reading where neither session nor option states one, mm.
+const ASSUMED_NOISE_MM: f64 = 1e-3;
+
+/// What the poses are to make small.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Criterion {
+    /// Volume of the confidence ellipsoid.
+    D,
+    /// Mean variance.
+    A,
+    /// Largest standard uncertainty.
+    Worst,
+}
+
+/// The selection of poses.
+#[derive(Args)]
+pub struct PoseArguments {
+    /// Choose this many poses that determine the errors best, by exchange over candidates within the travel of the axes.
+    ///
+    /// Example: --poses 30
+    #[arg(long, value_name = "N", conflicts_with_all = ["improve", "separate", "range", "patterns", "global"])]
+    poses: Option<usize>,
+    /// What the poses are to make small.
+    ///
+    /// Example: --poses 30 --criterion d
+    #[arg(long, value_enum, default_value = "worst", requires = "poses")]
+    criterion: Criterion,
+    /// The test whose instrument measures the poses [default: the last].
+    ///
+    /// Example: --poses 30 --pose-test A
+    #[arg(long, value_name = "TEST", requires = "poses")]
+    pose_test: Option<String>,
+    /// Number of candidate poses.
+    ///
+    /// Example: --poses 30 --candidates 2000
+    #[arg(long, value_name = "N", default_value_t = 1000, requires = "poses")]
+    candidates: usize,
+    /// Box that contains the instrument's point of the tool, in R.
+    ///
+    /// Example: --poses 30 --box-mm -800,800,-800,800,100,1200
+    #[arg(long, value_name = "X,X,Y,Y,Z,Z", value_delimiter = ',', requires = "poses", allow_hyphen_values = true)]
+    box_mm: Option<Vec<f64>>,
+    /// Position of the tracker in R. The line from it to the target keeps a distance from the links of the machine.
+    ///
+    /// Example: --poses 30 --tracker-mm 3000,0,1000
+    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', requires = "poses", allow_hyphen_values = true)]
+    tracker_mm: Option<Vec<f64>>,
+    /// Distance of the line of sight from the links: the lines between the origins of the axes.
+    ///
+    /// Example: --poses 30 --tracker-mm 3000,0,1000 --sight-mm 150
+    #[arg(long, value_name = "MM", default_value_t = 100.0, requires = "tracker_mm")]
+    sight_mm: f64,
+    /// Write the poses as CSV, one row per pose, with the columns of data files.
+    ///
+    /// Example: --poses 30 --poses-csv poses.csv
+    #[arg(long, value_name = "FILE.csv", requires = "poses")]
+    poses_csv: Option<PathBuf>,
+}
+
+impl PoseArguments {
+    /// Whether poses are requested.
+    pub fn asked(&self) -> bool {
+        self.poses.is_some()
+    }
+
+    /// The file of the poses.
+    pub fn file(&self) -> Option<&PathBuf> {
+        self.poses_csv.as_ref()
+    }
+
+    /// Selects and shows the poses.
+    pub fn run(
+        &self,
+        session: &Session,
+        noise_mm: Option<f64>,
+        seed: u64,
+        tables: bool,
+    ) -> Result<PoseSelection, Failure> {
+        let within = |flag: &str, value: usize, most: usize| match value {
+            value if (1..=most).contains(&value) => Ok(value),
+            value => Err(Failure::Other(format!("`{flag} {value}`: a number from 1 to {most} is expected"))),
+        };
+        let options = PoseOptions {
+            poses: within("--poses", self.poses.unwrap_or(1), MAX_POSES)?,
+            criterion: match self.criterion {
+                Criterion::D => PoseCriterion::D,
+                Criterion::A => PoseCriterion::A,
+                Criterion::Worst => PoseCriterion::WorstUncertainty,
+            },
+            candidates: within("--candidates", self.candidates, MAX_CANDIDATES)?,
+            seed,
+            limits: self.limits()?,
+            noise_mm: noise_mm.or(session.noise_mm).filter(|noise| *noise > 0.0).unwrap_or(ASSUMED_NOISE_MM),
+        };
+        let test = match &self.pose_test {
+            None => session.tests.last(),
+            Some(name) => session.tests.iter().find(|test| test.name == *name),
+        };
+        let Some(test) = test else {
+            let names: Vec<&str> = session.tests.iter().map(|test| test.name.as_str()).collect();
+            return Err(Failure::Other(format!(
+                "`--pose-test {}`: the session has no such test; its tests are {}",
+                self.pose_test.as_deref().unwrap_or_default(),
+                names.join(", ")
+            )));
+        };
+        let found = select(session, test, &options)?;
+        if tables {
+            say!("{}", present::sentence(&found));
+            output::print(&present::uncertainties(&found));
+            output::print(&present::poses(&found));
+        }
+        if let Some(path) = &self.poses_csv {
+            output::write_whole(path, &output::csv(&present::exact_poses(&found))?)?;
+        }
+        Ok(found)
+    }
+
+    fn limits(&self) -> Result<PoseLimits, Failure> {
+        let fault = |flag: &str, words: &str| Err(Failure::Other(format!("`{flag}`: {words}")));
+        let box_mm = match self.box_mm.as_deref() {
+            None => None,
+            Some(&[x, xx, y, yy, z, zz]) if x < xx && y < yy && z < zz => Some([[x, xx], [y, yy], [z, zz]]),
+            Some(_) => return fault("--box-mm", "six numbers are expected: least and greatest X, Y, Z"),
+        };
+        let sight = match self.tracker_mm.as_deref() {
+            None => None,
+            Some(&[x, y, z]) if [x, y, z].iter().all(|x| x.is_finite()) => Some([x, y, z]),
+            Some(_) => return fault("--tracker-mm", "three numbers are expected: X, Y, Z"),
+        };
+        if !(self.sight_mm.is_finite() && self.sight_mm >= 0.0) {
+            return fault("--sight-mm", "a number of at least 0 is expected");
+        }
+        let sight = sight.map(|from_mm| LineOfSight { from_mm, clearance_mm: self.sight_mm });
+        Ok(PoseLimits { box_mm, sight })
+    }
+}

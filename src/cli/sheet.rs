@@ -1,0 +1,83 @@
+//! `abbe sheet`: set-up sheets of the planned tests.
+
+use std::path::PathBuf;
+
+use abbe::identify::plan::sheet::{SetUpTimes, sheets};
+use abbe::model::files::{self, ReadOptions};
+use abbe::model::session::motion::Motion;
+use abbe::model::words::counted;
+use clap::Args;
+
+use super::failure::Failure;
+use super::message::print_warnings;
+use super::{SessionArguments, output};
+use crate::present::sheet as present;
+
+/// Examples of `abbe sheet`.
+pub const HELP: &str = "One page of HTML for each test, to be printed from the browser: drawing of balls, bar and rotary axes, what to mount and what stays \
+mounted, coordinates, bar length and extension, positions of all axes with their distance from the ends of travel, duration, room for notes. \
+The first page has the order of the tests.
+
+Examples:
+  abbe sheet sessions/hermle-c600u/chapter5.toml --out sheets.html
+  abbe sheet sessions/hermle-c600u/chapter5.toml --out sheets.html --bar-mm 100 --setup-min 10";
+
+/// `abbe sheet SESSION --out FILE.html`
+#[derive(Args)]
+pub struct SheetArguments {
+    #[command(flatten)]
+    session: SessionArguments,
+    /// The page; `-` is standard output.
+    ///
+    /// Example: --out sheets.html
+    #[arg(long, value_name = "FILE.html")]
+    out: PathBuf,
+    /// Length of the bar without an extension, mm [default: the shortest bar of the session].
+    ///
+    /// Example: --bar-mm 100
+    #[arg(long, value_name = "MM")]
+    bar_mm: Option<f64>,
+    /// Time to mount a ball.
+    ///
+    /// Example: --setup-min 10
+    #[arg(long, value_name = "MIN", default_value_t = 5.0)]
+    setup_min: f64,
+    /// Time to prepare a test.
+    ///
+    /// Example: --test-min 2
+    #[arg(long, value_name = "MIN", default_value_t = 1.0)]
+    test_min: f64,
+}
+
+/// Runs `abbe sheet`.
+pub fn run(arguments: &SheetArguments, quiet: bool) -> Result<(), Failure> {
+    for (flag, value) in [("--setup-min", arguments.setup_min), ("--test-min", arguments.test_min)] {
+        if !(0.0..=1e4).contains(&value) {
+            return Err(Failure::Other(format!("`{flag} {value}`: a number of minutes from 0 to 10000 is expected")));
+        }
+    }
+    if let Some(mm) = arguments.bar_mm
+        && !(1.0..=1e4).contains(&mm)
+    {
+        return Err(Failure::Other(format!("`--bar-mm {mm}`: a length from 1 to 10000 mm is expected")));
+    }
+    let outputs = output::Outputs::new([&arguments.out])?;
+    let reading = ReadOptions { read_data: false, ..arguments.session.options() };
+    let (mut session, mut sources) = files::session_with_sources(&arguments.session.session, &reading)?;
+    // Poses stand in the data.
+    if session.tests.iter().any(|test| matches!(test.motion, None | Some(Motion::List))) {
+        (session, sources) = files::session_with_sources(&arguments.session.session, &arguments.session.options())?;
+    }
+    outputs.refuse_overwrite_of_sources(&sources)?;
+    let times = SetUpTimes { setup_min: arguments.setup_min, test_min: arguments.test_min };
+    let sheets = sheets(&session, times)?;
+    let shortest = sheets.iter().filter_map(|sheet| sheet.bar_mm).reduce(f64::min);
+    let name = sources.file.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let page = present::html(&session, &sheets, arguments.bar_mm.or(shortest), &name);
+    print_warnings(&session.warnings);
+    output::write_whole(&arguments.out, page.as_bytes())?;
+    if outputs.tables(quiet) {
+        say!("{}: {}, one page each, and an overview", arguments.out.display(), counted(sheets.len(), "test"));
+    }
+    Ok(())
+}

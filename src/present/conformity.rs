@@ -1,0 +1,63 @@
+//! Decisions of conformity by the rule of ISO 14253-1.
+
+use abbe::identify::tolerance::rule::Decision;
+use abbe::identify::tolerance::{Conformity, ConformityItem};
+use abbe::model::words::counted;
+
+use super::number::{places, unit};
+use super::table::{Cell, Table, cells};
+
+/// The verdict and its rule in one sentence.
+pub fn sentence(conformity: &Conformity) -> String {
+    let count = |decision: Decision| conformity.items.iter().filter(|item| item.decision == decision).count();
+    format!(
+        "{}: {} of {} pass, {} fail, {} undecided (rule of ISO 14253-1, probability {} %)",
+        conformity.verdict.word(),
+        count(Decision::Pass),
+        counted(conformity.items.len(), "item"),
+        count(Decision::Fail),
+        count(Decision::Undecided),
+        100.0 * conformity.probability
+    )
+}
+
+/// One row per item.
+pub fn table(conformity: &Conformity) -> Table {
+    let columns = ["item", ">value", ">u", "unit", ">limits", ">passes within", ">P(within limits)", "decision", "why"];
+    Table::new(columns, conformity.items.iter().map(row)).without_empty_columns()
+}
+
+fn row(item: &ConformityItem) -> Vec<Cell> {
+    let [value, u] = match (item.value, item.u) {
+        (Some(value), Some(u)) => Cell::estimate(value, u),
+        _ => ["–".into(), "–".into()],
+    };
+    let digits = item.u.map_or(1, places);
+    let zone = item.acceptance_zone.map_or_else(
+        || "–".to_string(),
+        |zone| format!("{:.digits$} to {:.digits$}", if item.lower.is_some() { zone.low } else { 0.0 }, zone.high),
+    );
+    let limits = match item.lower {
+        None => format!("≤ {}", limit(item.upper)),
+        Some(lower) if lower == -item.upper => format!("±{}", limit(item.upper)),
+        Some(lower) => format!("{} to {}", limit(lower), limit(item.upper)),
+    };
+    let probability = item.conformance_probability.map(|p| Cell::from(format!("{:.1} %", 100.0 * p)));
+    cells![
+        &item.id,
+        value,
+        u,
+        unit(&item.unit),
+        limits,
+        zone,
+        Cell::or_dash(probability),
+        item.decision.word(),
+        item.why.clone().unwrap_or_default()
+    ]
+}
+
+/// A limit with the digits that were stated; of a converted one four.
+fn limit(value: f64) -> String {
+    let text = value.to_string();
+    if text.len() <= 8 { text } else { format!("{value:.4}") }
+}

@@ -1,0 +1,55 @@
+//! Selected poses.
+
+use abbe::identify::plan::poses::PoseSelection;
+use abbe::model::words::counted;
+
+use super::number::{three_digits, unit};
+use super::table::{Cell, Table, cells, numbers};
+
+/// The criterion of the poses and of random sets.
+pub fn sentence(found: &PoseSelection) -> String {
+    format!(
+        "{} of {}: {} {}; median of 100 random sets {}",
+        counted(found.poses.len(), "pose"),
+        counted(found.candidates, "candidate"),
+        unit(&found.criterion),
+        three_digits(found.value),
+        three_digits(found.random_median)
+    )
+}
+
+/// The errors with their predicted uncertainties.
+pub fn uncertainties(found: &PoseSelection) -> Table {
+    let rows = found.uncertainties.iter().map(|error| cells![&error.id, three_digits(error.u), unit(&error.unit)]);
+    let mut table = Table::new(["error", ">u", "unit"], rows).titled("Predicted standard uncertainty u");
+    if !found.held.is_empty() {
+        table.notes.push(format!(
+            "held at nominal, because as many candidate poses do not separate them from the others: {}",
+            found.held.join(", ")
+        ));
+    }
+    table
+}
+
+/// The positions of all axes.
+pub fn poses(found: &PoseSelection) -> Table {
+    table(found, |q| Cell::fixed(q, 3)).titled("Poses")
+}
+
+/// The positions of all axes with all digits, for a file.
+pub fn exact_poses(found: &PoseSelection) -> Table {
+    let mut table = table(found, Cell::exact);
+    table.columns.remove(0);
+    table.rows.iter_mut().for_each(|row| drop(row.remove(0)));
+    table
+}
+
+fn table(found: &PoseSelection, cell: fn(f64) -> Cell) -> Table {
+    let columns = std::iter::once(numbers("pose")).chain(found.columns.iter().map(|name| numbers(name.clone())));
+    let rows = found.poses.iter().enumerate().map(|(number, pose)| {
+        let mut row = cells![(number + 1).to_string()];
+        row.extend(pose.iter().map(|q| cell(*q)));
+        row
+    });
+    Table::new(columns, rows)
+}
