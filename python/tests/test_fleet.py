@@ -156,8 +156,7 @@ def test_history_is_that_of_the_command(finished):
         for parameter in machine["parameters"]
         if parameter["drift_per_year"]
     ]
-    # The scatter of few sessions is badly known, so that the drift of M0 need not be significant; nothing else is.
-    assert set(drifting) <= {("M0", "EX0C")}
+    assert drifting == [("M0", "EX0C")]
     with pytest.raises(abbe.Error, match="no session of the machine"):
         abbe.fleet.history(finished, machine="none")
 

@@ -49,7 +49,7 @@ impl Default for HistoryOptions {
 
 /// Analyses machines. The sessions of each are sorted by time.
 pub fn analyse(machines: &[MachineSessions], options: &HistoryOptions) -> History {
-    let all: Vec<Vec<Series>> = parallel::map(machines.len(), &|k| Series::of_machine(&machines[k]));
+    let all = Series::of_fleet(machines);
     let p_values: Vec<f64> = all.iter().flatten().map(Series::p_value).collect();
     let threshold = benjamini_hochberg(&p_values, options.false_discovery_rate);
     let fitted: Vec<MachineHistory> = parallel::map(machines.len(), &|k| {

@@ -79,10 +79,10 @@ pub struct ParameterHistory {
     pub points: Vec<PointResult>,
     /// Probability of a change as large as the largest one if there is none. All positions of a step are counted.
     pub p_value: f64,
-    /// Scatter between neighbouring sessions over that which the uncertainties predict.
+    /// Scatter between neighbouring sessions, less the drift, over that which the uncertainties predict.
     pub scatter_ratio: f64,
-    /// Factor by which `u` is enlarged: the scatter of all parameters of the machine together where it is above 1, or
-    /// `scatter_ratio` where that is significantly above 1; else 1.
+    /// Factor by which `u` is enlarged: the scatter of all parameters of all machines where it is above 1; that of the
+    /// machine, or `scatter_ratio`, where it is significantly larger; else 1.
     pub u_enlargement: f64,
     /// Level: at the mean date of a series with drift, before the first step; `null` if the model is not separable.
     pub level: Option<Estimate>,

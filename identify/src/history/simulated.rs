@@ -107,11 +107,15 @@ fn consistent(count: [u64; 2], at_least: bool, rate: f64) -> bool {
     if at_least { law.cdf(count[0]) > 1e-3 } else { count[0] == 0 || law.sf(count[0] - 1) > 1e-3 }
 }
 
+/// The number of fleets of a test: this, or that of a study.
+fn number_of_fleets(usual: u64) -> u64 {
+    std::env::var("ABBE_STUDY").ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
+}
+
 #[test]
 fn drifts_and_steps_of_a_fleet_are_found() {
-    let fleets = std::env::var("ABBE_STUDY").ok().and_then(|text| text.parse().ok()).unwrap_or(6);
     let (mut counts, mut any) = (Counts::default(), [0; 2]);
-    for fleet in 0..fleets {
+    for fleet in 0..number_of_fleets(6) {
         let mut random = Pcg64::seed_from_u64(41 + fleet);
         let mut truth = [[Truth::Nothing; PARAMETERS]; 20];
         for truth in &mut truth {
@@ -235,7 +239,7 @@ fn scatter_is_no_change() {
     let mut random = Pcg64::seed_from_u64(23);
     for scatter in [1.0, 1.2, 1.4, 1.6] {
         let mut any = [0, 0];
-        for _ in 0..60 {
+        for _ in 0..number_of_fleets(60) {
             let mut quiet: Vec<MachineSessions> = (0..20).map(|one| machine(one, |_, _, _| 0.0, &mut random)).collect();
             let sessions = quiet.iter_mut().flat_map(|machine| &mut machine.sessions);
             for (value, _) in sessions.flat_map(|session| &mut session.values).flatten() {
@@ -249,6 +253,47 @@ fn scatter_is_no_change() {
         println!("scatter {scatter}: fleets without a change that have a claim {any:?}");
         assert!(consistent(any, false, 0.05), "{scatter}: {any:?}");
     }
+}
+
+/// Half a year of a small fleet: a drift far above the noise is found, although few sessions determine the scatter badly,
+/// and a drifting machine does not pass for a scattering one.
+#[test]
+fn a_large_drift_of_a_small_fleet_is_found() {
+    let mut random = Pcg64::seed_from_u64(29);
+    let mut small = |drift: f64| {
+        let machines = (0..4).map(|number| {
+            let value = |parameter: usize, years: f64, _: usize| match (number, parameter) {
+                (0, 0) => 12.0 * drift * years,
+                _ => 0.0,
+            };
+            let mut one = machine(number, value, &mut random);
+            one.sessions.truncate(6);
+            one.parameters.truncate(2);
+            one.sessions.iter_mut().for_each(|session| session.values.truncate(2));
+            one
+        });
+        analyse(&machines.collect::<Vec<_>>(), &HistoryOptions::default())
+    };
+    let (mut found, mut others, mut any) = ([0, 0], [0, 0], [0, 0]);
+    for _ in 0..number_of_fleets(200) {
+        let has_change = |one: &super::results::ParameterHistory| one.drift_per_year.is_some() || !one.steps.is_empty();
+        let changed = |history: &History| -> Vec<bool> {
+            history.machines.iter().flat_map(|machine| &machine.parameters).map(has_change).collect()
+        };
+        // 9 standard uncertainties a month.
+        let drifting = small(9.0);
+        found[0] += u64::from(drifting.machines[0].parameters[0].drift_per_year.is_some());
+        found[1] += 1;
+        let claims = changed(&drifting);
+        others[0] += claims[1..].iter().filter(|claim| **claim).count() as u64;
+        others[1] += claims.iter().filter(|claim| **claim).count() as u64;
+        any[0] += u64::from(changed(&small(0.0)).contains(&true));
+        any[1] += 1;
+    }
+    println!("small fleets: drifts {found:?}, false of all claims {others:?}, quiet fleets with a claim {any:?}");
+    assert!(consistent(found, true, 0.98), "{found:?}");
+    assert!(consistent(others, false, 0.05), "{others:?}");
+    assert!(consistent(any, false, 0.05), "{any:?}");
 }
 
 /// A compensation takes away what its tables say; a collision does not. Both are found as steps of several parameters.
