@@ -1,5 +1,10 @@
 //! The command `abbe`.
 
+#![cfg_attr(
+    not(test),
+    deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::todo)
+)]
+
 mod cli;
 
 use std::process::ExitCode;

@@ -60,6 +60,11 @@
 //! # Ok::<(), abbe_model::ModelError>(())
 //! ```
 
+#![cfg_attr(
+    not(test),
+    deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::todo)
+)]
+
 pub mod axis;
 pub mod body;
 pub mod chain;

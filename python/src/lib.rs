@@ -7,6 +7,11 @@
 //! - [`fleet`]: units of work of many sessions;
 //! - [`show`]: tables, figures and reports; [`failed`]: errors as exceptions.
 
+#![cfg_attr(
+    not(test),
+    deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::todo)
+)]
+
 mod equation;
 mod failed;
 mod fit;

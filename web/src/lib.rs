@@ -5,6 +5,11 @@
 //! - [`plan`]: a plan that changes while it is looked at;
 //! - [`failed`]: errors with file, line and column.
 
+#![cfg_attr(
+    not(test),
+    deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::todo)
+)]
+
 mod failed;
 mod fit;
 mod folder;
