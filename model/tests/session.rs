@@ -274,6 +274,25 @@ fn sockets_named_by_a_column_become_tests() {
     assert_eq!(session.tests[0].spindle_setup, session.tests[1].spindle_setup);
 }
 
+/// The bar turns about its ball, so that its length does not show the mistake.
+#[test]
+fn degrees_in_a_column_of_radians_are_doubted() {
+    for (column, doubted) in [("c_rad", true), ("c_deg", false)] {
+        let folder = tempfile::tempdir().unwrap();
+        let rows: String = (0..37).map(|k| format!("{},100.0\n", 10 * k)).collect();
+        fs::write(folder.path().join("t.csv"), format!("{column},length_mm\n{rows}")).unwrap();
+        let text = "[machine]\nchain = \"w C b Y X Z t\"\n[machine.axis.C]\n[machine.axis.X]\n[machine.axis.Y]\n\
+                    [machine.axis.Z]\n\n[instrument]\nkind = \"ballbar\"\n\n[unknowns]\nerrors = []\n\n[[test]]\n\
+                    name = \"T\"\ndata = \"t.csv\"\nbar_mm = 100\nworkpiece_ball_mm = [0, 0, 0]\n\
+                    spindle_ball_mm = [0, 0, 100]\n";
+        let path = folder.path().join("session.toml");
+        fs::write(&path, text).unwrap();
+        let warnings = files::session(&path, &ReadOptions::default()).unwrap().warnings.join("\n");
+        let found = warnings.contains("axis `C` goes to 20626.481 deg, 57 turns from zero");
+        assert_eq!(found, doubted, "{column}: {warnings}");
+    }
+}
+
 #[test]
 fn missing_runs_are_reported() {
     let sweep = "sweep = { axis = \"C\", from_deg = 0, to_deg = 270, step_deg = 90, runs = 2, both_directions = true }";

@@ -34,10 +34,16 @@ pub(crate) fn plan(machine: &Machine, test: &Test) -> Result<(), Fault> {
 pub(crate) fn readings(machine: &Machine, test: &Test, readings: &Readings) -> Result<Vec<String>, Fault> {
     plausibility::check(machine, test, readings)?;
     test.station.check_observed(&test.name, &readings.observed)?;
-    let doubts =
-        [planned::beyond_travel(machine, readings), runs::difference_from_stated(test.motion.as_ref(), readings)];
-    let doubts = doubts.into_iter().flatten();
-    Ok(doubts.map(|doubt| format!("test \"{}\": {doubt}; the data are used as they are", test.name)).collect())
+    let doubts = [
+        planned::beyond_travel(machine, readings),
+        planned::many_turns(machine, readings),
+        runs::difference_from_stated(test.motion.as_ref(), readings),
+    ];
+    Ok(doubts
+        .into_iter()
+        .flatten()
+        .map(|doubt| format!("test \"{}\": {doubt}; the data are used as they are", test.name))
+        .collect())
 }
 
 /// The fault of a time after another, if it decreases.

@@ -3,6 +3,7 @@
 use super::motion::Motion;
 use super::readings::Readings;
 use super::{Session, Test, trajectory};
+use crate::axis::AxisKind;
 use crate::chain::Machine;
 use crate::error::ModelError;
 use crate::instrument::Station;
@@ -82,6 +83,25 @@ pub(crate) fn beyond_travel(machine: &Machine, readings: &Readings) -> Option<St
             displayed(greatest),
             unit = axis.kind.unit(),
         ))
+    })
+}
+
+/// Turns beyond which the positions of a rotary axis are doubted. Degrees in a column of radians are 57 times as far.
+const MANY_TURNS: f64 = 10.0;
+
+/// A description of the first rotary axis whose positions are many turns from zero.
+pub(crate) fn many_turns(machine: &Machine, readings: &Readings) -> Option<String> {
+    machine.axes.iter().zip(&readings.positions).find_map(|(axis, positions)| {
+        let turns = |position: &f64| position.abs() / std::f64::consts::TAU;
+        let farthest = positions.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
+        (axis.kind == AxisKind::Rotary && turns(&farthest) > MANY_TURNS).then(|| {
+            format!(
+                "axis `{}` goes to {:.3} deg, {:.0} turns from zero: are its positions in degrees rather than radians?",
+                axis.name,
+                axis.kind.to_display(farthest),
+                turns(&farthest),
+            )
+        })
     })
 }
 
