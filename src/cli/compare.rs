@@ -125,8 +125,13 @@ pub fn run(arguments: &CompareArguments) -> Result<(), Failure> {
             }
             output::print(&present::differences(&comparison, pair, arguments.all));
         }
-        if !comparison.workspace.is_empty() {
-            output::print(&present::workspace(&comparison));
+        match comparison.workspace.is_empty() {
+            false => output::print(&present::workspace(&comparison)),
+            true if arguments.places > 0 => {
+                say!("");
+                say!("Volumetric error: not evaluated, because the ranges of the axes have nothing in common");
+            }
+            true => {}
         }
     }
     if let Some(path) = &arguments.csv {

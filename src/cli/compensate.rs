@@ -140,7 +140,7 @@ impl Write for UntilInterrupted<'_> {
 
 /// The stated positions of axes, zero for the others, mm or rad.
 fn positions(machine: &Machine, stated: &[String]) -> Result<Vec<f64>, Failure> {
-    let mut at = vec![0.0; machine.axes.len()];
+    let mut at = vec![None; machine.axes.len()];
     for text in stated {
         let fault = || Failure::Other(format!("--at {text}: write an axis and its position in mm or degrees, `A=30`"));
         let (name, number) = text.split_once('=').ok_or_else(fault)?;
@@ -153,7 +153,9 @@ fn positions(machine: &Machine, stated: &[String]) -> Result<Vec<f64>, Failure> 
                 name.trim()
             )));
         };
-        at[axis] = machine.axes[axis].kind.to_internal(number);
+        if at[axis].replace(machine.axes[axis].kind.to_internal(number)).is_some() {
+            return Err(Failure::Other(format!("--at {text}: the position of {} is stated twice", name.trim())));
+        }
     }
-    Ok(at)
+    Ok(at.into_iter().map(Option::unwrap_or_default).collect())
 }

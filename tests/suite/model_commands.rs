@@ -146,6 +146,8 @@ fn a_file_that_cannot_be_compensated_is_refused_before_anything_is_written() {
     let commands = file("program.csv", "x_mm\n1\n");
     let at = ["compensate", text(&model), text(&commands), "--out", text(&out), "--at", "X=5"];
     refused(&abbe(&at), "--at X=5: the commands have a column for the positions of X");
+    let twice = [&at[..5], &["--at", "A=5", "--at", "A=6"]].concat();
+    refused(&abbe(&twice), "--at A=6: the position of A is stated twice");
     assert!(!out.exists());
     let over = abbe(&["compensate", text(&model), text(&commands), "--out", text(&commands)]);
     refused(&over, "one of the files that are read");
