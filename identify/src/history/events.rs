@@ -144,9 +144,11 @@ impl Change {
         let count = self.values.len();
         let metric = Metric::of(&self.covariance)
             .unwrap_or_else(|| Metric { root: Mat::from_fn(count, count, |i, j| f64::from(u8::from(i == j))) });
+        let is_of_change =
+            |known: &KnownChange| self.parameters.iter().any(|parameter| machine.parameters[*parameter].0 == known.id);
         let known: Vec<&Compensation> = compensations
             .iter()
-            .filter(|known| known.machine_id == machine.machine_id)
+            .filter(|known| known.machine_id == machine.machine_id && known.changes.iter().any(is_of_change))
             .filter(|known| known.days[0] <= self.possible_days[1] && known.days[1] >= self.possible_days[0])
             .collect();
         let chi_square = metric.product(&self.values, &self.values);

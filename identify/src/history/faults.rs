@@ -13,6 +13,8 @@ pub struct FoundEffect {
     pub machine_id: String,
     /// What tells machines of one kind from others: effects of other kinds are other faults.
     pub kind: String,
+    /// The session.
+    pub session: String,
     /// Day of the session.
     pub days: f64,
     /// Identifier of the effect.
@@ -98,20 +100,23 @@ pub fn faults(effects: &[FoundEffect]) -> Vec<Fault> {
     found
 }
 
+/// Number of sessions of effects.
+fn sessions<'e>(effects: impl Iterator<Item = &'e FoundEffect>) -> usize {
+    effects.map(|effect| effect.session.as_str()).collect::<BTreeSet<_>>().len()
+}
+
 fn fault(members: &[(&str, &[&FoundEffect])]) -> Fault {
     let mut by_machine: BTreeMap<&str, Vec<&FoundEffect>> = BTreeMap::new();
     for effect in members.iter().flat_map(|(_, effects)| effects.iter()) {
         by_machine.entry(&effect.machine_id).or_default().push(effect);
     }
     let machines = by_machine.into_iter().map(|(machine_id, effects)| {
-        let mut days: Vec<f64> = effects.iter().map(|effect| effect.days).collect();
-        days.sort_by(f64::total_cmp);
-        days.dedup();
+        let days = || effects.iter().map(|effect| effect.days);
         FaultOfMachine {
             machine_id: machine_id.to_string(),
-            sessions: days.len(),
-            first_days: days[0],
-            last_days: days[days.len() - 1],
+            sessions: sessions(effects.iter().copied()),
+            first_days: days().fold(f64::INFINITY, f64::min),
+            last_days: days().fold(f64::NEG_INFINITY, f64::max),
         }
     });
     let machines: Vec<FaultOfMachine> = machines.collect();
@@ -123,7 +128,7 @@ fn fault(members: &[(&str, &[&FoundEffect])]) -> Fault {
         id: id.to_string(),
         meaning: first.map_or(String::new(), |effect| effect.meaning.clone()),
         code: first.map_or(String::new(), |effect| effect.kind.clone()),
-        names: members.iter().map(|(id, effects)| (id.to_string(), effects.len())).collect(),
+        names: members.iter().map(|(id, effects)| (id.to_string(), sessions(effects.iter().copied()))).collect(),
         sessions: machines.iter().map(|machine| machine.sessions).sum(),
         machines,
         mean_rms_gain_um: gain / count as f64,
@@ -138,6 +143,7 @@ mod tests {
         FoundEffect {
             machine_id: machine.into(),
             kind: kind.into(),
+            session: format!("{machine} {id}"),
             days: 1.0,
             id: id.into(),
             family: ("harmonic".into(), id[..3].into(), "C".into()),

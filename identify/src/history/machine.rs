@@ -33,6 +33,27 @@ pub(super) struct Fitted<'m> {
     terms: Vec<Terms>,
 }
 
+/// Sessions in front of which one change has its steps.
+struct Cluster {
+    /// The earliest session that lies before one of the steps in its series.
+    before: usize,
+    /// The sessions, ascending.
+    sessions: Vec<usize>,
+}
+
+impl Cluster {
+    fn last(&self) -> usize {
+        self.sessions.last().copied().unwrap_or(self.before)
+    }
+
+    fn add(&mut self, before: usize, session: usize) {
+        self.before = self.before.min(before);
+        if self.last() != session {
+            self.sessions.push(session);
+        }
+    }
+}
+
 /// A joint fit: the first coefficient of each series.
 struct Joint {
     solved: Regression,
@@ -227,26 +248,40 @@ impl<'m> Fitted<'m> {
 
     /// The steps of all parameters by session, each with its direction.
     fn changes(&self, options: &HistoryOptions) -> Vec<events::ChangeEvent> {
-        let mut sessions: Vec<usize> = self.terms.iter().flat_map(|terms| terms.steps.iter().copied()).collect();
-        sessions.sort_unstable();
-        sessions.dedup();
-        // One change has steps in neighbouring sessions where noise moves the position of a step.
-        let clusters = sessions.chunk_by(|earlier, later| *later == *earlier + 1);
-        clusters.filter_map(|cluster| self.change(cluster, options)).collect()
+        let mut clusters: Vec<Cluster> = Vec::new();
+        for (before, session) in self.steps() {
+            match clusters.last_mut() {
+                // One change has steps in neighbouring sessions where noise moves the position of a step.
+                Some(cluster) if before <= cluster.last() => cluster.add(before, session),
+                _ => clusters.push(Cluster { before, sessions: vec![session] }),
+            }
+        }
+        clusters.iter().filter_map(|cluster| self.change(cluster, options)).collect()
+    }
+
+    /// The steps of all series by session: the session of the series before the step, and that behind it.
+    fn steps(&self) -> Vec<(usize, usize)> {
+        let of_series = |series: &Series| -> Vec<(usize, usize)> {
+            series.steps.iter().map(|at| (series.sessions[at - 1], series.sessions[*at])).collect()
+        };
+        let mut steps: Vec<(usize, usize)> = self.series.iter().flat_map(of_series).collect();
+        steps.sort_unstable_by_key(|(before, session)| (*session, *before));
+        steps
     }
 
     /// The change of a cluster of sessions, at the session where its joint χ² is largest.
-    fn change(&self, cluster: &[usize], options: &HistoryOptions) -> Option<events::ChangeEvent> {
-        let candidates = cluster.iter().filter_map(|session| self.change_at(*session, cluster));
+    fn change(&self, cluster: &Cluster, options: &HistoryOptions) -> Option<events::ChangeEvent> {
+        let candidates = cluster.sessions.iter().filter_map(|session| self.change_at(*session, cluster));
         let candidates = candidates.map(|change| change.event(self.machine, &options.compensations));
         candidates.max_by(|a, b| a.chi_square.total_cmp(&b.chi_square))
     }
 
-    fn change_at(&self, session: usize, cluster: &[usize]) -> Option<Change> {
+    fn change_at(&self, session: usize, cluster: &Cluster) -> Option<Change> {
         let mut terms = self.terms.clone();
         let mut members = Vec::new();
         for (k, terms) in terms.iter_mut().enumerate() {
-            let mut steps: Vec<usize> = terms.steps.iter().copied().filter(|step| !cluster.contains(step)).collect();
+            let mut steps: Vec<usize> =
+                terms.steps.iter().copied().filter(|step| !cluster.sessions.contains(step)).collect();
             steps.push(session);
             // A series with sessions on one side only, or none between this step and its next, does not have the step.
             if self.series[k].separates(terms.drift, &steps) {
@@ -256,15 +291,17 @@ impl<'m> Fitted<'m> {
         }
         let joint = self.solve(&terms)?;
         let place = |k: usize| joint.first[k] + usize::from(terms[k].drift) + terms[k].steps.len();
-        let has_step = |k: usize| self.terms[k].steps.iter().any(|step| cluster.contains(step));
+        let has_step = |k: usize| self.terms[k].steps.iter().any(|step| cluster.sessions.contains(step));
+        // A series may lack the sessions just before its step.
+        let before = self.steps().into_iter().filter(|(_, at)| *at == session).map(|(before, _)| before).min();
         let count = members.len();
         let covariance =
             Mat::from_fn(count, count, |i, j| joint.solved.inverse[(place(members[i]), place(members[j]))]);
         let sessions = &self.machine.sessions;
         Some(Change {
-            after_days: sessions[session - 1].days,
+            after_days: sessions[before.unwrap_or(session - 1)].days,
             before_days: sessions[session].days,
-            possible_days: [sessions[cluster[0] - 1].days, sessions[cluster[cluster.len() - 1]].until_days],
+            possible_days: [sessions[cluster.before].days, sessions[cluster.last()].until_days],
             parameters: members.iter().map(|k| self.series[*k].parameter).collect(),
             values: members.iter().map(|k| joint.solved.beta[place(*k)]).collect(),
             covariance,

@@ -152,6 +152,7 @@ fn drifts_and_steps_of_a_fleet_are_found() {
     assert!(consistent(counts.drifts, true, 0.9), "{:?}", counts.drifts);
     assert!(consistent(counts.steps, true, 0.9), "{:?}", counts.steps);
     assert!(consistent(counts.claims, false, 0.05), "{:?}", counts.claims);
+    // Few fleets; `scatter_is_no_change` counts more.
     assert!(consistent(any, false, 0.05), "{any:?}");
 }
 
@@ -183,6 +184,35 @@ fn small_compensations_are_named() {
     }
     println!("named compensations {named:?}");
     assert!(consistent(named, true, 0.98), "{named:?}");
+}
+
+/// A parameter that every second session has may change during two months: a table of that time is its explanation. A
+/// table of other parameters says nothing.
+#[test]
+fn a_compensation_between_sparse_sessions_is_named() {
+    let mut random = Pcg64::seed_from_u64(31);
+    let value = |parameter: usize, _: f64, session: usize| if parameter == 0 && session >= 15 { 9.0 } else { 0.0 };
+    let mut one = machine(0, value, &mut random);
+    for values in one.sessions.iter_mut().skip(1).step_by(2) {
+        values.values[0] = None;
+    }
+    // Between the sessions 14 and 15. The session 15 lacks the parameter: its step lies between 14 and 16.
+    let own = table(0, 15, |i| if i == 0 { 9.0 * 0.5 } else { 0.0 });
+    let days = [one.sessions[14].days, one.sessions[16].days];
+    for at in [14.5, 15.5] {
+        let compensations = vec![Compensation { days: [at * 30.4375; 2], ..own.clone() }];
+        let options = HistoryOptions { compensations, ..HistoryOptions::default() };
+        let changes = &analyse(std::slice::from_ref(&one), &options).machines[0].changes;
+        assert_eq!(changes.len(), 1, "{changes:?}");
+        assert_eq!((changes[0].kind, [changes[0].after_days, changes[0].before_days]), (Kind::Compensation, days));
+    }
+    let mut other = own.clone();
+    other.changes = vec![KnownChange { id: "E99".into(), value: 5.0, ..KnownChange::default() }];
+    let kinds = |compensations: Vec<Compensation>| -> Vec<Kind> {
+        let options = HistoryOptions { compensations, ..HistoryOptions::default() };
+        analyse(std::slice::from_ref(&one), &options).machines[0].changes.iter().map(|change| change.kind).collect()
+    };
+    assert_eq!(kinds(vec![other]), kinds(Vec::new()));
 }
 
 /// The table in the opposite direction is no explanation, however small it is.
