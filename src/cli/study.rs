@@ -23,7 +23,7 @@ use crate::present::study as present;
 /// Examples of `abbe study`.
 pub const HELP: &str = "A study file states plans, effects and noise. Every combination is simulated and analysed: \
 how often the true effect is found (named or among the aliases), how often another one is claimed, how many 95 % \
-intervals contain the true value, each with its standard error. Plans are ranked by power, then by uncertainty. Draws \
+intervals contain the true value, each with its standard error. Plans are ranked by the errors that they determine, then by uncertainty. Draws \
 follow from the study file and their number alone; finished ones are kept in --out.
 
 Example of a study file:

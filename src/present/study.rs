@@ -22,11 +22,14 @@ pub fn cells(title: &str, draws: &[Draws]) -> Table {
             cell.noise.clone(),
             cell.draws.to_string(),
             cell.failed.to_string(),
+            cell.not_observed.to_string(),
             percent(&cell.found),
             percent(&cell.named),
             percent(&cell.false_claims),
             percent(&cell.coverage),
-            Cell::fixed(cell.pull_rms, 2)
+            Cell::fixed(cell.pull_rms, 2),
+            Cell::fixed(cell.undetermined, 1),
+            cell.mean_u.map_or_else(String::new, |u| fixed(u, 3))
         ]
     });
     let headings = [
@@ -35,11 +38,14 @@ pub fn cells(title: &str, draws: &[Draws]) -> Table {
         "noise",
         ">draws",
         ">failed",
+        ">not observed",
         ">found",
         ">of these named",
         ">false claim",
         ">coverage of 95 %",
         ">rms pull",
+        ">undetermined",
+        ">mean u",
     ];
     let mut table = Table::new(headings, rows.collect::<Vec<_>>());
     title.clone_into(&mut table.title);

@@ -46,6 +46,8 @@ pub struct Draw {
     pub truth: Option<String>,
     /// Why there is no result; `null` if there is one.
     pub error: Option<String>,
+    /// Whether the plan does not observe the effect: it is confounded with the plan's parameters. Nothing is simulated.
+    pub not_observed: bool,
     /// Verdict of the trace.
     pub verdict: Option<String>,
     /// Whether the true effect was found: named, or among the aliases of a found effect.
@@ -60,8 +62,10 @@ pub struct Draw {
     pub intervals: usize,
     /// Sum of the squares of (estimate − true value)/u of the location errors.
     pub pull_squares: f64,
-    /// Mean standard uncertainty of the location errors, whatever their units.
+    /// Mean standard uncertainty of the determined location errors, whatever their units; 0 of none.
     pub mean_u: f64,
+    /// Location errors that the readings do not determine.
+    pub undetermined: usize,
     /// Rms of the residual, µm.
     pub rms_um: f64,
 }
@@ -95,7 +99,14 @@ impl Study {
         if !goes_on() {
             return None;
         }
-        draw.error = made.err().map(|error| error.to_string());
+        draw.error = match made {
+            Ok(()) => None,
+            Err(Unmade::NotObserved) => {
+                draw.not_observed = true;
+                None
+            }
+            Err(Unmade::Failed(error)) => Some(error.to_string()),
+        };
         Some(draw)
     }
 
@@ -116,7 +127,7 @@ impl Study {
         [plan, effect, noise]: [usize; 3],
         random: &mut Pcg64,
         goes_on: &(dyn Fn() -> bool + Sync),
-    ) -> Result<(), IdentifyError> {
+    ) -> Result<(), Unmade> {
         let session = &self.plans[plan];
         let (stated, noise) = (&self.file.effect[effect], &self.file.noise[noise]);
         let truth =
@@ -144,7 +155,7 @@ impl Study {
             add_noise(readings, noise, session.resolution_mm, random);
         }
         let measured = session.clone().with_readings(simulated.readings);
-        self.analyse(draw, &measured, &locations, random.random::<u32>().into(), goes_on)
+        Ok(self.analyse(draw, &measured, &locations, random.random::<u32>().into(), goes_on)?)
     }
 
     fn analyse(
@@ -180,11 +191,26 @@ impl Study {
     }
 }
 
+/// Why a draw has no simulated session.
+enum Unmade {
+    NotObserved,
+    Failed(IdentifyError),
+}
+
+impl From<IdentifyError> for Unmade {
+    fn from(error: IdentifyError) -> Unmade {
+        Unmade::Failed(error)
+    }
+}
+
 impl Draw {
     /// Compares estimates with the true values.
     fn compare(&mut self, parameters: &[ParameterResult], truth: &[Given]) {
         for truth in truth {
-            let Some(found) = parameters.iter().find(|found| found.id == truth.id && found.u > 0.0) else { continue };
+            let Some(found) = parameters.iter().find(|found| found.id == truth.id && found.u > 0.0) else {
+                self.undetermined += 1;
+                continue;
+            };
             let pull = (found.value - truth.value) / found.u;
             self.intervals += 1;
             self.covered += usize::from(pull.abs() <= INTERVAL);
@@ -206,11 +232,11 @@ fn parameters(session: &Session) -> Result<Vec<abbe_identify::parameters::Parame
 }
 
 /// An effect of the library that the plan observes.
-fn of_library(session: &Session, random: &mut impl Rng) -> Result<Effect, IdentifyError> {
+fn of_library(session: &Session, random: &mut impl Rng) -> Result<Effect, Unmade> {
     let mut effects = screened_effects(session, &TraceOptions::default())?;
     effects.retain(|effect| effect.observable);
     if effects.is_empty() {
-        return Err(IdentifyError::Request("the plan observes no effect of the library".into()));
+        return Err(Unmade::NotObserved);
     }
     // Families are equally probable, whatever their number of effects.
     let mut families: Vec<usize> = effects.iter().map(|effect| effect.family).collect();
@@ -229,7 +255,7 @@ fn coefficients(
     size: f64,
     noise: &Noise,
     random: &mut impl Rng,
-) -> Result<Vec<Given>, IdentifyError> {
+) -> Result<Vec<Given>, Unmade> {
     let own = machine.effects.len() - 1;
     let coefficients: Vec<(String, f64, String)> = parameters(machine)?
         .into_iter()
@@ -258,7 +284,7 @@ fn coefficients(
     let inflation = (1.0 + noise.autocorrelation) / (1.0 - noise.autocorrelation);
     let strength = (chi_square / inflation).sqrt();
     if strength.is_nan() || chi_square <= SURVIVES * change / (noise_mm * noise_mm) || strength <= 0.0 {
-        return Err(IdentifyError::Request("the plan does not observe the effect".into()));
+        return Err(Unmade::NotObserved);
     }
     Ok(scaled(size * SIGNIFICANT / strength))
 }

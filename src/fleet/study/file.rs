@@ -1,8 +1,11 @@
 //! The study file.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use abbe_identify::simulate::{Simulation, simulate};
+use abbe_identify::trace::TraceOptions;
+use abbe_identify::trace::screening::screened_effects;
 use abbe_model::effect::Effect;
 use abbe_model::files::toml::parts;
 use abbe_model::files::{self, ReadOptions};
@@ -143,7 +146,7 @@ pub fn read(path: &Path) -> Result<Study, FleetError> {
     check(&file).map_err(fault)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut digest = Sha256::new();
-    digest.update(concat!("abbe study 2 ", env!("CARGO_PKG_VERSION"), "\n"));
+    digest.update(concat!("abbe study 3 ", env!("CARGO_PKG_VERSION"), "\n"));
     digest.update(&text);
     let (mut plans, mut effects) = (Vec::new(), Vec::new());
     for plan in &file.plan {
@@ -156,10 +159,19 @@ pub fn read(path: &Path) -> Result<Study, FleetError> {
                 .map_err(|source| FleetError::Read { path: stamp.file.display().to_string(), source })?;
             digest.update(Sha256::digest(contents));
         }
-        effects.push(file.effect.iter().map(|effect| declared(path, effect, &session)).collect::<Result<_, _>>()?);
+        let own: Vec<Option<Effect>> =
+            file.effect.iter().map(|effect| declared(path, effect, &session)).collect::<Result<_, _>>()?;
+        let of_plan = |error| fault(format!("plan `{}`: {error}", plan.name));
         let nominal = Simulation { noise_mm: Some(0.0), ..Simulation::default() };
-        let drawn = simulate(&session, &nominal).map_err(|error| fault(format!("plan `{}`: {error}", plan.name)))?;
-        plans.push(session.with_readings(drawn.readings));
+        let drawn = simulate(&session, &nominal).map_err(of_plan)?;
+        let session = session.with_readings(drawn.readings);
+        if file.study.analysis == Analysis::Trace && own.iter().any(Option::is_some) {
+            let library = screened_effects(&session, &TraceOptions::default()).map_err(of_plan)?;
+            let ids: HashSet<String> = library.iter().map(|screened| screened.effect.id()).collect();
+            check_searched(&own, &file, &ids).map_err(fault)?;
+        }
+        effects.push(own);
+        plans.push(session);
     }
     let key = digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
     Ok(Study { file, plans, effects, key })
@@ -176,8 +188,35 @@ fn declared(path: &Path, effect: &TrueEffect, session: &Session) -> Result<Optio
     Ok(effects.pop())
 }
 
+/// An effect that no search has under its name cannot be found, whatever the readings.
+fn check_searched(own: &[Option<Effect>], file: &StudyFile, ids: &HashSet<String>) -> Result<(), String> {
+    for (effect, stated) in own.iter().zip(&file.effect) {
+        let Some(id) = effect.as_ref().map(Effect::id).filter(|id| !ids.contains(id)) else { continue };
+        let mut alike: Vec<&str> = ids.iter().map(String::as_str).collect();
+        alike.retain(|other| other.split(':').next() == id.split(':').next());
+        alike.sort_unstable();
+        alike.truncate(8);
+        let help = match alike.is_empty() {
+            true => "it has none of this component and driver".to_string(),
+            false => format!("it has {}", alike.join(", ")),
+        };
+        return Err(format!("effect `{}`: the library of the trace has no effect `{id}`; {help}", stated.name));
+    }
+    Ok(())
+}
+
 fn check(file: &StudyFile) -> Result<(), String> {
     let head = &file.study;
+    let named = [
+        ("plan", file.plan.iter().map(|plan| plan.name.as_str()).collect::<Vec<_>>()),
+        ("effect", file.effect.iter().map(|effect| effect.name.as_str()).collect()),
+        ("noise", file.noise.iter().map(|noise| noise.name.as_str()).collect()),
+    ];
+    for (kind, names) in named {
+        if let Some(twice) = (1..names.len()).find(|k| names[..*k].contains(&names[*k])) {
+            return Err(format!("two [[{kind}]] are called `{}`: give each its own name", names[twice]));
+        }
+    }
     if !(1..=10_000_000).contains(&head.draws) {
         return Err(format!("draws = {}: 1 to 10,000,000 are expected", head.draws));
     }

@@ -46,7 +46,10 @@ pub struct Cell {
     pub draws: usize,
     /// Number of draws without one.
     pub failed: usize,
-    /// The true effect is named or among the aliases; of traces with an effect.
+    /// Number of draws, of those with a result, whose effect the plan does not observe.
+    pub not_observed: usize,
+    /// The true effect is named or among the aliases; of traces with an effect, and of those whose effect the plan does
+    /// not observe.
     pub found: Rate,
     /// The true effect is named; of those in which it is found.
     pub named: Rate,
@@ -57,8 +60,10 @@ pub struct Cell {
     pub coverage: Rate,
     /// Rms of (estimate − true value)/u of the location errors.
     pub pull_rms: f64,
-    /// Mean standard uncertainty of the location errors, over all units.
-    pub mean_u: f64,
+    /// Mean standard uncertainty of the determined location errors, over all units; `null` if none is determined.
+    pub mean_u: Option<f64>,
+    /// Mean number of location errors that are not determined.
+    pub undetermined: f64,
 }
 
 /// A study.
@@ -70,7 +75,9 @@ pub struct StudyResult {
     pub cells: Vec<Cell>,
     /// Each effect over all plans and kinds of noise.
     pub effects: Vec<Cell>,
-    /// The plans over all effects and kinds of noise, best first: by power, then by mean uncertainty.
+    /// The plans over all effects and kinds of noise, best first: by the number of location errors that are not
+    /// determined, then by the mean uncertainty of the others. Not by power: sizes are multiples of the smallest
+    /// significant size of each plan, so that equal sizes are larger effects in a worse plan.
     pub ranking: Vec<Cell>,
 }
 
@@ -85,7 +92,8 @@ pub fn summary(draws: &[Draw]) -> StudyResult {
     };
     let all = || "all".to_string();
     let mut ranking = by(&|draw| [draw.plan.clone(), all(), all()]);
-    ranking.sort_by(|a, b| b.found.rate.total_cmp(&a.found.rate).then(a.mean_u.total_cmp(&b.mean_u)));
+    let u = |cell: &Cell| cell.mean_u.unwrap_or(f64::INFINITY);
+    ranking.sort_by(|a, b| a.undetermined.total_cmp(&b.undetermined).then(u(a).total_cmp(&u(b))));
     StudyResult {
         draws: draws.len(),
         cells: by(&|draw| [draw.plan.clone(), draw.effect.clone(), draw.noise.clone()]),
@@ -99,7 +107,11 @@ fn cell([plan, effect, noise]: [String; 3], all: &[&Draw]) -> Cell {
     let count = |is: &dyn Fn(&Draw) -> bool| draws.iter().filter(|draw| is(draw)).count();
     let intervals: usize = draws.iter().map(|draw| draw.intervals).sum();
     // A fit searches no effect.
-    let searched = |draw: &Draw| draw.truth.is_some() && draw.verdict.is_some();
+    let traces = draws.iter().any(|draw| draw.verdict.is_some());
+    let searched = |draw: &Draw| draw.truth.is_some() && draw.verdict.is_some() || traces && draw.not_observed;
+    let analysed: Vec<&&&Draw> = draws.iter().filter(|draw| !draw.not_observed).collect();
+    let mean = |sum: f64, of: usize| if of > 0 { sum / of as f64 } else { 0.0 };
+    let determined: Vec<&&&&Draw> = analysed.iter().filter(|draw| draw.intervals > 0).collect();
     let found = count(&|draw| searched(draw) && draw.found);
     let squares: f64 = draws.iter().map(|draw| draw.pull_squares).sum();
     Cell {
@@ -108,11 +120,14 @@ fn cell([plan, effect, noise]: [String; 3], all: &[&Draw]) -> Cell {
         noise,
         draws: draws.len(),
         failed: all.len() - draws.len(),
+        not_observed: draws.len() - analysed.len(),
         found: Rate::of(found, count(&searched)),
         named: Rate::of(count(&|draw| searched(draw) && draw.named), found),
         false_claims: Rate::of(count(&|draw| draw.false_claims > 0), count(&|draw| draw.verdict.is_some())),
         coverage: Rate::of(draws.iter().map(|draw| draw.covered).sum(), intervals),
         pull_rms: (squares / intervals.max(1) as f64).sqrt(),
-        mean_u: draws.iter().map(|draw| draw.mean_u).sum::<f64>() / draws.len().max(1) as f64,
+        mean_u: (!determined.is_empty())
+            .then(|| mean(determined.iter().map(|draw| draw.mean_u).sum(), determined.len())),
+        undetermined: mean(analysed.iter().map(|draw| draw.undetermined as f64).sum(), analysed.len()),
     }
 }
