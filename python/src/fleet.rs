@@ -69,12 +69,19 @@ pub fn session_files(paths: Vec<PathBuf>) -> Result<Vec<PathBuf>, Failed> {
     Ok(list::sessions(&paths)?)
 }
 
+/// Removes the notes of session files in or below these places that are no longer there, and returns the files.
+#[pyfunction]
+pub fn forget_missing_sessions(out: PathBuf, paths: Vec<PathBuf>) -> Result<Vec<String>, Failed> {
+    Ok(Store::open(out)?.forget_missing(&paths)?)
+}
+
 /// The notes and records of a folder as JSON texts, and the files whose record is missing.
 #[pyfunction]
 pub fn fleet_records(py: Python<'_>, out: PathBuf) -> PyResult<(Vec<(String, String)>, Vec<String>)> {
     work::run(py, None, move |_| {
         let (records, missing) = Store::existing(out)?.records()?;
         let texts = records.iter().map(|(pointer, record)| Ok((json(pointer)?, json(record)?)));
+        let missing = missing.into_iter().map(|(_, file)| file).collect();
         Ok((texts.collect::<Result<_, Failed>>()?, missing))
     })
 }

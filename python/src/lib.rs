@@ -47,6 +47,7 @@ fn _abbe(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(fleet::run_session, module)?)?;
     module.add_function(wrap_pyfunction!(fleet::analyse_session, module)?)?;
     module.add_function(wrap_pyfunction!(fleet::session_files, module)?)?;
+    module.add_function(wrap_pyfunction!(fleet::forget_missing_sessions, module)?)?;
     module.add_function(wrap_pyfunction!(fleet::fleet_records, module)?)?;
     module.add_function(wrap_pyfunction!(fleet::fleet_history, module)?)?;
     module.add_function(wrap_pyfunction!(fleet::study_draws, module)?)?;

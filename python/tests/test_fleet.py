@@ -100,6 +100,8 @@ def test_the_dataset_has_its_schema_and_values(finished, tmp_path):
         for file in (tmp_path / "dataset" / table).rglob("*.parquet"):
             schema = parquet.read_schema(file)
             assert schema.names == list(abbe.fleet.SCHEMAS[table])
+            expected = abbe.fleet._dataset.schema(table)
+            assert [schema.field(name).type for name in schema.names] == [field.type for field in expected]
             assert schema.metadata[b"abbe.schema_version"] == str(abbe.fleet.SCHEMA_VERSION).encode()
     record = json.loads(next(iter(results(finished).values())))
     rows = dataset.sql(f"from parameters where key = '{record['key']}' order by position").fetchall()

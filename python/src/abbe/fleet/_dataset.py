@@ -206,7 +206,9 @@ def write_dataset(out: Path, path: Path | None = None) -> Dataset:
             place = target / table / f"machines={group}" / f"month={month}" / "data.parquet"
             known.add(place)
             _write(place, table, own, shared, dataset)
-        # Partitions of sessions that are no longer there.
+        # Partitions of sessions that are no longer there. A missing result is no reason to remove what it was.
+        if missing:
+            continue
         for place in (target / table).glob("machines=*/month=*/data.parquet"):
             if place not in known:
                 shutil.rmtree(place.parent)

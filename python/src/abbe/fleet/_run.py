@@ -61,6 +61,8 @@ class Run:
     """Sessions during which workers ended again and again. They have no result; the next run tries them again."""
     shared_ids: dict[str, list[str]] = field(default_factory=dict)
     """Identifiers that several sessions of different content have, with their files."""
+    forgotten: list[str] = field(default_factory=list)
+    """Session files of earlier runs that are no longer there: they have left history and data set."""
     seconds: float = 0.0
     """Time that the workers spent in the analysis, all together."""
 
@@ -106,7 +108,8 @@ def run(
     batch : int, optional
         Sessions of a task; by default an eighth of the share of a worker, 32 at most.
     retries : int
-        Times that a session is tried again if its worker ends.
+        Times that a session is tried again, alone, after Dask has given up its batch: after four workers ended during it
+        (``distributed.scheduler.allowed-failures``).
     threads : int
         Threads of the analysis of one session.
     progress : bool or callable
@@ -131,8 +134,9 @@ def run(
     if retries < 0 or threads < 1 or (batch is not None and batch < 1) or (workers is not None and workers < 1):
         raise ValueError("workers, batch and threads are at least 1, retries at least 0")
     out = os.path.abspath(out)
+    forgotten = _abbe.forget_missing_sessions(out, paths)
     common = (out, options, None if models is None else os.path.abspath(models), allow_outside, threads)
-    result = Run(out=out, sessions=len(files))
+    result = Run(out=out, sessions=len(files), forgotten=forgotten)
     through(client, workers, (run_sessions, files, common), batch, retries, progress, result)
     return result
 
@@ -151,10 +155,14 @@ def through(
     if not items:
         return
     with _connected(client, workers, len(items)) as connected:
-        cores = max(1, len(connected.scheduler_info(n_workers=-1)["workers"]))
-        size = batch or max(1, min(_MOST_IN_BATCH, len(items) // (8 * cores)))
+        size = batch or max(1, min(_MOST_IN_BATCH, len(items) // (8 * _present_workers(connected))))
         show = _bar if progress is True else (progress or (lambda done, all: None))
-        _Work(connected, function, common, retries, result, show).through(items, size, cores * _BATCHES_AHEAD)
+        _Work(connected, function, common, retries, result, show).through(items, size)
+
+
+def _present_workers(client: Client) -> int:
+    """The workers of the scheduler, at least 1. They may join and leave during a run."""
+    return max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
 
 
 def _dask() -> Any:
@@ -169,6 +177,8 @@ def _connected(client: str | Client | None, workers: int | None, sessions: int) 
     """The client of the caller, or one that ends with the run."""
     dask = _dask()
     if isinstance(client, dask.Client):
+        # An array of jobs may begin much later: without a limit, as with any other work of the client.
+        client.wait_for_workers(1)
         yield client
         return
     if client is None:
@@ -228,17 +238,19 @@ class _Work:
         self._items[future.key] = items
         return future
 
-    def through(self, items: Sequence[Any], size: int, ahead: int) -> None:
-        """Do all items, so many batches at a time."""
+    def through(self, items: Sequence[Any], size: int) -> None:
+        """Do all items, in batches of this size. Each present worker has some of them waiting."""
         rest = iter(items)
         batches = iter(lambda: list(islice(rest, size)), [])
         self._show(0, len(items))
-        waiting = _dask().as_completed([self._submit(batch) for batch in islice(batches, ahead)])
+        waiting = _dask().as_completed([self._submit(batch) for batch in islice(batches, self._wanted())])
         try:
             for future in waiting:
                 again = self._ended(future)
                 future.release()
-                for batch in [*again, *islice(batches, 1)]:
+                for batch in again:
+                    waiting.add(self._submit(batch))
+                for batch in islice(batches, max(0, self._wanted() - len(self._items))):
                     waiting.add(self._submit(batch))
                 self._show(self._done, len(items))
         except KeyboardInterrupt:
@@ -247,6 +259,9 @@ class _Work:
         shared = {id: keys for id, keys in self._keys.items() if len(keys) > 1}
         self._result.shared_ids = {id: sorted(sum(keys.values(), [])) for id, keys in sorted(shared.items())}
         self._result.failed.sort(key=lambda failure: failure.file)
+
+    def _wanted(self) -> int:
+        return _BATCHES_AHEAD * _present_workers(self._client)
 
     def _ended(self, future: Future) -> list[list[Any]]:
         """Take in a batch. Returns what has to be tried again, item by item."""
