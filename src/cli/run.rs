@@ -24,10 +24,10 @@ use crate::present::table::{Table, cells};
 
 /// Examples of `abbe run`.
 pub const HELP: &str = "Each session is fitted and traced; with --models the model of its machine is validated. The \
-result is a file of --out \
-whose name is the SHA-256 of all inputs and options: a second run computes only what is missing or changed. A session \
-that cannot be \
-analysed is a result with its error. Seeds follow from the inputs, so that results do not depend on the order, the process or the computer.
+result is a file of --out whose name is the SHA-256 of all inputs and options: a second run computes only what is \
+missing or changed. A session that cannot be analysed is a result with its error. Sessions of earlier runs whose files \
+are no longer in a named folder leave history and data set; their results stay. Seeds follow from the inputs, so that \
+results do not depend on the order, the process or the computer.
 
 Identifiers are notes of [about] in session.toml: `serial_number` of the machine, `session_id`, `date`.
 
@@ -127,6 +127,8 @@ pub struct RunResult {
     failed: Vec<FailedSession>,
     /// Identifiers that several sessions of different content have.
     shared_ids: Vec<SharedId>,
+    /// Session files of earlier runs that are no longer there: they have left history and data set.
+    forgotten: Vec<String>,
 }
 
 /// A session without a result.
@@ -156,6 +158,12 @@ pub fn run(arguments: &RunArguments, quiet: bool) -> Result<(), Failure> {
         )));
     }
     let outputs = Outputs::new(&arguments.json)?;
+    // A file of a list may be gone since the list was made: it is a result with its error. A path that is typed is a
+    // mistake.
+    if let Some(path) = arguments.sessions.iter().find(|path| matches!(path.try_exists(), Ok(false))) {
+        let message = format!("{}: neither a session file nor a folder is there; correct the path", path.display());
+        return Err(Failure::Other(message));
+    }
     let mut paths = arguments.sessions.clone();
     if let Some(file) = &arguments.list {
         paths.extend(list::listed(file)?);
@@ -172,11 +180,12 @@ pub fn run(arguments: &RunArguments, quiet: bool) -> Result<(), Failure> {
         return Err(Failure::Other(message));
     }
     let store = Store::open(&arguments.out)?;
+    let forgotten = store.forget_missing(&paths)?;
     let bar = progress_bar(files.len(), quiet);
     let outcomes = analyse(arguments, &files, &store, &bar);
     bar.finish_and_clear();
     let Outcomes { done, ended } = outcomes;
-    let result = summary(&arguments.out, files.len(), &done);
+    let result = RunResult { forgotten, ..summary(&arguments.out, files.len(), &done) };
     if outputs.tables(quiet) {
         print(&result);
     }
@@ -276,6 +285,7 @@ fn summary(out: &Path, sessions: usize, done: &[(Done, Pointer)]) -> RunResult {
                 files: pointers.iter().map(|pointer| pointer.file.clone()).collect(),
             })
             .collect(),
+        forgotten: Vec::new(),
     }
 }
 
@@ -296,6 +306,9 @@ fn print(result: &RunResult) {
         result.kept,
         result.failed.len()
     );
+    if !result.forgotten.is_empty() {
+        say!("  {} of earlier runs left: the file is no longer there", counted(result.forgotten.len(), "session"));
+    }
     if !result.failed.is_empty() {
         let rows = result.failed.iter().take(MAX_ROWS).map(|failed| {
             let first = failed.message.lines().next().unwrap_or_default();

@@ -30,6 +30,8 @@ pub struct FleetHistory {
 /// A session, a note or a row of known compensations that the history does not use.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct NotUsed {
+    /// Identifier of the machine; `null` if it is not known.
+    pub machine_id: Option<String>,
     /// The session file, the damaged note, or the file of compensations with the line.
     pub file: String,
     /// Why, and what to do.
@@ -45,7 +47,7 @@ struct Dated {
     record: Record,
 }
 
-/// The history of all machines of a folder, or of one.
+/// The history of all machines of a folder, or of one of them. The statistics are those of all machines either way.
 ///
 /// # Errors
 /// If the folder cannot be read, or has no session of the machine.
@@ -53,20 +55,18 @@ pub fn history(store: &Store, machine_id: Option<&str>, options: &HistoryOptions
     let (records, missing) = store.records()?;
     let mut not_used: Vec<NotUsed> = missing
         .into_iter()
-        .map(|file| NotUsed {
+        .map(|(machine_id, file)| NotUsed {
+            machine_id,
             file,
             reason: "its result is missing or of another version of the schema: run `abbe run` again".to_string(),
         })
         .collect();
     let all = records.len();
     let known: BTreeSet<String> = records.iter().map(|(_, record)| record.machine_id.clone()).collect();
-    let records = records.into_iter().filter(|(pointer, _)| machine_id.is_none_or(|id| pointer.machine_id == id));
-    let records: Vec<(Pointer, Record)> = records.collect();
-    if let Some(id) = machine_id.filter(|_| records.is_empty()) {
+    if let Some(id) = machine_id.filter(|id| !known.contains(*id)) {
         return Err(FleetError::Request(format!(
             "no session of the machine `{id}` among {all}: the identifier is `serial_number` of [about], or the name \
-            of \
-             the machine"
+             of the machine"
         )));
     }
     let mut machines: BTreeMap<String, Vec<Dated>> = BTreeMap::new();
@@ -76,14 +76,20 @@ pub fn history(store: &Store, machine_id: Option<&str>, options: &HistoryOptions
     let mut series = Vec::new();
     let mut effects = Vec::new();
     for (id, sessions) in machines {
-        let sessions = in_order(of_one_machine(sessions, &mut not_used), &mut not_used);
+        let sessions = of_one_machine(in_order(by_time(sessions), &mut not_used), &mut not_used);
         effects.extend(sessions.iter().flat_map(found_effects));
         series.push(machine_sessions(id, &sessions));
     }
     not_used.sort_by(|a, b| a.file.cmp(&b.file));
     check_units(&series, &options.compensations)?;
     not_used.extend(unknown_rows(&known, &series, &options.compensations));
-    Ok(FleetHistory { history: analyse(&series, options), faults: faults(&effects), not_used })
+    let mut history = analyse(&series, options);
+    if let Some(id) = machine_id {
+        history.machines.retain(|machine| machine.machine_id == id);
+        effects.retain(|effect| effect.machine_id == id);
+        not_used.retain(|not_used| not_used.machine_id.as_deref().is_none_or(|own| own == id));
+    }
+    Ok(FleetHistory { history, faults: faults(&effects), not_used })
 }
 
 /// # Errors
@@ -121,7 +127,7 @@ fn unknown_rows(
                 }
                 _ => continue,
             };
-            unknown.push(NotUsed { file: row.source.clone(), reason });
+            unknown.push(NotUsed { machine_id: Some(id.clone()), file: row.source.clone(), reason });
         }
     }
     unknown
@@ -129,20 +135,24 @@ fn unknown_rows(
 
 /// The sessions with a result, a date and an identifier of their own. A copy of a session counts once.
 fn usable(records: Vec<(Pointer, Record)>, not_used: &mut Vec<NotUsed>) -> Vec<Dated> {
-    let mut keys_of: HashMap<String, HashSet<String>> = HashMap::new();
+    // Sessions of other machines may have the same numbers.
+    let identifier = |record: &Record| record.session_id.clone().map(|id| (record.machine_id.clone(), id));
+    let mut keys_of: HashMap<(String, String), HashSet<String>> = HashMap::new();
     for (_, record) in &records {
-        if let Some(id) = &record.session_id {
-            keys_of.entry(id.clone()).or_default().insert(record.key.clone());
+        if let Some(id) = identifier(record) {
+            keys_of.entry(id).or_default().insert(record.key.clone());
         }
     }
     let mut known = HashSet::new();
     let mut found = Vec::new();
     for (pointer, record) in records {
-        let shared = record.session_id.as_ref().filter(|id| keys_of.get(*id).is_some_and(|keys| keys.len() > 1));
+        let shared = identifier(&record).filter(|id| keys_of.get(id).is_some_and(|keys| keys.len() > 1));
         let text = record.date.as_deref();
-        let reason = if let Some(error) = &record.error {
+        let machine_id = Some(record.machine_id.clone()).filter(|id| !id.is_empty());
+        // The estimates do not depend on the validation of a model.
+        let reason = if let Some(error) = record.error.as_ref().filter(|error| error.stage != "validate") {
             Some(format!("it has no result: {}", error.message.lines().next().unwrap_or_default()))
-        } else if let Some(id) = shared {
+        } else if let Some((_, id)) = shared {
             Some(format!(
                 "several sessions of different content have its identifier `{id}`: give each a `session_id` of its own"
             ))
@@ -159,18 +169,23 @@ fn usable(records: Vec<(Pointer, Record)>, not_used: &mut Vec<NotUsed>) -> Vec<D
                 }
             }
         };
-        not_used.extend(reason.map(|reason| NotUsed { file: pointer.file, reason }));
+        not_used.extend(reason.map(|reason| NotUsed { machine_id, file: pointer.file, reason }));
     }
     found
 }
 
-/// The sessions of a machine with the axes of its latest session, by time.
-fn of_one_machine(mut sessions: Vec<Dated>, not_used: &mut Vec<NotUsed>) -> Vec<Dated> {
+fn by_time(mut sessions: Vec<Dated>) -> Vec<Dated> {
     sessions.sort_by(|a, b| a.days.total_cmp(&b.days).then_with(|| a.pointer.file.cmp(&b.pointer.file)));
+    sessions
+}
+
+/// The sessions of a machine with the axes of its latest session.
+fn of_one_machine(sessions: Vec<Dated>, not_used: &mut Vec<NotUsed>) -> Vec<Dated> {
     let axes = |dated: &Dated| dated.record.machine.as_ref().map(|machine| machine.sha256.clone());
     let latest = sessions.last().and_then(axes);
     let (kept, others): (Vec<Dated>, Vec<Dated>) = sessions.into_iter().partition(|dated| axes(dated) == latest);
     not_used.extend(others.into_iter().map(|dated| NotUsed {
+        machine_id: Some(dated.record.machine_id),
         file: dated.pointer.file,
         reason: "the axes of the machine differ from those of its latest session: parameters are not comparable".into(),
     }));
@@ -196,6 +211,7 @@ fn in_order(sessions: Vec<Dated>, not_used: &mut Vec<NotUsed>) -> Vec<Dated> {
                     "its date {} contradicts its `session_number`: correct the clock or the date",
                     dated.record.date.as_deref().unwrap_or_default()
                 ),
+                machine_id: Some(dated.record.machine_id),
                 file: dated.pointer.file,
             });
         }
@@ -272,6 +288,7 @@ fn found_effects(dated: &Dated) -> impl Iterator<Item = FoundEffect> {
     dated.record.effects.iter().map(|effect| FoundEffect {
         machine_id: dated.record.machine_id.clone(),
         kind: dated.record.machine.as_ref().map_or(String::new(), |machine| machine.code.clone()),
+        session: dated.record.key.clone(),
         days: dated.days,
         id: effect.id.clone(),
         family: (effect.family.clone(), effect.component.clone(), effect.driver.clone()),
@@ -298,15 +315,26 @@ pub fn compensations(file: &Path) -> Result<Vec<Compensation>, FleetError> {
     }
     let name = file.display();
     let fault = |line: usize, what: String| FleetError::Request(format!("{name}:{line}: {what}"));
-    let contents = std::fs::read(file).map_err(|source| FleetError::Read { path: name.to_string(), source })?;
+    let mut contents = std::fs::read(file).map_err(|source| FleetError::Read { path: name.to_string(), source })?;
+    // The line of a row is that before the place of the reader behind it.
+    if !contents.ends_with(b"\n") {
+        contents.push(b'\n');
+    }
     let mut found: Vec<Compensation> = Vec::new();
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(contents.as_slice());
-    for (row, read) in reader.deserialize::<Row>().enumerate() {
-        let line = row + 2;
-        let row = read.map_err(|error| {
-            let expected = "columns machine_id, date, parameter, change, unit are expected";
-            fault(line, format!("{error}; {expected}"))
-        })?;
+    let mut reader =
+        csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(contents.as_slice());
+    let expected = |line: usize, error: csv::Error| {
+        fault(line, format!("{error}; columns machine_id, date, parameter, change, unit are expected"))
+    };
+    let columns = reader.headers().map_err(|error| expected(1, error))?.clone();
+    let mut cells = csv::StringRecord::new();
+    loop {
+        let read = reader.read_record(&mut cells);
+        let line = usize::try_from(reader.position().line()).unwrap_or(usize::MAX).saturating_sub(1);
+        if !read.map_err(|error| expected(line, error))? {
+            break;
+        }
+        let row: Row = cells.deserialize(Some(&columns)).map_err(|error| expected(line, error))?;
         let days = date::interval(&row.date)
             .ok_or_else(|| fault(line, format!("date `{}`: the form 2026-11-23T08:00:00 is expected", row.date)))?;
         if !row.change.is_finite() {
@@ -316,6 +344,10 @@ pub fn compensations(file: &Path) -> Result<Vec<Compensation>, FleetError> {
         let change =
             KnownChange { id: row.parameter, value: row.change, unit: row.unit, source: format!("{name}:{line}") };
         match known {
+            Some(known) if known.changes.iter().any(|other| other.id == change.id) => {
+                let (id, date) = (&change.id, &row.date);
+                return Err(fault(line, format!("the change of {id} on {date} is stated twice: remove a row")));
+            }
             Some(known) => known.changes.push(change),
             None => found.push(Compensation { machine_id: row.machine_id, days, changes: vec![change] }),
         }

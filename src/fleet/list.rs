@@ -11,14 +11,16 @@ const SESSION_FILE: &str = "session.toml";
 /// Session files: each file itself, and every `session.toml` in or below each folder, in the order of their names. A
 /// file that is named twice counts once.
 ///
+/// A folder that cannot be read is listed in place of its sessions, so that it is a row with its error.
+///
 /// # Errors
-/// If a folder cannot be read or holds no `session.toml`.
+/// If a folder holds no `session.toml`.
 pub fn sessions(paths: &[PathBuf]) -> Result<Vec<PathBuf>, FleetError> {
     let mut found = Vec::new();
     for path in paths {
         if path.is_dir() {
             let before = found.len();
-            below(path, &mut found)?;
+            below(path, &mut found);
             if found.len() == before {
                 return Err(FleetError::Request(format!(
                     "{}: no {SESSION_FILE} lies in this folder or below; name session files",
@@ -52,17 +54,17 @@ pub fn listed(file: &Path) -> Result<Vec<PathBuf>, FleetError> {
 }
 
 /// Adds the session files of a folder. A link to a folder is not followed, so that no circle is walked.
-fn below(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), FleetError> {
-    let fault = |source| FleetError::Read { path: folder.display().to_string(), source };
-    let mut entries = std::fs::read_dir(folder).map_err(fault)?.collect::<Result<Vec<_>, _>>().map_err(fault)?;
+fn below(folder: &Path, found: &mut Vec<PathBuf>) {
+    let Ok(mut entries) = std::fs::read_dir(folder).and_then(Iterator::collect::<Result<Vec<_>, _>>) else {
+        found.push(folder.to_path_buf());
+        return;
+    };
     entries.sort_by_key(std::fs::DirEntry::file_name);
     for entry in entries {
-        let kind = entry.file_type().map_err(fault)?;
-        if kind.is_dir() {
-            below(&entry.path(), found)?;
+        if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+            below(&entry.path(), found);
         } else if entry.file_name() == SESSION_FILE {
             found.push(entry.path());
         }
     }
-    Ok(())
 }

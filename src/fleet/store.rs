@@ -16,6 +16,9 @@ use super::FleetError;
 use super::record::{Record, SCHEMA_VERSION};
 use super::study::draw::Draw;
 
+/// Records with their sessions, and what has no record: its machine where it is known, and the file.
+pub type Records = (Vec<(Pointer, Record)>, Vec<(Option<String>, String)>);
+
 /// A folder of records.
 #[derive(Clone, Debug)]
 pub struct Store {
@@ -129,10 +132,7 @@ impl Store {
     /// # Errors
     /// If the note cannot be read or written.
     pub fn note(&self, pointer: &Pointer) -> Result<(), FleetError> {
-        let file = std::path::absolute(&pointer.file).unwrap_or_else(|_| PathBuf::from(&pointer.file));
-        let digest = Sha256::digest(file.as_os_str().as_encoded_bytes());
-        let hash: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
-        let place = self.place("sessions", &hash);
+        let place = self.place_of_note(pointer);
         let known = read(&place)?.and_then(|contents| serde_json::from_slice::<Pointer>(&contents).ok());
         if known.as_ref() == Some(pointer) {
             return Ok(());
@@ -164,21 +164,59 @@ impl Store {
         Ok((found, damaged))
     }
 
-    /// The records of all sessions, by file, and the files whose record is missing (a killed run left them) with the
-    /// damaged notes.
+    /// The records of all sessions, by file, and the files whose record is missing or cannot be read (a killed run left
+    /// them), each with its machine, and the damaged notes.
     ///
     /// # Errors
     /// If the folder cannot be read.
-    pub fn records(&self) -> Result<(Vec<(Pointer, Record)>, Vec<String>), FleetError> {
-        let (sessions, mut missing) = self.sessions()?;
+    pub fn records(&self) -> Result<Records, FleetError> {
+        let (sessions, damaged) = self.sessions()?;
+        let mut missing: Vec<(Option<String>, String)> = damaged.into_iter().map(|file| (None, file)).collect();
         let mut records = Vec::with_capacity(sessions.len());
         for pointer in sessions {
-            match self.record(&pointer.key)? {
-                Some(record) => records.push((pointer, record)),
-                None => missing.push(pointer.file),
+            match self.record(&pointer.key) {
+                Ok(Some(record)) => records.push((pointer, record)),
+                Ok(None) | Err(_) => missing.push((Some(pointer.machine_id), pointer.file)),
             }
         }
         Ok((records, missing))
+    }
+
+    /// Removes the notes of session files that were in or below these folders, or are these files, and are no longer
+    /// there. Returns them. Results stay. A note counts where its file has the absolute path that it had when it was
+    /// written.
+    ///
+    /// # Errors
+    /// If the folder cannot be read, or a note cannot be removed.
+    pub fn forget_missing(&self, places: &[PathBuf]) -> Result<Vec<String>, FleetError> {
+        if !self.folder.join("sessions").is_dir() {
+            return Ok(Vec::new());
+        }
+        let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+        let places: Vec<PathBuf> = places.iter().map(|place| absolute(place)).collect();
+        let mut forgotten = Vec::new();
+        for pointer in self.sessions()?.0 {
+            let file = absolute(Path::new(&pointer.file));
+            let note = self.place_of_note(&pointer);
+            let is_gone = matches!(file.try_exists(), Ok(false));
+            if is_gone && note.is_file() && places.iter().any(|place| file.starts_with(place)) {
+                match std::fs::remove_file(&note) {
+                    Err(source) if source.kind() != ErrorKind::NotFound => {
+                        return Err(FleetError::Write { path: note.display().to_string(), source });
+                    }
+                    _ => forgotten.push(pointer.file),
+                }
+            }
+        }
+        Ok(forgotten)
+    }
+
+    /// The place of the note of a session file: by its absolute path.
+    fn place_of_note(&self, pointer: &Pointer) -> PathBuf {
+        let file = std::path::absolute(&pointer.file).unwrap_or_else(|_| PathBuf::from(&pointer.file));
+        let digest = Sha256::digest(file.as_os_str().as_encoded_bytes());
+        let hash: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
+        self.place("sessions", &hash)
     }
 
     fn place(&self, kind: &str, name: &str) -> PathBuf {

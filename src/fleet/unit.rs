@@ -156,9 +156,10 @@ fn describe(record: &mut Record, session: &Session) {
     record.machine_id = note("serial_number").unwrap_or_else(|| machine.name.clone());
     record.date = note("date");
     record.session_id = note("session_id");
-    // Other names of the same axes are the same machine.
+    // Other names and travels of the same axes are the same machine.
     let geometry = machine_text(machine);
-    let geometry: Vec<&str> = geometry.lines().filter(|line| !line.starts_with("name")).collect();
+    let is_geometry = |line: &&str| !line.starts_with("name") && !line.starts_with("travel_");
+    let geometry: Vec<&str> = geometry.lines().filter(is_geometry).collect();
     record.machine = Some(MachineRecord {
         name: machine.name.clone(),
         code: machine.code(),
@@ -167,12 +168,16 @@ fn describe(record: &mut Record, session: &Session) {
     record.instrument = Some(session.instrument.word().to_string());
 }
 
-/// The model of a machine and its checksum. Signs that no file name should have are `_`.
+/// The model of a machine and its checksum; `None` if there is none. Signs that no file name should have are `_`. A
+/// model that cannot be read has no checksum: its validation fails.
 fn model_of(machine_id: &str, places: &Places) -> Option<(PathBuf, String)> {
     let plain = |sign: char| if sign.is_alphanumeric() || "-_. ".contains(sign) { sign } else { '_' };
     let file = places.models.as_ref()?.join(format!("{}.json", machine_id.chars().map(plain).collect::<String>()));
-    let contents = std::fs::read(&file).ok()?;
-    Some((file, hexadecimal(Sha256::digest(contents))))
+    match std::fs::read(&file) {
+        Ok(contents) => Some((file, hexadecimal(Sha256::digest(contents)))),
+        Err(cause) if cause.kind() == std::io::ErrorKind::NotFound => None,
+        Err(_) => Some((file, String::new())),
+    }
 }
 
 /// Analyses what was read.

@@ -19,6 +19,8 @@ mod faults;
 mod field_files;
 mod first_screen;
 mod fleet;
+mod fleet_history;
+mod fleet_study;
 mod generated;
 mod geometric;
 mod help;
