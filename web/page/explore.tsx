@@ -92,7 +92,8 @@ export function Explore({ opened, shared, analyse }: Props) {
   const [test, setTest] = useState(0);
   const [code, setCode] = useState("[wCAbYXZt]");
   const [fault, setFault] = useState<Fault>();
-  const [milliseconds, setMilliseconds] = useState(0);
+  /** The pictures of changes: how many there were, and how long the last took. */
+  const [picture, setPicture] = useState({ number: 0, milliseconds: 0 });
   const wanted = useRef({ state, kind, test, since: 0, known: "", description: undefined as Description | undefined });
   Object.assign(wanted.current, { state, kind, test });
 
@@ -118,6 +119,7 @@ export function Explore({ opened, shared, analyse }: Props) {
     } catch (error) {
       // The text with a fault is not known to the worker as a plan.
       job.known = "";
+      job.since = 0;
       setFault(faultOf(error));
     }
   });
@@ -161,7 +163,11 @@ export function Explore({ opened, shared, analyse }: Props) {
     const { since } = wanted.current;
     if (!since) return;
     wanted.current.since = 0;
-    setMilliseconds(performance.now() - since);
+    // After the other charts, which are drawn in the same turn.
+    queueMicrotask(() => {
+      const milliseconds = performance.now() - since;
+      setPicture(({ number }) => ({ number: number + 1, milliseconds }));
+    });
   };
   const change = (next: Partial<Shared>) => {
     begin();
@@ -272,8 +278,8 @@ export function Explore({ opened, shared, analyse }: Props) {
                   <option value="sensitivities">sensitivities: change per unit of each error</option>
                 </select>
               </label>
-              <span class="note" data-ms={milliseconds.toFixed(1)}>
-                {milliseconds > 0 && `${milliseconds.toFixed(0)} ms from change to picture`}
+              <span class="note" data-ms={picture.milliseconds.toFixed(1)} data-pictures={picture.number}>
+                {picture.number > 0 && `${picture.milliseconds.toFixed(0)} ms from change to picture`}
               </span>
             </p>
             <div class="charts">
