@@ -15,7 +15,9 @@ fn main() -> ExitCode {
         .input_path(module)
         .out_name("abbe")
         .web(true)
-        .and_then(|bindgen| bindgen.typescript(true).omit_default_module_path(true).generate(folder));
+        .and_then(|bindgen| {
+            bindgen.typescript(true).omit_default_module_path(true).remove_name_section(true).generate(folder)
+        });
     match written {
         Ok(()) => ExitCode::SUCCESS,
         Err(fault) => {
