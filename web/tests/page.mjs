@@ -13,7 +13,7 @@ export const web = fileURLToPath(new URL("..", import.meta.url));
 export const root = resolve(web, "..");
 const dist = join(web, "dist");
 
-/** Longest wait for anything, ms. Tests wait for conditions: on a machine with much else to do these take their time. */
+/** Longest wait for anything, ms: on a machine with much else to do, conditions take their time. */
 export const PATIENCE_MS = 600_000;
 
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".wasm": "application/wasm" };
@@ -120,9 +120,11 @@ export async function saved(page, button) {
   return readFileSync(await (await download).path(), "utf8");
 }
 
+/** The command to compare with. */
+export const abbe = resolve(process.env.ABBE_COMMAND ?? join(root, "target/checked/abbe"));
+
 /** The JSON of the command in a folder. */
 export function command(folder, ...words) {
-  const abbe = resolve(process.env.ABBE_COMMAND ?? join(root, "target/checked/abbe"));
   const scratch = mkdtempSync(join(tmpdir(), "abbe-web-"));
   try {
     const out = join(scratch, "result.json");
