@@ -18,7 +18,7 @@ export default defineConfig(({ mode }) => {
       modulePreload: { polyfill: false },
       assetsInlineLimit: single ? Number.MAX_SAFE_INTEGER : 0,
       cssCodeSplit: !single,
-      chunkSizeWarningLimit: 4096,
+      chunkSizeWarningLimit: 16_384,
       rolldownOptions: { output: single ? { codeSplitting: false } : {} },
     },
   };

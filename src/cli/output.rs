@@ -11,11 +11,6 @@ use super::message::{Kind, tell};
 use crate::present::table::Table;
 use crate::present::{csv, terminal};
 
-/// How the signs are meant, in front of a table of figures.
-const CONVENTION: &str = "# Errors by their names of ISO 230-1: EX0C is a location error, EXC an error motion. Value = actual less nominal: the body that the axis\n\
-# carries is displaced along +X, +Y, +Z of R and turned about them by the right-hand rule, E = Trans(EX, EY, EZ) Rx(EA) Ry(EB) Rz(EC), whatever\n\
-# the axis' own direction. A correction has the opposite sign. u is one standard uncertainty.\n";
-
 /// Writes a file through a temporary one beside it, so that a reader finds the old file or the whole new one, whatever
 /// happens meanwhile.
 ///
@@ -221,5 +216,5 @@ pub fn csv(table: &Table) -> Result<Vec<u8>, Failure> {
 
 /// Writes the figures of a result as CSV, under a comment that states the convention of their signs.
 pub fn write_figures(path: &Path, table: &Table) -> Result<(), Failure> {
-    write_whole(path, &[CONVENTION.as_bytes(), &csv(table)?].concat())
+    write_whole(path, &[csv::CONVENTION.as_bytes(), &csv(table)?].concat())
 }

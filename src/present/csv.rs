@@ -2,6 +2,11 @@
 
 use super::table::{Cell, Table};
 
+/// How the signs of a table of figures are meant, as comments in front of it.
+pub const CONVENTION: &str = "# Errors by their names of ISO 230-1: EX0C is a location error, EXC an error motion. Value = actual less nominal: the body that the axis\n\
+# carries is displaced along +X, +Y, +Z of R and turned about them by the right-hand rule, E = Trans(EX, EY, EZ) Rx(EA) Ry(EB) Rz(EC), whatever\n\
+# the axis' own direction. A correction has the opposite sign. u is one standard uncertainty.\n";
+
 /// A cell that a spreadsheet takes for text: one that begins as a formula does (`=`, `+`, `-`, `@`) and is no number
 /// stands behind an apostrophe.
 ///

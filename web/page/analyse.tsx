@@ -2,19 +2,19 @@
 
 import { zipSync } from "fflate";
 import { useEffect, useRef, useState } from "preact/hooks";
-import { bundled, filesOf } from "./bundled";
+import { ChooseSession } from "./choose-session";
 import { Drop } from "./drop";
 import { Editor } from "./editor";
 import { Engine } from "./engine";
 import { FaultBox, faultOf } from "./fault";
-import { download, type FileMap, sessionsIn, text } from "./files";
+import { download, type FileMap, isEditable, sessionsIn, text } from "./files";
 import type { Opened } from "./main";
 import type { Fault } from "./protocol";
 
 interface Checked {
   machine: string;
   instrument: string;
-  tests: { name: string; readings: number }[];
+  tests: { name: string; readings: number; moves: boolean }[];
   effects: string[];
   warnings: string[];
 }
@@ -34,9 +34,6 @@ interface Props {
   imports: (opened: Opened) => void;
 }
 
-/** Largest text in the editor, bytes. */
-const EDITABLE = 1 << 20;
-
 export function Analyse({ opened, explore, imports }: Props) {
   const engine = useRef<Engine | undefined>(undefined);
   engine.current ??= new Engine();
@@ -48,31 +45,40 @@ export function Analyse({ opened, explore, imports }: Props) {
   const [working, setWorking] = useState("");
   const [result, setResult] = useState<Result>();
 
-  /** Number of the opened folder: an end of what was computed for an earlier one is not told. */
+  /** Number of what is open, a folder with a text and a session: what was begun with another is not told. */
   const opening = useRef(0);
-  const open = (next: FileMap, path?: string) => {
-    const sessions = sessionsIn(next);
-    const first = path ?? sessions[0] ?? "";
+  const begin = () => {
     opening.current += 1;
+    if (working) engine.current?.stop();
+    setResult(undefined);
+    return opening.current;
+  };
+  const open = (next: FileMap, path?: string) => {
+    const first = path ?? sessionsIn(next)[0];
+    if (first === undefined) {
+      setFault({ message: "no session file among these files: a session is a .toml file with [[test]]" });
+      return;
+    }
+    begin();
     engine.current?.stop();
     setFiles(next);
     setSession(first);
     setShown(first);
-    setResult(undefined);
     setChecked(undefined);
-    if (first) void check(next, first);
-    else setFault({ message: "no session file among these files: a session is a .toml file with [[test]]" });
+    void check(next, first);
   };
   useEffect(() => {
     if (opened) open(opened.files, opened.session);
   }, [opened]);
 
   const check = async (of: FileMap, path: string) => {
+    const number = opening.current;
     setFault(undefined);
     try {
-      await engine.current?.call("folder", [[...of]]);
-      setChecked(await engine.current?.call<Checked>("check", [path]));
+      const found = await engine.current?.call<Checked>("check", [path], { files: of });
+      if (number === opening.current) setChecked(found);
     } catch (error) {
+      if (number !== opening.current) return;
       setChecked(undefined);
       failed(error, of);
     }
@@ -80,27 +86,32 @@ export function Analyse({ opened, explore, imports }: Props) {
   const failed = (error: unknown, of: FileMap = files) => {
     const found = faultOf(error);
     setFault(found);
-    if (found.file && of.has(found.file) && (of.get(found.file)?.length ?? 0) <= EDITABLE) setShown(found.file);
+    if (found.file && isEditable(of.get(found.file))) setShown(found.file);
   };
   const timer = useRef<ReturnType<typeof setTimeout> | undefined>(undefined);
   const edit = (changed: string) => {
     const next = new Map(files).set(shown, new TextEncoder().encode(changed));
+    const number = begin();
     setFiles(next);
     clearTimeout(timer.current);
-    timer.current = setTimeout(() => void check(next, session), 400);
+    timer.current = setTimeout(() => {
+      if (number === opening.current) void check(next, session);
+    }, 400);
   };
   const run = async (kind: "fit" | "trace") => {
+    const number = begin();
     setFault(undefined);
-    setResult(undefined);
     setWorking(kind === "fit" ? "fitting" : "reading the session");
     const start = performance.now();
-    const of = opening.current;
     try {
-      await engine.current?.call("folder", [[...files]]);
-      const found = await engine.current?.call<Omit<Result, "kind" | "seconds">>(kind, [session], setWorking);
-      if (found) setResult({ ...found, kind, seconds: (performance.now() - start) / 1000 });
+      const found = await engine.current?.call<Omit<Result, "kind" | "seconds">>(kind, [session], {
+        files,
+        progress: setWorking,
+      });
+      const seconds = (performance.now() - start) / 1000;
+      if (found && number === opening.current) setResult({ ...found, kind, seconds });
     } catch (error) {
-      if (of === opening.current) failed(error);
+      if (number === opening.current) failed(error);
     }
     setWorking("");
   };
@@ -117,7 +128,9 @@ export function Analyse({ opened, explore, imports }: Props) {
     }
   };
   const zip = () => download(`${stem}.zip`, new Uint8Array(zipSync(Object.fromEntries(files))), "application/zip");
-  const editable = [...files].filter(([, bytes]) => bytes.length <= EDITABLE).map(([path]) => path);
+  /** Tests that are no part of a plan: their data say how the axes moved. */
+  const still = checked?.tests.filter((test) => !test.moves).map((test) => test.name) ?? [];
+  const editable = [...files].filter(([, bytes]) => isEditable(bytes)).map(([path]) => path);
   return (
     <>
       <Drop
@@ -127,23 +140,11 @@ export function Analyse({ opened, explore, imports }: Props) {
         failed={failed}
       />
       <p>
-        <label>
-          Or open a bundled session{" "}
-          <select
-            value=""
-            onChange={(event) => {
-              const path = event.currentTarget.value;
-              if (path) open(filesOf(path), path.slice(path.lastIndexOf("/") + 1));
-            }}
-          >
-            <option value="">choose …</option>
-            {bundled.map(([path, about]) => (
-              <option key={path} value={path}>
-                {about}
-              </option>
-            ))}
-          </select>
-        </label>
+        <ChooseSession
+          label="Or open a bundled session"
+          placeholder="choose …"
+          open={({ files, session }) => open(files, session)}
+        />
       </p>
       {fault && (
         <FaultBox
@@ -157,11 +158,14 @@ export function Analyse({ opened, explore, imports }: Props) {
             <label>
               Session{" "}
               <select
+                aria-label="Session"
                 value={session}
                 onChange={(event) => {
                   const path = event.currentTarget.value;
+                  begin();
                   setSession(path);
                   setShown(path);
+                  setChecked(undefined);
                   void check(files, path);
                 }}
               >
@@ -182,13 +186,23 @@ export function Analyse({ opened, explore, imports }: Props) {
             <button disabled={working === ""} onClick={() => engine.current?.stop()}>
               Stop
             </button>
-            <button disabled={!checked} onClick={() => explore({ files, session })}>
+            <button
+              disabled={!checked || still.length > 0}
+              title={still.length ? `without a sweep or a path: ${still.join(", ")}` : undefined}
+              onClick={() => explore({ files, session })}
+            >
               Explore
             </button>
             <button onClick={() => imports({ files, session })}>Import readings</button>
             <button onClick={zip}>Download the session</button>
             <span role="status">{working}</span>
           </p>
+          {still.length > 0 && (
+            <p class="note">
+              Explore needs the motion of every test, a sweep or a path. These have their readings only:{" "}
+              {still.join(", ")}.
+            </p>
+          )}
           {result && (
             <>
               <p class="actions" data-kind={result.kind} data-seconds={result.seconds} data-bytes={result.bytes}>
@@ -217,19 +231,21 @@ export function Analyse({ opened, explore, imports }: Props) {
               <label>
                 File{" "}
                 <select value={shown} onChange={(event) => setShown(event.currentTarget.value)}>
-                  {editable.map((path) => (
+                  {[...new Set([...editable, shown])].map((path) => (
                     <option key={path}>{path}</option>
                   ))}
                 </select>
               </label>
             </p>
-            {files.has(shown) && (
+            {editable.includes(shown) ? (
               <Editor
                 name={shown}
                 text={text(files, shown)}
                 fault={fault?.file === shown ? fault : undefined}
                 change={edit}
               />
+            ) : (
+              <p class="note">Texts in UTF-8 up to 1 MiB can be edited here; {shown} is larger, or is no such text.</p>
             )}
           </details>
         </>

@@ -5,8 +5,8 @@ import EngineWorker from "./worker?worker";
 
 /** The bytes of the module. */
 export async function moduleBytes(): Promise<ArrayBuffer> {
-  const answer = await fetch(url);
-  if (!answer.ok) throw new Error(`the module cannot be loaded: ${answer.status}`);
+  const answer = await fetch(url).catch((error: unknown) => ({ ok: false as const, status: String(error) }));
+  if (!answer.ok) throw new Error(`a part of this page cannot be loaded: ${answer.status}; try again with a network`);
   return answer.arrayBuffer();
 }
 

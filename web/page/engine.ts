@@ -9,9 +9,19 @@ export class EngineError extends Error {
   }
 }
 
+/** Why a call failed that was stopped. */
+export const STOPPED = "stopped";
+
 interface Waiting {
   resolve: (result: never) => void;
   reject: (fault: EngineError) => void;
+  progress?: (words: string) => void;
+}
+
+/** What a call may have besides its arguments. */
+export interface CallOptions {
+  /** The folder in which it works; that of the call before if there is none. */
+  files?: Iterable<[path: string, contents: Uint8Array]>;
   progress?: (words: string) => void;
 }
 
@@ -20,24 +30,33 @@ let compiled: Promise<WebAssembly.Module> | undefined;
 /** The module is compiled once; every worker has an instance of it. */
 function compiledModule(): Promise<WebAssembly.Module> {
   compiled ??= moduleBytes().then((bytes) => WebAssembly.compile(bytes));
+  // The next call tries again: perhaps the network was away.
+  compiled.catch(() => {
+    compiled = undefined;
+  });
   return compiled;
 }
 
 export class Engine {
   private worker?: Worker;
   private waiting: Waiting[] = [];
+  /** How often it was stopped: a call that waits for its worker meanwhile is stopped too. */
+  private stops = 0;
 
   /** Calls a method of the worker. */
-  async call<T>(method: string, args: unknown[] = [], progress?: (words: string) => void): Promise<T> {
+  async call<T>(method: string, args: unknown[] = [], { files, progress }: CallOptions = {}): Promise<T> {
+    const stops = this.stops;
     const worker = await this.started();
+    if (stops !== this.stops) throw new EngineError({ message: STOPPED });
     return new Promise<T>((resolve, reject) => {
       this.waiting.push({ resolve: resolve as (result: never) => void, reject, progress });
-      worker.postMessage({ method, args });
+      worker.postMessage({ method, args, files: files && [...files] });
     });
   }
 
   /** Ends the worker, whatever it does. The next call starts another. */
-  stop(why = "stopped"): void {
+  stop(why = STOPPED): void {
+    this.stops += 1;
     this.worker?.terminate();
     this.worker = undefined;
     const waiting = this.waiting.splice(0);
@@ -50,10 +69,12 @@ export class Engine {
     if (this.worker) return this.worker;
     const worker = startWorker();
     worker.postMessage({ module });
-    worker.onmessage = ({ data }: MessageEvent<Answer>) => this.answered(data);
+    worker.onmessage = ({ data }: MessageEvent<Answer>) => {
+      if (worker === this.worker) this.answered(data);
+    };
     worker.onerror = (event) => {
       event.preventDefault();
-      this.stop(`the computation failed: ${event.message}`);
+      if (worker === this.worker) this.stop(`the computation failed: ${event.message}`);
     };
     this.worker = worker;
     return worker;

@@ -4,13 +4,14 @@
 import { zipSync } from "fflate";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { bundled, filesOf } from "./bundled";
-import { Chart, type Curve } from "./chart";
+import type { Curve } from "./chart";
+import { Charts } from "./charts";
 import { type Call, computedCurves } from "./curves";
 import { Editor } from "./editor";
 import { Engine, EngineError } from "./engine";
 import { Equation } from "./equation";
 import { FaultBox, faultOf } from "./fault";
-import { download, text } from "./files";
+import { beside, download, text } from "./files";
 import { type Analysis, Identifiability } from "./identifiability";
 import { useLatest } from "./latest";
 import type { Opened } from "./main";
@@ -27,6 +28,8 @@ export interface PlannedTest extends SetUp {
   bar_mm: number | null;
   moves: string[];
   readings: number;
+  /** The names of the coordinates of a reading; one for a length. */
+  coordinates: string[];
 }
 
 export interface Parameter {
@@ -44,10 +47,18 @@ export interface Description {
   abscissae: Float64Array[];
 }
 
+interface ProposedTest {
+  test: string;
+  after: number | null;
+  duration_min: number;
+  name: string;
+  session_toml: string;
+}
+
 interface Improvement {
   criterion: string;
   before: number | null;
-  steps: { test: string; after: number | null; duration_min: number; makes_identifiable: string[]; session_toml: string }[];
+  steps: ProposedTest[];
 }
 
 interface Props {
@@ -68,8 +79,8 @@ const TEMPLATES = [
 function planOf({ files, session }: Opened): Shared {
   const own = text(files, session);
   const named = machineFile(own);
-  const folder = session.slice(0, session.lastIndexOf("/") + 1);
-  const machine = named !== undefined && files.has(folder + named) ? text(files, folder + named) : "";
+  const path = named === undefined ? undefined : beside(session, named);
+  const machine = path !== undefined && files.has(path) ? text(files, path) : "";
   return { machine, plan: asPlan(own), values: {} };
 }
 
@@ -84,7 +95,7 @@ export function Explore({ opened, shared, analyse }: Props) {
   thinker.current ??= new Engine();
   const [state, setState] = useState<Shared>(() => (opened ? planOf(opened) : (shared ?? templateOf(TEMPLATES[0]))));
   const [description, setDescription] = useState<Description>();
-  const [curves, setCurves] = useState<Curve[][]>([]);
+  const [curves, setCurves] = useState<Curve[][][]>([]);
   const [kind, setKind] = useState<"patterns" | "sensitivities">("patterns");
   const [analysis, setAnalysis] = useState<Analysis>();
   const [latex, setLatex] = useState<string | Fault>("");
@@ -92,7 +103,9 @@ export function Explore({ opened, shared, analyse }: Props) {
   const [test, setTest] = useState(0);
   const [code, setCode] = useState("[wCAbYXZt]");
   const [fault, setFault] = useState<Fault>();
-  const [milliseconds, setMilliseconds] = useState(0);
+  const [isShareable, setIsShareable] = useState(true);
+  /** The pictures of changes: how many there were, and how long the last took. */
+  const [picture, setPicture] = useState({ number: 0, milliseconds: 0 });
   const wanted = useRef({ state, kind, test, since: 0, known: "", description: undefined as Description | undefined });
   Object.assign(wanted.current, { state, kind, test });
 
@@ -103,8 +116,7 @@ export function Explore({ opened, shared, analyse }: Props) {
     const call = caller(engine.current);
     try {
       if (job.known !== textsOf(state)) {
-        await call("folder", [folderOf(state)]);
-        job.description = await call<Description>("plan", ["plan.toml"]);
+        job.description = await call<Description>("plan", ["plan.toml"], { files: folderOf(state) });
         job.known = textsOf(state);
         setDescription(job.description);
         setFault(undefined);
@@ -118,6 +130,7 @@ export function Explore({ opened, shared, analyse }: Props) {
     } catch (error) {
       // The text with a fault is not known to the worker as a plan.
       job.known = "";
+      job.since = 0;
       setFault(faultOf(error));
     }
   });
@@ -128,8 +141,7 @@ export function Explore({ opened, shared, analyse }: Props) {
     const call = caller(thinker.current);
     try {
       if (thought.current.texts !== texts) {
-        await call("folder", [folderOf(state)]);
-        await call("plan", ["plan.toml"]);
+        await call("plan", ["plan.toml"], { files: folderOf(state) });
         setAnalysis(await call<Analysis>("analysis"));
         thought.current = { texts, test: -1 };
       }
@@ -143,7 +155,11 @@ export function Explore({ opened, shared, analyse }: Props) {
   });
   useEffect(curvesNow, [state, kind, test]);
   useEffect(() => {
-    const timer = setTimeout(() => history.replaceState(null, "", toFragment(state)), 300);
+    const timer = setTimeout(() => {
+      const fragment = toFragment(state);
+      setIsShareable(fragment !== undefined);
+      history.replaceState(null, "", fragment ?? "#");
+    }, 300);
     return () => clearTimeout(timer);
   }, [state]);
   useEffect(
@@ -161,7 +177,11 @@ export function Explore({ opened, shared, analyse }: Props) {
     const { since } = wanted.current;
     if (!since) return;
     wanted.current.since = 0;
-    setMilliseconds(performance.now() - since);
+    // After the other charts, which are drawn in the same turn.
+    queueMicrotask(() => {
+      const milliseconds = performance.now() - since;
+      setPicture(({ number }) => ({ number: number + 1, milliseconds }));
+    });
   };
   const change = (next: Partial<Shared>) => {
     begin();
@@ -190,18 +210,18 @@ export function Explore({ opened, shared, analyse }: Props) {
       setProposal(error instanceof EngineError ? error.fault.message : String(error));
     }
   };
-  const add = (written: string) => {
-    const name = JSON.stringify(
-      description ? freeName(description, `proposed-${description.tests.length + 1}`) : "proposed",
-    );
-    changePlan((plan) => withValue(`${plan.trimEnd()}\n\n${written}`, tests(plan), "name", name));
+  const add = ({ name, session_toml }: ProposedTest) => {
+    const free = JSON.stringify(description ? freeName(description, name) : name);
+    changePlan((plan) => withValue(`${plan.trimEnd()}\n\n${session_toml}`, tests(plan), "name", free));
     setProposal(undefined);
   };
-  const shown = useRef(opened);
+  const shown = useRef({ opened, shared });
   useEffect(() => {
-    if (opened && opened !== shown.current) open(planOf(opened));
-    shown.current = opened;
-  }, [opened]);
+    const before = shown.current;
+    shown.current = { opened, shared };
+    if (opened && opened !== before.opened) open(planOf(opened));
+    else if (shared && shared !== before.shared) open(shared);
+  }, [opened, shared]);
   const files = () => new Map(folderOf(state));
   const shownTest = description?.tests[Math.min(test, description.tests.length - 1)];
   const errors = description?.parameters ?? [];
@@ -231,7 +251,13 @@ export function Explore({ opened, shared, analyse }: Props) {
         >
           Save as a session folder
         </button>
-        <button onClick={() => void navigator.clipboard?.writeText(location.href)}>Copy the address</button>
+        <button
+          disabled={!isShareable}
+          title={isShareable ? undefined : "the plan is too large for an address; save it as a folder"}
+          onClick={() => void navigator.clipboard?.writeText(location.href)}
+        >
+          Copy the address
+        </button>
         <button onClick={() => analyse({ files: files(), session: "plan.toml" })}>Open in Analyse</button>
       </p>
       {fault && <FaultBox fault={fault} />}
@@ -272,23 +298,11 @@ export function Explore({ opened, shared, analyse }: Props) {
                   <option value="sensitivities">sensitivities: change per unit of each error</option>
                 </select>
               </label>
-              <span class="note" data-ms={milliseconds.toFixed(1)}>
-                {milliseconds > 0 && `${milliseconds.toFixed(0)} ms from change to picture`}
+              <span class="note" data-ms={picture.milliseconds.toFixed(1)} data-pictures={picture.number}>
+                {picture.number > 0 && `${picture.milliseconds.toFixed(0)} ms from change to picture`}
               </span>
             </p>
-            <div class="charts">
-              {description.tests.map((one, k) => (
-                <Chart
-                  key={one.name}
-                  title={one.name}
-                  x={description.abscissae[k]}
-                  curves={curves[k] ?? []}
-                  axis={one.moves[0] ?? ""}
-                  unit={kind === "patterns" ? "µm" : "µm per unit"}
-                  drawn={drawn}
-                />
-              ))}
-            </div>
+            <Charts description={description} curves={curves} kind={kind} drawn={drawn} />
             {analysis && <Identifiability analysis={analysis} />}
             <h2>Next test</h2>
             <p class="actions">
@@ -301,7 +315,7 @@ export function Explore({ opened, shared, analyse }: Props) {
                   <li key={step.test}>
                     {step.test}, {step.duration_min.toFixed(1)} min: {proposal.criterion}{" "}
                     {proposal.before?.toPrecision(3) ?? "∞"} → {step.after?.toPrecision(3) ?? "∞"}{" "}
-                    {step.session_toml && <button onClick={() => add(step.session_toml)}>Add</button>}
+                    {step.session_toml && <button onClick={() => add(step)}>Add</button>}
                   </li>
                 ))}
                 {proposal.steps.length === 0 && <li>No candidate test improves it.</li>}
@@ -345,7 +359,7 @@ function folderOf({ machine, plan }: Shared): [string, Uint8Array][] {
 
 function caller(engine: Engine | undefined): Call {
   if (!engine) throw new Error("no worker");
-  return (method, args = []) => engine.call(method, args);
+  return (method, args, options) => engine.call(method, args, options);
 }
 
 function freeName(description: Description, name: string): string {

@@ -6,6 +6,8 @@ import { crc32, directory } from "./zip";
 /** Largest size of one file, and of all together, bytes. The readings are held in memory several times. */
 export const LARGEST_FILE = 100 << 20;
 export const LARGEST_FOLDER = 200 << 20;
+/** Largest text in the editor, bytes. */
+const LARGEST_TEXT = 1 << 20;
 /** Largest number of files. */
 const MOST_FILES = 2000;
 
@@ -39,6 +41,16 @@ class Budget {
     this.files += 1;
     if (this.files > MOST_FILES) throw new FileFault(`more than ${MOST_FILES} files; drop the folder of one session`);
   }
+}
+
+/** The path of a file that another names relative to itself. */
+export function beside(file: string, named: string): string {
+  const parts: string[] = [];
+  for (const part of [...file.split("/").slice(0, -1), ...named.split(/[\\/]/)]) {
+    if (part === "..") parts.pop();
+    else if (part !== "" && part !== ".") parts.push(part);
+  }
+  return parts.join("/");
 }
 
 /** A path without a leading slash, `.` and `..`; undefined if nothing remains. */
@@ -78,7 +90,7 @@ function unpacked(name: string, bytes: Uint8Array, budget: Budget): FileMap {
           if (stated && !stated.get(entry.name)?.includes(crc32(whole))) {
             throw new FileFault(`${name}: ${path} in it is damaged: its checksum differs; pack the folder again`);
           }
-          found.set(path, whole);
+          add(found, path, whole);
           complete += 1;
         }
       } catch (error) {
@@ -116,8 +128,17 @@ function unpacked(name: string, bytes: Uint8Array, budget: Budget): FileMap {
   return found;
 }
 
+/** Adds a file. Two files under one path would make one session of two. */
+function add(found: FileMap, path: string, contents: Uint8Array): void {
+  if (found.has(path)) {
+    throw new FileFault(`two of these files have the path ${path}; drop the folder of one session`);
+  }
+  found.set(path, contents);
+}
+
 /** Reads files with their paths; ZIP files are unpacked. */
 async function readAll(files: { path: string; file: File }[]): Promise<FileMap> {
+  if (files.length === 0) throw new FileFault("no file was dropped; drop files, a folder or a ZIP file");
   const budget = new Budget();
   const found: FileMap = new Map();
   for (const { path, file } of files) {
@@ -130,10 +151,10 @@ async function readAll(files: { path: string; file: File }[]): Promise<FileMap> 
       throw new FileFault(`${path}: cannot be read: ${error instanceof Error ? error.message : error}`);
     }
     if (/\.zip$/i.test(path)) {
-      for (const [inner, contents] of unpacked(path, bytes, budget)) found.set(inner, contents);
+      for (const [inner, contents] of unpacked(path, bytes, budget)) add(found, inner, contents);
     } else {
       const plain = plainPath(path);
-      if (plain) found.set(plain, bytes);
+      if (plain) add(found, plain, bytes);
     }
   }
   return withoutCommonFolder(found);
@@ -179,19 +200,31 @@ export async function chosen(list: Iterable<File>): Promise<FileMap> {
   return readAll([...list].map((file) => ({ path: path(file), file })));
 }
 
-/** What a text is; by its contents, so that an unchanged file is read once. Each expression stays in its line. */
-const kinds = new WeakMap<Uint8Array, { session: boolean; data: boolean }>();
+interface Kind {
+  session: boolean;
+  data: boolean;
+  editable: boolean;
+}
 
-function kindOf(contents: Uint8Array): { session: boolean; data: boolean } {
+/** What a file is; by its contents, so that an unchanged file is read once. Each expression stays in its line. */
+const kinds = new WeakMap<Uint8Array, Kind>();
+
+function kindOf(contents: Uint8Array): Kind {
   let kind = kinds.get(contents);
   if (!kind) {
     const text = new TextDecoder().decode(contents);
     const session = /^[ \t]*(\[\[[ \t]*test[ \t]*\]\]|test[ \t]*=)/m.test(text);
-    kind = { session, data: session && /^[ \t]*data[ \t]*=/m.test(text) };
+    // An edited text is written in UTF-8; a file that is not would be damaged.
+    const editable = contents.length <= LARGEST_TEXT && !/[\0\ufffd]/.test(text);
+    kind = { session, data: session && /^[ \t]*data[ \t]*=/m.test(text), editable };
     kinds.set(contents, kind);
   }
   return kind;
 }
+
+/** Whether the editor takes a file. */
+export const isEditable = (contents?: Uint8Array): boolean =>
+  contents !== undefined && contents.length <= LARGEST_TEXT && kindOf(contents).editable;
 
 /** The session files: TOML texts with tests. */
 export function sessionsIn(files: FileMap): string[] {

@@ -2,12 +2,11 @@
 // library reads the file with them.
 
 import { useEffect, useRef, useState } from "preact/hooks";
-import { bundled, filesOf } from "./bundled";
+import { ChooseSession } from "./choose-session";
 import { Drop } from "./drop";
 import { Engine } from "./engine";
 import { FaultBox, faultOf } from "./fault";
-import type { FileMap } from "./files";
-import { text } from "./files";
+import { beside, FileFault, type FileMap, text } from "./files";
 import { ENCODINGS, guess, type Layout, type Own, rowsOf, SEPARATORS, written } from "./layout";
 import type { Opened } from "./main";
 import { type Variant, variants } from "./variants";
@@ -23,6 +22,14 @@ interface Tried {
   fault?: string;
 }
 
+/** The name, or one like it that no file beside the session has: another test may read that file. */
+function freeName(files: FileMap, session: string, name: string): string {
+  const [, stem, extension] = /^(.*?)(\.[^.]*)?$/s.exec(name) ?? ["", name];
+  let free = name;
+  for (let number = 2; files.has(beside(session, free)); number++) free = `${stem}-${number}${extension ?? ""}`;
+  return free;
+}
+
 /** The session with these readings in place of the data of a test. */
 export function imported(
   files: FileMap,
@@ -32,11 +39,9 @@ export function imported(
   bytes: Uint8Array,
   layout: Layout,
 ): FileMap {
-  const folder = session.slice(0, session.lastIndexOf("/") + 1);
-  const next = new Map(files);
-  next.set(folder + name, bytes);
-  next.set(session, new TextEncoder().encode(written(text(files, session), test, name, layout)));
-  return next;
+  const own = freeName(files, session, name);
+  const next = new Map(files).set(beside(session, own), bytes);
+  return next.set(session, new TextEncoder().encode(written(text(files, session), test, own, layout)));
 }
 
 export function Wizard({ opened, analyse }: { opened?: Opened; analyse: (opened: Opened) => void }) {
@@ -54,24 +59,40 @@ export function Wizard({ opened, analyse }: { opened?: Opened; analyse: (opened:
   useEffect(() => {
     if (opened) setBase(opened);
   }, [opened]);
+  /** Number of what is imported into what: what was begun for another is not told. */
+  const trying = useRef(0);
+  const forget = () => {
+    trying.current += 1;
+    engine.current?.stop();
+    setTried([]);
+    setWorking("");
+    return trying.current;
+  };
   useEffect(() => {
     if (!base) return;
-    const read = async () => {
-      await engine.current?.call("folder", [[...base.files]]);
-      setFound(await engine.current?.call<Found>("columns", [base.session]));
-      setTest(0);
-      setFault(undefined);
-    };
-    read().catch(setFault);
+    const number = forget();
+    setFound(undefined);
+    setFile(undefined);
+    setTest(0);
+    setFault(undefined);
+    const read = engine.current?.call<Found>("columns", [base.session], { files: base.files });
+    read?.then(
+      (known) => number === trying.current && setFound(known),
+      (error) => number === trying.current && setFault(error),
+    );
   }, [base]);
 
   const take = (files: FileMap) => {
     const [first] = files;
     if (!first || !found) return;
     const name = first[0].split("/").pop() ?? "readings.csv";
+    if (/^PK\x03\x04|^\xd0\xcf\x11\xe0/.test(String.fromCharCode(...first[1].subarray(0, 4)))) {
+      setFault(new FileFault(`${name}: this is a spreadsheet; name it as \`data\` of the test, or save it as CSV`));
+      return;
+    }
+    forget();
     setFile({ name, bytes: first[1] });
     setLayout(guess(first[1], found.columns));
-    setTried([]);
     setFault(undefined);
   };
   const set = (next: Partial<Layout>) => {
@@ -80,16 +101,17 @@ export function Wizard({ opened, analyse }: { opened?: Opened; analyse: (opened:
     const columnsChange = "separator" in next || "header" in next || "skip" in next || "encoding" in next;
     const changed = { ...layout, ...next };
     setLayout(columnsChange ? guess(file.bytes, found.columns, changed) : changed);
-    setTried([]);
+    forget();
   };
   const rms = async (of: Layout): Promise<number> => {
     if (!base || !file || !engine.current) return Number.NaN;
-    await engine.current.call("folder", [[...imported(base.files, base.session, test, file.name, file.bytes, of)]]);
-    const { json } = await engine.current.call<{ json: string }>("fit", [base.session]);
+    const files = imported(base.files, base.session, test, file.name, file.bytes, of);
+    const { json } = await engine.current.call<{ json: string }>("fit", [base.session], { files });
     return JSON.parse(json).rms_um as number;
   };
   const tryAll = async () => {
     if (!layout || !found) return;
+    const number = forget();
     const results: Tried[] = [];
     for (const variant of [{ words: "as guessed", layout }, ...variants(layout, found.columns)] as Variant[]) {
       setWorking(`fit: ${variant.words}`);
@@ -99,6 +121,7 @@ export function Wizard({ opened, analyse }: { opened?: Opened; analyse: (opened:
         const { message, line } = faultOf(error);
         results.push({ words: variant.words, fault: line ? `line ${line}: ${message}` : message });
       }
+      if (number !== trying.current) return;
       setTried([...results]);
     }
     setWorking("");
@@ -112,24 +135,7 @@ export function Wizard({ opened, analyse }: { opened?: Opened; analyse: (opened:
     <>
       <p>
         Readings of another program become those of a test. First the session that has the test, then the file.{" "}
-        <label>
-          Session{" "}
-          <select
-            aria-label="Session"
-            value=""
-            onChange={(event) => {
-              const path = event.currentTarget.value;
-              if (path) setBase({ files: filesOf(path), session: path.slice(path.lastIndexOf("/") + 1) });
-            }}
-          >
-            <option value="">{base ? base.session : "choose …"}</option>
-            {bundled.map(([path, about]) => (
-              <option key={path} value={path}>
-                {about}
-              </option>
-            ))}
-          </select>
-        </label>
+        <ChooseSession label="Session" placeholder={base ? base.session : "choose …"} open={setBase} />
       </p>
       {fault !== undefined && <FaultBox fault={faultOf(fault)} />}
       {found && (
@@ -137,7 +143,14 @@ export function Wizard({ opened, analyse }: { opened?: Opened; analyse: (opened:
           <p>
             <label>
               Test{" "}
-              <select aria-label="Test" value={test} onChange={(event) => setTest(Number(event.currentTarget.value))}>
+              <select
+                aria-label="Test"
+                value={test}
+                onChange={(event) => {
+                  setTest(Number(event.currentTarget.value));
+                  forget();
+                }}
+              >
                 {found.tests.map((name, k) => (
                   <option key={name} value={k}>
                     {name}
@@ -238,7 +251,7 @@ export function Wizard({ opened, analyse }: { opened?: Opened; analyse: (opened:
             <button class="main" disabled={working !== ""} onClick={() => void tryAll()}>
               Fit, and the same with other guesses
             </button>
-            <button disabled={working === ""} onClick={() => engine.current?.stop()}>
+            <button disabled={working === ""} onClick={forget}>
               Stop
             </button>
             <button onClick={use}>Open in Analyse</button>

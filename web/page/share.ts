@@ -11,17 +11,23 @@ export interface Shared {
 
 /** Largest text that a fragment may hold, bytes: a fragment comes from anywhere. */
 const LARGEST = 1 << 20;
+/** Longest fragment, characters: it may unpack to a thousand times its size. */
+const LONGEST = 1 << 18;
 
-export function toFragment(shared: Shared): string {
-  const packed = deflateSync(strToU8(JSON.stringify(shared)), { level: 9 });
+/** The fragment of a plan; undefined if it is too large for an address. */
+export function toFragment(shared: Shared): string | undefined {
+  const bytes = strToU8(JSON.stringify(shared));
+  if (bytes.length > LARGEST) return undefined;
+  const packed = deflateSync(bytes, { level: 9 });
   const binary = Array.from(packed, (byte) => String.fromCharCode(byte)).join("");
-  return `#plan=${btoa(binary).replaceAll("+", "-").replaceAll("/", "_").replaceAll("=", "")}`;
+  const fragment = `#plan=${btoa(binary).replaceAll("+", "-").replaceAll("/", "_").replaceAll("=", "")}`;
+  return fragment.length <= LONGEST ? fragment : undefined;
 }
 
 /** The plan of a fragment; undefined if it holds none. */
 export function fromFragment(fragment: string): Shared | undefined {
   const packed = fragment.match(/^#plan=([\w-]+)$/)?.[1];
-  if (!packed) return undefined;
+  if (!packed || fragment.length > LONGEST) return undefined;
   try {
     const binary = atob(packed.replaceAll("-", "+").replaceAll("_", "/"));
     const bytes = Uint8Array.from(binary, (character) => character.charCodeAt(0));

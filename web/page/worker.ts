@@ -19,13 +19,14 @@ function held<T>(value: T | undefined): T {
 /** The memory of the module, which never shrinks, bytes. */
 const used = () => ({ bytes: memory?.buffer.byteLength ?? 0 });
 
+/** Replaces the folder. */
+function open(files: Files): void {
+  folder?.free();
+  folder = new Folder();
+  for (const [path, contents] of files) folder.add(path, contents);
+}
+
 const methods: Record<string, (...args: never[]) => unknown> = {
-  /** Replaces the folder. */
-  folder(files: Files) {
-    folder?.free();
-    folder = new Folder();
-    for (const [path, contents] of files) folder.add(path, contents);
-  },
   columns: (session: string) => JSON.parse(held(folder).columns(session)),
   check: (session: string) => JSON.parse(held(folder).check(session)),
   fit(session: string) {
@@ -87,6 +88,7 @@ onmessage = async ({ data }: MessageEvent) => {
   }
   try {
     memory = (await ready)?.memory;
+    if (data.files) open(data.files as Files);
     const answer = await methods[data.method](...(data.args as never[]));
     const transfer = answer instanceof Float64Array ? [answer.buffer] : [];
     postMessage({ result: answer }, { transfer });

@@ -43,7 +43,7 @@ impl Fit {
 
     /// The table of `--csv`.
     pub fn csv(&self) -> Result<String, Failed> {
-        output::table(&Figures::of_fit(&self.fit.result))
+        output::figures(&Figures::of_fit(&self.fit.result))
     }
 
     /// The table of `--residuals`.

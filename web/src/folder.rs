@@ -7,6 +7,7 @@ use abbe::model::axis::AxisKind;
 use abbe::model::files::store::Store;
 use abbe::model::files::{self, ReadOptions, SourceMap};
 use abbe::model::session::Session;
+use abbe::model::session::motion::Motion;
 use serde_json::json;
 use wasm_bindgen::prelude::*;
 
@@ -47,7 +48,9 @@ impl Folder {
         let read = self.read(session, true)?;
         let tests = read.session.tests.iter().map(|test| {
             let readings = test.readings.as_ref().map_or(0, |readings| readings.rows());
-            json!({ "name": test.name, "readings": readings })
+            // What the axes do without data, which a plan needs.
+            let moves = !matches!(test.motion, None | Some(Motion::List));
+            json!({ "name": test.name, "readings": readings, "moves": moves })
         });
         let files: Vec<String> = read.sources.files.iter().map(|stamp| stamp.file.display().to_string()).collect();
         let found = json!({

@@ -41,6 +41,11 @@ pub fn model(command: &str, read: &Read, seed: u64, problem: &Problem, fit: &Fit
     Ok(IdentifiedModel::of_fit(problem, fit, provenance)?.to_text()?)
 }
 
+/// The figures of a result as CSV, under a comment that states the convention of their signs.
+pub fn figures(table: &Table) -> Result<String, Failed> {
+    Ok(csv::CONVENTION.to_string() + &self::table(table)?)
+}
+
 /// A table as CSV.
 pub fn table(table: &Table) -> Result<String, Failed> {
     Ok(String::from_utf8_lossy(&csv::text(table)?).into_owned())

@@ -2,8 +2,8 @@
 
 use std::cell::OnceCell;
 
-use abbe::codegen::print::{Numbering, Style};
-use abbe::codegen::{Equation, Options, Order, SessionTest, Symbols, check, language};
+use abbe::codegen::print::{LATEX, Numbering, Style};
+use abbe::codegen::{Equation, Options, Order, SessionTest, Symbols, check};
 use abbe::equation::EquationParameters;
 use abbe::identify::parameters::Role;
 use abbe::identify::plan::criterion::Goal;
@@ -76,14 +76,16 @@ impl Plan {
             };
             let moved = moved_axes(machine, test);
             let readings = test.readings.as_ref().map_or(0, |readings| readings.rows());
-            let names: Vec<&str> = moved.iter().map(|axis| machine.axes[*axis].name.as_str()).collect();
+            let coordinates = test.station.coordinate_names();
+            let moves: Vec<&str> = moved.iter().map(|axis| machine.axes[*axis].name.as_str()).collect();
             json!({
                 "name": test.name,
                 "instrument": test.station.kind().word(),
                 "bar_mm": bar_mm,
                 "table_point_mm": test.station.table_point_mm(),
                 "tool_point_mm": test.station.tool_point_mm(),
-                "moves": names,
+                "moves": moves,
+                "coordinates": &coordinates[..test.station.kind().coordinates()],
                 "readings": readings,
                 "table_path_mm": path.workpiece_mm,
                 "tool_path_mm": path.tool_mm,
@@ -195,7 +197,7 @@ impl Plan {
         let source = SessionTest::new(session, test)?;
         let equation = Equation::of(&session.machine, &source, &parameters.errors, &options)?;
         let style = Style { numbering: Numbering::None, nomenclature: false, ..Style::default() };
-        Ok(language("latex")?.print(&check(&equation, &source)?, &style)?)
+        Ok(LATEX.print(&check(&equation, &source)?, &style)?)
     }
 }
 

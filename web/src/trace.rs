@@ -48,7 +48,7 @@ impl Trace {
 
     /// The table of `--csv`.
     pub fn csv(&self) -> Result<String, Failed> {
-        output::table(&present::figures(&self.trace.result))
+        output::figures(&present::figures(&self.trace.result))
     }
 
     /// The table of `--residuals`.

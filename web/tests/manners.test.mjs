@@ -1,49 +1,39 @@
 // Without a network, without a mouse, on a small screen; many readings.
 
 import assert from "node:assert/strict";
-import { readdirSync, readFileSync } from "node:fs";
-import { join } from "node:path";
-import { after, before, test } from "node:test";
-import { browser, give, opened, root, saved, served, single } from "./page.mjs";
+import { test } from "node:test";
+import { analysed, filesOf, give, hermle, opened, PATIENCE_MS, saved, served, shared, single } from "./page.mjs";
 
-let chromium, server;
-before(async () => {
-  chromium = await browser();
-  server = await served();
-});
-after(async () => {
-  await chromium.close();
-  server.end();
-});
+const own = shared();
 
-const folder = join(root, "sessions/hermle-c600u/measured");
-const files = Object.fromEntries(readdirSync(folder).map((name) => [name, readFileSync(join(folder, name))]));
+const files = filesOf(hermle);
 
 async function fitted(page) {
   await page.getByRole("button", { name: "Fit", exact: true }).click();
-  await page.locator("[data-seconds]").waitFor({ timeout: 120_000 });
+  await page.locator("[data-seconds]").waitFor();
   return JSON.parse(await saved(page, "JSON"));
 }
 
 test("after the first visit the page works without its server", async () => {
-  const context = await chromium.newContext();
-  const own = await served();
+  const context = await own.chromium.newContext();
+  const server = await served();
+  context.setDefaultTimeout(PATIENCE_MS);
   const page = await context.newPage();
-  await page.goto(own.address);
+  await page.goto(server.address);
   await page.evaluate(() => navigator.serviceWorker.ready.then(() => undefined));
-  own.end();
+  server.end();
   await context.setOffline(true);
   await page.reload();
   await give(page, files);
   assert.ok((await fitted(page)).rms_um > 0.5);
   await page.getByRole("tab", { name: "Explore" }).click();
-  await page.getByText(/Rank \d+ of/).waitFor({ timeout: 60_000 });
+  await analysed(page);
   assert.deepEqual(await context.cookies(), []);
   await context.close();
 });
 
 test("the keyboard reaches and operates everything", async () => {
-  const { page, wrong } = await opened(chromium, server.address);
+  const { page, wrong } = await opened(own.chromium, own.server.address);
   const press = async (name) => {
     for (let k = 0; k < 60; k++) {
       const focused = await page.evaluate(() =>
@@ -57,10 +47,10 @@ test("the keyboard reaches and operates everything", async () => {
   await give(page, files);
   await page.getByText("2416 readings").waitFor();
   await press("Fit");
-  await page.locator("[data-seconds]").waitFor({ timeout: 120_000 });
+  await page.locator("[data-seconds]").waitFor();
   await page.locator("h1").click();
   await press("Explore");
-  await page.getByText(/Rank \d+ of/).waitFor({ timeout: 60_000 });
+  await analysed(page);
   const slider = page.getByLabel("EX0C", { exact: true });
   await slider.focus();
   await page.keyboard.press("ArrowRight");
@@ -71,12 +61,12 @@ test("the keyboard reaches and operates everything", async () => {
 
 test("no view is wider than a screen of 360 pixels, light and dark", async () => {
   for (const colorScheme of ["light", "dark"]) {
-    const { page } = await opened(chromium, single, { viewport: { width: 360, height: 720 }, colorScheme });
+    const { page } = await opened(own.chromium, single, { viewport: { width: 360, height: 720 }, colorScheme });
     await give(page, files);
     await page.getByText("2416 readings").waitFor();
     for (const view of ["Analyse", "Explore", "Import"]) {
       await page.getByRole("tab", { name: view }).click();
-      if (view === "Explore") await page.getByText(/Rank \d+ of/).waitFor({ timeout: 60_000 });
+      if (view === "Explore") await analysed(page);
       assert.ok(
         (await page.evaluate(() => document.documentElement.scrollWidth - innerWidth)) <= 0,
         `${view}, ${colorScheme}`,
@@ -87,7 +77,7 @@ test("no view is wider than a screen of 360 pixels, light and dark", async () =>
 });
 
 test("200,000 readings are fitted", async (context) => {
-  const { page } = await opened(chromium, server.address);
+  const { page } = await opened(own.chromium, own.server.address);
   const session = `${files["session.toml"]}`.replace(
     /\[\[test\]\]\nname = "A100"[\s\S]*?(?=\[\[test\]\]\nname = "C150")/,
     "",
@@ -106,7 +96,7 @@ test("200,000 readings are fitted", async (context) => {
     lines.push(cells.join(","));
   }
   await give(page, { ...files, "session.toml": session, "C150.csv": lines.join("\n") });
-  await page.getByText("200000 readings").waitFor({ timeout: 120_000 });
+  await page.getByText("200000 readings").waitFor();
   assert.equal((await fitted(page)).readings, 200_000);
   const bytes = Number(await page.locator("[data-bytes]").getAttribute("data-bytes"));
   context.diagnostic(

@@ -2,15 +2,19 @@
 
 import { execFileSync } from "node:child_process";
 import { createServer } from "node:http";
-import { existsSync, mkdtempSync, readFileSync, statSync } from "node:fs";
+import { existsSync, mkdtempSync, readdirSync, readFileSync, rmSync, statSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { extname, join, resolve } from "node:path";
+import { after, before } from "node:test";
 import { fileURLToPath, pathToFileURL } from "node:url";
 import { chromium } from "playwright-core";
 
 export const web = fileURLToPath(new URL("..", import.meta.url));
 export const root = resolve(web, "..");
 const dist = join(web, "dist");
+
+/** Longest wait for anything, ms: on a machine with much else to do, conditions take their time. */
+export const PATIENCE_MS = 600_000;
 
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".wasm": "application/wasm" };
 
@@ -36,6 +40,7 @@ export const single = pathToFileURL(join(dist, "abbe.html")).href;
 
 export const browser = () =>
   chromium.launch({
+    timeout: PATIENCE_MS,
     executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
     args: [
       "--headless",
@@ -50,9 +55,34 @@ export const browser = () =>
     ],
   });
 
+/** What the tests of a file share: one browser and one server, from before the first test until after the last. */
+export function shared() {
+  const own = {};
+  before(async () => {
+    own.chromium = await browser();
+    own.server = await served();
+  });
+  after(async () => {
+    await own.chromium.close();
+    own.server.end();
+  });
+  return own;
+}
+
+/** The files of a folder, by name. */
+export const filesOf = (folder) =>
+  Object.fromEntries(readdirSync(folder).map((name) => [name, readFileSync(join(folder, name))]));
+
+/** The folder of the session of four tests that most tests use. */
+export const hermle = join(root, "sessions/hermle-c600u/measured");
+
+/** Waits until Explore shows a plan with its analysis. */
+export const analysed = (page) => page.getByText(/Rank \d+ of/).waitFor();
+
 /** A page that collects what it should not do: requests to elsewhere, errors, violated policies. */
 export async function opened(browser, address, options = {}) {
   const page = await browser.newPage(options);
+  page.setDefaultTimeout(PATIENCE_MS);
   const wrong = [];
   page.on("request", (request) => {
     const url = request.url();
@@ -90,12 +120,19 @@ export async function saved(page, button) {
   return readFileSync(await (await download).path(), "utf8");
 }
 
+/** The command to compare with. */
+export const abbe = resolve(process.env.ABBE_COMMAND ?? join(root, "target/checked/abbe"));
+
 /** The JSON of the command in a folder. */
 export function command(folder, ...words) {
-  const abbe = process.env.ABBE_COMMAND ?? join(root, "target/checked/abbe");
-  const out = join(mkdtempSync(join(tmpdir(), "abbe-web-")), "result.json");
-  execFileSync(abbe, [...words, "--json", out, "--quiet"], { cwd: folder, stdio: ["ignore", "ignore", "inherit"] });
-  return JSON.parse(readFileSync(out, "utf8"));
+  const scratch = mkdtempSync(join(tmpdir(), "abbe-web-"));
+  try {
+    const out = join(scratch, "result.json");
+    execFileSync(abbe, [...words, "--json", out, "--quiet"], { cwd: folder, stdio: ["ignore", "ignore", "inherit"] });
+    return JSON.parse(readFileSync(out, "utf8"));
+  } finally {
+    rmSync(scratch, { recursive: true });
+  }
 }
 
 /**

@@ -1,34 +1,34 @@
 // Draws the pictures of docs/guide/browser.md: `node tests/pictures.mjs` in web/, after the build.
 
-import { readdirSync, readFileSync } from "node:fs";
+import { readFileSync } from "node:fs";
 import { join } from "node:path";
-import { browser, give, opened, root, served } from "./page.mjs";
+import { analysed, browser, filesOf, give, hermle, opened, root, served } from "./page.mjs";
 
-const folder = join(root, "sessions/hermle-c600u/measured");
 const pictures = join(root, "docs/pictures");
 const chromium = await browser();
 const server = await served();
 
 const VIEWS = {
   async analyse(page) {
-    await give(page, Object.fromEntries(readdirSync(folder).map((name) => [name, readFileSync(join(folder, name))])));
+    await give(page, filesOf(hermle));
     await page.getByText("2416 readings").waitFor();
   },
   async report(page) {
     await VIEWS.analyse(page);
     await page.getByRole("button", { name: "Trace", exact: true }).click();
-    await page.locator("[data-seconds]").waitFor({ timeout: 300_000 });
+    await page.locator("[data-seconds]").waitFor();
     await page.frameLocator("iframe").getByText("explained").first().waitFor();
     await page.locator("iframe").evaluate((frame) => frame.scrollIntoView());
     await page.evaluate(() => scrollBy(0, -60));
   },
   async explore(page) {
     await page.getByRole("tab", { name: "Explore" }).click();
-    await page.getByText(/Rank \d+ of/).waitFor({ timeout: 60_000 });
+    await analysed(page);
     for (const [error, value] of Object.entries({ EX0C: 10, EY0A: -8, EB0C: 5 })) {
       await page.getByLabel(error, { exact: true }).fill(String(value));
     }
-    await page.waitForTimeout(1500);
+    await page.waitForFunction(() => Number(document.querySelector("[data-pictures]").dataset.pictures) > 0);
+    await page.waitForFunction(() => document.querySelector('canvas[aria-label^="Set-up"]').placeOf);
     if (page.viewportSize().width < 600)
       await page.getByText("Show", { exact: false }).first().scrollIntoViewIfNeeded();
   },
@@ -37,7 +37,7 @@ const VIEWS = {
     const view = page.getByLabel("Import", { exact: true });
     await view.getByLabel("Session", { exact: true }).selectOption("hermle-c600u/measured/session.toml");
     await view.getByLabel("Test", { exact: true }).selectOption("C150");
-    const rows = readFileSync(join(folder, "C150.csv"), "utf8").trim().split("\n").slice(1);
+    const rows = readFileSync(join(hermle, "C150.csv"), "utf8").trim().split("\n").slice(1);
     const foreign = [
       "Zeit [s];Run;X [mm];Y [mm];Z [mm];A [deg];C-Achse [°];Länge [mm]",
       ...rows.map((row) => row.replaceAll(",", ";").replaceAll(".", ",")),
@@ -45,14 +45,12 @@ const VIEWS = {
     const buffer = Buffer.from(foreign.join("\r\n"), "latin1");
     await view.locator('input[type="file"]').setInputFiles({ name: "export.csv", mimeType: "text/csv", buffer });
     await view.getByRole("button", { name: /^Fit/ }).click();
-    await view.locator("tbody").last().getByText("decimal point", { exact: true }).waitFor({ timeout: 60_000 });
+    await view.locator("tbody").last().getByText("decimal point", { exact: true }).waitFor();
     await page.waitForFunction(
       () =>
         [...document.querySelectorAll("button")].some(
           (button) => /^Fit, and/.test(button.textContent) && !button.disabled,
         ),
-      undefined,
-      { timeout: 120_000 },
     );
   },
 };

@@ -59,10 +59,13 @@ pub struct OutputLanguage {
     language: &'static dyn Language,
 }
 
+/// LaTeX. A program that names it in place of [`language`] does not hold the printers of the others.
+pub const LATEX: OutputLanguage = entry("latex", "tex", Authors, &latex::Latex);
+
 /// All languages, in the order in which they are listed.
 pub const LANGUAGES: &[OutputLanguage] = &[
     entry("text", "txt", Readers, &text::Text),
-    entry("latex", "tex", Authors, &latex::Latex),
+    LATEX,
     entry("typst", "typ", Authors, &typst::Typst),
     entry("rust", "rs", Compilers, &rust::Rust),
     entry("c", "c", Compilers, &c::C),

@@ -48,6 +48,8 @@ pub struct LeastSquaresSolution {
 
 const MAX_ITERATIONS: usize = 200;
 const SMALLEST_RELATIVE_STEP: f64 = 1e-12;
+/// Decrease of the sum of squares, as a share of it, that is below the rounding of the sum.
+const ROUNDING_OF_SUM: f64 = 1e-12;
 /// Relative step below which the nonlinearity of the model is negligible: its square is below rounding.
 const LINEAR_RELATIVE_STEP: f64 = 1e-7;
 
@@ -85,8 +87,8 @@ pub fn minimise(
         let scaled = Mat::from_fn(n, n, |i, j| r[(i, j)] * scale[j]);
         let directions = Directions::of(scaled.as_ref())?;
         let largest = directions.singular_values.first().copied().unwrap_or(0.0);
-        // A step is accepted if the sum of squares falls. Near the minimum the decrease is below rounding and the size
-        // of the step decides.
+        // A step is accepted if the sum of squares falls. Near the minimum the decrease is below rounding and the sizes
+        // of the steps decide.
         let mut accepted = false;
         let mut converged = false;
         let mut next = None;
@@ -113,6 +115,15 @@ pub fn minimise(
                     iterations: iteration,
                 });
             }
+            // A direction may be determined so poorly that a step along it changes the sum of squares by less than rounding,
+            // while it is no small step. Successive steps decide then: the minimum is reached when they
+            // no longer shrink by half.
+            let rounded = damping == 0.0 && directions.explained(&c) < ROUNDING_OF_SUM * current;
+            if rounded && iteration > 1 && relative < LINEAR_RELATIVE_STEP && relative > 0.5 * step_before {
+                converged = true;
+                accepted = true;
+                break;
+            }
             // The first attempt is nearly always accepted, so it is linearised at once.
             let sum = if attempt == 0 {
                 next = problem.linearise(&trial).ok();
@@ -121,10 +132,11 @@ pub fn minimise(
                 next = None;
                 problem.sum_of_squares(&trial)
             };
-            let close = relative < SMALLEST_RELATIVE_STEP * 100.0;
+            let close = rounded || relative < SMALLEST_RELATIVE_STEP * 100.0;
             if sum.is_finite() && (sum < current || (close && sum <= current * (1.0 + 1e-9))) {
                 x = trial;
-                converged = relative < SMALLEST_RELATIVE_STEP || current - sum <= 1e-15 * current && relative < 1e-7;
+                converged = relative < SMALLEST_RELATIVE_STEP
+                    || (!rounded && current - sum <= 1e-15 * current && relative < LINEAR_RELATIVE_STEP);
                 current = sum;
                 damping *= 0.1;
                 if damping < largest * largest * 1e-12 {
@@ -155,4 +167,49 @@ pub fn minimise(
         }
     }
     Err(IdentifyError::NoConvergence { iterations: MAX_ITERATIONS, sum_of_squares: current })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Beside residuals of 10⁴ standard deviations, steps of 10⁻⁴ along `x` change the part `(y₁ − eˣ)² + (y₂ − e²ˣ)²` of
+    /// the sum of squares by less than the rounding of the sum. With `y₁ = 3/2` and `y₂ = 3/4` its minimum is `x = 0`: with `t = eˣ` it solves `2t³ + t(1 − 2y₂) = y₁`.
+    /// The residual stays, so that each step is about a tenth of the step before.
+    struct Poorly;
+
+    impl Poorly {
+        fn rows(x: &[f64]) -> Mat<f64> {
+            let t = x[1].exp();
+            let rows = [
+                [1e4, 0.0, 1e4 * (0.0 - x[0])],
+                [1e4, 0.0, 1e4 * (2.0 - x[0])],
+                [0.0, t, 1.5 - t],
+                [0.0, 2.0 * t * t, 0.75 - t * t],
+            ];
+            Mat::from_fn(4, 3, |i, j| rows[i][j])
+        }
+    }
+
+    impl LeastSquares for Poorly {
+        fn parameters(&self) -> usize {
+            2
+        }
+
+        fn linearise(&self, x: &[f64]) -> Result<Triangle, IdentifyError> {
+            Ok(Triangle::of(Poorly::rows(x)))
+        }
+
+        fn sum_of_squares(&self, x: &[f64]) -> f64 {
+            let rows = Poorly::rows(x);
+            (0..4).map(|i| rows[(i, 2)].powi(2)).sum()
+        }
+    }
+
+    #[test]
+    fn a_direction_below_the_rounding_of_the_sum_is_minimised_too() {
+        let found = minimise(&Poorly, &[0.3, 0.3], &Scaling::Physical(vec![1.0; 2])).unwrap();
+        assert!((found.x[0] - 1.0).abs() < 1e-12, "{:?}", found.x);
+        assert!(found.x[1].abs() < 1e-10, "{:?}", found.x);
+    }
 }

@@ -62,6 +62,12 @@ impl Directions {
         solution
     }
 
+    /// By how much the undamped solution lowers `‖c − A·x‖²`.
+    pub fn explained(&self, c: &[f64]) -> f64 {
+        let along = |k: usize| self.left().col(k).iter().zip(c).map(|(u, c)| u * c).sum::<f64>();
+        (0..self.numerical_rank()).map(|k| along(k).powi(2)).sum()
+    }
+
     /// `W` with `W·Wᵀ = (AᵀA)⁻¹`: the right singular vectors over the singular values. Columns of directions below
     /// rounding are zero.
     pub fn inverse_root(&self) -> Mat<f64> {

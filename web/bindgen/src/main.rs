@@ -11,11 +11,9 @@ fn main() -> ExitCode {
         eprintln!("abbe-web-bindgen MODULE.wasm FOLDER");
         return ExitCode::from(2);
     };
-    let written = Bindgen::new()
-        .input_path(module)
-        .out_name("abbe")
-        .web(true)
-        .and_then(|bindgen| bindgen.typescript(true).omit_default_module_path(true).generate(folder));
+    let written = Bindgen::new().input_path(module).out_name("abbe").web(true).and_then(|bindgen| {
+        bindgen.typescript(true).omit_default_module_path(true).remove_name_section(true).generate(folder)
+    });
     match written {
         Ok(()) => ExitCode::SUCCESS,
         Err(fault) => {
