@@ -110,7 +110,7 @@ pub fn run(arguments: &HistoryArguments, quiet: bool) -> Result<(), Failure> {
     }
     if let Some(path) = &arguments.report {
         let document = match (&arguments.machine, found.history.machines.first()) {
-            (Some(_), Some(machine)) => report::machine(machine),
+            (Some(_), Some(machine)) => report::machine(machine, &found.conformity),
             _ => report::fleet(&found),
         };
         output::write_whole(path, html(&document)?.as_bytes())?;
@@ -121,7 +121,7 @@ pub fn run(arguments: &HistoryArguments, quiet: bool) -> Result<(), Failure> {
             let plain = |sign: char| if sign.is_alphanumeric() || "-_.".contains(sign) { sign } else { '_' };
             let name: String = machine.machine_id.chars().map(plain).collect();
             // The number keeps machines apart whose identifiers differ in other signs or in case alone.
-            files.push((format!("{:04}-{name}.html", number + 1), html(&report::machine(machine))?));
+            files.push((format!("{:04}-{name}.html", number + 1), html(&report::machine(machine, &found.conformity))?));
         }
         folder::write(path, &files, false, |_| Ok(()))?;
     }
@@ -147,6 +147,7 @@ fn print(found: &FleetHistory, all: bool) {
         (present::machines(found), "Machines"),
         (present::drifts(machines), "Drifts"),
         (present::changes(machines), "Changes"),
+        (present::conformity(&found.conformity), "Conformity (rule of ISO 14253-1, limits of each session)"),
         (present::faults(found), "Faults"),
         (present::not_used(&found.not_used), "Not used"),
     ];

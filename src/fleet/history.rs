@@ -11,6 +11,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::FleetError;
+use super::conformity::MachineConformity;
 use super::date;
 use super::record::Record;
 use super::store::{Pointer, Store};
@@ -23,6 +24,8 @@ pub struct FleetHistory {
     pub history: History,
     /// The effects of all sessions, by alias set, the most frequent first.
     pub faults: Vec<Fault>,
+    /// Decisions of conformity over time, of the machines whose sessions state limits.
+    pub conformity: Vec<MachineConformity>,
     /// Sessions, notes and rows of known compensations that the history does not use.
     pub not_used: Vec<NotUsed>,
 }
@@ -75,15 +78,21 @@ pub fn history(store: &Store, machine_id: Option<&str>, options: &HistoryOptions
     }
     let mut series = Vec::new();
     let mut effects = Vec::new();
+    let mut conformity = Vec::new();
     for (id, sessions) in machines {
         let sessions = in_order(of_one_machine(sessions, &mut not_used), &mut not_used);
         effects.extend(sessions.iter().flat_map(found_effects));
+        let decided = sessions.iter().map(|dated| {
+            let Dated { days, pointer, record, .. } = dated;
+            (*days, pointer.file.as_str(), record.conformity.as_ref())
+        });
+        conformity.extend(MachineConformity::of(&id, decided));
         series.push(machine_sessions(id, &sessions));
     }
     not_used.sort_by(|a, b| a.file.cmp(&b.file));
     check_units(&series, &options.compensations)?;
     not_used.extend(unknown_rows(&known, &series, &options.compensations));
-    Ok(FleetHistory { history: analyse(&series, options), faults: faults(&effects), not_used })
+    Ok(FleetHistory { history: analyse(&series, options), faults: faults(&effects), conformity, not_used })
 }
 
 /// # Errors

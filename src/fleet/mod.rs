@@ -10,6 +10,7 @@
 //!
 //! The unit of work depends on nothing but its inputs: any process may do it, at any time and in any order.
 
+pub mod conformity;
 pub mod date;
 pub mod history;
 pub mod list;
