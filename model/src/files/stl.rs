@@ -63,13 +63,19 @@ fn triangles(mut bytes: Vec<u8>) -> Result<Vec<[[f64; 3]; 3]>, (String, String)>
     let is_text = !is_binary && bytes.starts_with(b"solid");
     if !is_binary && !is_text {
         let (Some(count), Some(stated)) = (count, stated) else {
-            return Err(fault(format!("is no STL file: it has {} bytes, and does not begin with `solid`", bytes.len())));
+            return Err(fault(format!(
+                "is no STL file: it has {} bytes, and does not begin with `solid`",
+                bytes.len()
+            )));
         };
         let found = bytes.len() - BEFORE_TRIANGLES;
         return Err(fault(if (bytes.len() as u64) < stated {
             format!("states {count} triangles, but ends in triangle {}", found / TRIANGLE + 1)
         } else {
-            format!("states {count} triangles, but has {found} bytes for them in place of {}", TRIANGLE * count as usize)
+            format!(
+                "states {count} triangles, but has {found} bytes for them in place of {}",
+                TRIANGLE * count as usize
+            )
         }));
     }
     let facets = if is_text { facets(&bytes) } else { 0 };

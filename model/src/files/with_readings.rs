@@ -47,9 +47,10 @@ pub fn with_readings(
                 help: "put the STL file beside the machine file, or below".into(),
             });
         }
-        let contents = stamp
-            .read()
-            .map_err(|cause| ModelError::Session { message: format!("{name}: {cause}"), help: "check the file".into() })?;
+        let contents = stamp.read().map_err(|cause| ModelError::Session {
+            message: format!("{name}: {cause}"),
+            help: "check the file".into(),
+        })?;
         files.push((name.clone(), contents));
     }
     let mut text = write::with_data(&sources.text, file, &data)?;

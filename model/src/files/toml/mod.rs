@@ -142,7 +142,8 @@ pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError
 pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Session, SourceMap), ModelError> {
     let source = Source::read(&options.store, path, "the session file")?;
     let mut root = source.parse()?;
-    let SessionMachine { machine, source: machine_source, bodies, warnings } = session_machine(path, options, &mut root)?;
+    let SessionMachine { machine, source: machine_source, bodies, warnings } =
+        session_machine(path, options, &mut root)?;
     let head = head(machine, &mut root)?;
 
     let format = match root.take("format") {
