@@ -70,7 +70,8 @@ impl FigureUncertainties {
     /// Of a path with these radial deviations.
     pub(super) fn of(path: &Path, trace: &PolarPath, deviations_mm: &[f64], set_up: &SetUp) -> FigureUncertainties {
         let at = |better: fn(f64, f64) -> bool| {
-            (0..deviations_mm.len()).reduce(|best, k| if better(deviations_mm[k], deviations_mm[best]) { k } else { best })
+            (0..deviations_mm.len())
+                .reduce(|best, k| if better(deviations_mm[k], deviations_mm[best]) { k } else { best })
         };
         let (Some(most), Some(least)) = (at(|a, b| a > b), at(|a, b| a < b)) else {
             return FigureUncertainties::default();

@@ -68,12 +68,7 @@ pub fn candidate_tests(session: &Session, variations: &TestVariations) -> Result
 }
 
 /// Plans the states of a candidate test. `None` if the travel forbids them or the bar does not reach.
-fn finished(
-    session: &Session,
-    bodies: &Bodies,
-    variations: &TestVariations,
-    draft: Draft,
-) -> Option<CandidateTest> {
+fn finished(session: &Session, bodies: &Bodies, variations: &TestVariations, draft: Draft) -> Option<CandidateTest> {
     let Draft { mut test, name, new_setup } = draft;
     let Station::BallBar(bar) = &test.station else {
         return None;

@@ -61,8 +61,7 @@ fn item(limit: &Limit, probability: f64, measured: Result<Measured, String>) -> 
         // The value that is least probably within the limits decides.
         let rules = measured.values.iter().map(|(value, u)| (Rule { lower, upper, u: *u, probability }, *value));
         let probable = |(rule, value): &(Rule, f64)| rule.conformance_probability(*value);
-        let (rule, value) =
-            rules.min_by(|a, b| probable(a).total_cmp(&probable(b))).ok_or("there is no value")?;
+        let (rule, value) = rules.min_by(|a, b| probable(a).total_cmp(&probable(b))).ok_or("there is no value")?;
         Ok((rule, value, measured.unit))
     });
     let (rule, value, unit) = match decided {

@@ -34,9 +34,10 @@ impl Parts<'_> {
     pub fn least_of_moves(&self, moves: &Moves) -> Option<TestClearance> {
         let mut states: Vec<Vec<f64>> = moves.states.first().cloned().into_iter().collect();
         for pair in moves.states.windows(2) {
-            let steps = self.machine().axes.iter().zip(pair[0].iter().zip(&pair[1])).map(|(axis, (a, b))| {
-                (b - a).abs() / if axis.kind == AxisKind::Linear { STEP_MM } else { STEP_RAD }
-            });
+            let steps =
+                self.machine().axes.iter().zip(pair[0].iter().zip(&pair[1])).map(|(axis, (a, b))| {
+                    (b - a).abs() / if axis.kind == AxisKind::Linear { STEP_MM } else { STEP_RAD }
+                });
             let count = steps.fold(1.0, f64::max).ceil().min(MOST_STEPS);
             states.extend((1..=count as usize).map(|step| between(&pair[0], &pair[1], step as f64 / count)));
         }
@@ -98,12 +99,7 @@ fn lowest(mm: &[f64]) -> Vec<usize> {
 }
 
 /// The least clearance between a state and its neighbours, with interpolated axes.
-fn refined(
-    states: &[Vec<f64>],
-    k: usize,
-    found: &Found,
-    at: &dyn Fn(&[f64]) -> Option<Found>,
-) -> (Vec<f64>, Found) {
+fn refined(states: &[Vec<f64>], k: usize, found: &Found, at: &dyn Fn(&[f64]) -> Option<Found>) -> (Vec<f64>, Found) {
     let mut least = (states[k].clone(), found.clone());
     for other in [k.checked_sub(1), Some(k + 1)].into_iter().flatten().filter_map(|k| states.get(k)) {
         for step in 1..REFINED {

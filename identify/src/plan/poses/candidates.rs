@@ -62,8 +62,12 @@ pub(super) fn draw(
     let kind = test.station.kind();
     if !matches!(kind, InstrumentKind::Tracker | InstrumentKind::RTest | InstrumentKind::BallBar) {
         return Err(IdentifyError::Request(format!(
-            "poses are chosen for trackers, R-tests and ball bars; the states of a {} are not free",
-            kind.word()
+            "poses are chosen for trackers, R-tests and ball bars; the states of a {} are not free: {}",
+            kind.word(),
+            match kind {
+                InstrumentKind::Socket => "the ball of the tool has to lie in a socket at each of them",
+                _ => "the tool has to touch the artefact at each of them",
+            }
         )));
     }
     let bar = bar_of(&test.station);
