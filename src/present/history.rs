@@ -139,8 +139,7 @@ pub fn conformity(machines: &[MachineConformity]) -> Table {
             item.count(Decision::Undecided).to_string()
         ]
     });
-    let headings =
-        ["machine", "quantity", ">latest", ">u", "", "decision", "since", ">pass", ">fail", ">undecided"];
+    let headings = ["machine", "quantity", ">latest", ">u", "", "decision", "since", ">pass", ">fail", ">undecided"];
     Table::new(headings, rows.collect::<Vec<_>>())
 }
 
