@@ -106,7 +106,7 @@ fn surfaces_that_cannot_be_used_are_errors() {
         (binary("", 3, &facets), "states 3 triangles, but has 200 bytes for them in place of 150"),
         (binary("", u32::MAX, &facets), "states 4294967295 triangles, but ends in triangle 5"),
         (binary("", 4, &infinite), "triangle 3 has the coordinate NaN"),
-        (binary("", 4, &far), "triangle 1 has a coordinate that is 1e13"),
+        (binary("", 4, &far), "triangle 1 has a coordinate that is 9.99"),
         (two.into_bytes(), "has 8 triangles in several solids, of which the first has 4"),
         (text_of.as_bytes()[..text_of.len() - 40].to_vec(), "triangle 4: EOF while expecting"),
         (text_of.replace("vertex 10 0 100", "vertex 10 zero 100").into_bytes(), "triangle 1: invalid float literal"),
@@ -203,12 +203,13 @@ fn walk(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// A post of the bed, beside the measured path, stands where the spindle goes from the centring of the ball to the start.
+/// With the overshoot of half a turn the ball is centred at Y = −100 mm.
 /// A lid lies where the tool retreats to.
 #[test]
 fn moves_of_programs_that_meet_a_body_are_named() {
     let spindle = "[[body]]\nname = \"spindle\"\naxis = \"Z\"\n\
                    capsule = { from_mm = [0, 0, 90], to_mm = [0, 0, 300], radius_mm = 15 }\n";
-    let post = "[[body]]\nname = \"post\"\nbox_mm = [[-10, 45, 200], [10, 55, 400]]\n";
+    let post = "[[body]]\nname = \"post\"\nbox_mm = [[-10, -55, 200], [10, -45, 400]]\n";
     let lid = "[[body]]\nname = \"lid\"\nbox_mm = [[-10, -10, 420], [10, 10, 430]]\n";
     for (bodies, stages) in [
         (format!("{spindle}{post}"), &["approach"][..]),
@@ -248,7 +249,8 @@ fn an_overshoot_into_a_body_is_named() {
     std::fs::write(&file, format!("{session}[clearance]\nleast_mm = 0\nbar_radius_mm = 6\n")).unwrap();
     let run = |overshoot: &str| {
         let programs = folder.path().join(overshoot);
-        let arguments = ["nc", text(&file), "--control", "fanuc", "--out", text(&programs), "--overshoot-deg", overshoot];
+        let arguments =
+            ["nc", text(&file), "--control", "fanuc", "--out", text(&programs), "--overshoot-deg", overshoot];
         let run = abbe(&arguments);
         assert_eq!(run.status.code(), Some(0));
         String::from_utf8_lossy(&run.stderr).replace('\n', " ")

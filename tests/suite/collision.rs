@@ -64,7 +64,7 @@ fn plan(random: &mut Pcg64, stl: Option<&str>) -> (String, Vec<u8>) {
         String::from("[machine]\nchain = \"w C A b Y X Z t\"\naxis = { C = {}, A = {}, X = {}, Y = {}, Z = {} }\n");
     let (half, top) = (between(60.0, 160.0), -between(5.0, 90.0));
     let sides = between(3.0, 60.0) as usize;
-    let surface = prism(sides, half, top - 40.0, top, sides % 2 == 0);
+    let surface = prism(sides, half, top - 40.0, top, sides.is_multiple_of(2));
     text += "[[machine.body]]\nname = \"table\"\naxis = \"C\"\n";
     text += &match stl {
         Some(name) => format!("stl = \"{name}\"\n"),

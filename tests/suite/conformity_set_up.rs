@@ -86,8 +86,8 @@ fn the_set_up_of_the_balls_is_in_the_uncertainty_of_d_and_f() {
     let nominal = RADIUS.hypot(HEIGHT);
     let (up, out) = (HEIGHT / nominal, RADIUS / nominal);
     // The centre takes up the spindle ball across the axis, and along the path the workpiece ball is not measured.
-    let expected_um = 1e3
-        * (up * U_SPINDLE[2]).hypot(up * U_WORKPIECE[2]).hypot(out * U_WORKPIECE[1]).hypot(U_BAR).hypot(NOISE);
+    let expected_um =
+        1e3 * (up * U_SPINDLE[2]).hypot(up * U_WORKPIECE[2]).hypot(out * U_WORKPIECE[1]).hypot(U_BAR).hypot(NOISE);
     let mut random = Pcg64::seed_from_u64(6);
     let mut covered = [0; 2];
     let mut passed_failed = [0; 2];
@@ -102,8 +102,7 @@ fn the_set_up_of_the_balls_is_in_the_uncertainty_of_d_and_f() {
         }));
         let d = decided(&mut session, TestFigure::MeanBidirectionalRadialDeviation, -500.0, TRUE_D_UM, 1e3 * NOISE);
         let f = decided(&mut session, TestFigure::RadialDeviation, -500.0, 20.0, 1e3 * NOISE);
-        for ((item, truth), covered) in
-            [(&d, TRUE_D_UM), (&f, TRUE_D_UM + AMPLITUDE_UM)].into_iter().zip(&mut covered)
+        for ((item, truth), covered) in [(&d, TRUE_D_UM), (&f, TRUE_D_UM + AMPLITUDE_UM)].into_iter().zip(&mut covered)
         {
             let (value, u) = (item.value.unwrap(), item.u.unwrap());
             assert!((u / expected_um - 1.0).abs() < 2e-3, "{u} µm, expected {expected_um}");
@@ -114,7 +113,11 @@ fn the_set_up_of_the_balls_is_in_the_uncertainty_of_d_and_f() {
     }
     let sampling = (0.05_f64 * 0.95 / DRAWS as f64).sqrt();
     let share = |count: usize| count as f64 / DRAWS as f64;
-    println!("u {expected_um:.3} um, covered {:?}, at the limit {:?} (± {sampling:.4})", covered.map(share), passed_failed.map(share));
+    println!(
+        "u {expected_um:.3} um, covered {:?}, at the limit {:?} (± {sampling:.4})",
+        covered.map(share),
+        passed_failed.map(share)
+    );
     for count in covered.map(|count| DRAWS - count).into_iter().chain(passed_failed) {
         assert!((share(count) - 0.05).abs() < 3.5 * sampling, "{count} of {DRAWS}");
     }
@@ -168,7 +171,8 @@ fn error_motions_need_a_radial_bar() {
             let motions = [direction.synchronous_error_motion_um, direction.asynchronous_error_motion_um];
             assert_eq!(motions.map(|motion| motion.is_some()), [is_radial; 2], "{height}: {direction:?}");
             for (motion, expected) in motions.into_iter().zip([8.0, 3.0]) {
-                assert!(motion.is_none_or(|motion| (motion - expected).abs() < 0.02), "{motion:?}");
+                // Both ends of the turn count, so that the centre takes up a part of the second harmonic.
+                assert!(motion.is_none_or(|motion| (motion - expected).abs() < 0.15), "{motion:?}");
             }
         }
         let mut session = session;

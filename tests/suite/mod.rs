@@ -21,6 +21,7 @@ mod faults;
 mod field_files;
 mod first_screen;
 mod fleet;
+mod fleet_conformity;
 mod generated;
 mod geometric;
 mod help;
