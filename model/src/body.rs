@@ -21,22 +21,21 @@ pub enum BodyShape {
         /// The radius.
         radius_mm: f64,
     },
-    /// A closed surface of triangles, mm. A box is one with twelve.
-    Mesh(Vec<[[f64; 3]; 3]>),
-}
-
-impl BodyShape {
-    /// The box between two opposite corners, with faces across X, Y and Z.
-    pub fn cuboid(low: [f64; 3], high: [f64; 3]) -> BodyShape {
-        let corner = |number: usize| -> [f64; 3] {
-            std::array::from_fn(|i| if number >> i & 1 == 1 { high[i] } else { low[i] })
-        };
-        // Four corners of each face, in the order of a walk around it.
-        const FACES: [[usize; 4]; 6] =
-            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        let of_face = |[a, b, c, d]: [usize; 4]| [[a, b, c], [a, c, d]].map(|three| three.map(corner));
-        BodyShape::Mesh(FACES.into_iter().flat_map(of_face).collect())
-    }
+    /// The box between two opposite corners, with faces across X, Y and Z, mm.
+    Box {
+        /// The least corner.
+        low_mm: [f64; 3],
+        /// The greatest corner.
+        high_mm: [f64; 3],
+    },
+    /// A surface of triangles, mm. The corners of a triangle of a closed surface turn counterclockwise, seen from
+    /// outside.
+    Mesh {
+        /// The corners of each triangle.
+        triangles_mm: Vec<[[f64; 3]; 3]>,
+        /// Whether every edge belongs to two triangles of opposite turn. Only a closed surface has an inside.
+        is_closed: bool,
+    },
 }
 
 /// Sizes of a ball bar and of what holds its balls, for checks of clearance, mm.

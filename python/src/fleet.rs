@@ -6,7 +6,7 @@ use abbe::fleet::history;
 use abbe::fleet::options::Options;
 use abbe::fleet::store::Store;
 use abbe::fleet::unit::{self, Done, Places};
-use abbe::fleet::{FleetError, list, study};
+use abbe::fleet::{FleetError, compensations, list, study};
 use abbe::identify::history::HistoryOptions;
 use pyo3::prelude::*;
 use serde::Serialize;
@@ -97,8 +97,8 @@ pub fn fleet_history(
     compensations: Option<PathBuf>,
 ) -> PyResult<String> {
     work::run(py, None, move |_| {
-        let compensations = compensations.map(|file| history::compensations(&file)).transpose()?.unwrap_or_default();
-        let options = HistoryOptions { false_discovery_rate, tolerance_u, compensations };
+        let known = compensations.map(|file| compensations::read(&file)).transpose()?.unwrap_or_default();
+        let options = HistoryOptions { false_discovery_rate, tolerance_u, compensations: known };
         json(&history::history(&Store::existing(out)?, machine_id.as_deref(), &options)?)
     })
 }

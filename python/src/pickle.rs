@@ -49,7 +49,7 @@ pub fn unpickled(pickled: &Bound<'_, PyDict>) -> PyResult<Session> {
     let origin: String = item("origin")?.extract()?;
     let origin: Origin = serde_json::from_str(&origin).map_err(|cause| Failed::new(cause.to_string()))?;
     let file: PathBuf = item("file")?.extract()?;
-    let sources = SourceMap { file, text, machine_text: None, files: Vec::new() };
+    let sources = SourceMap { file, text, machine_text: None, bodies: Vec::new(), files: Vec::new() };
     Ok(Session::of(State::new(session, sources, origin)))
 }
 

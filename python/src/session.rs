@@ -48,7 +48,13 @@ impl State {
 
     /// A state of a session with this text and no files.
     pub fn in_memory(session: domain::Session, text: String) -> State {
-        let sources = SourceMap { file: PathBuf::from("session.toml"), text, machine_text: None, files: Vec::new() };
+        let sources = SourceMap {
+            file: PathBuf::from("session.toml"),
+            text,
+            machine_text: None,
+            bodies: Vec::new(),
+            files: Vec::new(),
+        };
         State::new(session, sources, Origin::default())
     }
 
@@ -311,8 +317,8 @@ impl Session {
         Ok((Session::of(next), truth, warnings))
     }
 
-    /// The files of a folder that can be read as this session: names and texts.
-    fn files(&self, py: Python<'_>) -> PyResult<Vec<(String, String)>> {
+    /// The files of a folder that can be read as this session: names and contents.
+    fn files(&self, py: Python<'_>) -> PyResult<Vec<(String, Vec<u8>)>> {
         let state = self.state();
         work::at_once(py, || {
             let readings = state.session.tests.iter().map(|test| test.readings.as_deref().cloned());

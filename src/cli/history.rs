@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use abbe::fleet::history::{FleetHistory, compensations, history};
+use abbe::fleet::compensations;
+use abbe::fleet::history::{FleetHistory, history};
 use abbe::fleet::store::Store;
 use abbe::identify::history::HistoryOptions;
 use clap::Args;
@@ -98,7 +99,7 @@ pub fn run(arguments: &HistoryArguments, quiet: bool) -> Result<(), Failure> {
     let options = HistoryOptions {
         false_discovery_rate: arguments.false_discovery_rate,
         tolerance_u: arguments.tolerance_u,
-        compensations: arguments.compensations.as_deref().map(compensations).transpose()?.unwrap_or_default(),
+        compensations: arguments.compensations.as_deref().map(compensations::read).transpose()?.unwrap_or_default(),
     };
     let found = history(&store, arguments.machine.as_deref(), &options)?;
     if outputs.tables(quiet) {
@@ -110,7 +111,7 @@ pub fn run(arguments: &HistoryArguments, quiet: bool) -> Result<(), Failure> {
     }
     if let Some(path) = &arguments.report {
         let document = match (&arguments.machine, found.history.machines.first()) {
-            (Some(_), Some(machine)) => report::machine(machine),
+            (Some(_), Some(machine)) => report::machine(machine, &found.conformity),
             _ => report::fleet(&found),
         };
         output::write_whole(path, html(&document)?.as_bytes())?;
@@ -121,7 +122,7 @@ pub fn run(arguments: &HistoryArguments, quiet: bool) -> Result<(), Failure> {
             let plain = |sign: char| if sign.is_alphanumeric() || "-_.".contains(sign) { sign } else { '_' };
             let name: String = machine.machine_id.chars().map(plain).collect();
             // The number keeps machines apart whose identifiers differ in other signs or in case alone.
-            files.push((format!("{:04}-{name}.html", number + 1), html(&report::machine(machine))?));
+            files.push((format!("{:04}-{name}.html", number + 1), html(&report::machine(machine, &found.conformity))?));
         }
         folder::write(path, &files, false, |_| Ok(()))?;
     }
@@ -147,6 +148,7 @@ fn print(found: &FleetHistory, all: bool) {
         (present::machines(found), "Machines"),
         (present::drifts(machines), "Drifts"),
         (present::changes(machines), "Changes"),
+        (present::conformity(&found.conformity), "Conformity (rule of ISO 14253-1, limits of each session)"),
         (present::faults(found), "Faults"),
         (present::not_used(&found.not_used), "Not used"),
     ];

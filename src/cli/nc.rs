@@ -6,6 +6,7 @@ use abbe::codegen::nc::{self, NcFiles, NcOptions};
 use abbe::identify::plan::{collision, states};
 use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
+use abbe::model::session::moves::Moves;
 use clap::Args;
 
 use super::failure::Failure;
@@ -18,7 +19,8 @@ pub const HELP: &str = "A program for each test and `main`, which calls them in 
 ball, a stop to mount the bar, feed-in, the path with overshoot before and after, every run in both directions, feed-out, retreat. The \
 positions are those of the session's `sweep` or `path`: the recorded readings belong to them as they are. Positions count from R with \
 the tool length of the session; no work offset and no tool length is changed. Travel limits of the machine are checked before a file \
-is written.
+is written. Bodies of the machine and sizes of [clearance] are compared along the paths, and along centring, approach, feed-in, overshoot and \
+retreat: what comes too close is a warning.
 
 Rotary and linear axes together move in segments at inverse time (G93; heidenhain: the feed of each segment). --tool-point writes these \
 paths for the tool point over the table: TRAORI, G43.4, TCPM.
@@ -90,10 +92,12 @@ pub struct NcArguments {
     force: bool,
 }
 
-/// Tests with less clearance than the session asks for.
-fn collisions(session: &Session) -> Result<Vec<String>, Failure> {
+/// Tests, and moves of their programs, with less clearance than the session asks for.
+fn collisions(session: &Session, moves: &[Moves]) -> Result<Vec<String>, Failure> {
     let complete = states::complete(session, true)?;
-    Ok(collision::warnings(&complete, &collision::clearances(&complete)))
+    let mut found = collision::warnings(&complete, &collision::clearances(&complete));
+    found.extend(collision::warnings_of_moves(session, moves));
+    Ok(found)
 }
 
 /// Runs `abbe nc`.
@@ -111,12 +115,12 @@ pub fn run(arguments: &NcArguments, quiet: bool) -> Result<(), Failure> {
     };
     let reading = ReadOptions { read_data: false, ..arguments.session.options() };
     let (session, sources) = files::session_with_sources(&arguments.session.session, &reading)?;
-    let NcFiles { files: written, warnings } = nc::files(&session, control, &options)?;
+    let NcFiles { files: written, warnings, moves } = nc::files(&session, control, &options)?;
     output::Outputs::in_folder(&arguments.out, written.iter().map(|(name, _)| name))
         .refuse_overwrite_of_sources(&sources)?;
     folder::write(&arguments.out, &written, arguments.force, |_| Ok(()))?;
     print_warnings(&warnings);
-    print_warnings(&collisions(&session)?);
+    print_warnings(&collisions(&session, &moves)?);
     if !quiet {
         let mut rows = vec![cells![&written[0].0, "all tests", written[0].1.lines().count().to_string()]];
         rows.extend(

@@ -2,8 +2,11 @@
 
 use std::path::PathBuf;
 
+use abbe::codegen::nc::{self, NcOptions};
+use abbe::identify::plan::collision;
 use abbe::identify::plan::sheet::{SetUpTimes, sheets};
 use abbe::model::files::{self, ReadOptions};
+use abbe::model::session::Session;
 use abbe::model::session::motion::Motion;
 use abbe::model::words::counted;
 use clap::Args;
@@ -49,6 +52,13 @@ pub struct SheetArguments {
     test_min: f64,
 }
 
+/// Moves of NC programs with less clearance than the session asks for; none where no program can be written. The page has
+/// the clearances of the tests.
+fn collisions(session: &Session) -> Vec<String> {
+    let programs = nc::control("linuxcnc").and_then(|control| nc::files(session, control, &NcOptions::default()));
+    programs.map_or(Vec::new(), |programs| collision::warnings_of_moves(session, &programs.moves))
+}
+
 /// Runs `abbe sheet`.
 pub fn run(arguments: &SheetArguments, quiet: bool) -> Result<(), Failure> {
     for (flag, value) in [("--setup-min", arguments.setup_min), ("--test-min", arguments.test_min)] {
@@ -73,8 +83,9 @@ pub fn run(arguments: &SheetArguments, quiet: bool) -> Result<(), Failure> {
     let sheets = sheets(&session, times)?;
     let shortest = sheets.iter().filter_map(|sheet| sheet.bar_mm).reduce(f64::min);
     let name = sources.file.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    let page = present::html(&session, &sheets, arguments.bar_mm.or(shortest), &name);
-    print_warnings(&session.warnings);
+    let warnings: Vec<String> = session.warnings.iter().cloned().chain(collisions(&session)).collect();
+    let page = present::html(&session, &sheets, arguments.bar_mm.or(shortest), &name, &warnings);
+    print_warnings(&warnings);
     output::write_whole(&arguments.out, page.as_bytes())?;
     if outputs.tables(quiet) {
         say!("{}: {}, one page each, and an overview", arguments.out.display(), counted(sheets.len(), "test"));

@@ -1,9 +1,8 @@
 //! The history of the machines of a folder of records.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
-use std::path::Path;
 
-use abbe_identify::history::events::{Compensation, KnownChange};
+use abbe_identify::history::events::Compensation;
 use abbe_identify::history::faults::{Fault, FoundEffect, faults};
 use abbe_identify::history::results::History;
 use abbe_identify::history::{HistoryOptions, MachineSessions, SessionValues, analyse};
@@ -11,6 +10,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::FleetError;
+use super::conformity::MachineConformity;
 use super::date;
 use super::record::Record;
 use super::store::{Pointer, Store};
@@ -23,6 +23,8 @@ pub struct FleetHistory {
     pub history: History,
     /// The effects of all sessions, by alias set, the most frequent first.
     pub faults: Vec<Fault>,
+    /// Decisions of conformity over time, of the machines whose sessions state limits.
+    pub conformity: Vec<MachineConformity>,
     /// Sessions, notes and rows of known compensations that the history does not use.
     pub not_used: Vec<NotUsed>,
 }
@@ -75,9 +77,15 @@ pub fn history(store: &Store, machine_id: Option<&str>, options: &HistoryOptions
     }
     let mut series = Vec::new();
     let mut effects = Vec::new();
+    let mut conformity = Vec::new();
     for (id, sessions) in machines {
         let sessions = of_one_machine(in_order(by_time(sessions), &mut not_used), &mut not_used);
         effects.extend(sessions.iter().flat_map(found_effects));
+        let decided = sessions.iter().map(|dated| {
+            let Dated { days, pointer, record, .. } = dated;
+            (*days, pointer.file.as_str(), record.conformity.as_ref())
+        });
+        conformity.extend(MachineConformity::of(&id, decided));
         series.push(machine_sessions(id, &sessions));
     }
     not_used.sort_by(|a, b| a.file.cmp(&b.file));
@@ -87,9 +95,10 @@ pub fn history(store: &Store, machine_id: Option<&str>, options: &HistoryOptions
     if let Some(id) = machine_id {
         history.machines.retain(|machine| machine.machine_id == id);
         effects.retain(|effect| effect.machine_id == id);
+        conformity.retain(|machine| machine.machine_id == id);
         not_used.retain(|not_used| not_used.machine_id.as_deref().is_none_or(|own| own == id));
     }
-    Ok(FleetHistory { history, faults: faults(&effects), not_used })
+    Ok(FleetHistory { history, faults: faults(&effects), conformity, not_used })
 }
 
 /// # Errors
@@ -298,65 +307,10 @@ fn found_effects(dated: &Dated) -> impl Iterator<Item = FoundEffect> {
     })
 }
 
-/// Reads known compensations: a CSV file with the columns `machine_id`, `date`, `parameter`, `change` and `unit`, one
-/// row for each parameter. The unit is that of the parameter: `um`, `arcsec`.
-///
-/// # Errors
-/// If the file cannot be read; with the line of what cannot be used.
-pub fn compensations(file: &Path) -> Result<Vec<Compensation>, FleetError> {
-    #[derive(serde::Deserialize)]
-    #[serde(deny_unknown_fields)]
-    struct Row {
-        machine_id: String,
-        date: String,
-        parameter: String,
-        change: f64,
-        unit: String,
-    }
-    let name = file.display();
-    let fault = |line: usize, what: String| FleetError::Request(format!("{name}:{line}: {what}"));
-    let mut contents = std::fs::read(file).map_err(|source| FleetError::Read { path: name.to_string(), source })?;
-    // The line of a row is that before the place of the reader behind it.
-    if !contents.ends_with(b"\n") {
-        contents.push(b'\n');
-    }
-    let mut found: Vec<Compensation> = Vec::new();
-    let mut reader =
-        csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(contents.as_slice());
-    let expected = |line: usize, error: csv::Error| {
-        fault(line, format!("{error}; columns machine_id, date, parameter, change, unit are expected"))
-    };
-    let columns = reader.headers().map_err(|error| expected(1, error))?.clone();
-    let mut cells = csv::StringRecord::new();
-    loop {
-        let read = reader.read_record(&mut cells);
-        let line = usize::try_from(reader.position().line()).unwrap_or(usize::MAX).saturating_sub(1);
-        if !read.map_err(|error| expected(line, error))? {
-            break;
-        }
-        let row: Row = cells.deserialize(Some(&columns)).map_err(|error| expected(line, error))?;
-        let days = date::interval(&row.date)
-            .ok_or_else(|| fault(line, format!("date `{}`: the form 2026-11-23T08:00:00 is expected", row.date)))?;
-        if !row.change.is_finite() {
-            return Err(fault(line, format!("change `{}`: a number is expected", row.change)));
-        }
-        let known = found.iter_mut().find(|known| known.machine_id == row.machine_id && known.days == days);
-        let change =
-            KnownChange { id: row.parameter, value: row.change, unit: row.unit, source: format!("{name}:{line}") };
-        match known {
-            Some(known) if known.changes.iter().any(|other| other.id == change.id) => {
-                let (id, date) = (&change.id, &row.date);
-                return Err(fault(line, format!("the change of {id} on {date} is stated twice: remove a row")));
-            }
-            Some(known) => known.changes.push(change),
-            None => found.push(Compensation { machine_id: row.machine_id, days, changes: vec![change] }),
-        }
-    }
-    Ok(found)
-}
-
 #[cfg(test)]
 mod tests {
+    use abbe_identify::history::events::KnownChange;
+
     use super::*;
 
     #[test]

@@ -6,10 +6,13 @@
 //! - [`store`]: a folder of records, each written completely or not at all;
 //! - [`study`]: simulated sessions and their analysis;
 //! - [`list`]: session files from files, folders and lists;
-//! - [`history`]: the machines of a folder over time; [`date`]: the date of a session.
+//! - [`history`]: the machines of a folder over time; [`conformity`]: their decisions; [`compensations`]: the file of known
+//!   ones; [`date`]: the date of a session.
 //!
 //! The unit of work depends on nothing but its inputs: any process may do it, at any time and in any order.
 
+pub mod compensations;
+pub mod conformity;
 pub mod date;
 pub mod history;
 pub mod list;

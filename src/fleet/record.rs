@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 
 use abbe_identify::results::{Covariance, EffectName, ParameterResult, Unobservable};
+use abbe_identify::tolerance::Conformity;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::options::Options;
 
 /// Version of the schema of records and of the tables that are made from them.
-pub const SCHEMA_VERSION: u32 = 1;
+pub const SCHEMA_VERSION: u32 = 2;
 
 /// The result of one session. It depends on the contents of the input files, the options and the version of the program
 /// alone.
@@ -69,6 +70,8 @@ pub struct Record {
     pub covariance: Vec<f64>,
     /// The effects that the trace found.
     pub effects: Vec<EffectRecord>,
+    /// The decisions by the limits of the session; `null` without limits.
+    pub conformity: Option<Conformity>,
     /// The validation of the machine's model; `null` without a model.
     pub validation: Option<ValidationRecord>,
     /// Warnings in words.

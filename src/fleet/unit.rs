@@ -262,6 +262,7 @@ fn set_fit(record: &mut Record, fit: &FitResult) {
     record.rank = Some(fit.rank);
     record.parameter_count = Some(fit.parameter_count);
     record.conflicts = Some(fit.plausibility.conflicts.len());
+    record.conformity.clone_from(&fit.conformity);
     record.warnings.clone_from(&fit.warnings);
     record.set_parameters(&fit.parameters, &fit.covariance, &fit.unobservable);
 }
@@ -278,6 +279,7 @@ fn set_trace(record: &mut Record, trace: &TraceResult) {
     record.rank = Some(trace.after.rank);
     record.parameter_count = Some(trace.after.parameter_count);
     record.conflicts = Some(trace.plausibility.conflicts.len());
+    record.conformity.clone_from(&trace.conformity);
     record.warnings.clone_from(&trace.warnings);
     record.set_parameters(&trace.after.parameters, &trace.after.covariance, &trace.unobservable);
 }

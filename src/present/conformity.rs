@@ -37,23 +37,27 @@ fn row(item: &ConformityItem) -> Vec<Cell> {
         || "–".to_string(),
         |zone| format!("{:.digits$} to {:.digits$}", if item.lower.is_some() { zone.low } else { 0.0 }, zone.high),
     );
-    let limits = match item.lower {
-        None => format!("≤ {}", limit(item.upper)),
-        Some(lower) if lower == -item.upper => format!("±{}", limit(item.upper)),
-        Some(lower) => format!("{} to {}", limit(lower), limit(item.upper)),
-    };
     let probability = item.conformance_probability.map(|p| Cell::from(format!("{:.1} %", 100.0 * p)));
     cells![
         &item.id,
         value,
         u,
         unit(&item.unit),
-        limits,
+        limits(item.lower, item.upper),
         zone,
         Cell::or_dash(probability),
         item.decision.word(),
         item.why.clone().unwrap_or_default()
     ]
+}
+
+/// Limits as they are stated.
+pub(super) fn limits(lower: Option<f64>, upper: f64) -> String {
+    match lower {
+        None => format!("≤ {}", limit(upper)),
+        Some(lower) if lower == -upper => format!("±{}", limit(upper)),
+        Some(lower) => format!("{} to {}", limit(lower), limit(upper)),
+    }
 }
 
 /// A limit with the digits that were stated; of a converted one four.

@@ -1,11 +1,14 @@
 //! The machines of a fleet over time.
 
+use abbe::fleet::conformity::{ItemHistory, MachineConformity};
 use abbe::fleet::date::date;
 use abbe::fleet::history::{FleetHistory, NotUsed};
 use abbe::identify::history::events::Kind;
 use abbe::identify::history::results::{Due, MachineHistory, ParameterHistory};
+use abbe::identify::tolerance::rule::Decision;
 use abbe::model::words::counted;
 
+use super::conformity::limits;
 use super::number::unit;
 use super::table::{Cell, Table, cells};
 
@@ -103,6 +106,63 @@ pub fn changes(machines: &[MachineHistory]) -> Table {
         })
     });
     Table::new(["machine", "after", "before", "change", ">cosine", "parameters"], rows.collect::<Vec<_>>())
+}
+
+/// The decisions of conformity of all machines: the latest one of each quantity, those that fail first.
+pub fn conformity(machines: &[MachineConformity]) -> Table {
+    let items = machines.iter().flat_map(|machine| machine.items.iter().map(move |item| (machine, item)));
+    let mut latest: Vec<(&MachineConformity, &ItemHistory, Decision, f64)> = items
+        .filter_map(|(machine, item)| item.latest().map(|(decision, since)| (machine, item, decision, since)))
+        .collect();
+    let urgency = |decision: Decision| match decision {
+        Decision::Fail => 0,
+        Decision::Undecided => 1,
+        Decision::Pass => 2,
+    };
+    latest.sort_by_key(|(.., decision, _)| urgency(*decision));
+    let rows = latest.into_iter().map(|(machine, item, decision, since)| {
+        let last = item.points.last();
+        let [value, u] = match last.and_then(|point| point.value.zip(point.u)) {
+            Some((value, u)) => Cell::estimate(value, u),
+            None => ["–".into(), "–".into()],
+        };
+        cells![
+            machine.machine_id.clone(),
+            item.id.clone(),
+            value,
+            u,
+            last.map_or_else(String::new, |point| unit(&point.unit)),
+            decision.word(),
+            date(since),
+            item.count(Decision::Pass).to_string(),
+            item.count(Decision::Fail).to_string(),
+            item.count(Decision::Undecided).to_string()
+        ]
+    });
+    let headings = ["machine", "quantity", ">latest", ">u", "", "decision", "since", ">pass", ">fail", ">undecided"];
+    Table::new(headings, rows.collect::<Vec<_>>())
+}
+
+/// The decisions about one machine, session by session.
+pub fn decisions(machine: &MachineConformity) -> Table {
+    let rows = machine.items.iter().flat_map(|item| item.points.iter().map(move |point| (item, point)));
+    let rows = rows.map(|(item, point)| {
+        let [value, u] = match point.value.zip(point.u) {
+            Some((value, u)) => Cell::estimate(value, u),
+            None => ["–".into(), "–".into()],
+        };
+        cells![
+            item.id.clone(),
+            date(point.days),
+            value,
+            u,
+            unit(&point.unit),
+            limits(point.lower, point.upper),
+            point.decision.word(),
+            point.why.clone().unwrap_or_default()
+        ]
+    });
+    Table::new(["quantity", "session", ">value", ">u", "", "limits", "decision", "why"], rows.collect::<Vec<_>>())
 }
 
 /// The most frequent faults.

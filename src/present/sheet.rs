@@ -18,8 +18,15 @@ const PAGE_STYLE: &str = include_str!("sheet.css");
 const POLICY: &str =
     "default-src 'none'; style-src 'unsafe-inline'; img-src data:; form-action 'none'; base-uri 'none'";
 
-/// The sheets of a session as one HTML page. `basic_bar_mm` is the length of the bar without an extension.
-pub fn html(session: &Session, sheets: &[TestSheet], basic_bar_mm: Option<f64>, source: &str) -> String {
+/// The sheets of a session as one HTML page. `basic_bar_mm` is the length of the bar without an extension; the warnings
+/// stand on the first page.
+pub fn html(
+    session: &Session,
+    sheets: &[TestSheet],
+    basic_bar_mm: Option<f64>,
+    source: &str,
+    warnings: &[String],
+) -> String {
     let colours: String = LIGHT.iter().map(|(name, colour)| format!("--{name}:{colour};")).collect();
     let style = format!(":root{{color-scheme:light;{colours}}}\n{STYLE}{PAGE_STYLE}");
     let title = format!("Set-up sheets: {}", session.machine.name);
@@ -36,7 +43,7 @@ pub fn html(session: &Session, sheets: &[TestSheet], basic_bar_mm: Option<f64>, 
                 style { (PreEscaped(style)) }
             }
             body {
-                (overview(session, sheets, source))
+                (overview(session, sheets, source, warnings))
                 @for (number, sheet) in sheets.iter().enumerate() {
                     (page_of(session, sheet, number + 1, sheets.len(), basic_bar_mm))
                 }
@@ -47,7 +54,7 @@ pub fn html(session: &Session, sheets: &[TestSheet], basic_bar_mm: Option<f64>, 
 }
 
 /// The first page: the tests in their order with what is mounted, and the time.
-fn overview(session: &Session, sheets: &[TestSheet], source: &str) -> Markup {
+fn overview(session: &Session, sheets: &[TestSheet], source: &str, warnings: &[String]) -> Markup {
     let mut clock_min = 0.0;
     let rows: Vec<Vec<Cell>> = sheets
         .iter()
@@ -75,6 +82,10 @@ fn overview(session: &Session, sheets: &[TestSheet], source: &str) -> Markup {
             h1 { (session.machine.name) ": set-up sheets" }
             p { "Session " code { (source) } ". " (counted(sheets.len(), "test")) ", " (clock(clock_min)) " h with set-up." }
             (table(&Table::new(columns, rows)))
+            @if !warnings.is_empty() {
+                h2 { "Warnings" }
+                ul { @for warning in warnings { li { (warning) } } }
+            }
             @if !session.about.is_empty() {
                 dl { @for (name, note) in &session.about { dt { (name.replace('_', " ")) } dd { (note) } } }
             }

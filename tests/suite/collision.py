@@ -25,12 +25,25 @@ def capsule(name, a, b, radius):
 
 
 def beyond(a, b, by):
-    a, b = np.array(a, float), np.array(b, float)
-    length = np.linalg.norm(b - a)
-    return b if length <= by else a + (b - a) * (by / length)
+    length = math.dist(a, b)
+    return np.array(b if length <= by else [x + (y - x) * (by / length) for x, y in zip(a, b)], float)
+
+
+def corners(path):
+    """The corners of a binary or an ASCII STL file."""
+    contents = path.read_bytes()
+    if contents.startswith(b"solid"):
+        words = contents.decode().split("vertex")[1:]
+        return np.array([[float(x) for x in word.split()[:3]] for word in words])
+    count = int.from_bytes(contents[80:84], "little")
+    facets = np.frombuffer(contents[84:], np.dtype([("floats", "<f4", 12), ("rest", "<u2")]), count)
+    return facets["floats"][:, 3:].reshape(-1, 3).astype(float)
 
 
 def geom(body):
+    if "stl" in body:
+        # The hull of the corners: these surfaces are convex.
+        return f'<geom name="{body["name"]}" type="mesh" mesh="{body["name"]}"/>'
     if "box_mm" in body:
         low, high = (np.array(corner, float) for corner in body["box_mm"])
         centre, half = (low + high) / 2, (high - low) / 2
@@ -40,14 +53,19 @@ def geom(body):
     return capsule(body["name"], own["from_mm"], own["to_mm"], own["radius_mm"])
 
 
-def scene(session):
+def scene(session, folder):
     """The model and the side of each geom."""
     machine, test, sizes = session["machine"], session["test"][0], session["clearance"]
     workpiece, tool = ("".join(machine["chain"].split())[1:-1]).split("b")
+    meshes = ""
     side, geoms = {}, {name: "" for name in [*workpiece, *tool, ""]}
     for body in machine["body"]:
         axis = body.get("axis", "")
         geoms[axis] += geom(body)
+        if "stl" in body:
+            points = np.unique(corners(folder / body["stl"]), axis=0)
+            text = " ".join(f"{x!r}" for x in points.ravel().tolist())
+            meshes += f'<mesh name="{body["name"]}" vertex="{text}"/>'
         side[body["name"]] = "w" if axis and axis in workpiece else "t" if axis else "b"
     ball, spindle = test["workpiece_ball_mm"], test["spindle_ball_mm"]
     bar = sizes["bar_radius_mm"]
@@ -77,27 +95,32 @@ def scene(session):
         for name in ["bar", "bar beyond workpiece", "bar beyond spindle"]
     )
     # From the bed outwards on either side.
-    text = f"""<mujoco><compiler angle="radian"/><worldbody>{geoms[""]}{nested(workpiece[::-1])}{nested(tool)}{moving}
+    text = f"""<mujoco><compiler angle="radian"/><asset>{meshes}</asset><worldbody>{geoms[""]}{nested(workpiece[::-1])}{nested(tool)}{moving}
       </worldbody></mujoco>"""
     return mujoco.MjModel.from_xml_string(text), side
 
 
-def place(model, data, name, a, b):
-    """Puts a bar between two points."""
-    body, geom_id = (mujoco.mj_name2id(model, kind, name) for kind in (mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_GEOM))
-    length = np.linalg.norm(b - a)
-    model.geom_size[geom_id, 1] = max(length / 2, 1e-6)
-    model.geom_rbound[geom_id] = length / 2 + model.geom_size[geom_id, 0]
-    direction = (b - a) / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
-    quat = np.zeros(4)
-    mujoco.mju_quatZ2Vec(quat, direction)
-    mocap = model.body_mocapid[body]
-    data.mocap_pos[mocap], data.mocap_quat[mocap] = (a + b) / 2, quat
+class Bar:
+    """A bar that is put between two points."""
+
+    def __init__(self, model, data, name):
+        self.model, self.data = model, data
+        body, self.geom = (mujoco.mj_name2id(model, kind, name) for kind in (mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_GEOM))
+        self.mocap = model.body_mocapid[body]
+        self.quat = np.zeros(4)
+
+    def place(self, a, b):
+        half = max(math.dist(a, b) / 2, 1e-6)
+        self.model.geom_size[self.geom, 1] = half
+        self.model.geom_rbound[self.geom] = half + self.model.geom_size[self.geom, 0]
+        mujoco.mju_quatZ2Vec(self.quat, (b - a) / (2 * half) if half > 1e-6 else np.array([0.0, 0.0, 1.0]))
+        self.data.mocap_pos[self.mocap], self.data.mocap_quat[self.mocap] = (a + b) / 2, self.quat
 
 
-def least(session):
+def least(file):
+    session = tomllib.loads(file.read_text())
     test, sizes = session["test"][0], session["clearance"]
-    model, side = scene(session)
+    model, side = scene(session, file.parent)
     data = mujoco.MjData(model)
     joint = lambda axis: model.jnt_qposadr[mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, axis)]
     for key, value in test.get("at", {}).items():
@@ -117,20 +140,23 @@ def least(session):
             pairs.append(("bar", one))
     ids = np.array([[mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name) for name in pair] for pair in pairs])
     skip = {name: 2 * (sizes["bar_radius_mm"] + sizes[name + "_holder"]["radius_mm"]) for name in ("workpiece", "spindle")}
+    bars = [Bar(model, data, name) for name in ("bar", "bar beyond workpiece", "bar beyond spindle")]
+    ball, spindle, swept = data.site("ball"), data.site("spindle"), joint(sweep["axis"])
     found = math.inf
     for degrees in np.linspace(sweep["from_deg"], sweep["to_deg"], steps + 1):
-        data.qpos[joint(sweep["axis"])] = math.radians(degrees)
+        data.qpos[swept] = math.radians(degrees)
         mujoco.mj_kinematics(model, data)
-        a, b = data.site("ball").xpos.copy(), data.site("spindle").xpos.copy()
-        place(model, data, "bar", a, b)
-        place(model, data, "bar beyond workpiece", beyond(a, b, skip["workpiece"]), b)
-        place(model, data, "bar beyond spindle", beyond(b, a, skip["spindle"]), a)
+        a, b = ball.xpos.copy(), spindle.xpos.copy()
+        bars[0].place(a, b)
+        bars[1].place(beyond(a, b, skip["workpiece"]), b)
+        bars[2].place(beyond(b, a, skip["spindle"]), a)
         mujoco.mj_kinematics(model, data)
         # Spheres about the shapes exclude most pairs.
-        apart = np.linalg.norm(data.geom_xpos[ids[:, 0]] - data.geom_xpos[ids[:, 1]], axis=1)
-        for one, other in ids[apart - model.geom_rbound[ids].sum(axis=1) < found]:
+        between = data.geom_xpos[ids[:, 0]] - data.geom_xpos[ids[:, 1]]
+        apart = np.sqrt(np.einsum("ij,ij->i", between, between))
+        for one, other in ids[apart - model.geom_rbound[ids].sum(axis=1) < found].tolist():
             found = min(found, mujoco.mj_geomDistance(model, data, one, other, 1e4, None))
     return found
 
 
-print(json.dumps({file.name: least(tomllib.loads(file.read_text())) for file in sorted(pathlib.Path(sys.argv[1]).glob("*.toml"))}))
+print(json.dumps({file.name: least(file) for file in sorted(pathlib.Path(sys.argv[1]).glob("*.toml"))}))

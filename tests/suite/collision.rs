@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use abbe::identify::plan::collision::clearances;
+use abbe::identify::plan::collision::{TestClearance, clearances};
 use abbe::identify::plan::states;
 use abbe::model::files::{self, ReadOptions};
 use rand::{RngExt, SeedableRng};
@@ -15,8 +15,38 @@ use super::{abbe, ready, text};
 
 const PLANS: usize = 200;
 
-/// A random machine with a plan of one sweep of C or A.
-fn plan(random: &mut Pcg64) -> String {
+/// The surface of a prism with its axis along Z, as an STL file, binary or ASCII.
+fn prism(sides: usize, radius: f64, bottom: f64, top: f64, is_text: bool) -> Vec<u8> {
+    let corner = |k: usize, z: f64| {
+        let angle = std::f64::consts::TAU * (k % sides) as f64 / sides as f64;
+        [radius * angle.cos(), radius * angle.sin(), z]
+    };
+    let mut facets = Vec::new();
+    for k in 0..sides {
+        let [a, b, c, d] = [corner(k, bottom), corner(k + 1, bottom), corner(k + 1, top), corner(k, top)];
+        facets.extend([[a, b, c], [a, c, d], [[0.0, 0.0, bottom], b, a], [[0.0, 0.0, top], d, c]]);
+    }
+    if is_text {
+        let vertices = |facet: &[[f64; 3]; 3]| {
+            facet.iter().map(|[x, y, z]| format!("      vertex {x:e} {y:e} {z:e}\n")).collect::<String>()
+        };
+        let facet = |facet: &[[f64; 3]; 3]| {
+            format!("  facet normal 0 0 0\n    outer loop\n{}    endloop\n  endfacet\n", vertices(facet))
+        };
+        return format!("solid prism\n{}endsolid prism\n", facets.iter().map(facet).collect::<String>()).into_bytes();
+    }
+    let mut bytes = vec![0; 80];
+    bytes.extend((facets.len() as u32).to_le_bytes());
+    for facet in facets {
+        bytes.extend([0; 12]);
+        bytes.extend(facet.iter().flatten().flat_map(|x| (*x as f32).to_le_bytes()));
+        bytes.extend([0; 2]);
+    }
+    bytes
+}
+
+/// A random machine with a plan of one sweep of C or A. The table of every second machine is a surface, `stl`.
+fn plan(random: &mut Pcg64, stl: Option<&str>) -> (String, Vec<u8>) {
     let mut between = |low: f64, high: f64| low + (high - low) * random.random::<f64>();
     let about_c = between(0.0, 1.0) < 0.5;
     let (radius, height, beside) = (between(40.0, 150.0), between(0.0, 60.0), between(20.0, 140.0));
@@ -33,10 +63,13 @@ fn plan(random: &mut Pcg64) -> String {
     let mut text =
         String::from("[machine]\nchain = \"w C A b Y X Z t\"\naxis = { C = {}, A = {}, X = {}, Y = {}, Z = {} }\n");
     let (half, top) = (between(60.0, 160.0), -between(5.0, 90.0));
-    text += &format!(
-        "[[machine.body]]\nname = \"table\"\naxis = \"C\"\nbox_mm = [[-{half}, -{half}, {}], [{half}, {half}, {top}]]\n",
-        top - 40.0
-    );
+    let sides = between(3.0, 60.0) as usize;
+    let surface = prism(sides, half, top - 40.0, top, sides.is_multiple_of(2));
+    text += "[[machine.body]]\nname = \"table\"\naxis = \"C\"\n";
+    text += &match stl {
+        Some(name) => format!("stl = \"{name}\"\n"),
+        None => format!("box_mm = [[-{half}, -{half}, {}], [{half}, {half}, {top}]]\n", top - 40.0),
+    };
     let (x, y) = (between(150.0, 260.0), between(30.0, 80.0));
     text += &format!(
         "[[machine.body]]\nname = \"trunnion\"\naxis = \"A\"\nbox_mm = [[{x}, -{y}, -60], [{}, {y}, 60]]\n",
@@ -63,7 +96,7 @@ fn plan(random: &mut Pcg64) -> String {
          spindle_holder = {{ radius_mm = {own}, length_mm = {up} }}\n[instrument]\nkind = \"ballbar\"\n[[test]]\nname = \"T\"\n\
          bar_mm = {bar}\nworkpiece_ball_mm = {ball}\nspindle_ball_mm = [0, 0, 0]\nat = {{ {at} }}\nsweep = {{ {sweep} }}\n"
     );
-    text
+    (text, surface)
 }
 
 #[test]
@@ -79,17 +112,28 @@ fn clearances_agree_with_mujoco() {
     let mut random = Pcg64::seed_from_u64(4);
     let file = |number: usize| folder.path().join(format!("{number:03}.toml"));
     for number in 0..PLANS {
-        std::fs::write(file(number), plan(&mut random)).unwrap();
+        let stl = format!("{number:03}.stl");
+        let (text, surface) = plan(&mut random, (number % 2 == 1).then_some(&stl));
+        std::fs::write(file(number), text).unwrap();
+        std::fs::write(folder.path().join(stl), surface).unwrap();
     }
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/suite/collision.py");
-    let run = Command::new(python).arg(script).arg(folder.path()).output().unwrap();
+    // Both computations run at the same time.
+    let mujoco = std::thread::spawn({
+        let folder = folder.path().to_path_buf();
+        move || Command::new(python).arg(script).arg(folder).output().unwrap()
+    });
+    let found: Vec<TestClearance> = (0..PLANS)
+        .map(|number| {
+            let session = files::session(&file(number), &ReadOptions::default()).unwrap();
+            clearances(&states::complete(&session, true).unwrap()).remove(0)
+        })
+        .collect();
+    let run = mujoco.join().unwrap();
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
     let expected: Value = serde_json::from_slice(&run.stdout).unwrap();
     let (mut collisions, mut worst) = (0, 0.0_f64);
-    for number in 0..PLANS {
-        let session = files::session(&file(number), &ReadOptions::default()).unwrap();
-        let complete = states::complete(&session, true).unwrap();
-        let found = &clearances(&complete)[0];
+    for (number, found) in found.iter().enumerate() {
         let expected = expected[format!("{number:03}.toml")].as_f64().unwrap();
         assert_eq!(found.clearance_mm <= 0.0, expected <= 0.0, "{number}: {found:?} against {expected}");
         if expected > 0.0 {

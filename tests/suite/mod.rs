@@ -2,6 +2,7 @@
 
 mod another_build;
 mod bad_input;
+mod bodies;
 mod circular;
 mod claims;
 mod closed_loop;
@@ -9,6 +10,7 @@ mod codes;
 mod collision;
 mod compensation;
 mod conformity;
+mod conformity_set_up;
 mod conformity_shares;
 mod data;
 mod effect_description;
@@ -19,6 +21,7 @@ mod faults;
 mod field_files;
 mod first_screen;
 mod fleet;
+mod fleet_conformity;
 mod fleet_history;
 mod fleet_study;
 mod generated;

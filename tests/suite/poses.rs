@@ -28,7 +28,7 @@ fn options(criterion: PoseCriterion) -> PoseOptions {
         candidates: 1000,
         seed: 1,
         limits: PoseLimits { box_mm: Some([[-900.0, 900.0], [-900.0, 900.0], [100.0, 1300.0]]), sight: None },
-        noise_mm: NOISE_MM,
+        noise_mm: Some(NOISE_MM),
     }
 }
 
@@ -146,4 +146,33 @@ fn the_command_writes_poses_and_refuses_what_has_none() {
         assert_eq!(run.status.code(), Some(1), "{message}");
         assert!(message.contains(expected), "{expected}: {message}");
     }
+}
+
+/// One pose gives three readings: no rank beyond three. Thirty poses give full rank. The noise and its source are stated,
+/// and an assumed one causes a warning.
+#[test]
+fn rank_and_noise_are_stated() {
+    let folder = tempfile::tempdir().unwrap();
+    let json = folder.path().join("poses.json");
+    let ur10 = ready("ur10/session.toml");
+    let run = |more: &[&str]| {
+        let output = abbe(&[&["plan", text(&ur10), "--candidates", "300", "--json", text(&json)][..], more].concat());
+        let message = String::from_utf8_lossy(&output.stderr).replace('\n', " ");
+        (output.status.code(), message, String::from_utf8_lossy(&output.stdout).into_owned())
+    };
+    let (code, message, _) = run(&["--poses", "1"]);
+    assert_eq!(code, Some(1), "{message}");
+    assert!(message.contains("the readings of 1 pose have rank 3 in"), "{message}");
+    let (code, message, shown) = run(&["--poses", "30"]);
+    assert_eq!(code, Some(0), "{message}");
+    assert!(message.contains("the session states no `noise_um`: 1.00 µm is assumed"), "{message}");
+    assert!(shown.contains("noise 1.000 µm, assumed"), "{shown}");
+    let found: Value = serde_json::from_slice(&std::fs::read(&json).unwrap()).unwrap();
+    assert_eq!((&found["noise_um"], &found["noise_source"]), (&1.0.into(), &"assumed".into()));
+    assert_eq!(found["warnings"].as_array().unwrap().len(), 1, "{found}");
+    assert!(found["value"].as_f64().is_some_and(|value| value > 0.0 && value < 100.0), "{found}");
+    let (code, message, shown) = run(&["--poses", "30", "--noise-um", "50"]);
+    assert_eq!(code, Some(0), "{message}");
+    assert!(!message.contains("noise_um"), "{message}");
+    assert!(shown.contains("noise 50.000 µm, stated"), "{shown}");
 }

@@ -20,6 +20,7 @@ mod path;
 pub mod program;
 
 use abbe_model::session::Session;
+use abbe_model::session::moves::Moves;
 
 pub use options::NcOptions;
 pub use program::Program;
@@ -88,6 +89,8 @@ pub struct NcFiles {
     pub files: Vec<NcFile>,
     /// What the programs remark about their tests, each with the name of the test.
     pub warnings: Vec<String>,
+    /// The moves of the programs beside the measured paths.
+    pub moves: Vec<Moves>,
 }
 
 /// The programs of every test of a session, and `main`, which calls them.
@@ -97,7 +100,7 @@ pub struct NcFiles {
 /// options ask for.
 pub fn files(session: &Session, control: &dyn Control, options: &NcOptions) -> Result<NcFiles, CodegenError> {
     options.check(control)?;
-    let (mut files, mut warnings) = (Vec::new(), Vec::new());
+    let (mut files, mut warnings, mut moves) = (Vec::new(), Vec::new(), Vec::new());
     let mut calls: Vec<(String, String)> = Vec::new();
     let mut seen: Vec<&str> = Vec::new();
     for (number, test) in session.tests.iter().enumerate() {
@@ -106,6 +109,7 @@ pub fn files(session: &Session, control: &dyn Control, options: &NcOptions) -> R
         seen.push(&test.setup);
         let program = Program::of(session, test, control, options, centred)?;
         warnings.extend(program.warnings.iter().map(|warning| format!("test \"{}\": {warning}", test.name)));
+        moves.extend(program.moves.iter().cloned());
         let mut name = control.name(number + 1, &test.name);
         if name == "main" || calls.iter().any(|(other, _)| *other == name) {
             name = format!("{name}{}", number + 1);
@@ -117,5 +121,5 @@ pub fn files(session: &Session, control: &dyn Control, options: &NcOptions) -> R
         calls.push((name, test.name.clone()));
     }
     files.insert(0, (format!("main.{}", control.extension()), control.main(&calls)));
-    Ok(NcFiles { files, warnings })
+    Ok(NcFiles { files, warnings, moves })
 }

@@ -19,12 +19,16 @@ use crate::error::CodegenError;
 const FULL_CIRCLE_DEG: f64 = 180.0;
 /// Overshoot of a part of a circle or of a turn, degrees.
 const PART_DEG: f64 = 2.0;
+/// Steps of an overshoot in which the clearance of its states is compared.
+const OVERSHOOT_STEPS: usize = 90;
 /// Largest number of segments of a leg.
 const MOST_SEGMENTS: usize = 100_000;
 
 /// The path of a test: legs that follow each other.
 pub(super) struct Path {
     pub legs: Vec<Leg>,
+    /// Close states of each overshoot.
+    pub overshoots: Vec<Vec<Vec<f64>>>,
     pub runs: usize,
     pub both_directions: bool,
     /// What the operator must know of it.
@@ -74,16 +78,19 @@ impl Path {
         let (mut remarks, mut warnings) = (Vec::new(), Vec::new());
         let ends = overshot(machine, test, range, options, &mut warnings)?;
         let [from, to] = range;
-        let mut legs = Vec::new();
+        let (mut legs, mut overshoots) = (Vec::new(), Vec::new());
         for (range, measured) in [([ends[0], from], false), ([from, to], true), ([to, ends[1]], false)] {
             if range[0] != range[1] {
                 legs.push(Leg::of(machine, test, range, measured, control, options)?);
+                if !measured {
+                    overshoots.push(states(machine, test, range, OVERSHOOT_STEPS)?);
+                }
             }
         }
         if legs.iter().any(|leg| matches!(leg.shape, Shape::Segments { .. })) {
             remarks.push(format!("Segments with a chord error of at most {} um", options.chord_error_mm * 1e3));
         }
-        Ok(Path { legs, runs, both_directions, remarks, warnings })
+        Ok(Path { legs, overshoots, runs, both_directions, remarks, warnings })
     }
 
     /// The first state, with overshoot.

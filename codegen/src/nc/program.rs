@@ -5,6 +5,7 @@ use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
 use abbe_model::frames::Point;
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::instrument::{InstrumentKind, Station};
+use abbe_model::session::moves::{Mounted, Moves};
 use abbe_model::session::placing::{balls, positions_for_bar};
 use abbe_model::session::{Session, Test};
 
@@ -24,6 +25,8 @@ pub struct Program {
     pub blocks: Vec<Block>,
     /// What the operator must know before it runs; the remarks of the program say the same.
     pub warnings: Vec<String>,
+    /// Its moves beside the measured path, as far as both their ends are known.
+    pub moves: Vec<Moves>,
 }
 
 impl Program {
@@ -41,11 +44,14 @@ impl Program {
         let machine = &*session.machine;
         let writer = Writer { machine, test, letters: letters(machine)?, options };
         let path = Path::of(machine, test, control, options)?;
-        let (mut blocks, mut warnings) = (Vec::new(), path.warnings.clone());
-        writer.approach(&path, centred, &mut blocks, &mut warnings);
+        let mut draft = Draft { warnings: path.warnings.clone(), ..Draft::default() };
+        writer.approach(&path, centred, &mut draft);
         let start = path.start().to_vec();
-        writer.traversals(&path, &mut blocks);
-        writer.retreat(&path, &start, &mut blocks, &mut warnings);
+        writer.traversals(&path, &mut draft.blocks);
+        let overshoots = path.overshoots.iter();
+        draft.moves.extend(overshoots.map(|states| writer.moves("overshoot", Mounted::Bar, states.clone())));
+        writer.retreat(&path, &start, &mut draft);
+        let Draft { blocks, warnings, moves } = draft;
         let kind = session.instrument.word();
         let mut title = vec![
             format!("{}: test {} ({kind})", machine.name, test.name),
@@ -56,7 +62,7 @@ impl Program {
         if !control.is_run() {
             title.push(format!("This form has not been run on a control. Syntax: {}", control.source()));
         }
-        Ok(Program { name: test.name.clone(), title, blocks, warnings })
+        Ok(Program { name: test.name.clone(), title, blocks, warnings, moves })
     }
 }
 
@@ -76,6 +82,22 @@ fn letters(machine: &Machine) -> Result<Vec<char>, CodegenError> {
             })
         })
         .collect()
+}
+
+/// What becomes a program.
+#[derive(Default)]
+struct Draft {
+    blocks: Vec<Block>,
+    warnings: Vec<String>,
+    moves: Vec<Moves>,
+}
+
+impl Draft {
+    /// A remark of the program, which is also told to whoever writes it.
+    fn warn(&mut self, text: String) {
+        self.warnings.push(text.clone());
+        self.blocks.push(Block::Comment(text));
+    }
 }
 
 struct Writer<'s> {
@@ -106,6 +128,10 @@ impl Writer<'_> {
         if !to.is_empty() {
             blocks.push(Block::Line { to, feed: self.options.approach_feed });
         }
+    }
+
+    fn moves(&self, stage: &'static str, mounted: Mounted, states: Vec<Vec<f64>>) -> Moves {
+        Moves { test: self.test.name.clone(), stage, states, mounted }
     }
 
     /// The balls of the instrument: where a bar, or a sensor and a ball, stand.
@@ -151,19 +177,20 @@ impl Writer<'_> {
     }
 
     /// To the start of the path, by way of the centre of the workpiece ball if it has no place yet.
-    fn approach(&self, path: &Path, centred: bool, blocks: &mut Vec<Block>, warnings: &mut Vec<String>) {
+    fn approach(&self, path: &Path, centred: bool, draft: &mut Draft) {
         let start = path.start();
         let ball_bar = matches!(self.test.station, Station::BallBar(_));
-        blocks.push(Block::Stop(
+        draft.blocks.push(Block::Stop(
             "Take the bar off. Move the tool clear of table and fixtures. The axes turn to the start".into(),
         ));
-        self.line(self.all(start, AxisKind::Rotary), blocks);
+        self.line(self.all(start, AxisKind::Rotary), &mut draft.blocks);
         let mut here: Option<Vec<f64>> = None;
         let centre = self.bar().filter(|_| ball_bar && !centred).and_then(|bar| {
             let centre = self.within(positions_for_bar(self.machine, &bar, start, [0.0; 3])?)?;
             Some((self.retracted(&centre)?, centre))
         });
         if let Some((above, centre)) = centre {
+            let blocks = &mut draft.blocks;
             blocks.push(Block::Comment(format!("Centring of the workpiece ball, setup {}", self.test.setup)));
             self.line(self.all(&above, AxisKind::Linear), blocks);
             blocks
@@ -171,37 +198,42 @@ impl Writer<'_> {
             self.line(self.moved(&above, &centre, AxisKind::Linear), blocks);
             blocks.push(Block::Stop("Let the cup take the workpiece ball. Lock its base".into()));
             self.line(self.moved(&centre, &above, AxisKind::Linear), blocks);
+            draft.moves.push(self.moves("centring", Mounted::BallInCup, vec![above.clone(), centre]));
             here = Some(above);
         } else if ball_bar && !centred {
-            let warning = format!(
+            draft.warn(format!(
                 "The centre of the workpiece ball, setup {}, cannot be reached: place it by measurement",
                 self.test.setup
-            );
-            warn(warning, blocks, warnings);
+            ));
         }
         let first = self.fed_in(start).filter(|_| ball_bar).unwrap_or_else(|| start.to_vec());
+        // What the axes come from before the first known position is the operator's.
+        let mut approach: Vec<Vec<f64>> = Vec::new();
         if let Some(above) = self.retracted(&first) {
             // Across at the clearance, then down along the tool.
-            self.line(
-                here.map_or_else(
-                    || self.all(&above, AxisKind::Linear),
-                    |here| self.moved(&here, &above, AxisKind::Linear),
-                ),
-                blocks,
-            );
-            self.line(self.moved(&above, &first, AxisKind::Linear), blocks);
+            let across = match &here {
+                None => self.all(&above, AxisKind::Linear),
+                Some(here) => self.moved(here, &above, AxisKind::Linear),
+            };
+            self.line(across, &mut draft.blocks);
+            self.line(self.moved(&above, &first, AxisKind::Linear), &mut draft.blocks);
+            approach.extend(here.into_iter().chain([above]));
         } else {
-            warn("The start cannot be approached along the tool within the travel".into(), blocks, warnings);
-            self.line(self.all(&first, AxisKind::Linear), blocks);
+            draft.warn("The start cannot be approached along the tool within the travel".into());
+            self.line(self.all(&first, AxisKind::Linear), &mut draft.blocks);
+            approach.extend(here);
         }
+        approach.push(first.clone());
+        draft.moves.push(self.moves("approach", Mounted::Nothing, approach));
         let mount = match self.test.station.kind() {
             InstrumentKind::BallBar => format!("Mount the bar of {} mm", self.test.station.reference_mm()),
             _ => "Bring the instrument into its measuring range".to_string(),
         };
-        blocks.push(Block::Stop(format!("{mount}. Start recording")));
+        draft.blocks.push(Block::Stop(format!("{mount}. Start recording")));
         if first != start {
-            blocks.push(Block::Comment("Feed-in".into()));
-            self.line(self.moved(&first, start, AxisKind::Linear), blocks);
+            draft.blocks.push(Block::Comment("Feed-in".into()));
+            self.line(self.moved(&first, start, AxisKind::Linear), &mut draft.blocks);
+            draft.moves.push(self.moves("feed-in", Mounted::Bar, vec![first, start.to_vec()]));
         }
     }
 
@@ -233,26 +265,22 @@ impl Writer<'_> {
     }
 
     /// From where the traversals end: feed-out, and away along the tool.
-    fn retreat(&self, path: &Path, start: &[f64], blocks: &mut Vec<Block>, warnings: &mut Vec<String>) {
+    fn retreat(&self, path: &Path, start: &[f64], draft: &mut Draft) {
         let end = if path.both_directions { start } else { path.end() };
         let ball_bar = matches!(self.test.station, Station::BallBar(_));
         let last = self.fed_in(end).filter(|_| ball_bar).unwrap_or_else(|| end.to_vec());
         if last != end {
-            blocks.push(Block::Comment("Feed-out".into()));
-            self.line(self.moved(end, &last, AxisKind::Linear), blocks);
+            draft.blocks.push(Block::Comment("Feed-out".into()));
+            self.line(self.moved(end, &last, AxisKind::Linear), &mut draft.blocks);
+            draft.moves.push(self.moves("feed-out", Mounted::Bar, vec![end.to_vec(), last.clone()]));
         }
-        blocks.push(Block::Stop("Stop recording. Take the instrument off, and hold it".into()));
+        draft.blocks.push(Block::Stop("Stop recording. Take the instrument off, and hold it".into()));
         match self.retracted(&last) {
-            Some(above) => self.line(self.moved(&last, &above, AxisKind::Linear), blocks),
-            None => {
-                warn("Retreat along the tool by hand: the travel ends before the clearance".into(), blocks, warnings)
+            Some(above) => {
+                self.line(self.moved(&last, &above, AxisKind::Linear), &mut draft.blocks);
+                draft.moves.push(self.moves("retreat", Mounted::Nothing, vec![last, above]));
             }
+            None => draft.warn("Retreat along the tool by hand: the travel ends before the clearance".into()),
         }
     }
-}
-
-/// A remark of the program, which is also told to whoever writes it.
-fn warn(text: String, blocks: &mut Vec<Block>, warnings: &mut Vec<String>) {
-    warnings.push(text.clone());
-    blocks.push(Block::Comment(text));
 }

@@ -10,8 +10,10 @@ mod fault;
 mod figures;
 mod names;
 mod path;
+mod polar;
 mod results;
 mod search;
+mod set_up;
 mod terms;
 
 pub use results::{CircularTest, Diagnosis, DirectionFigures};

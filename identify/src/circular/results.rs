@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::set_up::FigureUncertainties;
 use crate::results::ParameterResult;
 
 /// Ball-bar figures of a circular test (ISO 230-4).
@@ -47,6 +48,9 @@ pub struct CircularTest {
     /// What this test does not identify, in words.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub not_identifiable: Vec<String>,
+    /// Uncertainties of the figures of both directions by the set-up.
+    #[serde(skip)]
+    pub(crate) set_up_u: FigureUncertainties,
 }
 
 /// Figures of the mean path of the runs in one direction.
@@ -64,13 +68,17 @@ pub struct DirectionFigures {
     /// Smallest radial deviation F, µm.
     pub radial_deviation_min_um: f64,
     /// Synchronous error motion of a rotary axis, µm (ISO 230-7): radial range of the mean of the runs without its
-    /// first harmonic. Absent unless a rotary axis makes a full turn with the linear axes at rest.
+    /// first harmonic. Absent unless a rotary axis makes a full turn with the linear axes at rest and the bar radial to
+    /// the axis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub synchronous_error_motion_um: Option<f64>,
     /// Asynchronous error motion of a rotary axis, µm (ISO 230-7): greatest range of the runs at one angle. Absent
-    /// for a single run, and unless a rotary axis makes a full turn with the linear axes at rest.
+    /// for a single run, and under the same conditions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub asynchronous_error_motion_um: Option<f64>,
+    /// Uncertainties of the figures by the set-up.
+    #[serde(skip)]
+    pub(crate) set_up_u: FigureUncertainties,
 }
 
 /// Contribution of one classical fault.

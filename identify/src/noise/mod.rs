@@ -47,6 +47,8 @@ pub struct Noise {
 pub enum NoiseSource {
     /// Stated in the session.
     Stated,
+    /// Assumed, because neither the session nor readings determine it.
+    Assumed,
     /// Repeated readings (pure error).
     Repeats,
     /// The residual of the model: noise and unmodelled effects.
@@ -58,6 +60,7 @@ impl NoiseSource {
     pub fn word(self) -> &'static str {
         match self {
             NoiseSource::Stated => "stated",
+            NoiseSource::Assumed => "assumed",
             NoiseSource::Repeats => "repeats",
             NoiseSource::Residual => "residual",
         }

@@ -45,13 +45,7 @@ pub fn analyse(session: &Session, options: &PlanOptions) -> Result<PlanAnalysis,
     let (complete, noise) = prepared(session, options)?;
     let problem = states::problem_by_test(&complete, noise)?;
     let mut analysis = analyse_problem(&problem, options.reach_mm)?;
-    if options.noise_mm.is_none() && session.noise_mm.is_none() {
-        let found =
-            if problem.noise.source == NoiseSource::Stated { "is assumed" } else { "is estimated from its data" };
-        let sigma_um = problem.noise.sigma_mm * 1e3;
-        let warning = format!("the session states no `noise_um`: {sigma_um:.2} µm {found}");
-        analysis.warnings.push(warning);
-    }
+    analysis.warnings.extend(states::noise_warning(&problem.noise));
     if options.effects {
         analysis.effects = Some(effects::effects(&problem)?);
     }

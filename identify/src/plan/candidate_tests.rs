@@ -13,7 +13,7 @@ use abbe_model::instrument::Station;
 use abbe_model::session::{Session, Test};
 
 use super::candidate_layout::{Draft, drafts};
-use super::collision::Parts;
+use super::collision::{Bodies, Parts};
 use super::states;
 use super::test_variations::TestVariations;
 use crate::error::IdentifyError;
@@ -56,7 +56,8 @@ pub fn candidate_tests(session: &Session, variations: &TestVariations) -> Result
         ));
     };
     let drafts = drafts(session, variations, last);
-    let finished = parallel::map(drafts.len(), &|k| finished(session, variations, drafts[k].clone()));
+    let bodies = Bodies::of(&session.machine);
+    let finished = parallel::map(drafts.len(), &|k| finished(session, &bodies, variations, drafts[k].clone()));
     let tests: Vec<CandidateTest> = finished.into_iter().flatten().collect();
     if tests.is_empty() {
         return Err(IdentifyError::Request(
@@ -67,7 +68,7 @@ pub fn candidate_tests(session: &Session, variations: &TestVariations) -> Result
 }
 
 /// Plans the states of a candidate test. `None` if the travel forbids them or the bar does not reach.
-fn finished(session: &Session, variations: &TestVariations, draft: Draft) -> Option<CandidateTest> {
+fn finished(session: &Session, bodies: &Bodies, variations: &TestVariations, draft: Draft) -> Option<CandidateTest> {
     let Draft { mut test, name, new_setup } = draft;
     let Station::BallBar(bar) = &test.station else {
         return None;
@@ -78,7 +79,7 @@ fn finished(session: &Session, variations: &TestVariations, draft: Draft) -> Opt
         return None;
     }
     // Only tests that clear are proposed.
-    if Parts::of(session, &test).is_some_and(|parts| !parts.clears_all(&readings)) {
+    if Parts::of(session, bodies, &test).is_some_and(|parts| !parts.clears_all(&readings)) {
         return None;
     }
     let start = session.tests.iter().filter_map(|test| test.readings.as_ref()?.time_s.last().copied());

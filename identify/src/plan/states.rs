@@ -65,9 +65,24 @@ pub fn fold_by_test(problem: &mut Problem) {
 
 /// Assumed noise of a reading if neither the session nor its data determine it: 1 µm, the accuracy that makers of ball
 /// bars state.
-pub(crate) const ASSUMED_NOISE_MM: f64 = 1e-3;
+const ASSUMED_NOISE_MM: f64 = 1e-3;
 
-/// The noise model of a plan: that of the session, that of its data, or [`ASSUMED_NOISE_MM`].
+/// The noise of readings of which nothing is known.
+pub(crate) fn assumed_noise() -> Noise {
+    Noise::white(ASSUMED_NOISE_MM, NoiseSource::Assumed)
+}
+
+/// The warning about a noise that the session does not state.
+pub(crate) fn noise_warning(noise: &Noise) -> Option<String> {
+    let found = match noise.source {
+        NoiseSource::Stated => return None,
+        NoiseSource::Assumed => "is assumed",
+        NoiseSource::Repeats | NoiseSource::Residual => "is estimated from its data",
+    };
+    Some(format!("the session states no `noise_um`: {:.2} µm {found}", noise.sigma_mm * 1e3))
+}
+
+/// The noise model of a plan: that of the session, that of its data, or the assumed one.
 ///
 /// # Errors
 /// If the data cannot be fitted.
@@ -78,5 +93,5 @@ pub(crate) fn noise_of(session: &Session) -> Result<Noise, IdentifyError> {
     if session.tests.iter().all(|test| test.readings.is_some()) {
         return Ok(crate::fit::prepare(session, 1)?.0.noise);
     }
-    Ok(Noise::white(ASSUMED_NOISE_MM, NoiseSource::Stated))
+    Ok(assumed_noise())
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Serialize, Serializer};
 
 /// Coverage factor of the expanded uncertainty `U = k u` (JCGM 100, 6.2).
 const COVERAGE_FACTOR: f64 = 2.0;
@@ -116,7 +116,7 @@ pub struct Covariance {
 }
 
 /// An interval of values.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Interval {
     /// Lower end.
     pub low: f64,

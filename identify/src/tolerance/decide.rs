@@ -46,7 +46,7 @@ fn of_parameter(parameters: &[ParameterResult], id: &str) -> Result<Measured, St
     if found.u <= 0.0 {
         return Err(format!("the uncertainty of {id} is not quantified"));
     }
-    Ok(Measured { values: vec![found.value], u: found.u, unit: found.unit.clone() })
+    Ok(Measured { values: vec![(found.value, found.u)], unit: found.unit.clone() })
 }
 
 fn item(limit: &Limit, probability: f64, measured: Result<Measured, String>) -> ConformityItem {
@@ -57,11 +57,12 @@ fn item(limit: &Limit, probability: f64, measured: Result<Measured, String>) -> 
     };
     let decided = measured.and_then(|measured| {
         let lower = limit.lower.map(|lower| in_unit(lower, &measured.unit)).transpose()?;
-        let rule = Rule { lower, upper: in_unit(limit.upper, &measured.unit)?, u: measured.u, probability };
+        let upper = in_unit(limit.upper, &measured.unit)?;
         // The value that is least probably within the limits decides.
-        let probable = |value: &f64| rule.conformance_probability(*value);
-        let value = measured.values.iter().copied().min_by(|a, b| probable(a).total_cmp(&probable(b)));
-        Ok((rule, value.ok_or("there is no value")?, measured.unit))
+        let rules = measured.values.iter().map(|(value, u)| (Rule { lower, upper, u: *u, probability }, *value));
+        let probable = |(rule, value): &(Rule, f64)| rule.conformance_probability(*value);
+        let (rule, value) = rules.min_by(|a, b| probable(a).total_cmp(&probable(b))).ok_or("there is no value")?;
+        Ok((rule, value, measured.unit))
     });
     let (rule, value, unit) = match decided {
         Ok(decided) => decided,

@@ -8,10 +8,9 @@ use abbe_model::session::{Prior, Session};
 
 use crate::circular::{CircularTest, DirectionFigures};
 
-/// Measured values of one quantity, all of which have to be within its limits.
+/// Measured values of one quantity with their standard uncertainties. All have to be within its limits.
 pub(super) struct Measured {
-    pub values: Vec<f64>,
-    pub u: f64,
+    pub values: Vec<(f64, f64)>,
     pub unit: String,
 }
 
@@ -30,74 +29,68 @@ pub(super) fn measured(
     let runs = found.directions.iter().map(|direction| direction.runs).min().unwrap_or(1).max(1) as f64;
     let mean_um = noise_um / runs.sqrt();
     let range_um = mean_um * SQRT_2;
-    let of_directions =
-        |value: fn(&DirectionFigures) -> f64| -> Vec<f64> { found.directions.iter().map(value).collect() };
-    let both = |value: Option<f64>| value.into_iter().collect::<Vec<f64>>();
-    let (values, u_um) = match figure {
-        TestFigure::CircularDeviation => (of_directions(|direction| direction.circular_deviation_um), range_um),
-        TestFigure::BidirectionalCircularDeviation => (both(found.bidirectional_circular_deviation_um), range_um),
-        TestFigure::Hysteresis => (both(found.hysteresis_um), range_um),
-        TestFigure::SynchronousErrorMotion => {
-            (some(found, |direction| direction.synchronous_error_motion_um), range_um)
+    let of_directions = |value: fn(&DirectionFigures) -> (f64, f64)| found.directions.iter().map(value).collect();
+    let both = |value: Option<f64>, set_up_um: f64| value.map(|value| (value, set_up_um)).into_iter().collect();
+    // Values with their uncertainties by the set-up.
+    let (values, u_um): (Vec<(f64, f64)>, f64) = match figure {
+        TestFigure::CircularDeviation => {
+            (of_directions(|direction| (direction.circular_deviation_um, direction.set_up_u.range_um)), range_um)
         }
+        TestFigure::BidirectionalCircularDeviation => {
+            (both(found.bidirectional_circular_deviation_um, found.set_up_u.range_um), range_um)
+        }
+        // Differences between directions and between runs do not contain the set-up.
+        TestFigure::Hysteresis => (both(found.hysteresis_um, 0.0), range_um),
+        TestFigure::SynchronousErrorMotion => (
+            some(found, |direction| Some((direction.synchronous_error_motion_um?, direction.set_up_u.range_um))),
+            range_um,
+        ),
         // The range of single runs, not of their mean.
         TestFigure::AsynchronousErrorMotion => {
-            (some(found, |direction| direction.asynchronous_error_motion_um), noise_um * SQRT_2)
+            (some(found, |direction| Some((direction.asynchronous_error_motion_um?, 0.0))), noise_um * SQRT_2)
         }
-        TestFigure::MeanBidirectionalRadialDeviation => {
-            (both(found.mean_bidirectional_radial_deviation_um), mean_um.hypot(bar_u_um(session, test)?))
-        }
+        TestFigure::MeanBidirectionalRadialDeviation => (
+            both(found.mean_bidirectional_radial_deviation_um, found.set_up_u.mean_um),
+            mean_um.hypot(bar_u_um(session, test)?),
+        ),
         TestFigure::RadialDeviation => {
-            let ends = [
-                of_directions(|direction| direction.radial_deviation_max_um),
-                of_directions(|direction| direction.radial_deviation_min_um),
+            let ends: [Vec<(f64, f64)>; 2] = [
+                of_directions(|direction| (direction.radial_deviation_max_um, direction.set_up_u.max_um)),
+                of_directions(|direction| (direction.radial_deviation_min_um, direction.set_up_u.min_um)),
             ];
             (ends.concat(), mean_um.hypot(bar_u_um(session, test)?))
         }
     };
     if values.is_empty() {
+        const ERROR_MOTION: &str =
+            "a full turn of a rotary axis, with the linear axes at rest and the bar radial to the axis";
         return Err(format!(
             "test \"{test}\" has no {}: it needs {}",
             figure.word().replace('_', " "),
             match figure {
-                TestFigure::SynchronousErrorMotion => "a full turn of a rotary axis, with the linear axes at rest",
-                TestFigure::AsynchronousErrorMotion =>
-                    "a full turn of a rotary axis, with the linear axes at rest, and several runs in one direction",
-                _ => "both directions",
+                TestFigure::SynchronousErrorMotion => ERROR_MOTION.to_string(),
+                TestFigure::AsynchronousErrorMotion => format!("{ERROR_MOTION}, and several runs in one direction"),
+                _ => "both directions".to_string(),
             }
         ));
     }
-    if contains_set_up(found, figure) && balls_are_uncertain(session, test) {
+    if values.iter().any(|(_, set_up_um)| set_up_um.is_infinite()) {
         return Err(format!(
-            "{} of test \"{test}\" contains the set-up of the balls, which its uncertainty does not cover",
+            "{} of test \"{test}\" contains the position of a ball that is not known: state workpiece_ball_u_um and \
+             spindle_ball_u_um",
             figure.word().replace('_', " ")
         ));
     }
-    let u = u_um.hypot(instrument_u_um);
-    if u <= 0.0 {
+    let with_u = |(value, set_up_um): (f64, f64)| (value, u_um.hypot(instrument_u_um).hypot(set_up_um));
+    let values: Vec<(f64, f64)> = values.into_iter().map(with_u).collect();
+    if values.iter().any(|(_, u)| *u <= 0.0) {
         return Err("the uncertainty is not quantified: state `instrument_u_um`".to_string());
     }
-    Ok(Measured { values, u, unit: "um".to_string() })
-}
-
-/// Whether a figure contains the set-up of the balls: lengths of a rotary sweep do, and every figure of an arc from
-/// which no centre is removed.
-fn contains_set_up(found: &CircularTest, figure: TestFigure) -> bool {
-    const HALF_TURN_DEG: f64 = 180.0 * 0.99;
-    let is_length = matches!(figure, TestFigure::RadialDeviation | TestFigure::MeanBidirectionalRadialDeviation);
-    // Differences between runs and directions do not contain it.
-    let is_difference = matches!(figure, TestFigure::AsynchronousErrorMotion | TestFigure::Hysteresis);
-    (found.radius_mm.is_none() && is_length) || (found.arc_deg < HALF_TURN_DEG && !is_difference)
-}
-
-/// Whether the position of a ball of a test is not known exactly.
-fn balls_are_uncertain(session: &Session, test: &str) -> bool {
-    let found = session.tests.iter().find(|other| other.name == test);
-    found.is_some_and(|test| test.priors.iter().take(BAR).any(|prior| !matches!(prior, Prior::Known)))
+    Ok(Measured { values, unit: "um".to_string() })
 }
 
 /// The values of both directions that exist.
-fn some(found: &CircularTest, value: fn(&DirectionFigures) -> Option<f64>) -> Vec<f64> {
+fn some(found: &CircularTest, value: fn(&DirectionFigures) -> Option<(f64, f64)>) -> Vec<(f64, f64)> {
     found.directions.iter().filter_map(value).collect()
 }
 

@@ -5,8 +5,12 @@
 //! of the instrument and of the bar:
 //!
 //! ```text
-//! u²(G) = u²(H) = 2σ²/n + u²(instrument)        u²(F) = u²(D) = σ²/n + u²(bar) + u²(instrument)
+//! u²(G) = 2σ²/n + u²(instrument) + u²(set-up)        u²(F) = u²(D) = σ²/n + u²(bar) + u²(instrument) + u²(set-up)
+//! u²(H) = 2σ²/n + u²(instrument)
 //! ```
+//!
+//! `u(set-up)` follows from the priors of both balls by the evaluation of the figure, which removes the centre
+//! (`circular::set_up`).
 
 mod decide;
 mod figures;

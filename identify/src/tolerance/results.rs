@@ -1,13 +1,13 @@
 //! Decisions of conformity, as JSON has them.
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::rule::Decision;
 use crate::results::Interval;
 
 /// The decision about a session, by the rule of ISO 14253-1.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Conformity {
     /// `fail` if an item fails; else `undecided` if an item is undecided; else `pass`.
     pub verdict: Decision,
@@ -18,7 +18,7 @@ pub struct Conformity {
 }
 
 /// The decision about one quantity.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ConformityItem {
     /// The parameter, `EX0C`, or the figure with its test, `circular_deviation[XY]`.
     pub id: String,

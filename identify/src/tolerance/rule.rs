@@ -12,13 +12,13 @@
 //! 106, 7.3); below `T_U − T_L = 2 Φ⁻¹((1 + p)/2)·u` it is empty.
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::numerics::tails::{normal_quantile, normal_tail};
 use crate::results::Interval;
 
 /// The decision about one quantity.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Decision {
     /// The quantity is within its limits with at least the stated probability.

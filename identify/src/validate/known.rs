@@ -327,7 +327,7 @@ fn first_noise(model: &IdentifiedModel, session: &Session) -> (Noise, &'static s
             Noise::white((model.quality.heldout_rms_um * 1e-3).max(model.noise.sigma_mm), NoiseSource::Residual)
         }
         // The inflation belongs to the likelihood of the model's families; it is no noise.
-        NoiseSource::Stated | NoiseSource::Repeats => {
+        NoiseSource::Stated | NoiseSource::Assumed | NoiseSource::Repeats => {
             Noise { source: NoiseSource::Residual, inflation: 1.0, ..model.noise.clone() }
         }
     };

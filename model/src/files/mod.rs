@@ -3,7 +3,7 @@
 //! - [`toml`]: machine and session files; [`table`]: data files, one module per data format;
 //! - [`with_readings()`]: a copy of a session with other readings;
 //! - [`template`]: files of a new machine from its structural code;
-//! - [`store`]: files on the disk or in memory;
+//! - [`store`]: files on the disk or in memory; `stl`: surfaces of bodies;
 //! - [`SourceMap`]: the files and texts of a session that was read;
 //! - [`schema`]: JSON Schema of machine and session files; [`stamp`]: state of the files that were read.
 
@@ -13,6 +13,7 @@ pub mod schema;
 pub mod source_map;
 mod spelling;
 pub mod stamp;
+mod stl;
 pub mod store;
 pub mod table;
 pub mod template;

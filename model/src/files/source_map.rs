@@ -15,6 +15,8 @@ pub struct SourceMap {
     pub text: String,
     /// The text of the machine file, if the session names one.
     pub machine_text: Option<String>,
-    /// All files that were read, each once: the session, its machine, its data.
+    /// The files of the machine's bodies: each as it is named, relative to the file that names it, and its state.
+    pub bodies: Vec<(String, FileStamp)>,
+    /// All files that were read, each once: the session, its machine, its bodies, its data.
     pub files: Vec<FileStamp>,
 }

@@ -1,5 +1,7 @@
 //! A copy of a session with other readings: the files of a folder that can be read as a session.
 
+use std::path::{Component, Path};
+
 use super::source_map::SourceMap;
 use super::table::csv;
 use super::toml::{rewrite, write};
@@ -16,16 +18,16 @@ pub struct Changes {
     pub hide_effects: bool,
 }
 
-/// The names and texts of the files: one data file per test, the machine if it has a file of its own, and
-/// `session.toml` as the last.
+/// The names and contents of the files: one data file per test, the machine if it has a file of its own, the files of its
+/// bodies, and `session.toml` as the last.
 ///
 /// # Errors
-/// If the text of the session cannot be rewritten.
+/// If the text of the session cannot be rewritten, or a body has its file outside the folder of the machine.
 pub fn with_readings(
     (session, sources): (&Session, &SourceMap),
     readings: &[Readings],
     changes: Changes,
-) -> Result<Vec<(String, String)>, ModelError> {
+) -> Result<Vec<(String, Vec<u8>)>, ModelError> {
     let file = sources.file.as_path();
     let mut files = Vec::new();
     let mut data: Vec<(String, String)> = Vec::new();
@@ -33,10 +35,23 @@ pub fn with_readings(
         let name = data_name(&test.name, &data);
         let text = csv::text(&session.machine, &test.station, readings);
         data.push((test.name.clone(), name.clone()));
-        files.push((name, text));
+        files.push((name, text.into_bytes()));
     }
     if let Some(machine) = &sources.machine_text {
-        files.push(("machine.toml".into(), machine.clone()));
+        files.push(("machine.toml".into(), machine.clone().into_bytes()));
+    }
+    for (name, stamp) in &sources.bodies {
+        if !Path::new(name).components().all(|part| matches!(part, Component::Normal(_))) {
+            return Err(ModelError::Session {
+                message: format!("the body in {name} cannot be copied with the session"),
+                help: "put the STL file beside the machine file, or below".into(),
+            });
+        }
+        let contents = stamp.read().map_err(|cause| ModelError::Session {
+            message: format!("{name}: {cause}"),
+            help: "check the file".into(),
+        })?;
+        files.push((name.clone(), contents));
     }
     let mut text = write::with_data(&sources.text, file, &data)?;
     text = rewrite::with_machine_file(&text, file, "machine.toml")?;
@@ -48,7 +63,7 @@ pub fn with_readings(
     if changes.hide_effects {
         text = rewrite::without_tables(&text, &["effect"]);
     }
-    files.push(("session.toml".into(), text));
+    files.push(("session.toml".into(), text.into_bytes()));
     Ok(files)
 }
 

@@ -9,6 +9,7 @@ pub mod columns;
 pub mod expression;
 pub mod limits;
 pub mod motion;
+pub mod moves;
 pub mod placing;
 pub mod planned;
 pub(crate) mod plausibility;

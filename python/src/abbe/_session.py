@@ -354,8 +354,9 @@ class Session(Predicting):
             raise FileExistsError(f"{folder}: exists; name a new folder")
         files = self._handle.files()
         temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
-        for name, text in files:
-            (temporary / name).write_text(text, encoding="utf-8", newline="")
+        for name, contents in files:
+            (temporary / name).parent.mkdir(parents=True, exist_ok=True)
+            (temporary / name).write_bytes(contents)
         temporary.chmod(0o755)
         temporary.rename(folder)
         return folder / "session.toml"

@@ -164,7 +164,7 @@ fn poses(arguments: &PlanArguments, outputs: &output::Outputs, tables: bool) -> 
     outputs.refuse_overwrite_of_sources(&sources)?;
     let noise_mm = arguments.noise_um.map(|um| positive("--noise-um", um)).transpose()?;
     let found = arguments.poses.run(&session, noise_mm, arguments.common.seed, tables)?;
-    print_warnings(&session.warnings);
+    print_warnings(&found.warnings);
     arguments.common.write_json(&sources, &found)
 }
 

@@ -15,8 +15,6 @@ use crate::present::poses as present;
 const MAX_POSES: usize = 1000;
 /// Maximum number of candidate poses.
 const MAX_CANDIDATES: usize = 20_000;
-/// Noise of a reading where neither session nor option states one, mm.
-const ASSUMED_NOISE_MM: f64 = 1e-3;
 
 /// What the poses are to make small.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -107,7 +105,7 @@ impl PoseArguments {
             candidates: within("--candidates", self.candidates, MAX_CANDIDATES)?,
             seed,
             limits: self.limits()?,
-            noise_mm: noise_mm.or(session.noise_mm).filter(|noise| *noise > 0.0).unwrap_or(ASSUMED_NOISE_MM),
+            noise_mm,
         };
         let test = match &self.pose_test {
             None => session.tests.last(),

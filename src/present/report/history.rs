@@ -1,5 +1,6 @@
 //! Report of `abbe history`: a page for the fleet, and one for each machine.
 
+use abbe::fleet::conformity::MachineConformity;
 use abbe::fleet::date::date;
 use abbe::fleet::history::FleetHistory;
 use abbe::identify::history::chart::{EWMA_LIMIT, SHEWHART_LIMIT};
@@ -53,6 +54,9 @@ pub fn fleet(found: &FleetHistory) -> Document {
     document.section("Machines", table(&present::machines(found)));
     section(&mut document, "Drifts", &drifts, "No parameter drifts significantly.");
     section(&mut document, "Changes", &changes, "No parameter has a significant step.");
+    if !found.conformity.is_empty() {
+        document.section("Conformity", table(&present::conformity(&found.conformity)));
+    }
     section(&mut document, "Faults", &present::faults(found), "No session has an effect.");
     if !found.not_used.is_empty() {
         document.section("Not used", table(&present::not_used(&found.not_used)));
@@ -60,8 +64,8 @@ pub fn fleet(found: &FleetHistory) -> Document {
     document
 }
 
-/// The page of a machine: a small figure for each parameter and its control chart.
-pub fn machine(machine: &MachineHistory) -> Document {
+/// The page of a machine: a small figure for each parameter and its control chart, and its decisions of conformity.
+pub fn machine(machine: &MachineHistory, conformity: &[MachineConformity]) -> Document {
     let own = std::slice::from_ref(machine);
     let changed = machine.parameters.iter().filter(|parameter| present::has_changed(parameter)).count();
     let mut document = Document {
@@ -81,6 +85,9 @@ pub fn machine(machine: &MachineHistory) -> Document {
     };
     section(&mut document, "Drifts", &present::drifts(own), "No parameter drifts significantly.");
     section(&mut document, "Changes", &present::changes(own), "No parameter has a significant step.");
+    if let Some(own) = conformity.iter().find(|own| own.machine_id == machine.machine_id) {
+        document.section("Conformity", table(&present::decisions(own)));
+    }
     let shown = document.show(machine.parameters.iter().map(|parameter| over_time(machine, parameter)));
     document.section("Parameters over time", shown);
     let shown = document.show(machine.parameters.iter().map(|parameter| control_chart(machine, parameter)));

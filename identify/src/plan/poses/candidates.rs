@@ -14,7 +14,7 @@ use rand_pcg::Pcg64;
 
 use super::between;
 use crate::error::IdentifyError;
-use crate::plan::collision::Parts;
+use crate::plan::collision::{Bodies, Parts, segment_distance};
 
 /// Where poses may be. Lengths in mm, in R.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -62,8 +62,12 @@ pub(super) fn draw(
     let kind = test.station.kind();
     if !matches!(kind, InstrumentKind::Tracker | InstrumentKind::RTest | InstrumentKind::BallBar) {
         return Err(IdentifyError::Request(format!(
-            "poses are chosen for trackers, R-tests and ball bars; the states of a {} are not free",
-            kind.word()
+            "poses are chosen for trackers, R-tests and ball bars; the states of a {} are not free: {}",
+            kind.word(),
+            match kind {
+                InstrumentKind::Socket => "the ball of the tool has to lie in a socket at each of them",
+                _ => "the tool has to touch the artefact at each of them",
+            }
         )));
     }
     let bar = bar_of(&test.station);
@@ -74,7 +78,8 @@ pub(super) fn draw(
             axis.name
         )));
     }
-    let parts = Parts::of(session, test);
+    let bodies = Bodies::of(machine);
+    let parts = Parts::of(session, &bodies, test);
     let mut found = Candidates { states: Vec::with_capacity(count), excluded: 0 };
     while found.states.len() < count && found.excluded < count * DRAWS_PER_CANDIDATE {
         let mut at: Vec<f64> = machine
@@ -147,7 +152,7 @@ fn is_permitted(machine: &Machine, station: &Station<f64>, at: &[f64], limits: &
         joints.insert(0, [0.0; 3]);
         joints.push(tool);
         let to = shortened(sight.from_mm, tool, AT_TARGET * sight.clearance_mm);
-        joints.windows(2).all(|link| distance(sight.from_mm, to, link[0], link[1]) >= sight.clearance_mm)
+        joints.windows(2).all(|link| segment_distance(sight.from_mm, to, link[0], link[1]) >= sight.clearance_mm)
     })
 }
 
@@ -159,11 +164,6 @@ fn shortened(from: [f64; 3], to: [f64; 3], by: f64) -> [f64; 3] {
         return from;
     }
     std::array::from_fn(|i| from[i] + along[i] * (1.0 - by / length))
-}
-
-/// The distance of two segments.
-fn distance(a: [f64; 3], b: [f64; 3], c: [f64; 3], d: [f64; 3]) -> f64 {
-    crate::plan::collision::segment_distance(a, b, c, d).0
 }
 
 /// States without readings.

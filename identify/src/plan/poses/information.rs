@@ -14,6 +14,8 @@ use faer::{Mat, Side};
 use super::PoseCriterion;
 use crate::error::IdentifyError;
 use crate::numerics::parallel;
+use crate::numerics::solve::Directions;
+use crate::numerics::triangle::Triangle;
 use crate::problem::{Problem, RowBlock};
 
 /// Information of a unit weight on every parameter at its physical size. It makes the covariance of few poses exist.
@@ -29,6 +31,8 @@ const MIN_GAIN: f64 = 1e-9;
 pub(super) struct Exchange {
     /// Whitened rows of each candidate, coordinates × parameters, at the physical sizes of the parameters.
     rows: Vec<Mat<f64>>,
+    /// Rows of the priors, at the physical sizes of the parameters.
+    prior: Mat<f64>,
     /// Information of the priors and the ridge.
     base: Mat<f64>,
     /// The parameters that the criterion counts.
@@ -64,6 +68,7 @@ impl Exchange {
         let display = |k: &usize| list[kept[*k]].size * list[kept[*k]].unit.display_per_internal;
         Ok(Exchange {
             rows: (0..count).map(of_pose).collect(),
+            prior: scaled,
             base,
             targets: targets.to_vec(),
             display: targets.iter().map(display).collect(),
@@ -82,15 +87,18 @@ impl Exchange {
         Some(factor.solve(Mat::<f64>::identity(n, n)))
     }
 
-    /// Whether the readings of some poses and the priors determine every parameter without the ridge: each direction
-    /// has more information than the ridge gives.
-    pub fn determines(&self, poses: &[usize]) -> bool {
-        let mut information = self.base.clone();
-        for pose in poses {
-            information += self.rows[*pose].transpose() * &self.rows[*pose];
+    /// Numerical rank of the readings of some poses with the priors, without the ridge. The uncertainties of poses of
+    /// full rank contain the ridge with a share of at most [`RIDGE`].
+    pub fn rank(&self, poses: &[usize]) -> Result<usize, IdentifyError> {
+        let blocks = poses.iter().map(|pose| &self.rows[*pose]).chain([&self.prior]);
+        let mut rows = Triangle::new(self.prior.ncols());
+        for block in blocks {
+            let columns = block.ncols();
+            let with_residuals =
+                Mat::from_fn(block.nrows(), columns + 1, |i, k| if k < columns { block[(i, k)] } else { 0.0 });
+            rows.absorb(with_residuals.as_ref());
         }
-        (0..information.nrows()).for_each(|k| information[(k, k)] -= 2.0 * RIDGE);
-        information.llt(Side::Lower).is_ok()
+        Ok(Directions::of(rows.r().as_ref())?.identifiable_rank())
     }
 
     /// Standard uncertainties of the targets at some poses, in display units.
@@ -147,6 +155,7 @@ impl Exchange {
     fn parts(&self) -> Exchange {
         Exchange {
             rows: self.rows.clone(),
+            prior: self.prior.clone(),
             base: Mat::new(),
             targets: self.targets.clone(),
             display: self.display.clone(),

@@ -15,6 +15,7 @@ use std::sync::Arc;
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test};
+use abbe_model::words::counted;
 use rand::RngExt;
 use rand::seq::index;
 use rand_pcg::Pcg64;
@@ -69,8 +70,8 @@ pub struct PoseOptions {
     pub seed: u64,
     /// Where poses may be.
     pub limits: PoseLimits,
-    /// Standard deviation of a scalar reading, mm.
-    pub noise_mm: f64,
+    /// Standard deviation of a scalar reading, mm; `None`: that of the session, else the assumed one of a plan.
+    pub noise_mm: Option<f64>,
 }
 
 /// Number of random sets with which the selection is compared.
@@ -92,6 +93,10 @@ pub struct PoseSelection {
     /// them leave an error undetermined.
     #[schemars(with = "Option<f64>")]
     pub random_median: f64,
+    /// Standard deviation of a scalar reading, µm.
+    pub noise_um: f64,
+    /// Source of `noise_um`: `stated` by the session or the user, or `assumed`.
+    pub noise_source: String,
     /// Number of candidate poses.
     pub candidates: usize,
     /// Number of drawn poses that the limits excluded.
@@ -104,6 +109,8 @@ pub struct PoseSelection {
     pub columns: Vec<String>,
     /// The positions of all axes at each pose, in the units of `columns`.
     pub poses: Vec<Vec<f64>>,
+    /// Warnings in words.
+    pub warnings: Vec<String>,
 }
 
 /// Selects poses for one test of a session: its instrument, its priors and its set-up. Readings of the session do not
@@ -122,7 +129,7 @@ pub fn select(session: &Session, test: &Test, options: &PoseOptions) -> Result<P
             options.poses
         )));
     }
-    let problem = problem(session, test, &found.states, options.noise_mm)?;
+    let problem = problem(session, test, &found.states, noise(session, options))?;
     let list = &problem.parameters.list;
     let nominal = vec![0.0; list.len()];
     // What as many average poses do not determine is held.
@@ -137,22 +144,23 @@ pub fn select(session: &Session, test: &Test, options: &PoseOptions) -> Result<P
     }
     let exchange = Exchange::new(&problem, &kept, &targets, options.criterion)?;
     let chosen = exchange.run(options.poses);
-    if !exchange.determines(&chosen) {
-        let coordinates = problem.coordinates();
-        let (readings, unknowns) = (coordinates * options.poses, kept.len());
+    let rank_of_chosen = exchange.rank(&chosen)?;
+    if rank_of_chosen < kept.len() {
+        let lacking = kept.len() - rank_of_chosen;
         return Err(IdentifyError::Request(format!(
-            "{} poses give {readings} readings, which do not determine {unknowns} unknowns; ask for at least {} poses",
-            options.poses,
-            unknowns.div_ceil(coordinates).max(options.poses + 1)
+            "the readings of {} have rank {rank_of_chosen} in {}; ask for at least {} poses",
+            counted(options.poses, "pose"),
+            counted(kept.len(), "unknown"),
+            options.poses + lacking.div_ceil(problem.coordinates())
         )));
     }
     let mut random = Pcg64::new(u128::from(options.seed), RANDOM_SET_STREAM);
-    let mut values: Vec<f64> = (0..RANDOM_SETS)
+    let mut values = (0..RANDOM_SETS)
         .map(|_| {
             let poses = index::sample(&mut random, found.states.len(), options.poses).into_vec();
-            if exchange.determines(&poses) { exchange.value(&poses) } else { f64::INFINITY }
+            Ok(if exchange.rank(&poses)? == kept.len() { exchange.value(&poses) } else { f64::INFINITY })
         })
-        .collect();
+        .collect::<Result<Vec<f64>, IdentifyError>>()?;
     let u = exchange.uncertainties(&chosen);
     let machine = &session.machine;
     let display = |pose: &usize| -> Vec<f64> {
@@ -163,6 +171,8 @@ pub fn select(session: &Session, test: &Test, options: &PoseOptions) -> Result<P
         criterion: options.criterion.words().to_string(),
         value: exchange.value(&chosen),
         random_median: median(&mut values),
+        noise_um: problem.noise.sigma_mm * 1e3,
+        noise_source: problem.noise.source.word().to_string(),
         candidates: found.states.len(),
         excluded: found.excluded,
         uncertainties: targets
@@ -176,11 +186,12 @@ pub fn select(session: &Session, test: &Test, options: &PoseOptions) -> Result<P
         held: rank.pivots.iter().map(|j| list[*j].id.clone()).collect(),
         columns: machine.axes.iter().map(|axis| axis.column("")).collect(),
         poses: chosen.iter().map(display).collect(),
+        warnings: session.warnings.iter().cloned().chain(states::noise_warning(&problem.noise)).collect(),
     })
 }
 
 /// The problem of a session with one test, which has a reading at every candidate pose.
-fn problem(session: &Session, test: &Test, poses: &[Vec<f64>], noise_mm: f64) -> Result<Problem, IdentifyError> {
+fn problem(session: &Session, test: &Test, poses: &[Vec<f64>], noise: Noise) -> Result<Problem, IdentifyError> {
     let mut readings: Readings = states_of(&session.machine, poses, test.station.kind().coordinates());
     let model = TestModel::new(Arc::clone(&session.machine), test.station.clone(), &readings);
     readings.observed = model.readings_mm(&SlotValues::zero(model.slots()));
@@ -188,7 +199,13 @@ fn problem(session: &Session, test: &Test, poses: &[Vec<f64>], noise_mm: f64) ->
     readings.drivers = means.map(|(name, mean)| (name, vec![mean; poses.len()])).collect();
     let alone = Test { readings: Some(Arc::new(readings)), ..test.clone() };
     let session = Session { tests: vec![alone], socket_distances: Vec::new(), ..session.clone() };
-    states::problem_by_test(&session, Noise::white(noise_mm, NoiseSource::Stated))
+    states::problem_by_test(&session, noise)
+}
+
+/// The noise of a reading: that of the options, else that of the session, else the assumed one.
+fn noise(session: &Session, options: &PoseOptions) -> Noise {
+    let stated = options.noise_mm.or(session.noise_mm).filter(|sigma| *sigma > 0.0);
+    stated.map_or_else(states::assumed_noise, |sigma| Noise::white(sigma, NoiseSource::Stated))
 }
 
 /// A number between two limits.

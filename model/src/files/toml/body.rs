@@ -1,13 +1,61 @@
 //! Reader of `[[body]]` of a machine and `[clearance]` of a session: what can collide.
 
-use super::quantity;
+use std::path::Path;
+
+use super::{ReadOptions, data_folder, quantity};
 use crate::body::{Body, BodyShape, ClearanceSizes, Holder};
 use crate::chain::Machine;
 use crate::error::ModelError;
+use crate::files::stamp::FileStamp;
+use crate::files::stl;
 use crate::files::toml::document::{Table, Value};
 
+/// The files of bodies: where they may lie, and which were read.
+#[derive(Default)]
+pub(super) struct BodyFiles<'f> {
+    /// The session file or the machine file that is read, the file that names the bodies, and the options; `None` for a
+    /// text from no file.
+    pub from: Option<(&'f Path, &'f Path, &'f ReadOptions)>,
+    /// Each file as it is named, and its state when it was read.
+    pub read: Vec<(String, FileStamp)>,
+    /// Warnings about usable files.
+    pub warnings: Vec<String>,
+}
+
+impl BodyFiles<'_> {
+    /// Reads the surface of a body.
+    fn surface(&mut self, body: &str, value: &Value<'_>) -> Result<BodyShape, ModelError> {
+        let named = value.text()?;
+        let Some((reader, beside, options)) = self.from else {
+            let help = "write the machine to a file beside the STL file";
+            return Err(value.error("`stl` names a file, but this text is in none", Some(help.into())));
+        };
+        let found = data_folder::folder(beside).join(&named);
+        if !options.store.exists(&found) {
+            let message = format!("the STL file `{named}` does not exist; looked for {}", found.display());
+            return Err(value.file_error(message, "its name is relative to the file that names it"));
+        }
+        data_folder::check(reader, options, value, &found)?;
+        let surface = stl::surface(&options.store, &found)
+            .map_err(|(message, help)| value.error(format!("{} {message}", found.display()), Some(help)))?;
+        if surface.open_edges > 0 {
+            self.warnings.push(format!(
+                "body `{body}`: the surface of {named} is not closed: {} of its edges belong to one triangle only; \
+                 what is wholly inside is not noticed",
+                surface.open_edges
+            ));
+        }
+        self.read.push((named, surface.stamp));
+        Ok(surface.shape)
+    }
+}
+
 /// Reads the bodies of a machine.
-pub(super) fn bodies(machine: &Machine, table: &mut Table<'_>) -> Result<Vec<Body>, ModelError> {
+pub(super) fn bodies(
+    machine: &Machine,
+    table: &mut Table<'_>,
+    files: &mut BodyFiles<'_>,
+) -> Result<Vec<Body>, ModelError> {
     let Some(value) = table.take("body") else {
         return Ok(Vec::new());
     };
@@ -30,11 +78,12 @@ pub(super) fn bodies(machine: &Machine, table: &mut Table<'_>) -> Result<Vec<Bod
                 Some(axis)
             }
         };
-        let shape = match (table.take("box_mm"), table.take("capsule")) {
-            (Some(corners), None) => cuboid(corners)?,
-            (None, Some(capsule)) => shape_of_capsule(capsule)?,
+        let shape = match (table.take("box_mm"), table.take("capsule"), table.take("stl")) {
+            (Some(corners), None, None) => cuboid(corners)?,
+            (None, Some(capsule), None) => shape_of_capsule(capsule)?,
+            (None, None, Some(file)) => files.surface(&name, &file)?,
             _ => {
-                let help = "box_mm = [[-160, -160, -60], [160, 160, -10]], or capsule = { from_mm = [0, 0, 60], to_mm = [0, 0, 300], radius_mm = 40 }; in R with all axes at zero";
+                let help = "box_mm = [[-160, -160, -60], [160, 160, -10]], or capsule = { from_mm = [0, 0, 60], to_mm = [0, 0, 300], radius_mm = 40 }, or stl = \"table.stl\"; in R with all axes at zero";
                 return Err(table.error(format!("body `{name}` has no shape, or two"), Some(help.into())));
             }
         };
@@ -52,7 +101,7 @@ fn cuboid(value: Value<'_>) -> Result<BodyShape, ModelError> {
     let corners = value.list("a list of two corners")?;
     let corners = corners.into_iter().map(Value::vector).collect::<Result<Vec<_>, _>>()?;
     match corners[..] {
-        [low, high] if (0..3).all(|i| low[i] < high[i]) => Ok(BodyShape::cuboid(low, high)),
+        [low_mm, high_mm] if (0..3).all(|i| low_mm[i] < high_mm[i]) => Ok(BodyShape::Box { low_mm, high_mm }),
         [_, _] => Err(fault("`box_mm`: a coordinate of the second corner is not greater than that of the first")),
         _ => Err(fault("`box_mm` is not a list of two corners")),
     }

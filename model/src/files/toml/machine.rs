@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use super::{body, quantity};
+use super::body::{self, BodyFiles};
+use super::{ReadOptions, quantity};
 use crate::axis::{Axis, AxisKind};
 use crate::chain::Machine;
 use crate::code::StructuralCode;
@@ -17,7 +18,9 @@ use crate::frames::Rotation;
 /// # Errors
 /// If the file cannot be read or does not describe a machine, with its line and what to do.
 pub fn machine(path: &Path) -> Result<Machine, ModelError> {
-    from_table(source(&Store::Disk, path)?.parse()?)
+    let options = ReadOptions::default();
+    let mut files = BodyFiles { from: Some((path, path, &options)), ..BodyFiles::default() };
+    from_table(source(&options.store, path)?.parse()?, &mut files)
 }
 
 /// The text of a machine file.
@@ -25,8 +28,8 @@ pub(super) fn source(store: &Store, path: &Path) -> Result<Source, ModelError> {
     Source::read(store, path, "the machine file")
 }
 
-/// A machine from the tables `name`, `chain`, `[axis.…]`.
-pub(super) fn from_table(mut table: Table<'_>) -> Result<Machine, ModelError> {
+/// A machine from the tables `name`, `chain`, `[axis.…]`, `[[body]]`.
+pub(super) fn from_table(mut table: Table<'_>, files: &mut BodyFiles<'_>) -> Result<Machine, ModelError> {
     let chain = table.require("chain", "the axes from workpiece over bed to tool, such as \"w C A b Y X Z t\"")?;
     let text = chain.text()?;
     let code = StructuralCode::parse(&text).map_err(|fault| chain.error(fault.to_string(), None))?;
@@ -77,7 +80,7 @@ pub(super) fn from_table(mut table: Table<'_>) -> Result<Machine, ModelError> {
     }
     let mut machine =
         Machine { name, workpiece_side: code.workpiece_side.len(), axes, rotation, gravity, bodies: Vec::new() };
-    machine.bodies = body::bodies(&machine, &mut table)?;
+    machine.bodies = body::bodies(&machine, &mut table, files)?;
     table.finish()?;
     Ok(machine)
 }

@@ -21,6 +21,7 @@
 
 use std::path::Path;
 
+use super::body::BodyFiles;
 use super::document::{Source, Table};
 use super::{
     Context, Declared, Found, ReadOptions, body, driver_columns, effect, head, machine, sockets, test, tolerance,
@@ -37,7 +38,7 @@ use crate::session::{Session, setups};
 pub fn session(text: &str) -> Result<Session, ModelError> {
     parsed(text, |root| {
         let machine = root.require("machine", "the machine's tables")?.table("[machine]".into())?;
-        head(machine::from_table(machine)?, root)
+        head(machine::from_table(machine, &mut BodyFiles::default())?, root)
     })
 }
 
@@ -48,7 +49,7 @@ pub fn session(text: &str) -> Result<Session, ModelError> {
 pub fn plan(text: &str) -> Result<Session, ModelError> {
     parsed(text, |root| {
         let machine = root.require("machine", "the machine's tables")?.table("[machine]".into())?;
-        let mut session = head(machine::from_table(machine)?, root)?;
+        let mut session = head(machine::from_table(machine, &mut BodyFiles::default())?, root)?;
         // The layout of data files has no meaning without them.
         drop(root.take("format"));
         drop(root.take("columns"));

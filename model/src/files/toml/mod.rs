@@ -40,6 +40,7 @@ use crate::instrument::InstrumentKind;
 use crate::session::expression::{Constant, Length};
 use crate::session::limits;
 use crate::session::{Session, Test, setups};
+use body::BodyFiles;
 use document::{Source, Table, Value};
 
 /// Options for reading a session.
@@ -141,7 +142,8 @@ pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError
 pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Session, SourceMap), ModelError> {
     let source = Source::read(&options.store, path, "the session file")?;
     let mut root = source.parse()?;
-    let SessionMachine { machine, source: machine_source } = session_machine(path, options, &mut root)?;
+    let SessionMachine { machine, source: machine_source, bodies, warnings } =
+        session_machine(path, options, &mut root)?;
     let head = head(machine, &mut root)?;
 
     let format = match root.take("format") {
@@ -162,7 +164,7 @@ pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Sessi
         memory: None,
         options,
     };
-    let mut found = Found::default();
+    let mut found = Found { warnings, ..Found::default() };
     let (tests, declared) = tests(&context, &mut root, &mut found)?;
     for (index, test) in tests.iter().enumerate() {
         found.warnings.extend(setups::differing(&tests[..index], test));
@@ -183,7 +185,7 @@ pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Sessi
     root.finish()?;
     let mut files: Vec<FileStamp> = Vec::new();
     let own = source.stamp.iter().chain(machine_source.iter().filter_map(|source| source.stamp.as_ref()));
-    for stamp in own.chain(&found.stamps) {
+    for stamp in own.chain(bodies.iter().map(|(_, stamp)| stamp)).chain(&found.stamps) {
         if !files.contains(stamp) {
             files.push(stamp.clone());
         }
@@ -192,6 +194,7 @@ pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Sessi
         file: path.to_path_buf(),
         text: source.text.clone(),
         machine_text: machine_source.map(|source| source.text),
+        bodies,
         files,
     };
     let session = Session { effects, tests, socket_distances, tolerance, clearance, warnings: found.warnings, ..head };
@@ -234,6 +237,10 @@ struct Found {
 struct SessionMachine {
     machine: Machine,
     source: Option<Source>,
+    /// The files of bodies, as they are named.
+    bodies: Vec<(String, FileStamp)>,
+    /// Warnings about usable files of bodies.
+    warnings: Vec<String>,
 }
 
 /// Reads the machine: a file beside the session, or tables in the session.
@@ -241,7 +248,9 @@ fn session_machine(path: &Path, options: &ReadOptions, root: &mut Table<'_>) -> 
     let value = root.require("machine", "[machine] with `file = \"machine.toml\"`, or the machine's tables in it")?;
     let mut table = value.table("[machine]".into())?;
     let Some(file) = table.take("file") else {
-        return Ok(SessionMachine { machine: machine::from_table(table)?, source: None });
+        let mut files = BodyFiles { from: Some((path, path, options)), ..BodyFiles::default() };
+        let machine = machine::from_table(table, &mut files)?;
+        return Ok(SessionMachine { machine, source: None, bodies: files.read, warnings: files.warnings });
     };
     let named = file.text()?;
     let found = path.parent().unwrap_or(Path::new("")).join(&named);
@@ -252,7 +261,9 @@ fn session_machine(path: &Path, options: &ReadOptions, root: &mut Table<'_>) -> 
     data_folder::check(path, options, &file, &found)?;
     table.finish()?;
     let source = machine::source(&options.store, &found)?;
-    Ok(SessionMachine { machine: machine::from_table(source.parse()?)?, source: Some(source) })
+    let mut files = BodyFiles { from: Some((path, &found, options)), ..BodyFiles::default() };
+    let machine = machine::from_table(source.parse()?, &mut files)?;
+    Ok(SessionMachine { machine, source: Some(source), bodies: files.read, warnings: files.warnings })
 }
 
 /// Reads `[about]`: notes that reports repeat.

@@ -7,6 +7,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::Path;
 
+use super::body::BodyFiles;
 use super::document::Source;
 use super::quoted::quoted;
 use super::write::with_effects;
@@ -73,7 +74,7 @@ pub fn machine_text(machine: &Machine) -> String {
 /// # Errors
 /// As [`super::machine()`].
 pub fn machine_of_text(file: &Path, text: &str) -> Result<Machine, ModelError> {
-    machine::from_table(Source::new(file, text).parse()?)
+    machine::from_table(Source::new(file, text).parse()?, &mut BodyFiles::default())
 }
 
 /// Effects as tables `[[effect]]` of a session file.

@@ -1,0 +1,138 @@
+//! Paths of a test in polar form: means of runs, and deviations about the least-squares circle.
+
+use std::f64::consts::{PI, TAU};
+
+use num_dual::DualNum;
+
+use super::path::{MovingAxes, Path};
+use crate::numerics::circle;
+
+/// A reading, or the mean of the readings of several runs at one angle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PolarPoint {
+    /// Angle, rad.
+    pub angle: f64,
+    /// Observed less nominal length, mm.
+    pub deviation_mm: f64,
+    /// Nominal length, mm.
+    pub nominal_mm: f64,
+    /// The row of the reading, in the first of the runs.
+    pub row: usize,
+}
+
+/// A path in polar form, by angle.
+#[derive(Clone, Debug)]
+pub(super) struct PolarPath(pub Vec<PolarPoint>);
+
+/// The runs in one direction.
+fn in_direction(path: &Path, direction: f64) -> Vec<PolarPath> {
+    let runs = path.runs.iter().filter(|run| run.direction == direction);
+    runs.map(|run| {
+        let kept = run.rows.clone().filter(|row| !path.left_out.get(*row).copied().unwrap_or(false));
+        let mut points: Vec<PolarPoint> = kept
+            .map(|row| PolarPoint {
+                angle: path.angle[row],
+                deviation_mm: path.deviation_mm[row],
+                nominal_mm: path.nominal_mm[row],
+                row,
+            })
+            .collect();
+        points.sort_by(|a, b| a.angle.total_cmp(&b.angle));
+        PolarPath(points)
+    })
+    .collect()
+}
+
+/// The greatest range of the runs in one direction at one angle of the first run, mm; `None` for a single run.
+pub(super) fn width_mm(path: &Path, direction: f64) -> Option<f64> {
+    let runs = in_direction(path, direction);
+    let (first, others) = runs.split_first().filter(|(_, others)| !others.is_empty())?;
+    let widths = first.0.iter().map(|p| {
+        let deviations: Vec<f64> = others.iter().filter_map(|run| run.at(p.angle)).chain([p.deviation_mm]).collect();
+        let (least, most) = range(&deviations);
+        most - least
+    });
+    widths.reduce(f64::max)
+}
+
+/// The mean path of the runs in one direction, at the angles of the first run, and the number of these runs.
+pub(super) fn mean(path: &Path, direction: f64) -> Option<(PolarPath, usize)> {
+    let runs = in_direction(path, direction);
+    let first = runs.first()?;
+    let points = first.0.iter().map(|p| {
+        let others: Vec<f64> = runs[1..].iter().filter_map(|run| run.at(p.angle)).collect();
+        let sum = p.deviation_mm + others.iter().sum::<f64>();
+        PolarPoint { deviation_mm: sum / (1 + others.len()) as f64, ..*p }
+    });
+    Some((PolarPath(points.collect()), runs.len()))
+}
+
+impl PolarPath {
+    /// The deviation at an angle (modulo whole turns), interpolated between the neighbouring readings.
+    pub fn at(&self, angle: f64) -> Option<f64> {
+        const SAME: f64 = 1e-6;
+        let points = &self.0;
+        let (first, last) = (points.first()?.angle, points.last()?.angle);
+        let turns = ((first - SAME - angle) / TAU).ceil();
+        let angle = (angle + turns * TAU).clamp(first, f64::INFINITY);
+        if angle > last + SAME {
+            return None;
+        }
+        let next = points.partition_point(|p| p.angle < angle).min(points.len() - 1);
+        if next == 0 {
+            return Some(points[0].deviation_mm);
+        }
+        let (a, b) = (points[next - 1], points[next]);
+        let share = ((angle - a.angle) / (b.angle - a.angle).max(SAME)).clamp(0.0, 1.0);
+        Some(a.deviation_mm + share * (b.deviation_mm - a.deviation_mm))
+    }
+}
+
+/// Radial deviations about the centre of the least-squares circle.
+pub(super) struct RadialDeviations<D> {
+    /// Distance from the centre less the nominal length, mm.
+    pub deviations_mm: Vec<D>,
+    /// Radius of the circle less the nominal length, mm.
+    pub radius_mm: D,
+}
+
+/// Removes the centre. If a rotary axis turns, the reading need not be a radius; the centre is then the first harmonic
+/// of the reading. `deviation` gives the deviation of a point, or with dual numbers its derivative too.
+pub(super) fn about<D: DualNum<Primitive = f64> + Copy>(
+    path: &Path,
+    trace: &PolarPath,
+    deviation: impl Fn(&PolarPoint) -> D,
+) -> RadialDeviations<D> {
+    let count = trace.0.len() as f64;
+    let nominal = trace.0.iter().map(|p| p.nominal_mm).sum::<f64>() / count;
+    let radial = matches!(path.moves, MovingAxes::Linear { radial: true, .. });
+    let nominal_of = |p: &PolarPoint| if radial { p.nominal_mm } else { nominal };
+    let points: Vec<[D; 2]> = trace
+        .0
+        .iter()
+        .map(|p| {
+            let length = deviation(p) + nominal_of(p);
+            [length * p.angle.cos(), length * p.angle.sin()]
+        })
+        .collect();
+    // On a short arc the centre is confounded with the radius.
+    let found = (path.arc() >= PI * 0.99).then(|| circle::through(&points)).flatten();
+    let Some(circle) = found else {
+        let deviations_mm: Vec<D> = trace.0.iter().map(&deviation).collect();
+        let sum = deviations_mm.iter().fold(D::from(0.0), |sum, deviation| sum + *deviation);
+        return RadialDeviations { deviations_mm, radius_mm: sum / count };
+    };
+    let distance = |p: &[D; 2]| {
+        let (x, y) = (p[0] - circle.centre[0], p[1] - circle.centre[1]);
+        (x * x + y * y).sqrt()
+    };
+    RadialDeviations {
+        deviations_mm: points.iter().zip(&trace.0).map(|(point, p)| distance(point) - nominal_of(p)).collect(),
+        radius_mm: circle.radius - nominal,
+    }
+}
+
+/// The least and the greatest value.
+pub(super) fn range(values: &[f64]) -> (f64, f64) {
+    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), x| (least.min(*x), most.max(*x)))
+}

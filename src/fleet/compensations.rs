@@ -1,0 +1,65 @@
+//! The file of known compensations.
+
+use std::path::Path;
+
+use abbe_identify::history::events::{Compensation, KnownChange};
+
+use super::FleetError;
+use super::date;
+
+/// Reads known compensations: a CSV file with the columns `machine_id`, `date`, `parameter`, `change` and `unit`, one
+/// row for each parameter. The unit is that of the parameter: `um`, `arcsec`.
+///
+/// # Errors
+/// If the file cannot be read; with the line of what cannot be used.
+pub fn read(file: &Path) -> Result<Vec<Compensation>, FleetError> {
+    #[derive(serde::Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Row {
+        machine_id: String,
+        date: String,
+        parameter: String,
+        change: f64,
+        unit: String,
+    }
+    let name = file.display();
+    let fault = |line: usize, what: String| FleetError::Request(format!("{name}:{line}: {what}"));
+    let mut contents = std::fs::read(file).map_err(|source| FleetError::Read { path: name.to_string(), source })?;
+    // The line of a row is that before the place of the reader behind it.
+    if !contents.ends_with(b"\n") {
+        contents.push(b'\n');
+    }
+    let mut found: Vec<Compensation> = Vec::new();
+    let mut reader =
+        csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(contents.as_slice());
+    let expected = |line: usize, error: csv::Error| {
+        fault(line, format!("{error}; columns machine_id, date, parameter, change, unit are expected"))
+    };
+    let columns = reader.headers().map_err(|error| expected(1, error))?.clone();
+    let mut cells = csv::StringRecord::new();
+    loop {
+        let read = reader.read_record(&mut cells);
+        let line = usize::try_from(reader.position().line()).unwrap_or(usize::MAX).saturating_sub(1);
+        if !read.map_err(|error| expected(line, error))? {
+            break;
+        }
+        let row: Row = cells.deserialize(Some(&columns)).map_err(|error| expected(line, error))?;
+        let days = date::interval(&row.date)
+            .ok_or_else(|| fault(line, format!("date `{}`: the form 2026-11-23T08:00:00 is expected", row.date)))?;
+        if !row.change.is_finite() {
+            return Err(fault(line, format!("change `{}`: a number is expected", row.change)));
+        }
+        let known = found.iter_mut().find(|known| known.machine_id == row.machine_id && known.days == days);
+        let change =
+            KnownChange { id: row.parameter, value: row.change, unit: row.unit, source: format!("{name}:{line}") };
+        match known {
+            Some(known) if known.changes.iter().any(|other| other.id == change.id) => {
+                let (id, date) = (&change.id, &row.date);
+                return Err(fault(line, format!("the change of {id} on {date} is stated twice: remove a row")));
+            }
+            Some(known) => known.changes.push(change),
+            None => found.push(Compensation { machine_id: row.machine_id, days, changes: vec![change] }),
+        }
+    }
+    Ok(found)
+}

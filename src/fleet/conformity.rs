@@ -1,0 +1,107 @@
+//! Decisions of conformity of the machines over time.
+
+use abbe_identify::tolerance::rule::Decision;
+use abbe_identify::tolerance::{Conformity, ConformityItem};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// The decisions about a machine over time.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct MachineConformity {
+    /// Identifier of the machine.
+    pub machine_id: String,
+    /// The sessions that state limits, by time.
+    pub sessions: Vec<SessionConformity>,
+    /// The quantities that have limits.
+    pub items: Vec<ItemHistory>,
+}
+
+/// The decision about one session.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct SessionConformity {
+    /// Day of the session.
+    pub days: f64,
+    /// The session file.
+    pub file: String,
+    /// `fail` if an item fails; else `undecided` if an item is undecided; else `pass`.
+    pub verdict: Decision,
+}
+
+/// The decisions about one quantity over time.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ItemHistory {
+    /// The parameter, `EX0C`, or the figure with its test, `circular_deviation[XY]`.
+    pub id: String,
+    /// The decisions, by time. Each holds for the limits that its session states.
+    pub points: Vec<DecisionPoint>,
+}
+
+/// A decision about one quantity in one session.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct DecisionPoint {
+    /// Day of the session.
+    pub days: f64,
+    /// The measured value, in `unit`; `null` where there is none.
+    pub value: Option<f64>,
+    /// Its standard uncertainty, in `unit`.
+    pub u: Option<f64>,
+    /// Unit of all numbers: `um`, `arcsec`.
+    pub unit: String,
+    /// The lower limit, in `unit`; `null` without one.
+    pub lower: Option<f64>,
+    /// The upper limit, in `unit`.
+    pub upper: f64,
+    /// The decision.
+    pub decision: Decision,
+    /// Why it is undecided, in words; `null` otherwise.
+    pub why: Option<String>,
+}
+
+impl ItemHistory {
+    /// The latest decision, and the first day from which on the decision is the same; `None` without decisions.
+    pub fn latest(&self) -> Option<(Decision, f64)> {
+        let last = self.points.last()?;
+        let since = self.points.iter().rev().take_while(|point| point.decision == last.decision).last()?;
+        Some((last.decision, since.days))
+    }
+
+    /// The number of sessions with a decision.
+    pub fn count(&self, decision: Decision) -> usize {
+        self.points.iter().filter(|point| point.decision == decision).count()
+    }
+}
+
+impl MachineConformity {
+    /// The decisions about a machine: day and file of each session, by time, with its decisions; `None` if no session
+    /// states limits.
+    pub fn of<'c>(
+        machine_id: &str,
+        sessions: impl Iterator<Item = (f64, &'c str, Option<&'c Conformity>)>,
+    ) -> Option<MachineConformity> {
+        let mut found =
+            MachineConformity { machine_id: machine_id.to_string(), sessions: Vec::new(), items: Vec::new() };
+        for (days, file, conformity) in sessions {
+            let Some(Conformity { verdict, items, .. }) = conformity else { continue };
+            found.sessions.push(SessionConformity { days, file: file.to_string(), verdict: *verdict });
+            items.iter().for_each(|item| found.add(days, item));
+        }
+        (!found.sessions.is_empty()).then_some(found)
+    }
+
+    fn add(&mut self, days: f64, item: &ConformityItem) {
+        let point = DecisionPoint {
+            days,
+            value: item.value,
+            u: item.u,
+            unit: item.unit.clone(),
+            lower: item.lower,
+            upper: item.upper,
+            decision: item.decision,
+            why: item.why.clone(),
+        };
+        match self.items.iter_mut().find(|known| known.id == item.id) {
+            Some(known) => known.points.push(point),
+            None => self.items.push(ItemHistory { id: item.id.clone(), points: vec![point] }),
+        }
+    }
+}
