@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::fs;
 
+use abbe::fleet::record::SCHEMA_VERSION;
 use serde_json::Value;
 
 use super::abbe;
@@ -85,7 +86,7 @@ fn sessions_that_do_not_fit_together_are_named_and_isolated() {
     // A result of another schema.
     let results = files(&place.at("results/results"));
     let (name, contents) = results.iter().find(|(_, contents)| contents.contains("2026-01-08")).unwrap();
-    let other = contents.replacen("\"schema_version\":1", "\"schema_version\":99", 1);
+    let other = contents.replacen(&format!("\"schema_version\":{SCHEMA_VERSION}"), "\"schema_version\":99", 1);
     fs::write(place.at("results/results").join(name), other).unwrap();
 
     let output = place.shell("abbe history results --json history.json");

@@ -26,6 +26,8 @@ const SIGNIFICANT: f64 = 2.807;
 /// Least share of the squared change of the readings that the plan's parameters do not absorb. Below it, the effect is
 /// confounded with them.
 const SURVIVES: f64 = 1e-4;
+/// Effects of the library that are drawn until the plan observes one.
+const LIBRARY_TRIES: usize = 50;
 /// Half of a 95 % interval, standard deviations.
 const INTERVAL: f64 = 1.96;
 /// Smallest and largest outlier, µm.
@@ -130,8 +132,6 @@ impl Study {
     ) -> Result<(), Unmade> {
         let session = &self.plans[plan];
         let (stated, noise) = (&self.file.effect[effect], &self.file.noise[noise]);
-        let truth =
-            if stated.library { Some(of_library(session, random)?) } else { self.effects[plan][effect].clone() };
         let mut given: Vec<Given> = Vec::new();
         for parameter in parameters(session)?.iter().filter(|parameter| parameter.role == Role::Error) {
             let sigma = match parameter.unit.name.as_str() {
@@ -143,10 +143,22 @@ impl Study {
         }
         let locations = given.clone();
         let mut machine = session.clone();
-        if let Some(truth) = &truth {
+        let mut tries = if stated.library { LIBRARY_TRIES } else { 1 };
+        while tries > 0 {
+            tries -= 1;
+            let truth =
+                if stated.library { Some(of_library(session, random)?) } else { self.effects[plan][effect].clone() };
+            let Some(truth) = truth else { break };
             draw.truth = Some(truth.id());
-            machine.effects.push(truth.clone());
-            given.extend(coefficients(session, &machine, stated.size, noise, random)?);
+            machine.effects = [session.effects.as_slice(), &[truth]].concat();
+            match coefficients(session, &machine, stated.size, noise, random) {
+                // Another effect of the library, which the plan observes.
+                Err(Unmade::NotObserved) if tries > 0 => {}
+                coefficients => {
+                    given.extend(coefficients?);
+                    break;
+                }
+            }
         }
         let exact = Simulation { given, noise_mm: Some(0.0), draw_setups: true, seed: random.random() };
         machine.resolution_mm = None;

@@ -22,7 +22,7 @@ from .. import _abbe
 from .._errors import Error
 from ._work import Path
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 """Version of the tables. It is in the metadata of every file (``abbe.schema_version``)."""
 
 _GROUPS = 4
