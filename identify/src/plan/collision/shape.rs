@@ -108,9 +108,9 @@ mod tests {
         Shape::of(shape).unwrap().moved(&Pose::translation(x, 0.0, 0.0))
     }
 
-    /// A tetrahedron with three edges of a length along X, Y, Z from a corner at −1, −1, −1.
-    fn tetrahedron(length: f64, is_closed: bool) -> BodyShape {
-        let corner = |k: usize| -> [f64; 3] { std::array::from_fn(|i| if i + 1 == k { length - 1.0 } else { -1.0 }) };
+    /// A tetrahedron with three edges of a length along X, Y, Z from a corner on the diagonal.
+    fn tetrahedron(from: f64, length: f64, is_closed: bool) -> BodyShape {
+        let corner = |k: usize| -> [f64; 3] { std::array::from_fn(|i| if i + 1 == k { from + length } else { from }) };
         let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
         let faces = if is_closed { &faces[..] } else { &faces[..3] };
         BodyShape::Mesh { triangles_mm: faces.iter().map(|face| face.map(corner)).collect(), is_closed }
@@ -120,14 +120,14 @@ mod tests {
     fn what_is_wholly_inside_a_closed_surface_collides() {
         let capsule = BodyShape::Capsule { ends_mm: [[0.0; 3], [1.0, 0.0, 0.0]], radius_mm: 0.5 };
         let cuboid = BodyShape::Box { low_mm: [0.0; 3], high_mm: [1.0; 3] };
-        let small = tetrahedron(2.0, true);
+        let small = tetrahedron(0.0, 2.0, true);
         for inside in [&capsule, &cuboid, &small] {
-            let closed = placed(&tetrahedron(100.0, true), 0.0);
+            let closed = placed(&tetrahedron(-1.0, 100.0, true), 0.0);
             assert!(placed(inside, 5.0).clearance(&closed, f64::INFINITY) <= 0.0);
             assert!(closed.clearance(&placed(inside, 5.0), f64::INFINITY) <= 0.0);
             // The surface begins at x = −1.
             assert!(placed(inside, -20.0).clearance(&closed, f64::INFINITY) > 10.0);
-            let open = placed(&tetrahedron(100.0, false), 0.0);
+            let open = placed(&tetrahedron(-1.0, 100.0, false), 0.0);
             assert!(placed(inside, 5.0).clearance(&open, f64::INFINITY) > 0.0);
         }
         let around = BodyShape::Box { low_mm: [-50.0; 3], high_mm: [50.0; 3] };
