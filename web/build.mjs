@@ -9,7 +9,7 @@ import { createHash } from "node:crypto";
 import { existsSync, mkdirSync, readdirSync, readFileSync, rmSync, statSync, writeFileSync } from "node:fs";
 import { dirname, join, relative, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
-import { brotliCompressSync, gzipSync } from "node:zlib";
+import { gzipSync } from "node:zlib";
 
 const here = dirname(fileURLToPath(import.meta.url));
 const root = resolve(here, "..");
@@ -193,6 +193,6 @@ if (!process.argv.includes("--page")) buildModule();
 buildPage();
 const size = (file) => `${file}: ${(statSync(join(here, file)).size / 1e6).toFixed(2)} MB`;
 const module = readFileSync(join(here, "pkg/abbe_bg.wasm"));
-const megabytes = (bytes) => `${(bytes.length / 1e6).toFixed(2)} MB`;
-const compressed = `gzip ${megabytes(gzipSync(module, { level: 9 }))}, brotli ${megabytes(brotliCompressSync(module))}`;
-console.error(`${size("pkg/abbe_bg.wasm")}, ${compressed}; ${size("dist/abbe.html")}`);
+console.error(
+  `${size("pkg/abbe_bg.wasm")}, ${(gzipSync(module, { level: 9 }).length / 1e6).toFixed(2)} MB compressed; ${size("dist/abbe.html")}`,
+);
