@@ -72,9 +72,9 @@ fn unusable_study_files_are_named() {
         ("session = \"session.toml\"", "session = \"nowhere.toml\"", "nowhere.toml"),
         ("[[noise]]", "[[noise]]\nname = \"n\"\num = 1\n[[noise]]", "two [[noise]] are called `n`"),
         (
-            "analysis = \"fit\"",
-            "analysis = \"trace\"\n[[effect]]\nname = \"x\"\nsize = 5\n\
-             effect = { component = \"EYY\", driver = \"Y\", shape = \"harmonic\", order = 0.5 }",
+            "\"fit\"\ndraws = 1",
+            "\"trace\"\ndraws = 1\n[[effect]]\nname = \"x\"\nsize = 5\n\
+             effect = { component = \"EYY\", driver = \"Y\", shape = \"polynomial\", order = 2 }",
             "the library of the trace has no effect",
         ),
     ] {
