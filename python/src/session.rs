@@ -48,13 +48,8 @@ impl State {
 
     /// A state of a session with this text and no files.
     pub fn in_memory(session: domain::Session, text: String) -> State {
-        let sources = SourceMap {
-            file: PathBuf::from("session.toml"),
-            text,
-            machine_text: None,
-            bodies: Vec::new(),
-            files: Vec::new(),
-        };
+        let file = PathBuf::from("session.toml");
+        let sources = SourceMap { file, text, machine_text: None, bodies: Vec::new(), files: Vec::new() };
         State::new(session, sources, Origin::default())
     }
 

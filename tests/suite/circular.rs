@@ -65,24 +65,20 @@ fn circle(folder: &Path, directions: &[f64], time: bool, error: impl Fn(&At) -> 
 
 /// The ball-bar figures of `abbe fit` for a session.
 fn figures(session: &Path) -> Vec<Value> {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("fit.json");
-    let run = abbe(&["fit", text(session), "--json", text(&file)]);
+    let run = abbe(&["fit", text(session), "--json", "-"]);
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
-    let fit: Value = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
+    let fit: Value = serde_json::from_slice(&run.stdout).unwrap();
     fit["circular"].as_array().unwrap().clone()
 }
 
 fn fault<'v>(test: &'v Value, fault: &str, axes: &str) -> Option<&'v Value> {
-    let all = test["diagnosis"].as_array().unwrap();
-    all.iter().find(|found| found["fault"] == fault && found["axes"] == axes)
+    test["diagnosis"].as_array().unwrap().iter().find(|found| found["fault"] == fault && found["axes"] == axes)
 }
 
 /// A figure of a fault with its uncertainty.
 fn figure(test: &Value, name: &str, axes: &str, id: &str) -> (f64, f64) {
-    let fault = fault(test, name, axes).unwrap_or_else(|| panic!("no {name} of {axes}: {test}"));
-    let values = fault["values"].as_array().unwrap();
-    let value = values.iter().find(|value| value["id"] == id).unwrap();
+    let Some(fault) = fault(test, name, axes) else { panic!("no {name} of {axes}: {test}") };
+    let value = fault["values"].as_array().unwrap().iter().find(|value| value["id"] == id).unwrap();
     (value["value"].as_f64().unwrap(), value["u"].as_f64().unwrap())
 }
 
@@ -394,11 +390,9 @@ fn a_short_arc_is_reported_as_an_arc() {
     assert!((um(&test, "arc_deg") - 120.0).abs() < 0.6, "{test}");
     assert!(test.get("diagnosis").is_none(), "{test}");
     let undetermined = test["not_identifiable"].to_string();
-    assert!(
-        undetermined.contains("ISO 230-4 requires a full circle")
-            && undetermined.contains("an arc of 120° is too short"),
-        "{undetermined}"
-    );
+    for reason in ["ISO 230-4 requires a full circle", "an arc of 120° is too short"] {
+        assert!(undetermined.contains(reason), "{undetermined}");
+    }
     // 40 µm/m of X alone, from the centre of the set-up: 40·cos²θ·R, between 30° and 90°.
     let direction = &test["directions"][0];
     assert!((um(direction, "circular_deviation_um") - 3.0).abs() < 0.06, "{test}");

@@ -85,7 +85,7 @@ fn the_set_up_of_the_balls_is_in_the_uncertainty_of_d_and_f() {
     const AMPLITUDE_UM: f64 = 20.0;
     let nominal = RADIUS.hypot(HEIGHT);
     let (up, out) = (HEIGHT / nominal, RADIUS / nominal);
-    // The centre takes up the spindle ball across the axis, and along the path the workpiece ball is not measured.
+    // The centre absorbs the spindle ball across the axis, and along the path the workpiece ball is not measured.
     let expected_um =
         1e3 * (up * U_SPINDLE[2]).hypot(up * U_WORKPIECE[2]).hypot(out * U_WORKPIECE[1]).hypot(U_BAR).hypot(NOISE);
     let mut random = Pcg64::seed_from_u64(6);
@@ -123,7 +123,7 @@ fn the_set_up_of_the_balls_is_in_the_uncertainty_of_d_and_f() {
     }
 }
 
-/// A ball without a prior leaves D and F undecided, unless the centre takes up what is unknown.
+/// A ball without a prior leaves D and F undecided, unless the centre absorbs what is unknown.
 #[test]
 fn an_unknown_ball_leaves_a_figure_undecided_only_where_it_moves_it() {
     let mut session = session(75.0, 1, |c, _| length(c, 75.0, [0.0; 3], [0.0; 3]) + 0.01);
@@ -171,7 +171,7 @@ fn error_motions_need_a_radial_bar() {
             let motions = [direction.synchronous_error_motion_um, direction.asynchronous_error_motion_um];
             assert_eq!(motions.map(|motion| motion.is_some()), [is_radial; 2], "{height}: {direction:?}");
             for (motion, expected) in motions.into_iter().zip([8.0, 3.0]) {
-                // Both ends of the turn count, so that the centre takes up a part of the second harmonic.
+                // Both ends of the turn count, so that the centre absorbs a part of the second harmonic.
                 assert!(motion.is_none_or(|motion| (motion - expected).abs() < 0.15), "{motion:?}");
             }
         }
