@@ -1,13 +1,13 @@
 //! Many sessions of many machines: the analysis of one session as the unit of work, and the folder of results.
 //!
-//! - [`unit`](mod@unit): fit, trace and validation of one session, with its [`options`]; its key is the SHA-256 of all inputs and
-//!   options;
+//! - [`unit`](mod@unit): fit, trace and validation of one session, with its [`options`]; its key is the SHA-256 of all
+//!   inputs and options;
 //! - [`record`]: the result of one session, as JSON has it;
 //! - [`store`]: a folder of records, each written completely or not at all;
 //! - [`study`]: simulated sessions and their analysis;
 //! - [`list`]: session files from files, folders and lists;
-//! - [`history`]: the machines of a folder over time; [`conformity`]: their decisions; [`compensations`]: the file of known
-//!   ones; [`date`]: the date of a session.
+//! - [`history`]: the machines of a folder over time; [`conformity`]: their decisions; [`compensations`]: the file of
+//!   known ones; [`date`]: the date of a session.
 //!
 //! The unit of work depends on nothing but its inputs: any process may do it, at any time and in any order.
 

@@ -285,8 +285,8 @@ fn scatter_is_no_change() {
     }
 }
 
-/// Half a year of a small fleet: a drift far above the noise is found, although few sessions determine the scatter badly,
-/// and a drifting machine does not pass for a scattering one.
+/// Half a year of a small fleet: a drift far above the noise is found, although few sessions determine the scatter
+/// badly, and a drifting machine does not pass for a scattering one.
 #[test]
 fn a_large_drift_of_a_small_fleet_is_found() {
     let mut random = Pcg64::seed_from_u64(29);

@@ -115,9 +115,9 @@ pub fn minimise(
                     iterations: iteration,
                 });
             }
-            // A direction may be determined so poorly that a step along it changes the sum of squares by less than rounding,
-            // while it is no small step. Successive steps decide then: the minimum is reached when they
-            // no longer shrink by half.
+            // A direction may be determined so poorly that a step along it changes the sum of squares by less than
+            // rounding, while it is no small step. Successive steps decide then: the minimum is reached when they no
+            // longer shrink by half.
             let rounded = damping == 0.0 && directions.explained(&c) < ROUNDING_OF_SUM * current;
             if rounded && iteration > 1 && relative < LINEAR_RELATIVE_STEP && relative > 0.5 * step_before {
                 converged = true;
@@ -173,9 +173,10 @@ pub fn minimise(
 mod tests {
     use super::*;
 
-    /// Beside residuals of 10⁴ standard deviations, steps of 10⁻⁴ along `x` change the part `(y₁ − eˣ)² + (y₂ − e²ˣ)²` of
-    /// the sum of squares by less than the rounding of the sum. With `y₁ = 3/2` and `y₂ = 3/4` its minimum is `x = 0`: with `t = eˣ` it solves `2t³ + t(1 − 2y₂) = y₁`.
-    /// The residual stays, so that each step is about a tenth of the step before.
+    /// Beside residuals of 10⁴ standard deviations, steps of 10⁻⁴ along `x` change the part `(y₁ − eˣ)² + (y₂ − e²ˣ)²`
+    /// of the sum of squares by less than the rounding of the sum. With `y₁ = 3/2` and `y₂ = 3/4` its minimum is `x = 0`:
+    /// with `t = eˣ` it solves `2t³ + t(1 − 2y₂) = y₁`. The residual stays, so that each step is about a tenth of the
+    /// step before.
     struct Poorly;
 
     impl Poorly {

@@ -1,6 +1,5 @@
 //! Studies: sessions simulated by plans × effects × noise, and analysed. A draw is one piece of work: it follows from
-//! the
-//! study file, the plans and its number alone.
+//! the study file, the plans and its number alone.
 //!
 //! - [`file`](mod@file): the study file; [`draw`]: one simulated session and what the analysis makes of it;
 //! - [`summary`]: power, false claims and coverage with their sampling errors.

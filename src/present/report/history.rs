@@ -16,21 +16,16 @@ use crate::present::html::table;
 use crate::present::table::Table;
 
 /// Method of a history.
-const METHOD: &str = "The value of a parameter in a session has the standard uncertainty of the session's fit, \
-enlarged by \
-     the scatter between neighbouring sessions of all parameters of the machine where that is larger. A parameter over time has a level, \
-     perhaps a \
-     drift, and steps. The test of no change compares the best drift or step with a level alone; its p value counts \
-     all positions \
-     of a step (Bonferroni). The procedure of Benjamini and Hochberg (1995) bounds the rate of false claims over all \
-     parameters of \
-     all machines. Levels, drifts and steps of one machine are estimated together by generalised least squares with \
-     the covariances \
-     of its sessions. A change is a compensation if it agrees with the known tables (p at least 0.001, and a cosine of at least 0.9). Control \
-     charts: Shewhart with \
-     limits of 3 standard deviations, EWMA with weight 0.2 and limits of 2.962 (Lucas and Saccucci 1990), about the \
-     mean of the first \
-     six sessions, and again after each step.";
+const METHOD: &str = "The value of a parameter in a session has the standard uncertainty of the fit, enlarged by the \
+     scatter between neighbouring sessions, less the drift, of all parameters of all machines where that is \
+     larger, or of the machine or the parameter where that is significantly larger. A parameter over time has \
+     a level, perhaps a drift, and steps. The test of no change compares the best drift or step with a level \
+     alone; its p value counts all positions of a step (Bonferroni). The procedure of Benjamini and Hochberg \
+     (1995) bounds the rate of false claims over all parameters of all machines. Levels, drifts and steps of \
+     one machine are estimated together by generalised least squares with the covariances of its sessions. A \
+     change is a compensation if it agrees with the known tables (p at least 0.001, and a cosine of at least \
+     0.9). Control charts: Shewhart with limits of 3 standard deviations, EWMA with weight 0.2 and limits of \
+     2.962 (Lucas and Saccucci 1990), about the mean of the first six sessions, and again after each step.";
 
 /// Days of a year in the figures.
 const DAYS_PER_YEAR: f64 = 365.25;

@@ -8,8 +8,8 @@
 //! | body of the workpiece side | bodies of the tool side and of the bed |
 //! | body of the tool side | bodies of the bed |
 //!
-//! Bodies of one side are not compared with each other, and two parts without a moving axis between them only once. Between two states of a test, axes are interpolated around the
-//! state with the least clearance.
+//! Bodies of one side are not compared with each other, and two parts without a moving axis between them only once.
+//! Between two states of a test, axes are interpolated around the state with the least clearance.
 
 mod along;
 mod parts;
