@@ -5,7 +5,7 @@ import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { join } from "node:path";
 import { unzipSync } from "fflate";
-import { analysed, command, opened, root, shared } from "./page.mjs";
+import { analysed, command, fragmentAfter, opened, root, shared } from "./page.mjs";
 
 const own = shared();
 
@@ -99,12 +99,8 @@ test("from slider to picture, four tests of 721 readings with patterns of eight 
 
 test("a plan is shared by its address, saved as a folder, and opened in Analyse", async () => {
   const { page, wrong } = await explorer(own.server.address);
-  await slide(page, "EY0C", 7);
-  await page.waitForFunction(() => location.hash.startsWith("#plan="));
-  const before = new URL(page.url()).hash;
-  await page.getByLabel("bar, mm").fill("101.5");
-  await page.waitForFunction((before) => location.hash !== before, before);
-  const address = page.url();
+  await fragmentAfter(page, () => slide(page, "EY0C", 7));
+  const address = own.server.address + (await fragmentAfter(page, () => page.getByLabel("bar, mm").fill("101.5")));
   const download = page.waitForEvent("download");
   await page.getByRole("button", { name: "Save as a session folder" }).click();
   const files = unzipSync(new Uint8Array(readFileSync(await (await download).path())));

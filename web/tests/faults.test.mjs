@@ -7,7 +7,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { test } from "node:test";
 import { zipSync } from "fflate";
-import { abbe, analysed, filesOf, give, hermle, opened, root, saved, shared } from "./page.mjs";
+import { abbe, analysed, filesOf, fragmentAfter, give, hermle, opened, root, saved, shared } from "./page.mjs";
 
 const own = shared();
 const rTest = join(root, "sessions/r-test/measured");
@@ -113,9 +113,7 @@ test("an address with a part missing is told, and another address in the same ta
   const { page, wrong } = await opened(own.chromium, own.server.address);
   await page.getByRole("tab", { name: "Explore" }).click();
   await analysed(page);
-  await page.getByLabel("bar, mm").fill("101.5");
-  await page.waitForFunction(() => location.hash.startsWith("#plan="));
-  const whole = new URL(page.url()).hash;
+  const whole = await fragmentAfter(page, () => page.getByLabel("bar, mm").fill("101.5"));
   await page.close();
   for (const broken of [whole.slice(0, 200), "#plan=", "#plan=%00<b>", `#plan=${"A".repeat(1 << 19)}`]) {
     const { page } = await opened(own.chromium, own.server.address + broken);

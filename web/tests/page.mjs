@@ -79,6 +79,15 @@ export const hermle = join(root, "sessions/hermle-c600u/measured");
 /** Waits until Explore shows a plan with its analysis. */
 export const analysed = (page) => page.getByText(/Rank \d+ of/).waitFor();
 
+/** The fragment of the address that holds a plan after a change. It is written some time after each change. */
+export async function fragmentAfter(page, change) {
+  await page.waitForFunction(() => location.hash.startsWith("#plan="));
+  const before = await page.evaluate(() => location.hash);
+  await change();
+  await page.waitForFunction((before) => location.hash !== before, before);
+  return page.evaluate(() => location.hash);
+}
+
 /** A page that collects what it should not do: requests to elsewhere, errors, violated policies. */
 export async function opened(browser, address, options = {}) {
   const page = await browser.newPage(options);
