@@ -1,11 +1,26 @@
 //! Tables and sentences as HTML. All text passes through templates that escape markup.
 
-use maud::{Markup, html};
+use maud::{Markup, PreEscaped, html};
 
 use super::table::{Align, Table};
 
 /// A word column with a longer cell than this wraps.
 const MAX_UNWRAPPED: usize = 26;
+
+/// The head of a page that stands alone: its policy, title and style.
+pub fn head(policy: &str, title: &str, style: &str) -> Markup {
+    html! {
+        head {
+            meta charset="utf-8";
+            meta http-equiv="Content-Security-Policy" content=(policy);
+            meta name="viewport" content="width=device-width, initial-scale=1";
+            meta name="generator" content=(concat!("abbe ", env!("CARGO_PKG_VERSION")));
+            link rel="icon" href="data:,";
+            title { (title) }
+            style { (PreEscaped(style)) }
+        }
+    }
+}
 
 /// The table under its title. Columns of words are aligned to the left, columns of numbers to the right.
 pub fn table(table: &Table) -> Markup {

@@ -3,12 +3,12 @@
 use abbe::identify::plan::sheet::{AxisRange, PlacedPoint, TestSheet};
 use abbe::model::session::Session;
 use abbe::model::words::counted;
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{DOCTYPE, Markup, html};
 
 use super::figure::set_up::SetUps;
 use super::figure::svg::{LIGHT, STYLE, element};
 use super::figure::{Chart, Figure};
-use super::html::{table, with_minus_signs};
+use super::html::{head, table, with_minus_signs};
 use super::number::unit;
 use super::table::{Cell, Table, cells};
 
@@ -33,15 +33,7 @@ pub fn html(
     let page = html! {
         (DOCTYPE)
         html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta http-equiv="Content-Security-Policy" content=(POLICY);
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="generator" content=(concat!("abbe ", env!("CARGO_PKG_VERSION")));
-                link rel="icon" href="data:,";
-                title { (title) }
-                style { (PreEscaped(style)) }
-            }
+            (head(POLICY, &title, &style))
             body {
                 (overview(session, sheets, source, warnings))
                 @for (number, sheet) in sheets.iter().enumerate() {

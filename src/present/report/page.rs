@@ -8,7 +8,7 @@ use super::provenance::Provenance;
 use crate::present::csv;
 use crate::present::figure::file_name;
 use crate::present::figure::svg::{DARK, LIGHT, STYLE};
-use crate::present::html::{capitalised, list, prose, table};
+use crate::present::html::{capitalised, head, list, prose, table};
 use crate::present::table::{Table, cells};
 
 const SCRIPT: &str = include_str!("page.js");
@@ -26,15 +26,7 @@ pub fn html(document: &Document, provenance: &Provenance) -> Result<String, Stri
     let page = html! {
         (DOCTYPE)
         html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta http-equiv="Content-Security-Policy" content=(POLICY);
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="generator" content=(concat!("abbe ", env!("CARGO_PKG_VERSION")));
-                link rel="icon" href="data:,";
-                title { (document.title) }
-                style { (PreEscaped(style())) }
-            }
+            (head(POLICY, &document.title, &style()))
             body {
                 header {
                     h1 { (document.title) }
