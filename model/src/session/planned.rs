@@ -96,7 +96,7 @@ pub(crate) fn many_turns(machine: &Machine, readings: &Readings) -> Option<Strin
         let farthest = positions.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
         (axis.kind == AxisKind::Rotary && turns(&farthest) > MANY_TURNS).then(|| {
             format!(
-                "axis `{}` goes to {:.3} deg, {:.0} turns from zero: are its positions in degrees rather than radians?",
+                "axis `{}` goes to {:.3} deg, {:.0} turns from zero, as degrees in a column of radians would",
                 axis.name,
                 axis.kind.to_display(farthest),
                 turns(&farthest),
