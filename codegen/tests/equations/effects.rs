@@ -23,7 +23,11 @@ struct Ball;
 
 impl Source for Ball {
     fn subject<N: Nominal>(&self, _length: &impl Fn(&str) -> N) -> Subject<N> {
-        Subject::Station(Station::Socket(Socket { ball: [N::constant(0.0); 3], socket: [N::constant(0.0); 3] }))
+        Subject::Station(Station::Socket(Socket {
+            ball: [N::constant(0.0); 3],
+            socket: [N::constant(0.0); 3],
+            is_located: true,
+        }))
     }
 }
 

@@ -74,6 +74,7 @@ impl Source for Batch {
         Subject::Station(Station::Socket(Socket {
             ball: self.coordinates(["P", "Q", "U", "V"].map(length)),
             socket: [N::constant(0.0); 3],
+            is_located: true,
         }))
     }
 }

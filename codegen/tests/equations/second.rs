@@ -36,6 +36,7 @@ impl Source for AnySocket {
         Subject::Station(Station::Socket(Socket {
             ball: [length("S_x"), length("S_y"), length("S_z")],
             socket: [400.0, 100.0, 60.0].map(N::constant),
+            is_located: true,
         }))
     }
 }

@@ -82,6 +82,11 @@ pub trait SetUpReader {
     /// # Errors
     /// If it is absent or not three lengths.
     fn point(&mut self, key: &'static str, what: &str) -> Result<[Written; 3], ModelError>;
+    /// A point that need not be stated.
+    ///
+    /// # Errors
+    /// If it is not three lengths.
+    fn stated_point(&mut self, key: &'static str) -> Result<Option<[Written; 3]>, ModelError>;
     /// A direction of three numbers, normalised to unit length.
     ///
     /// # Errors

@@ -41,6 +41,11 @@ pub(super) const ENTRY: Entry = Entry {
         SetUpKey::new("ball_mm", SetUpForm::Point, "socket: ball in the tool frame"),
         SetUpKey::new("ball_u_um", SetUpForm::Uncertainties, ""),
         SetUpKey::new("socket", SetUpForm::Text, "socket: the socket of all poses of the test"),
+        SetUpKey::new(
+            "socket_mm",
+            SetUpForm::Point,
+            "socket: where it is in R, for plans; default: the mean of the poses in the data",
+        ),
     ],
     read,
 };
@@ -53,8 +58,14 @@ fn read(keys: &mut dyn SetUpReader) -> Result<SetUp, ModelError> {
     let mut priors = vec![Prior::Free; 3];
     priors.extend(keys.priors("ball_u_um", 3)?);
     let name = keys.text("socket")?;
-    let socket = [0.0; 3].map(Written::number);
-    Ok(SetUp { station: Station::Socket(Socket { ball, socket }), priors, socket: name })
+    let stated = keys.stated_point("socket_mm")?;
+    if stated.is_some() && name.is_none() {
+        let help = "add `socket = \"…\"`, the name of the socket of all poses of the test";
+        return Err(keys.fault("socket_mm", "`socket_mm` without the name of the socket".into(), help));
+    }
+    let is_located = stated.is_some();
+    let socket = stated.unwrap_or_else(|| [0.0; 3].map(Written::number));
+    Ok(SetUp { station: Station::Socket(Socket { ball, socket, is_located }), priors, socket: name })
 }
 
 /// A ball and its socket, mm.
@@ -64,13 +75,15 @@ pub struct Socket<N> {
     pub ball: [N; 3],
     /// Centre of the socket in R.
     pub socket: [N; 3],
+    /// Whether that centre is known: stated, or the mean of poses.
+    pub is_located: bool,
 }
 
 impl<N> Geometry<N> for Socket<N> {
     type Over<M> = Socket<M>;
 
     fn map<M>(&self, to: &impl Fn(&N) -> M) -> Socket<M> {
-        Socket { ball: point(&self.ball, to), socket: point(&self.socket, to) }
+        Socket { ball: point(&self.ball, to), socket: point(&self.socket, to), is_located: self.is_located }
     }
     /// The closure: ball less socket, mm.
     fn reading<S: Scalar<Nominal = N>>(
@@ -105,7 +118,7 @@ impl Instrument for Socket<f64> {
     /// The mean of the points.
     fn placed(&self, points: &[Vector3<f64>], _: &[Vector3<f64>]) -> Option<Station<f64>> {
         let mean = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
-        let socket = Socket { socket: [mean.x, mean.y, mean.z], ..self.clone() };
+        let socket = Socket { socket: [mean.x, mean.y, mean.z], is_located: true, ..self.clone() };
         (!points.is_empty()).then_some(Station::Socket(socket))
     }
 }

@@ -29,7 +29,7 @@ fn station() -> impl Strategy<Value = Station<f64>> {
     (point(), point(), 0_usize..5).prop_map(move |(table, tool, kind)| match kind {
         0 => Station::BallBar(BallBar { workpiece_ball: table, spindle_ball: tool, bar: 100.0 }),
         1 => Station::Tracker(Tracker { target: tool, rotation: turned, origin: table }),
-        2 => Station::Socket(Socket { ball: tool, socket: table }),
+        2 => Station::Socket(Socket { ball: tool, socket: table, is_located: true }),
         kind => Station::RTest(RTest {
             setting: if kind == 3 { Setting::Table } else { Setting::Spindle },
             workpiece_ball: table,

@@ -46,6 +46,14 @@ impl<'a> Keys<'_, '_, 'a> {
         let (length, mm) = self.context.length(value)?;
         Ok(Written { length, mm })
     }
+
+    fn three_lengths(&self, value: Value<'_>) -> Result<[Written; 3], ModelError> {
+        let mut point = [const { Written::number(0.0) }; 3];
+        for (coordinate, item) in point.iter_mut().zip(&value.three("a list of three lengths")?) {
+            *coordinate = self.written(item)?;
+        }
+        Ok(point)
+    }
 }
 
 impl SetUpReader for Keys<'_, '_, '_> {
@@ -59,12 +67,12 @@ impl SetUpReader for Keys<'_, '_, '_> {
     }
 
     fn point(&mut self, key: &'static str, what: &str) -> Result<[Written; 3], ModelError> {
-        let items = self.table.require(key, what)?.three("a list of three lengths")?;
-        let mut point = [const { Written::number(0.0) }; 3];
-        for (coordinate, item) in point.iter_mut().zip(&items) {
-            *coordinate = self.written(item)?;
-        }
-        Ok(point)
+        let value = self.table.require(key, what)?;
+        self.three_lengths(value)
+    }
+
+    fn stated_point(&mut self, key: &'static str) -> Result<Option<[Written; 3]>, ModelError> {
+        self.take(key).map(|value| self.three_lengths(value)).transpose()
     }
 
     fn direction(&mut self, key: &'static str) -> Result<Option<[f64; 3]>, ModelError> {
