@@ -1,11 +1,13 @@
 //! Programs in the plain text of Heidenhain's TNC.
 
-use super::block::Block;
+use super::block::{Block, Positions, before, change, is_rotary};
 use super::iso::{number, plain, simple};
 use super::{Control, Plane, Program};
 
 /// Decimals of a position.
 const DECIMALS: usize = 4;
+/// Largest change of a rotary axis in a block, degrees.
+const LONGEST_TURN_DEG: f64 = 90.0;
 
 /// TNC 640.
 pub(super) struct Heidenhain;
@@ -23,12 +25,44 @@ impl Lines {
     }
 }
 
-fn coordinates(to: &[(char, f64)]) -> String {
-    let sign = |value: f64| if number(value, DECIMALS).starts_with('-') { "" } else { "+" };
-    to.iter().map(|(letter, q)| format!(" {letter}{}{}", sign(*q), number(*q, DECIMALS))).collect()
+/// A number with its sign.
+fn signed(value: f64) -> String {
+    let text = number(value, DECIMALS);
+    if text.starts_with('-') { text } else { format!("+{text}") }
 }
 
-fn block(block: &Block, here: &mut Vec<(char, f64)>, lines: &mut Lines) {
+fn coordinates(to: &Positions) -> String {
+    to.iter().map(|(letter, q)| format!(" {letter}{}", signed(*q))).collect()
+}
+
+/// The blocks of a straight motion: the words of each, and its length, which counts a degree as a millimetre.
+///
+/// An axis whose display is within one turn may go the shorter way to a position. Rotary axes therefore move by a change,
+/// of a quarter of a turn at most: the shorter way is then the programmed one.
+fn straight(from: &Positions, to: &Positions) -> Vec<(String, f64)> {
+    let known = |letter: char, q: f64| before(from, letter).unwrap_or(q);
+    let widest = to.iter().filter(|(letter, _)| is_rotary(*letter)).map(|(letter, q)| (q - known(*letter, *q)).abs());
+    let parts = (widest.fold(0.0, f64::max) / LONGEST_TURN_DEG - 1e-9).ceil().max(1.0) as usize;
+    let at = |part: usize| -> Vec<(char, f64)> {
+        let share = part as f64 / parts as f64;
+        let position =
+            |letter: char, q: f64| if part == parts { q } else { (1.0 - share) * known(letter, q) + share * q };
+        to.iter().map(|(letter, q)| (*letter, position(*letter, *q))).collect()
+    };
+    let part = |part: usize| {
+        // The first part comes from positions of `from`, which may not be known.
+        let (start, end) = (if part == 1 { from.to_vec() } else { at(part - 1) }, at(part));
+        let word = |(letter, q): &(char, f64)| match is_rotary(*letter) && before(&start, *letter).is_some() {
+            true => format!(" I{letter}{}", signed(change(&start, (*letter, *q), DECIMALS))),
+            false => format!(" {letter}{}", signed(*q)),
+        };
+        let squares = end.iter().map(|(letter, q)| (q - before(&start, *letter).unwrap_or(*q)).powi(2));
+        (end.iter().map(word).collect(), squares.sum::<f64>().sqrt())
+    };
+    (1..=parts).map(part).collect()
+}
+
+fn block(block: &Block, lines: &mut Lines) {
     match block {
         Block::Comment(remark) => lines.push(&format!("; {}", plain(remark))),
         Block::Stop(remark) => {
@@ -39,48 +73,34 @@ fn block(block: &Block, here: &mut Vec<(char, f64)>, lines: &mut Lines) {
             lines.push("CYCL DEF 9.0 DWELL TIME");
             lines.push(&format!("CYCL DEF 9.1 DWELL {seconds}"));
         }
-        Block::Line { to, feed } => {
-            lines.push(&format!("L{} R0 F{}", coordinates(to), number(*feed, 3)));
-            moved(here, to);
+        Block::Line { from, to, feed } => {
+            for (words, _) in straight(from, to) {
+                lines.push(&format!("L{words} R0 F{}", number(*feed, 3)));
+            }
         }
         Block::Arc { to, centre_at, counterclockwise, feed, .. } => {
             lines.push(&format!("CC{}", coordinates(&[(to[0].0, centre_at[0]), (to[1].0, centre_at[1])])));
             let turn = if *counterclockwise { "DR+" } else { "DR-" };
             lines.push(&format!("C{} {turn} R0 F{}", coordinates(to), number(*feed, 3)));
-            moved(here, to);
         }
-        Block::Segments { ends, tool_point } => {
+        Block::Segments { from, ends, tool_point } => {
             if *tool_point {
                 lines.push("FUNCTION TCPM F CONT AXIS POS PATHCTRL AXIS");
             }
+            let mut from = from;
             for (to, seconds) in ends {
-                // The feed counts a degree as a millimetre, over all axes of a block.
-                let length = to
-                    .iter()
-                    .map(|(letter, q)| {
-                        let before = here.iter().find(|(other, _)| other == letter).map_or(*q, |(_, q)| *q);
-                        (q - before).powi(2)
-                    })
-                    .sum::<f64>()
-                    .sqrt();
-                let feed =
-                    if length > 0.0 { format!(" F{}", number(60.0 * length / seconds, 3)) } else { String::new() };
-                lines.push(&format!("L{} R0{feed}", coordinates(to)));
-                moved(here, to);
+                let parts = straight(from, to);
+                let each = seconds / parts.len() as f64;
+                for (words, length) in parts {
+                    let feed =
+                        if length > 0.0 { format!(" F{}", number(60.0 * length / each, 3)) } else { String::new() };
+                    lines.push(&format!("L{words} R0{feed}"));
+                }
+                from = to;
             }
             if *tool_point {
                 lines.push("FUNCTION RESET TCPM");
             }
-        }
-    }
-}
-
-/// Keeps the positions of the axes.
-fn moved(here: &mut Vec<(char, f64)>, to: &[(char, f64)]) {
-    for (letter, position) in to {
-        match here.iter_mut().find(|(other, _)| other == letter) {
-            Some((_, own)) => *own = *position,
-            None => here.push((*letter, *position)),
         }
     }
 }
@@ -115,8 +135,7 @@ impl Control for Heidenhain {
         let mut lines = Lines { text: String::new(), number: 0 };
         lines.push(&format!("BEGIN PGM {} MM", program.name));
         program.title.iter().for_each(|line| lines.push(&format!("; {}", plain(line))));
-        let mut here = Vec::new();
-        program.blocks.iter().for_each(|own| block(own, &mut here, &mut lines));
+        program.blocks.iter().for_each(|own| block(own, &mut lines));
         lines.push(&format!("END PGM {} MM", program.name));
         lines.text
     }

@@ -1,6 +1,6 @@
 //! Programs in G codes after ISO 6983-1, as LinuxCNC, Fanuc and SINUMERIK read them.
 
-use super::block::Block;
+use super::block::{Block, Positions, change, is_rotary, turns};
 use super::{Control, Plane, Program};
 
 /// What differs between controls that read G codes.
@@ -10,6 +10,7 @@ pub(super) struct Iso {
     source: &'static str,
     decimals: usize,
     is_run: bool,
+    turning: Turning,
     /// First and last block of the function that holds the tool point over the table.
     tool_point: Option<[&'static str; 2]>,
     name: fn(usize, &str) -> String,
@@ -22,6 +23,15 @@ pub(super) struct Iso {
     main: fn(&[(String, String)]) -> String,
 }
 
+/// How a motion of a rotary axis is written, so that it goes the programmed way on an axis whose positions are counted
+/// within one turn.
+enum Turning {
+    /// All words of the block are changes, between G91 and G90.
+    Block,
+    /// The words of rotary axes are changes, as IC.
+    Word,
+}
+
 /// LinuxCNC 2.9: RS274/NGC.
 pub(super) static LINUXCNC: Iso = Iso {
     word: "linuxcnc",
@@ -29,6 +39,7 @@ pub(super) static LINUXCNC: Iso = Iso {
     source: "LinuxCNC 2.9, G-Code Reference; O Codes; M-Codes (M70, M72)",
     decimals: 6,
     is_run: true,
+    turning: Turning::Block,
     tool_point: None,
     name: |_, test| simple(test, '_').to_lowercase(),
     comment: |text| format!("({})", plain(text)),
@@ -50,6 +61,7 @@ pub(super) static FANUC: Iso = Iso {
     source: "FANUC Series 30i/31i/32i-MODEL B Operator's Manual B-64484EN (G codes), custom macro (#4001 to #4008, G65)",
     decimals: 4,
     is_run: false,
+    turning: Turning::Block,
     tool_point: Some(["G43.4 H#4111", "G49"]),
     name: |_, test| simple(test, '_'),
     comment: |text| format!("({})", plain(text).to_uppercase()),
@@ -79,6 +91,7 @@ pub(super) static SIEMENS: Iso = Iso {
     source: "SINUMERIK 840D sl / 828D Programming Manual Fundamentals (G93, G2/G3, MSG), Job Planning (PROC SAVE, TRAORI)",
     decimals: 6,
     is_run: false,
+    turning: Turning::Word,
     tool_point: Some(["TRAORI", "TRAFOOF"]),
     name: |number, test| {
         let name = simple(test, '_').to_uppercase();
@@ -124,12 +137,32 @@ impl Iso {
         to.iter().map(|(letter, position)| format!(" {letter}{}", number(*position, self.decimals))).collect()
     }
 
+    /// The words of a motion in which rotary axes turn.
+    fn turned(&self, from: &Positions, to: &Positions) -> String {
+        let word = |(letter, position): &(char, f64)| {
+            let change = number(change(from, (*letter, *position), self.decimals), self.decimals);
+            match self.turning {
+                Turning::Block => format!(" {letter}{change}"),
+                Turning::Word if is_rotary(*letter) => format!(" {letter}=IC({change})"),
+                Turning::Word => format!(" {letter}{}", number(*position, self.decimals)),
+            }
+        };
+        to.iter().map(word).collect()
+    }
+
     fn block(&self, block: &Block, text: &mut String) {
         match block {
             Block::Comment(remark) => *text += &(self.comment)(remark),
             Block::Stop(remark) => *text += &(self.stop)(remark),
             Block::Dwell(seconds) => *text += &(self.dwell)(*seconds),
-            Block::Line { to, feed } => *text += &format!("G1{} F{}", self.words(to), number(*feed, 3)),
+            Block::Line { from, to, feed } if turns(from, to) => {
+                let words = format!("G1{} F{}", self.turned(from, to), number(*feed, 3));
+                *text += &match self.turning {
+                    Turning::Block => format!("G91 {words}\nG90"),
+                    Turning::Word => words,
+                };
+            }
+            Block::Line { to, feed, .. } => *text += &format!("G1{} F{}", self.words(to), number(*feed, 3)),
             Block::Arc { plane, to, centre, counterclockwise, feed, .. } => {
                 let (plane, [first, second]) = match plane {
                     Plane::Xy => ("G17", ['I', 'J']),
@@ -144,16 +177,22 @@ impl Iso {
                     number(*feed, 3)
                 );
             }
-            Block::Segments { ends, tool_point } => {
+            Block::Segments { from, ends, tool_point } => {
                 let around = self.tool_point.filter(|_| *tool_point);
                 if let Some([first, _]) = around {
                     *text += &format!("{first}\n");
                 }
-                *text += "G93\n";
+                let [first, last] = match self.turning {
+                    Turning::Block => ["G91 G93\n", "G90 G94"],
+                    Turning::Word => ["G93\n", "G94"],
+                };
+                *text += first;
+                let mut from = from;
                 for (to, seconds) in ends {
-                    *text += &format!("G1{} F{}\n", self.words(to), number(60.0 / seconds, 6));
+                    *text += &format!("G1{} F{}\n", self.turned(from, to), number(60.0 / seconds, 6));
+                    from = to;
                 }
-                *text += "G94";
+                *text += last;
                 if let Some([_, last]) = around {
                     *text += &format!("\n{last}");
                 }

@@ -245,8 +245,10 @@ impl Leg {
         match &self.shape {
             Shape::Line(feed) => pairs
                 .map(|(from, to)| {
-                    let moved = (0..letters.len()).filter(|axis| from[*axis] != to[*axis]);
-                    Block::Line { to: moved.map(|axis| display(axis, to)).collect(), feed: *feed }
+                    let moved = |state: &[f64]| -> Vec<(char, f64)> {
+                        (0..letters.len()).filter(|k| from[*k] != to[*k]).map(|axis| display(axis, state)).collect()
+                    };
+                    Block::Line { from: moved(from), to: moved(to), feed: *feed }
                 })
                 .collect(),
             Shape::Arc { plane, axes, centre, counterclockwise, feed } => pairs
@@ -262,25 +264,28 @@ impl Leg {
             Shape::Segments { seconds, tool_points: None } => {
                 let moves = |axis: &usize| self.vertices.iter().any(|state| state[*axis] != self.vertices[0][*axis]);
                 let moving: Vec<usize> = (0..letters.len()).filter(moves).collect();
-                let end = |to: &Vec<f64>| (moving.iter().map(|axis| display(*axis, to)).collect(), *seconds);
-                vec![Block::Segments { ends: pairs.map(|(_, to)| end(to)).collect(), tool_point: false }]
+                let at = |state: &[f64]| moving.iter().map(|axis| display(*axis, state)).collect();
+                vec![Block::Segments {
+                    from: order.first().map(|first| at(&self.vertices[*first])).unwrap_or_default(),
+                    ends: pairs.map(|(_, to)| (at(to), *seconds)).collect(),
+                    tool_point: false,
+                }]
             }
             Shape::Segments { seconds, tool_points: Some(points) } => {
                 let rotary: Vec<usize> =
                     (0..letters.len()).filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary).collect();
-                let end = |number: usize, seconds: f64| {
+                let at = |number: usize| -> Vec<(char, f64)> {
                     let linear = ['X', 'Y', 'Z'].into_iter().zip(points[number]);
-                    let turned = rotary.iter().map(|axis| display(*axis, &self.vertices[number]));
-                    (linear.chain(turned).collect::<Vec<_>>(), seconds)
+                    linear.chain(rotary.iter().map(|axis| display(*axis, &self.vertices[number]))).collect()
                 };
                 let same = |p: &[f64; 3]| (0..3).all(|i| (p[i] - points[0][i]).abs() < 1e-7);
                 let count = order.len() - 1;
                 // A tool point that stays over its place of the table needs one block.
                 let ends = match points.iter().all(same) {
-                    true => vec![end(order[count], seconds * count as f64)],
-                    false => order[1..].iter().map(|number| end(*number, *seconds)).collect(),
+                    true => vec![(at(order[count]), seconds * count as f64)],
+                    false => order[1..].iter().map(|number| (at(*number), *seconds)).collect(),
                 };
-                vec![Block::Segments { ends, tool_point: true }]
+                vec![Block::Segments { from: at(order[0]), ends, tool_point: true }]
             }
         }
     }

@@ -126,7 +126,7 @@ impl Writer<'_> {
 
     fn line(&self, to: Vec<(char, f64)>, blocks: &mut Vec<Block>) {
         if !to.is_empty() {
-            blocks.push(Block::Line { to, feed: self.options.approach_feed });
+            blocks.push(Block::Line { from: Vec::new(), to, feed: self.options.approach_feed });
         }
     }
 
@@ -183,7 +183,16 @@ impl Writer<'_> {
         draft.blocks.push(Block::Stop(
             "Take the bar off. Move the tool clear of table and fixtures. The axes turn to the start".into(),
         ));
-        self.line(self.all(start, AxisKind::Rotary), &mut draft.blocks);
+        let turned = self.all(start, AxisKind::Rotary);
+        // A control that counts within one turn may take another place for such a position.
+        let is_beyond = turned.iter().any(|(_, q)| !(0.0..360.0).contains(q));
+        let stand = |(letter, q): &(char, f64)| format!("{letter} {}", (q * 1e4).round() / 1e4 + 0.0);
+        let stand: Vec<String> = turned.iter().map(stand).collect();
+        self.line(turned, &mut draft.blocks);
+        if is_beyond {
+            let check = format!("Check that the axes stand at {} deg, or whole turns from there", stand.join(", "));
+            draft.blocks.push(Block::Stop(check));
+        }
         let mut here: Option<Vec<f64>> = None;
         let centre = self.bar().filter(|_| ball_bar && !centred).and_then(|bar| {
             let centre = self.within(positions_for_bar(self.machine, &bar, start, [0.0; 3])?)?;

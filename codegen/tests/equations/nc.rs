@@ -16,7 +16,7 @@ use abbe_model::session::{Session, Test};
 use nalgebra::DVector;
 
 use crate::tools::{self, folder};
-use decode::{Move, Positions, canonical, of_g_codes, of_plain_text};
+use decode::{Counting, Move, Positions, canonical, of_g_codes, of_plain_text};
 
 fn bar_of(test: &Test) -> BallBar<f64> {
     BallBar {
@@ -162,7 +162,7 @@ fn the_interpreter_of_linuxcnc_keeps_the_bar() {
             let moves = canonical(&rs274(&interpreter, &place, name));
             holds_the_plan(&session, test, &moves, 1e-4);
             // The parser of this file sees the same motions.
-            let own = of_g_codes(text);
+            let own = of_g_codes(text, Counting::Turns);
             assert_eq!(own.len(), moves.len(), "{name}");
             all += moves.len();
         }
@@ -181,8 +181,11 @@ fn the_other_controls_get_the_same_motion() {
             assert_eq!(files.len(), session.tests.len() + 1);
             assert_eq!(files[0].0, format!("main.{}", control.extension()));
             for ((name, text), test) in files[1..].iter().zip(&session.tests) {
-                let moves = if control.word() == "heidenhain" { of_plain_text(text) } else { of_g_codes(text) };
-                holds_the_plan(&session, test, &moves, 0.1_f64.powi(control.decimals() as i32));
+                // However the control counts rotary axes.
+                for counting in Counting::ALL {
+                    let decoded = if control.word() == "heidenhain" { of_plain_text } else { of_g_codes };
+                    holds_the_plan(&session, test, &decoded(text, counting), 0.1_f64.powi(control.decimals() as i32));
+                }
                 let called = name.split_once('.').unwrap().0;
                 let number =
                     format!("G65 P{}", 1001 + session.tests.iter().position(|own| own.name == test.name).unwrap());
@@ -193,6 +196,30 @@ fn the_other_controls_get_the_same_motion() {
     std::fs::remove_dir_all(place).unwrap();
 }
 
+/// The positions of the manuals' examples: TNC 640 (M126, M127), Series 16i B-63534EN, 20.2.1 (ROAx with RABx 0).
+#[test]
+fn axes_within_one_turn_go_as_the_manuals_say() {
+    for (counting, from, stated, change) in [
+        (Counting::Turns, 350.0, 10.0, -340.0),
+        (Counting::Line, 350.0, 10.0, -340.0),
+        (Counting::Line, 10.0, 340.0, 330.0),
+        (Counting::Shorter, 350.0, 10.0, 20.0),
+        (Counting::Shorter, 10.0, 340.0, -30.0),
+        (Counting::Shorter, 0.0, -150.0, -150.0),
+        (Counting::Shorter, 210.0, 540.0, -30.0),
+        (Counting::Shorter, 180.0, -620.0, -80.0),
+        (Counting::Sign, 10.0, -340.0, -30.0),
+        (Counting::Sign, 350.0, 10.0, 20.0),
+    ] {
+        let found = counting.reached(from, stated) - from;
+        assert!((found - change).abs() < 1e-9, "{counting:?}: {from} to {stated} by {found}");
+    }
+    // A whole turn by its end is none.
+    let program = "G1 C0. F1000.\nG1 C360. F1000.\n";
+    let end = |counting: Counting| of_g_codes(program, counting)[1].points.last().unwrap()[&'C'];
+    assert_eq!(Counting::ALL.map(end), [360.0, 0.0, 0.0, 0.0]);
+}
+
 #[test]
 fn programs_as_they_are_printed() {
     let place = folder("printed");
@@ -200,7 +227,9 @@ fn programs_as_they_are_printed() {
     for control in nc::CONTROLS {
         let options = NcOptions { overshoot_deg: Some(5.0), chord_error_mm: 0.01, ..NcOptions::default() };
         let files = nc::files(&session, control, &options).unwrap().files;
-        let text = format!("{}\n{}", files[0].1, files[2].1);
+        // A circle in full, and the begin of a table that turns with the linear axes.
+        let turning: String = files[4].1.lines().take(48).map(|line| format!("{line}\n")).collect();
+        let text = format!("{}\n{}\n{turning}", files[0].1, files[2].1);
         let mut settings = insta::Settings::clone_current();
         settings.set_snapshot_path("../../../snapshots");
         settings.set_prepend_module_to_snapshot(false);
@@ -257,7 +286,8 @@ fn the_tool_point_stays_over_its_place_of_the_table() {
         let inside: Vec<&str> =
             text.lines().skip_while(|line| !is(line, first)).take_while(|line| !is(line, last)).collect();
         let motion = inside.iter().find(|line| line.contains(" X")).unwrap().replace('+', "");
-        for position in [" X0.", " Y200.", " Z50."] {
+        let positions = if word == "fanuc" { [" X0.", " Y0.", " Z0."] } else { [" X0.", " Y200.", " Z50."] };
+        for position in positions {
             assert!(motion.contains(position), "{word}: {motion}");
         }
         let count = |code: &str| text.lines().filter(|line| is(line, code)).count();

@@ -11,6 +11,57 @@ pub struct Move {
     pub run: Option<usize>,
 }
 
+/// How a control takes a position that a program states of a rotary axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Counting {
+    /// As it stands: the axis counts its turns.
+    Turns,
+    /// As a place within one turn, reached the shorter way: M126 or `shortestDistance`, ROAx with RABx 0, DC.
+    Shorter,
+    /// As a place within one turn, reached along the line from 0 to 360 degrees: M127, AC.
+    Line,
+    /// As a place within one turn, reached in the direction of the sign: RAAx, the wrapped rotary axis of LinuxCNC.
+    Sign,
+}
+
+impl Counting {
+    pub const ALL: [Counting; 4] = [Counting::Turns, Counting::Shorter, Counting::Line, Counting::Sign];
+
+    /// Where an axis ends, counted in turns from where it is.
+    pub fn reached(self, from: f64, stated: f64) -> f64 {
+        let turn = 360.0;
+        match self {
+            Counting::Turns => stated,
+            Counting::Shorter => from + shorter(stated - from),
+            Counting::Line => from + stated.rem_euclid(turn) - from.rem_euclid(turn),
+            Counting::Sign if stated >= 0.0 => from + (stated - from).rem_euclid(turn),
+            Counting::Sign => from - (from + stated).rem_euclid(turn),
+        }
+    }
+}
+
+/// A change within half a turn; half a turn goes the other way.
+fn shorter(change: f64) -> f64 {
+    let within = change.rem_euclid(360.0);
+    let way = if within > 180.0 { within - 360.0 } else { within };
+    if way == 180.0 { -change.signum() * 180.0 } else { way }
+}
+
+/// Sets the end of an axis. The first stated position of a rotary axis is where the operator finds it.
+fn reach(to: &mut Positions, found: &mut String, counting: Counting, axis: char, value: f64, is_change: bool) {
+    let first = "ABC".contains(axis) && !found.contains(axis);
+    let own = to.get_mut(&axis).unwrap();
+    *own = match is_change {
+        true => *own + value,
+        false if first || "XYZ".contains(axis) => value,
+        false => counting.reached(*own, value),
+    };
+    if first {
+        assert!(!is_change, "{axis} changes before it has a position");
+        found.push(axis);
+    }
+}
+
 /// The runs that comments of a program delimit.
 #[derive(Default)]
 struct Run {
@@ -111,14 +162,20 @@ pub fn canonical(text: &str) -> Vec<Move> {
     moves
 }
 
-/// Letter and number of each word of a G-code block.
-fn words(block: &str) -> Vec<(char, f64)> {
-    block.split_whitespace().filter_map(|word| Some((word.chars().next()?, word.get(1..)?.parse().ok()?))).collect()
+/// Letter and number of each word of a block, and whether the number is a change: `C90.`, `C=IC(90.)`.
+fn words(block: &str) -> Vec<(char, f64, bool)> {
+    let word = |word: &str| {
+        let (letter, rest) = (word.chars().next()?, word.get(1..)?);
+        let change = rest.strip_prefix("=IC(").and_then(|rest| rest.strip_suffix(')'));
+        Some((letter, change.unwrap_or(rest).parse().ok()?, change.is_some()))
+    };
+    block.split_whitespace().filter_map(word).collect()
 }
 
-/// Motions of a program in G codes (ISO 6983-1): G1, G2, G3, G17 to G19, incremental arc centres.
-pub fn of_g_codes(text: &str) -> Vec<Move> {
+/// Motions of a program in G codes (ISO 6983-1): G1, G2, G3, G17 to G19, G90, G91, incremental arc centres.
+pub fn of_g_codes(text: &str, counting: Counting) -> Vec<Move> {
     let mut here: Positions = "XYZABC".chars().map(|axis| (axis, 0.0)).collect();
+    let (mut found, mut changes) = (String::new(), false);
     let (mut moves, mut measured, mut plane) = (Vec::new(), Run::default(), 0);
     for line in text.lines() {
         measured.read(line);
@@ -126,18 +183,21 @@ pub fn of_g_codes(text: &str) -> Vec<Move> {
             continue;
         }
         let words = words(line);
-        let codes: Vec<i64> = words.iter().filter(|(letter, _)| *letter == 'G').map(|(_, n)| *n as i64).collect();
+        let codes: Vec<i64> = words.iter().filter(|word| word.0 == 'G').map(|word| word.1 as i64).collect();
         if let Some(code) = codes.iter().find(|code| (17..=19).contains(*code)) {
             plane = (code - 17) as usize;
         }
+        if let Some(code) = codes.iter().find(|code| (90..=91).contains(*code)) {
+            changes = *code == 91;
+        }
         let Some(code) = codes.iter().find(|code| (1..=3).contains(*code)) else { continue };
         let mut to = here.clone();
-        words.iter().filter(|(letter, _)| "XYZABC".contains(*letter)).for_each(|(axis, value)| {
-            to.insert(*axis, *value);
-        });
+        for (axis, value, change) in words.iter().filter(|word| "XYZABC".contains(word.0)) {
+            reach(&mut to, &mut found, counting, *axis, *value, changes || *change);
+        }
         let centre = PLANES[plane].map(|axis| {
             let word = ['I', 'J', 'K']["XYZ".find(axis).unwrap()];
-            here[&axis] + words.iter().find(|(letter, _)| *letter == word).map_or(0.0, |(_, value)| *value)
+            here[&axis] + words.iter().find(|own| own.0 == word).map_or(0.0, |own| own.1)
         });
         let points = if *code == 1 { straight(&here, &to) } else { arc(&here, &to, PLANES[plane], centre, *code == 3) };
         moves.push(Move { points, run: measured.now });
@@ -146,27 +206,36 @@ pub fn of_g_codes(text: &str) -> Vec<Move> {
     moves
 }
 
-/// Motions of a program in the TNC's plain text: L, CC, C.
-pub fn of_plain_text(text: &str) -> Vec<Move> {
+/// Motions of a program in the TNC's plain text: L, CC, C. A control that goes the shorter way is taken to do so for a
+/// change, too.
+pub fn of_plain_text(text: &str, counting: Counting) -> Vec<Move> {
     let mut here: Positions = "XYZABC".chars().map(|axis| (axis, 0.0)).collect();
+    let mut found = String::new();
     let (mut moves, mut measured, mut centre) = (Vec::new(), Run::default(), [0.0; 2]);
     for (number, line) in text.lines().enumerate() {
         let (own, block) = line.split_once(' ').unwrap();
         assert_eq!(own, number.to_string(), "{line}");
         measured.read(block);
         let (kind, rest) = block.split_once(' ').unwrap_or((block, ""));
+        if !["L", "CC", "C"].contains(&kind) {
+            continue;
+        }
         let mut to = here.clone();
-        words(rest).iter().filter(|(letter, _)| "XYZABC".contains(*letter)).for_each(|(axis, value)| {
-            to.insert(*axis, *value);
-        });
+        for word in rest.split_whitespace() {
+            let (own, is_change) = word.strip_prefix('I').map_or((word, false), |own| (own, true));
+            let Some((axis, value, _)) = words(own).first().copied() else { continue };
+            if "XYZABC".contains(axis) {
+                let value = if is_change && counting == Counting::Shorter { shorter(value) } else { value };
+                reach(&mut to, &mut found, counting, axis, value, is_change);
+            }
+        }
         let points = match kind {
             "CC" => {
                 centre = [to[&'X'], to[&'Y']];
                 continue;
             }
             "L" => straight(&here, &to),
-            "C" => arc(&here, &to, ['X', 'Y'], centre, rest.contains("DR+")),
-            _ => continue,
+            _ => arc(&here, &to, ['X', 'Y'], centre, rest.contains("DR+")),
         };
         moves.push(Move { points, run: measured.now });
         here = to;
