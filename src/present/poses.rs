@@ -4,7 +4,7 @@ use abbe::identify::plan::poses::PoseSelection;
 use abbe::model::words::counted;
 
 use super::number::{micrometres, three_digits, unit};
-use super::table::{Cell, Table, cells, numbers};
+use super::table::{Cell, Table, cells, numbers, words};
 
 /// The criterion of the poses and of random sets.
 pub fn sentence(found: &PoseSelection) -> String {
@@ -33,7 +33,7 @@ pub fn uncertainties(found: &PoseSelection) -> Table {
     table
 }
 
-/// The positions of all axes.
+/// The positions of all axes, and the sockets.
 pub fn poses(found: &PoseSelection) -> Table {
     table(found, |q| Cell::fixed(q, 3)).titled("Poses")
 }
@@ -53,5 +53,9 @@ fn table(found: &PoseSelection, cell: fn(f64) -> Cell) -> Table {
         row.extend(pose.iter().map(|q| cell(*q)));
         row
     });
-    Table::new(columns, rows)
+    let mut table = Table::new(columns, rows);
+    if !found.sockets.is_empty() {
+        table.push(words("socket"), found.sockets.iter().map(Cell::from));
+    }
+    table
 }

@@ -53,6 +53,7 @@ mod plan_rank;
 mod plan_uncertainty;
 mod plausibility;
 mod poses;
+mod poses_in_contact;
 mod propagation;
 mod properties;
 mod recovery;

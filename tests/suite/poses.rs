@@ -27,13 +27,16 @@ fn options(criterion: PoseCriterion) -> PoseOptions {
         criterion,
         candidates: 1000,
         seed: 1,
-        limits: PoseLimits { box_mm: Some([[-900.0, 900.0], [-900.0, 900.0], [100.0, 1300.0]]), sight: None },
+        limits: PoseLimits {
+            box_mm: Some([[-900.0, 900.0], [-900.0, 900.0], [100.0, 1300.0]]),
+            ..PoseLimits::default()
+        },
         noise_mm: Some(NOISE_MM),
     }
 }
 
 fn poses(session: &Session, options: &PoseOptions) -> PoseSelection {
-    select(session, &session.tests[0], options).unwrap()
+    select(session, &[&session.tests[0]], options).unwrap()
 }
 
 #[test]
@@ -121,7 +124,7 @@ fn poses_are_within_their_limits() {
 }
 
 #[test]
-fn the_command_writes_poses_and_refuses_what_has_none() {
+fn the_command_writes_poses_and_refuses_what_is_wrong() {
     let folder = tempfile::tempdir().unwrap();
     let [csv, json] = ["poses.csv", "poses.json"].map(|name| folder.path().join(name));
     let ur10 = ready("ur10/session.toml");
@@ -139,7 +142,9 @@ fn the_command_writes_poses_and_refuses_what_has_none() {
         ("ur10/session.toml", &["--poses", "5", "--box-mm=1,0,0,1,0,1"], "six numbers are expected"),
         ("ur10/session.toml", &["--poses", "5", "--box-mm=9000,9001,0,1,0,1", "--candidates", "5"], "widen the limits"),
         ("ur10/session.toml", &["--poses", "5", "--pose-test", "Q"], "the session has no such test; its tests are A"),
-        ("kuka-iiwa14/session.toml", &["--poses", "5"], "the states of a socket are not free"),
+        ("kuka-iiwa14/session.toml", &["--poses", "5", "--candidates", "100"], "the readings of 5 poses have rank"),
+        ("kuka-iiwa14/session.toml", &["--poses", "5", "--height-mm", "0,1"], "this session's instrument is a socket"),
+        ("self-calibration/session.toml", &["--poses", "5", "--height-mm", "1,0"], "two numbers are expected"),
     ] {
         let run = abbe(&[&["plan", text(&ready(session))][..], options].concat());
         let message = String::from_utf8_lossy(&run.stderr).replace('\n', " ");

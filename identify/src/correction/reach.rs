@@ -7,6 +7,7 @@ use std::f64::consts::TAU;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, Machine};
+use nalgebra::Matrix3;
 
 use super::jacobian::{Inverse, lever_mm};
 use super::pose::{Aim, Pose};
@@ -35,6 +36,20 @@ pub fn axis_positions(machine: &Machine, tool_mm: [f64; 3], aim: Aim, wanted: &P
     let starts = (1..=STARTS).map(|number| start(machine, &axes, number, last));
     let solutions = std::iter::once(last.to_vec()).chain(starts).filter_map(solve);
     solutions.min_by(|a, b| distance(machine, a, last).total_cmp(&distance(machine, b, last)))
+}
+
+/// The axis positions at which some axes bring the tool point to a point of the table frame, mm, by the iteration from
+/// one start. `None` if it does not lead there within the travel.
+pub(crate) fn from_start(
+    machine: &Machine,
+    tool_mm: [f64; 3],
+    wanted_mm: [f64; 3],
+    axes: &[usize],
+    start: &[f64],
+) -> Option<Vec<f64>> {
+    let wanted = Pose { point_mm: wanted_mm.into(), directions: Matrix3::identity() };
+    let found = newton(machine, tool_mm, Aim::Position, &wanted, axes, start.to_vec())?;
+    within_travel(machine, found, start)
 }
 
 /// Point `number` of the sequence with the golden ratio's generalisation as its step, over the travel of the axes.

@@ -7,6 +7,7 @@ mod poses;
 mod screen;
 
 use abbe::identify::plan::clearance::Clearance;
+use abbe::identify::plan::poses::without_place;
 use abbe::identify::plan::{self, PlanOptions};
 use abbe::model::files::{self, ReadOptions, SourceMap};
 use abbe::model::instrument::Station;
@@ -157,10 +158,19 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Poses, without the data of the session.
+/// Poses, without the data of the session unless only they tell where a socket is.
 fn poses(arguments: &PlanArguments, outputs: &output::Outputs, tables: bool) -> Result<(), Failure> {
     let reading = ReadOptions { read_data: false, ..arguments.session.options() };
-    let (session, sources) = files::session_with_sources(&arguments.session.session, &reading)?;
+    let (mut session, mut sources) = files::session_with_sources(&arguments.session.session, &reading)?;
+    if let Some(test) = without_place(&session, &arguments.poses.tests(&session)?).first() {
+        let with_data = files::session_with_sources(&arguments.session.session, &arguments.session.options());
+        (session, sources) = with_data.map_err(|error| {
+            Failure::Other(format!(
+                "test \"{}\" states no `socket_mm`, and its data do not tell where its socket is: {error}",
+                test.name
+            ))
+        })?;
+    }
     outputs.refuse_overwrite_of_sources(&sources)?;
     let noise_mm = arguments.noise_um.map(|um| positive("--noise-um", um)).transpose()?;
     let found = arguments.poses.run(&session, noise_mm, arguments.common.seed, tables)?;

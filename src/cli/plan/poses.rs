@@ -1,10 +1,11 @@
-//! `abbe plan --poses`: poses for a tracker, an R-test or a ball bar at rest.
+//! `abbe plan --poses`: poses for an instrument that measures at rest.
 
 use std::path::PathBuf;
 
 use abbe::identify::plan::poses::candidates::{LineOfSight, PoseLimits};
-use abbe::identify::plan::poses::{PoseCriterion, PoseOptions, PoseSelection, select};
-use abbe::model::session::Session;
+use abbe::identify::plan::poses::{PoseCriterion, PoseOptions, PoseSelection, measured_by, select};
+use abbe::model::instrument::InstrumentKind;
+use abbe::model::session::{Session, Test};
 use clap::{Args, ValueEnum};
 
 use crate::cli::failure::Failure;
@@ -40,7 +41,7 @@ pub struct PoseArguments {
     /// Example: --poses 30 --criterion d
     #[arg(long, value_enum, default_value = "worst", requires = "poses")]
     criterion: Criterion,
-    /// The test whose instrument measures the poses [default: the last].
+    /// The test whose instrument measures the poses [default: the last; of sockets all].
     ///
     /// Example: --poses 30 --pose-test A
     #[arg(long, value_name = "TEST", requires = "poses")]
@@ -65,6 +66,12 @@ pub struct PoseArguments {
     /// Example: --poses 30 --tracker-mm 3000,0,1000 --sight-mm 150
     #[arg(long, value_name = "MM", default_value_t = 100.0, requires = "tracker_mm")]
     sight_mm: f64,
+    /// Part of the cylinder that a probe may touch: least and greatest distance along its axis from `artefact_mm`
+    /// [default: 0,0].
+    ///
+    /// Example: --poses 12 --height-mm=-20,20
+    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', requires = "poses", allow_hyphen_values = true)]
+    height_mm: Option<Vec<f64>>,
     /// Write the poses as CSV, one row per pose, with the columns of data files.
     ///
     /// Example: --poses 30 --poses-csv poses.csv
@@ -107,19 +114,8 @@ impl PoseArguments {
             limits: self.limits()?,
             noise_mm,
         };
-        let test = match &self.pose_test {
-            None => session.tests.last(),
-            Some(name) => session.tests.iter().find(|test| test.name == *name),
-        };
-        let Some(test) = test else {
-            let names: Vec<&str> = session.tests.iter().map(|test| test.name.as_str()).collect();
-            return Err(Failure::Other(format!(
-                "`--pose-test {}`: the session has no such test; its tests are {}",
-                self.pose_test.as_deref().unwrap_or_default(),
-                names.join(", ")
-            )));
-        };
-        let found = select(session, test, &options)?;
+        let tests = self.tests(session)?;
+        let found = select(session, &tests, &options)?;
         if tables {
             say!("{}", present::sentence(&found));
             output::print(&present::uncertainties(&found));
@@ -129,6 +125,27 @@ impl PoseArguments {
             output::write_whole(path, &output::csv(&present::exact_poses(&found))?)?;
         }
         Ok(found)
+    }
+
+    /// The tests whose instruments measure the poses.
+    pub fn tests<'s>(&self, session: &'s Session) -> Result<Vec<&'s Test>, Failure> {
+        let tests = measured_by(session, self.pose_test.as_deref());
+        if tests.is_empty() {
+            let names: Vec<&str> = session.tests.iter().map(|test| test.name.as_str()).collect();
+            return Err(Failure::Other(format!(
+                "`--pose-test {}`: the session has no such test; its tests are {}",
+                self.pose_test.as_deref().unwrap_or_default(),
+                names.join(", ")
+            )));
+        }
+        let probed = |test: &&Test| test.station.kind() == InstrumentKind::Probe;
+        if self.height_mm.is_some() && !tests.iter().all(probed) {
+            return Err(Failure::Other(format!(
+                "`--height-mm` is of the cylinder that a probe touches; this session's instrument is a {}",
+                session.instrument.word()
+            )));
+        }
+        Ok(tests)
     }
 
     fn limits(&self) -> Result<PoseLimits, Failure> {
@@ -147,6 +164,11 @@ impl PoseArguments {
             return fault("--sight-mm", "a number of at least 0 is expected");
         }
         let sight = sight.map(|from_mm| LineOfSight { from_mm, clearance_mm: self.sight_mm });
-        Ok(PoseLimits { box_mm, sight })
+        let height_mm = match self.height_mm.as_deref() {
+            None => [0.0; 2],
+            Some(&[low, high]) if low <= high && low.is_finite() && high.is_finite() => [low, high],
+            Some(_) => return fault("--height-mm", "two numbers are expected: the least and the greatest height"),
+        };
+        Ok(PoseLimits { box_mm, sight, height_mm })
     }
 }

@@ -1,19 +1,21 @@
-//! Candidate poses: drawn within the travel of the axes, kept where the limits permit them.
+//! Candidate poses: drawn within the travel of the axes, brought to where the instrument measures, and kept where the
+//! limits permit them.
 
 use std::f64::consts::TAU;
 
-use abbe_model::axis::AxisKind;
-use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
+use abbe_model::axis::{Axis, AxisKind};
+use abbe_model::chain::{BodyErrors, Machine};
 use abbe_model::frames::Point;
-use abbe_model::instrument::ballbar::BallBar;
-use abbe_model::instrument::{InstrumentKind, Station};
-use abbe_model::session::placing::{axis_line, positions_for_bar};
+use abbe_model::instrument::Station;
+use abbe_model::session::placing::axis_line;
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test};
 use rand_pcg::Pcg64;
 
 use super::between;
+use super::goal::{Goal, state};
 use crate::error::IdentifyError;
+use crate::numerics::parallel;
 use crate::plan::collision::{Bodies, Parts, segment_distance};
 
 /// Where poses may be. Lengths in mm, in R.
@@ -23,6 +25,8 @@ pub struct PoseLimits {
     pub box_mm: Option<[[f64; 2]; 3]>,
     /// A tracker that has to see that point.
     pub sight: Option<LineOfSight>,
+    /// Part of a probe's cylinder that may be touched: least and greatest distance along its axis from its point.
+    pub height_mm: [f64; 2],
 }
 
 /// The line of sight from a tracker to the tool.
@@ -34,23 +38,34 @@ pub struct LineOfSight {
     pub clearance_mm: f64,
 }
 
-/// Candidate poses.
+/// Candidate poses of one test.
 pub(super) struct Candidates {
     /// Positions of all axes, mm or rad.
     pub states: Vec<Vec<f64>>,
-    /// Number of poses that the limits excluded.
+    /// Number of drawn poses that do not meet the instrument's condition or the limits.
     pub excluded: usize,
+    /// Number of those that do not meet the instrument's condition.
+    pub unmet: usize,
 }
 
 /// Most poses that are drawn for a candidate.
 const DRAWS_PER_CANDIDATE: usize = 200;
+/// The same if each needs iterations.
+const SOLVED_DRAWS_PER_CANDIDATE: usize = 20;
+/// Number of draws without a candidate after which none is expected from iterations.
+const FRUITLESS_DRAWS: usize = 1000;
+/// Poses that are drawn before they are judged together.
+const BATCH: usize = 250;
 /// Travel of a rotary axis that states none, rad.
 const TURN: [f64; 2] = [-0.5 * TAU, 0.5 * TAU];
 /// Part of the sight beside the target that is not compared with the links, as a multiple of the clearance: the last link
 /// ends at the target.
 const AT_TARGET: f64 = 2.0;
 
-/// Draws candidate poses.
+/// Draws candidate poses of a test.
+///
+/// # Errors
+/// If a linear axis has to be drawn and states no travel.
 pub(super) fn draw(
     session: &Session,
     test: &Test,
@@ -58,78 +73,62 @@ pub(super) fn draw(
     count: usize,
     random: &mut Pcg64,
 ) -> Result<Candidates, IdentifyError> {
-    let machine = &session.machine;
-    let kind = test.station.kind();
-    if !matches!(kind, InstrumentKind::Tracker | InstrumentKind::RTest | InstrumentKind::BallBar) {
-        return Err(IdentifyError::Request(format!(
-            "poses are chosen for trackers, R-tests and ball bars; the states of a {} are not free: {}",
-            kind.word(),
-            match kind {
-                InstrumentKind::Socket => "the ball of the tool has to lie in a socket at each of them",
-                _ => "the tool has to touch the artefact at each of them",
-            }
-        )));
-    }
-    let bar = bar_of(&test.station);
+    let machine = &*session.machine;
+    let station = &test.station;
+    let is_placed = station.table_point_mm().is_some();
     let untravelled = machine.axes.iter().find(|axis| axis.kind == AxisKind::Linear && axis.travel.is_none());
-    if let (Some(axis), None) = (untravelled, &bar) {
-        return Err(IdentifyError::Request(format!(
-            "axis `{}` states no travel, so that no poses can be drawn; add `travel_mm` to the machine",
-            axis.name
-        )));
+    if let (Some(axis), false) = (untravelled, is_placed) {
+        return Err(IdentifyError::NoTravel { axis: axis.name.clone() });
     }
+    let iterates = match station {
+        Station::Tracker(_) => false,
+        Station::Socket(_) => true,
+        _ => machine.axes.iter().all(|axis| axis.kind == AxisKind::Rotary),
+    };
+    let most = count * if iterates { SOLVED_DRAWS_PER_CANDIDATE } else { DRAWS_PER_CANDIDATE };
     let bodies = Bodies::of(machine);
     let parts = Parts::of(session, &bodies, test);
-    let mut found = Candidates { states: Vec::with_capacity(count), excluded: 0 };
-    while found.states.len() < count && found.excluded < count * DRAWS_PER_CANDIDATE {
-        let mut at: Vec<f64> = machine
-            .axes
-            .iter()
-            .map(|axis| match (axis.kind, axis.travel) {
-                // A turn at most, about the middle of the travel: positions beyond it are the same poses.
-                (AxisKind::Rotary, Some([low, high])) => {
-                    let (middle, half) = (0.5 * (low + high), 0.5 * (high - low).min(TAU));
-                    between(random, [middle - half, middle + half])
-                }
-                (AxisKind::Rotary, None) => between(random, TURN),
-                (AxisKind::Linear, Some(travel)) => between(random, travel),
-                (AxisKind::Linear, None) => 0.0,
-            })
-            .collect();
-        if let Some(bar) = &bar {
-            let requested = direction(random).map(|x| x * bar.bar);
-            match positions_for_bar(machine, bar, &at, requested) {
-                Some(placed) => at = placed,
+    let mut found = Candidates { states: Vec::with_capacity(count), excluded: 0, unmet: 0 };
+    while found.states.len() < count && found.excluded < most {
+        if iterates && found.states.is_empty() && found.excluded >= FRUITLESS_DRAWS {
+            break;
+        }
+        let batch: Vec<(Vec<f64>, Goal)> =
+            (0..BATCH).map(|_| (drawn(machine, random), Goal::draw(station, limits, random))).collect();
+        let met = parallel::map(BATCH, &|k| {
+            let (drawn, goal) = &batch[k];
+            let at = goal.met(machine, station, drawn)?;
+            let kept = is_permitted(machine, station, &at, limits) && parts.as_ref().is_none_or(|it| it.clears(&at));
+            Some(kept.then_some(at))
+        });
+        for pose in met {
+            match pose {
+                _ if found.states.len() == count => break,
+                Some(Some(at)) => found.states.push(at),
+                Some(None) => found.excluded += 1,
                 None => {
                     found.excluded += 1;
-                    continue;
+                    found.unmet += 1;
                 }
             }
-        }
-        if is_permitted(machine, &test.station, &at, limits) && parts.as_ref().is_none_or(|parts| parts.clears(&at)) {
-            found.states.push(at);
-        } else {
-            found.excluded += 1;
         }
     }
     Ok(found)
 }
 
-/// The points that the linear axes hold at a distance, if the instrument has one on either side.
-fn bar_of(station: &Station<f64>) -> Option<BallBar<f64>> {
-    Some(BallBar {
-        workpiece_ball: station.table_point_mm()?,
-        spindle_ball: station.tool_point_mm(),
-        bar: station.reference_mm(),
-    })
-}
-
-/// A direction, uniform over the upper half of the sphere.
-fn direction(random: &mut Pcg64) -> [f64; 3] {
-    let z = between(random, [0.0, 1.0]);
-    let (sin, cos) = between(random, TURN).sin_cos();
-    let across = (1.0 - z * z).sqrt();
-    [across * cos, across * sin, z]
+/// Positions of all axes within their travel.
+fn drawn(machine: &Machine, random: &mut Pcg64) -> Vec<f64> {
+    let position = |axis: &Axis| match (axis.kind, axis.travel) {
+        // A turn at most, about the middle of the travel: positions beyond it are the same poses.
+        (AxisKind::Rotary, Some([low, high])) => {
+            let (middle, half) = (0.5 * (low + high), 0.5 * (high - low).min(TAU));
+            between(random, [middle - half, middle + half])
+        }
+        (AxisKind::Rotary, None) => between(random, TURN),
+        (AxisKind::Linear, Some(travel)) => between(random, travel),
+        (AxisKind::Linear, None) => 0.0,
+    };
+    machine.axes.iter().map(position).collect()
 }
 
 fn is_permitted(machine: &Machine, station: &Station<f64>, at: &[f64], limits: &PoseLimits) -> bool {
@@ -138,10 +137,8 @@ fn is_permitted(machine: &Machine, station: &Station<f64>, at: &[f64], limits: &
     if !inside {
         return false;
     }
-    let states: Vec<AxisPosition<f64>> =
-        machine.axes.iter().zip(at).map(|(axis, q)| AxisPosition::new(axis.kind, *q)).collect();
     let none = vec![BodyErrors::<f64>::NONE; at.len()];
-    let tool = machine.tool_point::<f64>(&states, &none, Point(station.tool_point_mm())).0;
+    let tool = machine.tool_point::<f64>(&state(machine, at), &none, Point(station.tool_point_mm())).0;
     let in_box = |limits: &[[f64; 2]; 3]| (0..3).all(|i| tool[i] >= limits[i][0] && tool[i] <= limits[i][1]);
     if !limits.box_mm.as_ref().is_none_or(in_box) {
         return false;
@@ -167,7 +164,7 @@ fn shortened(from: [f64; 3], to: [f64; 3], by: f64) -> [f64; 3] {
 }
 
 /// States without readings.
-pub(super) fn states_of(machine: &Machine, poses: &[Vec<f64>], coordinates: usize) -> Readings {
+pub(super) fn states_of(machine: &Machine, poses: &[&[f64]], coordinates: usize) -> Readings {
     Readings {
         positions: (0..machine.axes.len()).map(|axis| poses.iter().map(|pose| pose[axis]).collect()).collect(),
         coordinates,

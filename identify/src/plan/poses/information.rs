@@ -43,6 +43,7 @@ pub(super) struct Exchange {
 }
 
 impl Exchange {
+    /// The candidates are the readings of all tests, in their order.
     pub fn new(
         problem: &Problem,
         kept: &[usize],
@@ -53,21 +54,23 @@ impl Exchange {
         let nominal = vec![0.0; list.len()];
         let values = problem.slot_values(&nominal);
         let coordinates = problem.coordinates();
-        let count = problem.readings();
-        let whole = problem.rows(&values, &RowBlock { test: 0, rows: 0..count })?;
         let sigma = problem.noise.sigma_mm;
-        let of_pose = |pose: usize| {
-            Mat::from_fn(coordinates, kept.len(), |i, k| {
-                whole[(pose * coordinates + i, kept[k])] * list[kept[k]].size / sigma
-            })
-        };
+        let mut rows = Vec::new();
+        for (test, model) in problem.models.iter().enumerate() {
+            let whole = problem.rows(&values, &RowBlock { test, rows: 0..model.rows() })?;
+            rows.extend((0..model.rows()).map(|pose| {
+                Mat::from_fn(coordinates, kept.len(), |i, k| {
+                    whole[(pose * coordinates + i, kept[k])] * list[kept[k]].size / sigma
+                })
+            }));
+        }
         let prior = problem.prior_triangle(&nominal).r();
         let scaled = Mat::from_fn(prior.nrows(), kept.len(), |i, k| prior[(i, kept[k])] * list[kept[k]].size);
         let mut base = scaled.transpose() * &scaled;
         (0..kept.len()).for_each(|k| base[(k, k)] += RIDGE);
         let display = |k: &usize| list[kept[*k]].size * list[kept[*k]].unit.display_per_internal;
         Ok(Exchange {
-            rows: (0..count).map(of_pose).collect(),
+            rows,
             prior: scaled,
             base,
             targets: targets.to_vec(),
@@ -87,18 +90,32 @@ impl Exchange {
         Some(factor.solve(Mat::<f64>::identity(n, n)))
     }
 
-    /// Numerical rank of the readings of some poses with the priors, without the ridge. The uncertainties of poses of
-    /// full rank contain the ridge with a share of at most [`RIDGE`].
-    pub fn rank(&self, poses: &[usize]) -> Result<usize, IdentifyError> {
-        let blocks = poses.iter().map(|pose| &self.rows[*pose]).chain([&self.prior]);
-        let mut rows = Triangle::new(self.prior.ncols());
-        for block in blocks {
-            let columns = block.ncols();
+    /// Numerical rank of the readings of some poses with the priors, without the ridge, and the number of parameters that
+    /// they involve: the place of a socket without a pose is none of them. The uncertainties of poses of full rank contain
+    /// the ridge with a share of at most [`RIDGE`].
+    pub fn rank(&self, poses: &[usize]) -> Result<[usize; 2], IdentifyError> {
+        let involved = |k: &usize| {
+            self.targets.contains(k) || poses.iter().any(|pose| self.rows[*pose].col(*k).iter().any(|x| *x != 0.0))
+        };
+        let [own, others]: [Vec<usize>; 2] = {
+            let (own, others) = (0..self.prior.ncols()).partition(involved);
+            [own, others]
+        };
+        // A prior that connects a parameter with one that is not involved tells nothing of it.
+        let is_own = |row: &usize| others.iter().all(|k| self.prior[(*row, *k)] == 0.0);
+        let prior_rows: Vec<usize> = (0..self.prior.nrows()).filter(is_own).collect();
+        let prior = Mat::from_fn(prior_rows.len(), own.len() + 1, |i, k| {
+            own.get(k).map_or(0.0, |column| self.prior[(prior_rows[i], *column)])
+        });
+        let mut rows = Triangle::new(own.len());
+        for pose in poses {
+            let block = &self.rows[*pose];
             let with_residuals =
-                Mat::from_fn(block.nrows(), columns + 1, |i, k| if k < columns { block[(i, k)] } else { 0.0 });
+                Mat::from_fn(block.nrows(), own.len() + 1, |i, k| own.get(k).map_or(0.0, |column| block[(i, *column)]));
             rows.absorb(with_residuals.as_ref());
         }
-        Ok(Directions::of(rows.r().as_ref())?.identifiable_rank())
+        rows.absorb(prior.as_ref());
+        Ok([Directions::of(rows.r().as_ref())?.identifiable_rank(), own.len()])
     }
 
     /// Standard uncertainties of the targets at some poses, in display units.

@@ -1,6 +1,7 @@
-//! Selects poses for an instrument whose states are free: a tracker, or an R-test or a ball bar at rest.
+//! Selects poses for an instrument that measures at rest.
 //!
-//! Candidate poses are drawn at random within the travel of the axes and the limits of the user ([`candidates`]). A
+//! Candidate poses are drawn at random within the travel of the axes and the limits of the user ([`candidates`]), and
+//! brought to where the instrument measures ([`goal`]): a tracker anywhere, a socket's ball in the socket. A
 //! first set is built greedily; then poses are exchanged against candidates until no exchange improves the criterion
 //! (Fedorov's algorithm: Atkinson, Donev & Tobias, Optimum Experimental Designs, 2007, ch. 12).
 //!
@@ -8,10 +9,13 @@
 //! the covariance of the others exists. Set-up quantities are estimated within their priors.
 
 pub mod candidates;
+mod goal;
 mod information;
 
 use std::sync::Arc;
 
+use abbe_model::axis::AxisKind;
+use abbe_model::instrument::{InstrumentKind, Station};
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test};
@@ -31,6 +35,7 @@ use crate::plan::improve::NamedUncertainty;
 use crate::plan::states;
 use crate::problem::Problem;
 use candidates::{PoseLimits, states_of};
+use goal::Goal;
 use information::Exchange;
 
 /// What the poses are to make small.
@@ -83,8 +88,11 @@ const RANDOM_SET_STREAM: u128 = 1;
 /// The selected poses.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct PoseSelection {
-    /// The test whose instrument measures the poses.
-    pub test: String,
+    /// The test of each pose, whose instrument measures it.
+    pub tests: Vec<String>,
+    /// The socket of each pose; empty for other instruments.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sockets: Vec<String>,
     /// The criterion and its unit.
     pub criterion: String,
     /// Its value for the selected poses.
@@ -99,7 +107,7 @@ pub struct PoseSelection {
     pub noise_source: String,
     /// Number of candidate poses.
     pub candidates: usize,
-    /// Number of drawn poses that the limits excluded.
+    /// Number of drawn poses at which the instrument cannot measure, or that the limits excluded.
     pub excluded: usize,
     /// The errors with their standard uncertainties at the selected poses.
     pub uncertainties: Vec<NamedUncertainty>,
@@ -113,28 +121,48 @@ pub struct PoseSelection {
     pub warnings: Vec<String>,
 }
 
-/// Selects poses for one test of a session: its instrument, its priors and its set-up. Readings of the session do not
-/// count.
+/// The tests whose instruments measure the poses: that of a name; without a name the last one, or of sockets all. Empty
+/// if no test has the name.
+pub fn measured_by<'s>(session: &'s Session, name: Option<&str>) -> Vec<&'s Test> {
+    match name {
+        Some(name) => session.tests.iter().filter(|test| test.name == name).collect(),
+        None if session.instrument == InstrumentKind::Socket => session.tests.iter().collect(),
+        None => session.tests.last().into_iter().collect(),
+    }
+}
+
+/// The tests whose sockets have no place: neither the session states it, nor do the poses of their readings.
+pub fn without_place<'t>(session: &Session, tests: &[&'t Test]) -> Vec<&'t Test> {
+    let located = located(session, tests);
+    let lacking = |(_, test): &(&&Test, Test)| matches!(&test.station, Station::Socket(own) if !own.is_located);
+    tests.iter().zip(located).filter(lacking).map(|(test, _)| *test).collect()
+}
+
+/// Selects poses for tests of a session, by their instruments, priors and set-up. Readings of the session do not count,
+/// but for the places of sockets that it does not state.
 ///
 /// # Errors
-/// If the instrument has no free states, the limits leave too few candidates, or the model cannot be evaluated.
-pub fn select(session: &Session, test: &Test, options: &PoseOptions) -> Result<PoseSelection, IdentifyError> {
-    let mut random = Pcg64::new(u128::from(options.seed), CANDIDATE_STREAM);
-    let found = candidates::draw(session, test, &options.limits, options.candidates, &mut random)?;
-    if found.states.len() < options.poses {
+/// If a socket has no place, no pose reaches where the instrument measures, the limits leave too few candidates, or the
+/// model cannot be evaluated.
+pub fn select(session: &Session, tests: &[&Test], options: &PoseOptions) -> Result<PoseSelection, IdentifyError> {
+    if let Some(test) = without_place(session, tests).first() {
+        return Err(IdentifyError::NoPlace { test: test.name.clone() });
+    }
+    let Found { tests, candidates, excluded, warnings } = candidates(session, tests, options)?;
+    if candidates.len() < options.poses {
         return Err(IdentifyError::Request(format!(
             "{} of {} drawn poses are within the limits, and {} are asked for; widen the limits or draw more candidates",
-            found.states.len(),
-            found.states.len() + found.excluded,
+            candidates.len(),
+            candidates.len() + excluded,
             options.poses
         )));
     }
-    let problem = problem(session, test, &found.states, noise(session, options))?;
+    let problem = problem(session, &tests, &candidates, noise(session, options))?;
     let list = &problem.parameters.list;
     let nominal = vec![0.0; list.len()];
     // What as many average poses do not determine is held.
     let mut average = problem.clone();
-    average.noise.sigma_mm *= (found.states.len() as f64 / options.poses as f64).sqrt();
+    average.noise.sigma_mm *= (candidates.len() as f64 / options.poses as f64).sqrt();
     let information = Triangle::new(list.len()).merged(&average.triangles(&nominal)?);
     let rank = problem.parameters.rank(&information.merged([&problem.prior_triangle(&nominal)]))?;
     let kept: Vec<usize> = (0..list.len()).filter(|j| !rank.pivots.contains(j)).collect();
@@ -144,37 +172,40 @@ pub fn select(session: &Session, test: &Test, options: &PoseOptions) -> Result<P
     }
     let exchange = Exchange::new(&problem, &kept, &targets, options.criterion)?;
     let chosen = exchange.run(options.poses);
-    let rank_of_chosen = exchange.rank(&chosen)?;
-    if rank_of_chosen < kept.len() {
-        let lacking = kept.len() - rank_of_chosen;
+    let [rank_of_chosen, involved] = exchange.rank(&chosen)?;
+    if rank_of_chosen < involved {
+        let lacking = involved - rank_of_chosen;
         return Err(IdentifyError::Request(format!(
             "the readings of {} have rank {rank_of_chosen} in {}; ask for at least {} poses",
             counted(options.poses, "pose"),
-            counted(kept.len(), "unknown"),
+            counted(involved, "unknown"),
             options.poses + lacking.div_ceil(problem.coordinates())
         )));
     }
     let mut random = Pcg64::new(u128::from(options.seed), RANDOM_SET_STREAM);
     let mut values = (0..RANDOM_SETS)
         .map(|_| {
-            let poses = index::sample(&mut random, found.states.len(), options.poses).into_vec();
-            Ok(if exchange.rank(&poses)? == kept.len() { exchange.value(&poses) } else { f64::INFINITY })
+            let poses = index::sample(&mut random, candidates.len(), options.poses).into_vec();
+            let [rank, involved] = exchange.rank(&poses)?;
+            Ok(if rank == involved { exchange.value(&poses) } else { f64::INFINITY })
         })
         .collect::<Result<Vec<f64>, IdentifyError>>()?;
     let u = exchange.uncertainties(&chosen);
     let machine = &session.machine;
     let display = |pose: &usize| -> Vec<f64> {
-        machine.axes.iter().zip(&found.states[*pose]).map(|(axis, q)| axis.kind.to_display(*q)).collect()
+        machine.axes.iter().zip(&candidates[*pose].at).map(|(axis, q)| axis.kind.to_display(*q)).collect()
     };
+    let test = |pose: &usize| &tests[candidates[*pose].test];
     Ok(PoseSelection {
-        test: test.name.clone(),
+        tests: chosen.iter().map(|pose| test(pose).name.clone()).collect(),
+        sockets: chosen.iter().filter_map(|pose| test(pose).socket.clone()).collect(),
         criterion: options.criterion.words().to_string(),
         value: exchange.value(&chosen),
         random_median: median(&mut values),
         noise_um: problem.noise.sigma_mm * 1e3,
         noise_source: problem.noise.source.word().to_string(),
-        candidates: found.states.len(),
-        excluded: found.excluded,
+        candidates: candidates.len(),
+        excluded,
         uncertainties: targets
             .iter()
             .zip(u)
@@ -186,20 +217,94 @@ pub fn select(session: &Session, test: &Test, options: &PoseOptions) -> Result<P
         held: rank.pivots.iter().map(|j| list[*j].id.clone()).collect(),
         columns: machine.axes.iter().map(|axis| axis.column("")).collect(),
         poses: chosen.iter().map(display).collect(),
-        warnings: session.warnings.iter().cloned().chain(states::noise_warning(&problem.noise)).collect(),
+        warnings: [session.warnings.clone(), warnings, states::noise_warning(&problem.noise).into_iter().collect()]
+            .concat(),
     })
 }
 
-/// The problem of a session with one test, which has a reading at every candidate pose.
-fn problem(session: &Session, test: &Test, poses: &[Vec<f64>], noise: Noise) -> Result<Problem, IdentifyError> {
-    let mut readings: Readings = states_of(&session.machine, poses, test.station.kind().coordinates());
-    let model = TestModel::new(Arc::clone(&session.machine), test.station.clone(), &readings);
-    readings.observed = model.readings_mm(&SlotValues::zero(model.slots()));
-    let means = session.reference().means.into_iter();
-    readings.drivers = means.map(|(name, mean)| (name, vec![mean; poses.len()])).collect();
-    let alone = Test { readings: Some(Arc::new(readings)), ..test.clone() };
-    let session = Session { tests: vec![alone], socket_distances: Vec::new(), ..session.clone() };
-    states::problem_by_test(&session, noise)
+/// Copies of tests of a session, with the places of sockets that only their readings tell.
+fn located(session: &Session, tests: &[&Test]) -> Vec<Test> {
+    let stations = crate::start::stations(session, &session.tests);
+    let of = |test: &&Test| {
+        let place = session.tests.iter().position(|own| own.name == test.name);
+        let station = match (&test.station, place.map(|place| &stations[place])) {
+            (Station::Socket(own), Some(found)) if !own.is_located => found.clone(),
+            (own, _) => own.clone(),
+        };
+        Test { station, ..(*test).clone() }
+    };
+    tests.iter().map(of).collect()
+}
+
+/// A candidate pose.
+struct Candidate {
+    /// Index of its test.
+    test: usize,
+    /// Positions of all axes, mm or rad.
+    at: Vec<f64>,
+}
+
+/// The tests with candidates, and their candidates in the order of the tests.
+struct Found {
+    tests: Vec<Test>,
+    candidates: Vec<Candidate>,
+    excluded: usize,
+    warnings: Vec<String>,
+}
+
+/// Candidates of all tests, as many of each. A test without any is left out with a warning unless all are.
+fn candidates(session: &Session, tests: &[&Test], options: &PoseOptions) -> Result<Found, IdentifyError> {
+    let mut random = Pcg64::new(u128::from(options.seed), CANDIDATE_STREAM);
+    let mut found = Found { tests: Vec::new(), candidates: Vec::new(), excluded: 0, warnings: untravelled(session) };
+    let mut unmet = None;
+    for (number, test) in located(session, tests).into_iter().enumerate() {
+        let share = options.candidates / tests.len() + usize::from(number < options.candidates % tests.len());
+        let drawn = candidates::draw(session, &test, &options.limits, share, &mut random)?;
+        found.excluded += drawn.excluded;
+        if drawn.states.is_empty() && drawn.unmet > 0 && drawn.unmet == drawn.excluded {
+            let (goal, check) = Goal::words(&test.station);
+            found.warnings.push(format!("test `{}`: no drawn pose {goal}; it is left out", test.name));
+            unmet.get_or_insert(IdentifyError::OutOfReach { test: test.name, drawn: drawn.unmet, goal, check });
+            continue;
+        }
+        let number = found.tests.len();
+        found.candidates.extend(drawn.states.into_iter().map(|at| Candidate { test: number, at }));
+        found.tests.push(test);
+    }
+    match unmet {
+        Some(error) if found.candidates.is_empty() => Err(error),
+        _ => Ok(found),
+    }
+}
+
+/// The warning about rotary axes without travel.
+fn untravelled(session: &Session) -> Vec<String> {
+    let axes = session.machine.axes.iter().filter(|axis| axis.kind == AxisKind::Rotary && axis.travel.is_none());
+    let names: Vec<String> = axes.map(|axis| format!("`{}`", axis.name)).collect();
+    let sentence = format!("no travel is stated of {}: poses may turn them from -180 to 180 deg", names.join(", "));
+    if names.is_empty() { Vec::new() } else { vec![sentence] }
+}
+
+/// The problem of a session with these tests, which have a reading at every candidate pose.
+fn problem(
+    session: &Session,
+    tests: &[Test],
+    candidates: &[Candidate],
+    noise: Noise,
+) -> Result<Problem, IdentifyError> {
+    let means = session.reference().means;
+    let with_readings = |(number, test): (usize, &Test)| {
+        let poses: Vec<&[f64]> =
+            candidates.iter().filter(|pose| pose.test == number).map(|pose| pose.at.as_slice()).collect();
+        let mut readings: Readings = states_of(&session.machine, &poses, test.station.kind().coordinates());
+        let model = TestModel::new(Arc::clone(&session.machine), test.station.clone(), &readings);
+        readings.observed = model.readings_mm(&SlotValues::zero(model.slots()));
+        let means = means.iter();
+        readings.drivers = means.map(|(name, mean)| (name.clone(), vec![*mean; poses.len()])).collect();
+        Test { readings: Some(Arc::new(readings)), ..test.clone() }
+    };
+    let tests = tests.iter().enumerate().map(with_readings).collect();
+    states::problem_by_test(&Session { tests, ..session.clone() }, noise)
 }
 
 /// The noise of a reading: that of the options, else that of the session, else the assumed one.
