@@ -31,6 +31,7 @@ mod run;
 mod save;
 mod schema;
 mod screen;
+mod search;
 mod self_calibration;
 mod sheet;
 mod simulate;

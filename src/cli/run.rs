@@ -20,6 +20,7 @@ use super::interrupt::Interrupts;
 use super::json::{self, Origin};
 use super::message::{Kind, tell};
 use super::output::{self, Outputs};
+use super::search::SearchArguments;
 use crate::present::table::{Table, cells};
 
 /// Examples of `abbe run`.
@@ -68,21 +69,8 @@ pub struct RunArguments {
     /// Fit alone, without the search for effects.
     #[arg(long)]
     no_trace: bool,
-    /// Maximum number of effects of a session (default: until the held-out error stops improving).
-    ///
-    /// Example: --max-effects 2
-    #[arg(long, value_name = "N")]
-    max_effects: Option<usize>,
-    /// Search only effects whose identifier contains this text; may be repeated.
-    ///
-    /// Example: --only EZC
-    #[arg(long, value_name = "TEXT")]
-    only: Vec<String>,
-    /// Do not search effects whose identifier contains this text; may be repeated.
-    ///
-    /// Example: --exclude ~time
-    #[arg(long, value_name = "TEXT")]
-    exclude: Vec<String>,
+    #[command(flatten)]
+    search: SearchArguments,
     /// Folder of saved models to validate: MACHINE.json is the model of the machine with this identifier.
     ///
     /// Example: --models models
@@ -221,9 +209,9 @@ struct Outcomes {
 fn analyse(arguments: &RunArguments, files: &[PathBuf], store: &Store, bar: &ProgressBar) -> Outcomes {
     let options = Options {
         no_trace: arguments.no_trace,
-        max_effects: arguments.max_effects,
-        only: arguments.only.clone(),
-        exclude: arguments.exclude.clone(),
+        max_effects: arguments.search.max_effects,
+        only: arguments.search.only.clone(),
+        exclude: arguments.search.exclude.clone(),
     };
     let places = Places { models: arguments.models.clone(), allow_outside: arguments.allow_outside };
     let interrupts = Interrupts::noticed();

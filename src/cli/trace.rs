@@ -23,6 +23,7 @@ use super::failure::Failure;
 use super::interrupt::Interrupts;
 use super::report::ReportArguments;
 use super::save::SaveArguments;
+use super::search::SearchArguments;
 use super::{CommonArguments, SessionArguments, compensation, message, next_session, output, read_session};
 use crate::present::{readings, trace as present};
 
@@ -59,21 +60,8 @@ pub struct TraceArguments {
     /// rejected candidates.
     #[arg(long)]
     all: bool,
-    /// Maximum number of effects (default: until the held-out error stops improving).
-    ///
-    /// Example: --max-effects 2
-    #[arg(long, value_name = "N")]
-    max_effects: Option<usize>,
-    /// Search only effects whose identifier contains this text; may be repeated.
-    ///
-    /// Example: --only EZC --only ~time --only :h2
-    #[arg(long, value_name = "TEXT")]
-    only: Vec<String>,
-    /// Do not search effects whose identifier contains this text; may be repeated.
-    ///
-    /// Example: --exclude :spline --exclude ~time
-    #[arg(long, value_name = "TEXT")]
-    exclude: Vec<String>,
+    #[command(flatten)]
+    search: SearchArguments,
     /// End the search after this many seconds. The effects found until then are fitted and reported, and every output
     /// states that the result is incomplete.
     ///
@@ -120,9 +108,9 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     let (session, sources) = read_session(&arguments.session, &outputs)?;
     let options = TraceOptions {
         seed: arguments.common.seed,
-        max_effects: arguments.max_effects,
-        only: arguments.only.clone(),
-        exclude: arguments.exclude.clone(),
+        max_effects: arguments.search.max_effects,
+        only: arguments.search.only.clone(),
+        exclude: arguments.search.exclude.clone(),
         ..TraceOptions::default()
     };
     if arguments.list {

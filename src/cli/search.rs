@@ -1,0 +1,23 @@
+//! Which effects a search considers, and how many it adds: options of `abbe trace` and `abbe run`.
+
+use clap::Args;
+
+/// The candidates of a search.
+#[derive(Args)]
+pub struct SearchArguments {
+    /// Maximum number of effects of a session (default: until the held-out error stops improving).
+    ///
+    /// Example: --max-effects 2
+    #[arg(long, value_name = "N")]
+    pub max_effects: Option<usize>,
+    /// Search only effects whose identifier contains this text; may be repeated.
+    ///
+    /// Example: --only EZC --only ~time --only :h2
+    #[arg(long, value_name = "TEXT")]
+    pub only: Vec<String>,
+    /// Do not search effects whose identifier contains this text; may be repeated.
+    ///
+    /// Example: --exclude :spline --exclude ~time
+    #[arg(long, value_name = "TEXT")]
+    pub exclude: Vec<String>,
+}
