@@ -138,23 +138,32 @@ fn socket_uncertainties_are_those_of_simulated_poses() {
     let (session, found) = kuka_poses();
     let session = as_predicted(session, &found, NOISE_MM);
     let ball = Vector3::new(0.0, 0.0, 1346.7);
-    let moved = |joints: &[f64], by: Vector3<f64>| -> Vec<f64> {
-        let start = kuka_ball(joints, ball);
+    // The pseudoinverse of the simulator's differences, once per pose.
+    let inverse = |joints: &[f64]| -> DMatrix<f64> {
         let step = 1e-6;
-        let mut q = joints.to_vec();
+        let here = kuka_ball(joints, ball);
+        let column = |k: usize| -> Vector3<f64> {
+            let mut other = joints.to_vec();
+            other[k] += step;
+            (kuka_ball(&other, ball) - here) / step
+        };
+        let columns: Vec<Vector3<f64>> = (0..7).map(column).collect();
+        DMatrix::from_fn(3, 7, |i, k| columns[k][i]).pseudo_inverse(1e-9).unwrap()
+    };
+    let known: Vec<(&String, Vec<f64>, DMatrix<f64>)> = found
+        .tests
+        .iter()
+        .zip(&found.poses)
+        .map(|(test, pose)| (test, radians(pose), inverse(&radians(pose))))
+        .collect();
+    let moved = |joints: &[f64], inverse: &DMatrix<f64>, by: Vector3<f64>| -> Vec<f64> {
+        let goal = kuka_ball(joints, ball) + by;
+        let mut q = DVector::from_column_slice(joints);
         for _ in 0..3 {
-            let here = kuka_ball(&q, ball);
-            let column = |k: usize| -> Vector3<f64> {
-                let mut other = q.clone();
-                other[k] += step;
-                (kuka_ball(&other, ball) - here) / step
-            };
-            let jacobian = DMatrix::from_fn(3, 7, |i, k| column(k)[i]);
-            let rest = start + by - here;
-            let change = jacobian.svd(true, true).solve(&DVector::from_column_slice(rest.as_slice()), 1e-9).unwrap();
-            q.iter_mut().zip(change.iter()).for_each(|(q, change)| *q += change);
+            let rest = goal - kuka_ball(q.as_slice(), ball);
+            q += inverse * DVector::from_column_slice(rest.as_slice());
         }
-        q
+        q.as_slice().to_vec()
     };
     let mut random = Pcg64::seed_from_u64(7);
     let mut squares = vec![0.0; found.uncertainties.len()];
@@ -164,9 +173,11 @@ fn socket_uncertainties_are_those_of_simulated_poses() {
         // Distances as a caliper tells them.
         drawn.socket_distances.iter_mut().for_each(|known| known.distance_mm = 50.0 + known.u_mm * noise());
         let readings = session.tests.iter().map(|test| {
-            let own = found.poses.iter().zip(&found.tests).filter(|(_, name)| **name == test.name);
-            let poses: Vec<Vec<f64>> =
-                own.map(|(pose, _)| moved(&radians(pose), Vector3::from_fn(|_, _| NOISE_MM * noise()))).collect();
+            let own = known.iter().filter(|(name, ..)| **name == test.name);
+            let noisy = |(_, joints, inverse): &(&String, Vec<f64>, DMatrix<f64>)| {
+                moved(joints, inverse, Vector3::from_fn(|_, _| NOISE_MM * noise()))
+            };
+            let poses: Vec<Vec<f64>> = own.map(noisy).collect();
             Readings {
                 positions: (0..7).map(|axis| poses.iter().map(|pose| pose[axis]).collect()).collect(),
                 coordinates: 3,
