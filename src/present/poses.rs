@@ -3,20 +3,20 @@
 use abbe::identify::plan::poses::PoseSelection;
 use abbe::model::words::counted;
 
-use super::number::{micrometres, three_digits, unit};
+use super::fit::noise;
+use super::number::{three_digits, unit};
 use super::table::{Cell, Table, cells, numbers, words};
 
 /// The criterion of the poses and of random sets.
 pub fn sentence(found: &PoseSelection) -> String {
     format!(
-        "{} of {}: {} {}; median of 100 random sets {}; noise {}, {}",
+        "{} of {}: {} {}; median of 100 random sets {}; {}",
         counted(found.poses.len(), "pose"),
         counted(found.candidates, "candidate"),
         unit(&found.criterion),
         three_digits(found.value),
         three_digits(found.random_median),
-        micrometres(found.noise_um),
-        found.noise_source
+        noise(found.noise_um, &found.noise_source)
     )
 }
 

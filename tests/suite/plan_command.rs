@@ -116,3 +116,30 @@ fn a_warning_names_a_test_beyond_the_travel_of_the_sensor() {
     );
     assert!(!warnings(&["--reach-mm", "2"]).contains("A150"));
 }
+
+/// Every result of a plan with uncertainties states where its noise comes from, on the terminal and in JSON.
+#[test]
+fn results_of_a_plan_name_the_source_of_the_noise() {
+    let folder = tempfile::tempdir().unwrap();
+    let [stated, assumed, json] = ["stated.toml", "assumed.toml", "plan.json"].map(|name| folder.path().join(name));
+    std::fs::copy(ready("hermle-c600u/machine.toml"), folder.path().join("machine.toml")).unwrap();
+    let plan = std::fs::read_to_string(ready("hermle-c600u/chapter5.toml")).unwrap();
+    let silent: String =
+        plan.lines().filter(|line| !line.starts_with("noise_um")).map(|line| format!("{line}\n")).collect();
+    assert_ne!(plan.lines().count(), silent.lines().count());
+    std::fs::write(&stated, plan).unwrap();
+    std::fs::write(&assumed, silent).unwrap();
+    for (session, source) in [(&stated, "stated"), (&assumed, "assumed")] {
+        for options in
+            [&["--no-effects"][..], &["--range"], &["--improve", "--bars-mm", "100"], &["--global", "--samples", "8"]]
+        {
+            let run = abbe(&[&["plan", text(session), "--json", text(&json)][..], options].concat());
+            let shown = String::from_utf8_lossy(&run.stdout).into_owned();
+            assert!(run.status.success(), "{options:?}: {}", String::from_utf8_lossy(&run.stderr));
+            assert!(shown.contains(&format!("({source})")), "{options:?}: {shown}");
+            let found: Value = serde_json::from_slice(&std::fs::read(&json).unwrap()).unwrap();
+            assert_eq!(found["noise_source"], source, "{options:?}");
+            assert!(found["noise_um"].as_f64().is_some_and(|um| um > 0.0), "{options:?}");
+        }
+    }
+}

@@ -171,7 +171,7 @@ fn rank_and_noise_are_stated() {
     let (code, message, shown) = run(&["--poses", "30"]);
     assert_eq!(code, Some(0), "{message}");
     assert!(message.contains("the session states no `noise_um`: 1.00 µm is assumed"), "{message}");
-    assert!(shown.contains("noise 1.000 µm, assumed"), "{shown}");
+    assert!(shown.contains("noise 1.000 µm (assumed)"), "{shown}");
     let found: Value = serde_json::from_slice(&std::fs::read(&json).unwrap()).unwrap();
     assert_eq!((&found["noise_um"], &found["noise_source"]), (&1.0.into(), &"assumed".into()));
     assert_eq!(found["warnings"].as_array().unwrap().len(), 1, "{found}");
@@ -179,5 +179,5 @@ fn rank_and_noise_are_stated() {
     let (code, message, shown) = run(&["--poses", "30", "--noise-um", "50"]);
     assert_eq!(code, Some(0), "{message}");
     assert!(!message.contains("noise_um"), "{message}");
-    assert!(shown.contains("noise 50.000 µm, stated"), "{shown}");
+    assert!(shown.contains("noise 50.000 µm (stated)"), "{shown}");
 }

@@ -11,6 +11,8 @@ use crate::results::{Combination, Unobservable};
 pub struct PlanAnalysis {
     /// Standard deviation of one scalar reading, µm.
     pub noise_um: f64,
+    /// Source of `noise_um`: `stated` by the session or the user, `repeats` or `residual` of its readings, or `assumed`.
+    pub noise_source: String,
     /// Number of readings.
     pub readings: usize,
     /// Numerical rank: number of independent combinations of the parameters that are identifiable.

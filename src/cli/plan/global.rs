@@ -7,6 +7,7 @@ use clap::Args;
 
 use crate::cli::failure::Failure;
 use crate::cli::output;
+use crate::present::fit::noise;
 use crate::present::plan::global as present;
 
 /// Global sensitivity.
@@ -53,7 +54,13 @@ impl GlobalArguments {
 
 /// Prints the indices.
 pub fn print(found: &GlobalAnalysis) {
-    say!("{} samples, {} fits, {} inputs", found.samples, found.evaluations, found.inputs.len());
+    say!(
+        "{} samples, {} fits, {} inputs, {}",
+        found.samples,
+        found.evaluations,
+        found.inputs.len(),
+        noise(found.noise_um, &found.noise_source)
+    );
     output::print(&present::errors(found));
     output::print(&present::indices(found));
     output::print(&present::convergence(found));

@@ -181,6 +181,10 @@ fn poses(arguments: &PlanArguments, outputs: &output::Outputs, tables: bool) -> 
 /// Proposed tests, and ranges that suffice.
 #[derive(serde::Serialize, schemars::JsonSchema)]
 pub struct NextTest {
+    /// Standard deviation of one scalar reading, µm.
+    noise_um: f64,
+    /// Source of `noise_um`: `stated` by the session or the user, `repeats` or `residual` of its readings, or `assumed`.
+    noise_source: String,
     /// The tests that `--improve` or `--separate` proposes.
     #[serde(skip_serializing_if = "Option::is_none")]
     improvement: Option<plan::improve::Improvement>,
@@ -197,6 +201,10 @@ fn next_test(
 ) -> Result<(), Failure> {
     let (complete, noise) = plan::prepared(session, options)?;
     let problem = plan::states::problem_by_test(&complete, noise)?;
+    let (noise_um, noise_source) = (problem.noise.sigma_mm * 1e3, problem.noise.source.word().to_string());
+    if tables {
+        say!("{}", crate::present::fit::noise(noise_um, &noise_source));
+    }
     let improvement = if arguments.improve.asked() {
         let improvement = arguments.improve.run(&problem)?;
         if tables {
@@ -211,7 +219,7 @@ fn next_test(
     if arguments.range && tables {
         output::print(&crate::present::next_test::ranges(&ranges));
     }
-    let found = NextTest { improvement, ranges };
+    let found = NextTest { noise_um, noise_source, improvement, ranges };
     arguments.common.write_json(sources, &found)?;
     if arguments.report.asked() {
         let document = crate::present::report::next_test::document(&problem, found.improvement.as_ref(), &found.ranges);

@@ -6,7 +6,8 @@ use abbe::model::words::counted;
 
 use crate::cli::screen::{self, Step, command};
 use crate::cli::{SessionArguments, output};
-use crate::present::number::{micrometres, with_symbols};
+use crate::present::fit::noise;
+use crate::present::number::with_symbols;
 use crate::present::plan::verdict::verdict;
 use crate::present::plan::{self as present, effects};
 
@@ -37,11 +38,11 @@ fn header(analysis: &PlanAnalysis) {
     );
     let moving = analysis.moving_min.map_or(String::new(), |min| format!(", {min:.1} min of movement"));
     say!(
-        "{} in {}, {}{moving}, noise {}",
+        "{} in {}, {}{moving}, {}",
         counted(analysis.readings, "reading"),
         counted(analysis.tests.len(), "test"),
         counted(analysis.setup_count, "set-up"),
-        micrometres(analysis.noise_um)
+        noise(analysis.noise_um, &analysis.noise_source)
     );
 }
 

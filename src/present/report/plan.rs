@@ -11,6 +11,7 @@ use super::document::{Document, KeyFigure};
 use super::{curves, readings, sections, summary};
 use crate::present::figure::bars::{Bars, Fill};
 use crate::present::figure::{Chart, Figure, Quantity};
+use crate::present::fit::noise;
 use crate::present::html::{capitalised, folded, integer, list, prose, table};
 use crate::present::number::{micrometres, three_digits, unit, units, with_symbols};
 use crate::present::plan::{self as present, effects};
@@ -22,9 +23,10 @@ const MAX_ROWS: usize = 30;
 fn method(analysis: &PlanAnalysis) -> String {
     format!(
         "The model is linearised at the nominal machine and every planned state. The uncertainties follow from the \
-         noise ({} per reading) and from the priors of the set-up by the law of propagation of uncertainty (JCGM 100, \
+         noise ({} per reading, {}) and from the priors of the set-up by the law of propagation of uncertainty (JCGM 100, \
          JCGM 102).",
-        micrometres(analysis.noise_um)
+        micrometres(analysis.noise_um),
+        analysis.noise_source
     )
 }
 
@@ -92,7 +94,7 @@ fn key_figures(problem: &Problem, analysis: &PlanAnalysis) -> Vec<KeyFigure> {
     figures.push(KeyFigure::new(
         "Readings",
         integer(analysis.readings),
-        format!("{}; noise {}", counted(problem.tests.len(), "test"), micrometres(analysis.noise_um)),
+        format!("{}; {}", counted(problem.tests.len(), "test"), noise(analysis.noise_um, &analysis.noise_source)),
     ));
     figures
 }

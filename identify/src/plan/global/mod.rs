@@ -59,6 +59,10 @@ pub struct GlobalOptions {
 /// Sobol' indices of the estimates of a plan.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct GlobalAnalysis {
+    /// Standard deviation of one scalar reading, µm.
+    pub noise_um: f64,
+    /// Source of `noise_um`: `stated` by the session or the user, `repeats` or `residual` of its readings, or `assumed`.
+    pub noise_source: String,
     /// Number of samples.
     pub samples: usize,
     /// Number of fits: samples times inputs plus two.
@@ -183,6 +187,8 @@ pub fn global(problem: &Problem, options: &GlobalOptions) -> Result<GlobalAnalys
         }
     });
     Ok(GlobalAnalysis {
+        noise_um: problem.noise.sigma_mm * 1e3,
+        noise_source: problem.noise.source.word().to_string(),
         samples: options.samples,
         evaluations: options.samples * (plan.inputs.len() + 2),
         errors: errors.collect(),
