@@ -38,6 +38,21 @@ fn programs_are_written_together_or_not_at_all() {
     assert!(String::from_utf8_lossy(&output.stdout).contains("has not been run on a control"));
 }
 
+/// A path at the surface is nothing for a touch probe.
+#[test]
+fn a_probe_has_to_be_one_that_scans() {
+    let place = tempfile::tempdir().unwrap();
+    let out = place.path().join("programs");
+    let plan = ready("self-calibration/session.toml");
+    let output = abbe(&["nc", text(&plan), "--control", "fanuc", "--out", text(&out), "--quiet"]);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{message}");
+    assert!(message.contains("warning: test \"1a\": The stylus stays at the surface"), "{message}");
+    let program = std::fs::read_to_string(out.join("1a.nc")).unwrap();
+    assert!(program.contains("(THE STYLUS STAYS AT THE SURFACE"), "{program}");
+    assert!(program.contains("TAKE THE INSTRUMENT OFF. MOVE"), "{program}");
+}
+
 /// What the programs only remark, the terminal says too: an overshoot that the travel cuts short, a ball that no axis
 /// reaches, a start without room above it.
 #[test]

@@ -180,9 +180,17 @@ impl Writer<'_> {
     fn approach(&self, path: &Path, centred: bool, draft: &mut Draft) {
         let start = path.start();
         let ball_bar = matches!(self.test.station, Station::BallBar(_));
-        draft.blocks.push(Block::Stop(
-            "Take the bar off. Move the tool clear of table and fixtures. The axes turn to the start".into(),
-        ));
+        if self.test.station.kind() == InstrumentKind::Probe {
+            draft.warn(
+                "The stylus stays at the surface: this is for a scanning probe. A touch probe needs the cycle of the control \
+                 at each position"
+                    .into(),
+            );
+        }
+        let off = if ball_bar { "Take the bar off" } else { "Take the instrument off" };
+        draft
+            .blocks
+            .push(Block::Stop(format!("{off}. Move the tool clear of table and fixtures. The axes turn to the start")));
         let turned = self.all(start, AxisKind::Rotary);
         // A control that counts within one turn may take another place for such a position.
         let is_beyond = turned.iter().any(|(_, q)| !(0.0..360.0).contains(q));
