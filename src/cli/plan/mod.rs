@@ -202,12 +202,11 @@ fn next_test(
     let (complete, noise) = plan::prepared(session, options)?;
     let problem = plan::states::problem_by_test(&complete, noise)?;
     let (noise_um, noise_source) = (problem.noise.sigma_mm * 1e3, problem.noise.source.word().to_string());
-    if tables {
-        say!("{}", crate::present::fit::noise(noise_um, &noise_source));
-    }
+    let of_noise = crate::present::fit::noise(noise_um, &noise_source);
     let improvement = if arguments.improve.asked() {
         let improvement = arguments.improve.run(&problem)?;
         if tables {
+            say!("{of_noise}");
             improve::print(&improvement);
         }
         arguments.improve.write(&improvement, sources, &arguments.session)?;
@@ -217,6 +216,9 @@ fn next_test(
     };
     let ranges = if arguments.range { plan::range::shrinkages(&problem)? } else { Vec::new() };
     if arguments.range && tables {
+        if improvement.is_none() {
+            say!("{of_noise}");
+        }
         output::print(&crate::present::next_test::ranges(&ranges));
     }
     let found = NextTest { noise_um, noise_source, improvement, ranges };

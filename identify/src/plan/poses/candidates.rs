@@ -52,7 +52,8 @@ pub(super) struct Candidates {
 const DRAWS_PER_CANDIDATE: usize = 200;
 /// The same if each needs iterations.
 const SOLVED_DRAWS_PER_CANDIDATE: usize = 20;
-/// Number of draws without a candidate after which none is expected from iterations.
+/// Number of draws without a candidate after which none is expected, if iterations are needed or no draw has met the
+/// instrument's condition.
 const FRUITLESS_DRAWS: usize = 1000;
 /// Poses that are drawn before they are judged together.
 const BATCH: usize = 250;
@@ -90,7 +91,8 @@ pub(super) fn draw(
     let parts = Parts::of(session, &bodies, test);
     let mut found = Candidates { states: Vec::with_capacity(count), excluded: 0, unmet: 0 };
     while found.states.len() < count && found.excluded < most {
-        if iterates && found.states.is_empty() && found.excluded >= FRUITLESS_DRAWS {
+        let fruitless = found.states.is_empty() && found.excluded >= FRUITLESS_DRAWS;
+        if fruitless && (iterates || found.unmet == found.excluded) {
             break;
         }
         let batch: Vec<(Vec<f64>, Goal)> =
