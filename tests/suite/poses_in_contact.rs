@@ -349,3 +349,39 @@ fn the_command_names_sockets_and_says_what_is_out_of_reach() {
     assert!(message.contains("test `one`: no drawn pose brings the ball into the socket"), "{message}");
     assert!(message.contains("no travel is stated of `J1`, `J2`"), "{message}");
 }
+
+/// A robot has no linear axes that place the balls or the stylus: its joints do.
+#[test]
+fn robots_hold_a_bar_and_touch_a_cylinder() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::copy(ready("ur10/machine.toml"), folder.path().join("machine.toml")).unwrap();
+    let place = folder.path().join("session.toml");
+    let head = "[machine]\nfile = \"machine.toml\"\n[unknowns]\nerrors = [\"EB0J2\", \"EX0J2\", \"EB0J3\"]\n";
+    let bar = "kind = \"ballbar\"\n[[test]]\nname = \"A\"\ndata = \"A.csv\"\nbar_mm = 200\n\
+               workpiece_ball_mm = [500, 200, 200]\nspindle_ball_mm = [0, 0, 100]\n";
+    let probe = "kind = \"probe\"\n[[test]]\nname = \"A\"\ndata = \"A.csv\"\nradius_mm = 50\n\
+                 artefact_mm = [500, 200, 200]\nstylus_mm = [0, 0, 100]\n";
+    for (instrument, length, is_probe) in [(bar, 200.0, false), (probe, 50.0, true)] {
+        std::fs::write(&place, format!("{head}[instrument]\n{instrument}")).unwrap();
+        let reading = ReadOptions { read_data: false, ..ReadOptions::default() };
+        let session = files::session(&place, &reading).unwrap();
+        let joints: Vec<(Joint, [f64; 3], [f64; 3])> =
+            session.machine.axes.iter().map(|axis| (Joint::Rotary, axis.direction, axis.origin_mm)).collect();
+        let found = select(&session, &measured_by(&session, None), &options(20, 0.02)).unwrap();
+        for pose in &found.poses {
+            let tool = chain(&joints, &radians(pose)).apply(Vector3::new(0.0, 0.0, 100.0));
+            let mut apart = tool - Vector3::new(500.0, 200.0, 200.0);
+            if is_probe {
+                assert!(apart.z.abs() < CONTACT_MM, "{apart}");
+                apart.z = 0.0;
+            }
+            assert!((apart.norm() - length).abs() < CONTACT_MM, "{apart}");
+        }
+    }
+    // Out of reach.
+    std::fs::write(&place, format!("{head}[instrument]\n{}", probe.replace("500, 200", "5000, 200"))).unwrap();
+    let output = abbe(&["plan", text(&place), "--poses", "5"]);
+    let message = String::from_utf8_lossy(&output.stderr).replace('\n', " ");
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(message.contains("none of 1000 drawn poses makes the probe touch the cylinder"), "{message}");
+}

@@ -96,7 +96,7 @@ pub(super) fn draw(
             break;
         }
         let batch: Vec<(Vec<f64>, Goal)> =
-            (0..BATCH).map(|_| (drawn(machine, random), Goal::draw(station, limits, random))).collect();
+            (0..BATCH).map(|_| (drawn(machine, random), Goal::draw(station, limits.height_mm, random))).collect();
         let met = parallel::map(BATCH, &|k| {
             let (drawn, goal) = &batch[k];
             let at = goal.met(machine, station, drawn)?;

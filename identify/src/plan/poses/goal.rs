@@ -21,7 +21,6 @@ use abbe_model::session::placing::positions_for_bar;
 use rand_pcg::Pcg64;
 
 use super::between;
-use super::candidates::PoseLimits;
 use crate::correction::reach;
 
 /// Least cosine of the angle between the probing direction and the inward normal of the surface. A probe that touches at
@@ -41,14 +40,14 @@ pub(super) enum Goal {
 }
 
 impl Goal {
-    /// Draws the goal of one candidate.
-    pub fn draw(station: &Station<f64>, limits: &PoseLimits, random: &mut Pcg64) -> Goal {
+    /// Draws the goal of one candidate. A probe touches its cylinder between two heights above its point, mm.
+    pub fn draw(station: &Station<f64>, height_mm: [f64; 2], random: &mut Pcg64) -> Goal {
         match station {
             Station::Tracker(_) => Goal::Free,
             Station::Socket(socket) => Goal::InR(socket.socket),
             Station::Probe(probe) => {
                 let turn = between(random, [0.0, TAU]);
-                let height = between(random, limits.height_mm);
+                let height = between(random, height_mm);
                 Goal::OnTable { point_mm: surface_point(probe, turn, height), apart_mm: [0.0; 3] }
             }
             Station::BallBar(_) | Station::RTest(_) => {
