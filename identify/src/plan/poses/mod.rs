@@ -1,7 +1,7 @@
 //! Selects poses for an instrument that measures at rest.
 //!
 //! Candidate poses are drawn at random within the travel of the axes and the limits of the user ([`candidates`]), and
-//! brought to where the instrument measures ([`goal`]): a tracker anywhere, a socket's ball in the socket. A
+//! brought to where the instrument measures: a tracker anywhere, a socket's ball in the socket. A
 //! first set is built greedily; then poses are exchanged against candidates until no exchange improves the criterion
 //! (Fedorov's algorithm: Atkinson, Donev & Tobias, Optimum Experimental Designs, 2007, ch. 12).
 //!
