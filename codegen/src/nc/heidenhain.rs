@@ -37,8 +37,8 @@ fn coordinates(to: &Positions) -> String {
 
 /// The blocks of a straight motion: the words of each, and its length, which counts a degree as a millimetre.
 ///
-/// An axis whose display is within one turn may go the shorter way to a position. Rotary axes therefore move by a change,
-/// of a quarter of a turn at most: the shorter way is then the programmed one.
+/// An axis whose display is within one turn may go the shorter way to a position. Rotary axes therefore move by a
+/// change, of a quarter of a turn at most: the shorter way is then the programmed one.
 fn straight(from: &Positions, to: &Positions) -> Vec<(String, f64)> {
     let known = |letter: char, q: f64| before(from, letter).unwrap_or(q);
     let widest = to.iter().filter(|(letter, _)| is_rotary(*letter)).map(|(letter, q)| (q - known(*letter, *q)).abs());

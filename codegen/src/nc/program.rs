@@ -182,8 +182,8 @@ impl Writer<'_> {
         let ball_bar = matches!(self.test.station, Station::BallBar(_));
         if self.test.station.kind() == InstrumentKind::Probe {
             draft.warn(
-                "The stylus stays at the surface: this is for a scanning probe. A touch probe needs the cycle of the control \
-                 at each position"
+                "The stylus stays at the surface: this is for a scanning probe. A touch probe needs the cycle of the \
+                 control at each position"
                     .into(),
             );
         }
