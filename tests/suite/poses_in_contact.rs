@@ -343,7 +343,8 @@ fn the_command_names_sockets_and_says_what_is_out_of_reach() {
         .unwrap();
     // One socket of two out of reach.
     let far = "socket = \"a\"\nsocket_mm = [5000, 0, 0]\n";
-    let near = "[[test]]\nname = \"two\"\ndata = \"none.csv\"\nball_mm = [0, 0, 1346.7]\nsocket = \"b\"\nsocket_mm = [500, 0, 300]\n";
+    let near = "[[test]]\nname = \"two\"\ndata = \"none.csv\"\nball_mm = [0, 0, 1346.7]\n\
+                socket = \"b\"\nsocket_mm = [500, 0, 300]\n";
     let (code, message) = run(&format!("{single}{far}{near}"), &[]);
     assert_eq!(code, Some(0), "{message}");
     assert!(message.contains("test `one`: no drawn pose brings the ball into the socket"), "{message}");

@@ -11,7 +11,7 @@ use crate::results::{Combination, Unobservable};
 pub struct PlanAnalysis {
     /// Standard deviation of one scalar reading, µm.
     pub noise_um: f64,
-    /// Source of `noise_um`: `stated` by the session or the user, `repeats` or `residual` of its readings, or `assumed`.
+    /// Source of `noise_um`: `stated` by session or user, `repeats` or `residual` of its readings, or `assumed`.
     pub noise_source: String,
     /// Number of readings.
     pub readings: usize,

@@ -183,7 +183,7 @@ fn poses(arguments: &PlanArguments, outputs: &output::Outputs, tables: bool) -> 
 pub struct NextTest {
     /// Standard deviation of one scalar reading, µm.
     noise_um: f64,
-    /// Source of `noise_um`: `stated` by the session or the user, `repeats` or `residual` of its readings, or `assumed`.
+    /// Source of `noise_um`: `stated` by session or user, `repeats` or `residual` of its readings, or `assumed`.
     noise_source: String,
     /// The tests that `--improve` or `--separate` proposes.
     #[serde(skip_serializing_if = "Option::is_none")]

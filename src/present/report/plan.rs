@@ -23,8 +23,8 @@ const MAX_ROWS: usize = 30;
 fn method(analysis: &PlanAnalysis) -> String {
     format!(
         "The model is linearised at the nominal machine and every planned state. The uncertainties follow from the \
-         noise ({} per reading, {}) and from the priors of the set-up by the law of propagation of uncertainty (JCGM 100, \
-         JCGM 102).",
+         noise ({} per reading, {}) and from the priors of the set-up by the law of propagation of uncertainty (JCGM \
+         100, JCGM 102).",
         micrometres(analysis.noise_um),
         analysis.noise_source
     )

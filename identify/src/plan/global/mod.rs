@@ -61,7 +61,7 @@ pub struct GlobalOptions {
 pub struct GlobalAnalysis {
     /// Standard deviation of one scalar reading, µm.
     pub noise_um: f64,
-    /// Source of `noise_um`: `stated` by the session or the user, `repeats` or `residual` of its readings, or `assumed`.
+    /// Source of `noise_um`: `stated` by session or user, `repeats` or `residual` of its readings, or `assumed`.
     pub noise_source: String,
     /// Number of samples.
     pub samples: usize,
@@ -219,11 +219,9 @@ impl<'p> Plan<'p> {
         let candidates = library::candidates(problem)?;
         for (given, _) in options.vary.iter().zip(&used).filter(|(_, used)| !**used) {
             let Some(candidate) = candidates.iter().find(|candidate| candidate.effect.id() == given.id) else {
-                return Err(IdentifyError::Request(format!(
-                    "`{}` is neither a set-up parameter with an uncertainty nor an effect of the library for this plan; \
-                     identifiers are as in `bar[A100]` and `EZC~C:h2`",
-                    given.id
-                )));
+                let message = "is neither a set-up parameter with an uncertainty nor an effect of the library for this \
+                               plan; identifiers are as in `bar[A100]` and `EZC~C:h2`";
+                return Err(IdentifyError::Request(format!("`{}` {message}", given.id)));
             };
             let first = truth.parameters.list.len();
             truth.add_effect(&candidate.effect)?;

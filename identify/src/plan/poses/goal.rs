@@ -23,8 +23,8 @@ use rand_pcg::Pcg64;
 use super::between;
 use crate::correction::reach;
 
-/// Least cosine of the angle between the probing direction and the inward normal of the surface. A probe that touches at
-/// a smaller one slips.
+/// Least cosine of the angle between the probing direction and the inward normal of the surface. A probe that touches
+/// at a smaller one slips.
 const LEAST_COSINE: f64 = 0.5;
 /// Largest distance of a probe from the surface that it touches, mm.
 const TOUCHING_MM: f64 = 1e-6;

@@ -90,9 +90,9 @@ impl Exchange {
         Some(factor.solve(Mat::<f64>::identity(n, n)))
     }
 
-    /// Numerical rank of the readings of some poses with the priors, without the ridge, and the number of parameters that
-    /// they involve: the place of a socket without a pose is none of them. The uncertainties of poses of full rank contain
-    /// the ridge with a share of at most [`RIDGE`].
+    /// Numerical rank of the readings of some poses with the priors, without the ridge, and the number of parameters
+    /// that they involve: the place of a socket without a pose is none of them. The uncertainties of poses of full rank
+    /// contain the ridge with a share of at most [`RIDGE`].
     pub fn rank(&self, poses: &[usize]) -> Result<[usize; 2], IdentifyError> {
         let involved = |k: &usize| {
             self.targets.contains(k) || poses.iter().any(|pose| self.rows[*pose].col(*k).iter().any(|x| *x != 0.0))
