@@ -22,6 +22,10 @@ pub mod store;
 pub mod study;
 pub mod unit;
 
+/// Version of the program and the first digits of the SHA-256 of the sources that determine results, such as
+/// `0.1.0+3fa2b1c9d4e5`. A change of these sources gives other keys.
+pub const BUILD: &str = concat!(env!("CARGO_PKG_VERSION"), "+", env!("ABBE_SOURCES"));
+
 /// Why the results of a fleet cannot be read or written. A session that cannot be analysed is a record, not an error.
 #[derive(Debug, thiserror::Error)]
 pub enum FleetError {

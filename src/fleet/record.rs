@@ -12,19 +12,19 @@ use super::options::Options;
 /// Version of the schema of records and of the tables that are made from them.
 pub const SCHEMA_VERSION: u32 = 2;
 
-/// The result of one session. It depends on the contents of the input files, the options and the version of the program
+/// The result of one session. It depends on the contents of the input files, the options and the build of the program
 /// alone.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Record {
     /// Version of this schema.
     pub schema_version: u32,
-    /// SHA-256 of all inputs, all options and the version of the program, in hexadecimal.
+    /// SHA-256 of all inputs, all options and the build of the program, in hexadecimal.
     pub key: String,
-    /// Version of the program.
+    /// Build of the program: its version and a checksum of its sources, such as `0.1.0+3fa2b1c9d4e5`.
     pub tool_version: String,
     /// The options of the analysis.
     pub options: Options,
-    /// Seed of all random numbers; it follows from `key`.
+    /// Seed of all random numbers; it follows from what `key` follows from, except the build.
     pub seed: u64,
     /// Identifier of the session: `session_id` of `[about]`; `null` without one.
     pub session_id: Option<String>,

@@ -1,7 +1,8 @@
 //! The unit of work: fit, trace and validation of one session.
 //!
-//! Its key is the SHA-256 of the contents of all inputs, of the options and of the version of the program. Seeds follow
-//! from the key. A record is therefore the same whoever computes it, and is computed once.
+//! Its key is the SHA-256 of the contents of all inputs, of the options and of the build of the program. A record is
+//! therefore the same whoever computes it, and is computed once. Seeds follow from the same without the build, so that
+//! results of two builds differ by what the program computes alone.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -16,10 +17,10 @@ use abbe_model::files::{self, ReadOptions, SourceMap};
 use abbe_model::session::Session;
 use sha2::{Digest, Sha256};
 
-use super::FleetError;
 use super::options::Options;
 use super::record::{EffectRecord, ErrorRecord, InputRecord, MachineRecord, Record, SCHEMA_VERSION, ValidationRecord};
 use super::store::{Pointer, Store};
+use super::{BUILD, FleetError};
 use crate::present::report::provenance;
 
 /// Bits of a seed: every reader of JSON keeps an integer of this size.
@@ -99,7 +100,7 @@ fn inputs(file: &Path, options: &Options, places: &Places) -> Inputs {
     let read_options = ReadOptions { allow_outside: places.allow_outside, ..ReadOptions::default() };
     let mut record = Record {
         schema_version: SCHEMA_VERSION,
-        tool_version: env!("CARGO_PKG_VERSION").to_string(),
+        tool_version: BUILD.to_string(),
         options: options.clone(),
         ..Record::default()
     };
@@ -121,7 +122,7 @@ fn inputs(file: &Path, options: &Options, places: &Places) -> Inputs {
     }
     let stated = serde_json::json!({
         "schema_version": SCHEMA_VERSION,
-        "tool_version": record.tool_version,
+        "tool_version": env!("CARGO_PKG_VERSION"),
         "options": options,
         "inputs": record.inputs,
         "model": model.as_ref().map(|(_, sha256)| sha256),
@@ -129,7 +130,7 @@ fn inputs(file: &Path, options: &Options, places: &Places) -> Inputs {
     });
     let digest = Sha256::digest(stated.to_string());
     record.seed = digest.iter().take(8).fold(0, |seed, byte| seed << 8 | u64::from(*byte)) >> (64 - SEED_BITS);
-    record.key = hexadecimal(digest);
+    record.key = hexadecimal(Sha256::new().chain_update(digest).chain_update(BUILD).finalize());
     Inputs { read, record, model }
 }
 

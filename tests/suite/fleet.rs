@@ -135,7 +135,27 @@ fn every_record_is_described_by_its_schema() {
         let faults: Vec<String> = validator.iter_errors(&record).map(|fault| fault.to_string()).collect();
         assert!(faults.is_empty(), "{name}: {faults:?}");
         assert_eq!(name, format!("{}/{}.json", &record["key"].as_str().unwrap()[..2], record["key"].as_str().unwrap()));
+        assert_eq!(record["tool_version"], abbe::fleet::BUILD);
     }
+}
+
+/// The checksum of the sources, by the tools of the system: names and contents of the files in the order of the names,
+/// after the crates of the registry.
+#[test]
+#[cfg(target_os = "linux")]
+fn the_build_is_known_by_its_sources() {
+    let script = r#"
+        awk 'BEGIN { RS = "\[\[package\]\]"; ORS = "" } /
+checksum = / { print }' Cargo.lock
+        find model/src identify/src src/fleet -type f ! -name '.*' | LC_ALL=C sort | while read -r name; do
+            printf '%s
+' "$name"
+            printf "$(sha256sum "$name" | cut -c1-64 | sed 's/../\x&/g')"
+        done"#;
+    let line = format!("({script}) | sha256sum | cut -c1-12");
+    let output = Command::new("bash").args(["-c", &line]).current_dir(super::workspace()).output().unwrap();
+    let digits = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(abbe::fleet::BUILD, format!("{}+{}", env!("CARGO_PKG_VERSION"), digits.trim()));
 }
 
 #[test]

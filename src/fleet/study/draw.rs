@@ -84,9 +84,9 @@ impl Study {
 
     /// Makes a draw. `goes_on` returns whether to continue; a draw that was interrupted is `None`.
     pub fn draw(&self, number: usize, goes_on: &(dyn Fn() -> bool + Sync)) -> Option<Draw> {
-        // The key holds the seed of the study. Streams of one seed are correlated; hashes are not.
+        // The digest holds the seed of the study. Streams of one seed are correlated; hashes are not.
         let mut digest = Sha256::new();
-        digest.update(&self.key);
+        digest.update(&self.digest);
         digest.update((number as u64).to_le_bytes());
         let mut random = Pcg64::from_seed(digest.finalize().into());
         let [plan, effect, noise] = self.combination(number, &mut random);

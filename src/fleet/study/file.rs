@@ -14,7 +14,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::fleet::FleetError;
+use crate::fleet::{BUILD, FleetError};
 
 /// A study as its file has it.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
@@ -130,7 +130,10 @@ pub struct Study {
     pub plans: Vec<Session>,
     /// The declared effect of each entry of `effect` in each plan; `None` for no effect or one of the library.
     pub effects: Vec<Vec<Option<Effect>>>,
-    /// SHA-256 of the study file, the plans and the version of the program, in hexadecimal.
+    /// SHA-256 of the study file, the plans and the version of the program, in hexadecimal. All random numbers follow
+    /// from it.
+    pub digest: String,
+    /// SHA-256 of `digest` and the build of the program, in hexadecimal: draws of another build are made again.
     pub key: String,
 }
 
@@ -173,8 +176,10 @@ pub fn read(path: &Path) -> Result<Study, FleetError> {
         effects.push(own);
         plans.push(session);
     }
-    let key = digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
-    Ok(Study { file, plans, effects, key })
+    let hexadecimal = |digest: Sha256| digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect::<String>();
+    let digest = hexadecimal(digest);
+    let key = hexadecimal(Sha256::new().chain_update(&digest).chain_update(BUILD));
+    Ok(Study { file, plans, effects, digest, key })
 }
 
 /// The declared effect of an entry in a plan.

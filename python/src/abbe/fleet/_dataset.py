@@ -30,7 +30,7 @@ _GROUPS = 4
 
 SCHEMAS: dict[str, dict[str, tuple[str, str]]] = {
     "sessions": {
-        "key": ("string", "SHA-256 of all inputs, options and the version of the program"),
+        "key": ("string", "SHA-256 of all inputs, options and the build of the program"),
         "session_id": ("string", "`session_id` of `[about]`, else the session file"),
         "shared_id": ("bool", "whether sessions of different content have this identifier"),
         "file": ("string", "session file"),
@@ -55,7 +55,7 @@ SCHEMAS: dict[str, dict[str, tuple[str, str]]] = {
         "conflicts": ("int64", "set-up conflicts"),
         "validation_verdict": ("string", "verdict of the validation"),
         "validation_rms_um": ("double", "residual of the validated model"),
-        "tool_version": ("string", "version of the program"),
+        "tool_version": ("string", "build of the program: version and checksum of its sources"),
         "seed": ("int64", "seed of all random numbers"),
         "warnings": ("strings", "warnings"),
     },
