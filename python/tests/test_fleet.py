@@ -1,55 +1,19 @@
-"""Fleets: runs on Dask, the data set, the queries of the documentation."""
+"""Fleets: runs on Dask, and the data set."""
 
 import json
-import os
-import re
-import signal
 import subprocess
-import sys
-import time
-from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import SESSIONS, find_command
+from conftest import find_command
+from fleets import make, results
 
 import abbe
 import abbe.fleet
 
-distributed = pytest.importorskip("distributed")
-duckdb = pytest.importorskip("duckdb")
+pytest.importorskip("distributed")
+pytest.importorskip("duckdb")
 parquet = pytest.importorskip("pyarrow.parquet")
-
-GUIDE = Path(__file__).parent.parent.parent / "docs" / "guide" / "fleet.md"
-
-
-def make(folder, count, machines=4):
-    """Small simulated sessions of some machines, one a month."""
-    plan = abbe.Session.read(SESSIONS / "hermle-c600u" / "chapter5.toml")
-    for number in range(count):
-        machine, month = number % machines, number // machines
-        session = abbe.Session(
-            plan.machine,
-            noise_um=0.3,
-            errors=["EX0C", "EY0C"],
-            about={
-                "serial_number": f"M{machine}",
-                "date": f"{2024 + month // 12}-{month % 12 + 1:02}-05T08:00:00",
-            },
-        )
-        session.add_test(
-            "C125", bar_mm=125, workpiece_ball_mm=(0, 100, 0), spindle_ball_mm=(0, 0, 0), z_mm=75,
-            sweep={"axis": "C", "from_deg": 0, "to_deg": 360, "step_deg": 4},
-        )  # fmt: skip
-        drift = 0.4 * month if machine == 0 else 0.0
-        measured = session.simulate({"EX0C": 10.0 + drift, "EY0C": -5.0}, seed=number + 1)
-        (folder / f"m{machine}").mkdir(parents=True, exist_ok=True)
-        measured.save(folder / f"m{machine}" / f"{month:02}")
-    return folder
-
-
-def results(out):
-    return {file.name: file.read_bytes() for file in sorted((out / "results").rglob("*.json"))}
 
 
 @pytest.fixture(scope="module")
@@ -127,26 +91,6 @@ def find_file(out, key):
     raise KeyError(key)
 
 
-def queries():
-    """The queries of the guide, by the question in front of each."""
-    text = GUIDE.read_text(encoding="utf-8")
-    return re.findall(r"\n\*\*(.+?)\*\*\n\n```sql\n(.*?)```", text, re.DOTALL)
-
-
-def test_there_are_ten_queries():
-    assert len(queries()) == 10
-
-
-@pytest.mark.parametrize("question, query", queries())
-def test_queries_of_the_guide(finished, question, query):
-    dataset = abbe.fleet.write_dataset(finished)
-    rows = dataset.sql(query).fetchall()
-    if "drift" in question.lower():
-        assert rows[0][0] == "M0", "the machine that drifts"
-    if "effect" not in question.lower() and "fault" not in question.lower() and "fail" not in question.lower():
-        assert rows
-
-
 def test_history_is_that_of_the_command(finished):
     found = abbe.fleet.history(finished)
     done = subprocess.run([find_command(), "history", str(finished), "--json", "-"], capture_output=True, check=True)
@@ -171,120 +115,6 @@ def test_bad_sessions_are_isolated(tmp_path):
     assert "C125.csv" in run.failed[0].message
     rows = abbe.fleet.write_dataset(tmp_path / "out").sql("select error_stage, error from sessions where error is not null")
     assert [stage for stage, _ in rows.fetchall()] == ["read"]
-
-
-def test_an_unreachable_scheduler_is_named(sessions, tmp_path, monkeypatch):
-    monkeypatch.setattr("abbe.fleet._run._CONNECT_S", 2.0)
-    with pytest.raises(abbe.Error, match="127.0.0.1:1 cannot be reached"):
-        abbe.fleet.run(sessions, tmp_path, client="tcp://127.0.0.1:1", progress=False)
-
-
-class Cluster:
-    """A scheduler and workers as processes of their own."""
-
-    def __init__(self, port):
-        self.address = f"tcp://127.0.0.1:{port}"
-        self.port = port
-        self.processes = []
-
-    def start(self, module, *arguments):
-        line = [sys.executable, "-m", "distributed.cli." + module, *map(str, arguments)]
-        process = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        self.processes.append(process)
-        return process
-
-    def scheduler(self):
-        return self.start("dask_scheduler", "--host", "127.0.0.1", "--port", self.port, "--no-dashboard")
-
-    def worker(self):
-        return self.start("dask_worker", self.address, "--nthreads", 1, "--no-nanny", "--no-dashboard")
-
-    def end(self):
-        for process in self.processes:
-            process.kill()
-            process.wait()
-
-
-@pytest.fixture
-def cluster():
-    own = Cluster(20000 + os.getpid() % 20000)
-    yield own
-    own.end()
-
-
-RUN = """
-import sys, abbe, abbe.fleet
-run = abbe.fleet.run(sys.argv[1], sys.argv[2], client=sys.argv[3], batch=2, progress=False, only=["EX0", "EXC"])
-print(run.computed, run.kept, len(run.lost))
-"""
-
-
-def test_killed_workers_and_schedulers_lose_nothing(tmp_path, cluster):
-    count = 40
-    sessions, out = make(tmp_path / "fleet", count), tmp_path / "out"
-
-    def start():
-        line = [sys.executable, "-c", RUN, str(sessions), str(out), cluster.address]
-        return subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-
-    def done():
-        return len(list((out / "results").rglob("*.json"))) if (out / "results").is_dir() else 0
-
-    def wait(condition, seconds=90):
-        end = time.monotonic() + seconds
-        while not condition():
-            assert time.monotonic() < end, "nothing goes on"
-            time.sleep(0.02)
-
-    scheduler = cluster.scheduler()
-    first, _ = cluster.worker(), cluster.worker()
-    run = start()
-    wait(lambda: done() >= 4 or run.poll() is not None)
-    first.send_signal(signal.SIGKILL)
-    wait(lambda: done() >= 12 or run.poll() is not None)
-    scheduler.send_signal(signal.SIGKILL)
-    scheduler.wait()
-    run.kill()
-    run.wait()
-    time.sleep(0.5)
-    before = done()
-    assert 0 < before < count, "the kill came too late to tell anything"
-
-    cluster.end()
-    cluster.scheduler()
-    cluster.worker()
-    run = start()
-    output, errors = run.communicate(timeout=180)
-    assert run.returncode == 0, errors
-    computed, kept, lost = map(int, output.split())
-    assert (computed, kept, lost) == (count - before, before, 0)
-    texts = results(out)
-    assert len(texts) == count
-    for text in texts.values():
-        json.loads(text)
-    assert abbe.fleet.write_dataset(out).rows["sessions"] == count
-
-
-def test_ctrl_c_keeps_finished_results(tmp_path):
-    count = 40
-    sessions, out = make(tmp_path / "fleet", count), tmp_path / "out"
-    line = RUN.replace("client=sys.argv[3]", "workers=1")
-    run = subprocess.Popen(
-        [sys.executable, "-c", f"if __name__ == '__main__':\n{line.replace(chr(10), chr(10) + '    ')}", sessions, out],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        start_new_session=True,
-    )
-    end = time.monotonic() + 90
-    while not (out / "results").is_dir() and time.monotonic() < end:
-        time.sleep(0.02)
-    run.send_signal(signal.SIGINT)
-    run.communicate(timeout=60)
-    assert run.returncode != 0
-    kept = len(results(out))
-    assert 0 < kept <= count
-    again = abbe.fleet.run(sessions, out, workers=1, progress=False, only=["EX0", "EXC"])
-    assert (again.computed, again.kept) == (count - kept, kept)
 
 
 def test_dates_outside_the_calendar_are_unknown():

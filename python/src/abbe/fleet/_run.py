@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
+import logging
 import os
 import sys
+import threading
 import uuid
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -31,6 +36,14 @@ _BATCHES_AHEAD = 4
 
 _CONNECT_S = 15.0
 """Time in which a scheduler has to answer."""
+
+_ALONE_S = 30.0
+"""Time without a worker after which a run says so."""
+
+_MOST_ALONE_S = 3600.0
+"""Longest time to the next such message. It grows from message to message."""
+
+_LOG = logging.getLogger("abbe.fleet")
 
 
 @dataclass(frozen=True)
@@ -93,7 +106,8 @@ def run(
     """Analyse sessions, and keep what is done.
 
     A result is a file of `out` whose name is the SHA-256 of all inputs and options. A second run computes only what is
-    missing or changed. Ctrl-C ends the run; finished results stay.
+    missing or changed. Ctrl-C ends the run; finished results stay. A run whose scheduler has no worker waits for one; a
+    warning of the logger ``abbe.fleet`` says so after 30 s, and again.
 
     Parameters
     ----------
@@ -108,8 +122,8 @@ def run(
     batch : int, optional
         Sessions of a task; by default an eighth of the share of a worker, 32 at most.
     retries : int
-        Times that a session is tried again, alone, after Dask has given up its batch: after four workers ended during it
-        (``distributed.scheduler.allowed-failures``).
+        Times that a session is tried again, alone, at the end of the run, after Dask has given up its batch: after four
+        workers ended during it (``distributed.scheduler.allowed-failures``).
     threads : int
         Threads of the analysis of one session.
     progress : bool or callable
@@ -155,14 +169,13 @@ def through(
     if not items:
         return
     with _connected(client, workers, len(items)) as connected:
-        size = batch or max(1, min(_MOST_IN_BATCH, len(items) // (8 * _present_workers(connected))))
         show = _bar if progress is True else (progress or (lambda done, all: None))
-        _Work(connected, function, common, retries, result, show).through(items, size)
+        _Work(connected, function, common, retries, result, show).through(items, batch)
 
 
 def _present_workers(client: Client) -> int:
-    """The workers of the scheduler, at least 1. They may join and leave during a run."""
-    return max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
+    """The workers of the scheduler. They may join and leave during a run."""
+    return len(client.scheduler_info(n_workers=-1)["workers"])
 
 
 def _dask() -> Any:
@@ -177,8 +190,6 @@ def _connected(client: str | Client | None, workers: int | None, sessions: int) 
     """The client of the caller, or one that ends with the run."""
     dask = _dask()
     if isinstance(client, dask.Client):
-        # An array of jobs may begin much later: without a limit, as with any other work of the client.
-        client.wait_for_workers(1)
         yield client
         return
     if client is None:
@@ -192,21 +203,26 @@ def _connected(client: str | Client | None, workers: int | None, sessions: int) 
             yield own
         return
     try:
+        # Dask waits without a limit for the first words of what listens at the address.
+        with ThreadPoolExecutor(1) as thread:
+            thread.submit(asyncio.run, _answers(client)).result()
         own = dask.Client(client, timeout=_CONNECT_S)
-    except (OSError, ValueError) as cause:
+    except Exception as cause:
+        why = str(cause) or f"no answer in {_CONNECT_S:.0f} s"
         raise Error(
-            f"the scheduler {client} cannot be reached: {cause}",
+            f"the scheduler {client} cannot be reached: {why}",
             help="start it with `dask scheduler`, and workers with `dask worker ADDRESS --nthreads 1`",
         ) from cause
     with own:
-        try:
-            own.wait_for_workers(1, timeout=_CONNECT_S)
-        except TimeoutError as cause:
-            raise Error(
-                f"the scheduler {client} has no worker",
-                help="start workers with `dask worker ADDRESS --nthreads 1`, in an environment that has abbe",
-            ) from cause
         yield own
+
+
+async def _answers(address: str) -> None:
+    """Return if what listens at the address speaks as Dask does."""
+    dask = _dask()
+    arguments = dask.Security().get_connection_args("client")
+    connected = dask.comm.connect(address, timeout=_CONNECT_S, **arguments)
+    (await asyncio.wait_for(connected, _CONNECT_S)).abort()
 
 
 class _Work:
@@ -228,6 +244,7 @@ class _Work:
         self._result = result
         self._show = show
         self._tried: dict[Any, int] = {}
+        self._suspects: deque[Any] = deque()
         self._items: dict[str, list[Any]] = {}
         self._keys: dict[str, dict[str, list[str]]] = {}
         self._done = 0
@@ -238,20 +255,66 @@ class _Work:
         self._items[future.key] = items
         return future
 
-    def through(self, items: Sequence[Any], size: int) -> None:
+    def through(self, items: Sequence[Any], batch: int | None) -> None:
         """Do all items, in batches of this size. Each present worker has some of them waiting."""
+        with self._watched():
+            # Jobs of a queue may begin much later: without a limit, as with any other work of Dask.
+            try:
+                self._client.wait_for_workers(1)
+            except OSError as cause:
+                raise self._disconnected() from cause
+            workers = max(1, _present_workers(self._client))
+            self._all(items, batch or max(1, min(_MOST_IN_BATCH, len(items) // (8 * workers))))
+
+    @contextmanager
+    def _watched(self) -> Iterator[None]:
+        """Say it if there is no worker. Nothing is lost: the batches wait for workers that join."""
+        ended = threading.Event()
+
+        def watch() -> None:
+            alone, say_at = 0.0, _ALONE_S
+            while not ended.wait(_ALONE_S / 10):
+                try:
+                    workers = _present_workers(self._client)
+                except (OSError, RuntimeError):  # A scheduler that is lost is reported by its batches.
+                    return
+                if workers:
+                    alone, say_at = 0.0, _ALONE_S
+                    continue
+                alone += _ALONE_S / 10
+                if alone >= say_at:
+                    say_at = alone + min(2 * say_at, _MOST_ALONE_S)
+                    _LOG.warning(self._alone(alone))
+
+        watcher = threading.Thread(target=watch, name="abbe-fleet-workers", daemon=True)
+        watcher.start()
+        try:
+            yield
+        finally:
+            ended.set()
+            watcher.join(_CONNECT_S)
+
+    def _alone(self, seconds: float) -> str:
+        address = self._client.scheduler.address
+        return (
+            f"the scheduler {address} has had 0 workers for {seconds:.0f} s: {self._done} of {self._result.sessions} "
+            f"sessions are done, the others wait; start workers with `dask worker {address} --nthreads 1`, or end the "
+            "run with Ctrl-C: finished results are kept"
+        )
+
+    def _all(self, items: Sequence[Any], size: int) -> None:
         rest = iter(items)
         batches = iter(lambda: list(islice(rest, size)), [])
         self._show(0, len(items))
         waiting = _dask().as_completed([self._submit(batch) for batch in islice(batches, self._wanted())])
         try:
             for future in waiting:
-                again = self._ended(future)
+                self._ended(future)
                 future.release()
-                for batch in again:
-                    waiting.add(self._submit(batch))
                 for batch in islice(batches, max(0, self._wanted() - len(self._items))):
                     waiting.add(self._submit(batch))
+                for item in self._next_suspects():
+                    waiting.add(self._submit([item]))
                 self._show(self._done, len(items))
         except KeyboardInterrupt:
             self._client.cancel(list(waiting.futures), force=True)
@@ -261,10 +324,18 @@ class _Work:
         self._result.failed.sort(key=lambda failure: failure.file)
 
     def _wanted(self) -> int:
-        return _BATCHES_AHEAD * _present_workers(self._client)
+        return _BATCHES_AHEAD * max(1, _present_workers(self._client))
 
-    def _ended(self, future: Future) -> list[list[Any]]:
-        """Take in a batch. Returns what has to be tried again, item by item."""
+    def _next_suspects(self) -> list[Any]:
+        """Suspects to try alone, when all batches have ended: Dask gives up whatever waits for a worker that ends, so
+        that each worker has one item at most."""
+        if not self._suspects or any(items[0] not in self._tried for items in self._items.values()):
+            return []
+        count = max(1, _present_workers(self._client)) - len(self._items)
+        return [self._suspects.popleft() for _ in range(min(count, len(self._suspects)))]
+
+    def _ended(self, future: Future) -> None:
+        """Take in a batch."""
         items = self._items.pop(future.key)
         if future.status == "finished":
             try:
@@ -273,7 +344,7 @@ class _Work:
                 raise self._disconnected() from cause
             for outcome in outcomes:
                 self._take(outcome)
-            return []
+            return
         if future.status in ("cancelled", "lost"):
             raise self._disconnected()
         why = future.exception()
@@ -281,15 +352,13 @@ class _Work:
             raise Error(f"{why.message} ({self._done} of {self._result.sessions} done)")
         if not isinstance(why, _dask().KilledWorker):
             raise why
-        again = []
         for item in items:
             tried = self._tried[item] = self._tried.get(item, 0) + 1
             if tried <= self._retries:
-                again.append([item])
+                self._suspects.append(item)
             else:
                 self._result.lost.append(Failure(str(item), f"its worker ended {tried} times: {why}"))
                 self._done += 1
-        return again
 
     def _take(self, outcome: Outcome) -> None:
         file, computed, text, seconds = outcome
