@@ -145,12 +145,10 @@ fn every_record_is_described_by_its_schema() {
 #[cfg(target_os = "linux")]
 fn the_build_is_known_by_its_sources() {
     let script = r#"
-        awk 'BEGIN { RS = "\[\[package\]\]"; ORS = "" } /
-checksum = / { print }' Cargo.lock
+        awk 'BEGIN { RS = "\\[\\[package\\]\\]"; ORS = "" } /\nchecksum = / { print }' Cargo.lock
         find model/src identify/src src/fleet -type f ! -name '.*' | LC_ALL=C sort | while read -r name; do
-            printf '%s
-' "$name"
-            printf "$(sha256sum "$name" | cut -c1-64 | sed 's/../\x&/g')"
+            printf '%s\n' "$name"
+            printf "$(sha256sum "$name" | cut -c1-64 | sed 's/../\\x&/g')"
         done"#;
     let line = format!("({script}) | sha256sum | cut -c1-12");
     let output = Command::new("bash").args(["-c", &line]).current_dir(super::workspace()).output().unwrap();
