@@ -43,15 +43,19 @@ fn assert_consistent(result: &TraceResult, what: &str) {
     }
 }
 
-/// Noise of 0.3 µm for which a backlash of 0.076 ± 0.020 µm exceeds the whole null distribution, although the held-out
-/// error does not fall.
+/// Noise of 0.3 µm for which a backlash and a local feature exceed the whole null distribution, although the held-out
+/// error rises.
 #[test]
 fn an_effect_that_does_not_lower_the_held_out_error_is_not_claimed() {
-    let recipe = Recipe::new(Kind::TiltedTable, 27_035);
-    let result = traced(&session_of(&recipe), TraceOptions::default().significance);
-    assert!(result.effects.is_empty(), "{:?}", result.effects[0].name);
-    assert_eq!(result.verdict, "clean");
-    assert_consistent(&result, &result.residual_before);
+    for (kind, seed, shape) in [(Kind::Chapter4, 27_034, "backlash"), (Kind::Rotary, 27_075, "local")] {
+        let result = traced(&session_of(&Recipe::new(kind, seed)), TraceOptions::default().significance);
+        assert!(result.effects.is_empty(), "{:?}", result.effects[0].name);
+        assert_eq!(result.verdict, "clean");
+        let rejected: Vec<&str> = result.rejected_candidates.iter().map(|found| found.name.shape.as_str()).collect();
+        assert_eq!(rejected, [shape]);
+        assert!(result.rejected_candidates[0].heldout_decrease_um < 0.0);
+        assert_consistent(&result, &result.residual_before);
+    }
 }
 
 /// White noise of 0.20 µm without an effect. At a significance level at which candidates exceed the null distribution,

@@ -55,7 +55,7 @@ pub struct Policy {
 }
 
 /// The significance level if the caller states none.
-pub const SIGNIFICANCE: f64 = 0.005;
+pub const SIGNIFICANCE: f64 = 0.01;
 
 /// The policy for readings along runs.
 const RUNS: Policy = Policy {

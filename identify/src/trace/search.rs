@@ -132,7 +132,7 @@ fn add_best(search: &mut SearchState<'_>) -> Result<(f64, Option<usize>), Identi
         return Ok((p_value, None));
     }
     let before = search.selection.branches.clone();
-    if !moves::on_every_branch(&Add { p_value, threshold }, search)? {
+    if !moves::on_every_branch(&Add { p_value }, search)? {
         return Ok((p_value, None));
     }
     let added = search.selected().last().map(|selected| selected.candidate);

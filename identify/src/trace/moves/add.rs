@@ -6,11 +6,12 @@ use crate::trace::state::{ALL, SearchBranch, SearchState, SelectedEffect};
 
 /// Adds to each branch its best candidate. On all readings it is the candidate with the shortest description among
 /// those confounded with the best. With one fold left out, prediction matters and not the name, so it is the best.
+///
+/// The p-value on all readings decides for every branch. A threshold for each branch would leave the branches without
+/// the effect if its score is near the threshold, and the held-out error would then not decrease in their folds.
 pub struct Add {
     /// The p-value of the best candidate on all readings.
     pub p_value: f64,
-    /// The score that a candidate has to reach with one fold left out. On all readings the p-value decides.
-    pub threshold: f64,
 }
 
 impl Move for Add {
@@ -30,8 +31,7 @@ impl Move for Add {
             }
         };
         selected.push(SelectedEffect { candidate, p_value: self.p_value });
-        let margin = if branch == ALL { f64::NEG_INFINITY } else { self.threshold };
-        Ok(Proposal { selected, increase: score, margin }.accept(search, branch))
+        Ok(Proposal { selected, increase: score, margin: f64::NEG_INFINITY }.accept(search, branch))
     }
 
     fn follows_all_readings(&self) -> bool {

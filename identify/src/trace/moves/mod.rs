@@ -11,8 +11,8 @@
 //!
 //! | move | replaces | margin |
 //! |---|---|---|
-//! | [`add`] | nothing by one effect | the best score of readings without structure; it stands for `ln n` |
-//! | [`remove`] | one effect by nothing | the same, negative |
+//! | [`add`] | nothing by one effect | none: the p-value of the branch on all readings decides for all branches |
+//! | [`remove`] | one effect by nothing | the best score of readings without structure, negative; it stands for `ln n` |
 //! | [`swap`] | one effect by another | the confounding margin |
 //! | [`refine`] | all by a set with an effect tuned again | the confounding margin |
 //! | [`pair`] | all by a set with two other effects | the confounding margin |
