@@ -69,7 +69,7 @@ pub struct PoseArguments {
     /// Part of the cylinder that a probe may touch: least and greatest distance along its axis from `artefact_mm`
     /// [default: 0,0].
     ///
-    /// Example: --poses 12 --height-mm=-20,20
+    /// Example: --poses 12 --height-mm -20,20
     #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', requires = "poses", allow_hyphen_values = true)]
     height_mm: Option<Vec<f64>>,
     /// Write the poses as CSV, one row per pose, with the columns of data files.
