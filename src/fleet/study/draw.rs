@@ -28,6 +28,8 @@ const SIGNIFICANT: f64 = 2.807;
 const SURVIVES: f64 = 1e-4;
 /// Effects of the library that are drawn until the plan observes one.
 const LIBRARY_TRIES: usize = 50;
+/// Largest share of the χ² of the true effect that an equal effect of another name leaves: a cosine of 0.99.
+const EQUAL: f64 = 0.02;
 /// Half of a 95 % interval, standard deviations.
 const INTERVAL: f64 = 1.96;
 /// Smallest and largest outlier, µm.
@@ -52,7 +54,8 @@ pub struct Draw {
     pub not_observed: bool,
     /// Verdict of the trace.
     pub verdict: Option<String>,
-    /// Whether the true effect was found: named, or among the aliases of a found effect.
+    /// Whether the true effect was found: named, or among the aliases of a found effect, by its name or as an effect
+    /// that changes the readings equally.
     pub found: bool,
     /// Whether the found effect has the name of the true one.
     pub named: bool,
@@ -142,6 +145,7 @@ impl Study {
             given.push(value(&parameter.id, sigma * normal, &parameter.unit.name));
         }
         let locations = given.clone();
+        let mut own = Vec::new();
         let mut machine = session.clone();
         let mut tries = if stated.library { LIBRARY_TRIES } else { 1 };
         while tries > 0 {
@@ -155,7 +159,8 @@ impl Study {
                 // Another effect of the library, which the plan observes.
                 Err(Unmade::NotObserved) if tries > 0 => {}
                 coefficients => {
-                    given.extend(coefficients?);
+                    own = coefficients?;
+                    given.extend(own.iter().cloned());
                     break;
                 }
             }
@@ -167,14 +172,15 @@ impl Study {
             add_noise(readings, noise, session.resolution_mm, random);
         }
         let measured = session.clone().with_readings(simulated.readings);
-        Ok(self.analyse(draw, &measured, &locations, random.random::<u32>().into(), goes_on)?)
+        let truth = Truth { locations, alone: alone(session, &machine, own)?, noise_mm: noise_mm(noise) };
+        Ok(self.analyse(draw, &measured, &truth, random.random::<u32>().into(), goes_on)?)
     }
 
     fn analyse(
         &self,
         draw: &mut Draw,
         session: &Session,
-        truth: &[Given],
+        truth: &Truth,
         seed: u64,
         goes_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<(), IdentifyError> {
@@ -183,23 +189,47 @@ impl Study {
                 let (problem, found) = fit::prepare(session, seed)?;
                 let result = fit::report(&problem, &found)?;
                 draw.rms_um = result.rms_um;
-                draw.compare(&result.parameters, truth);
+                draw.compare(&result.parameters, &truth.locations);
             }
             Analysis::Trace => {
                 let options = TraceOptions { seed, ..TraceOptions::default() };
                 let found = trace(session, &options, &|_: Progress| goes_on())?;
                 draw.verdict = Some(found.result.verdict.clone());
                 draw.rms_um = found.result.after.rms_um;
-                draw.compare(&found.result.after.parameters, truth);
+                draw.compare(&found.result.after.parameters, &truth.locations);
                 let is_truth = |effect: &Effect| draw.truth.as_ref().is_some_and(|truth| *truth == effect.id());
                 draw.named = found.effects.iter().any(is_truth);
-                let hits = found.effects.iter().zip(&found.alias_effects);
-                let hit = hits.filter(|(effect, aliases)| is_truth(effect) || aliases.iter().any(is_truth)).count();
+                let mut hit = 0;
+                for (effect, aliases) in found.effects.iter().zip(&found.alias_effects) {
+                    let mut is_hit = is_truth(effect) || aliases.iter().any(is_truth);
+                    for effect in std::iter::once(effect).chain(aliases) {
+                        is_hit = is_hit || draw.truth.is_some() && truth.equals(effect)?;
+                    }
+                    hit += usize::from(is_hit);
+                }
                 draw.found = hit > 0;
                 draw.false_claims = found.effects.len() - hit.min(1);
             }
         }
         Ok(())
+    }
+}
+
+/// What a draw simulates.
+struct Truth {
+    /// The location errors.
+    locations: Vec<Given>,
+    /// Readings of the true effect alone, without noise.
+    alone: Session,
+    noise_mm: f64,
+}
+
+impl Truth {
+    /// Whether an effect changes the readings as the true one does, beside the parameters of the plan.
+    fn equals(&self, effect: &Effect) -> Result<bool, IdentifyError> {
+        let mut with = self.alone.clone();
+        with.effects.push(effect.clone());
+        Ok(chi_square(&with, self.noise_mm)? <= EQUAL * chi_square(&self.alone, self.noise_mm)?)
     }
 }
 
@@ -280,18 +310,15 @@ fn coefficients(
     let scaled = |factor: f64| -> Vec<Given> {
         coefficients.iter().map(|(id, number, unit)| value(id, factor * number, unit)).collect()
     };
-    let exact = Simulation { given: scaled(1.0), noise_mm: Some(0.0), ..Simulation::default() };
-    let mut exact_machine = machine.clone();
-    exact_machine.resolution_mm = None;
-    let readings = simulate(&exact_machine, &exact)?.readings;
-    let observed = readings.iter().flat_map(|readings| &readings.observed);
-    let nominal = plan.tests.iter().flat_map(|test| test.readings.iter().flat_map(|readings| &readings.observed));
-    let change: f64 = observed.zip(nominal).map(|(with, without)| (with - without).powi(2)).sum();
-    let measured = Session { resolution_mm: None, ..plan.clone().with_readings(readings) };
-    // The model has no noise to estimate: that of the study is stated.
-    let noise_mm = noise.um.max(1e-3) * 1e-3;
-    let problem = Problem::new(&measured, NoiseModel::white(noise_mm, NoiseSource::Stated), 1)?;
-    let chi_square = fit::fit(&problem, None)?.chi_square;
+    let measured = alone(plan, machine, scaled(1.0))?;
+    let observed = |session: &Session| -> Vec<f64> {
+        let readings = session.tests.iter().filter_map(|test| test.readings.as_ref());
+        readings.flat_map(|readings| readings.observed.iter().copied()).collect()
+    };
+    let change: f64 =
+        observed(&measured).iter().zip(observed(plan)).map(|(with, without)| (with - without).powi(2)).sum();
+    let noise_mm = noise_mm(noise);
+    let chi_square = chi_square(&measured, noise_mm)?;
     // Slow structure stands out less from autocorrelated noise: by the spectral density at frequency zero.
     let inflation = (1.0 + noise.autocorrelation) / (1.0 - noise.autocorrelation);
     let strength = (chi_square / inflation).sqrt();
@@ -299,6 +326,25 @@ fn coefficients(
         return Err(Unmade::NotObserved);
     }
     Ok(scaled(size * SIGNIFICANT / strength))
+}
+
+/// The readings of a plan on a machine with given coefficients and no other error, without noise.
+fn alone(plan: &Session, machine: &Session, given: Vec<Given>) -> Result<Session, IdentifyError> {
+    let exact = Simulation { given, noise_mm: Some(0.0), ..Simulation::default() };
+    let exact_machine = Session { resolution_mm: None, ..machine.clone() };
+    let readings = simulate(&exact_machine, &exact)?.readings;
+    Ok(Session { resolution_mm: None, ..plan.clone().with_readings(readings) })
+}
+
+/// The noise of a study in mm. It is not zero, so that χ² is finite.
+fn noise_mm(noise: &Noise) -> f64 {
+    noise.um.max(1e-3) * 1e-3
+}
+
+/// χ² of the fit of a session. The model has no noise to estimate: it is stated.
+fn chi_square(session: &Session, noise_mm: f64) -> Result<f64, IdentifyError> {
+    let problem = Problem::new(session, NoiseModel::white(noise_mm, NoiseSource::Stated), 1)?;
+    Ok(fit::fit(&problem, None)?.chi_square)
 }
 
 /// Adds noise to the readings of a test, run by run, and rounds them.
