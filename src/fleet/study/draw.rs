@@ -26,7 +26,11 @@ const SIGNIFICANT: f64 = 2.807;
 /// Least share of the squared change of the readings that the plan's parameters do not absorb. Below it, the effect is
 /// confounded with them.
 const SURVIVES: f64 = 1e-4;
-/// Effects of the library that are drawn until the plan observes one.
+/// Largest plausible coefficient of an effect of the library, as a share of its physical size: 0.1 mm, 1 mrad; on
+/// robots and other long chains ten times as much. The trace searches no larger ones.
+const PLAUSIBLE: f64 = 0.1;
+const PLAUSIBLE_OF_LONG_CHAINS: f64 = 1.0;
+/// Effects of the library that are drawn until the plan observes one of a plausible size.
 const LIBRARY_TRIES: usize = 50;
 /// Largest share of the χ² of the true effect that an equal effect of another name leaves: a cosine of 0.99.
 const EQUAL: f64 = 0.02;
@@ -155,7 +159,12 @@ impl Study {
             let Some(truth) = truth else { break };
             draw.truth = Some(truth.id());
             machine.effects = [session.effects.as_slice(), &[truth]].concat();
-            match coefficients(session, &machine, stated.size, noise, random) {
+            let most = match (stated.library, session.instrument.is_two_sided()) {
+                (false, _) => f64::INFINITY,
+                (true, true) => PLAUSIBLE,
+                (true, false) => PLAUSIBLE_OF_LONG_CHAINS,
+            };
+            match coefficients(session, &machine, (stated.size, most), noise, random) {
                 // Another effect of the library, which the plan observes.
                 Err(Unmade::NotObserved) if tries > 0 => {}
                 coefficients => {
@@ -229,7 +238,9 @@ impl Truth {
     fn equals(&self, effect: &Effect) -> Result<bool, IdentifyError> {
         let mut with = self.alone.clone();
         with.effects.push(effect.clone());
-        Ok(chi_square(&with, self.noise_mm)? <= EQUAL * chi_square(&self.alone, self.noise_mm)?)
+        // An effect that cannot be fitted to the true one is another one.
+        let Ok(left) = chi_square(&with, self.noise_mm) else { return Ok(false) };
+        Ok(left <= EQUAL * chi_square(&self.alone, self.noise_mm)?)
     }
 }
 
@@ -290,23 +301,25 @@ fn of_library(session: &Session, random: &mut impl Rng) -> Result<Effect, Unmade
 }
 
 /// Coefficients of the last effect of a machine, in a random direction and of the stated size: the χ² that it adds to
-/// the residual of the plan's parameters.
+/// the residual of the plan's parameters. None if one of them were larger than `most` of its physical size.
 fn coefficients(
     plan: &Session,
     machine: &Session,
-    size: f64,
+    (size, most): (f64, f64),
     noise: &Noise,
     random: &mut impl Rng,
 ) -> Result<Vec<Given>, Unmade> {
     let own = machine.effects.len() - 1;
-    let coefficients: Vec<(String, f64, String)> = parameters(machine)?
-        .into_iter()
-        .filter(|parameter| matches!(parameter.role, Role::Coefficient { effect, .. } if effect == own))
-        .map(|parameter| {
-            let normal: f64 = StandardNormal.sample(random);
-            (parameter.id, normal * parameter.unit.display_per_internal * 1e-3, parameter.unit.name)
-        })
-        .collect();
+    let mut largest = 0.0_f64;
+    let mut coefficients: Vec<(String, f64, String)> = Vec::new();
+    for parameter in parameters(machine)? {
+        if matches!(parameter.role, Role::Coefficient { effect, .. } if effect == own) {
+            let internal = 1e-3 * random.sample::<f64, _>(StandardNormal);
+            largest = largest.max(internal.abs() / parameter.size);
+            let number = internal * parameter.unit.display_per_internal;
+            coefficients.push((parameter.id, number, parameter.unit.name));
+        }
+    }
     let scaled = |factor: f64| -> Vec<Given> {
         coefficients.iter().map(|(id, number, unit)| value(id, factor * number, unit)).collect()
     };
@@ -325,7 +338,11 @@ fn coefficients(
     if strength.is_nan() || chi_square <= SURVIVES * change / (noise_mm * noise_mm) || strength <= 0.0 {
         return Err(Unmade::NotObserved);
     }
-    Ok(scaled(size * SIGNIFICANT / strength))
+    let factor = size * SIGNIFICANT / strength;
+    if factor * largest > most {
+        return Err(Unmade::NotObserved);
+    }
+    Ok(scaled(factor))
 }
 
 /// The readings of a plan on a machine with given coefficients and no other error, without noise.
