@@ -139,6 +139,11 @@ impl Machine {
         })
     }
 
+    /// The positions of all axes, mm or rad, as the chain takes them.
+    pub fn axis_positions(&self, positions: &[f64]) -> Vec<AxisPosition<f64>> {
+        self.axes.iter().zip(positions).map(|(axis, position)| AxisPosition::new(axis.kind, *position)).collect()
+    }
+
     /// Number of error slots of the machine: [`ERRORS_PER_AXIS`] per axis, in the order of [`Machine::axes`].
     pub fn error_slots(&self) -> usize {
         self.axes.len() * ERRORS_PER_AXIS

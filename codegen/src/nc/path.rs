@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use abbe_model::axis::AxisKind;
-use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
+use abbe_model::chain::{BodyErrors, Machine};
 use abbe_model::frames::Point;
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::session::Test;
@@ -324,8 +324,7 @@ fn chord_error_mm(machine: &Machine, test: &Test, vertices: &[Vec<f64>]) -> f64 
 
 /// The tool point in the table frame, mm.
 fn tool_over_table(machine: &Machine, test: &Test, state: &[f64]) -> [f64; 3] {
-    let states: Vec<AxisPosition<f64>> =
-        machine.axes.iter().zip(state).map(|(axis, q)| AxisPosition::new(axis.kind, *q)).collect();
+    let states = machine.axis_positions(state);
     let none = vec![BodyErrors::<f64>::NONE; state.len()];
     let tool = machine.tool_point::<f64>(&states, &none, Point(test.station.tool_point_mm()));
     machine.table_point::<f64>(&states, &none, tool).0

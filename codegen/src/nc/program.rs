@@ -1,7 +1,7 @@
 //! The program of a test as data: approach, centring, feed-in, traversals, feed-out, retreat.
 
 use abbe_model::axis::AxisKind;
-use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
+use abbe_model::chain::{BodyErrors, Machine};
 use abbe_model::frames::Point;
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::instrument::{InstrumentKind, Station};
@@ -146,8 +146,7 @@ impl Writer<'_> {
     /// The positions with the tool retracted along itself; `None` if the linear axes or their travel do not allow it.
     fn retracted(&self, at: &[f64]) -> Option<Vec<f64>> {
         let bar = self.bar()?;
-        let states: Vec<AxisPosition<f64>> =
-            self.machine.axes.iter().zip(at).map(|(axis, q)| AxisPosition::new(axis.kind, *q)).collect();
+        let states = self.machine.axis_positions(at);
         let none = vec![BodyErrors::<f64>::NONE; at.len()];
         let point = |z: f64| self.machine.tool_point::<f64>(&states, &none, Point([0.0, 0.0, z])).0;
         let (near, far) = (point(0.0), point(self.options.clearance_mm));

@@ -89,8 +89,7 @@ fn newton(
     mut positions: Vec<f64>,
 ) -> Option<Vec<f64>> {
     for _ in 0..MAX_STEPS {
-        let state: Vec<AxisPosition<f64>> =
-            machine.axes.iter().zip(&positions).map(|(axis, q)| AxisPosition::new(axis.kind, *q)).collect();
+        let state = machine.axis_positions(&positions);
         let deviation = aim.deviation(&Pose::nominal(machine, &state, tool_mm), wanted);
         let [mm, rad] = size(&deviation);
         if mm <= TOLERANCE_MM * 1e-3 && rad <= TOLERANCE_RAD * 1e-3 && faces(aim, &state, machine, tool_mm, wanted) {

@@ -64,7 +64,7 @@ pub(super) fn ball_positions(
 }
 
 /// A unit vector perpendicular to an axis: the projection of R's Y, or of Z if the axis is close to Y.
-fn across(direction: [f64; 3]) -> [f64; 3] {
+pub(super) fn across(direction: [f64; 3]) -> [f64; 3] {
     let start = if direction[1].abs() < 0.5 { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] };
     let along: f64 = (0..3).map(|i| start[i] * direction[i]).sum();
     let rest: [f64; 3] = std::array::from_fn(|i| start[i] - along * direction[i]);

@@ -11,7 +11,7 @@ pub mod functions;
 mod results;
 
 use abbe_model::axis::AxisKind;
-use abbe_model::chain::{AxisPosition, BodyErrors, ERRORS_PER_AXIS, Machine};
+use abbe_model::chain::{BodyErrors, ERRORS_PER_AXIS, Machine};
 use abbe_model::frames::Point;
 use abbe_model::sensitivity::SlotValues;
 use abbe_model::session::limits::LARGEST;
@@ -66,8 +66,7 @@ impl MachineWithErrors<'_> {
     /// The tool point in the table frame, with errors or without.
     fn point(&self, positions: &[f64], with_errors: bool, only: Option<usize>) -> Vector3<f64> {
         let machine = self.machine;
-        let state: Vec<AxisPosition<f64>> =
-            machine.axes.iter().zip(positions).map(|(axis, q)| AxisPosition::new(axis.kind, *q)).collect();
+        let state = machine.axis_positions(positions);
         let errors = if with_errors {
             let mut slots = vec![0.0; machine.error_slots()];
             for function in self.functions {

@@ -9,7 +9,7 @@ const POSITION_TOLERANCE_MM: f64 = 1e-6;
 
 /// The two balls in R, nominal: workpiece ball, spindle ball; mm.
 pub fn balls(machine: &Machine, bar: &BallBar<f64>, at: &[f64]) -> ([f64; 3], [f64; 3]) {
-    let state = trajectory::positions(machine, at);
+    let state = machine.axis_positions(at);
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let (workpiece, spindle) = bar.balls::<f64>(machine, &state, &none, &|_| None);
     (workpiece.0, spindle.0)
@@ -24,5 +24,5 @@ pub fn positions_for_bar(machine: &Machine, bar: &BallBar<f64>, at: &[f64], requ
 
 /// A point of an axis and its direction in R, carried by the axes between it and the bed.
 pub fn axis_line(machine: &Machine, at: &[f64], axis: usize) -> ([f64; 3], [f64; 3]) {
-    trajectory::axis_line(machine, &trajectory::positions(machine, at), axis)
+    trajectory::axis_line(machine, &machine.axis_positions(at), axis)
 }

@@ -91,7 +91,7 @@ pub(super) fn bar_between_points(station: &Station<f64>) -> Option<BallBar<f64>>
 
 /// The point of the table frame at the tool point.
 fn table_point_at_tool(machine: &Machine, bar: &BallBar<f64>, at: &[f64]) -> [f64; 3] {
-    let state = positions(machine, at);
+    let state = machine.axis_positions(at);
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let tool = machine.tool_point::<f64>(&state, &none, Point(bar.spindle_ball));
     machine.table_point::<f64>(&state, &none, tool).0
@@ -224,7 +224,7 @@ pub(super) fn solve_linear_axes(
 
 /// Spindle ball less workpiece ball in R, nominal.
 fn spindle_from_workpiece(machine: &Machine, bar: &BallBar<f64>, at: &[f64]) -> [f64; 3] {
-    let state = positions(machine, at);
+    let state = machine.axis_positions(at);
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let (workpiece, spindle) = bar.balls::<f64>(machine, &state, &none, &|_| None);
     spindle.minus(workpiece).0
@@ -245,10 +245,6 @@ fn relative_move(machine: &Machine, bar: &BallBar<f64>, at: &[f64], axis: usize)
     })
 }
 
-pub(crate) fn positions(machine: &Machine, at: &[f64]) -> Vec<AxisPosition<f64>> {
-    machine.axes.iter().zip(at).map(|(axis, &position)| AxisPosition::new(axis.kind, position)).collect()
-}
-
 /// From workpiece ball to spindle ball while the linear axes follow a rotary axis. The vector has the length of the bar
 /// and points away from the axis, along the path of the carried ball, or along the axis.
 fn offset_vector(
@@ -258,7 +254,7 @@ fn offset_vector(
     axis: usize,
     offset: FollowOffset,
 ) -> Result<[f64; 3], Fault> {
-    let state = positions(machine, at);
+    let state = machine.axis_positions(at);
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let (workpiece, spindle) = bar.balls::<f64>(machine, &state, &none, &|_| None);
     let on_workpiece_side = axis < machine.workpiece_side;

@@ -13,7 +13,7 @@ use abbe_model::session::{Session, Test};
 use rand_pcg::Pcg64;
 
 use super::between;
-use super::goal::{Goal, state};
+use super::goal::Goal;
 use crate::error::IdentifyError;
 use crate::numerics::parallel;
 use crate::plan::collision::{Bodies, Parts, segment_distance};
@@ -140,7 +140,7 @@ fn is_permitted(machine: &Machine, station: &Station<f64>, at: &[f64], limits: &
         return false;
     }
     let none = vec![BodyErrors::<f64>::NONE; at.len()];
-    let tool = machine.tool_point::<f64>(&state(machine, at), &none, Point(station.tool_point_mm())).0;
+    let tool = machine.tool_point::<f64>(&machine.axis_positions(at), &none, Point(station.tool_point_mm())).0;
     let in_box = |limits: &[[f64; 2]; 3]| (0..3).all(|i| tool[i] >= limits[i][0] && tool[i] <= limits[i][1]);
     if !limits.box_mm.as_ref().is_none_or(in_box) {
         return false;

@@ -12,7 +12,7 @@
 
 use std::f64::consts::TAU;
 
-use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
+use abbe_model::chain::{BodyErrors, Machine};
 use abbe_model::frames::{Point, cross};
 use abbe_model::instrument::Station;
 use abbe_model::instrument::ballbar::BallBar;
@@ -22,6 +22,7 @@ use rand_pcg::Pcg64;
 
 use super::between;
 use crate::correction::reach;
+use crate::plan::ball_positions::across;
 
 /// Least cosine of the angle between the probing direction and the inward normal of the surface. A probe that touches
 /// at a smaller one slips.
@@ -67,7 +68,8 @@ impl Goal {
                 let bar = BallBar { workpiece_ball: point_mm, spindle_ball: tool_mm, bar: 0.0 };
                 positions_for_bar(machine, &bar, drawn, apart_mm).or_else(|| {
                     let none = vec![BodyErrors::<f64>::NONE; drawn.len()];
-                    let carried = machine.workpiece_point::<f64>(&state(machine, drawn), &none, Point(point_mm)).0;
+                    let carried =
+                        machine.workpiece_point::<f64>(&machine.axis_positions(drawn), &none, Point(point_mm)).0;
                     solved(machine, tool_mm, std::array::from_fn(|i| carried[i] + apart_mm[i]), drawn)
                 })?
             }
@@ -103,7 +105,7 @@ impl Goal {
 /// The positions at which the axes of the tool side bring the tool's point to a point of R.
 fn solved(machine: &Machine, tool_mm: [f64; 3], point_mm: [f64; 3], drawn: &[f64]) -> Option<Vec<f64>> {
     let none = vec![BodyErrors::<f64>::NONE; drawn.len()];
-    let wanted = machine.table_point::<f64>(&state(machine, drawn), &none, Point(point_mm)).0;
+    let wanted = machine.table_point::<f64>(&machine.axis_positions(drawn), &none, Point(point_mm)).0;
     let axes: Vec<usize> = (machine.workpiece_side..machine.axes.len()).collect();
     reach::from_start(machine, tool_mm, wanted, &axes, drawn)
 }
@@ -111,7 +113,7 @@ fn solved(machine: &Machine, tool_mm: [f64; 3], point_mm: [f64; 3], drawn: &[f64
 /// Whether the probe touches the surface from outside.
 fn touches(machine: &Machine, probe: &Probe<f64>, at: &[f64]) -> bool {
     let none = vec![BodyErrors::<f64>::NONE; at.len()];
-    let geometry = probe.geometry::<f64>(machine, &state(machine, at), &none, |_| None);
+    let geometry = probe.geometry::<f64>(machine, &machine.axis_positions(at), &none, |_| None);
     let [_, outward, _] = geometry.quadratic();
     let cosine = -outward / (geometry.radius * geometry.step_length.unwrap_or(1.0));
     cosine >= LEAST_COSINE && geometry.distance().abs() <= TOUCHING_MM
@@ -120,11 +122,7 @@ fn touches(machine: &Machine, probe: &Probe<f64>, at: &[f64]) -> bool {
 /// The centre of the stylus in the table frame that touches the cylinder at an angle and at a height above its point.
 fn surface_point(probe: &Probe<f64>, turn: f64, height: f64) -> [f64; 3] {
     let along = probe.axis;
-    // The axis of R that is most perpendicular to the cylinder.
-    let least = (0..3).min_by(|a, b| along[*a].abs().total_cmp(&along[*b].abs())).unwrap_or(0);
-    let across = cross(along, Point(std::array::from_fn(|i| f64::from(u8::from(i == least))))).0;
-    let length = across.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let first = across.map(|x| x / length);
+    let first = across(along);
     let second = cross(along, Point(first)).0;
     let (sin, cos) = turn.sin_cos();
     std::array::from_fn(|i| probe.artefact[i] + height * along[i] + probe.radius * (cos * first[i] + sin * second[i]))
@@ -136,9 +134,4 @@ fn upward(random: &mut Pcg64) -> [f64; 3] {
     let (sin, cos) = between(random, [-0.5 * TAU, 0.5 * TAU]).sin_cos();
     let across = (1.0 - z * z).sqrt();
     [across * cos, across * sin, z]
-}
-
-/// The positions of the axes with their sines and cosines.
-pub(super) fn state(machine: &Machine, at: &[f64]) -> Vec<AxisPosition<f64>> {
-    machine.axes.iter().zip(at).map(|(axis, q)| AxisPosition::new(axis.kind, *q)).collect()
 }
