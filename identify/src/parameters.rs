@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use abbe_model::driver::{DriverInput, Reference};
 use abbe_model::effect::{CoefficientPrior, Component, Effect};
-use abbe_model::instrument::InternalUnit;
+use abbe_model::instrument::{InstrumentKind, InternalUnit};
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::{Prior, Session, Test};
 
@@ -107,12 +107,26 @@ pub struct Parameters {
 /// The prior standard deviation from which its estimation starts, in physical sizes.
 const START_OF_SCALE: f64 = 0.01;
 
+/// The physical size of a delay, s.
+pub(crate) const LONG_DELAY_S: f64 = 0.1;
+
 /// The physical size of a component.
 pub(crate) fn physical_size(unit: InternalUnit) -> f64 {
     match unit {
         InternalUnit::Millimetre => 1.0,
         InternalUnit::Radian => 0.01,
         InternalUnit::Ratio => 0.01,
+    }
+}
+
+/// Largest plausible coefficient of an effect over its physical size, by the unit of its component: 0.1 mm and 1 mrad on
+/// a machine tool, ten times as much on the robots and long chains that trackers and sockets measure; a gain error of 0.1;
+/// a delay (no unit) of 0.1 s.
+pub fn largest_plausible_share(unit: Option<InternalUnit>, instrument: InstrumentKind) -> f64 {
+    match unit {
+        Some(InternalUnit::Ratio) => 10.0,
+        Some(_) if instrument.is_two_sided() => 0.1,
+        _ => 1.0,
     }
 }
 
@@ -200,7 +214,7 @@ impl Parameters {
     ) -> Result<(), IdentifyError> {
         let size = match effect.component.unit(session.instrument.unknowns()) {
             Some(unit) => physical_size(unit),
-            None if effect.component == Component::TriggerDelay => 0.1,
+            None if effect.component == Component::TriggerDelay => LONG_DELAY_S,
             None => {
                 return Err(IdentifyError::NoSuchComponent {
                     effect: effect.id(),

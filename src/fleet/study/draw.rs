@@ -3,7 +3,7 @@
 use abbe_identify::IdentifyError;
 use abbe_identify::fit;
 use abbe_identify::noise::{Noise as NoiseModel, NoiseSource};
-use abbe_identify::parameters::Role;
+use abbe_identify::parameters::{Parameter, Role, largest_plausible_share};
 use abbe_identify::problem::Problem;
 use abbe_identify::quantity::Given;
 use abbe_identify::results::ParameterResult;
@@ -20,20 +20,15 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::file::{Analysis, Combinations, Noise, Study};
+use super::truth::{DrawnEffect, alone, chi_square, noise_mm};
 
 /// The smallest significant size, standard deviations: 0.5 % two-sided.
 const SIGNIFICANT: f64 = 2.807;
 /// Least share of the squared change of the readings that the plan's parameters do not absorb. Below it, the effect is
 /// confounded with them.
 const SURVIVES: f64 = 1e-4;
-/// Largest plausible coefficient of an effect of the library, as a share of its physical size: 0.1 mm, 1 mrad; on
-/// robots and other long chains ten times as much. The trace searches no larger ones.
-const PLAUSIBLE: f64 = 0.1;
-const PLAUSIBLE_OF_LONG_CHAINS: f64 = 1.0;
 /// Effects of the library that are drawn until the plan observes one of a plausible size.
 const LIBRARY_TRIES: usize = 50;
-/// Largest share of the χ² of the true effect that an equal effect of another name leaves: a cosine of 0.99.
-const EQUAL: f64 = 0.02;
 /// Half of a 95 % interval, standard deviations.
 const INTERVAL: f64 = 1.96;
 /// Smallest and largest outlier, µm.
@@ -149,7 +144,7 @@ impl Study {
             given.push(value(&parameter.id, sigma * normal, &parameter.unit.name));
         }
         let locations = given.clone();
-        let mut own = Vec::new();
+        let mut true_effect = None;
         let mut machine = session.clone();
         let mut tries = if stated.library { LIBRARY_TRIES } else { 1 };
         while tries > 0 {
@@ -158,18 +153,17 @@ impl Study {
                 if stated.library { Some(of_library(session, random)?) } else { self.effects[plan][effect].clone() };
             let Some(truth) = truth else { break };
             draw.truth = Some(truth.id());
-            machine.effects = [session.effects.as_slice(), &[truth]].concat();
-            let most = match (stated.library, session.instrument.is_two_sided()) {
-                (false, _) => f64::INFINITY,
-                (true, true) => PLAUSIBLE,
-                (true, false) => PLAUSIBLE_OF_LONG_CHAINS,
-            };
+            let unit = truth.component.unit(session.instrument.unknowns());
+            // A stated effect has its stated size, however large.
+            let most = if stated.library { largest_plausible_share(unit, session.instrument) } else { f64::INFINITY };
+            machine.effects = [session.effects.as_slice(), std::slice::from_ref(&truth)].concat();
             match coefficients(session, &machine, (stated.size, most), noise, random) {
                 // Another effect of the library, which the plan observes.
                 Err(Unmade::NotObserved) if tries > 0 => {}
                 coefficients => {
-                    own = coefficients?;
+                    let own = coefficients?;
                     given.extend(own.iter().cloned());
+                    true_effect = Some(DrawnEffect::of(session, &machine, truth.id(), own, noise_mm(noise))?);
                     break;
                 }
             }
@@ -181,7 +175,7 @@ impl Study {
             add_noise(readings, noise, session.resolution_mm, random);
         }
         let measured = session.clone().with_readings(simulated.readings);
-        let truth = Truth { locations, alone: alone(session, &machine, own)?, noise_mm: noise_mm(noise) };
+        let truth = Truth { locations, effect: true_effect };
         Ok(self.analyse(draw, &measured, &truth, random.random::<u32>().into(), goes_on)?)
     }
 
@@ -206,16 +200,14 @@ impl Study {
                 draw.verdict = Some(found.result.verdict.clone());
                 draw.rms_um = found.result.after.rms_um;
                 draw.compare(&found.result.after.parameters, &truth.locations);
-                let is_truth = |effect: &Effect| draw.truth.as_ref().is_some_and(|truth| *truth == effect.id());
-                draw.named = found.effects.iter().any(is_truth);
-                let mut hit = 0;
-                for (effect, aliases) in found.effects.iter().zip(&found.alias_effects) {
-                    let mut is_hit = is_truth(effect) || aliases.iter().any(is_truth);
-                    for effect in std::iter::once(effect).chain(aliases) {
-                        is_hit = is_hit || draw.truth.is_some() && truth.equals(effect)?;
-                    }
-                    hit += usize::from(is_hit);
-                }
+                let is_named = |effect: &Effect| truth.effect.as_ref().is_some_and(|own| own.id == effect.id());
+                draw.named = found.effects.iter().any(is_named);
+                let is_equal = |effect: &Effect| truth.effect.as_ref().is_some_and(|own| own.is_equal(effect));
+                let hits = found.effects.iter().zip(&found.alias_effects).filter(|(effect, aliases)| {
+                    let mut names = std::iter::once(*effect).chain(*aliases);
+                    names.clone().any(is_named) || names.any(is_equal)
+                });
+                let hit = hits.count();
                 draw.found = hit > 0;
                 draw.false_claims = found.effects.len() - hit.min(1);
             }
@@ -228,20 +220,7 @@ impl Study {
 struct Truth {
     /// The location errors.
     locations: Vec<Given>,
-    /// Readings of the true effect alone, without noise.
-    alone: Session,
-    noise_mm: f64,
-}
-
-impl Truth {
-    /// Whether an effect changes the readings as the true one does, beside the parameters of the plan.
-    fn equals(&self, effect: &Effect) -> Result<bool, IdentifyError> {
-        let mut with = self.alone.clone();
-        with.effects.push(effect.clone());
-        // An effect that cannot be fitted to the true one is another one.
-        let Ok(left) = chi_square(&with, self.noise_mm) else { return Ok(false) };
-        Ok(left <= EQUAL * chi_square(&self.alone, self.noise_mm)?)
-    }
+    effect: Option<DrawnEffect>,
 }
 
 /// Why a draw has no simulated session.
@@ -279,7 +258,7 @@ fn value(id: &str, value: f64, unit: &str) -> Given {
 }
 
 /// The parameters of a session.
-fn parameters(session: &Session) -> Result<Vec<abbe_identify::parameters::Parameter>, IdentifyError> {
+fn parameters(session: &Session) -> Result<Vec<Parameter>, IdentifyError> {
     // No parameter depends on the noise.
     Ok(Problem::new(session, NoiseModel::white(1e-3, NoiseSource::Stated), 1)?.parameters.list)
 }
@@ -343,25 +322,6 @@ fn coefficients(
         return Err(Unmade::NotObserved);
     }
     Ok(scaled(factor))
-}
-
-/// The readings of a plan on a machine with given coefficients and no other error, without noise.
-fn alone(plan: &Session, machine: &Session, given: Vec<Given>) -> Result<Session, IdentifyError> {
-    let exact = Simulation { given, noise_mm: Some(0.0), ..Simulation::default() };
-    let exact_machine = Session { resolution_mm: None, ..machine.clone() };
-    let readings = simulate(&exact_machine, &exact)?.readings;
-    Ok(Session { resolution_mm: None, ..plan.clone().with_readings(readings) })
-}
-
-/// The noise of a study in mm. It is not zero, so that χ² is finite.
-fn noise_mm(noise: &Noise) -> f64 {
-    noise.um.max(1e-3) * 1e-3
-}
-
-/// χ² of the fit of a session. The model has no noise to estimate: it is stated.
-fn chi_square(session: &Session, noise_mm: f64) -> Result<f64, IdentifyError> {
-    let problem = Problem::new(session, NoiseModel::white(noise_mm, NoiseSource::Stated), 1)?;
-    Ok(fit::fit(&problem, None)?.chi_square)
 }
 
 /// Adds noise to the readings of a test, run by run, and rounds them.

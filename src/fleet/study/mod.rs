@@ -2,11 +2,13 @@
 //! the study file, the plans and its number alone.
 //!
 //! - [`file`](mod@file): the study file; [`draw`]: one simulated session and what the analysis makes of it;
+//! - `truth`: the true effect of a draw, and what equals it;
 //! - [`summary`]: power, false claims and coverage with their sampling errors.
 
 pub mod draw;
 pub mod file;
 pub mod summary;
+mod truth;
 
 use super::FleetError;
 use super::store::Store;

@@ -7,11 +7,11 @@ use std::sync::{Arc, Mutex};
 use abbe_model::driver::{Driver, DriverInput, DriverPart, DriverSample};
 use abbe_model::effect::shape::Curve;
 use abbe_model::effect::{Component, Effect, Shape};
-use abbe_model::instrument::InternalUnit;
 use faer::Mat;
 
 use super::states::{Channel, DriverStates};
 use super::{Columns, SharedSamples};
+use crate::parameters::{LONG_DELAY_S, largest_plausible_share, physical_size};
 
 /// The columns of an effect: a channel, and basis functions of the states of its driver.
 #[derive(Clone, Debug)]
@@ -217,18 +217,14 @@ impl Columns<'_> {
         column_sets
     }
 
-    /// The largest plausible coefficient of an effect, in internal units: 0.1 mm and 1 mrad on a machine tool, ten
-    /// times as much on the robots and long chains that trackers and sockets measure.
+    /// The largest plausible coefficient of an effect, in internal units ([`largest_plausible_share`]).
     pub fn plausible(&self, effect: &Effect, column_set: &EffectColumns) -> f64 {
-        let machine_tool = self.problem.session.instrument.is_two_sided();
-        let scale = if machine_tool { 1.0 } else { 10.0 };
-        let most = match effect.component.unit(self.problem.session.instrument.unknowns()) {
-            Some(InternalUnit::Millimetre) => 0.1 * scale,
-            Some(InternalUnit::Radian) => 1e-3 * scale,
-            Some(InternalUnit::Ratio) => 0.1,
-            // The factor of a delay is the speed. A tenth of a second is a long delay.
-            None => return 0.1,
-        };
+        let instrument = self.problem.session.instrument;
+        let unit = effect.component.unit(instrument.unknowns());
+        let share = largest_plausible_share(unit, instrument);
+        // The basis function of a delay is the speed.
+        let Some(unit) = unit else { return share * LONG_DELAY_S };
+        let most = share * physical_size(unit);
         let greatest = column_set.greatest();
         if greatest > 0.0 { most / greatest } else { 0.0 }
     }
