@@ -95,7 +95,7 @@ fn ranked(
     let sets: Vec<EffectColumns> = candidates.iter().map(|candidate| candidate.columns.clone()).collect();
     let residual = columns.whitened_values(&found.fit.residuals);
     let go_on = || interrupt.check().is_ok();
-    let moments = Moments::new(columns, sets, start.model.clone(), &residual, start.prior(), Vec::new())?;
+    let moments = Moments::new(columns, sets, start.model.clone(), &residual, start.prior());
     let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
     moments.prepare(&[], &go_on)?;
     let trained = TrainedModel::new(&moments, &[], &folds)?;

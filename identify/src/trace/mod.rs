@@ -276,20 +276,22 @@ fn trace_or_interrupted(
         let draws = null(SINGLE);
         remainder::structure(problem, &columns, model, &start.residual, draws, prior)
     };
-    let (draws, structure_before) = parallel::both(|| null(BLOCK), || policy.tests_structure.then(structure_before));
-
-    let structure_before = structure_before.transpose()?;
-    interrupt.check()?;
-
     let searched = screening::searched_candidates(problem, &columns, options)?;
     let candidate_count = searched.len();
     progress(Progress::Screening(candidate_count));
     let (reserve, candidates): (Vec<_>, Vec<_>) = searched.into_iter().partition(|candidate| candidate.last_resort);
     let column_sets: Vec<EffectColumns> = candidates.iter().map(|candidate| candidate.columns.clone()).collect();
-    let (model, prior) = (start.model.clone(), start.prior());
     let go_on = || interrupt.check().is_ok();
-    let moments = Moments::new(&columns, column_sets, model, &start.residual, prior, draws)?;
-    moments.prepare(&[], &go_on)?;
+    let moments = || {
+        let mut moments = Moments::new(&columns, column_sets, start.model.clone(), &start.residual, start.prior());
+        moments.prepare(&[], &go_on)?;
+        moments.take_draws(null(BLOCK), true, &go_on)?;
+        Ok::<_, IdentifyError>(moments)
+    };
+    let (moments, structure_before) =
+        parallel::both(moments, || policy.tests_structure.then(structure_before).transpose());
+    let (moments, structure_before) = (moments?, structure_before?);
+    interrupt.check()?;
     let unwhitened = start.unwhitened(&columns, &before_fit.beta, problem.noise.sigma_mm)?;
     let mut search = SearchState::new(&columns, candidates, reserve, moments, unwhitened, policy)?;
     search.interrupt = Some(interrupt);

@@ -18,41 +18,39 @@ use crate::noise::{Noise, PureError};
 use crate::numerics::median;
 use crate::problem::Problem;
 
-/// Null draws, each over the whitened rows in fold order, in blocks of `block` readings.
-pub fn draws(
-    problem: &Problem,
-    columns: &Columns<'_>,
+/// Null draws, each over the whitened rows in fold order, in blocks of `block` readings. A draw is formed when it is
+/// taken: a hundred thousand readings times two hundred draws are 160 MB.
+pub fn draws<'d>(
+    problem: &'d Problem,
+    columns: &'d Columns<'_>,
     residuals: &[Vec<f64>],
-    whitened: &[f64],
+    whitened: &'d [f64],
     count: usize,
     block: usize,
     seed: u64,
-) -> Vec<Vec<f64>> {
+) -> impl ExactSizeIterator<Item = Vec<f64>> + use<'d> {
     let mut generator = Pcg64::seed_from_u64(seed ^ 0x6e75_6c6c);
-    if Policy::of(problem).null == NullSource::SignFlips {
-        return sign_flipped(columns, whitened, count, &mut generator);
-    }
-    let pool = pool(problem, residuals);
-    let mut draw = || {
-        let mut values = block_draws(&pool, columns.rows(), block, &mut generator);
-        with_noise_spectrum(&mut values, &problem.noise, &mut generator);
-        columns.placed(&values)
+    let mut draw: Box<dyn FnMut() -> Vec<f64> + 'd> = if Policy::of(problem).null == NullSource::SignFlips {
+        let origins = columns.origin_of_rows();
+        Box::new(move || sign_flipped(&origins, whitened, &mut generator))
+    } else {
+        let pool = pool(problem, residuals);
+        Box::new(move || {
+            let mut values = block_draws(&pool, columns.rows(), block, &mut generator);
+            with_noise_spectrum(&mut values, &problem.noise, &mut generator);
+            columns.placed(&values)
+        })
     };
-    (0..count).map(|_| draw()).collect()
+    (0..count).map(move |_| draw())
 }
 
-/// The residual with a random sign for each pose.
-fn sign_flipped(columns: &Columns<'_>, whitened: &[f64], count: usize, generator: &mut Pcg64) -> Vec<Vec<f64>> {
-    let origins = columns.origin_of_rows();
-    let mut draw = || {
-        let mut signs: HashMap<(usize, usize), f64> = HashMap::new();
-        let values = origins.iter().zip(whitened);
-        let flipped = |((test, row, _), value): (&(usize, usize, usize), &f64)| {
-            *signs.entry((*test, *row)).or_insert_with(|| sign(generator)) * value
-        };
-        values.map(flipped).collect()
+/// The residual with a random sign for each pose. `origins` are the test, row and coordinate of each value.
+fn sign_flipped(origins: &[(usize, usize, usize)], whitened: &[f64], generator: &mut Pcg64) -> Vec<f64> {
+    let mut signs: HashMap<(usize, usize), f64> = HashMap::new();
+    let flipped = |((test, row, _), value): (&(usize, usize, usize), &f64)| {
+        *signs.entry((*test, *row)).or_insert_with(|| sign(generator)) * value
     };
-    (0..count).map(|_| draw()).collect()
+    origins.iter().zip(whitened).map(flipped).collect()
 }
 
 fn sign(generator: &mut Pcg64) -> f64 {

@@ -188,7 +188,7 @@ pub fn structure(
     columns: &Columns<'_>,
     model: faer::Mat<f64>,
     residual: &[f64],
-    null: Vec<Vec<f64>>,
+    null: impl ExactSizeIterator<Item = Vec<f64>>,
     prior: PriorMoments,
 ) -> Result<Structure, IdentifyError> {
     let detectors = detectors(problem, columns);
@@ -201,7 +201,8 @@ pub fn structure(
     }
     let column_sets: Vec<EffectColumns> = detectors.iter().map(|detector| detector.column_set.clone()).collect();
     let count = column_sets.len();
-    let moments = Moments::new(columns, column_sets, model, residual, prior, null)?;
+    let mut moments = Moments::new(columns, column_sets, model, residual, prior);
+    moments.take_draws(null, false, &|| true)?;
     let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
     let trained = TrainedModel::new(&moments, &[], &folds)?;
     let mut best = (0, f64::NEG_INFINITY, 0.0);

@@ -40,7 +40,7 @@ pub fn screened_effects(session: &Session, options: &TraceOptions) -> Result<Vec
     let prior = start.prior();
     let searched = searched_candidates(&problem, &columns, options)?;
     let column_sets: Vec<EffectColumns> = searched.iter().map(|candidate| candidate.columns.clone()).collect();
-    let moments = Moments::new(&columns, column_sets, start.model, &start.residual, prior, Vec::new())?;
+    let moments = Moments::new(&columns, column_sets, start.model, &start.residual, prior);
     let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
     let trained = TrainedModel::new(&moments, &[], &folds)?;
     Ok(searched

@@ -68,12 +68,24 @@ pub struct Moments<'c> {
     model: Arc<Mat<f64>>,
     residual: Arc<Vec<f64>>,
     prior: Arc<PriorMoments>,
-    /// The null draws with the model projected out.
-    null: Arc<Adjoint>,
+    /// Number of null draws.
+    draws: usize,
+    /// The null draws, for the products of segments that are added later.
+    null: Arc<NullDraws>,
     /// For each segment draws × columns.
     null_products: Store<usize, Mat<f64>>,
     /// By training folds.
     projections: Store<Vec<usize>, Projection>,
+}
+
+/// The null draws with the model projected out, as [`Adjoint`]. They are the largest array of a trace. Single precision
+/// halves it; scores are compared with each other, and a rounding of 10⁻⁷ decides nothing.
+#[derive(Default)]
+struct NullDraws {
+    /// The test and the scalar reading of each row.
+    rows: Vec<(usize, usize)>,
+    /// Some draws × rows, one part after another.
+    parts: Vec<Mat<f32>>,
 }
 
 /// Values that clones share.
@@ -102,18 +114,14 @@ pub(super) fn stored<K: std::hash::Hash + Eq + Clone, V: Clone, E>(
 }
 
 impl<'c> Moments<'c> {
-    /// From the orthonormal model columns (rows × rank), the residual, and the null draws, each over all rows.
-    ///
-    /// # Errors
-    /// If products are not finite.
+    /// From the orthonormal model columns (rows × rank) and the residual over all rows, without null draws.
     pub fn new(
         columns: &'c Columns<'c>,
         sets: Vec<EffectColumns>,
         model: Mat<f64>,
         residual: &[f64],
         prior: PriorMoments,
-        null: Vec<Vec<f64>>,
-    ) -> Result<Moments<'c>, IdentifyError> {
+    ) -> Moments<'c> {
         let mut moments = Moments {
             columns,
             sets: Vec::new(),
@@ -122,32 +130,66 @@ impl<'c> Moments<'c> {
             model: Arc::new(model),
             residual: Arc::new(residual.to_vec()),
             prior: Arc::new(prior),
-            null: Arc::new(Adjoint { rows: Vec::new(), values: Mat::zeros(0, 0) }),
+            draws: 0,
+            null: Arc::default(),
             null_products: Arc::default(),
             projections: Arc::default(),
         };
-        moments.take_draws(null)?;
         moments.append(sets);
-        Ok(moments)
+        moments
     }
 
-    /// Projects the model out of the null draws and keeps them. Each draw is released as soon as it is projected.
-    fn take_draws(&mut self, null: Vec<Vec<f64>>) -> Result<(), IdentifyError> {
-        let draws = null.len();
+    /// Forms the products of the candidates with null draws, each over all rows. Draws are taken in parts and forgotten,
+    /// unless they are `kept` for candidates that are added later.
+    ///
+    /// # Errors
+    /// If products are not finite, or [`IdentifyError::Interrupted`] if `go_on` returns `false`.
+    pub fn take_draws(
+        &mut self,
+        mut draws: impl ExactSizeIterator<Item = Vec<f64>>,
+        kept: bool,
+        go_on: &(dyn Fn() -> bool + Sync),
+    ) -> Result<(), IdentifyError> {
         let whole = self.projection(&self.all_folds())?;
-        let mut values: Option<Adjoint> = None;
-        let mut rest = null.into_iter();
-        for first in (0..draws).step_by(DRAWS_AT_ONCE) {
-            let part: Vec<Vec<f64>> = rest.by_ref().take(DRAWS_AT_ONCE).collect();
-            let mut part = Mat::from_fn(self.residual.len(), part.len(), |i, k| part[k][i]);
+        let (count, layout) = (draws.len(), Arc::clone(&self.segments[0].layout));
+        let at_once = (MAX_NULL_ENTRIES / self.residual.len().max(1)).clamp(1, count.max(1));
+        let mut products = Mat::zeros(count, layout.total());
+        let mut null = NullDraws::default();
+        for first in (0..count).step_by(at_once) {
+            let part: Vec<Vec<f64>> = draws.by_ref().take(at_once).collect();
+            let mut side = self.projected(&whole, &part);
+            drop(part);
+            let formed = layout.products(&whole.training, &side, false, go_on).ok_or(IdentifyError::Interrupted)?;
+            products.as_mut().subrows_mut(first, formed.side.nrows()).copy_from(&formed.side);
+            if kept {
+                let values = &side.values;
+                null.parts.push(Mat::from_fn(values.nrows(), values.ncols(), |i, j| values[(i, j)] as f32));
+                null.rows = std::mem::take(&mut side.rows);
+            }
+        }
+        (self.draws, self.null) = (count, Arc::new(null));
+        stored(&self.null_products, &self.segments[0].key, || Ok(Arc::new(products))).map(|_: Arc<Mat<f64>>| ())
+    }
+
+    /// Null draws with the model projected out.
+    fn projected(&self, whole: &Projection, draws: &[Vec<f64>]) -> Adjoint {
+        let parts: Vec<&[Vec<f64>]> = draws.chunks(DRAWS_AT_ONCE).collect();
+        let projected = parallel::map(parts.len(), &|k| {
+            let mut part = Mat::from_fn(self.residual.len(), parts[k].len(), |i, draw| parts[k][draw][i]);
             let along = &whole.inverse * transposed_product(self.model(), part.as_ref());
             matmul(part.as_mut(), Accum::Add, self.model(), along.as_ref(), -1.0, Par::Seq);
-            let Adjoint { rows, values: of_part } = Adjoint::of(&whole.training, part.as_ref());
-            let kept = values.get_or_insert_with(|| Adjoint { values: Mat::zeros(draws, rows.len()), rows });
-            kept.values.as_mut().subrows_mut(first, of_part.nrows()).copy_from(&of_part);
+            Adjoint::of(&whole.training, part.as_ref())
+        });
+        let mut all = Adjoint { rows: Vec::new(), values: Mat::zeros(0, 0) };
+        let mut first = 0;
+        for Adjoint { rows, values } in projected {
+            if first == 0 {
+                all = Adjoint { values: Mat::zeros(draws.len(), rows.len()), rows };
+            }
+            all.values.as_mut().subrows_mut(first, values.nrows()).copy_from(&values);
+            first += values.nrows();
         }
-        self.null = Arc::new(values.unwrap_or(Adjoint { rows: Vec::new(), values: Mat::zeros(0, 0) }));
-        Ok(())
+        all
     }
 
     /// Adds candidates as a segment of their own.
@@ -245,20 +287,15 @@ impl<'c> Moments<'c> {
         stored(&self.null_products, &self.segments[segment].key, || {
             let whole = self.projection(&self.all_folds())?;
             let layout = &self.segments[segment].layout;
-            let draws = self.draws();
-            let at_once = (MAX_NULL_ENTRIES / self.null.rows.len().max(1)).clamp(1, draws.max(1));
-            let form = |side: &Adjoint| {
-                layout.products(&whole.training, side, false, &|| true).ok_or(IdentifyError::Interrupted)
-            };
-            if at_once == draws {
-                return Ok(Arc::new(form(&self.null)?.side));
-            }
-            let mut products = Mat::zeros(draws, layout.total());
-            for first in (0..draws).step_by(at_once) {
-                let count = at_once.min(draws - first);
-                let values = self.null.values.as_ref().subrows(first, count).to_owned();
-                let side = Adjoint { rows: self.null.rows.clone(), values };
-                products.as_mut().subrows_mut(first, count).copy_from(&form(&side)?.side);
+            let mut products = Mat::zeros(self.draws, layout.total());
+            let mut side = Adjoint { rows: self.null.rows.clone(), values: Mat::zeros(0, 0) };
+            let mut first = 0;
+            for part in &self.null.parts {
+                side.values = Mat::from_fn(part.nrows(), part.ncols(), |i, j| f64::from(part[(i, j)]));
+                let formed = layout.products(&whole.training, &side, false, &|| true);
+                let formed = formed.ok_or(IdentifyError::Interrupted)?.side;
+                products.as_mut().subrows_mut(first, part.nrows()).copy_from(&formed);
+                first += part.nrows();
             }
             Ok(Arc::new(products))
         })
@@ -266,6 +303,6 @@ impl<'c> Moments<'c> {
 
     /// Number of null draws.
     pub fn draws(&self) -> usize {
-        self.null.values.nrows()
+        self.draws
     }
 }
