@@ -3,12 +3,16 @@
 //!
 //! Structure in the residual must not be excluded. Along a run a residual is therefore compared with the medians of its
 //! neighbours on either side, not with zero (Hampel's identifier: Davies & Gather, J. Am. Stat. Assoc. 88 (1993) 782).
+//! A deviation that returns in the repeats of the reading is structure too: a spike after every reversal.
 //! In the residual of a circle's own diagnosis, which contains all structure, it is compared with zero and with both
 //! neighbours. Poses have no neighbours. A pose is an outlier if its residual is a large multiple of the median
 //! residual.
 
+use std::collections::HashMap;
+
 use abbe_model::session::readings::Readings;
 
+use super::RepeatKeys;
 use crate::numerics::{median, parallel, robust_deviation};
 use crate::problem::Problem;
 
@@ -57,40 +61,67 @@ pub(crate) fn alone(residual: &[f64]) -> impl Iterator<Item = usize> {
 
 fn reject_along_runs(readings: &Readings, residual: &[f64], coordinates: usize, sigma_mm: f64) -> Vec<bool> {
     let mut reject = vec![false; readings.rows()];
-    for run in readings.runs() {
-        if run.len() < 2 * NEIGHBOURS + 1 {
-            continue;
-        }
-        for coordinate in 0..coordinates {
+    for coordinate in 0..coordinates {
+        // The deviation of each reading from its neighbours, and the limits that single readings exceed.
+        let mut deviations = vec![0.0; readings.rows()];
+        let mut conspicuous = Vec::new();
+        for run in readings.runs().into_iter().filter(|run| run.len() > 2 * NEIGHBOURS) {
             let values: Vec<f64> = (run.clone().map(|row| residual[row * coordinates + coordinate])).collect();
-            let middle: Vec<f64> = values.array_windows().map(|five| median_of_five(*five)).collect();
-            let mut deviations: Vec<f64> = Vec::with_capacity(run.len());
-            for (row, value) in values.iter().enumerate() {
-                // Beside a step (backlash at a reversal) a reading agrees with one of the two sides. An outlier agrees
-                // with neither.
-                let start = row.saturating_sub(NEIGHBOURS);
-                let end = (row + NEIGHBOURS + 1).min(values.len());
-                let from = |side: std::ops::Range<usize>| match side.len() {
-                    0..3 => None,
-                    NEIGHBOURS => Some(value - middle[side.start]),
-                    _ => Some(value - median(&mut values[side].to_vec())),
-                };
-                let deviation = match (from(start..row), from(row + 1..end)) {
-                    (Some(before), Some(after)) if before * after <= 0.0 => 0.0,
-                    (Some(before), Some(after)) if before.abs() < after.abs() => before,
-                    (_, Some(after)) => after,
-                    (Some(before), None) => before,
-                    (None, None) => 0.0,
-                };
-                deviations.push(deviation);
-            }
-            let spread = robust_deviation(&deviations).max(sigma_mm);
-            for (row, deviation) in run.clone().zip(&deviations) {
-                reject[row] |= deviation.abs() > OUTLIER_ALONG_RUN * spread;
-            }
+            let of_run = deviations_from_neighbours(&values);
+            let limit = OUTLIER_ALONG_RUN * robust_deviation(&of_run).max(sigma_mm);
+            let exceeds = |row: &usize| of_run[*row - run.start].abs() > limit;
+            conspicuous.extend(run.clone().filter(exceeds).map(|row| (row, limit)));
+            deviations[run].copy_from_slice(&of_run);
         }
+        retain_unrepeated(&mut conspicuous, readings, &deviations);
+        conspicuous.into_iter().for_each(|(row, _)| reject[row] = true);
     }
     reject
+}
+
+/// The deviation of each value of a run from the medians of its neighbours: the lesser of the two.
+fn deviations_from_neighbours(values: &[f64]) -> Vec<f64> {
+    let middle: Vec<f64> = values.array_windows().map(|five| median_of_five(*five)).collect();
+    let deviation = |(row, value): (usize, &f64)| {
+        // Beside a step (backlash at a reversal) a reading agrees with one of the two sides. An outlier agrees with
+        // neither.
+        let start = row.saturating_sub(NEIGHBOURS);
+        let end = (row + NEIGHBOURS + 1).min(values.len());
+        let from = |side: std::ops::Range<usize>| match side.len() {
+            0..3 => None,
+            NEIGHBOURS => Some(value - middle[side.start]),
+            _ => Some(value - median(&mut values[side].to_vec())),
+        };
+        match (from(start..row), from(row + 1..end)) {
+            (Some(before), Some(after)) if before * after <= 0.0 => 0.0,
+            (Some(before), Some(after)) if before.abs() < after.abs() => before,
+            (_, Some(after)) => after,
+            (Some(before), None) => before,
+            (None, None) => 0.0,
+        }
+    };
+    values.iter().enumerate().map(deviation).collect()
+}
+
+/// Keeps the rows, with their limits, that deviate from their repeats too. What returns at the same position in the same
+/// direction is structure, such as the spike after a reversal.
+fn retain_unrepeated(rows: &mut Vec<(usize, f64)>, readings: &Readings, deviations: &[f64]) {
+    if rows.is_empty() {
+        return;
+    }
+    let keys = RepeatKeys::of(readings);
+    let mut repeats: HashMap<&[i64], Vec<usize>> =
+        rows.iter().map(|(row, _)| (keys.of_row(*row), Vec::new())).collect();
+    for row in 0..readings.rows() {
+        if let Some(repeats) = repeats.get_mut(keys.of_row(row)) {
+            repeats.push(row);
+        }
+    }
+    rows.retain(|(row, limit)| {
+        let others = repeats[keys.of_row(*row)].iter().filter(|other| *other != row);
+        let mut others: Vec<f64> = others.map(|other| deviations[*other]).collect();
+        others.is_empty() || (deviations[*row] - median(&mut others)).abs() > *limit
+    });
 }
 
 /// The median of five values: that of the fifth and the two middle values of the first four.
@@ -103,6 +134,27 @@ fn median_of_five([a, b, c, d, e]: [f64; NEIGHBOURS]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Four runs of one axis, to and fro. A spike at the first reading of each run stays, one of a single run does not.
+    #[test]
+    fn what_returns_in_every_repeat_is_no_outlier() {
+        const PLACES: usize = 40;
+        let place = |row: usize| if row / PLACES % 2 == 0 { row % PLACES } else { PLACES - 1 - row % PLACES };
+        let readings = Readings {
+            positions: vec![(0..4 * PLACES).map(|row| place(row) as f64).collect()],
+            run: (0..4 * PLACES).map(|row| (row / PLACES) as i64).collect(),
+            coordinates: 1,
+            ..Readings::default()
+        };
+        let mut residual: Vec<f64> = (0..4 * PLACES).map(|row| 1e-4 * (((row * 7) % 11) as f64 - 5.0)).collect();
+        for run in 0..4 {
+            residual[run * PLACES] += 0.01;
+        }
+        residual[PLACES + 17] += 0.01;
+        let rejected = reject_along_runs(&readings, &residual, 1, 3e-4);
+        let rows: Vec<usize> = (0..rejected.len()).filter(|row| rejected[*row]).collect();
+        assert_eq!(rows, [PLACES + 17]);
+    }
 
     #[test]
     fn the_median_of_five_is_the_third_in_order() {
