@@ -43,12 +43,17 @@ fn assert_consistent(result: &TraceResult, what: &str) {
     }
 }
 
-/// Noise of 0.3 µm for which a backlash and a local feature exceed the whole null distribution, although the held-out
-/// error rises.
+/// Noise of 0.3 µm for which a constant and a drift exceed the whole null distribution, although the held-out error
+/// rises.
 #[test]
 fn an_effect_that_does_not_lower_the_held_out_error_is_not_claimed() {
-    for (kind, seed, shape) in [(Kind::Chapter4, 27_034, "backlash"), (Kind::Rotary, 27_075, "local")] {
-        let result = traced(&session_of(&Recipe::new(kind, seed)), TraceOptions::default().significance);
+    let sessions = [
+        (Kind::LinearCircles, 7316, Noise::White { sigma_um: 0.3 }, "constant"),
+        (Kind::Simultaneous, 7463, Noise::Serial { sigma_um: 0.3, coefficient: 0.8 }, "drift"),
+    ];
+    for (kind, seed, noise, shape) in sessions {
+        let recipe = Recipe::new(kind, seed).noise(noise);
+        let result = traced(&session_of(&recipe), TraceOptions::default().significance);
         assert!(result.effects.is_empty(), "{:?}", result.effects[0].name);
         assert_eq!(result.verdict, "clean");
         let rejected: Vec<&str> = result.rejected_candidates.iter().map(|found| found.name.shape.as_str()).collect();
@@ -58,19 +63,24 @@ fn an_effect_that_does_not_lower_the_held_out_error_is_not_claimed() {
     }
 }
 
-/// White noise of 0.20 µm without an effect. At a significance level at which candidates exceed the null distribution,
-/// the held-out error must reject them.
+/// White noise of 0.20 µm without an effect, at a significance level at which most sessions have a candidate beyond the
+/// null distribution. A decrease of the held-out error by more than its standard error has a probability of 16 %
+/// without an effect. No more of the sessions have a claim, within four standard errors of their number.
 #[test]
 fn noise_beyond_the_null_distribution_fails_the_held_out_rule() {
-    let mut rejected = 0;
-    for seed in [1, 2, 3] {
+    const SESSIONS: u64 = 24;
+    const PASSING: f64 = 0.159;
+    let (mut claimed, mut rejected) = (0, 0);
+    for seed in 1..=SESSIONS {
         let recipe = Recipe::new(Kind::Rotary, seed).noise(Noise::White { sigma_um: 0.20 });
         let result = traced(&session_of(&recipe), 0.6);
-        assert!(result.effects.is_empty(), "{seed}: {:?}", result.effects[0].name);
         assert_consistent(&result, &format!("seed {seed}"));
-        rejected += result.rejected_candidates.len();
+        claimed += usize::from(!result.effects.is_empty());
+        rejected += usize::from(result.effects.is_empty() && !result.rejected_candidates.is_empty());
     }
-    assert!(rejected > 0, "no candidate was let through");
+    let sampling = (SESSIONS as f64 * PASSING * (1.0 - PASSING)).sqrt();
+    assert!(claimed as f64 <= SESSIONS as f64 * PASSING + 4.0 * sampling, "{claimed} of {SESSIONS}");
+    assert!(rejected > claimed, "{rejected} rejected, {claimed} claimed");
 }
 
 /// Mistakes in the run column of a test.

@@ -24,7 +24,7 @@ use faer::{Mat, Par, Side};
 use abbe_model::session::Prior;
 
 use crate::error::IdentifyError;
-use crate::heldout::paired::{HeldOutDecrease, Units};
+use crate::heldout::paired::HeldOutDecrease;
 use crate::noise::NoiseSource;
 use crate::numerics::evidence::{NormalEquations, Posterior};
 use crate::numerics::parallel;
@@ -132,7 +132,7 @@ impl Scales {
 
     /// The decrease of the held-out error from another model of the same readings, by folds.
     pub fn decrease_from(&self, other: &Scales) -> HeldOutDecrease {
-        Units::of((0..self.held_out.len()).map(|fold| (0, fold))).decrease(&other.held_out, &self.held_out)
+        HeldOutDecrease::over_blocks(&other.held_out, &self.held_out)
     }
 }
 

@@ -37,8 +37,11 @@ pub const MAX_COMPARED: usize = 3;
 /// Share of the best evidence that a candidate needs on the grid to be tuned. A local feature between two grid points
 /// loses a third of its evidence.
 pub const MIN_EVIDENCE_SHARE: f64 = 0.5;
-/// Evidence by which a step table may fall short of the best and still be reported as an alternative.
+/// Evidence by which a step table may fall short of the best and still be reported as an alternative, and by which an
+/// explanation may fall short of the selected effect and still be averaged into a prediction, with a weight of 2 %.
 pub const MAX_EVIDENCE_DEFICIT: f64 = 4.0;
+/// Maximum number of explanations over which the prediction of a fold is averaged.
+pub const MAX_AVERAGED: usize = 13;
 /// Numbers of intervals of the nonparametric curves that effects along one axis are compared with.
 pub const INTERVALS: [usize; 3] = [8, 16, 32];
 

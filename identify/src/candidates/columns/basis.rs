@@ -286,11 +286,15 @@ mod tests {
         let effect = Effect::new(Component::Reading(problem.tests[1].name.clone()), Driver::None, Shape::Constant);
         let columns = Columns::new(&problem, &fit.beta);
         let term = columns.reading_columns(&effect, 0, false, None).unwrap();
-        let rows = columns.unwhitened_rows(&[&term]);
-        let kept = |test: usize| problem.rejected[test].iter().filter(|rejected| !**rejected).count();
-        assert_eq!(rows.nrows(), (0..problem.tests.len()).map(kept).sum::<usize>());
-        let own = kept(0)..kept(0) + kept(1);
-        assert!((0..rows.nrows()).all(|i| rows[(i, 0)] == f64::from(u8::from(own.contains(&i)))));
+        let rejected = &problem.rejected;
+        let accepted = |test: usize| (0..rejected[test].len()).filter(move |row| !rejected[test][*row]);
+        for fold in 0..problem.folds.count {
+            let rows = columns.unwhitened_rows_of_fold(&term, fold);
+            let in_fold = |test: usize| accepted(test).filter(|row| problem.folds.of_row[test][*row] == fold).count();
+            let own = in_fold(0)..in_fold(0) + in_fold(1);
+            assert_eq!(rows.nrows(), (0..problem.tests.len()).map(in_fold).sum::<usize>());
+            assert!((0..rows.nrows()).all(|i| rows[(i, 0)] == f64::from(u8::from(own.contains(&i)))));
+        }
         drop(columns);
         assert!(problem.add_effect(&effect).is_err());
     }

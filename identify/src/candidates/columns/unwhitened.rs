@@ -9,10 +9,21 @@ use crate::heldout::paired::Units;
 use crate::problem::RowBlock;
 
 impl Columns<'_> {
-    /// The rows of effects for the accepted readings, in mm, unwhitened, block after block.
-    pub fn unwhitened_rows(&self, column_sets: &[&EffectColumns]) -> Mat<f64> {
-        let blocks = self.blocks.iter().map(|block| self.block_rows(column_sets, block));
-        self.unwhitened(blocks.collect())
+    /// The rows of an effect for the accepted readings of one fold, in mm, unwhitened, block after block.
+    pub fn unwhitened_rows_of_fold(&self, column_set: &EffectColumns, fold: usize) -> Mat<f64> {
+        let coordinates = self.problem.coordinates();
+        let of_row = &self.problem.folds.of_row;
+        let mut found: Vec<f64> = Vec::new();
+        for block in &self.blocks {
+            let is_inside = |i: &usize| of_row[block.test][block.rows.start + i / coordinates] == fold;
+            let rows: Vec<usize> = self.counting(block).into_iter().filter(is_inside).collect();
+            if !rows.is_empty() {
+                let of_block = self.block_rows(&[column_set], block);
+                rows.iter().for_each(|i| found.extend((0..column_set.count).map(|j| of_block[(*i, j)])));
+            }
+        }
+        let count = column_set.count;
+        Mat::from_fn(found.len() / count.max(1), count, |i, j| found[i * count + j])
     }
 
     /// The unwhitened rows of `[J | r]` at given parameter values, block after block.
@@ -25,7 +36,7 @@ impl Columns<'_> {
         Ok(self.unwhitened(blocks.collect::<Result<_, _>>()?))
     }
 
-    /// The fold of each row of [`Columns::unwhitened_rows`].
+    /// The fold of each row of [`Columns::unwhitened_model_rows`].
     pub fn unwhitened_folds(&self) -> Vec<usize> {
         let coordinates = self.problem.coordinates();
         let fold =
@@ -33,9 +44,8 @@ impl Columns<'_> {
         self.blocks.iter().flat_map(|block| self.counting(block).into_iter().map(move |i| fold(block, i))).collect()
     }
 
-    /// The independent units over which held-out errors are paired. Along runs they are the folds (runs or blocks),
-    /// each of which belongs to one test. Among poses they are the blocks of joint space, because one fit predicts a
-    /// whole block, or the poses if folds are random. The rows are those of [`Columns::unwhitened_rows`].
+    /// The independent units over which held-out errors are paired. Along runs they are the folds (runs or blocks). Among poses they are the blocks of joint space, because one fit predicts a
+    /// whole block, or the poses if folds are random. The rows are those of [`Columns::unwhitened_model_rows`].
     pub fn unwhitened_units(&self) -> Units {
         let coordinates = self.problem.coordinates();
         let rows = self.blocks.iter().flat_map(|block| {
@@ -44,10 +54,9 @@ impl Columns<'_> {
         });
         let fold = |test: usize, row: usize| self.problem.folds.of_row[test][row];
         match self.problem.folds.kind {
-            FoldKind::RandomPoses => Units::of(rows.map(|(test, row)| (0, (test, row)))),
-            FoldKind::PoseBlocks => Units::of(rows.map(|(test, row)| (0, (fold(test, row), 0)))).divided(),
-            FoldKind::Runs | FoldKind::RunGroups | FoldKind::Blocks => {
-                Units::of(rows.map(|(test, row)| (test, (fold(test, row), 0)))).divided()
+            FoldKind::RandomPoses => Units::of(rows),
+            FoldKind::PoseBlocks | FoldKind::Runs | FoldKind::RunGroups | FoldKind::Blocks => {
+                Units::of(rows.map(|(test, row)| fold(test, row))).divided()
             }
         }
     }

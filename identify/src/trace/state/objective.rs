@@ -41,7 +41,7 @@ impl SearchState<'_> {
     }
 
     /// An upper bound of the score of a candidate.
-    fn most_score(&self, candidate: usize, gain: &Gain, variance: f64) -> f64 {
+    pub fn most_score(&self, candidate: usize, gain: &Gain, variance: f64) -> f64 {
         self.most_evidence_for(candidate, gain, variance) - self.candidates[candidate].cost
     }
 
