@@ -1,6 +1,7 @@
 //! The products of candidates against least squares on their rows.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use abbe_model::files::{self, ReadOptions};
 use faer::Mat;
@@ -77,7 +78,7 @@ fn gains_are_those_of_least_squares() {
         let sets = candidates(&problem, &columns, 97);
         let rank = model.ncols();
         let prior = PriorMoments { base: Mat::zeros(rank, rank), base_y: vec![0.0; rank] };
-        let moments = Moments::new(&columns, sets.clone(), model.clone(), &residual, prior);
+        let moments = Moments::new(&columns, sets.clone(), Arc::new(model.clone()), &residual, prior);
         let all: Vec<usize> = (0..columns.fold_rows.len()).collect();
         let without: Vec<usize> = all.iter().copied().filter(|fold| *fold != 5).collect();
         let few: Vec<usize> = (0..sets.len()).filter(|k| sets[*k].count <= 2).collect();

@@ -346,7 +346,7 @@ impl<'m> TrainedModel<'m> {
                 residual.col_as_slice_mut(0).iter_mut().zip(of_effect).for_each(|(r, e)| *r -= c * e);
             }
         }
-        let rows: usize = self.projection.training.blocks.iter().map(|block| block.rows.len()).sum();
+        let rows: usize = self.projection.training.blocks.iter().map(|block| block.count()).sum();
         let parameters = self.moments.rank() + self.along.len();
         (residual.squared_norm_l2(), rows.saturating_sub(parameters).max(1))
     }

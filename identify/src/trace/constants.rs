@@ -67,6 +67,9 @@ pub const MAX_AR_SUM: f64 = 0.98;
 pub const MIN_POOL: usize = 200;
 /// Readings on either side of the running median that removes structure from a residual without repeats.
 pub const SMOOTHING: usize = 7;
+/// Number of readings up to which the structure test and the products of the search are formed at the same time. With
+/// more readings either keeps all cores busy, and their memory does not add up.
+pub const MAX_AT_THE_SAME_TIME: usize = 20_000;
 
 /// How many candidates the steps of a branch try.
 #[derive(Clone, Copy, Debug)]

@@ -44,7 +44,7 @@ use crate::numerics::parallel;
 use crate::problem::Problem;
 use crate::results::TraceResult;
 use crate::tolerance::conformity;
-use constants::{BLOCK, SINGLE};
+use constants::{BLOCK, MAX_AT_THE_SAME_TIME, SINGLE};
 use families::AcceptedFamilies;
 use implausible::Contradicted;
 use interrupt::Interrupt;
@@ -288,8 +288,12 @@ fn trace_or_interrupted(
         moments.take_draws(null(BLOCK), true, &go_on)?;
         Ok::<_, IdentifyError>(moments)
     };
-    let (moments, structure_before) =
-        parallel::both(moments, || policy.tests_structure.then(structure_before).transpose());
+    let structure_before = || policy.tests_structure.then(structure_before).transpose();
+    let (structure_before, moments) = if columns.rows() <= MAX_AT_THE_SAME_TIME {
+        parallel::both(structure_before, moments)
+    } else {
+        (structure_before(), moments())
+    };
     let (moments, structure_before) = (moments?, structure_before?);
     interrupt.check()?;
     let unwhitened = start.unwhitened(&columns, &before_fit.beta, problem.noise.sigma_mm)?;

@@ -5,12 +5,14 @@
 //! the same pure error as that of the search.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use abbe_model::axis::{Axis, AxisKind};
 use abbe_model::driver::Driver;
 use abbe_model::effect::shape::{Curve, Local, Periodic};
 use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::session::readings::Readings;
+use faer::Mat;
 
 use super::constants::STRUCTURED;
 use crate::candidates::columns::{Columns, EffectColumns};
@@ -186,7 +188,7 @@ fn curve(from: f64, to: f64, intervals: usize) -> Shape {
 pub fn structure(
     problem: &Problem,
     columns: &Columns<'_>,
-    model: faer::Mat<f64>,
+    model: Arc<Mat<f64>>,
     residual: &[f64],
     null: impl ExactSizeIterator<Item = Vec<f64>>,
     prior: PriorMoments,

@@ -3,6 +3,8 @@
 //! `J` is the Jacobian, `V` the basis of the identifiable directions, and `R` the triangular factor of `J V` with its
 //! prior rows. The columns are `J V R⁻¹`. Normal equations over orthonormal columns lose no precision.
 
+use std::sync::Arc;
+
 use faer::Mat;
 
 use super::state::UnwhitenedModel;
@@ -16,7 +18,7 @@ use crate::problem::Problem;
 /// The fitted model for the search: orthonormal columns and residual, whitened, in fold order.
 pub(super) struct Start {
     /// Rows × rank.
-    pub model: Mat<f64>,
+    pub model: Arc<Mat<f64>>,
     /// One value per row.
     pub residual: Vec<f64>,
     /// Maps orthonormal coordinates to parameters in internal units: parameters × rank.
@@ -41,7 +43,7 @@ impl Start {
         let (of_prior, prior_residual, _) = prior.parts();
         let prior_rows = &of_prior * &to_parameters;
         debug_assert_eq!(model.ncols(), rank);
-        Ok(Start { model, residual, to_parameters, prior_rows, prior_residual })
+        Ok(Start { model: Arc::new(model), residual, to_parameters, prior_rows, prior_residual })
     }
 
     /// The same model and residual without whitening.

@@ -3,6 +3,8 @@
 //! The product of a whitened column with `z` is that of the unwhitened column with `Wᵀ z`. Sums over the states of a
 //! driver can then be formed before any basis function is known.
 
+use std::sync::Arc;
+
 use faer::{Mat, MatRef};
 
 use super::Columns;
@@ -15,13 +17,25 @@ pub struct WhitenedRows {
     /// The scalar reading of the test at which the block begins.
     pub start: usize,
     /// For each whitened row its scalar row in the block, and its index in fold order.
-    pub rows: Vec<(usize, usize)>,
+    rows: Vec<(u32, u32)>,
+}
+
+impl WhitenedRows {
+    /// Number of the rows.
+    pub fn count(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// For each whitened row its scalar row in the block, and its index in fold order.
+    pub fn iter(&self) -> impl Iterator<Item = (usize, usize)> {
+        self.rows.iter().map(|(scalar, row)| (*scalar as usize, *row as usize))
+    }
 }
 
 /// Whitened rows, and the filter that forms them.
 pub struct TrainingRows {
     /// Block after block.
-    pub blocks: Vec<WhitenedRows>,
+    pub blocks: Vec<Arc<WhitenedRows>>,
     /// The filter of every block.
     pub filter: Filter,
     /// Scalar rows of a reading.
@@ -29,22 +43,40 @@ pub struct TrainingRows {
 }
 
 impl Columns<'_> {
+    /// The whitened rows of every block that has some.
+    fn whole_blocks(&self) -> &[Arc<WhitenedRows>] {
+        self.whole.get_or_init(|| {
+            let mut start = 0;
+            let mut blocks = Vec::new();
+            for (block, kept) in self.blocks.iter().zip(&self.kept) {
+                let target = &self.target[start..start + kept.len()];
+                start += kept.len();
+                let rows: Vec<(u32, u32)> =
+                    kept.iter().zip(target).map(|(scalar, row)| (*scalar as u32, *row as u32)).collect();
+                if !rows.is_empty() {
+                    let start = block.rows.start * self.problem.coordinates();
+                    blocks.push(Arc::new(WhitenedRows { test: block.test, start, rows }));
+                }
+            }
+            blocks
+        })
+    }
+
     /// The whitened rows of some folds.
     pub fn training_rows(&self, folds: &[usize]) -> TrainingRows {
         let mut inside = vec![false; self.rows];
         folds.iter().for_each(|fold| inside[self.fold_rows[*fold].clone()].fill(true));
-        let mut start = 0;
         let mut blocks = Vec::new();
-        let coordinates = self.problem.coordinates();
-        for (block, kept) in self.blocks.iter().zip(&self.kept) {
-            let target = &self.target[start..start + kept.len()];
-            start += kept.len();
-            let rows = kept.iter().copied().zip(target.iter().copied());
-            let rows: Vec<(usize, usize)> = rows.filter(|(_, row)| inside[*row]).collect();
-            if !rows.is_empty() {
-                blocks.push(WhitenedRows { test: block.test, start: block.rows.start * coordinates, rows });
+        for whole in self.whole_blocks() {
+            let count = whole.iter().filter(|(_, row)| inside[*row]).count();
+            if count == whole.count() {
+                blocks.push(Arc::clone(whole));
+            } else if count > 0 {
+                let rows = whole.rows.iter().copied().filter(|(_, row)| inside[*row as usize]).collect();
+                blocks.push(Arc::new(WhitenedRows { test: whole.test, start: whole.start, rows }));
             }
         }
+        let coordinates = self.problem.coordinates();
         TrainingRows { blocks, filter: self.problem.filter(), coordinates }
     }
 }
@@ -52,7 +84,7 @@ impl Columns<'_> {
 /// `Wᵀ z` of several vectors.
 pub struct Adjoint {
     /// The test and the scalar reading of each row, in ascending order.
-    pub rows: Vec<(usize, usize)>,
+    pub rows: Vec<(u32, u32)>,
     /// Vectors × rows.
     pub values: Mat<f64>,
 }
@@ -64,21 +96,21 @@ impl Adjoint {
         let mut rows = Vec::new();
         let mut places: Vec<Vec<usize>> = Vec::with_capacity(training.blocks.len());
         for block in &training.blocks {
-            let length = block.rows.iter().map(|(i, _)| i + 1).max().unwrap_or(0);
+            let length = block.iter().map(|(i, _)| i + 1).max().unwrap_or(0);
             let mut place = vec![NONE; length];
-            block.rows.iter().for_each(|(i, _)| training.filter.terms(*i).for_each(|(raw, _)| place[raw] = 0));
+            block.iter().for_each(|(i, _)| training.filter.terms(i).for_each(|(raw, _)| place[raw] = 0));
             for (raw, place) in place.iter_mut().enumerate().filter(|(_, place)| **place != NONE) {
                 *place = rows.len();
-                rows.push((block.test, block.start + raw));
+                rows.push((block.test as u32, (block.start + raw) as u32));
             }
             places.push(place);
         }
         let mut values = Mat::zeros(vectors.ncols(), rows.len());
         let mut entries = vec![0.0; vectors.ncols()];
         for (block, place) in training.blocks.iter().zip(&places) {
-            for (i, row) in &block.rows {
-                entries.iter_mut().enumerate().for_each(|(j, entry)| *entry = vectors[(*row, j)]);
-                for (raw, factor) in training.filter.terms(*i) {
+            for (i, row) in block.iter() {
+                entries.iter_mut().enumerate().for_each(|(j, entry)| *entry = vectors[(row, j)]);
+                for (raw, factor) in training.filter.terms(i) {
                     let sums = values.col_as_slice_mut(place[raw]);
                     sums.iter_mut().zip(&entries).for_each(|(sum, entry)| *sum += factor * entry);
                 }

@@ -10,7 +10,7 @@ use abbe_model::effect::{Component, Effect, Shape};
 use faer::Mat;
 
 use super::states::{Channel, DriverStates};
-use super::{Columns, SharedSamples};
+use super::{Acting, Columns, SharedSamples};
 use crate::parameters::{LONG_DELAY_S, largest_plausible_share, physical_size};
 
 /// The columns of an effect: a channel, and basis functions of the states of its driver.
@@ -77,34 +77,58 @@ impl Columns<'_> {
         let lag_s = effect.shape.lag_s();
         let key = format!("{} {:?} {name} {part:?} {}", effect.component, effect.tests, lag_s.is_some());
         cached(&self.channels, key, || {
-            let coordinates = self.problem.coordinates();
-            let mut greatest_factor = 0.0_f64;
-            let mut sensitivity = Vec::new();
+            let (sensitivity, greatest_factor) = self.acting(effect)?;
             let mut samples = Vec::new();
             for (number, test) in self.problem.tests.iter().enumerate() {
-                let mut of_test: Vec<f64> = Vec::new();
-                let mut of_driver = None;
-                if effect.acts_in(&test.name) {
-                    let readings = test.readings.as_ref()?;
-                    of_driver = Some(self.driver_samples(number, &effect.driver, axis, lag_s)?);
-                    for (slot, factor) in effect.component.slots_in(machine, test.station.kind().unknowns(), readings) {
-                        let Some(slot) = self.slot_index[number].get(&slot) else { continue };
-                        let derivative = &self.sensitivities[number].derivatives[*slot];
-                        of_test.resize(derivative.len(), 0.0);
-                        let of_row = |row: usize| factor.as_ref().map_or(1.0, |factor| factor[row]);
-                        for (i, (sum, derivative)) in of_test.iter_mut().zip(derivative).enumerate() {
-                            *sum += derivative * of_row(i / coordinates);
-                        }
-                        let greatest = factor.as_ref().map_or(1.0, |f| f.iter().fold(0.0_f64, |a, b| a.max(b.abs())));
-                        greatest_factor = greatest_factor.max(greatest);
-                    }
-                }
-                samples.push(of_driver.filter(|_| !of_test.is_empty()));
-                sensitivity.push(of_test);
+                let of_driver = match effect.acts_in(&test.name) {
+                    true => Some(self.driver_samples(number, &effect.driver, axis, lag_s)?),
+                    false => None,
+                };
+                samples.push(of_driver.filter(|_| !sensitivity[number].is_empty()));
             }
             let lagging = lag_s.map(|_| effect.driver.clone());
             let states = self.states(&name, &samples, part, lagging.is_some());
             Some(Arc::new(Channel { sensitivity, states, greatest_factor, lagging }))
+        })
+    }
+
+    /// What the component of an effect changes. `None` if a test in which it acts has no readings.
+    fn acting(&self, effect: &Effect) -> Option<Acting> {
+        let machine = &self.problem.session.machine;
+        cached(&self.acting, format!("{} {:?}", effect.component, effect.tests), || {
+            let coordinates = self.problem.coordinates();
+            let mut greatest_factor = 0.0_f64;
+            let mut sensitivity = Vec::new();
+            for (number, test) in self.problem.tests.iter().enumerate() {
+                if !effect.acts_in(&test.name) {
+                    sensitivity.push(Arc::default());
+                    continue;
+                }
+                let readings = test.readings.as_ref()?;
+                let slots = effect.component.slots_in(machine, test.station.kind().unknowns(), readings);
+                let derivatives = &self.derivatives[number];
+                let known: Vec<_> =
+                    slots.into_iter().filter_map(|(slot, factor)| Some((derivatives.get(&slot)?, factor))).collect();
+                for (_, factor) in &known {
+                    let greatest = factor.as_ref().map_or(1.0, |f| f.iter().fold(0.0_f64, |a, b| a.max(b.abs())));
+                    greatest_factor = greatest_factor.max(greatest);
+                }
+                // Most components are one slot, whose derivative they share.
+                if let [(derivative, None)] = known.as_slice() {
+                    sensitivity.push(Arc::clone(derivative));
+                    continue;
+                }
+                let mut of_test: Vec<f64> = Vec::new();
+                for (derivative, factor) in known {
+                    of_test.resize(derivative.len(), 0.0);
+                    let of_row = |row: usize| factor.as_ref().map_or(1.0, |factor| factor[row]);
+                    for (i, (sum, derivative)) in of_test.iter_mut().zip(derivative.iter()).enumerate() {
+                        *sum += derivative * of_row(i / coordinates);
+                    }
+                }
+                sensitivity.push(Arc::new(of_test));
+            }
+            Some((sensitivity, greatest_factor))
         })
     }
 
@@ -171,11 +195,11 @@ impl Columns<'_> {
             let coordinates = self.problem.coordinates();
             let turned = |row: usize| if by_direction { samples[row].direction } else { 1.0 };
             let inside = |row: usize| rows.is_none_or(|rows| rows.contains(&row));
-            let mut sensitivity = vec![Vec::new(); self.problem.tests.len()];
-            sensitivity[test] = (0..samples.len() * coordinates)
-                .map(|i| (i / coordinates, i % coordinates))
-                .map(|(row, moved)| if moved == coordinate && inside(row) { turned(row) } else { 0.0 })
-                .collect();
+            let of_row =
+                |(row, moved): (usize, usize)| if moved == coordinate && inside(row) { turned(row) } else { 0.0 };
+            let of_test = (0..samples.len() * coordinates).map(|i| of_row((i / coordinates, i % coordinates)));
+            let mut sensitivity = vec![Arc::default(); self.problem.tests.len()];
+            sensitivity[test] = Arc::new(of_test.collect());
             let mut of_tests = vec![None; self.problem.tests.len()];
             of_tests[test] = Some(samples);
             let lagging = effect.shape.lag_s().map(|_| effect.driver.clone());

@@ -10,7 +10,7 @@ mod unwhitened;
 
 use std::collections::HashMap;
 use std::ops::Range;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use abbe_model::driver::DriverSample;
 use abbe_model::sensitivity::Sensitivities;
@@ -19,7 +19,7 @@ use faer::{Mat, MatMut};
 use crate::error::IdentifyError;
 use crate::numerics::parallel;
 use crate::problem::{Problem, RowBlock};
-pub use adjoint::{Adjoint, TrainingRows};
+pub use adjoint::{Adjoint, TrainingRows, WhitenedRows};
 pub use basis::{EffectColumns, chunked};
 pub use states::{Channel, DriverStates};
 
@@ -29,10 +29,8 @@ const ROWS_AT_ONCE: usize = 512;
 /// The whitened rows of a problem in fold order, and the data to compute the columns of any effect.
 pub struct Columns<'p> {
     problem: &'p Problem,
-    /// The sensitivities of each test.
-    sensitivities: Vec<Sensitivities>,
-    /// Index of each slot among the sensitivities, by test.
-    slot_index: Vec<HashMap<usize, usize>>,
+    /// For each test the derivative of each scalar reading by each slot.
+    derivatives: Vec<HashMap<usize, Arc<Vec<f64>>>>,
     blocks: Vec<RowBlock>,
     /// The scalar rows of each block that whitening keeps.
     kept: Vec<Vec<usize>>,
@@ -40,7 +38,11 @@ pub struct Columns<'p> {
     target: Vec<usize>,
     /// The rows of each fold.
     pub fold_rows: Vec<Range<usize>>,
+    /// The whitened rows of each block. Projections without single folds share most of them.
+    whole: OnceLock<Vec<Arc<WhitenedRows>>>,
     rows: usize,
+    /// What each component changes, by its name and tests. Channels with other drivers share it.
+    acting: Mutex<HashMap<String, Option<Acting>>>,
     /// The samples of each driver, by test and name. `None` if the data have no such column.
     samples: Mutex<HashMap<(usize, String), Option<SharedSamples>>>,
     /// The distinct states of each driver, by name, the part that shapes use, and tests.
@@ -51,15 +53,17 @@ pub struct Columns<'p> {
     bases: Mutex<HashMap<(usize, String), Arc<Mat<f64>>>>,
 }
 
+/// The change of each scalar reading per unit of a component, by test, and the largest factor of a sensitivity in it.
+type Acting = (Vec<Arc<Vec<f64>>>, f64);
+
 type SharedSamples = Arc<Vec<DriverSample<f64>>>;
 
 impl<'p> Columns<'p> {
     /// Computes the sensitivities at the parameter values of a fit.
     pub fn new(problem: &'p Problem, beta: &[f64]) -> Columns<'p> {
-        let sensitivities = sensitivities(problem, beta);
-        let slot_index = sensitivities
-            .iter()
-            .map(|s| s.slots.iter().enumerate().map(|(index, slot)| (*slot, index)).collect())
+        let derivatives = sensitivities(problem, beta).into_iter();
+        let derivatives = derivatives
+            .map(|of_test| of_test.slots.into_iter().zip(of_test.derivatives.into_iter().map(Arc::new)).collect())
             .collect();
         let blocks = problem.blocks();
         let mut fold_of = Vec::new();
@@ -80,13 +84,14 @@ impl<'p> Columns<'p> {
         }
         Columns {
             problem,
-            sensitivities,
-            slot_index,
+            derivatives,
             blocks,
             kept,
             rows: target.len(),
             target,
             fold_rows,
+            whole: OnceLock::new(),
+            acting: Default::default(),
             samples: Default::default(),
             states: Default::default(),
             channels: Default::default(),

@@ -68,7 +68,7 @@ impl DriverStates {
 pub struct Channel {
     /// The change of each scalar reading per unit of the basis function, by test. Empty for a test in which the effect
     /// does not act.
-    pub sensitivity: Vec<Vec<f64>>,
+    pub sensitivity: Vec<Arc<Vec<f64>>>,
     /// The states of the driver.
     pub states: Arc<DriverStates>,
     /// The largest absolute value of what multiplies the basis functions, other than the sensitivity of the component.

@@ -37,7 +37,7 @@ pub(super) use tuning::{ChannelProducts, TuningSide};
 /// Null draws that are projected together.
 const DRAWS_AT_ONCE: usize = 32;
 /// Largest number of entries of the null draws whose products are formed together.
-const MAX_NULL_ENTRIES: usize = 4_000_000;
+const MAX_NULL_ENTRIES: usize = 1_000_000;
 
 /// The priors as products with the model columns.
 pub struct PriorMoments {
@@ -83,7 +83,7 @@ pub struct Moments<'c> {
 #[derive(Default)]
 struct NullDraws {
     /// The test and the scalar reading of each row.
-    rows: Vec<(usize, usize)>,
+    rows: Vec<(u32, u32)>,
     /// Some draws × rows, one part after another.
     parts: Vec<Mat<f32>>,
 }
@@ -118,7 +118,7 @@ impl<'c> Moments<'c> {
     pub fn new(
         columns: &'c Columns<'c>,
         sets: Vec<EffectColumns>,
-        model: Mat<f64>,
+        model: Arc<Mat<f64>>,
         residual: &[f64],
         prior: PriorMoments,
     ) -> Moments<'c> {
@@ -127,7 +127,7 @@ impl<'c> Moments<'c> {
             sets: Vec::new(),
             segments: Vec::new(),
             next_key: Arc::default(),
-            model: Arc::new(model),
+            model,
             residual: Arc::new(residual.to_vec()),
             prior: Arc::new(prior),
             draws: 0,
@@ -152,7 +152,8 @@ impl<'c> Moments<'c> {
     ) -> Result<(), IdentifyError> {
         let whole = self.projection(&self.all_folds())?;
         let (count, layout) = (draws.len(), Arc::clone(&self.segments[0].layout));
-        let at_once = (MAX_NULL_ENTRIES / self.residual.len().max(1)).clamp(1, count.max(1));
+        // Whole parts: a column of fewer draws is padded to a multiple of 64 bytes.
+        let at_once = DRAWS_AT_ONCE * (MAX_NULL_ENTRIES / (DRAWS_AT_ONCE * self.residual.len().max(1))).max(1);
         let mut products = Mat::zeros(count, layout.total());
         let mut null = NullDraws::default();
         for first in (0..count).step_by(at_once) {

@@ -96,8 +96,8 @@ fn key(set: &EffectColumns) -> (usize, usize) {
 fn restricted(matrix: MatRef<'_, f64>, training: &TrainingRows) -> Mat<f64> {
     let mut restricted = Mat::zeros(matrix.nrows(), matrix.ncols());
     for j in 0..matrix.ncols() {
-        for (_, row) in training.blocks.iter().flat_map(|block| &block.rows) {
-            restricted[(*row, j)] = matrix[(*row, j)];
+        for (_, row) in training.blocks.iter().flat_map(|block| block.iter()) {
+            restricted[(row, j)] = matrix[(row, j)];
         }
     }
     restricted

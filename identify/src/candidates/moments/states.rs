@@ -27,22 +27,23 @@ pub(super) struct LocalStates {
 
 impl LocalStates {
     /// Of some whitened rows. `rows` are the scalar readings that they combine.
-    pub fn of(states: &DriverStates, training: &TrainingRows, rows: &[(usize, usize)]) -> LocalStates {
+    pub fn of(states: &DriverStates, training: &TrainingRows, rows: &[(u32, u32)]) -> LocalStates {
         let coordinates = training.coordinates;
         let mut place = vec![NONE; states.samples.len()];
-        for (test, scalar) in rows.iter().filter(|(test, _)| !states.of_reading[*test].is_empty()) {
-            place[states.of_reading[*test][scalar / coordinates] as usize] = 0;
+        let readings = rows.iter().map(|(test, scalar)| (*test as usize, *scalar as usize / coordinates));
+        for (test, reading) in readings.clone().filter(|(test, _)| !states.of_reading[*test].is_empty()) {
+            place[states.of_reading[test][reading] as usize] = 0;
         }
         let mut present = Vec::new();
         for (state, place) in place.iter_mut().enumerate().filter(|(_, place)| **place != NONE) {
             *place = present.len() as u32;
             present.push(state as u32);
         }
-        let of_row = |(test, scalar): &(usize, usize)| {
-            let of_reading = &states.of_reading[*test];
-            if of_reading.is_empty() { NONE } else { place[of_reading[scalar / coordinates] as usize] }
+        let of_row = |(test, reading): (usize, usize)| {
+            let of_reading = &states.of_reading[test];
+            if of_reading.is_empty() { NONE } else { place[of_reading[reading] as usize] }
         };
-        let of_rows: Vec<u32> = rows.iter().map(of_row).collect();
+        let of_rows: Vec<u32> = readings.map(of_row).collect();
         let mut ends = vec![0; present.len() + 1];
         of_rows.iter().filter(|place| **place != NONE).for_each(|place| ends[*place as usize + 1] += 1);
         (1..ends.len()).for_each(|k| ends[k] += ends[k - 1]);
@@ -58,10 +59,10 @@ impl LocalStates {
             return local;
         }
         for block in training.blocks.iter().filter(|block| !states.of_reading[block.test].is_empty()) {
-            for (i, _) in &block.rows {
+            for (i, _) in block.iter() {
                 let places = training
                     .filter
-                    .terms(*i)
+                    .terms(i)
                     .map(|(raw, _)| local.of_scalar(&states.of_reading[block.test], block.start + raw, coordinates));
                 let (low, high) = places.fold((usize::MAX, 0), |(low, high), p| (low.min(p), high.max(p)));
                 local.band = local.band.max(high - low);
@@ -97,7 +98,7 @@ impl LocalStates {
                 let (test, scalar) = side.rows[*row as usize];
                 let values = side.values.col_as_slice(*row as usize);
                 for (channel, to) in channels.iter().zip(to.chunks_exact_mut(vectors.max(1))) {
-                    let sensitivity = channel.sensitivity[test][scalar];
+                    let sensitivity = channel.sensitivity[test as usize][scalar as usize];
                     to.iter_mut().zip(values).for_each(|(sum, value)| *sum += sensitivity * value);
                 }
             }
@@ -126,9 +127,9 @@ impl<'r> OwnProducts<'r> {
             for block in training.blocks.iter().filter(|block| channel.acts_in(block.test)) {
                 let (sensitivity, of_reading) =
                     (&channel.sensitivity[block.test], &channel.states.of_reading[block.test]);
-                for (i, _) in &block.rows {
+                for (i, _) in block.iter() {
                     terms.clear();
-                    terms.extend(training.filter.terms(*i).map(|(raw, factor)| {
+                    terms.extend(training.filter.terms(i).map(|(raw, factor)| {
                         let scalar = block.start + raw;
                         (local.of_scalar(of_reading, scalar, training.coordinates), factor * sensitivity[scalar])
                     }));
@@ -208,7 +209,7 @@ impl<'r> OwnProducts<'r> {
     /// The whitened columns of some basis functions.
     fn rows(&self, basis: &Mat<f64>) -> Mat<f64> {
         let training = self.training;
-        let rows: usize = training.blocks.iter().map(|block| block.rows.len()).sum();
+        let rows: usize = training.blocks.iter().map(|block| block.count()).sum();
         let mut columns = Mat::zeros(rows, basis.ncols());
         for k in 0..basis.ncols() {
             let (basis, column) = (basis.col_as_slice(k), columns.col_as_slice_mut(k));
@@ -217,13 +218,13 @@ impl<'r> OwnProducts<'r> {
                 let acts = self.channel.acts_in(block.test);
                 let (sensitivity, of_reading) =
                     (&self.channel.sensitivity[block.test], &self.channel.states.of_reading[block.test]);
-                for ((i, _), value) in block.rows.iter().zip(&mut next) {
+                for ((i, _), value) in block.iter().zip(&mut next) {
                     if acts {
                         let term = |(raw, factor): (usize, f64)| {
                             let scalar = block.start + raw;
                             factor * sensitivity[scalar] * basis[of_reading[scalar / training.coordinates] as usize]
                         };
-                        *value = training.filter.terms(*i).map(term).sum();
+                        *value = training.filter.terms(i).map(term).sum();
                     }
                 }
             }

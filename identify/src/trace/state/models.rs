@@ -42,6 +42,11 @@ impl SearchState<'_> {
         self.moments.keep_chosen(&branch.folds, &branch.chosen());
     }
 
+    /// Forgets the products of the selected effects of every branch. They are formed again where they are needed.
+    pub fn forget_chosen(&self) {
+        self.selection.branches.iter().for_each(|branch| self.moments.keep_chosen(&branch.folds, &[]));
+    }
+
     fn check(&self) -> Result<(), IdentifyError> {
         self.interrupt.map_or(Ok(()), |interrupt| interrupt.check())
     }
