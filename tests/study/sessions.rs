@@ -20,7 +20,7 @@ pub const NOISES: [Noise; 3] = [
     Noise::Outliers { sigma_um: 0.3, share: 0.01 },
 ];
 
-/// The significance level of trace, 0.5 % two-sided, in standard deviations.
+/// The significance level that defines the smallest significant size, 0.5 % two-sided, in standard deviations.
 pub const LEVEL: f64 = 2.8070;
 
 /// Sessions per study without `ABBE_STUDY`: enough to detect a regression, too few for figures.
@@ -69,7 +69,7 @@ pub fn oracle(kind: Kind, noise: Noise) -> Arc<Oracle> {
     place.get_or_init(|| Arc::new(Oracle::new(&Recipe::new(kind, 0).noise(noise)))).clone()
 }
 
-/// The effect at a multiple of the smallest amplitude that is significant for the oracle at the level of trace.
+/// The effect at a multiple of the smallest amplitude that is significant for the oracle at that level.
 pub fn at_multiple(oracle: &Oracle, effect: &Injected, factor: f64) -> Injected {
     effect.with_amplitude(factor * oracle.smallest_significant_amplitude(effect, LEVEL))
 }
