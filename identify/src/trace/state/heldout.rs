@@ -3,8 +3,8 @@
 //!
 //! Near the threshold, the readings of the other folds hardly distinguish the best explanation from the next ones. The
 //! prediction is therefore an average over them, weighted by `exp(score)` (Bayesian model averaging: Hoeting et al.,
-//! Statistical Science 14 (1999) 382). The gain of the best of many candidates is too large by chance. Each coefficient is
-//! reduced by the factor `1 − freedom/gain` (James & Stein, Proc. 4th Berkeley Symp. 1 (1961) 361).
+//! Statistical Science 14 (1999) 382). The gain of the best of many candidates is too large by chance. Each coefficient
+//! is reduced by the factor `1 − freedom/gain` (James & Stein, Proc. 4th Berkeley Symp. 1 (1961) 361).
 
 use std::sync::Arc;
 
@@ -150,7 +150,8 @@ impl SearchState<'_> {
         Ok(average)
     }
 
-    /// An effect and the candidates that explain about as much in its place beside others, with gains and scores.
+    /// An effect and the candidates that explain about as much in its place beside others, with gains and scores. Those
+    /// that the training folds do not determine are left out: they predict nothing.
     fn explanations(
         &self,
         effect: usize,
@@ -172,7 +173,9 @@ impl SearchState<'_> {
         found.retain(|(_, _, score)| *score > least);
         found.sort_by(|a, b| b.2.total_cmp(&a.2).then(a.0.cmp(&b.0)));
         found.truncate(MAX_AVERAGED - 1);
-        found.push((effect, own, least + MAX_EVIDENCE_DEFICIT));
+        if own.freedom > 0 {
+            found.push((effect, own, least + MAX_EVIDENCE_DEFICIT));
+        }
         Ok(found)
     }
 
