@@ -139,7 +139,8 @@ mod tests {
     #[test]
     fn what_returns_in_every_repeat_is_no_outlier() {
         const PLACES: usize = 40;
-        let place = |row: usize| if row / PLACES % 2 == 0 { row % PLACES } else { PLACES - 1 - row % PLACES };
+        let place =
+            |row: usize| if (row / PLACES).is_multiple_of(2) { row % PLACES } else { PLACES - 1 - row % PLACES };
         let readings = Readings {
             positions: vec![(0..4 * PLACES).map(|row| place(row) as f64).collect()],
             run: (0..4 * PLACES).map(|row| (row / PLACES) as i64).collect(),
