@@ -3,6 +3,10 @@
 //! In scaled parameters `y = x/d` the step solves `min ‖c − R·D·η‖² + λ‖η‖²` by the singular value decomposition of
 //! `R·D`. `λ` is zero as long as full steps lower the sum of squares. A linear problem therefore takes one step
 //! (Marquardt, J. SIAM 11 (1963) 431; Moré, Lecture Notes in Mathematics 630 (1978) 105).
+//!
+//! Along a direction that the readings hardly determine, the neglected second derivatives may be nearly as large as
+//! `JᵀJ`. Each full step is then `q` times the step before with `q` close to 1, or close to −1 if it goes too far. The sum
+//! of all further steps, `1/(1 − q)` times the present one, leads to the minimum (Aitken's extrapolation).
 
 use faer::Mat;
 
@@ -53,6 +57,11 @@ const ROUNDING_OF_SUM: f64 = 1e-12;
 /// Relative step below which the nonlinearity of the model is negligible: its square is below rounding.
 const LINEAR_RELATIVE_STEP: f64 = 1e-7;
 
+/// Iterations after which steps that shrink slowly are extrapolated.
+const PATIENCE: usize = 10;
+/// Least `|q|` of steps that shrink slowly. With less, some hundred steps reach [`SMALLEST_RELATIVE_STEP`].
+const SLOW: f64 = 0.8;
+
 /// Minimises the sum of squares from a start value.
 ///
 /// # Errors
@@ -72,6 +81,8 @@ pub fn minimise(
     };
     let mut damping = 0.0;
     let mut step_before = 1.0;
+    // The full step before, in scaled parameters.
+    let mut full_before: Option<Vec<f64>> = None;
     for iteration in 1..=MAX_ITERATIONS {
         let (r, c, _) = triangle.parts();
         if let Scaling::Columns = scaling {
@@ -95,7 +106,8 @@ pub fn minimise(
         for attempt in 0..60 {
             let mut step = directions.solve(&c, damping);
             step.iter_mut().zip(&scale).for_each(|(step, scale)| *step *= scale);
-            let trial: Vec<f64> = x.iter().zip(&step).map(|(a, b)| a + b).collect();
+            let after = |factor: f64| x.iter().zip(&step).map(|(a, b)| a + factor * b).collect::<Vec<f64>>();
+            let mut trial = after(1.0);
             let relative = step
                 .iter()
                 .zip(&scale)
@@ -125,13 +137,27 @@ pub fn minimise(
                 break;
             }
             // The first attempt is nearly always accepted, so it is linearised at once.
-            let sum = if attempt == 0 {
+            let mut sum = if attempt == 0 {
                 next = problem.linearise(&trial).ok();
                 next.as_ref().map_or(f64::NAN, |next| next.sum_of_squares())
             } else {
                 next = None;
                 problem.sum_of_squares(&trial)
             };
+            let mut full = (damping == 0.0).then(|| step.iter().zip(&scale).map(|(s, d)| s / d).collect::<Vec<f64>>());
+            if let (Some(now), Some(before)) = (&full, &full_before)
+                && iteration > PATIENCE
+            {
+                let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+                let q = dot(now, before) / dot(before, before);
+                if (SLOW..1.0).contains(&q.abs()) {
+                    let extrapolated = after(1.0 / (1.0 - q));
+                    let of_extrapolated = problem.sum_of_squares(&extrapolated);
+                    if of_extrapolated < sum {
+                        (trial, sum, next, full) = (extrapolated, of_extrapolated, None, None);
+                    }
+                }
+            }
             let close = rounded || relative < SMALLEST_RELATIVE_STEP * 100.0;
             if sum.is_finite() && (sum < current || (close && sum <= current * (1.0 + 1e-9))) {
                 x = trial;
@@ -142,7 +168,7 @@ pub fn minimise(
                 if damping < largest * largest * 1e-12 {
                     damping = 0.0;
                 }
-                step_before = relative;
+                (step_before, full_before) = (relative, full);
                 accepted = true;
                 break;
             }
@@ -212,5 +238,49 @@ mod tests {
         let found = minimise(&Poorly, &[0.3, 0.3], &Scaling::Physical(vec![1.0; 2])).unwrap();
         assert!((found.x[0] - 1.0).abs() < 1e-12, "{:?}", found.x);
         assert!(found.x[1].abs() < 1e-10, "{:?}", found.x);
+    }
+
+    /// `r = (x₀ − x, b + x²/2)`: near the minimum the neglected second derivative is `b` times `JᵀJ`. With `b = ∓0.993`
+    /// each full step is ±0.993 times the step before, so that 200 of them leave a quarter of the way. The minimum solves
+    /// `x − x₀ + (b + x²/2) x = 0`; `x₀` is chosen so that it is `x = 0.001`.
+    struct Valley {
+        b: f64,
+    }
+
+    impl Valley {
+        const MINIMUM: f64 = 1e-3;
+
+        fn rows(&self, x: f64) -> Mat<f64> {
+            let at = Valley::MINIMUM;
+            let x_0 = at + (self.b + 0.5 * at * at) * at;
+            // r = observed − model, so that the Jacobian of the model has the opposite sign.
+            let rows = [[1.0, x_0 - x], [-x, self.b + 0.5 * x * x]];
+            Mat::from_fn(2, 2, |i, j| rows[i][j])
+        }
+    }
+
+    impl LeastSquares for Valley {
+        fn parameters(&self) -> usize {
+            1
+        }
+
+        fn linearise(&self, x: &[f64]) -> Result<Triangle, IdentifyError> {
+            Ok(Triangle::of(self.rows(x[0])))
+        }
+
+        fn sum_of_squares(&self, x: &[f64]) -> f64 {
+            let rows = self.rows(x[0]);
+            (0..2).map(|i| rows[(i, 1)].powi(2)).sum()
+        }
+    }
+
+    #[test]
+    fn slowly_shrinking_steps_end_at_the_minimum() {
+        for b in [-0.993, 0.993] {
+            let found = minimise(&Valley { b }, &[0.0], &Scaling::Physical(vec![1.0])).unwrap();
+            // A thousandth of `x` changes the sum of squares by little more than its rounding.
+            assert!((found.x[0] / Valley::MINIMUM - 1.0).abs() < 1e-3, "{b}: {:?}", found.x);
+            assert!(found.iterations < 50, "{b}: {}", found.iterations);
+        }
     }
 }
