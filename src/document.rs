@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use crate::present::report::provenance::{self, Input};
+use crate::report::provenance::{self, Input};
 
 /// Version of the schemas of all documents.
 pub const SCHEMA_VERSION: u32 = 2;

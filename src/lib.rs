@@ -53,7 +53,9 @@ pub mod equation;
 #[cfg(feature = "fleet")]
 pub mod fleet;
 #[doc(hidden)]
-pub mod present;
+pub mod printers;
+#[doc(hidden)]
+pub mod report;
 
 /// What a program needs to build or read a session, to simulate, fit, plan and trace it, and to print an equation.
 pub mod prelude {

@@ -9,7 +9,7 @@ mod cli;
 
 use std::process::ExitCode;
 
-use abbe::present;
+use abbe::{printers, report};
 
 fn main() -> ExitCode {
     cli::run()

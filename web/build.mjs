@@ -106,7 +106,7 @@ const sha256 = (text) => `'sha256-${createHash("sha256").update(text).digest("ba
 
 /** The policy of the page. The script of reports runs in a frame without rights, which inherits the policy. */
 function policy(scripts) {
-  const report = sha256(readFileSync(join(root, "src/present/report/page.js"), "utf8"));
+  const report = sha256(readFileSync(join(root, "src/printers/page.js"), "utf8"));
   const single = scripts.length > 0;
   const own = single ? "" : "'self' ";
   return [

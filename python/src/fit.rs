@@ -6,8 +6,8 @@ use abbe::document::{Call, Document};
 use abbe::identify::fit::{Fit as Estimated, SessionFit};
 use abbe::identify::model_file::IdentifiedModel;
 use abbe::identify::problem::Problem;
-use abbe::present::parameters::{self, Estimates};
-use abbe::present::{readings, report};
+use abbe::report::parameters::{self, Estimates};
+use abbe::report::{pages, readings};
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 
@@ -76,8 +76,8 @@ impl Fit {
 }
 
 impl Fit {
-    fn document(&self) -> Result<report::document::Document, Failed> {
-        Ok(report::fit::document(&self.fit.problem, &self.fit.fit, &self.fit.result)?)
+    fn document(&self) -> Result<pages::document::Document, Failed> {
+        Ok(pages::fit::document(&self.fit.problem, &self.fit.fit, &self.fit.result)?)
     }
 }
 

@@ -10,8 +10,8 @@ use abbe::identify::unit::ARCSEC;
 use abbe::identify::validate::{self, validate};
 use abbe::model::files;
 use abbe::model::session::readings::Readings;
-use abbe::present::report;
-use abbe::present::validate as present;
+use abbe::report::pages;
+use abbe::report::validate as present;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
@@ -215,12 +215,12 @@ impl Validation {
     }
 
     fn figures(&self) -> Vec<Figure> {
-        show::figures(report::validate::document(&self.state.session, &self.validation))
+        show::figures(pages::validate::document(&self.state.session, &self.validation))
     }
 
     fn page(&self, py: Python<'_>, seed: u64) -> PyResult<String> {
         let read = (&self.state.session, &self.state.sources);
-        let document = report::validate::document(&self.state.session, &self.validation);
+        let document = pages::validate::document(&self.state.session, &self.validation);
         work::at_once(py, || show::page(&document, read, "abbe.Model.validate", seed))
     }
 }

@@ -7,8 +7,8 @@ use abbe::identify::plan::results::PlanAnalysis;
 use abbe::identify::plan::{self, PlanOptions};
 use abbe::identify::problem::Problem;
 use abbe::model::session::limits::{LARGEST, MIN_UM};
-use abbe::present::plan as present;
-use abbe::present::report;
+use abbe::report::pages;
+use abbe::report::plan as present;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use serde_json::{Map, Value};
@@ -90,13 +90,13 @@ impl Plan {
     }
 
     fn figures(&self, py: Python<'_>) -> PyResult<Vec<Figure>> {
-        work::at_once(py, || Ok(show::figures(report::plan::document(&self.problem, &self.analysis)?)))
+        work::at_once(py, || Ok(show::figures(pages::plan::document(&self.problem, &self.analysis)?)))
     }
 
     fn page(&self, py: Python<'_>, seed: u64) -> PyResult<String> {
         let read = (&self.state.session, &self.state.sources);
         work::at_once(py, || {
-            show::page(&report::plan::document(&self.problem, &self.analysis)?, read, "abbe.Session.plan", seed)
+            show::page(&pages::plan::document(&self.problem, &self.analysis)?, read, "abbe.Session.plan", seed)
         })
     }
 }

@@ -4,12 +4,13 @@ use std::path::PathBuf;
 
 use abbe::model::files::SourceMap;
 use abbe::model::session::Session;
-use abbe::present::figure::svg;
-use abbe::present::report::document::Document;
-use abbe::present::report::page;
-use abbe::present::report::provenance::Provenance;
-use abbe::present::table::{self, Cell};
-use abbe::present::{csv, figure, html, terminal};
+use abbe::printers::page;
+use abbe::printers::{csv, html, terminal};
+use abbe::report::figure;
+use abbe::report::figure::svg;
+use abbe::report::pages::document::Document;
+use abbe::report::provenance::Provenance;
+use abbe::report::table::{self, Cell};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 

@@ -8,7 +8,7 @@ use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::separating_tests::separate_aliases;
 use abbe::identify::trace::{self, Progress, TraceOptions, TraceOutcome};
 use abbe::model::words::counted;
-use abbe::present::{self, readings, report};
+use abbe::report::{self, pages, readings};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use serde_json::{Map, Value};
@@ -114,7 +114,7 @@ impl Trace {
     }
 
     fn tables(&self) -> Vec<Table> {
-        let mut tables = vec![Table(present::trace::before_and_after(&self.trace.result))];
+        let mut tables = vec![Table(report::trace::before_and_after(&self.trace.result))];
         tables.extend(estimate_tables(&self.trace.after, &self.trace.after_fit, &self.trace.result.after.parameters));
         tables
     }
@@ -124,12 +124,12 @@ impl Trace {
     }
 
     fn figures(&self, py: Python<'_>) -> PyResult<Vec<Figure>> {
-        work::at_once(py, || Ok(show::figures(report::trace::document(&self.trace)?)))
+        work::at_once(py, || Ok(show::figures(pages::trace::document(&self.trace)?)))
     }
 
     fn page(&self, py: Python<'_>) -> PyResult<String> {
         let read = (&self.state.session, &self.state.sources);
-        work::at_once(py, || show::page(&report::trace::document(&self.trace)?, read, "abbe.Session.trace", self.seed))
+        work::at_once(py, || show::page(&pages::trace::document(&self.trace)?, read, "abbe.Session.trace", self.seed))
     }
 
     fn model(&self, py: Python<'_>) -> PyResult<Model> {

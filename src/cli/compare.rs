@@ -14,7 +14,7 @@ use super::failure::Failure;
 use super::json::{self, Origin};
 use super::output;
 use super::{CommonArguments, output::Outputs};
-use crate::present::compare as present;
+use crate::report::compare as present;
 
 /// Examples of `abbe compare`.
 pub const HELP: &str = "Each input is a session, which is fitted as declared, or a model of `abbe fit --save` or `abbe trace --save`. Sessions are fitted \

@@ -15,7 +15,7 @@ use super::failure::Failure;
 use super::interrupt::Interrupts;
 use super::json::{self, Origin};
 use super::output::{self, Outputs};
-use crate::present::compensate as present;
+use crate::report::compensate as present;
 
 /// Examples of `abbe compensate`.
 pub const HELP: &str = "FILE is a CSV with a header line. Columns such as x_mm, c_deg or J1_rad are axis positions; time_s, run, temperature_c and driver.NAME_unit are \

@@ -12,7 +12,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use super::failure::Failure;
 use super::message::{Kind, tell};
 use super::{folder, output};
-use crate::present::compensation::uncertainties;
+use crate::report::compensation::uncertainties;
 
 /// The file of the uncertainties.
 const UNCERTAINTIES: &str = "uncertainty.csv";

@@ -17,7 +17,7 @@ use serde::Serialize;
 use super::failure::Failure;
 use super::json::{self, Origin};
 use super::output::{self, Outputs};
-use crate::present::export as present;
+use crate::report::export as present;
 
 /// Examples of `abbe export`.
 pub const HELP: &str = "urdf writes the calibrated chain (ROS, lengths in m); dh writes Denavit-Hartenberg parameters of a robot in the modified form of Craig, \

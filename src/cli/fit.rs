@@ -13,8 +13,8 @@ use super::save::SaveArguments;
 use super::{
     CommonArguments, SessionArguments, compensation, geometric, output, read_session, repeated, self_calibration,
 };
-use crate::present::fit::Figures;
-use crate::present::readings;
+use crate::report::fit::Figures;
+use crate::report::readings;
 
 /// Examples of `abbe fit`.
 pub const HELP: &str = "Examples:
@@ -185,7 +185,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
         output::write_figures(path, &Figures::of_fit(&result))?;
     }
     if arguments.report.asked() {
-        let document = crate::present::report::fit::document(&problem, &fit, &result)?;
+        let document = crate::report::pages::fit::document(&problem, &fit, &result)?;
         arguments.report.write(&document, (&session, &sources), arguments.common.seed)?;
     }
     arguments.save.run(&problem, &fit, &sources, arguments.common.seed)?;

@@ -8,9 +8,9 @@ use abbe::model::words::counted;
 use super::failure::Failure;
 use super::report::ReportArguments;
 use super::{CommonArguments, message, output};
-use crate::present::fit::noise;
-use crate::present::method::{centres, errors};
-use crate::present::number::micrometres;
+use crate::report::fit::noise;
+use crate::report::method::{centres, errors};
+use crate::report::number::micrometres;
 
 /// Runs a geometric method and the full fit on the same readings.
 pub fn run(
@@ -28,7 +28,7 @@ pub fn run(
     common.write_json(sources, &result)?;
     if report.asked() {
         let (problem, _) = abbe::identify::fit::prepare(session, common.seed)?;
-        let document = crate::present::report::method::document(&problem, &result);
+        let document = crate::report::pages::method::document(&problem, &result);
         report.write(&document, (session, sources), common.seed)?;
     }
     Ok(())

@@ -12,11 +12,12 @@ use super::failure::Failure;
 use super::json::{self, Origin};
 use super::output::{self, Outputs};
 use super::{folder, json::command_line};
-use crate::present::history as present;
-use crate::present::report::document::Document;
-use crate::present::report::provenance::Provenance;
-use crate::present::report::{history as report, page};
-use crate::present::table::Table;
+use crate::printers::page;
+use crate::report::history as present;
+use crate::report::pages::document::Document;
+use crate::report::pages::history as report;
+use crate::report::provenance::Provenance;
+use crate::report::table::Table;
 
 /// Examples of `abbe history`.
 pub const HELP: &str = "DIR is the folder of `abbe run`. A session counts if its [about] has a `date`. Each parameter \

@@ -12,7 +12,7 @@ use clap::Args;
 use super::failure::Failure;
 use super::json::{self, Origin};
 use super::output;
-use crate::present::volumetric as present;
+use crate::report::volumetric as present;
 
 /// A map of the volumetric error.
 #[derive(Args)]

@@ -12,7 +12,7 @@ use clap::Args;
 use super::failure::Failure;
 use super::message::print_warnings;
 use super::{SessionArguments, folder, output};
-use crate::present::table::{Table, cells};
+use crate::report::table::{Table, cells};
 
 /// Examples of `abbe nc`.
 pub const HELP: &str = "A program for each test and `main`, which calls them in the order of the session: approach along the tool, centring of the workpiece \

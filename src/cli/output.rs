@@ -8,8 +8,8 @@ use abbe::model::files::SourceMap;
 
 use super::failure::Failure;
 use super::message::{Kind, tell};
-use crate::present::table::Table;
-use crate::present::{csv, terminal};
+use crate::printers::{csv, terminal};
+use crate::report::table::Table;
 
 /// Writes a file through a temporary one beside it, so that a reader finds the old file or the whole new one, whatever
 /// happens meanwhile.

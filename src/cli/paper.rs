@@ -16,10 +16,10 @@ use clap::{Args, ValueEnum};
 use super::failure::Failure;
 use super::message::print_warnings;
 use super::{SessionArguments, folder, output};
-use crate::present::paper::contents::{self, Study};
-use crate::present::paper::layout::{Class, Layout};
-use crate::present::paper::{self, Section, comparison, methods};
-use crate::present::report::provenance::Provenance;
+use crate::printers::paper::layout::{Class, Layout};
+use crate::report::paper::contents::{self, Study};
+use crate::report::paper::{self, Section, comparison, methods};
+use crate::report::provenance::Provenance;
 
 /// Examples of `abbe paper`.
 pub const HELP: &str = "Examples:
@@ -136,7 +136,7 @@ pub fn run(arguments: &PaperArguments, quiet: bool) -> Result<(), Failure> {
         env!("CARGO_PKG_VERSION"),
         counted(studies.len(), "session"),
     );
-    let mut files = paper::files(&title, &summary, &sections, layout).map_err(Failure::Other)?;
+    let mut files = crate::printers::paper::files(&title, &summary, &sections, layout).map_err(Failure::Other)?;
     files.push(("README.md".into(), readme(arguments, &origins, &sections)?.into_bytes()));
     folder::write(&arguments.out, &files, arguments.force, |_| Ok(()))?;
     if !quiet {

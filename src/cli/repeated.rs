@@ -9,7 +9,7 @@ use super::failure::Failure;
 use super::json::{self, Origin};
 use super::output::{self, Outputs};
 use super::{CommonArguments, SessionArguments, message, read_session};
-use crate::present::repeated as present;
+use crate::report::repeated as present;
 
 /// Fits each session separately and compares the fits.
 pub fn run(

@@ -8,10 +8,11 @@ use clap::Args;
 
 use super::failure::Failure;
 use super::{folder, output};
-use crate::present::report::document::Document;
-use crate::present::report::page;
-use crate::present::report::provenance::Provenance;
-use crate::present::{csv, figure::svg};
+use crate::printers::csv;
+use crate::printers::page;
+use crate::report::figure::svg;
+use crate::report::pages::document::Document;
+use crate::report::provenance::Provenance;
 
 /// The files of a report.
 #[derive(Args, Clone)]
@@ -78,7 +79,7 @@ impl ReportArguments {
 
 fn write_plots(document: &Document, path: &Path) -> Result<(), Failure> {
     #[cfg(feature = "png")]
-    let fonts = crate::present::figure::png::Fonts::bundled();
+    let fonts = crate::report::figure::png::Fonts::bundled();
     let mut files = Vec::new();
     for figure in &document.figures {
         let data = csv::text(&figure.table()).map_err(Failure::Other)?;
@@ -86,7 +87,7 @@ fn write_plots(document: &Document, path: &Path) -> Result<(), Failure> {
         files.push((format!("{}.csv", figure.name), data));
         #[cfg(feature = "png")]
         {
-            let png = crate::present::figure::png::png(figure, &fonts)
+            let png = crate::report::figure::png::png(figure, &fonts)
                 .ok_or_else(|| Failure::Other(format!("the plot `{}` cannot be drawn as PNG", figure.name)))?;
             files.push((format!("{}.png", figure.name), png));
         }

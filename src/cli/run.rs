@@ -21,7 +21,7 @@ use super::json::{self, Origin};
 use super::message::{Kind, tell};
 use super::output::{self, Outputs};
 use super::search::SearchArguments;
-use crate::present::table::{Table, cells};
+use crate::report::table::{Table, cells};
 
 /// Examples of `abbe run`.
 pub const HELP: &str = "Each session is fitted and traced; with --models the model of its machine is validated. The \

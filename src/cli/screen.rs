@@ -9,10 +9,10 @@ use abbe::identify::tolerance::Conformity;
 use abbe::model::words::counted;
 
 use super::{SessionArguments, output};
-use crate::present::parameters::{self, Estimates};
-use crate::present::plausibility::conflicts;
-use crate::present::table::Table;
-use crate::present::{circular, conformity, confounded};
+use crate::report::parameters::{self, Estimates};
+use crate::report::plausibility::conflicts;
+use crate::report::table::Table;
+use crate::report::{circular, conformity, confounded};
 
 /// Entries of a long list that the first screen shows.
 const MAX_LISTED: usize = 3;

@@ -9,9 +9,9 @@ use clap::Args;
 
 use super::failure::Failure;
 use super::{CommonArguments, message, output, screen};
-use crate::present::fit::noise;
-use crate::present::number::micrometres;
-use crate::present::{parameters, self_calibration as present};
+use crate::report::fit::noise;
+use crate::report::number::micrometres;
+use crate::report::{parameters, self_calibration as present};
 
 /// Monte Carlo propagation of a self-calibration or of the full fit.
 #[derive(Args)]

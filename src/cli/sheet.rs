@@ -14,7 +14,7 @@ use clap::Args;
 use super::failure::Failure;
 use super::message::print_warnings;
 use super::{SessionArguments, output};
-use crate::present::sheet as present;
+use crate::printers::sheet as present;
 
 /// Examples of `abbe sheet`.
 pub const HELP: &str = "One page of HTML for each test, to be printed from the browser: drawing of balls, bar and rotary axes, what to mount and what stays \

@@ -14,9 +14,9 @@ use serde::Serialize;
 
 use super::failure::Failure;
 use super::{CommonArguments, SessionArguments, folder, message, output, read_session};
-use crate::present::number::micrometres;
-use crate::present::simulation::truth;
-use crate::present::table::Table;
+use crate::report::number::micrometres;
+use crate::report::simulation::truth;
+use crate::report::table::Table;
 
 /// Examples of `abbe simulate`, and the names of values.
 pub const HELP: &str = "Names of values are those of results, with a unit: errors (EY0A of ISO 230-1, e_y0a of the literature), set-up \

@@ -18,7 +18,7 @@ use super::interrupt::Interrupts;
 use super::json::{self, Origin};
 use super::output::{self, Outputs};
 use super::run::MAX_THREADS;
-use crate::present::study as present;
+use crate::report::study as present;
 
 /// Examples of `abbe study`.
 pub const HELP: &str = "A study file states plans, effects and noise. Every combination is simulated and analysed: \

@@ -25,7 +25,7 @@ use super::report::ReportArguments;
 use super::save::SaveArguments;
 use super::search::SearchArguments;
 use super::{CommonArguments, SessionArguments, compensation, message, next_session, output, read_session};
-use crate::present::{readings, trace as present};
+use crate::report::{readings, trace as present};
 
 /// Examples of `abbe trace`.
 pub const HELP: &str = "Examples:
@@ -179,7 +179,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         output::write_whole(path, &output::csv(&readings::residuals(&trace.after, &trace.after_fit))?)?;
     }
     if arguments.report.asked() {
-        let document = crate::present::report::trace::document(&trace)?;
+        let document = crate::report::pages::trace::document(&trace)?;
         arguments.report.write(&document, (&session, &sources), arguments.common.seed)?;
     }
     if trace.result.interrupted {

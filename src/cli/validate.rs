@@ -11,8 +11,8 @@ use super::json::{self, Origin};
 use super::message::print_warnings;
 use super::report::ReportArguments;
 use super::{CommonArguments, SessionArguments, output, read_session};
-use crate::present::table::Table;
-use crate::present::validate as present;
+use crate::report::table::Table;
+use crate::report::validate as present;
 
 /// Examples of `abbe validate`.
 pub const HELP: &str = "Examples:
@@ -70,7 +70,7 @@ pub fn run(arguments: &ValidateArguments) -> Result<(), Failure> {
         output::write_figures(path, &present::figures(result))?;
     }
     if arguments.report.asked() {
-        let document = crate::present::report::validate::document(&session, &validation);
+        let document = crate::report::pages::validate::document(&session, &validation);
         arguments.report.write(&document, (&session, &sources), arguments.common.seed)?;
     }
     Ok(())

@@ -21,7 +21,7 @@ use super::options::Options;
 use super::record::{EffectRecord, ErrorRecord, InputRecord, MachineRecord, Record, SCHEMA_VERSION, ValidationRecord};
 use super::store::{Pointer, Store};
 use super::{BUILD, FleetError};
-use crate::present::report::provenance;
+use crate::report::provenance;
 
 /// Bits of a seed: every reader of JSON keeps an integer of this size.
 const SEED_BITS: u32 = 52;

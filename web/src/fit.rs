@@ -1,8 +1,8 @@
 //! A fit.
 
 use abbe::identify::fit::SessionFit;
-use abbe::present::fit::Figures;
-use abbe::present::{readings, report};
+use abbe::report::fit::Figures;
+use abbe::report::{pages, readings};
 use wasm_bindgen::prelude::*;
 
 use crate::failed::Failed;
@@ -37,7 +37,7 @@ impl Fit {
 
     /// The page of `--report`.
     pub fn report(&self) -> Result<String, Failed> {
-        let document = report::fit::document(&self.fit.problem, &self.fit.fit, &self.fit.result)?;
+        let document = pages::fit::document(&self.fit.problem, &self.fit.fit, &self.fit.result)?;
         output::report("fit", &self.read, self.seed, &document)
     }
 

@@ -6,11 +6,11 @@ use abbe::document::{Call, Document};
 use abbe::identify::fit::Fit;
 use abbe::identify::model_file::IdentifiedModel;
 use abbe::identify::problem::Problem;
-use abbe::present::csv;
-use abbe::present::report::document::Document as Report;
-use abbe::present::report::page;
-use abbe::present::report::provenance::Provenance;
-use abbe::present::table::Table;
+use abbe::printers::csv;
+use abbe::printers::page;
+use abbe::report::pages::document::Document as Report;
+use abbe::report::provenance::Provenance;
+use abbe::report::table::Table;
 use serde::Serialize;
 use serde_json::Map;
 

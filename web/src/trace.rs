@@ -5,7 +5,7 @@ use abbe::identify::separating_tests::separate_aliases;
 use abbe::identify::trace::{self, Progress, TraceOptions, TraceOutcome};
 use abbe::model::files::toml::write;
 use abbe::model::words::counted;
-use abbe::present::{readings, report, trace as present};
+use abbe::report::{pages, readings, trace as present};
 use wasm_bindgen::prelude::*;
 
 use crate::failed::Failed;
@@ -43,7 +43,7 @@ impl Trace {
 
     /// The page of `--report`.
     pub fn report(&self) -> Result<String, Failed> {
-        output::report("trace", &self.read, self.seed, &report::trace::document(&self.trace)?)
+        output::report("trace", &self.read, self.seed, &pages::trace::document(&self.trace)?)
     }
 
     /// The table of `--csv`.

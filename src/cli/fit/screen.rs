@@ -9,11 +9,11 @@ use abbe::model::words::counted;
 
 use crate::cli::screen::{self, Step, command};
 use crate::cli::{SessionArguments, output};
-use crate::present::base::{base_parameters, base_statement};
-use crate::present::cross_validation;
-use crate::present::fit as present;
-use crate::present::number::micrometres;
-use crate::present::parameters::Estimates;
+use crate::report::base::{base_parameters, base_statement};
+use crate::report::cross_validation;
+use crate::report::fit as present;
+use crate::report::number::micrometres;
+use crate::report::parameters::Estimates;
 
 /// Prints the result of a fit of a session. With `all`, no list is folded.
 pub fn print(problem: &Problem, fit: &Fit, result: &FitResult, session: &SessionArguments, all: bool) {

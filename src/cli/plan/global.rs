@@ -7,8 +7,8 @@ use clap::Args;
 
 use crate::cli::failure::Failure;
 use crate::cli::output;
-use crate::present::fit::noise;
-use crate::present::plan::global as present;
+use crate::report::fit::noise;
+use crate::report::plan::global as present;
 
 /// Global sensitivity.
 #[derive(Args)]

@@ -16,8 +16,8 @@ use clap::{Args, ValueEnum};
 
 use crate::cli::failure::Failure;
 use crate::cli::{SessionArguments, next_session, output};
-use crate::present::next_test as present;
-use crate::present::number::three_digits;
+use crate::report::next_test as present;
+use crate::report::number::three_digits;
 
 /// The share of a range that is tried beside the whole range if gain per minute is compared.
 const HALF: f64 = 0.5;

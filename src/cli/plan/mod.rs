@@ -152,7 +152,7 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
     if arguments.report.asked() {
         let (complete, noise) = plan::prepared(&session, &options)?;
         let problem = plan::states::problem_by_test(&complete, noise)?;
-        let document = crate::present::report::plan::document(&problem, &analysis)?;
+        let document = crate::report::pages::plan::document(&problem, &analysis)?;
         arguments.report.write(&document, (&session, &sources), arguments.common.seed)?;
     }
     Ok(())
@@ -202,7 +202,7 @@ fn next_test(
     let (complete, noise) = plan::prepared(session, options)?;
     let problem = plan::states::problem_by_test(&complete, noise)?;
     let (noise_um, noise_source) = (problem.noise.sigma_mm * 1e3, problem.noise.source.word().to_string());
-    let of_noise = crate::present::fit::noise(noise_um, &noise_source);
+    let of_noise = crate::report::fit::noise(noise_um, &noise_source);
     let improvement = if arguments.improve.asked() {
         let improvement = arguments.improve.run(&problem)?;
         if tables {
@@ -219,12 +219,12 @@ fn next_test(
         if improvement.is_none() {
             say!("{of_noise}");
         }
-        output::print(&crate::present::next_test::ranges(&ranges));
+        output::print(&crate::report::next_test::ranges(&ranges));
     }
     let found = NextTest { noise_um, noise_source, improvement, ranges };
     arguments.common.write_json(sources, &found)?;
     if arguments.report.asked() {
-        let document = crate::present::report::next_test::document(&problem, found.improvement.as_ref(), &found.ranges);
+        let document = crate::report::pages::next_test::document(&problem, found.improvement.as_ref(), &found.ranges);
         arguments.report.write(&document, (session, sources), arguments.common.seed)?;
     }
     Ok(())

@@ -10,7 +10,7 @@ use clap::Args;
 
 use crate::cli::failure::Failure;
 use crate::cli::{CommonArguments, output};
-use crate::present::patterns as present;
+use crate::report::patterns as present;
 
 /// Trace patterns: the change of the readings by each error alone.
 #[derive(Args)]

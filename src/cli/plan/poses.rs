@@ -10,7 +10,7 @@ use clap::{Args, ValueEnum};
 
 use crate::cli::failure::Failure;
 use crate::cli::output;
-use crate::present::poses as present;
+use crate::report::poses as present;
 
 /// Maximum number of poses.
 const MAX_POSES: usize = 1000;

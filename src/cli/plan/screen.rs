@@ -6,10 +6,10 @@ use abbe::model::words::counted;
 
 use crate::cli::screen::{self, Step, command};
 use crate::cli::{SessionArguments, output};
-use crate::present::fit::noise;
-use crate::present::number::with_symbols;
-use crate::present::plan::verdict::verdict;
-use crate::present::plan::{self as present, effects};
+use crate::report::fit::noise;
+use crate::report::number::with_symbols;
+use crate::report::plan::verdict::verdict;
+use crate::report::plan::{self as present, effects};
 
 /// Prints the analysis of a plan. With `all`, no list is folded and the tables of [`details()`] are printed.
 pub fn print(analysis: &PlanAnalysis, session: &SessionArguments, improvable: bool, all: bool) {

@@ -7,10 +7,10 @@ use abbe::model::words::counted;
 
 use crate::cli::screen::{self, Step, command};
 use crate::cli::{SessionArguments, output};
-use crate::present::effect::name;
-use crate::present::number::{micrometres, p_value, quantity, shape_number, value_and_u};
-use crate::present::parameters::Estimates;
-use crate::present::{trace as present, uniqueness};
+use crate::report::effect::name;
+use crate::report::number::{micrometres, p_value, quantity, shape_number, value_and_u};
+use crate::report::parameters::Estimates;
+use crate::report::{trace as present, uniqueness};
 
 /// Prints the result of a trace of a session. With `all`, no list is folded.
 pub fn print(trace: &TraceOutcome, session: &SessionArguments, all: bool) {

@@ -1,0 +1,36 @@
+//! Tables as CSV: one row per row, numbers with all their places, for spreadsheets.
+
+use crate::report::table::{Cell, Table};
+
+/// How the signs of a table of figures are meant, as comments in front of it.
+pub const CONVENTION: &str = "# Errors by their names of ISO 230-1: EX0C is a location error, EXC an error motion. Value = actual less nominal: the body that the axis\n\
+# carries is displaced along +X, +Y, +Z of R and turned about them by the right-hand rule, E = Trans(EX, EY, EZ) Rx(EA) Ry(EB) Rz(EC), whatever\n\
+# the axis' own direction. A correction has the opposite sign. u is one standard uncertainty.\n";
+
+/// A cell that a spreadsheet takes for text: one that begins as a formula does (`=`, `+`, `-`, `@`) and is no number
+/// stands behind an apostrophe.
+///
+/// Names in a table come from session files, which others may have written.
+pub fn cell(text: String) -> String {
+    let formula = text.trim_start().starts_with(['=', '+', '-', '@']) || text.starts_with(['\t', '\r', '\n']);
+    if formula && text.parse::<f64>().is_err() { format!("'{text}") } else { text }
+}
+
+/// The table as CSV: cells that hold a separator stand in quotes.
+///
+/// # Errors
+/// If a row is not as long as the header.
+pub fn text(table: &Table) -> Result<Vec<u8>, String> {
+    let fault = |error: csv::Error| error.to_string();
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(table.columns.iter().map(|column| cell(column.heading.clone()))).map_err(fault)?;
+    for row in &table.rows {
+        let cells = row.iter().map(|value| match value {
+            Cell::Text(text) => cell(text.clone()),
+            Cell::Number(value, Some(places)) => format!("{value:.places$}"),
+            Cell::Number(value, None) => value.to_string(),
+        });
+        writer.write_record(cells).map_err(fault)?;
+    }
+    writer.into_inner().map_err(|error| error.to_string())
+}

@@ -1,0 +1,24 @@
+//! Tables on the terminal: aligned columns under a header.
+
+use crate::report::table::{Align, Table};
+
+/// The table without its title: one line per row under the header, then the notes, without a line end at the end.
+pub fn text(table: &Table) -> String {
+    let header: Vec<String> = table.columns.iter().map(|column| column.heading.clone()).collect();
+    let rows: Vec<Vec<String>> = table.rows.iter().map(|row| row.iter().map(ToString::to_string).collect()).collect();
+    let mut width: Vec<usize> = header.iter().map(|cell| cell.chars().count()).collect();
+    for row in &rows {
+        for (w, cell) in width.iter_mut().zip(row) {
+            *w = (*w).max(cell.chars().count());
+        }
+    }
+    let line = |cells: &Vec<String>| {
+        let aligned = cells.iter().zip(&table.columns).zip(&width).map(|((cell, column), width)| match column.align {
+            Align::Left => format!("{cell:<width$}"),
+            Align::Right => format!("{cell:>width$}"),
+        });
+        format!("  {}", aligned.collect::<Vec<_>>().join("  ")).trim_end().to_string()
+    };
+    let notes = table.notes.iter().map(|note| format!("  {note}"));
+    std::iter::once(&header).chain(&rows).map(line).chain(notes).collect::<Vec<_>>().join("\n")
+}

@@ -1,0 +1,280 @@
+//! Charts with two straight axes: lines, dots, stems, ranges and flags.
+
+use maud::{Markup, html};
+use serde_json::json;
+
+use super::scale::{Placed, Scale, coordinate, dots, polyline};
+use super::svg::{Drawing, WIDTH, legend, shortened};
+use super::{Kind, Quantity};
+use crate::report::table::{Cell, Table, cells, numbers, words};
+
+/// Height of a drawing without its legend, SVG units.
+const HEIGHT: f64 = 254.0;
+const LEFT: f64 = 62.0;
+const RIGHT: f64 = 16.0;
+/// Horizontal coordinates of the frame.
+const ACROSS: [f64; 2] = [LEFT, WIDTH - RIGHT];
+/// Vertical coordinates of the frame: of the minimum, of the maximum.
+const UP: [f64; 2] = [HEIGHT - 45.0, 12.0];
+/// A series with fewer dots than this has larger dots.
+const SPARSE: usize = 150;
+/// The labels of flags to the right of this coordinate are aligned to the right.
+const LABEL_LIMIT: f64 = ACROSS[1] - 144.0;
+
+/// How the points of a series are drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Mark {
+    /// Joined points. A point with a name has a dot.
+    Line,
+    /// Separate points.
+    Dots,
+    /// Vertical strokes from zero, displaced by this number of units of x, so that two series stand side by side.
+    Stems(f64),
+    /// Vertical strokes, each from an odd point to the next point.
+    Bars,
+    /// Names at the top, each with a line down to its point.
+    Flags,
+}
+
+/// A series of points.
+#[derive(Clone, Debug)]
+pub struct Series {
+    /// Label in the legend and the table; empty without an entry.
+    pub label: String,
+    /// CSS class of its colour and line.
+    pub class: &'static str,
+    /// Mark.
+    pub mark: Mark,
+    /// Points: x, y.
+    pub points: Vec<(f64, f64)>,
+    /// Names of the last points, as many as have one.
+    pub names: Vec<Name>,
+    /// Index of the traversal and name of the data column in a chart that the script of the page redraws.
+    pub source: Option<(usize, &'static str)>,
+    /// Index and name of the test in a chart of several tests. The script of the page hides a test by its index.
+    pub test: Option<(usize, String)>,
+}
+
+/// The name of a point.
+#[derive(Clone, Debug)]
+pub struct Name {
+    /// Name.
+    pub text: String,
+    /// Remark, shown under the pointer.
+    pub note: String,
+    /// Whether there is space for the name itself.
+    pub shown: bool,
+}
+
+impl Series {
+    /// A series without names.
+    pub fn new(label: impl Into<String>, class: &'static str, mark: Mark, points: Vec<(f64, f64)>) -> Series {
+        Series { label: label.into(), class, mark, points, names: Vec::new(), source: None, test: None }
+    }
+
+    /// Index of the traversal, if the script of the page redraws it.
+    pub(super) fn traversal(&self) -> Option<usize> {
+        self.source.map(|(traversal, _)| traversal)
+    }
+
+    /// The points that have a name.
+    fn named(&self) -> impl Iterator<Item = (&(f64, f64), &Name)> {
+        self.points.iter().skip(self.points.len() - self.names.len()).zip(&self.names)
+    }
+
+    fn path(&self, x: &Placed, y: &Placed) -> String {
+        let points = self.points.iter().map(|p| (x.at(p.0), y.at(p.1)));
+        let stroke = |x: f64, from: f64, to: f64| format!("M{} {}V{}", coordinate(x), coordinate(from), coordinate(to));
+        match self.mark {
+            Mark::Line | Mark::Flags => polyline(points),
+            Mark::Dots => dots(points),
+            Mark::Stems(beside) => {
+                self.points.iter().map(|p| stroke(x.at(p.0 + beside), y.at(0.0), y.at(p.1))).collect()
+            }
+            // Half a pixel at each end makes a single reading visible.
+            Mark::Bars => self
+                .points
+                .chunks_exact(2)
+                .map(|pair| stroke(x.at(pair[0].0), y.at(pair[0].1) + 0.5, y.at(pair[1].1) - 0.5))
+                .collect(),
+        }
+    }
+
+    /// CSS classes of the path.
+    fn classes(&self) -> String {
+        let test = self.test.as_ref().map_or(String::new(), |(test, _)| format!(" of-test-{test}"));
+        let mark = match self.mark {
+            Mark::Dots if self.points.len() < SPARSE => " dots sparse",
+            Mark::Dots => " dots",
+            Mark::Stems(_) => " stem",
+            Mark::Bars => " bars",
+            Mark::Line | Mark::Flags => "",
+        };
+        format!("run {}{test}{mark}", self.class)
+    }
+
+    /// CSS classes of the entry in the legend.
+    fn key(&self) -> String {
+        let mark = match self.mark {
+            Mark::Dots => " dots",
+            Mark::Bars => " bars",
+            _ => "",
+        };
+        format!("{}{mark}", self.class)
+    }
+
+    fn drawing(&self, x: &Placed, y: &Placed) -> Markup {
+        let name = |name: &Name, max: usize| shortened(&name.text, max);
+        html! {
+            @if self.mark == Mark::Flags {
+                @for (number, ((at, top), flag)) in self.named().enumerate() {
+                    @let (at, top, baseline) = (x.at(*at), y.at(*top), UP[1] + 12.0 + 12.0 * (number % 3) as f64);
+                    @let (class, beside) = if at > LABEL_LIMIT { ("small right", -4.0) } else { ("small", 4.0) };
+                    path class="found-line"
+                        d=(polyline([(at, (top - 3.0).max(baseline + 2.0)), (at, baseline + 2.0)])) {}
+                    path class="found" d=(format!("M{} {}l-4 8h8z", coordinate(at), UP[0])) {}
+                    text class=(class) x=(coordinate(at + beside)) y=(coordinate(baseline)) {
+                        title { (flag.text) } (name(flag, 24))
+                    }
+                }
+            } @else {
+                path class=(self.classes()) data-run=[self.traversal()] data-column=[self.source.map(|s| s.1)]
+                    d=(self.path(x, y)) {}
+                @for ((left, top), dot) in self.named() {
+                    @let (left, top) = (x.at(*left), y.at(*top));
+                    circle class=(format!("dot-{}", self.class)) cx=(coordinate(left)) cy=(coordinate(top)) r="3.4" {
+                        title { (dot.text) ": " (dot.note) }
+                    }
+                    @if dot.shown {
+                        text class="small" x=(coordinate(left + 6.0)) y=(coordinate(top - 7.0)) { (name(dot, 26)) }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// A straight axis.
+#[derive(Clone, Debug)]
+pub struct Axis {
+    /// What it shows.
+    pub quantity: Quantity,
+    /// Its scale.
+    pub scale: Scale,
+}
+
+impl Axis {
+    /// An axis.
+    pub fn new(name: impl Into<String>, unit: impl Into<String>, scale: Scale) -> Axis {
+        Axis { quantity: Quantity::new(name, unit), scale }
+    }
+}
+
+/// The readings behind a chart that the script of the page redraws.
+#[derive(Clone, Debug)]
+pub struct Live {
+    /// Index of the test.
+    pub test: usize,
+    /// Data column.
+    pub column: &'static str,
+    /// Data column of the abscissa.
+    pub abscissa: String,
+    /// Whether the script may magnify the ordinate: it has four divisions on either side of zero.
+    pub scaled: bool,
+}
+
+/// A chart with straight axes.
+#[derive(Clone, Debug)]
+pub struct Lines {
+    /// Horizontal axis.
+    pub x: Axis,
+    /// Vertical axis.
+    pub y: Axis,
+    /// Series, in drawing order.
+    pub series: Vec<Series>,
+    /// The readings behind it. `None` for a static chart.
+    pub live: Option<Live>,
+}
+
+impl Lines {
+    /// A static chart.
+    pub fn new(x: Axis, y: Axis, series: Vec<Series>) -> Lines {
+        Lines { x, y, series, live: None }
+    }
+}
+
+/// Entries of the legend: CSS classes and label, in the order of the first series of each.
+pub(super) fn entries(series: &[Series]) -> Vec<(String, String)> {
+    let mut entries: Vec<(String, String)> = Vec::new();
+    for entry in series.iter().map(|series| (series.key(), series.label.clone())) {
+        if !entry.1.is_empty() && !entries.contains(&entry) {
+            entries.push(entry);
+        }
+    }
+    entries
+}
+
+/// The points of all series, one row each.
+pub(super) fn table(series: &[Series], x: &Quantity, y: &Quantity) -> Table {
+    let rows = series.iter().flat_map(|series| {
+        let names = series.points.iter().map(|_| "").skip(series.names.len());
+        let names = names.chain(series.names.iter().map(|name| name.text.as_str()));
+        series.points.iter().zip(names).map(|((x, y), name)| {
+            let test = series.test.as_ref().map_or("", |(_, name)| name);
+            let traversal = series.traversal().map_or(String::new(), |traversal| (traversal + 1).to_string());
+            cells![test, &series.label, traversal, Cell::exact(*x), Cell::exact(*y), name]
+        })
+    });
+    let [x, y] = [x, y].map(|quantity| numbers(quantity.heading()));
+    let columns = [words("test"), words("series"), numbers("traversal"), x, y, words("name")];
+    Table::new(columns, rows).without_empty_columns()
+}
+
+/// Draws the frame, the grid, the tick labels and the labels of the axes.
+fn frame(x: &Placed, y: &Placed, [x_label, y_label]: [String; 2]) -> Markup {
+    html! {
+        @for (at, label) in y.ticks() {
+            path class="grid" d=(format!("M{} {}H{}", ACROSS[0], coordinate(at), ACROSS[1])) {}
+            text class="small soft right tick" x=(ACROSS[0] - 6.0) y=(coordinate(at + 4.0)) { (label) }
+        }
+        @for (at, label) in x.ticks() {
+            @let at = coordinate(at);
+            path class="grid" d=(format!("M{at} {}V{}", UP[0], UP[1])) {}
+            text class="small soft middle" x=(at) y=(UP[0] + 16.0) { (label) }
+        }
+        rect class="frame" x=(ACROSS[0]) y=(UP[1]) width=(ACROSS[1] - ACROSS[0]) height=(UP[0] - UP[1]) {}
+        text class="middle" x=((ACROSS[0] + ACROSS[1]) / 2.0) y=(UP[0] + 36.0) { (x_label) }
+        text class="middle" transform=(format!("translate(14 {}) rotate(-90)", (UP[0] + UP[1]) / 2.0)) { (y_label) }
+    }
+}
+
+impl Kind for Lines {
+    fn drawing(&self) -> Drawing {
+        let (x, y) = (self.x.scale.between(ACROSS), self.y.scale.between(UP));
+        let entries = entries(&self.series);
+        let (keys, bottom) = if entries.is_empty() {
+            (html! {}, HEIGHT - 6.0)
+        } else {
+            legend(&entries, LEFT, HEIGHT + 12.0, WIDTH - LEFT - RIGHT)
+        };
+        let inner = html! {
+            (frame(&x, &y, [self.x.quantity.label(), self.y.quantity.label()]))
+            @for series in &self.series { (series.drawing(&x, &y)) }
+            (keys)
+        };
+        let interaction = self.live.as_ref().map(|live| {
+            let um = if live.scaled { y.scale.step } else { 1.0 };
+            json!({
+                "kind": "line", "test": live.test, "column": live.column, "abscissa": live.abscissa,
+                "x0": x.at(0.0), "kx": x.per_unit(), "y0": y.at(0.0), "px": y.per_unit().abs() * um, "um": um,
+                "scaled": live.scaled,
+            })
+            .to_string()
+        });
+        Drawing { size: [WIDTH, bottom + 10.0], inner, interaction }
+    }
+
+    fn table(&self) -> Table {
+        table(&self.series, &self.x.quantity, &self.y.quantity)
+    }
+}

@@ -1,0 +1,96 @@
+//! The text of a methods section: machine, tests, parameters, estimation and uncertainty, every number from the result.
+
+use abbe::identify::parameters::Role;
+use abbe::model::instrument::InstrumentKind;
+use abbe::model::words::counted;
+
+use super::contents::Study;
+use super::{Item, Section};
+use crate::report::number::micrometres;
+
+/// The section.
+pub fn section(study: &Study) -> Section {
+    let mut items = vec![Item::Text(machine(study)), Item::Text(estimation(study)), Item::Text(uncertainty(study))];
+    items.extend(study.fitted.as_ref().map(|fitted| {
+        let result = &fitted.result;
+        let enlarged = if result.u_enlargement > 1.0 {
+            format!(
+                " The residual exceeds the noise significantly, so that all uncertainties are enlarged by {:.2}.",
+                result.u_enlargement
+            )
+        } else {
+            String::new()
+        };
+        let source = match result.noise_source.as_str() {
+            "stated" => "is that of the instrument",
+            "repeats" => "is estimated from repeated readings",
+            _ => "is estimated from the residual",
+        };
+        Item::Text(format!(
+            "The fit of {} has a root mean square residual of {} and of {} for held-out readings ({} left out in turn). \
+             The noise standard deviation of {} {source}. χ² is {:.0} for {} degrees of freedom (Birge ratio {:.2}).{enlarged}",
+            counted(result.readings, "reading"),
+            micrometres(result.rms_um),
+            micrometres(result.heldout_rms_um),
+            result.heldout_by,
+            micrometres(result.noise_um),
+            result.chi_square,
+            result.degrees_of_freedom,
+            result.birge_ratio,
+        ))
+    }));
+    Section { name: "methods", heading: "Methods", items }
+}
+
+fn machine(study: &Study) -> String {
+    let (session, analysis) = (&study.problem.session, &study.analysis);
+    let instrument = match session.instrument {
+        InstrumentKind::BallBar => "a double ball bar",
+        InstrumentKind::RTest => "an R-test",
+        InstrumentKind::Probe => "a touch probe",
+        InstrumentKind::Tracker => "a laser tracker",
+        InstrumentKind::Socket => "a ball in fixed sockets",
+    };
+    let moving = analysis.moving_min.map_or(String::new(), |min| format!(" and {min:.1} min of movement"));
+    format!(
+        "The machine {} has the structural code {} (from workpiece to tool, b is the bed). It is measured with {instrument} \
+         in {} with {}{moving}, from {}. Errors are named by ISO 230-1 [@iso230].",
+        session.machine.name,
+        session.machine.code(),
+        counted(analysis.tests.len(), "test"),
+        counted(analysis.readings, "reading"),
+        counted(analysis.setup_count, "set-up"),
+    )
+}
+
+fn estimation(study: &Study) -> String {
+    let list = &study.problem.parameters.list;
+    let setups = list.iter().filter(|parameter| parameter.role == Role::Setup).count();
+    let errors = list.len() - setups;
+    let analysis = &study.analysis;
+    let rank = if analysis.rank == list.len() {
+        "all parameters are identifiable".to_string()
+    } else {
+        let indices = &analysis.indices;
+        format!("{} of {} are identifiable", indices.identifiable_count, counted(indices.error_count, "error"))
+    };
+    format!(
+        "A reading is computed by the kinematic chain with exact derivatives. The {} and {} are estimated together by \
+         least squares with the Gauss-Newton method. Each linearisation is reduced by orthogonal transformations to a \
+         triangular factor [@demmel2012], so that no information is lost by squaring. The numerical rank is {} of {}: {rank}. \
+         A direction counts as identifiable if a change by 1 mm or 0.01 rad along it changes the readings by at least one \
+         standard deviation in total. Combinations that are not identifiable keep their nominal values.",
+        counted(errors, "error"),
+        counted(setups, "set-up parameter"),
+        analysis.rank,
+        list.len(),
+    )
+}
+
+fn uncertainty(study: &Study) -> String {
+    format!(
+        "The covariance of the estimates follows from the noise of a reading ({}) and from the priors of the set-up by the \
+         law of propagation of uncertainty [@jcgm100;@jcgm102]. Stated uncertainties are standard uncertainties.",
+        micrometres(study.analysis.noise_um)
+    )
+}

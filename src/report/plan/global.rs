@@ -1,0 +1,58 @@
+//! Sobol' indices of the estimates of a plan, beside the linear prediction.
+
+use abbe::identify::plan::global::GlobalAnalysis;
+
+use crate::report::number::{three_digits, unit};
+use crate::report::table::{Cell, Table, cells};
+
+/// Total indices below this value are not listed, unless the linear share is above it; the JSON lists all.
+const MIN_LISTED: f64 = 0.01;
+
+/// Standard deviation of each estimate over the samples and by linear propagation.
+pub fn errors(found: &GlobalAnalysis) -> Table {
+    let rows = found.errors.iter().map(|error| {
+        let interactions = 1.0 - error.indices.iter().map(|index| index.sobol.first).sum::<f64>();
+        cells![
+            &error.id,
+            three_digits(error.standard_deviation),
+            three_digits(error.linear_standard_deviation),
+            unit(&error.unit),
+            Cell::fixed(interactions, 3),
+        ]
+    });
+    Table::new(["error", ">s", ">linear", "unit", ">interactions"], rows).titled(
+        "Standard deviation s of each estimate over the samples and by linear propagation; share of the variance by\n\
+         interactions (1 less the sum of first-order indices)",
+    )
+}
+
+/// The indices of each error by each input.
+pub fn indices(found: &GlobalAnalysis) -> Table {
+    let rows = found.errors.iter().flat_map(|error| {
+        let inputs = found.inputs.iter().zip(&error.indices);
+        let listed = inputs.filter(|(_, index)| index.sobol.total.max(index.linear) >= MIN_LISTED);
+        listed.map(|(input, index)| {
+            let sobol = &index.sobol;
+            cells![
+                &error.id,
+                &input.id,
+                format!("{} {} {}", input.distribution, three_digits(input.size), unit(&input.unit)),
+                Cell::fixed(sobol.first, 3),
+                Cell::fixed(sobol.first_half_width, 3),
+                Cell::fixed(sobol.total, 3),
+                Cell::fixed(sobol.total_half_width, 3),
+                Cell::fixed(index.linear, 3),
+            ]
+        })
+    });
+    let columns = ["error", "input", "size", ">first", ">±", ">total", ">±", ">linear"];
+    Table::new(columns, rows)
+        .titled("Sobol' indices, first order and total, with 95 % confidence intervals; share by linear propagation")
+}
+
+/// Change of the total indices with the number of samples.
+pub fn convergence(found: &GlobalAnalysis) -> Table {
+    let rows = found.convergence.iter().map(|one| cells![one.samples.to_string(), Cell::fixed(one.largest_change, 3)]);
+    Table::new([">samples", ">largest change"], rows)
+        .titled(format!("Convergence: largest change of a total index up to {} samples", found.samples))
+}
