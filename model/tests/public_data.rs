@@ -1,4 +1,4 @@
-//! Tests on sessions with data that others measured or simulated; skipped by name if the data are missing.
+//! Tests on sessions with data that others measured or simulated.
 
 use std::path::{Path, PathBuf};
 
@@ -8,37 +8,20 @@ use abbe_model::frames::Point;
 use abbe_model::instrument::Station;
 use abbe_model::session::{Prior, Session};
 use nalgebra::{DMatrix, DVector};
+use test_needs::{data, data_folder};
 
 fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// The folder of public data: `ABBE_DATA`, else the one beside the workspace.
-fn data() -> PathBuf {
-    match std::env::var_os("ABBE_DATA") {
-        Some(folder) => PathBuf::from(folder),
-        None => workspace().join("../shared/data"),
-    }
-}
-
-/// A folder or file that a test requires; if it is missing, the test reports that it is skipped.
-fn available(test: &str, path: PathBuf) -> Option<PathBuf> {
-    if path.exists() {
-        return Some(path);
-    }
-    assert!(std::env::var("CI").as_deref() != Ok("true"), "{test}: {} is not there, and CI needs it", path.display());
-    println!("skipped: {test} (no data folder)");
-    None
-}
-
 fn ready(name: &str) -> Session {
-    let options = ReadOptions { data_directory: Some(data()), ..ReadOptions::default() };
+    let options = ReadOptions { data_directory: Some(data_folder()), ..ReadOptions::default() };
     files::session(&workspace().join("sessions").join(name), &options).unwrap()
 }
 
 #[test]
 fn the_samples_of_an_independent_simulator_read() {
-    let Some(samples) = available("samples", data().join("../sample")) else {
+    let Some(samples) = data("the_samples_of_an_independent_simulator_read", "../sample") else {
         return;
     };
     let rows = |name: &str| -> (Session, Vec<usize>) {
@@ -72,7 +55,7 @@ fn the_samples_of_an_independent_simulator_read() {
 
 #[test]
 fn the_ur10_session_reads() {
-    if available("UR10", data().join("landgraf_ur10")).is_none() {
+    if data("the_ur10_session_reads", "landgraf_ur10").is_none() {
         return;
     }
     let session = ready("ur10/session.toml");
@@ -87,7 +70,7 @@ fn the_ur10_session_reads() {
 
 #[test]
 fn the_kuka_session_reads_and_its_sockets_nearly_close() {
-    if available("KUKA", data().join("mukca")).is_none() {
+    if data("the_kuka_session_reads_and_its_sockets_nearly_close", "mukca").is_none() {
         return;
     }
     let session = ready("kuka-iiwa14/session.toml");

@@ -11,21 +11,12 @@ use super::recipe::{Row, SimulatedSession, Truth};
 use serde_json::Value;
 use std::path::PathBuf;
 
-/// The folder of the samples: beside the folder that `ABBE_DATA` names, otherwise beside the workspace.
 fn samples() -> PathBuf {
-    let data = std::env::var_os("ABBE_DATA")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
-    data.join("../sample")
+    test_needs::data_folder().join("../sample")
 }
 
-/// Whether the samples exist. Without them a test prints that it is skipped; in CI it fails.
 fn samples_exist(test: &str) -> bool {
-    let found = samples().is_dir();
-    assert!(found || std::env::var("CI").as_deref() != Ok("true"), "{test}: no samples, and CI needs them");
-    if !found {
-        println!("skipped: {test} (no data folder)");
-    }
-    found
+    test_needs::data(test, "../sample").is_some()
 }
 
 /// The plan of a sample: one traversal forward, one backward.

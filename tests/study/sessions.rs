@@ -31,11 +31,11 @@ pub fn sessions() -> usize {
     number("ABBE_STUDY").unwrap_or(FEW)
 }
 
-/// Whether studies are skipped; prints a line if so.
+/// Whether studies are skipped.
 pub fn skipped(study: &str) -> bool {
     let skipped = sessions() == 0;
     if skipped {
-        println!("skipped: {study} (ABBE_STUDY is 0)");
+        test_needs::skip(study, "ABBE_STUDY is 0");
     }
     skipped
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::{abbe, data, text};
+use super::{abbe, text};
 use crate::plant::{AxisName, Component, Driver, Freedom, Injected, Kind, Recipe, Shape};
 
 const RADIUS_MM: f64 = 100.0;
@@ -357,7 +357,7 @@ fn rotary_axes_have_figures_without_a_diagnosis() {
 #[test]
 fn the_sample_of_another_simulator_is_diagnosed() {
     let name = "the_sample_of_another_simulator_is_diagnosed";
-    let Some(sample) = data::data(name, "../sample/circle-backlash-y/session.toml") else {
+    let Some(sample) = test_needs::data(name, "../sample/circle-backlash-y/session.toml") else {
         return;
     };
     for test in figures(&sample) {

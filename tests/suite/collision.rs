@@ -101,13 +101,7 @@ fn plan(random: &mut Pcg64, stl: Option<&str>) -> (String, Vec<u8>) {
 
 #[test]
 fn clearances_agree_with_mujoco() {
-    let python = match std::env::var("ABBE_PYTHON") {
-        Ok(python) => python,
-        Err(_) => {
-            assert!(std::env::var("CI").as_deref() != Ok("true"), "CI needs ABBE_PYTHON");
-            return println!("skipped: clearances_agree_with_mujoco (no ABBE_PYTHON)");
-        }
-    };
+    let Some(python) = test_needs::python("clearances_agree_with_mujoco", "numpy, mujoco") else { return };
     let folder = tempfile::tempdir().unwrap();
     let mut random = Pcg64::seed_from_u64(4);
     let file = |number: usize| folder.path().join(format!("{number:03}.toml"));

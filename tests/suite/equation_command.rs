@@ -281,27 +281,11 @@ fn invalid_requests_are_refused_with_the_reason() {
     }
 }
 
-/// A Python with NumPy: that of `ABBE_PYTHON`, otherwise that of the system. Without one the test prints that it is
-/// skipped; in CI it fails.
-pub(super) fn python(test: &str) -> Option<String> {
-    let own = std::env::var("ABBE_PYTHON").unwrap_or_default();
-    let runs = |name: &String| {
-        let ran = Command::new(name).args(["-c", "import numpy"]).output();
-        ran.is_ok_and(|output| output.status.success())
-    };
-    let found = [own, "python3".to_string()].into_iter().filter(|name| !name.is_empty()).find(runs);
-    if found.is_none() {
-        assert!(std::env::var("CI").is_err(), "no python with numpy");
-        eprintln!("skipped {test}: no python with numpy");
-    }
-    found
-}
-
 /// The printed Python, run by Python, against the length of a triangle. Without errors the balls of the C test without
 /// extension are R apart at any C. With the axis displaced by 0.3 mm in X the length is √(R² + 0.09 − 2·0.3·R·sin C).
 #[test]
 fn printed_code_runs_unchanged() {
-    let Some(python) = python("printed_code_runs_unchanged") else {
+    let Some(python) = test_needs::python("printed_code_runs_unchanged", "numpy") else {
         return;
     };
     let folder = tempfile::tempdir().unwrap();

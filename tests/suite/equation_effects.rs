@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use super::equation_command::{printed, python, refused};
+use super::equation_command::{printed, refused};
 use super::{ready, text};
 
 const EFFECTS: &str = r#"
@@ -69,7 +69,7 @@ fn declared_effects_appear_where_they_act() {
 /// and the bar expands by k₃ (1 − exp(−t/900)), so the reading is √(R² + e²) minus the expansion.
 #[test]
 fn printed_effects_run_unchanged() {
-    let Some(python) = python("printed_effects_run_unchanged") else {
+    let Some(python) = test_needs::python("printed_effects_run_unchanged", "numpy") else {
         return;
     };
     let folder = tempfile::tempdir().unwrap();

@@ -18,8 +18,23 @@ use super::{ready, text};
 /// The exit status of shells for SIGINT.
 const INTERRUPTED: i32 = 130;
 
+/// A command that runs the program of its next argument with the default action of SIGINT. Where a script starts the
+/// tests in the background, SIGINT is ignored, and a program inherits that. `env` is that of GNU coreutils 8.31 or
+/// later; systems without it (macOS) have Perl.
+fn with_default_action() -> Command {
+    let of_coreutils = test_needs::first(&["env"], &["--default-signal=INT", "true"]).is_some();
+    let mut command = Command::new(if of_coreutils { "env" } else { "perl" });
+    if of_coreutils {
+        command.arg("--default-signal=INT");
+    } else {
+        command.args(["-e", "$SIG{INT} = 'DEFAULT'; exec @ARGV or die"]);
+    }
+    command
+}
+
 fn start(arguments: &[&str]) -> Child {
-    Command::new(env!("CARGO_BIN_EXE_abbe"))
+    with_default_action()
+        .arg(env!("CARGO_BIN_EXE_abbe"))
         .args(arguments)
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
@@ -148,17 +163,44 @@ fn a_time_limit_ends_the_search_and_every_output_says_so() {
     assert_eq!(run("soon", &whole).status.code(), Some(2));
 }
 
-/// A fit has no partial result: the signal ends the program, and nothing is written.
+/// A fit has no partial result: the signal ends the program, and nothing is written. The sign that the fit runs: its
+/// last data file, a pipe, is read.
 #[test]
 fn an_interrupted_fit_ends_by_the_signal() {
     let folder = tempfile::tempdir().unwrap();
-    let json = folder.path().join("fit.json");
-    let session = ready("hermle-c600u/measured/session.toml");
+    let measured = ready("hermle-c600u/measured");
+    for entry in std::fs::read_dir(&measured).unwrap() {
+        let file = entry.unwrap().path();
+        std::fs::copy(&file, folder.path().join(file.file_name().unwrap())).unwrap();
+    }
+    let [session, json, pipe] = ["session.toml", "fit.json", "C150.csv"].map(|name| folder.path().join(name));
+    let readings = std::fs::read(&pipe).unwrap();
+    std::fs::remove_file(&pipe).unwrap();
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     let mut child = start(&["fit", text(&session), "--monte-carlo", "1000000", "--json", text(&json)]);
-    std::thread::sleep(Duration::from_millis(200));
+    let writer = std::thread::spawn(move || std::fs::write(pipe, readings).unwrap());
+    while !writer.is_finished() {
+        assert!(child.try_wait().unwrap().is_none(), "the program ended before it read its data");
+        std::thread::sleep(Duration::from_millis(1));
+    }
     interrupt(&child);
     assert_eq!(child.wait().unwrap().signal(), Some(2));
     assert!(!json.exists());
+}
+
+/// A script starts its background jobs with SIGINT ignored.
+#[test]
+fn signals_are_tested_in_the_background_too() {
+    let here = std::env::current_exe().unwrap();
+    let name = "suite::interrupted::an_interrupted_fit_ends_by_the_signal";
+    let run = Command::new("sh")
+        .args(["-c", "trap '' INT; exec \"$0\" --exact \"$1\""])
+        .args([text(&here), name])
+        .current_dir(super::workspace())
+        .output()
+        .unwrap();
+    let printed = String::from_utf8_lossy(&run.stdout);
+    assert!(run.status.success() && printed.contains("1 passed"), "{printed}");
 }
 
 /// Runs a trace that is interrupted at the `until`-th query. Returns the number of queries.

@@ -1,7 +1,6 @@
 //! Messages on standard error: one form, colour on a terminal only, and counts that agree in number.
 
 use std::fs;
-use std::path::Path;
 use std::process::{Command, Output};
 
 use super::faults::TestFolder;
@@ -90,13 +89,10 @@ fn colour_is_for_terminals_and_no_color_is_respected() {
 #[test]
 #[cfg(target_os = "linux")]
 fn a_terminal_has_colour() {
-    if !Path::new("/usr/bin/script").exists() {
-        println!("a_terminal_has_colour: skipped, there is no /usr/bin/script");
-        return;
-    }
+    let Some(script) = test_needs::program("a_terminal_has_colour", &["script"], &["--version"]) else { return };
     let place = test_folder();
     let on_terminal = |environment: &[(&str, &str)]| {
-        let output = Command::new("/usr/bin/script")
+        let output = Command::new(&script)
             .args(["-qec", &format!("{PROGRAM} fit key.toml"), "/dev/null"])
             .current_dir(place.0.path())
             .env_remove("NO_COLOR")

@@ -12,7 +12,7 @@ mod compensation;
 mod conformity;
 mod conformity_set_up;
 mod conformity_shares;
-mod data;
+mod early_returns;
 mod effect_description;
 mod equation_command;
 mod equation_effects;

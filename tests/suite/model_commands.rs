@@ -215,18 +215,10 @@ fn an_error_motion_is_not_exported_as_a_location_error() {
     assert!(table.contains("Y0C") && !table.contains("XC"), "{table}");
 }
 
-/// MuJoCo reads the exported chain and moves the tool as the model does. Skipped by name where it is not installed.
+/// MuJoCo reads the exported chain and moves the tool as the model does.
 #[test]
 fn mujoco_reads_the_exported_urdf() {
-    let Some(python) = std::env::var_os("ABBE_PYTHON") else {
-        println!("skipped: mujoco_reads_the_exported_urdf (ABBE_PYTHON is not set)");
-        return;
-    };
-    let has = std::process::Command::new(&python).args(["-c", "import mujoco"]).output().unwrap();
-    if !has.status.success() {
-        println!("skipped: mujoco_reads_the_exported_urdf (mujoco is not installed)");
-        return;
-    }
+    let Some(python) = test_needs::python("mujoco_reads_the_exported_urdf", "numpy, mujoco") else { return };
     let folder = folder();
     let model = model(folder.path());
     let urdf = folder.path().join("machine.urdf");

@@ -5,8 +5,7 @@ use abbe::identify::numerics::least_squares::{LeastSquares, Scaling, minimise};
 use abbe::identify::numerics::triangle::Triangle;
 use nalgebra::{Const, SVector};
 use num_dual::{Derivative, DualNum, DualSVec64};
-
-use super::data::data;
+use test_needs::data;
 
 /// A data set: lines of start values and certified values, then the readings.
 struct Certified<const N: usize> {

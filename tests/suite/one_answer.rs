@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use serde_json::Value;
+use test_needs::data;
 
-use super::data::data;
 use super::{abbe, ready, text};
 
 /// Runs a command and asserts its success. Returns its standard output and its JSON.

@@ -3,9 +3,9 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use test_needs::data;
 
-use super::data::data;
-use super::equation_command::{printed, python};
+use super::equation_command::printed;
 use super::{abbe, ready};
 
 /// Classes and columns.
@@ -65,14 +65,10 @@ fn latex_complaints(folder: &Path) -> Vec<String> {
 /// `ABBE_ALL_PAPERS=1` typesets every session in every layout; without it each session has one layout.
 #[test]
 fn papers_typeset_in_latex_without_a_warning() {
-    let found = |class: &str| {
-        let output = Command::new("kpsewhich").args([class, "booktabs.sty"]).output();
-        output.is_ok_and(|output| output.status.success())
-    };
-    if !found("elsarticle.cls") || !found("IEEEtran.cls") {
-        println!(
-            "skipped: papers_typeset_in_latex_without_a_warning (no pdflatex with elsarticle, IEEEtran and booktabs)"
-        );
+    let name = "papers_typeset_in_latex_without_a_warning";
+    let found = |file: &&str| test_needs::first(&["kpsewhich"], &[file]).is_some();
+    if !["elsarticle.cls", "IEEEtran.cls", "booktabs.sty"].iter().all(found) {
+        test_needs::skip(name, "no pdflatex with elsarticle, IEEEtran and booktabs");
         return;
     }
     let all = std::env::var_os("ABBE_ALL_PAPERS").is_some();
@@ -90,12 +86,7 @@ fn papers_typeset_in_latex_without_a_warning() {
 #[test]
 fn papers_typeset_in_typst_without_a_warning() {
     let name = "papers_typeset_in_typst_without_a_warning";
-    let Some(python) = python(name) else { return };
-    let probe = Command::new(&python).args(["-c", "import typst; typst.compile_with_warnings"]).output();
-    if !probe.is_ok_and(|output| output.status.success()) {
-        println!("skipped: {name} (no Python with typst)");
-        return;
-    }
+    let Some(python) = test_needs::python(name, "typst") else { return };
     for (session, layout) in [("hermle-c600u/measured/session.toml", LAYOUTS[0]), ("r-test/plan.toml", LAYOUTS[1])] {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("paper");

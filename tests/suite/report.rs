@@ -6,8 +6,8 @@ use abbe::identify::plan::states;
 use abbe::identify::series::{Cause, sensitivities, views};
 use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
+use test_needs::data;
 
-use super::data::data;
 use super::{abbe, ready, text};
 use crate::plant::{Kind, Recipe};
 

@@ -2,7 +2,7 @@
 //! without overflow.
 //!
 //! A script is added to a copy of the page. Chromium runs it and prints the document. Without Chromium the tests are
-//! skipped with a message.
+//! skipped.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -14,21 +14,9 @@ use serde_json::Value;
 use super::report::with_markup_in_names;
 use super::{abbe, ready, text};
 
-fn chromium(test: &str) -> Option<&'static str> {
-    let found = ["chromium", "chromium-browser", "google-chrome"].into_iter().find(|name| {
-        let version = Command::new(name).arg("--version").output();
-        version.is_ok_and(|output| output.status.success())
-    });
-    if found.is_none() {
-        assert!(std::env::var("CI").as_deref() != Ok("true"), "{test}: no Chromium, and CI needs it");
-        println!("skipped: {test} (no Chromium)");
-    }
-    found
-}
-
 /// Opens a page of this width (px) with a script added to it. Returns the value of the script and the messages on the
 /// console.
-fn run(browser: &str, page: &Path, width: u32, script: &str) -> (Value, Vec<String>) {
+fn run(browser: &Path, page: &Path, width: u32, script: &str) -> (Value, Vec<String>) {
     let profile = tempfile::tempdir().unwrap();
     let copy = profile.path().join("page.html");
     let html = std::fs::read_to_string(page).unwrap();
@@ -105,7 +93,7 @@ const HELPERS: &str = "
 #[test]
 fn pages_request_nothing_and_sliders_agree_with_the_closed_form() {
     let name = "pages_request_nothing_and_sliders_agree_with_the_closed_form";
-    let Some(browser) = chromium(name) else { return };
+    let Some(browser) = test_needs::browser(name) else { return };
     let folder = tempfile::tempdir().unwrap();
     let page = report(folder.path(), "trace", &ready("hermle-c600u/measured/session.toml"));
     let script = format!(
@@ -139,7 +127,7 @@ fn pages_request_nothing_and_sliders_agree_with_the_closed_form() {
         return {{ angles, moves, half, left: Math.max(...left), division, shown, hidden, over, tip, rows: csv.trim().split('\\n').length,
             requests: performance.getEntriesByType('resource').length, wide: document.documentElement.scrollWidth }};"
     );
-    let (found, console) = run(browser, &page, 1280, &script);
+    let (found, console) = run(&browser, &page, 1280, &script);
     assert_eq!(console, Vec::<String>::new());
     assert_eq!(found["fault"], Value::Null, "{found}");
     assert_eq!(found["requests"], 0);
@@ -173,7 +161,7 @@ fn pages_request_nothing_and_sliders_agree_with_the_closed_form() {
 
 #[test]
 fn reports_of_plan_and_fit_write_nothing_to_the_console() {
-    let Some(browser) = chromium("reports_of_plan_and_fit_write_nothing_to_the_console") else {
+    let Some(browser) = test_needs::browser("reports_of_plan_and_fit_write_nothing_to_the_console") else {
         return;
     };
     let folder = tempfile::tempdir().unwrap();
@@ -184,7 +172,7 @@ fn reports_of_plan_and_fit_write_nothing_to_the_console() {
     let script = "return { requests: performance.getEntriesByType('resource').length, hit: window.hit || 0, \
                   images: document.images.length, title: document.title, labels: [...document.querySelectorAll('.controls label')].map((l) => l.textContent) };";
     for page in [plan, fit] {
-        let (found, console) = run(browser, &page, 1280, script);
+        let (found, console) = run(&browser, &page, 1280, script);
         assert_eq!(console, Vec::<String>::new());
         assert_eq!((&found["requests"], &found["hit"], &found["images"]), (&0.into(), &0.into(), &0.into()));
         if page.ends_with("fit.html") {
@@ -232,7 +220,7 @@ const OVERFLOW: &str = "
 
 #[test]
 fn nothing_is_cut_on_narrow_and_wide_pages() {
-    let Some(browser) = chromium("nothing_is_cut_on_narrow_and_wide_pages") else {
+    let Some(browser) = test_needs::browser("nothing_is_cut_on_narrow_and_wide_pages") else {
         return;
     };
     let folder = tempfile::tempdir().unwrap();
@@ -246,7 +234,7 @@ fn nothing_is_cut_on_narrow_and_wide_pages() {
         let frame = framed(folder.path(), page);
         for width in [400, 1280, 1800] {
             let script = format!("const width = {width}; {OVERFLOW}");
-            let (found, _) = run(browser, &frame, 1900, &script);
+            let (found, _) = run(&browser, &frame, 1900, &script);
             let name = format!("{} at {width} px", page.display());
             assert_eq!(found["inner"], width, "{name}: {found}");
             assert!(found["texts"].as_u64().unwrap() > 100, "{name}: {found}");
@@ -259,7 +247,8 @@ fn nothing_is_cut_on_narrow_and_wide_pages() {
 
 #[test]
 fn a_trace_shows_its_values_within_1500_px_and_folds_unaffected_tests() {
-    let Some(browser) = chromium("a_trace_shows_its_values_within_1500_px_and_folds_unaffected_tests") else {
+    let Some(browser) = test_needs::browser("a_trace_shows_its_values_within_1500_px_and_folds_unaffected_tests")
+    else {
         return;
     };
     let folder = tempfile::tempdir().unwrap();
@@ -273,7 +262,7 @@ fn a_trace_shows_its_values_within_1500_px_and_folds_unaffected_tests() {
         return { bottom: table.getBoundingClientRect().bottom + scrollY, rows: table.rows.length,
             folded: ['A100', 'A150', 'C100', 'C150'].map(isFolded), beside: tops[0] === tops[1],
             alternatives: effect.querySelectorAll('tbody tr').length, right: alternatives.left >= values.right && alternatives.top === values.top };";
-    let (found, _) = run(browser, &page, 1280, script);
+    let (found, _) = run(&browser, &page, 1280, script);
     // 8 errors, amplitude and phase of the found effect, and the header.
     assert_eq!(found["rows"], 11, "{found}");
     assert!(found["bottom"].as_f64().unwrap() <= 1500.0, "{found}");

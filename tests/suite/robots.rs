@@ -4,8 +4,8 @@ use abbe::identify::fit::{prepare, report};
 use abbe::identify::results::FitResult;
 use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
+use test_needs::data;
 
-use super::data::data;
 use super::ready;
 
 /// The session with public data, or `None` without the data.

@@ -120,7 +120,10 @@ fn everything_comes_from_the_registry_with_a_checksum() {
     for package in lock["package"].as_array().unwrap() {
         let name = package["name"].as_str().unwrap();
         match package.get("source").and_then(toml::Value::as_str) {
-            None => assert!(name == "abbe" || name.starts_with("abbe-"), "{name} comes from a folder"),
+            None => {
+                let own = name == "abbe" || name.starts_with("abbe-") || name == "test-needs";
+                assert!(own, "{name} comes from a folder");
+            }
             Some(source) => {
                 assert_eq!(source, "registry+https://github.com/rust-lang/crates.io-index", "{name}");
                 assert!(package.get("checksum").is_some(), "{name} has no checksum");
@@ -153,13 +156,62 @@ fn explained() -> BTreeSet<String> {
 #[test]
 fn the_page_names_every_direct_dependency_and_no_other() {
     let listed = built(&["--depth", "1", "--no-dedupe"]).into_iter().map(|package| package.name);
-    let crates = listed.filter(|name| !name.starts_with("abbe"));
+    let crates = listed.filter(|name| !name.starts_with("abbe") && name != "test-needs");
     let page = fs::read(workspace().join("web/package.json")).unwrap();
     let page: serde_json::Value = serde_json::from_slice(&page).unwrap();
     let packages = ["dependencies", "devDependencies"].map(|kind| page[kind].as_object().unwrap().keys().cloned());
     let packages = packages.into_iter().flatten().filter(|name| !name.starts_with("@types/"));
     let direct: BTreeSet<String> = crates.chain(packages).collect();
     assert_eq!(explained(), direct);
+}
+
+/// The names of packages in a list of requirements, in lower case: the words at the beginning of lines.
+fn required(text: &str) -> BTreeSet<String> {
+    let is_part = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
+    let name = |line: &str| line.split(|c| !is_part(c)).next().unwrap_or_default().to_lowercase();
+    text.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_alphanumeric())).map(name).collect()
+}
+
+/// CI installs from PyPI what `.ci/requirements.in` names: the tools of the build, the dependencies of the wheel with its
+/// extra `test`, and what the tests of the workspace import. All are pinned with hashes, and nothing else is installed.
+#[test]
+fn packages_of_pypi_are_pinned_with_their_hashes() {
+    let read = |name: &str| fs::read_to_string(workspace().join(name)).unwrap();
+    let project: toml::Table = read("python/pyproject.toml").parse().unwrap();
+    let names = |list: &toml::Value| -> BTreeSet<String> {
+        list.as_array().unwrap().iter().flat_map(|entry| required(entry.as_str().unwrap())).collect()
+    };
+    let of_build = required(&read(".ci/build.in"));
+    let asked = &required(&read(".ci/requirements.in")) | &of_build;
+    assert!(names(&project["build-system"]["requires"]).is_subset(&of_build), "{of_build:?}");
+    for list in [&project["project"]["dependencies"], &project["project"]["optional-dependencies"]["test"]] {
+        let missing: Vec<String> = names(list).difference(&asked).cloned().collect();
+        assert!(missing.is_empty(), ".ci/requirements.in lacks {missing:?} of python/pyproject.toml");
+    }
+    for (file, asked) in [(".ci/requirements.txt", &asked), (".ci/build.txt", &of_build)] {
+        let text = read(file);
+        let pinned = required(&text);
+        assert!(asked.is_subset(&pinned), "{file} does not pin {:?}", asked - &pinned);
+        // Each entry is `name==version` and its hashes.
+        let mut entries = text.lines().filter(|line| !line.trim_start().starts_with('#')).peekable();
+        while let Some(line) = entries.next() {
+            if line.trim().is_empty() {
+                continue;
+            }
+            assert!(line.contains("==") && line.ends_with('\\'), "{file}: {line}");
+            let mut hashes = 0;
+            while entries.next_if(|line| line.starts_with("    --hash=sha256:")).is_some() {
+                hashes += 1;
+            }
+            assert!(hashes > 0, "{file}: {line} has no hash");
+        }
+    }
+    let script = read(".ci/run");
+    for line in script.lines().filter(|line| line.contains("pip install")) {
+        let own = line.contains("--no-deps") && line.contains("/abbe-*.whl");
+        assert!(own || line.contains("--require-hashes"), ".ci/run: {line}");
+    }
+    assert!(!script.contains("npm install") && script.contains("npm --prefix web ci"));
 }
 
 #[test]

@@ -7,8 +7,8 @@ use abbe::identify::trace::{TraceOptions, trace};
 use abbe::identify::validate::validate;
 use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
+use test_needs::data;
 
-use super::data::data;
 use super::robots::session_on_public_data;
 use super::validate_command::ur10_series_b;
 use super::{abbe, ready, text};

@@ -22,7 +22,7 @@ pub(super) fn ur10_series_b(test: &str) -> Session {
     let file = folder.path().join("session.toml");
     std::fs::write(&file, series_b).unwrap();
     std::fs::copy(ready("ur10/machine.toml"), folder.path().join("machine.toml")).unwrap();
-    let data = super::data::data(test, "landgraf_ur10").unwrap().parent().unwrap().to_path_buf();
+    let data = test_needs::data(test, "landgraf_ur10").unwrap().parent().unwrap().to_path_buf();
     files::session(&file, &ReadOptions { data_directory: Some(data), ..ReadOptions::default() }).unwrap()
 }
 

@@ -10,7 +10,7 @@ use crate::tools;
 #[test]
 fn rust() {
     let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_string());
-    let Some(rustc) = tools::find("compiled::rust", &[&rustc], &["--version"]) else {
+    let Some(rustc) = test_needs::program("compiled::rust", &[&rustc], &["--version"]) else {
         return;
     };
     let folder = tools::folder("rust");
@@ -73,7 +73,7 @@ fn rust() {
 #[test]
 fn c() {
     let cc = std::env::var("CC").unwrap_or_default();
-    let Some(cc) = tools::find("compiled::c", &[&cc, "gcc", "cc"], &["--version"]) else {
+    let Some(cc) = test_needs::program("compiled::c", &[&cc, "gcc", "cc"], &["--version"]) else {
         return;
     };
     let folder = tools::folder("c");
@@ -131,11 +131,7 @@ fn run_with_input(program: &Path, arguments: &[&Path], input: &str) -> String {
 
 #[test]
 fn python() {
-    let own = std::env::var("ABBE_PYTHON").unwrap_or_default();
-    let candidates = [own.as_str(), "python3", "/usr/bin/python3"];
-    let Some(python) = tools::find("compiled::python", &candidates, &["-c", "import numpy"]) else {
-        return;
-    };
+    let Some(python) = test_needs::python("compiled::python", "numpy") else { return };
     let folder = tools::folder("python");
     let all = all("python");
     let mut main =
@@ -171,7 +167,7 @@ print('next')\n\n"
 #[test]
 fn octave() {
     let candidates = ["octave-cli", "octave"];
-    let Some(octave) = tools::find("compiled::octave", &candidates, &["--version"]) else {
+    let Some(octave) = test_needs::program("compiled::octave", &candidates, &["--version"]) else {
         return;
     };
     let folder = tools::folder("octave");

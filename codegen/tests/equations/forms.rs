@@ -88,7 +88,7 @@ fn derivatives_of_the_chapter_5_test() {
 #[test]
 fn operations_counted_by_running_the_printed_code() {
     let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_string());
-    let Some(rustc) = tools::find("forms::operations", &[&rustc], &["--version"]) else {
+    let Some(rustc) = test_needs::program("forms::operations", &[&rustc], &["--version"]) else {
         return;
     };
     let options = Options { gradient: true, ..Options::default() };
@@ -157,7 +157,7 @@ fn the_benchmark_code_is_the_printed_code() {
 #[test]
 fn the_printed_rust_builds_without_std() {
     let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_string());
-    let Some(rustc) = tools::find("forms::without_std", &[&rustc], &["--version"]) else {
+    let Some(rustc) = test_needs::program("forms::without_std", &[&rustc], &["--version"]) else {
         return;
     };
     let options = Options { gradient: true, rotation: Some(Rotation::Exact), ..Options::default() };

@@ -15,8 +15,8 @@ use crate::topologies::{Case, disagreement};
 #[test]
 fn julia() {
     let probe = ["-e", "VERSION >= v\"1.9\" || exit(1)"];
-    let Some(julia) = tools::first(&["julia"], &probe) else {
-        eprintln!("skipped julia::julia: no Julia 1.9 or later runs");
+    let Some(julia) = test_needs::first(&["julia"], &probe) else {
+        test_needs::skip_in_ci_too("julia::julia", "no Julia 1.9 or later");
         return;
     };
     let folder = tools::folder("julia");

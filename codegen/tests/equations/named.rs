@@ -26,17 +26,6 @@ fn points(printed: &Printed) -> String {
     printed.cases.iter().map(|case| row(case) + "\n").collect()
 }
 
-/// A Python with these modules.
-fn python(test: &str, modules: &str) -> Option<PathBuf> {
-    let own = std::env::var("ABBE_PYTHON").unwrap_or_default();
-    let probe = format!("import {modules}");
-    let found = tools::first(&[&own, "python3", "/usr/bin/python3"], &["-c", &probe]);
-    if found.is_none() {
-        eprintln!("skipped {test}: no Python has {modules}");
-    }
-    found
-}
-
 /// Writes the modules, their points and a program, and runs it.
 fn run_python(python: &PathBuf, name: &str, all: &[Printed], each: &str) -> String {
     let folder = tools::folder(name);
@@ -63,7 +52,7 @@ fn run_python(python: &PathBuf, name: &str, all: &[Printed], each: &str) -> Stri
 
 #[test]
 fn numpy() {
-    let Some(python) = python("named::numpy", "numpy") else { return };
+    let Some(python) = test_needs::python("named::numpy", "numpy") else { return };
     let all = laid_out("python", Layout::Named);
     let each = "
 for row in rows:
@@ -95,7 +84,7 @@ refused(ValueError, lambda: f(**(dict(zip(names, rows[0])) | short)))
 
 #[test]
 fn casadi() {
-    let Some(python) = python("named::casadi", "numpy, casadi") else { return };
+    let Some(python) = test_needs::python("named::casadi", "numpy, casadi") else { return };
     let all = laid_out("casadi", Layout::Named);
     let each = "
 f, g = f(), g()
@@ -123,7 +112,7 @@ except RuntimeError:
 /// SymPy differentiates its expression; value and derivatives agree with dual numbers.
 #[test]
 fn sympy() {
-    let Some(python) = python("named::sympy", "numpy, sympy") else { return };
+    let Some(python) = test_needs::python("named::sympy", "numpy, sympy") else { return };
     let mut random = rand_pcg::Pcg64::seed_from_u64(12);
     let mut all = Vec::new();
     for (name, rotation) in [("exact", Rotation::Exact), ("small", Rotation::SmallAngle)] {
@@ -184,7 +173,7 @@ fn bar_arguments(random: &mut impl rand::Rng) -> [Vec<f64>; 3] {
 #[test]
 fn c() {
     let cc = std::env::var("CC").unwrap_or_default();
-    let Some(cc) = tools::find("named::c", &[&cc, "gcc", "cc"], &["--version"]) else {
+    let Some(cc) = test_needs::program("named::c", &[&cc, "gcc", "cc"], &["--version"]) else {
         return;
     };
     let folder = tools::folder("named-c");
@@ -245,7 +234,7 @@ fn c() {
 #[test]
 fn rust() {
     let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_string());
-    let Some(rustc) = tools::find("named::rust", &[&rustc], &["--version"]) else {
+    let Some(rustc) = test_needs::program("named::rust", &[&rustc], &["--version"]) else {
         return;
     };
     let folder = tools::folder("named-rust");
@@ -307,7 +296,7 @@ fn for_octave(text: &str) -> String {
 
 #[test]
 fn octave() {
-    let Some(octave) = tools::find("named::octave", &["octave-cli", "octave"], &["--version"]) else {
+    let Some(octave) = test_needs::program("named::octave", &["octave-cli", "octave"], &["--version"]) else {
         return;
     };
     let folder = tools::folder("named-octave");

@@ -15,7 +15,7 @@ use abbe_model::session::planned::planned;
 use abbe_model::session::{Session, Test};
 use nalgebra::DVector;
 
-use crate::tools::{self, folder};
+use crate::tools::folder;
 use decode::{Counting, Move, Positions, canonical, of_g_codes, of_plain_text};
 
 fn bar_of(test: &Test) -> BallBar<f64> {
@@ -149,7 +149,7 @@ fn rs274(program: &Path, folder: &Path, file: &str) -> String {
 
 #[test]
 fn the_interpreter_of_linuxcnc_keeps_the_bar() {
-    let Some(interpreter) = tools::find("nc", &["rs274"], &[]) else { return };
+    let Some(interpreter) = test_needs::program("nc", &["rs274"], &[]) else { return };
     let place = folder("linuxcnc");
     for plan in plans(&place) {
         let session = session(&plan);

@@ -1,33 +1,7 @@
-//! Compilers and interpreters that may be missing on a machine.
+//! Files and runs of compilers and interpreters.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
-
-/// Whether a missing tool fails a test: on a build server, which installs the tools.
-fn required() -> bool {
-    std::env::var("CI").is_ok_and(|value| value == "true")
-}
-
-/// The first program that runs with these arguments.
-pub fn first(programs: &[&str], probe: &[&str]) -> Option<PathBuf> {
-    let named = programs.iter().filter(|program| !program.is_empty());
-    let mut running = named.filter(|program| {
-        let ran = Command::new(program).args(probe).output();
-        ran.is_ok_and(|output| output.status.success())
-    });
-    running.next().map(PathBuf::from)
-}
-
-/// The first program that runs with these arguments. Without one, the test is skipped with a message, or fails if tools
-/// are required.
-pub fn find(test: &str, programs: &[&str], probe: &[&str]) -> Option<PathBuf> {
-    let found = first(programs, probe);
-    if found.is_none() {
-        assert!(!required(), "{test}: none of {programs:?} runs");
-        eprintln!("skipped {test}: none of {programs:?} runs");
-    }
-    found
-}
 
 /// A new folder for a test's files.
 pub fn folder(test: &str) -> PathBuf {

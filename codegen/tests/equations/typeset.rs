@@ -112,7 +112,7 @@ fn text() {
 #[test]
 fn latex() {
     let candidates = ["pdflatex"];
-    let Some(engine) = tools::find("typeset::latex", &candidates, &["--version"]) else {
+    let Some(engine) = test_needs::program("typeset::latex", &candidates, &["--version"]) else {
         return;
     };
     let folder = tools::folder("latex");
@@ -137,12 +137,7 @@ fn latex() {
 /// Typst by the typst compiler, which PyPI provides prebuilt (the crate takes a quarter of an hour to build).
 #[test]
 fn typst() {
-    let own = std::env::var("ABBE_PYTHON").unwrap_or_default();
-    let probe = ["-c", "import typst; typst.compile_with_warnings"];
-    let candidates = [own.as_str(), "python3", "/usr/bin/python3"];
-    let Some(python) = tools::find("typeset::typst", &candidates, &probe) else {
-        return;
-    };
+    let Some(python) = test_needs::python("typeset::typst", "typst") else { return };
     let folder = tools::folder("typst");
     let mut document = String::from("#set page(paper: \"a3\", flipped: true, margin: 18mm)\n");
     for fragment in fragments("typst") {
@@ -158,7 +153,7 @@ fn typst() {
 /// Every fragment in a column of 84 mm with numbers and a table of symbols: no line is too long.
 #[test]
 fn latex_in_two_columns() {
-    let Some(engine) = tools::find("typeset::latex_in_two_columns", &["pdflatex"], &["--version"]) else {
+    let Some(engine) = test_needs::program("typeset::latex_in_two_columns", &["pdflatex"], &["--version"]) else {
         return;
     };
     let folder = tools::folder("latex-two-columns");

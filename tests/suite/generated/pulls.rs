@@ -42,7 +42,7 @@ fn errors_are_found_within_their_uncertainties_on_every_code() {
     let study = std::env::var("ABBE_STUDY").ok().and_then(|text| text.parse().ok());
     let sessions: u64 = study.unwrap_or(FEW as u64);
     if sessions == 0 {
-        println!("skipped: errors_are_found_within_their_uncertainties_on_every_code (ABBE_STUDY is 0)");
+        test_needs::skip("errors_are_found_within_their_uncertainties_on_every_code", "ABBE_STUDY is 0");
         return;
     }
     let folder = tempfile::tempdir().unwrap();

@@ -13,8 +13,8 @@ use std::process::Command;
 
 use insta::{Comparator, Snapshot};
 use serde_json::Value;
+use test_needs::data;
 
-use super::data::data;
 use super::ready;
 
 /// Largest relative difference from a kept number.

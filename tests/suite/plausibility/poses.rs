@@ -9,8 +9,8 @@ use abbe::identify::results::FitResult;
 use abbe::identify::trace::{TraceOptions, trace};
 use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
+use test_needs::data;
 
-use super::super::data::data;
 use super::super::ready;
 
 /// One pose in so many is read.

@@ -182,11 +182,10 @@ mod tests {
         }
     }
 
-    /// SALib's `analyze` on the outputs of the same samples gives the same indices. Skipped without a Python with
-    /// SALib.
+    /// SALib's `analyze` on the outputs of the same samples gives the same indices.
     #[test]
     fn indices_are_those_of_salib() {
-        let python = std::env::var("ABBE_PYTHON").unwrap_or_else(|_| "python3".into());
+        let Some(python) = test_needs::python("indices_are_those_of_salib", "numpy, SALib") else { return };
         let of = |x: &[f64]| Ok(vec![(4.0 * x[0]).sin() + x[1] * x[2] + 0.3 * x[2].powi(2) - x[3]]);
         let design = Design::evaluate(4, 64, 5, &of).unwrap();
         let outputs: Vec<f64> = design.outputs.iter().flatten().map(|one| one[0]).collect();
@@ -196,11 +195,8 @@ mod tests {
              found = sobol.analyze(problem, np.array({outputs:?}), calc_second_order=False, num_resamples=10)\n\
              print(*found['S1'], *found['ST'])\n"
         );
-        let run = std::process::Command::new(python).args(["-c", &script]).output();
-        let Some(run) = run.ok().filter(|run| run.status.success()) else {
-            println!("skipped: indices_are_those_of_salib (no Python with SALib; set ABBE_PYTHON)");
-            return;
-        };
+        let run = std::process::Command::new(python).args(["-c", &script]).output().unwrap();
+        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
         let text = String::from_utf8(run.stdout).unwrap();
         let theirs: Vec<f64> = text.split_whitespace().map(|number| number.parse().unwrap()).collect();
         let ours = design.indices(0, 64, 1);
