@@ -31,6 +31,7 @@ control; each says so. Try every program in single block, without the bar, befor
 Examples:
   abbe nc sessions/hermle-c600u/chapter5.toml --control linuxcnc --out programs
   abbe nc sessions/hermle-c600u/chapter5.toml --control heidenhain --out klartext --overshoot-deg 10
+  abbe nc sessions/hermle-c600u/chapter5.toml --control fanuc --out fanuc --number 7000
   abbe nc sessions/r-test/plan.toml --control siemens --out r-test --tool-point";
 
 /// `abbe nc SESSION --control C --out DIR`
@@ -84,6 +85,17 @@ pub struct NcArguments {
     /// Example: --chord-um 0.2
     #[arg(long, value_name = "UM", default_value_t = NcOptions::default().chord_error_mm * 1e3)]
     chord_um: f64,
+    /// Least increment of the control, mm and degrees: positions, changes and centres are whole increments [default: fanuc
+    /// 0.001, heidenhain 0.0001, linuxcnc and siemens 0.000001].
+    ///
+    /// Example: --increment-mm 0.0001
+    #[arg(long, value_name = "MM")]
+    increment_mm: Option<f64>,
+    /// Program number of `main` on a fanuc; the tests follow [default: 1000].
+    ///
+    /// Example: --number 7000
+    #[arg(long, value_name = "N")]
+    number: Option<u32>,
     /// Write paths of rotary and linear axes for the tool point over the table.
     #[arg(long)]
     tool_point: bool,
@@ -111,6 +123,8 @@ pub fn run(arguments: &NcArguments, quiet: bool) -> Result<(), Failure> {
         dwell_s: arguments.dwell_s,
         approach_feed: arguments.approach_mm_min,
         chord_error_mm: arguments.chord_um * 1e-3,
+        increment_mm: arguments.increment_mm,
+        number: arguments.number,
         tool_point: arguments.tool_point,
     };
     let reading = ReadOptions { read_data: false, ..arguments.session.options() };

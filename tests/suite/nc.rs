@@ -17,6 +17,8 @@ fn programs_are_written_together_or_not_at_all() {
             "no control is called `mazak`; the controls are linuxcnc, fanuc, siemens, heidenhain",
         ),
         (&["--control", "fanuc", "--overshoot-deg", "4000"], "the overshoot in degrees is 4000"),
+        (&["--control", "fanuc", "--increment-mm", "0.002"], "the increment in mm is 0.002"),
+        (&["--control", "heidenhain", "--number", "7000"], "programs for heidenhain have no numbers"),
         (&["--control", "linuxcnc", "--tool-point"], "linuxcnc has no function that moves the tool point"),
     ] {
         let output = run(options);
@@ -81,4 +83,25 @@ fn remarks_of_the_programs_are_warnings() {
     }
     let program = std::fs::read_to_string(out.join("a.ngc")).unwrap();
     assert!(program.contains("The start cannot be approached along the tool"), "{program}");
+}
+
+/// The programs of a fanuc have the numbers and the increments that are asked for.
+#[test]
+fn numbers_and_increments_of_a_fanuc() {
+    let place = tempfile::tempdir().unwrap();
+    let plan = ready("hermle-c600u/chapter5.toml");
+    for (name, options, decimals) in [("usual", &[][..], 3), ("finer", &["--increment-mm", "0.0001"][..], 4)] {
+        let out = place.path().join(name);
+        let fixed = ["nc", text(&plan), "--control", "fanuc", "--number", "7000", "--out", text(&out), "--quiet"];
+        let output = abbe(&[&fixed[..], options].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        let main = std::fs::read_to_string(out.join("main.nc")).unwrap();
+        assert!(main.contains("O7000 (MAIN)\nG65 P7001 (A100)\nG65 P7002 (A150)"), "{main}");
+        let program = std::fs::read_to_string(out.join("A150.nc")).unwrap();
+        assert!(program.contains("O7002 (A150)"), "{program}");
+        let motions = program.lines().filter(|line| line.starts_with("G1 ") || line.starts_with("G91 G1 "));
+        let words = motions.flat_map(|line| line.split(' ')).filter(|word| word.starts_with(['X', 'Y', 'Z', 'A', 'C']));
+        let longest = words.filter_map(|word| Some(word.split_once('.')?.1.len())).max();
+        assert_eq!(longest, Some(decimals), "{program}");
+    }
 }

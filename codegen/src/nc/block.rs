@@ -50,11 +50,11 @@ pub enum Block {
     Arc {
         /// The plane.
         plane: Plane,
+        /// Letter and start position of both axes.
+        from: [(char, f64); 2],
         /// Letter and end position of both axes.
         to: [(char, f64); 2],
-        /// Centre less start, mm, in the order of the axes.
-        centre: [f64; 2],
-        /// The centre, mm.
+        /// The centre, mm, in the order of the axes.
         centre_at: [f64; 2],
         /// Counterclockwise in the plane.
         counterclockwise: bool,

@@ -35,10 +35,12 @@ pub trait Control: Sync {
     fn extension(&self) -> &'static str;
     /// The source of its syntax.
     fn source(&self) -> &'static str;
-    /// Decimals of a position, mm or degrees.
+    /// Decimals of a position, mm or degrees, unless the options state the increment of the control.
     fn decimals(&self) -> usize;
     /// Whether an interpreter of this control has run its programs in the project's tests.
     fn is_run(&self) -> bool;
+    /// Whether its programs have numbers.
+    fn has_numbers(&self) -> bool;
     /// Whether circles are possible in a plane of these two axes.
     fn has_arc(&self, plane: Plane) -> bool;
     /// Whether the control moves the tool point over the table while rotary axes turn.
@@ -46,9 +48,9 @@ pub trait Control: Sync {
     /// The name of a program by its number from 1 and the name of its test, without the ending.
     fn name(&self, number: usize, test: &str) -> String;
     /// The text of a program.
-    fn text(&self, number: usize, program: &Program) -> String;
+    fn text(&self, number: usize, program: &Program, options: &NcOptions) -> String;
     /// The program that calls the others, by name and title.
-    fn main(&self, calls: &[(String, String)]) -> String;
+    fn main(&self, calls: &[(String, String)], options: &NcOptions) -> String;
 }
 
 /// A plane of two linear axes, in the order in which a counterclockwise turn goes from the first to the second.
@@ -99,7 +101,7 @@ pub struct NcFiles {
 /// If a test has no motion, an axis has no letter, an axis would leave its travel, or the control lacks what the
 /// options ask for.
 pub fn files(session: &Session, control: &dyn Control, options: &NcOptions) -> Result<NcFiles, CodegenError> {
-    options.check(control)?;
+    options.check(control, session.tests.len())?;
     let (mut files, mut warnings, mut moves) = (Vec::new(), Vec::new(), Vec::new());
     let mut calls: Vec<(String, String)> = Vec::new();
     let mut seen: Vec<&str> = Vec::new();
@@ -116,10 +118,10 @@ pub fn files(session: &Session, control: &dyn Control, options: &NcOptions) -> R
         }
         files.push((
             format!("{name}.{}", control.extension()),
-            control.text(number + 1, &Program { name: name.clone(), ..program }),
+            control.text(number + 1, &Program { name: name.clone(), ..program }, options),
         ));
         calls.push((name, test.name.clone()));
     }
-    files.insert(0, (format!("main.{}", control.extension()), control.main(&calls)));
+    files.insert(0, (format!("main.{}", control.extension()), control.main(&calls, options)));
     Ok(NcFiles { files, warnings, moves })
 }

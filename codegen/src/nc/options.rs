@@ -3,6 +3,11 @@
 use super::Control;
 use crate::error::CodegenError;
 
+/// The number of `main` unless another is asked for.
+const FIRST_NUMBER: u32 = 1000;
+/// The last program number.
+const LAST_NUMBER: u32 = 9999;
+
 /// Options of NC programs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NcOptions {
@@ -20,6 +25,11 @@ pub struct NcOptions {
     pub approach_feed: f64,
     /// Largest chord error of a segment in the distance of the balls, mm.
     pub chord_error_mm: f64,
+    /// The least increment of the control, mm and degrees: a power of ten. `None`: that of the control, 0.001 for Fanuc.
+    /// Positions, their changes and the centres of circles are whole increments.
+    pub increment_mm: Option<f64>,
+    /// The number of `main` on a control whose programs have numbers; the tests follow. `None`: 1000.
+    pub number: Option<u32>,
     /// Whether paths of rotary and linear axes are written for the tool point over the table, by a function of the
     /// control.
     pub tool_point: bool,
@@ -35,13 +45,25 @@ impl Default for NcOptions {
             dwell_s: 3.0,
             approach_feed: 1000.0,
             chord_error_mm: 0.5e-3,
+            increment_mm: None,
+            number: None,
             tool_point: false,
         }
     }
 }
 
 impl NcOptions {
-    pub(super) fn check(&self, control: &dyn Control) -> Result<(), CodegenError> {
+    /// The number of `main`.
+    pub(super) fn number(&self) -> u32 {
+        self.number.unwrap_or(FIRST_NUMBER)
+    }
+
+    /// Decimals of a position.
+    pub(super) fn decimals(&self, control: &dyn Control) -> usize {
+        self.increment_mm.map_or(control.decimals(), |increment| (-increment.log10()).round().max(0.0) as usize)
+    }
+
+    pub(super) fn check(&self, control: &dyn Control, tests: usize) -> Result<(), CodegenError> {
         let fault = |what: &str, value: f64, least: f64, most: f64| {
             if value >= least && value <= most {
                 return Ok(());
@@ -58,6 +80,30 @@ impl NcOptions {
         fault("the dwell in s", self.dwell_s, 0.0, 600.0)?;
         fault("the feed of approach", self.approach_feed, 1.0, 1e5)?;
         fault("the chord error in mm", self.chord_error_mm, 1e-5, 1e-2)?;
+        if let Some(increment) = self.increment_mm {
+            let power = 0.1_f64.powi(self.decimals(control) as i32);
+            if !(1e-6..=0.01).contains(&increment) || (increment - power).abs() > 1e-9 * power {
+                return Err(CodegenError::Nc {
+                    message: format!("the increment in mm is {increment}"),
+                    help: "0.01, 0.001, 0.0001, 0.00001 or 0.000001 is expected".into(),
+                });
+            }
+        }
+        if let Some(number) = self.number {
+            if !control.has_numbers() {
+                return Err(CodegenError::Nc {
+                    message: format!("programs for {} have no numbers", control.word()),
+                    help: "a number is for fanuc".into(),
+                });
+            }
+            let last = u64::from(number) + tests as u64;
+            if number == 0 || last > u64::from(LAST_NUMBER) {
+                return Err(CodegenError::Nc {
+                    message: format!("main has the number {number}, and the last test {last}"),
+                    help: format!("numbers from 1 to {LAST_NUMBER} are expected"),
+                });
+            }
+        }
         if self.tool_point && !control.has_tool_point() {
             return Err(CodegenError::Nc {
                 message: format!("{} has no function that moves the tool point over the table", control.word()),

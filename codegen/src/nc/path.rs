@@ -231,6 +231,13 @@ impl Leg {
         };
         let seconds = span * radius / speed / (vertices.len() - 1) as f64;
         let follows = matches!(test.motion, Some(Motion::Follow { .. }));
+        let vertices = match &test.motion {
+            Some(Motion::Follow { axis, .. }) => {
+                let increment = 0.1_f64.powi(options.decimals(control) as i32);
+                on_the_grid(machine, test, *axis, vertices, increment)?
+            }
+            _ => vertices,
+        };
         let tool_points = (options.tool_point && follows)
             .then(|| vertices.iter().map(|state| tool_over_table(machine, test, state)).collect());
         Ok(Leg { vertices, measured, shape: Shape::Segments { seconds, tool_points } })
@@ -254,8 +261,8 @@ impl Leg {
             Shape::Arc { plane, axes, centre, counterclockwise, feed } => pairs
                 .map(|(from, to)| Block::Arc {
                     plane: *plane,
+                    from: axes.map(|axis| display(axis, from)),
                     to: axes.map(|axis| display(axis, to)),
-                    centre: std::array::from_fn(|i| centre[i] - from[axes[i]]),
                     centre_at: *centre,
                     counterclockwise: *counterclockwise != back,
                     feed: *feed,
@@ -289,6 +296,28 @@ impl Leg {
             }
         }
     }
+}
+
+/// The vertices moved along the path to where the axis that the others follow is a whole number of increments: the
+/// rounding of its position then costs nothing, however long the lever. The ends stay.
+fn on_the_grid(
+    machine: &Machine,
+    test: &Test,
+    axis: usize,
+    mut vertices: Vec<Vec<f64>>,
+    increment: f64,
+) -> Result<Vec<Vec<f64>>, CodegenError> {
+    let kind = machine.axes[axis].kind;
+    let last = vertices.len() - 1;
+    let Some(end) = vertices.last().map(|end| end[axis]) else { return Ok(vertices) };
+    for vertex in &mut vertices[1..last] {
+        let whole = (kind.to_display(vertex[axis]) / increment).round() * increment;
+        let range = [kind.to_internal(whole), end];
+        if range[0] != vertex[axis] && range[0] != end {
+            *vertex = states(machine, test, range, 1)?.swap_remove(0);
+        }
+    }
+    Ok(vertices)
 }
 
 /// The plane of two axes, and the order in which a counterclockwise turn goes through them.
