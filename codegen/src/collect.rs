@@ -1,6 +1,7 @@
 //! Arranges polynomials for printing: grouped by error, then by sines and cosines of the axes, with lengths in
 //! parentheses.
 
+use std::cmp::Reverse;
 use std::collections::{BTreeSet, HashMap};
 
 use num_rational::BigRational;
@@ -30,32 +31,35 @@ impl Collector<'_, '_> {
         let atoms = polynomial.terms().flat_map(|(monomial, _)| monomial.powers());
         let lengths: BTreeSet<Atom> = atoms.filter(|(_, power)| *power == 2).map(|(atom, _)| *atom).collect();
         for length in lengths {
-            if let Some((base, without)) = self.completed(&rest, length) {
-                squares.push(base);
+            if let Some((factor, base, without)) = self.completed(&rest, length) {
+                squares.push((factor, base));
                 rest = without;
             }
         }
-        let square = |base: &Polynomial| {
+        let square = |(factor, base): &(f64, Polynomial)| {
             let base = self.group(base);
-            (false, binary(Binary::Mul, base.clone(), base))
+            let square = binary(Binary::Mul, base.clone(), base);
+            (false, if *factor == 1.0 { square } else { binary(Binary::Mul, Tree::Number(*factor), square) })
         };
         let mut terms = self.group_terms(&rest);
         terms.extend(squares.iter().map(square));
         sum(terms)
     }
 
-    /// `x + b/2` and what remains beside its square, if `x² + b·x` has no sine in `b` and the remainder is shorter.
-    fn completed(&self, polynomial: &Polynomial, length: Atom) -> Option<(Polynomial, Polynomial)> {
+    /// `a`, `x + b/2a` and what remains beside `a` times its square, if `a·x² + b·x` has a positive number `a` and no
+    /// sine in `b`, and the remainder is shorter.
+    fn completed(&self, polynomial: &Polynomial, length: Atom) -> Option<(f64, Polynomial, Polynomial)> {
         let by_power = polynomial.collect(|atom| atom == length);
         let power = |power| by_power.get(&Monomial(vec![(length, power)]));
         let (square, linear) = (power(2)?, power(1)?);
-        if !square.is_about(1.0) || linear.contains(is_sin_cos) {
+        let factor = square.rational()?;
+        if !factor.is_positive() || linear.contains(is_sin_cos) {
             return None;
         }
-        let half = BigRational::new(1.into(), 2.into());
-        let base = &Polynomial::atom(length) + &linear.scaled(&half);
-        let rest = polynomial - &self.ring.product(&base, &base);
-        (rest.len() + base.len() < polynomial.len()).then_some((base, rest))
+        let two = BigRational::from_integer(2.into());
+        let base = &Polynomial::atom(length) + &linear.scaled(&(two * factor).recip());
+        let rest = polynomial - &self.ring.product(&base, &base).scaled(factor);
+        (rest.len() + base.len() < polynomial.len()).then_some((factor.to_f64()?, base, rest))
     }
 
     fn group_terms(&self, polynomial: &Polynomial) -> Vec<Term> {
@@ -65,14 +69,14 @@ impl Collector<'_, '_> {
         let mut terms = Vec::new();
         for key in keys {
             let coefficient = &collected[key];
-            if key.powers().is_empty() {
+            let (shared, rest) = self.shared(coefficient);
+            if key.powers().is_empty() && shared.is_empty() {
                 terms.extend(self.coefficient_terms(coefficient));
                 continue;
             }
-            let turns = coefficient.contains(is_sin_cos);
-            let (minus, mut factors) = if turns {
-                let (minus, factor) = as_factor(self.coefficient_terms(coefficient));
-                (minus, factor.into_iter().collect())
+            let (minus, mut factors) = if rest.contains(is_sin_cos) {
+                let (minus, factor) = as_factor(self.coefficient_terms(&rest));
+                (minus, shared.into_iter().chain(factor).collect())
             } else {
                 self.length_factors(coefficient)
             };
@@ -80,6 +84,37 @@ impl Collector<'_, '_> {
             terms.push((minus, product(factors)));
         }
         terms
+    }
+
+    /// The number, lengths, sines and cosines that terms with several sines and cosines have in common, and the
+    /// polynomial without them.
+    fn shared(&self, polynomial: &Polynomial) -> (Vec<Tree>, Polynomial) {
+        if polynomial.collect(is_sin_cos).len() < 2 {
+            return (Vec::new(), polynomial.clone());
+        }
+        let (number, rest) = without_number(polynomial);
+        let shared = common(&rest);
+        let (turns, lengths) = shared.split(is_sin_cos);
+        let mut factors: Vec<Tree> = number.into_iter().collect();
+        factors.extend(self.powers(&lengths));
+        factors.extend(self.turns(&turns));
+        let mut quotient = Polynomial::default();
+        for (monomial, coefficient) in rest.terms() {
+            quotient.insert(monomial.divided_by(&shared).unwrap_or_default(), coefficient.clone());
+        }
+        (factors, quotient)
+    }
+
+    /// Sines, then cosines; those of outer axes first.
+    fn turns(&self, turn: &Monomial) -> Vec<Tree> {
+        let place = |id| self.inputs.iter().position(|input| input.variable() == self.ring.variable(id));
+        let mut powers = turn.powers().to_vec();
+        powers.sort_by_key(|(atom, _)| match atom {
+            Atom::Sin(id) => (0, Reverse(place(*id))),
+            Atom::Cos(id) => (1, Reverse(place(*id))),
+            Atom::Variable(_) | Atom::Root(_) | Atom::Function(_) => (2, Reverse(None)),
+        });
+        powers.into_iter().flat_map(|power| self.powers(&Monomial(vec![power]))).collect()
     }
 
     /// Terms of a polynomial in lengths, sines and cosines, grouped by sine and cosine.
@@ -92,7 +127,7 @@ impl Collector<'_, '_> {
                 continue;
             }
             let (minus, mut factors) = self.length_factors(lengths);
-            factors.extend(self.powers(turn));
+            factors.extend(self.turns(turn));
             terms.push((minus, product(factors)));
         }
         positive_first(terms)
@@ -100,38 +135,36 @@ impl Collector<'_, '_> {
 
     /// Lengths as terms. Terms with a common factor become one term, with the factor in front of the parentheses.
     fn length_terms(&self, polynomial: &Polynomial) -> Vec<Term> {
-        if polynomial.len() > 1 && !common(polynomial).powers().is_empty() {
+        let has_number = || without_number(polynomial).0.is_some();
+        if polynomial.len() > 1 && (!common(polynomial).powers().is_empty() || has_number()) {
             let (minus, factors) = self.length_factors(polynomial);
             return vec![(minus, product(factors))];
         }
         positive_first(polynomial.terms().map(|term| self.length_term(term)).collect())
     }
 
-    /// Lengths as factors of a product: `R`, or `D` and `(H − Z_CA)`. The first term of a sum is positive and the sign
-    /// is returned separately. Empty for 1.
+    /// Lengths as factors of a product: `R`, or `D` and `(H − Z_CA)`. The number comes first. The first term of a sum is
+    /// positive and the sign is returned separately. Empty for 1.
     fn length_factors(&self, polynomial: &Polynomial) -> (bool, Vec<Tree>) {
-        let shared = common(polynomial);
+        let (number, polynomial) = without_number(polynomial);
+        let shared = common(&polynomial);
         let rest =
             polynomial.terms().filter_map(|(monomial, coefficient)| Some((monomial.divided_by(&shared)?, coefficient)));
         let terms: Vec<Term> = rest.map(|(m, c)| self.length_term((&m, c))).collect();
         let (minus, inner) = as_factor(terms);
-        let mut factors = Vec::new();
-        // The number comes first.
-        if let Some(number @ Tree::Number(_)) = &inner {
-            factors.push(number.clone());
-        }
+        let mut factors: Vec<Tree> = number.into_iter().collect();
         factors.extend(self.powers(&shared));
-        factors.extend(inner.filter(|inner| !matches!(inner, Tree::Number(_))));
+        factors.extend(inner);
         (minus, factors)
     }
 
     fn length_term(&self, (monomial, coefficient): (&Monomial, &BigRational)) -> Term {
-        let size = coefficient.abs();
+        let (number, rest) = number_of(monomial, coefficient);
         let mut factors = Vec::new();
-        if !size.is_one() || monomial.powers().is_empty() {
-            factors.push(Tree::Number(size.to_f64().unwrap_or(f64::NAN)));
+        if number != 1.0 || rest.powers().is_empty() {
+            factors.push(Tree::Number(number));
         }
-        factors.extend(self.powers(monomial));
+        factors.extend(self.powers(&rest));
         (coefficient.is_negative(), product(factors))
     }
 
@@ -188,6 +221,35 @@ fn is_sin_cos(atom: Atom) -> bool {
     matches!(atom, Atom::Sin(_) | Atom::Cos(_) | Atom::Function(_))
 }
 
+/// The size of the number in front of a term, with the roots of numbers, and its other atoms.
+pub(crate) fn number_of(monomial: &Monomial, coefficient: &BigRational) -> (f64, Monomial) {
+    let (roots, rest) = monomial.split(|atom| Ring::root_of_number(atom).is_some());
+    let (mut whole, mut under) = (1.0, 1.0);
+    for (atom, power) in roots.powers() {
+        let root = f64::from(Ring::root_of_number(*atom).unwrap_or(1));
+        whole *= root.powi((power / 2) as i32);
+        under *= root.powi((power % 2) as i32);
+    }
+    (coefficient.abs().to_f64().unwrap_or(f64::NAN) * whole * under.sqrt(), rest)
+}
+
+/// The number that all terms have in common, unless it is 1, and the polynomial without it.
+fn without_number(polynomial: &Polynomial) -> (Option<Tree>, Polynomial) {
+    let (roots, _) = common(polynomial).split(|atom| Ring::root_of_number(atom).is_some());
+    let mut sizes = polynomial.terms().map(|(_, coefficient)| coefficient.abs());
+    let first = sizes.next().unwrap_or_else(BigRational::one);
+    let content = if sizes.all(|size| size == first) { first } else { BigRational::one() };
+    let (number, _) = number_of(&roots, &content);
+    if number == 1.0 {
+        return (None, polynomial.clone());
+    }
+    let mut rest = Polynomial::default();
+    for (monomial, coefficient) in polynomial.terms() {
+        rest.insert(monomial.divided_by(&roots).unwrap_or_default(), coefficient / &content);
+    }
+    (Some(Tree::Number(number)), rest)
+}
+
 /// The largest common factor of all terms.
 fn common(polynomial: &Polynomial) -> Monomial {
     let mut monomials = polynomial.terms().map(|(monomial, _)| monomial.clone());
@@ -196,7 +258,7 @@ fn common(polynomial: &Polynomial) -> Monomial {
 }
 
 /// Moves a positive term to the front if there is one.
-fn positive_first(mut terms: Vec<Term>) -> Vec<Term> {
+pub(crate) fn positive_first(mut terms: Vec<Term>) -> Vec<Term> {
     if let Some(first) = terms.iter().position(|(minus, _)| !minus) {
         let first = terms.remove(first);
         terms.insert(0, first);

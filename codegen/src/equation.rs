@@ -43,6 +43,8 @@ pub struct Equation {
     pub name: Option<String>,
     /// The named lengths whose meaning is known.
     pub meanings: Vec<(String, String)>,
+    /// The axes that the test holds and that stay symbols, with their positions, mm or rad.
+    pub held: Vec<(Variable, f64)>,
     /// The intermediate vectors.
     pub vectors: Vec<NamedVector>,
     /// The driven errors: errors and instrument parameters that are determined by effects alone, as functions of their
@@ -89,12 +91,15 @@ impl Equation {
             vectors::of_subject(&run.subject, &machine, &run.state, &run.errors, &|slot| run.unknown(slot));
         let on_the_way = vectors.clone();
         let inputs = inputs(&arena, &machine, &parameters);
+        let held = held(&machine, source);
+        let positions: Vec<Variable> = held.iter().map(|(position, _)| position.clone()).collect();
         let symbol = |index: usize| arena.variable(parameters[index].clone());
         let driven_errors = run.driven_errors(&symbol).into_iter();
         let driven_errors = driven_errors.map(|(variable, value)| (variable, value.operand())).collect();
         let bar_parameters = run.bar_parameters().map(|unknown| unknown.map(Symbol::operand));
         let whole = curves(&run, &parameters);
-        let written = FormContext { arena: &arena, inputs: &inputs, parameters: &parameters, whole: &whole };
+        let written =
+            FormContext { arena: &arena, inputs: &inputs, parameters: &parameters, whole: &whole, held: &positions };
         let (outputs, form) = match options.order {
             Order::Exact if options.arrangement == Arrangement::Frames => (exact.clone(), Form::Exact),
             Order::Exact => {
@@ -136,6 +141,7 @@ impl Equation {
             form,
             name: source.name().map(str::to_string),
             meanings,
+            held,
             vectors,
             driven_errors,
             stated_length,
@@ -175,7 +181,8 @@ impl Equation {
         self.outputs.iter().map(second).collect()
     }
 
-    /// The steps that compute the reading and, with `gradient`, its derivatives by every parameter, output by output.
+    /// The steps that compute the reading and, with `gradient`, its derivatives by every parameter, output by output. A
+    /// length on which no output depends is no input of it.
     pub fn program(&self, gradient: bool) -> Program {
         let mut outputs = self.outputs.clone();
         let mut vectors = self.vectors.clone();
@@ -197,7 +204,14 @@ impl Equation {
         if let (Kind::Length | Kind::Distance, Operand::Node(id)) = (self.kind, self.outputs[0]) {
             labels.insert(id, Label::Scalar("reading"));
         }
-        Program::of(&self.arena, self.inputs(), &outputs, &labels, Naming::Shared)
+        let used = self.arena.variables_of(&self.outputs);
+        let used: Vec<Variable> = used.into_iter().map(|id| self.arena.variable_at(id)).collect();
+        let is_needed = |input: &Input| match input.variable() {
+            length @ Variable::Length(_) => used.contains(length),
+            _ => true,
+        };
+        let inputs = self.inputs().into_iter().filter(is_needed).collect();
+        Program::of(&self.arena, inputs, &outputs, &labels, Naming::Shared)
     }
 
     /// The names of the driven errors, which effects determine.
@@ -251,6 +265,15 @@ fn parameters(
         arena.variable(parameter.clone());
     }
     Ok(parameters)
+}
+
+/// The axes that stay symbols although the test holds them.
+fn held(machine: &Machine, source: &impl Source) -> Vec<(Variable, f64)> {
+    let held = machine.axes.iter().filter_map(|axis| {
+        let position = Variable::Position { axis: axis.name.clone(), kind: axis.kind };
+        Some((position, source.held_symbol(&axis.name)?))
+    });
+    held.collect()
 }
 
 fn inputs(arena: &Arena, machine: &Machine, parameters: &[Variable]) -> Vec<Input> {

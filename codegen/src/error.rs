@@ -23,6 +23,16 @@ pub enum CodegenError {
         /// The structural code.
         machine: String,
     },
+    /// An axis to keep as a symbol that the machine does not have.
+    #[error("`{machine}` has no axis `{axis}` that could stay a symbol; its axes are {axes}")]
+    NoAxisToKeep {
+        /// The axis.
+        axis: String,
+        /// The structural code.
+        machine: String,
+        /// The axes of the machine.
+        axes: String,
+    },
     /// A parameter that the instrument does not have.
     #[error("the instrument has no parameter {parameter}")]
     NoSuchParameter {

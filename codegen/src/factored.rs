@@ -17,9 +17,9 @@ use abbe_model::frames::Point;
 use abbe_model::instrument::{Station, displaced};
 use abbe_model::scalar::Scalar;
 use num_rational::BigRational;
-use num_traits::{One, Signed, ToPrimitive};
+use num_traits::{One, Signed};
 
-use crate::collect::Collector;
+use crate::collect::{Collector, number_of};
 use crate::error::CodegenError;
 use crate::form::Arrangement;
 use crate::normal_form::Ring;
@@ -59,7 +59,7 @@ pub(crate) fn groups<'a>(
     arrangement: Arrangement,
     written: &FormContext<'a, '_>,
 ) -> Result<Vec<Tree>, CodegenError> {
-    let &FormContext { arena, inputs, whole, .. } = written;
+    let &FormContext { arena, inputs, whole, held, .. } = written;
     let form = arrangement.word();
     let Subject::Station(Station::BallBar(station)) = &run.subject else {
         return Err(CodegenError::NoSuchForm {
@@ -69,6 +69,7 @@ pub(crate) fn groups<'a>(
     };
     let mut ring = Ring::exact(arena);
     ring.keep(whole);
+    ring.hold(held);
     let machine = run.machine;
     let unknown = |slot: usize| run.unknown(slot);
     let p: Vec<usize> = (0..machine.workpiece_side).collect();
@@ -117,7 +118,7 @@ pub(crate) fn groups<'a>(
     }
     let operands = operands(arena, inputs);
     for (group, coordinate) in groups.iter().zip(bar) {
-        if !ring.equal(group.symbol(arena, &operands).operand(), coordinate)? {
+        if !ring.equal_to_rounding(group.symbol(arena, &operands).operand(), coordinate)? {
             let why = "is not proved equal to the chain by the normal form; use the form frames".to_string();
             return Err(CodegenError::NoSuchForm { form, why });
         }
@@ -239,12 +240,12 @@ fn lowest(ring: &Ring<'_>, sum: &[Term]) -> u32 {
 
 fn as_tree(collector: &Collector<'_, '_>, terms: &[Term]) -> Tree {
     let tree = |term: &Term| {
-        let mut atoms: Vec<&(Atom, u32)> = term.monomial.powers().iter().collect();
+        let (number, rest) = number_of(&term.monomial, &term.coefficient);
+        let mut atoms: Vec<&(Atom, u32)> = rest.powers().iter().collect();
         atoms.sort_by_key(|(atom, _)| class(collector, *atom));
-        let size = term.coefficient.abs();
         let mut factors = Vec::new();
-        if !size.is_one() || atoms.is_empty() && term.sums.is_empty() {
-            factors.push(Tree::Number(size.to_f64().unwrap_or(f64::NAN)));
+        if number != 1.0 || atoms.is_empty() && term.sums.is_empty() {
+            factors.push(Tree::Number(number));
         }
         factors.extend(atoms.into_iter().flat_map(|power| collector.powers(&Monomial(vec![*power]))));
         factors.extend(term.sums.iter().map(|inner| as_tree(collector, inner)));

@@ -71,10 +71,9 @@ impl FirstOrder {
         unknowns: [Option<Operand>; 2],
         parameters: &[Variable],
     ) -> Result<Self, CodegenError> {
-        let [x, y, z] = vector.map(|component| ring.normal_form(component));
-        let vector = [x?, y?, z?];
+        let vector = cleaned_vector(ring, vector)?;
         let nominal = vector.each_ref().map(|component| without_errors(ring, component));
-        let square = dot(ring, &nominal, &nominal);
+        let square = ring.cleaned(dot(ring, &nominal, &nominal));
         let length = ring.root(square.clone());
         let stated = ring.normal_form(stated)?;
         let [bar, gain] = unknowns.map(|unknown| unknown.unwrap_or(Operand::constant(0.0)));
@@ -97,9 +96,8 @@ impl FirstOrder {
                 column: Column::Distinct,
             });
         }
-        let mut form = FirstOrder { nominal: vec![square], sensitivities, alternative_length: None };
-        form.mark(ring);
-        Ok(form)
+        let form = FirstOrder { nominal: vec![square], sensitivities, alternative_length: None };
+        Ok(form.finished(ring))
     }
 
     /// First-order form of a probe that moves straight towards the artefact's axis: the distance to the axis less the
@@ -129,11 +127,7 @@ impl FirstOrder {
         radius: Operand,
         parameters: &[Variable],
     ) -> Result<Self, CodegenError> {
-        let mut vector = |components: [Operand; 3]| -> Result<[Polynomial; 3], CodegenError> {
-            let [x, y, z] = components.map(|component| ring.normal_form(component));
-            Ok([x?, y?, z?])
-        };
-        let (v, u) = (vector(stylus)?, vector(step)?);
+        let (v, u) = (cleaned_vector(ring, stylus)?, cleaned_vector(ring, step)?);
         let r = ring.normal_form(radius)?;
         let nominal = |vector: &[Polynomial; 3]| vector.each_ref().map(|part| without_errors(ring, part));
         let (v_0, u_0, r_0) = (nominal(&v), nominal(&u), without_errors(ring, &r));
@@ -143,7 +137,7 @@ impl FirstOrder {
         }
         let b = dot(ring, &v_0, &u_0);
         let c = &dot(ring, &v_0, &v_0) - &ring.product(&r_0, &r_0);
-        let square = &ring.product(&b, &b) - &c;
+        let square = ring.cleaned(&ring.product(&b, &b) - &c);
         let d_0 = -&(&b + &ring.root(square.clone()));
         let along = |start: &[Polynomial; 3], way: &[Polynomial; 3]| -> [Polynomial; 3] {
             std::array::from_fn(|i| &start[i] + &ring.product(&d_0, &way[i]))
@@ -160,13 +154,12 @@ impl FirstOrder {
                 column: Column::Distinct,
             }
         };
-        let mut form = FirstOrder {
+        let form = FirstOrder {
             sensitivities: parameters.iter().map(sensitivity).collect(),
             nominal: vec![square],
-            alternative_length: Some(AlternativeLength { sign: -1.0, offset: -&b }),
+            alternative_length: Some(AlternativeLength { sign: -1.0, offset: ring.cleaned(-&b) }),
         };
-        form.mark(ring);
-        Ok(form)
+        Ok(form.finished(ring))
     }
 
     /// First-order form of coordinates in a ring of first order.
@@ -177,6 +170,7 @@ impl FirstOrder {
     ) -> Result<Self, CodegenError> {
         let forms =
             coordinates.iter().map(|coordinate| ring.normal_form(*coordinate)).collect::<Result<Vec<_>, _>>()?;
+        let forms = ring.without_residue(&forms);
         let sensitivities = parameters
             .iter()
             .map(|parameter| Sensitivity {
@@ -186,13 +180,39 @@ impl FirstOrder {
                 column: Column::Distinct,
             })
             .collect();
-        let mut form = FirstOrder {
+        let form = FirstOrder {
             nominal: forms.iter().map(|form| without_errors(ring, form)).collect(),
             sensitivities,
             alternative_length: None,
         };
-        form.mark(ring);
-        Ok(form)
+        Ok(form.finished(ring))
+    }
+
+    /// Without residue, and with its columns marked. The coefficients of lengths are compared with each other, and so
+    /// are those of angles.
+    fn finished(mut self, ring: &Ring<'_>) -> Self {
+        // The coefficients of effects have units of their own.
+        let kind = |(index, sensitivity): (usize, &Sensitivity)| {
+            let alone = matches!(sensitivity.parameter, Variable::Coefficient(_)).then_some(index);
+            (alone, sensitivity.parameter.is_angle(), sensitivity.over_length)
+        };
+        let kinds: Vec<_> = self.sensitivities.iter().enumerate().map(kind).collect();
+        for (first, own) in kinds.iter().enumerate() {
+            if kinds[..first].contains(own) {
+                continue;
+            }
+            let alike: Vec<usize> = (first..kinds.len()).filter(|index| kinds[*index] == *own).collect();
+            let forms: Vec<Polynomial> =
+                alike.iter().flat_map(|index| self.sensitivities[*index].coefficients.clone()).collect();
+            let mut cleaned = ring.without_residue(&forms).into_iter();
+            for index in alike {
+                for coefficient in &mut self.sensitivities[index].coefficients {
+                    *coefficient = cleaned.next().unwrap_or_default();
+                }
+            }
+        }
+        self.mark(ring);
+        self
     }
 
     /// Marks zero columns and constant multiples of earlier columns.
@@ -217,6 +237,13 @@ impl FirstOrder {
             }
         }
     }
+}
+
+/// The normal forms of a vector without residue.
+fn cleaned_vector(ring: &mut Ring<'_>, vector: [Operand; 3]) -> Result<[Polynomial; 3], CodegenError> {
+    let [x, y, z] = vector.map(|component| ring.normal_form(component));
+    let mut forms = ring.without_residue(&[x?, y?, z?]).into_iter();
+    Ok(std::array::from_fn(|_| forms.next().unwrap_or_default()))
 }
 
 /// The terms without errors.

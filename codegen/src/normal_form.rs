@@ -4,6 +4,7 @@ use std::collections::{BTreeSet, HashMap};
 
 use num_rational::BigRational;
 
+use crate::constant::{Exact, ROOTS};
 use crate::error::CodegenError;
 use crate::polynomial::{Atom, Monomial, Polynomial};
 use crate::symbol::{Arena, Binary, Node, NodeId, Operand, Unary, VariableId, operands};
@@ -17,12 +18,16 @@ pub struct Ring<'a> {
     order: Option<u32>,
     roots: Vec<Polynomial>,
     known: HashMap<NodeId, Polynomial>,
+    /// Positions that stay symbols although they do not change.
+    held: Vec<Variable>,
 }
 
 impl<'a> Ring<'a> {
     /// The ring of untruncated expressions.
     pub fn exact(arena: &'a Arena) -> Self {
-        Ring { arena, variables: arena.variables(), order: None, roots: Vec::new(), known: HashMap::new() }
+        // The first roots are those of numbers.
+        let roots = ROOTS.map(|root| Polynomial::constant(f64::from(root))).to_vec();
+        Ring { arena, variables: arena.variables(), order: None, roots, known: HashMap::new(), held: Vec::new() }
     }
 
     /// The ring of expressions truncated at `order` in errors and instrument parameters: `sin e` is `e`, `cos e` is `1
@@ -60,14 +65,28 @@ impl<'a> Ring<'a> {
         }
     }
 
-    /// Whether an atom depends on the position of an axis.
-    pub fn moves(&self, atom: Atom) -> bool {
+    /// The root of a number, if the atom is one.
+    pub(crate) fn root_of_number(atom: Atom) -> Option<u32> {
         match atom {
-            Atom::Variable(id) | Atom::Sin(id) | Atom::Cos(id) => self.variable(id).moves(),
-            Atom::Function(id) => {
-                let variables = self.arena.variables_of(&[Operand::Node(id)]);
-                variables.into_iter().any(|variable| self.variable(variable).moves())
-            }
+            Atom::Root(root) => ROOTS.get(root).copied(),
+            Atom::Variable(_) | Atom::Sin(_) | Atom::Cos(_) | Atom::Function(_) => None,
+        }
+    }
+
+    /// Declares positions that stay symbols although they do not change.
+    pub(crate) fn hold(&mut self, positions: &[Variable]) {
+        self.held = positions.to_vec();
+    }
+
+    /// Whether an atom depends on the position of a moving axis or on another driver.
+    pub fn moves(&self, atom: Atom) -> bool {
+        let moves = |id: VariableId| {
+            let variable = self.variable(id);
+            variable.moves() && !self.held.contains(variable)
+        };
+        match atom {
+            Atom::Variable(id) | Atom::Sin(id) | Atom::Cos(id) => moves(id),
+            Atom::Function(id) => self.arena.variables_of(&[Operand::Node(id)]).into_iter().any(moves),
             Atom::Root(root) => self.roots[root].contains(|inner| self.moves(inner)),
         }
     }
@@ -86,6 +105,12 @@ impl<'a> Ring<'a> {
     /// If one of them is not a polynomial.
     pub fn equal(&mut self, a: Operand, b: Operand) -> Result<bool, CodegenError> {
         Ok(self.normal_form(a)? == self.normal_form(b)?)
+    }
+
+    /// Whether two expressions are equal but for the rounding of their constants.
+    pub(crate) fn equal_to_rounding(&mut self, a: Operand, b: Operand) -> Result<bool, CodegenError> {
+        let (a, b) = (self.normal_form(a)?, self.normal_form(b)?);
+        Ok(self.is_residue(&(&a - &b), &[a, b]))
     }
 
     /// The normal form of an expression.
@@ -136,7 +161,7 @@ impl<'a> Ring<'a> {
 
     fn normal_form_of(&self, operand: Operand) -> Polynomial {
         match operand {
-            Operand::Constant(constant) => Polynomial::constant(constant.value()),
+            Operand::Constant(constant) => number(constant.value()),
             Operand::Node(id) => self.known.get(&id).cloned().unwrap_or_default(),
         }
     }
@@ -179,11 +204,9 @@ impl<'a> Ring<'a> {
                     Binary::Sub => &x - &y,
                     Binary::Mul => self.product(&x, &y),
                     Binary::Div => {
-                        let divisor = BigRational::from_float(b.known().unwrap_or(0.0));
-                        let zero = BigRational::from_integer(0.into());
-                        let divisor = divisor.filter(|divisor| *divisor != zero);
+                        let divisor = b.known().filter(|divisor| *divisor != 0.0 && divisor.is_finite());
                         let divisor = divisor.ok_or_else(|| no("a quotient of expressions"))?;
-                        x.scaled(&divisor.recip())
+                        self.product(&x, &inverse(divisor))
                     }
                 }
             }
@@ -289,6 +312,30 @@ impl<'a> Ring<'a> {
         };
         parameters.iter().filter(|variable| !contains(variable)).collect()
     }
+}
+
+/// The inverse of a constant of the chain.
+fn inverse(value: f64) -> Polynomial {
+    match Exact::of(value) {
+        // 1/(f·√n) is √n/(f·n).
+        Some(Exact { factor, root }) => {
+            let square = BigRational::from_integer(root.into());
+            number(value).scaled(&(&factor * &factor * square).recip())
+        }
+        None => BigRational::from_float(value)
+            .map_or_else(Polynomial::default, |value| Polynomial::constant(1.0).scaled(&value.recip())),
+    }
+}
+
+/// A constant of the chain: a multiple of a root where it is one.
+fn number(value: f64) -> Polynomial {
+    let Some(Exact { factor, root }) = Exact::of(value) else {
+        return Polynomial::constant(value);
+    };
+    let roots = ROOTS.iter().enumerate().filter(|(_, prime)| root.is_multiple_of(**prime));
+    let mut number = Polynomial::default();
+    number.insert(Monomial(roots.map(|(index, _)| (Atom::Root(index), 1)).collect()), factor);
+    number
 }
 
 /// The index of a sine or root to which a rule applies.

@@ -125,6 +125,12 @@ impl Polynomial {
         self.0.is_empty()
     }
 
+    /// The number that it is, if it has no atoms; `None` for zero, too.
+    pub(crate) fn rational(&self) -> Option<&BigRational> {
+        let (monomial, coefficient) = self.0.iter().next().filter(|_| self.len() == 1)?;
+        monomial.0.is_empty().then_some(coefficient)
+    }
+
     /// Whether it equals this constant to rounding.
     pub fn is_about(&self, value: f64) -> bool {
         let constant = match self.0.iter().next() {

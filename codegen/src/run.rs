@@ -1,11 +1,13 @@
 //! Evaluation of the chain, over symbols for the equation and over numbers for its check.
 
+use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
-use abbe_model::frames::Point;
+use abbe_model::frames::{Point, SinCos};
 use abbe_model::instrument::probe::ProbeGeometry;
 use abbe_model::instrument::{Station, ballbar};
 use abbe_model::scalar::{Nominal, Scalar};
 
+use crate::constant::ROUNDING;
 use crate::effect::AxisStates;
 use crate::error::CodegenError;
 use crate::subject::{Source, Subject};
@@ -39,12 +41,16 @@ impl<'m, S: Scalar> Run<'m, S> {
         let subject = source.subject(&length);
         let mut held = Vec::with_capacity(machine.axes.len());
         let mut state = Vec::with_capacity(machine.axes.len());
+        // Only rotary axes are followed.
+        let turned = |axis: &str| nominal(Variable::Position { axis: axis.to_string(), kind: AxisKind::Rotary });
         for axis in &machine.axes {
-            let held_position = source.held(&axis.name, &length);
+            let held_position = source.held(&axis.name, &length, &turned);
             held.push(held_position.is_some());
-            let position = held_position
-                .unwrap_or_else(|| nominal(Variable::Position { axis: axis.name.clone(), kind: axis.kind }));
-            state.push(AxisPosition::new(axis.kind, position));
+            let symbol = || nominal(Variable::Position { axis: axis.name.clone(), kind: axis.kind });
+            state.push(match held_position {
+                Some(position) if source.held_symbol(&axis.name).is_none() => at_rest(axis.kind, position),
+                _ => AxisPosition::new(axis.kind, symbol()),
+            });
         }
         let unknowns = subject.unknowns();
         let movement = AxisStates { machine, state: &state, held: &held };
@@ -174,6 +180,19 @@ impl<'m, S: Scalar> Run<'m, S> {
             None => length,
         }
     }
+}
+
+/// The position of an axis that does not move. Its sine and cosine are 0, ±½ and ±1 where they are so to rounding: the
+/// cosine of 90° is no 6e-17.
+fn at_rest<N: Nominal>(kind: AxisKind, position: N) -> AxisPosition<N> {
+    let plain = |turn: N| {
+        let known = turn.known().map(|value| (2.0 * value).round() / 2.0);
+        let near = known.filter(|near| turn.known().is_some_and(|value| (value - near).abs() < ROUNDING));
+        near.map_or(turn, N::constant)
+    };
+    let position = AxisPosition::new(kind, position);
+    let SinCos { sin, cos } = position.turn;
+    AxisPosition { turn: SinCos { sin: plain(sin), cos: plain(cos) }, ..position }
 }
 
 /// The sum of the contributions to a slot.

@@ -12,9 +12,16 @@ pub trait Source {
     /// mm.
     fn subject<N: Nominal>(&self, length: &impl Fn(&str) -> N) -> Subject<N>;
 
-    /// The position at which the test holds an axis, mm or rad; `None` for a moving axis, which stays a symbol.
-    fn held<N: Nominal>(&self, axis: &str, length: &impl Fn(&str) -> N) -> Option<N> {
-        let _ = (axis, length);
+    /// The position at which the test holds an axis, mm or rad; `None` for a moving axis, which stays a symbol. A held
+    /// axis may stay one too: [`Source::held_symbol`]. `position` gives the position of such an axis.
+    fn held<N: Nominal>(&self, axis: &str, length: &impl Fn(&str) -> N, position: &impl Fn(&str) -> N) -> Option<N> {
+        let _ = (axis, length, position);
+        None
+    }
+
+    /// The position of an axis that the test holds and that stays a symbol all the same, mm or rad.
+    fn held_symbol(&self, axis: &str) -> Option<f64> {
+        let _ = axis;
         None
     }
 
@@ -35,7 +42,7 @@ pub trait Source {
         None
     }
 
-    /// Least and greatest position of a moving axis, mm or rad, if the test states it.
+    /// Least and greatest position of an axis that is a symbol, mm or rad, if the test states it.
     fn range(&self, axis: &str) -> Option<[f64; 2]> {
         let _ = axis;
         None

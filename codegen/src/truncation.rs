@@ -27,6 +27,8 @@ pub(crate) struct FormContext<'a, 'w> {
     pub(crate) parameters: &'w [Variable],
     /// Expressions that are kept as they are.
     pub(crate) whole: &'w [Operand],
+    /// Positions that stay symbols although they do not change.
+    pub(crate) held: &'w [Variable],
 }
 
 /// Bilinear form: coordinates up to second order in the errors; a length is their norm.
@@ -39,18 +41,20 @@ pub(crate) fn bilinear<'a>(
     let &FormContext { arena, inputs, .. } = written;
     let mut ring = Ring::truncated(arena, 2)?;
     ring.keep(written.whole);
+    ring.hold(written.held);
     let read_over = read_over(run, vectors);
     let requested: Vec<Operand> = match read_over.as_slice() {
         [] => exact.to_vec(),
         vectors => vectors.iter().flat_map(|vector| vector.components).collect(),
     };
     let groups = requested.iter().map(|group| ring.normal_form(*group)).collect::<Result<Vec<Polynomial>, _>>()?;
+    let groups = ring.without_residue(&groups);
     let parameters = inputs.iter().filter(|input| matches!(input, Input::Plain(v) if v.is_small()));
     let complete = parameters.count() <= 12 && {
         let mut whole = Ring::exact(arena);
         whole.keep(written.whole);
         let forms: Result<Vec<Polynomial>, _> = requested.iter().map(|group| whole.normal_form(*group)).collect();
-        forms.is_ok_and(|forms| forms == groups)
+        forms.is_ok_and(|forms| whole.without_residue(&forms) == groups)
     };
     let collector = Collector { ring: &ring, inputs };
     let trees: Vec<Tree> = groups.iter().map(|group| collector.group(group)).collect();
@@ -75,9 +79,10 @@ pub(crate) fn first<'a>(
     vectors: &mut Vec<NamedVector>,
     written: &FormContext<'a, '_>,
 ) -> Result<FormResult, CodegenError> {
-    let &FormContext { arena, inputs, parameters, whole } = written;
+    let &FormContext { arena, inputs, parameters, whole, held } = written;
     let mut ring = Ring::truncated(arena, 1)?;
     ring.keep(whole);
+    ring.hold(held);
     let read_over = read_over(run, vectors);
     let form = match (read_over.as_slice(), &run.subject) {
         ([bar], Subject::Station(Station::BallBar(station))) => {

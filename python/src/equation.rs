@@ -21,7 +21,8 @@ pub fn equation(
     order: &str,
     rotation: Option<&str>,
     errors: Option<Vec<String>>,
-    symbols: &str,
+    notation: &str,
+    symbols: Option<Vec<String>>,
     gradient: bool,
 ) -> PyResult<String> {
     let state = session.state();
@@ -37,17 +38,23 @@ pub fn equation(
                 &[("exact", Order::Exact), ("bilinear", Order::Bilinear), ("first", Order::First)],
             )?,
             rotation: rotation.map(|word| choice("rotation", word, &rotations)).transpose()?,
-            symbols: choice("symbols", symbols, &[("literature", Symbols::Literature), ("iso", Symbols::Iso)])?,
+            symbols: choice("notation", notation, &[("literature", Symbols::Literature), ("iso", Symbols::Iso)])?,
             gradient,
             unknowns: parameters.instrument,
             effects: parameters.effects,
             ..Options::default()
         };
+        let language = language_of(language)?;
         let source = SessionTest::new(session, test)?;
+        let source = match symbols {
+            Some(axes) => source.with_symbols(&axes)?,
+            None if language.keeps_symbols() => source,
+            None => source.with_symbols(&[])?,
+        };
         let equation = Equation::of(&session.machine, &source, &parameters.errors, &options)?;
         // The functions of this module call Python with arrays.
-        let layout = if language == "python" { Layout::Flat } else { Layout::default() };
-        Ok(language_of(language)?.print(&check(&equation, &source)?, &Style { layout, ..Style::default() })?)
+        let layout = if language.word == "python" { Layout::Flat } else { Layout::default() };
+        Ok(language.print(&check(&equation, &source)?, &Style { layout, ..Style::default() })?)
     })
 }
 

@@ -4,7 +4,7 @@ mod style;
 
 use std::path::PathBuf;
 
-use abbe::codegen::print::{LANGUAGES, OutputLanguage, TestEquations, language};
+use abbe::codegen::print::{Audience, LANGUAGES, OutputLanguage, Style, TestEquations, language};
 use abbe::codegen::{Arrangement, Checked, Equation, Options, Order, SessionTest, Source, Symbols, ToolPoint, check};
 use abbe::equation::EquationParameters;
 use abbe::model::files::{self, ReadOptions, SourceMap};
@@ -16,6 +16,7 @@ use clap::{Args, ValueEnum};
 
 use self::style::StyleArguments;
 use super::failure::Failure;
+use super::folder;
 use super::message::{Kind, tell};
 use super::output::{self, Outputs};
 
@@ -26,15 +27,18 @@ pub const HELP: &str = "Examples:
       --errors EX0C,EY0C,bar
   abbe equation sessions/hermle-c600u/chapter5.toml --test A150 --rotation small-angle \\
       --form single --as latex --two-column --number last --nomenclature
+  abbe equation sessions/hermle-c600u/chapter5.toml --test A100 --rotation small-angle \\
+      --form single --symbols A,C
   abbe equation sessions/hermle-c600u/chapter5.toml --all --order first --as latex
   abbe equation sessions/hermle-c600u/chapter5.toml --test A150 --as python \\
-      --gradient --out a150.py";
+      --gradient --out a150.py
+  abbe equation sessions/hermle-c600u/chapter5.toml --all --as c --gradient --out readings";
 
 /// Examples of `abbe volumetric`.
 pub const VOLUMETRIC_HELP: &str = "Examples:
   abbe volumetric sessions/hermle-c600u/machine.toml --order first --errors EX0C,EY0C,EXX
   abbe volumetric sessions/hermle-c600u/machine.toml --errors EX0C,EB0A --rotation small-angle \\
-      --as c --symbols iso --gradient --out error.c
+      --as c --notation iso --gradient --out error.c
   abbe volumetric sessions/volumetric/machine.toml --map map.csv \\
       --functions sessions/volumetric/errors.toml --compensate
   abbe volumetric sessions/volumetric/machine.toml --map map2.csv \\
@@ -60,7 +64,7 @@ enum RotationArgument {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum SymbolsArgument {
+enum NotationArgument {
     Literature,
     Iso,
 }
@@ -105,16 +109,16 @@ struct FormArguments {
     errors: Vec<String>,
     /// Symbols of the errors: e_y0a (literature) or EY0A (ISO 230-1).
     ///
-    /// Example: --symbols iso
+    /// Example: --notation iso
     #[arg(long, value_enum, default_value = "literature")]
-    symbols: SymbolsArgument,
+    notation: NotationArgument,
     /// Add the derivatives with respect to all parameters in the equation: in code for every order; in text, LaTeX and
     /// Typst for the exact length of a bar.
     #[arg(long)]
     gradient: bool,
     #[command(flatten)]
     style: StyleArguments,
-    /// Write the equation to a file instead of standard output.
+    /// Write the equation to a file instead of standard output; with --all, code goes to a new folder.
     ///
     /// Example: --out equation.tex
     #[arg(long, value_name = "FILE")]
@@ -131,12 +135,32 @@ pub struct EquationArguments {
     /// Example: --test A150
     #[arg(long, value_name = "NAME", required_unless_present = "all", conflicts_with = "all")]
     test: Option<String>,
-    /// The equations of all tests, and the derivatives of their readings by the errors as a matrix, in text, LaTeX and
-    /// Typst.
+    /// The equations of all tests: in text, LaTeX and Typst with the derivatives of their readings by the errors as a
+    /// matrix; as code with a file for each test in the folder that --out names.
     #[arg(long)]
     all: bool,
+    /// Axes that stay symbols where the test holds them, separated by commas; `none` for numbers [default: in code none,
+    /// otherwise the rotary axes that are held at an angle that is no multiple of 90°].
+    ///
+    /// Example: --symbols A,C
+    #[arg(long, value_delimiter = ',', value_name = "AXES")]
+    symbols: Option<Vec<String>>,
     #[command(flatten)]
     form: FormArguments,
+}
+
+impl EquationArguments {
+    /// The test with its symbols.
+    fn source<'s>(&self, session: &'s Session, test: &'s Test) -> Result<SessionTest<'s>, Failure> {
+        let source = SessionTest::new(session, test)?;
+        let symbols = match self.symbols.as_deref() {
+            None if self.form.language.keeps_symbols() => return Ok(source),
+            None => &[],
+            Some([none]) if none == "none" => &[],
+            Some(axes) => axes,
+        };
+        Ok(source.with_symbols(symbols)?)
+    }
 }
 
 /// `abbe volumetric MACHINE`
@@ -167,9 +191,9 @@ impl FormArguments {
                 RotationArgument::Exact => Rotation::Exact,
                 RotationArgument::SmallAngle => Rotation::SmallAngle,
             }),
-            symbols: match self.symbols {
-                SymbolsArgument::Literature => Symbols::Literature,
-                SymbolsArgument::Iso => Symbols::Iso,
+            symbols: match self.notation {
+                NotationArgument::Literature => Symbols::Literature,
+                NotationArgument::Iso => Symbols::Iso,
             },
             gradient: self.gradient,
             unknowns: parameters.instrument.clone(),
@@ -182,9 +206,9 @@ impl FormArguments {
         &self,
         session: &'s Session,
         test: &'s Test,
+        source: SessionTest<'s>,
         first: bool,
     ) -> Result<(Equation, SessionTest<'s>), Failure> {
-        let source = SessionTest::new(session, test)?;
         let parameters = EquationParameters::of_test(session, test, &self.errors)?;
         let mut options = self.options(&parameters);
         if first {
@@ -235,24 +259,28 @@ fn read(arguments: &super::SessionArguments) -> Result<(Session, SourceMap), Fai
 
 /// Runs `abbe equation`.
 pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
-    let outputs = Outputs::new(&arguments.form.out)?;
+    let form = &arguments.form;
+    let all_code = arguments.all && matches!(form.language.audience, Audience::Compilers | Audience::Algebra);
+    if all_code {
+        return write_all_code(arguments);
+    }
+    let outputs = Outputs::new(&form.out)?;
     let (session, sources) = read(&arguments.session)?;
     outputs.refuse_overwrite_of_sources(&sources)?;
-    let form = &arguments.form;
     if let Some(name) = &arguments.test {
         let Some(test) = session.tests.iter().find(|test| test.name == *name) else {
             let names: Vec<&str> = session.tests.iter().map(|test| test.name.as_str()).collect();
             let names = names.join(", ");
             return Err(Failure::Other(format!("no test `{name}`; the session has {names}")));
         };
-        let (equation, source) = form.of_test(&session, test, false)?;
+        let (equation, source) = form.of_test(&session, test, arguments.source(&session, test)?, false)?;
         return form.write(&equation, &source);
     }
     let style = form.style.style(form.language)?;
-    let both = session
-        .tests
-        .iter()
-        .map(|test| Ok([form.of_test(&session, test, false)?, form.of_test(&session, test, true)?]));
+    let both = session.tests.iter().map(|test| {
+        let of_test = |first: bool| form.of_test(&session, test, arguments.source(&session, test)?, first);
+        Ok([of_test(false)?, of_test(true)?])
+    });
     let both: Vec<[(Equation, SessionTest<'_>); 2]> = both.collect::<Result<_, Failure>>()?;
     let checked = |(equation, source)| -> Result<_, Failure> { Ok(check(equation, source)?) };
     let pairs = both.iter().map(|[whole, first]| Ok([checked((&whole.0, &whole.1))?, checked((&first.0, &first.1))?]));
@@ -260,6 +288,33 @@ pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
     let tests: Vec<TestEquations<'_>> =
         pairs.iter().map(|[equation, first]| TestEquations { equation, first }).collect();
     form.put(&form.language.print_system(&tests, &style)?)
+}
+
+/// A file of code for each test, in a new folder.
+fn write_all_code(arguments: &EquationArguments) -> Result<(), Failure> {
+    let form = &arguments.form;
+    let Some(out) = &form.out else {
+        return Err(Failure::Other(format!(
+            "`--all --as {}` writes a file for each test; name a new folder by --out",
+            form.language.word
+        )));
+    };
+    folder::check(out, None)?;
+    let (session, _) = read(&arguments.session)?;
+    let style = Style { name_of_test: true, ..form.style.style(form.language)? };
+    let mut files: Vec<(String, String)> = Vec::new();
+    for test in &session.tests {
+        let (equation, source) = form.of_test(&session, test, arguments.source(&session, test)?, false)?;
+        let name = form.language.file_name(&equation);
+        if let Some((other, _)) = files.iter().find(|(other, _)| other.eq_ignore_ascii_case(&name)) {
+            return Err(Failure::Other(format!(
+                "test \"{}\" would be written to {name}, and another test is written to {other}; rename one of them",
+                test.name
+            )));
+        }
+        files.push((name, form.language.print(&check(&equation, &source)?, &style)?));
+    }
+    folder::write(out, &files, false, |_| Ok(()))
 }
 
 /// Runs `abbe volumetric`.

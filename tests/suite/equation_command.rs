@@ -66,7 +66,7 @@ fn every_option_reaches_the_library_in_every_language() {
         ];
         for (order_word, order, rotation_word, rotation, symbols_word, symbols) in forms {
             let options = Options { order, rotation: Some(rotation), symbols, ..Options::default() };
-            let form = ["--order", order_word, "--rotation", rotation_word, "--symbols", symbols_word];
+            let form = ["--order", order_word, "--rotation", rotation_word, "--notation", symbols_word];
             let kept = ["--errors", "e_y0a,EX0C,EA0C"];
             let found = printed(&[&a150[..], &form, &kept].concat());
             let expected = of_library(language, &["EY0A", "EX0C", "EA0C"], &options);
@@ -342,10 +342,60 @@ fn equations_are_set_and_called_as_requested() {
     refuse(&["--as", "latex", "--layout", "flat"], &["`--layout` does not apply to `--as latex`", "rust, c, python"]);
     refuse(&["--as", "c", "--layout", "flat", "--angles", "deg"], &["`--angles` does not apply to `--layout flat`"]);
     refuse(&["--order", "first", "--form", "groups"], &["`groups`", "first order"]);
-    refused(&["equation", text(&plan), "--all", "--as", "c"], &["`all`", "text, latex or typst"]);
+    refused(&["equation", text(&plan), "--all", "--as", "c"], &["`--all --as c` writes a file for each test", "--out"]);
+    refuse(&["--symbols", "B"], &["no axis `B` that could stay a symbol", "C, A, Y, X, Z"]);
     for wrong in [&["--width", "84"][..], &["--width", "1mm"]] {
         let output = abbe(&[&a150[..], &["--as", "latex"], wrong].concat());
         assert_eq!(output.status.code(), Some(2));
     }
     assert_eq!(abbe(&["equation", text(&plan)]).status.code(), Some(2));
+}
+
+/// Code of all tests lies side by side: each function has the name of its test, and lengths that no reading depends on are
+/// no arguments.
+#[test]
+fn code_of_all_tests_is_a_folder() {
+    let place = tempfile::tempdir().unwrap();
+    let plan = plan();
+    let out = place.path().join("readings");
+    let all = ["equation", text(&plan), "--all", "--gradient", "--out", text(&out)];
+    assert_eq!(printed(&[&all[..], &["--as", "python"]].concat()), "");
+    let mut names: Vec<String> =
+        fs::read_dir(&out).unwrap().map(|file| file.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    assert_eq!(names, ["a100", "a150", "c100", "c150"].map(|test| format!("bar_length_{test}.py")));
+    let a100 = fs::read_to_string(out.join("bar_length_a100.py")).unwrap();
+    assert!(a100.contains("def bar_length_a100(") && a100.contains("def bar_length_a100_gradient("), "{a100}");
+    assert!(!a100.contains("R_c") && !a100.contains("R_e"), "{a100}");
+    assert!(fs::read_to_string(out.join("bar_length_a150.py")).unwrap().contains("    R_e: ArrayLike,"));
+    // Not into a folder with files.
+    refused(&[&all[..], &["--as", "python"]].concat(), &["is not empty"]);
+    let flat = place.path().join("kernels");
+    let kernels = ["equation", text(&plan), "--all", "--as", "c", "--layout", "flat", "--out", text(&flat)];
+    printed(&kernels);
+    let a100 = fs::read_to_string(flat.join("bar_length_a100.c")).unwrap();
+    assert!(a100.contains("void bar_length_a100_columns(") && !a100.contains("R_c"), "{a100}");
+    if let Some(cc) = ["gcc", "cc"].into_iter().find(|cc| Command::new(cc).arg("--version").output().is_ok()) {
+        let tests = ["a100", "a150", "c100", "c150"];
+        let includes: String = tests.iter().map(|test| format!("#include \"bar_length_{test}.c\"\n")).collect();
+        fs::write(flat.join("all.c"), includes + "int main(void) { return 0; }\n").unwrap();
+        let output =
+            Command::new(cc).current_dir(&flat).args(["-Wall", "-Werror", "all.c", "-o", "all", "-lm"]).output();
+        let output = output.unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    }
+}
+
+/// `--symbols` reaches the library: the A test of the thesis holds C, which is a symbol on request.
+#[test]
+fn a_held_axis_is_a_symbol_on_request() {
+    let plan = plan();
+    let a100 = ["equation", text(&plan), "--test", "A100", "--form", "single", "--rotation", "small-angle"];
+    assert!(!printed(&a100).contains("cθ_c"));
+    let symbols = printed(&[&a100[..], &["--symbols", "A,C"]].concat());
+    assert!(symbols.contains("θ_x0c·cθ_c + θ_y0c·sθ_c"), "{symbols}");
+    assert!(symbols.contains("sine and cosine of the angle of axis C, held at 0°"), "{symbols}");
+    assert_eq!(printed(&[&a100[..], &["--symbols", "none"]].concat()), printed(&a100));
+    let code = printed(&[&a100[..5], &["--as", "c", "--symbols", "C"]].concat());
+    assert!(code.contains("double C_rad;"), "{code}");
 }

@@ -31,6 +31,7 @@ pub(crate) fn absent_parameters(equation: &Equation, agreement: &Agreement) -> R
         let mut ring = Ring::exact(&equation.arena);
         ring.keep(&equation.whole);
         let forms = requested.iter().map(|w| ring.normal_form(*w)).collect::<Result<Vec<_>, _>>()?;
+        let forms = ring.without_residue(&forms);
         absent.extend(ring.absent(&forms, &doubtful).into_iter().cloned());
     }
     Ok(absent)

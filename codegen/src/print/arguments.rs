@@ -27,18 +27,13 @@ impl Argument {
     }
 }
 
-/// The arguments for these inputs, in their order. A length of the session on which no output depends is none.
+/// The arguments for these inputs, in their order.
 pub(crate) fn of(equation: &Equation, inputs: &[Input], angles: AngleUnit) -> Vec<Argument> {
-    let used = equation.arena.variables_of(&equation.outputs);
-    let used: Vec<Variable> = used.into_iter().map(|id| equation.arena.variable_at(id)).collect();
     let mut arguments: Vec<Argument> = Vec::new();
     let mut turned: Vec<&Variable> = Vec::new();
     let place = |input: Input| inputs.iter().position(|known| *known == input);
     for (index, input) in inputs.iter().enumerate() {
         let variable = input.variable();
-        if matches!(variable, Variable::Length(_)) && !used.contains(variable) {
-            continue;
-        }
         let rotary = matches!(variable, Variable::Position { .. }) && variable.is_angle();
         if rotary && turned.contains(&variable) {
             continue;

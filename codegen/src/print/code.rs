@@ -4,6 +4,7 @@ use std::collections::HashSet;
 use std::ops::Range;
 
 use crate::check::Checked;
+use crate::equation::Equation;
 use crate::form::Kind;
 use crate::print::arguments::{self, Argument};
 use crate::print::dialect::{self, Dialect};
@@ -63,6 +64,8 @@ pub(crate) struct Code<'e> {
     pub(crate) groups: [Range<usize>; 3],
     /// The arguments by name; empty for arrays.
     pub(crate) arguments: Vec<Argument>,
+    /// Name of the function that computes the value.
+    pub(crate) name: String,
     syntax: &'static Syntax,
 }
 
@@ -136,6 +139,7 @@ impl<'e> Code<'e> {
             gradient,
             syntax,
             arguments,
+            name: function_name(equation, style.name_of_test),
             groups: [0..lengths, lengths..all - small, all - small..all],
             program,
             inputs,
@@ -155,8 +159,7 @@ impl<'e> Code<'e> {
 
     /// Name of the function.
     pub(crate) fn function(&self) -> String {
-        let name = function_name(self.checked.equation.kind);
-        format!("{name}{}", if self.gradient { "_gradient" } else { "" })
+        format!("{}{}", self.name, if self.gradient { "_gradient" } else { "" })
     }
 
     /// The arguments of a group that the program uses, each as its index in the group and its name.
@@ -236,8 +239,8 @@ impl<'e> Code<'e> {
                 let input = &self.program.inputs[index];
                 let (unit, meaning) = match input {
                     Input::Plain(variable) => (variable.unit(), notes::meaning(equation, variable)),
-                    Input::Sine(variable) => ("1", format!("sine of the {}", variable.meaning())),
-                    Input::Cosine(variable) => ("1", format!("cosine of the {}", variable.meaning())),
+                    Input::Sine(variable) => ("1", format!("sine of the {}", notes::meaning(equation, variable))),
+                    Input::Cosine(variable) => ("1", format!("cosine of the {}", notes::meaning(equation, variable))),
                 };
                 let argument = at(group, number);
                 lines.push(format!("  {argument:<12} {:<12} {unit:<4} {meaning}", self.inputs[index]));
@@ -298,14 +301,18 @@ impl Dialect for Code<'_> {
     }
 }
 
-/// Name of the function that computes the value.
-pub(crate) fn function_name(kind: Kind) -> &'static str {
-    match kind {
+/// Name of the function that computes the value, followed by that of its test if requested: `bar_length_a150`.
+pub(crate) fn function_name(equation: &Equation, name_of_test: bool) -> String {
+    let name = match equation.kind {
         Kind::Length => "bar_length",
         Kind::Distance => "probe_distance",
         Kind::Coordinates => "coordinates",
         Kind::Volumetric => "volumetric_error",
-    }
+    };
+    let plain = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '_' };
+    let test = equation.name.as_deref().filter(|_| name_of_test);
+    let test = test.map(|test| format!("_{}", test.chars().map(plain).collect::<String>()));
+    format!("{name}{}", test.unwrap_or_default())
 }
 
 fn step_name(label: &Label, symbols: Symbols) -> String {

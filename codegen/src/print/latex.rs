@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use crate::check::Checked;
 use crate::print::language::Language;
-use crate::print::notation::{Notation, juxtaposed, rounded};
+use crate::print::notation::{Notation, decimal, juxtaposed};
 use crate::print::style::Style;
 use crate::print::system::{Block, TestEquations};
 use crate::print::tex_width;
@@ -90,19 +90,9 @@ fn matrix(block: &Block) -> String {
 impl Notation for Latex {
     fn number(&self, value: f64) -> String {
         match value {
-            PI => return "\\pi".to_string(),
-            TAU => return "2 \\pi".to_string(),
-            _ => {}
-        }
-        let value = rounded(value);
-        let plain = format!("{value}");
-        if plain.len() <= 12 {
-            return plain;
-        }
-        let scientific = format!("{value:e}");
-        match scientific.split_once('e') {
-            Some((mantissa, exponent)) => format!("{mantissa} \\cdot 10^{{{exponent}}}"),
-            None => scientific,
+            PI => "\\pi".to_string(),
+            TAU => "2 \\pi".to_string(),
+            value => decimal(value, |mantissa, exponent| format!("{mantissa} \\cdot 10^{{{exponent}}}")),
         }
     }
     fn letter(&self, text: &str) -> String {

@@ -2,7 +2,7 @@
 
 use crate::check::Checked;
 use crate::print::arguments::Argument;
-use crate::print::code::{Code, GROUPS, Syntax, function_name, lines, name};
+use crate::print::code::{Code, GROUPS, Syntax, lines, name};
 use crate::print::language::Language;
 use crate::print::style::{Layout, Style};
 use crate::symbol::Unary;
@@ -26,7 +26,7 @@ impl Language for Matlab {
         let code = Code::new(checked, checked.equation.options.gradient, style, &SYNTAX);
         let (values, slopes) = code.results();
         let returned = if slopes.is_empty() { "value" } else { "[value, gradient]" };
-        let name = function_name(checked.equation.kind);
+        let name = &code.name;
         let named = style.layout == Layout::Named;
         let arguments = if named { "in" } else { "lengths, axes, errors" };
         let mut file = format!("function {returned} = {name}({arguments})\n");

@@ -95,6 +95,16 @@ pub fn language(word: &str) -> Result<&'static OutputLanguage, CodegenError> {
 }
 
 impl OutputLanguage {
+    /// Whether its readers expect an angle at which a test holds an axis as a symbol, and not as numbers.
+    pub fn keeps_symbols(&self) -> bool {
+        self.audience != Compilers
+    }
+
+    /// The name of a file for the code of one test among several: that of its function ([`Style::name_of_test`]).
+    pub fn file_name(&self, equation: &Equation) -> String {
+        format!("{}.{}", code::function_name(equation, true), self.extension)
+    }
+
     /// Prints a checked equation.
     ///
     /// # Errors

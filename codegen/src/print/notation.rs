@@ -197,9 +197,18 @@ impl<N: Notation> Dialect for Spelling<'_, N> {
     }
 }
 
-/// Rounds the last digits of a number: 0.6 where nominal lengths give 0.5999999999999996.
-pub(crate) fn rounded(value: f64) -> f64 {
-    format!("{value:.11e}").parse().unwrap_or(value)
+/// A number with at most twelve digits: 0.6 where nominal lengths give 0.5999999999999996. A very small or large one is
+/// written by `scientific`, from its mantissa and its exponent.
+pub(crate) fn decimal(value: f64, scientific: impl Fn(&str, &str) -> String) -> String {
+    let text = format!("{value:.11e}");
+    let value: f64 = text.parse().unwrap_or(value);
+    if value == 0.0 || (1e-4..1e12).contains(&value.abs()) {
+        return format!("{value}");
+    }
+    match format!("{value:e}").split_once('e') {
+        Some((mantissa, exponent)) => scientific(mantissa, exponent),
+        None => text,
+    }
 }
 
 /// A product without a sign between the factors; `dot` separates digits, which a space alone would join to one number.

@@ -102,6 +102,10 @@ pub(crate) fn notes(checked: &Checked<'_>) -> Vec<String> {
 fn range(checked: &Checked<'_>) -> String {
     let degrees = |angle: f64| two_places(angle.to_degrees());
     let axes = checked.range.iter().filter_map(|(variable, [low, high])| match variable {
+        Variable::Position { axis, .. } if low == high && variable.is_angle() => {
+            Some(format!("{axis} {}°", degrees(*low)))
+        }
+        Variable::Position { axis, .. } if low == high => Some(format!("{axis} {} mm", two_places(*low))),
         Variable::Position { axis, .. } if variable.is_angle() => {
             Some(format!("{axis} {}° to {}°", degrees(*low), degrees(*high)))
         }
@@ -150,6 +154,12 @@ pub(crate) fn meaning(equation: &Equation, variable: &Variable) -> String {
             let stated = equation.meanings.iter().find(|(known, _)| known == name);
             stated.map_or_else(|| variable.meaning(), |(_, meaning)| meaning.clone())
         }
-        other => other.meaning(),
+        other => match equation.held.iter().find(|(held, _)| held == other) {
+            Some((_, at)) if other.is_angle() => {
+                format!("{}, held at {}°", other.meaning(), two_places(at.to_degrees()))
+            }
+            Some((_, at)) => format!("{}, held at {} mm", other.meaning(), two_places(*at)),
+            None => other.meaning(),
+        },
     }
 }

@@ -45,4 +45,6 @@ pub struct Style {
     pub layout: Layout,
     /// The unit of axis positions in named arguments.
     pub angles: AngleUnit,
+    /// Whether the names of functions end in that of the test, so that code of several tests lies side by side.
+    pub name_of_test: bool,
 }

@@ -7,7 +7,7 @@ use crate::print::article::Article;
 use crate::print::article::line::NoteKind;
 use crate::print::dialect;
 use crate::print::language::Language;
-use crate::print::notation::{Notation, Spelling, rounded};
+use crate::print::notation::{Notation, Spelling, decimal};
 use crate::print::notes;
 use crate::print::style::Style;
 use crate::print::system::{self, TestEquations};
@@ -26,7 +26,7 @@ impl Notation for Text {
         match value {
             PI => "π".to_string(),
             TAU => "(2·π)".to_string(),
-            value => format!("{}", rounded(value)),
+            value => decimal(value, |mantissa, exponent| format!("{mantissa}e{exponent}")),
         }
     }
     fn subscripted(&self, letter: &str, subscript: &str) -> String {
@@ -53,6 +53,7 @@ impl Notation for Text {
     }
     fn call(&self, function: Unary, argument: &str) -> String {
         match function {
+            Unary::Sqrt if argument.chars().all(|c| c.is_ascii_digit()) => format!("√{argument}"),
             Unary::Sqrt => format!("√({argument})"),
             Unary::Sin => format!("sin({argument})"),
             Unary::Cos => format!("cos({argument})"),

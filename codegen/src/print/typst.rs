@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use crate::check::Checked;
 use crate::print::dialect::PRODUCT;
 use crate::print::language::Language;
-use crate::print::notation::{Notation, juxtaposed, rounded};
+use crate::print::notation::{Notation, decimal, juxtaposed};
 use crate::print::style::Style;
 use crate::print::system::{Block, TestEquations};
 use crate::print::typeset::{Markup, page, system};
@@ -79,7 +79,7 @@ impl Notation for Typst {
         match value {
             PI => "pi".to_string(),
             TAU => "2 pi".to_string(),
-            value => format!("{}", rounded(value)),
+            value => decimal(value, |mantissa, exponent| format!("{mantissa} dot 10^({exponent})")),
         }
     }
     fn letter(&self, text: &str) -> String {

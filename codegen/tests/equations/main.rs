@@ -7,6 +7,7 @@ mod chain;
 mod compiled;
 mod effects;
 mod forms;
+mod held;
 mod julia;
 mod named;
 mod nc;

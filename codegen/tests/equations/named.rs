@@ -123,7 +123,7 @@ fn sympy() {
             name: format!("volumetric_{name}"),
             function: "volumetric_error",
             text: support::laid_out(&equation, &ToolPoint, "sympy", Layout::Named),
-            inputs: equation.inputs(),
+            inputs: equation.program(false).inputs,
             cases: cases(What::Volumetric, &machine, &eight(), 5, &mut random),
         });
         let source = Chapter5 { extended: true };
@@ -138,7 +138,7 @@ fn sympy() {
             name: format!("bar_{name}"),
             function: "bar_length",
             text: support::laid_out(&equation, &source, "sympy", Layout::Named),
-            inputs: equation.inputs(),
+            inputs: equation.program(false).inputs,
             cases: cases.collect(),
         });
     }

@@ -57,7 +57,7 @@ impl Source for Touch {
         }))
     }
 
-    fn held<N: Nominal>(&self, axis: &str, length: &impl Fn(&str) -> N) -> Option<N> {
+    fn held<N: Nominal>(&self, axis: &str, length: &impl Fn(&str) -> N, _: &impl Fn(&str) -> N) -> Option<N> {
         let held = || HELD.iter().find(|(name, _)| *name == axis);
         match axis {
             "X" if self.stated => Some(length("D")),
@@ -372,7 +372,7 @@ pub fn printed(
             }
         }
         let text = support::laid_out(&equation, &touch, language, layout);
-        printed.push((format!("probe_{}", usize::from(stated)), text, cases, equation.inputs()));
+        printed.push((format!("probe_{}", usize::from(stated)), text, cases, equation.program(false).inputs));
     }
     printed
 }

@@ -90,7 +90,7 @@ pub fn laid_out(language: &str, layout: Layout) -> Vec<Printed> {
                 name: format!("{kind}_{}", short(code)),
                 function,
                 text,
-                inputs: equation.inputs(),
+                inputs: equation.program(false).inputs,
                 cases: cases(what, &machine, &errors, CASES, &mut random),
             });
         }
@@ -129,7 +129,7 @@ fn operators(language: &str, layout: Layout, random: &mut impl rand::Rng) -> Vec
         printed.push(Printed {
             name: format!("operators_{}", batch.0),
             function: "coordinates",
-            inputs: equation.inputs(),
+            inputs: equation.program(false).inputs,
             text: support::laid_out(&equation, &batch, language, layout),
             cases: cases.collect(),
         });
@@ -177,7 +177,7 @@ fn effects(language: &str, layout: Layout, random: &mut impl rand::Rng) -> Print
     Printed {
         name: "effects".to_string(),
         function: "bar_length",
-        inputs: equation.inputs(),
+        inputs: equation.program(false).inputs,
         cases: cases.collect(),
         text: support::laid_out(&equation, &Bar, language, layout),
     }

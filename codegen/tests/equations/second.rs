@@ -86,7 +86,7 @@ fn gradient(source: &impl Source, machine: &Machine, errors: &[ErrorName], at: &
         .axes
         .iter()
         .map(|axis| {
-            let held = source.held(&axis.name, &length);
+            let held = source.held(&axis.name, &length, &length);
             AxisPosition::new(axis.kind, held.unwrap_or_else(|| named(&at.positions, &axis.name)))
         })
         .collect();

@@ -149,7 +149,12 @@ impl abbe_codegen::Source for Bar {
             },
         ))
     }
-    fn held<N: abbe_model::scalar::Nominal>(&self, axis: &str, _: &impl Fn(&str) -> N) -> Option<N> {
+    fn held<N: abbe_model::scalar::Nominal>(
+        &self,
+        axis: &str,
+        _: &impl Fn(&str) -> N,
+        _: &impl Fn(&str) -> N,
+    ) -> Option<N> {
         matches!(axis, "X" | "Y" | "Z").then(|| N::constant(0.0))
     }
 }

@@ -17,7 +17,7 @@ impl Source for Untilted {
     fn subject<N: Nominal>(&self, length: &impl Fn(&str) -> N) -> Subject<N> {
         ToolPoint.subject(length)
     }
-    fn held<N: Nominal>(&self, axis: &str, _: &impl Fn(&str) -> N) -> Option<N> {
+    fn held<N: Nominal>(&self, axis: &str, _: &impl Fn(&str) -> N, _: &impl Fn(&str) -> N) -> Option<N> {
         matches!(axis, "A" | "C").then(|| N::constant(0.0))
     }
 }

@@ -37,12 +37,13 @@ fn the_equations_of_a_session() {
     let text = system("hermle-c600u/chapter5.toml", Order::First, "text", &Style::default());
     let (_, matrix) = text.split_once("derivatives of the readings").expect("a matrix");
     let (matrix, _) = matrix.split_once("\nsymbols\n").expect("symbols");
-    // The matrix has two blocks.
+    // The matrix has two blocks; the second has one test.
     let row = |name: &str| -> String {
         let lines = matrix.lines().filter_map(|line| line.trim_start().strip_prefix(name));
         lines.flat_map(str::split_whitespace).collect::<Vec<&str>>().join(" ")
     };
-    assert_eq!([row("A100 "), row("C100 ")], ["A150", "C150"]);
+    assert_eq!(row("A100 "), "A150 C100");
+    assert!(matrix.lines().any(|line| line.trim() == "C150"), "{matrix}");
     // By hand: the unit vector of the bar times the displacement by the error.
     assert_eq!(row("e_x0c "), "0 √(R_e² − R²)/L_0 −R·s_c/L_0 −R·s_c/L_0");
     assert_eq!(

@@ -34,7 +34,7 @@ impl Source for Chapter5 {
         }))
     }
 
-    fn held<N: Nominal>(&self, axis: &str, _length: &impl Fn(&str) -> N) -> Option<N> {
+    fn held<N: Nominal>(&self, axis: &str, _: &impl Fn(&str) -> N, _: &impl Fn(&str) -> N) -> Option<N> {
         matches!(axis, "X" | "Y" | "Z").then(|| N::constant(0.0))
     }
 

@@ -34,7 +34,8 @@ def equation(
     order: str,
     rotation: str | None,
     errors: Sequence[str] | None,
-    symbols: str,
+    notation: str,
+    symbols: Sequence[str] | None,
     gradient: bool,
 ) -> str: ...
 def run_session(

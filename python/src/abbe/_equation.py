@@ -31,10 +31,12 @@ class Equation:
         order: str,
         rotation: str | None,
         errors: Sequence[str] | None,
-        symbols: str,
+        notation: str,
+        symbols: Sequence[str] | None,
     ) -> None:
         self._session = session
-        self._form = (order, rotation, None if errors is None else list(errors), symbols)
+        names = [None if group is None else list(group) for group in (errors, symbols)]
+        self._form = (order, rotation, names[0], notation, names[1])
         self.test = test
         self.text()
 

@@ -317,7 +317,8 @@ class Session(Predicting):
         order: str = "exact",
         rotation: str | None = None,
         errors: Sequence[str] | None = None,
-        symbols: str = "literature",
+        notation: str = "literature",
+        symbols: Sequence[str] | None = None,
     ) -> Equation:
         """Return the closed form of the readings of a test, as ``abbe equation``.
 
@@ -331,10 +332,13 @@ class Session(Predicting):
             ``"exact"`` or ``"small-angle"``; as the machine states by default.
         errors : sequence of str, optional
             The parameters in the equation; those of the session by default.
-        symbols : str
+        notation : str
             ``"literature"`` (``e_x0c``) or ``"iso"`` (``EX0C``).
+        symbols : sequence of str, optional
+            The axes that stay symbols where the test holds them. By default none in code, otherwise the rotary axes
+            that are held at an angle that is no multiple of 90°.
         """
-        return Equation(self._handle, test, order, rotation, errors, symbols)
+        return Equation(self._handle, test, order, rotation, errors, notation, symbols)
 
     def save(self, folder: str | os.PathLike[str]) -> Path:
         """Write the session as files that the command reads.

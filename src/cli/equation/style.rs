@@ -116,6 +116,7 @@ impl StyleArguments {
                 None | Some(AnglesArgument::Rad) => AngleUnit::Radian,
                 Some(AnglesArgument::Deg) => AngleUnit::Degree,
             },
+            name_of_test: false,
         })
     }
 }

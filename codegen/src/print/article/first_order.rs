@@ -1,5 +1,6 @@
 //! First-order form for readers: the value without errors, the sum over the errors, and the table of coefficients.
 
+use crate::collect::positive_first;
 use crate::equation::Equation;
 use crate::first_order::{Column, FirstOrder};
 use crate::form::{Kind, PrintedFirstOrder};
@@ -152,11 +153,19 @@ fn is_fraction(factor: &Option<(Tree, Tree)>) -> bool {
     matches!(factor, Some((_, denominator)) if *denominator != Tree::Number(1.0))
 }
 
-/// Splits a leading minus from a product or a name.
+/// Splits the minus from a negative product or name, or from a sum with more negative terms than others.
 fn without_minus(tree: &Tree) -> (bool, Tree) {
     match tree {
         Tree::Unary(Unary::Neg, inner) => (true, (**inner).clone()),
         Tree::Number(value) if *value < 0.0 => (true, Tree::Number(-value)),
+        Tree::Binary(Binary::Add | Binary::Sub, ..) => {
+            let mut terms = terms_of(tree);
+            if 2 * terms.iter().filter(|(minus, _)| *minus).count() <= terms.len() {
+                return (false, tree.clone());
+            }
+            terms.iter_mut().for_each(|(minus, _)| *minus = !*minus);
+            (true, sum(positive_first(terms)))
+        }
         other => (false, other.clone()),
     }
 }

@@ -5,6 +5,7 @@ mod exact;
 mod first_order;
 mod groups;
 pub(crate) mod line;
+mod number;
 mod probe;
 mod tidy;
 
@@ -54,7 +55,7 @@ impl Article {
             .map(|(_, input)| match input {
                 Input::Plain(variable) => (input.clone(), notes::meaning(equation, variable), variable.unit()),
                 Input::Sine(variable) | Input::Cosine(variable) => {
-                    (input.clone(), format!("sine and cosine of the {}", variable.meaning()), "1")
+                    (input.clone(), format!("sine and cosine of the {}", notes::meaning(equation, variable)), "1")
                 }
             })
             .collect();
@@ -99,7 +100,7 @@ impl Article {
     }
 }
 
-/// Orders factors, cancels terms, and omits coordinates that are zero.
+/// Orders factors, cancels terms, writes exact numbers, and omits coordinates that are zero.
 fn tidied(program: &Program, sections: Vec<Section>, reorder: bool) -> Vec<Section> {
     let zero = |row: &EquationLine| {
         matches!(row.left, LeftSide::Named(Label::Vector { .. })) && row.right == Tree::Number(0.0)
@@ -107,6 +108,9 @@ fn tidied(program: &Program, sections: Vec<Section>, reorder: bool) -> Vec<Secti
     let section = |mut section: Section| {
         for row in section.rows.iter_mut().filter(|_| reorder) {
             row.right = tidy::tidied(program, &row.right);
+        }
+        for row in &mut section.rows {
+            row.right = number::exact(&row.right);
         }
         section.rows.retain(|row| !zero(row));
         section
