@@ -129,7 +129,7 @@ fn terms(
             if *of != sensitivity.parameter || other.over_length != over_length || is_fraction(factor) {
                 continue;
             }
-            let (minus, scale) = without_minus(numerator);
+            let (minus, scale) = mostly_positive(numerator);
             let term = if scale == Tree::Number(1.0) { error } else { product(vec![scale, error]) };
             errors.push((minus, term));
         }
@@ -153,19 +153,21 @@ fn is_fraction(factor: &Option<(Tree, Tree)>) -> bool {
     matches!(factor, Some((_, denominator)) if *denominator != Tree::Number(1.0))
 }
 
-/// Splits the minus from a negative product or name, or from a sum with more negative terms than others.
+/// Splits a leading minus from a product or a name.
 fn without_minus(tree: &Tree) -> (bool, Tree) {
     match tree {
         Tree::Unary(Unary::Neg, inner) => (true, (**inner).clone()),
         Tree::Number(value) if *value < 0.0 => (true, Tree::Number(-value)),
-        Tree::Binary(Binary::Add | Binary::Sub, ..) => {
-            let mut terms = terms_of(tree);
-            if 2 * terms.iter().filter(|(minus, _)| *minus).count() <= terms.len() {
-                return (false, tree.clone());
-            }
-            terms.iter_mut().for_each(|(minus, _)| *minus = !*minus);
-            (true, sum(positive_first(terms)))
-        }
         other => (false, other.clone()),
     }
+}
+
+/// As [`without_minus`], also from a sum with more negative terms than others.
+fn mostly_positive(tree: &Tree) -> (bool, Tree) {
+    let mut terms = terms_of(tree);
+    if terms.len() < 2 || 2 * terms.iter().filter(|(minus, _)| *minus).count() <= terms.len() {
+        return without_minus(tree);
+    }
+    terms.iter_mut().for_each(|(minus, _)| *minus = !*minus);
+    (true, sum(positive_first(terms)))
 }
