@@ -32,6 +32,7 @@ impl RefittedModel {
         options: &TraceOptions,
         structure_before: Option<&Structure>,
     ) -> Result<RefittedModel, IdentifyError> {
+        search.forget_chosen();
         let effects: Vec<Effect> = selected_effects(search).cloned().collect();
         if effects.is_empty() {
             return Ok(RefittedModel {
@@ -48,7 +49,9 @@ impl RefittedModel {
             after.noise = problem.noise.clone();
             after_fit = fit(&after, Some(&after_fit.beta))?;
         }
-        let structure = structure_before.map(|_| remaining_structure(&after, &after_fit, options)).transpose()?;
+        let structure = structure_before
+            .map(|_| remaining_structure(&after, &after_fit, options, &|| search.goes_on()))
+            .transpose()?;
         Ok(RefittedModel { after, after_fit, effects, structure })
     }
 
@@ -79,11 +82,16 @@ fn noise_is_from_residual(search: &Problem, fit: &Problem) -> bool {
 }
 
 /// The remaining structure in the residual of a fit.
-fn remaining_structure(problem: &Problem, fit: &Fit, options: &TraceOptions) -> Result<Structure, IdentifyError> {
+fn remaining_structure(
+    problem: &Problem,
+    fit: &Fit,
+    options: &TraceOptions,
+    go_on: &(dyn Fn() -> bool + Sync),
+) -> Result<Structure, IdentifyError> {
     let columns = Columns::new(problem, &fit.beta);
     let start = Start::of(problem, &columns, fit)?;
     let (count, seed) = (null_draw_count(options), options.seed.wrapping_add(1));
     let draws = null::draws(problem, &columns, &fit.residuals, &start.residual, count, SINGLE, seed);
     let prior = start.prior();
-    remainder::structure(problem, &columns, start.model, &start.residual, draws, prior)
+    remainder::structure(problem, &columns, start.model, &start.residual, draws, prior, go_on)
 }

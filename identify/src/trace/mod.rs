@@ -271,17 +271,16 @@ fn trace_or_interrupted(
         let (count, seed) = (null_draw_count(options), options.seed);
         null::draws(problem, &columns, pure, &start.residual, count, block, seed)
     };
+    let go_on = || interrupt.check().is_ok();
     let structure_before = || {
         let (model, prior) = (start.model.clone(), start.prior());
-        let draws = null(SINGLE);
-        remainder::structure(problem, &columns, model, &start.residual, draws, prior)
+        remainder::structure(problem, &columns, model, &start.residual, null(SINGLE), prior, &go_on)
     };
     let searched = screening::searched_candidates(problem, &columns, options)?;
     let candidate_count = searched.len();
     progress(Progress::Screening(candidate_count));
     let (reserve, candidates): (Vec<_>, Vec<_>) = searched.into_iter().partition(|candidate| candidate.last_resort);
     let column_sets: Vec<EffectColumns> = candidates.iter().map(|candidate| candidate.columns.clone()).collect();
-    let go_on = || interrupt.check().is_ok();
     let moments = || {
         let mut moments = Moments::new(&columns, column_sets, start.model.clone(), &start.residual, start.prior());
         moments.prepare(&[], &go_on)?;

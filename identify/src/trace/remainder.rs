@@ -184,7 +184,7 @@ fn curve(from: f64, to: f64, intervals: usize) -> Shape {
 /// Tests a residual for structure that a model, given by its orthonormal columns, does not explain.
 ///
 /// # Errors
-/// If products are not finite.
+/// If products are not finite, or [`IdentifyError::Interrupted`] if `go_on` returns `false`.
 pub fn structure(
     problem: &Problem,
     columns: &Columns<'_>,
@@ -192,6 +192,7 @@ pub fn structure(
     residual: &[f64],
     null: impl ExactSizeIterator<Item = Vec<f64>>,
     prior: PriorMoments,
+    go_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<Structure, IdentifyError> {
     let detectors = detectors(problem, columns);
     if detectors.is_empty() {
@@ -204,7 +205,7 @@ pub fn structure(
     let column_sets: Vec<EffectColumns> = detectors.iter().map(|detector| detector.column_set.clone()).collect();
     let count = column_sets.len();
     let mut moments = Moments::new(columns, column_sets, model, residual, prior);
-    moments.take_draws(null, false, &|| true)?;
+    moments.take_draws(null, false, go_on)?;
     let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
     let trained = TrainedModel::new(&moments, &[], &folds)?;
     let mut best = (0, f64::NEG_INFINITY, 0.0);
@@ -223,4 +224,31 @@ pub fn structure(
     let size_um = (2.0 * best.2.max(0.0) / columns.rows().max(1) as f64).sqrt() * problem.noise.sigma_mm * 1e3;
     let description = format!("{} ({size_um:.2} µm over all readings)", detectors[best.0].description);
     Ok(Structure { p_value, excess: best.2.max(0.0), description })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use abbe_model::files::{self, ReadOptions};
+
+    use super::*;
+    use crate::fit::prepare;
+    use crate::trace::start::Start;
+
+    #[test]
+    fn a_structure_test_can_be_interrupted() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let (problem, fit) = prepare(&files::session(&file, &ReadOptions::default()).unwrap(), 1).unwrap();
+        let columns = Columns::new(&problem, &fit.beta);
+        let start = Start::of(&problem, &columns, &fit).unwrap();
+        let tested = |goes_on: bool| {
+            let draws = std::iter::repeat_n(vec![0.0; start.residual.len()], 3);
+            let (model, prior) = (start.model.clone(), start.prior());
+            structure(&problem, &columns, model, &start.residual, draws, prior, &|| goes_on)
+        };
+        assert!(matches!(tested(false), Err(IdentifyError::Interrupted)));
+        // One of four: no draw has structure.
+        assert_eq!(tested(true).unwrap().p_value, 0.25);
+    }
 }

@@ -61,7 +61,6 @@ pub(super) fn search_and_refit(
 ) -> Result<(f64, RefittedModel), IdentifyError> {
     let mut ended = search_on(search, record)?;
     (record.progress)(Progress::Judging);
-    search.forget_chosen();
     let mut judged = judge(search)?;
     if judged.is_structured() && search.selected().len() < search.policy.max_effects {
         search.last_resort = true;

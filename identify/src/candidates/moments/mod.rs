@@ -36,7 +36,7 @@ pub(super) use tuning::{ChannelProducts, TuningSide};
 
 /// Null draws that are projected together.
 const DRAWS_AT_ONCE: usize = 32;
-/// Largest number of entries of the null draws whose products are formed together.
+/// Largest number of entries of the null draws whose products are formed together, if they are more than one part.
 const MAX_NULL_ENTRIES: usize = 1_000_000;
 
 /// The priors as products with the model columns.
@@ -286,6 +286,7 @@ impl<'c> Moments<'c> {
     /// The products of a segment with the projected null draws: draws × columns.
     pub(super) fn null_products(&self, segment: usize) -> Result<Arc<Mat<f64>>, IdentifyError> {
         stored(&self.null_products, &self.segments[segment].key, || {
+            debug_assert!(self.draws == 0 || !self.null.parts.is_empty(), "the draws were not kept");
             let whole = self.projection(&self.all_folds())?;
             let layout = &self.segments[segment].layout;
             let mut products = Mat::zeros(self.draws, layout.total());

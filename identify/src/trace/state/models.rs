@@ -33,7 +33,7 @@ impl SearchState<'_> {
     /// Forms the products of the library for every branch.
     pub fn prepare_branches(&self) -> Result<(), IdentifyError> {
         let folds: Vec<&[usize]> = self.selection.branches.iter().map(|branch| &branch.folds[..]).collect();
-        self.moments.prepare(&folds, &|| self.check().is_ok())
+        self.moments.prepare(&folds, &|| self.goes_on())
     }
 
     /// Forgets the products of effects that were tried on a branch and are not selected.
@@ -45,6 +45,11 @@ impl SearchState<'_> {
     /// Forgets the products of the selected effects of every branch. They are formed again where they are needed.
     pub fn forget_chosen(&self) {
         self.selection.branches.iter().for_each(|branch| self.moments.keep_chosen(&branch.folds, &[]));
+    }
+
+    /// Whether the caller has not stopped the trace.
+    pub fn goes_on(&self) -> bool {
+        self.check().is_ok()
     }
 
     fn check(&self) -> Result<(), IdentifyError> {
