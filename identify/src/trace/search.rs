@@ -93,6 +93,7 @@ fn search_on(search: &mut SearchState<'_>, record: &mut SearchRecord<'_>) -> Res
             Round::Changed => pending.push(None),
             Round::Added(candidate) => pending.push(Some(candidate)),
         }
+        search.note_held_out()?;
         if search.accept() {
             record.note(search, pending.drain(..).flatten());
         }
@@ -142,6 +143,5 @@ fn add_best(search: &mut SearchState<'_>) -> Result<(f64, Option<usize>), Identi
         return Ok((p_value, None));
     }
     Remove { threshold }.try_on(search, ALL)?;
-    search.note_held_out()?;
     Ok((p_value, added))
 }

@@ -117,8 +117,7 @@ pub fn on_every_branch(tried: &dyn Move, search: &mut SearchState<'_>) -> Result
     Ok(all)
 }
 
-/// Tries a move on every branch if it is due, and records the held-out error. Returns whether the branch on all
-/// readings changed.
+/// Tries a move on every branch if it is due. Returns whether the branch on all readings changed.
 ///
 /// # Errors
 /// See [`Move::try_on`].
@@ -127,7 +126,5 @@ pub fn run(name: MoveName, search: &mut SearchState<'_>) -> Result<bool, Identif
     if !tried.is_due(search.selected().len()) {
         return Ok(false);
     }
-    let changed = on_every_branch(tried, search)?;
-    search.note_held_out()?;
-    Ok(changed)
+    on_every_branch(tried, search)
 }
