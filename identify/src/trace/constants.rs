@@ -37,9 +37,11 @@ pub const MAX_COMPARED: usize = 3;
 /// Share of the best evidence that a candidate needs on the grid to be tuned. A local feature between two grid points
 /// loses a third of its evidence.
 pub const MIN_EVIDENCE_SHARE: f64 = 0.5;
-/// Evidence by which a step table may fall short of the best and still be reported as an alternative, and by which an
-/// explanation may fall short of the selected effect and still be averaged into a prediction, with a weight of 2 %.
+/// Evidence by which a step table may fall short of the best and still be reported as an alternative.
 pub const MAX_EVIDENCE_DEFICIT: f64 = 4.0;
+/// Score by which an explanation may fall short of the selected effect and still be averaged into a prediction. Its weight
+/// is then 2 % of that of the effect.
+pub const MAX_SCORE_DEFICIT: f64 = 4.0;
 /// Maximum number of explanations over which the prediction of a fold is averaged.
 pub const MAX_AVERAGED: usize = 13;
 /// Numbers of intervals of the nonparametric curves that effects along one axis are compared with.
@@ -67,7 +69,7 @@ pub const MAX_AR_SUM: f64 = 0.98;
 pub const MIN_POOL: usize = 200;
 /// Readings on either side of the running median that removes structure from a residual without repeats.
 pub const SMOOTHING: usize = 7;
-/// Number of readings up to which the structure test and the products of the search are formed at the same time. With
+/// Number of scalar readings up to which the structure test and the products of the search are formed at the same time. With
 /// more readings either keeps all cores busy, and their memory does not add up.
 pub const MAX_AT_THE_SAME_TIME: usize = 20_000;
 

@@ -2,9 +2,10 @@
 //! accepted only if this error decreases by more than the standard error of the decrease.
 //!
 //! Near the threshold, the readings of the other folds hardly distinguish the best explanation from the next ones. The
-//! prediction is therefore an average over them, weighted by `exp(score)` (Bayesian model averaging: Hoeting et al.,
-//! Statistical Science 14 (1999) 382). The gain of the best of many candidates is too large by chance. Each coefficient
-//! is reduced by the factor `1 − freedom/gain` (James & Stein, Proc. 4th Berkeley Symp. 1 (1961) 361).
+//! prediction is therefore an average over them, weighted by `exp(score)`, in analogy to Bayesian model averaging (Hoeting
+//! et al., Statistical Science 14 (1999) 382). Each coefficient is multiplied by the shrinkage factor `1 − freedom/χ²` (van
+//! Houwelingen & le Cessie, Statistics in Medicine 9 (1990) 1303), so that an effect that the other folds hardly show
+//! predicts little.
 
 use std::sync::Arc;
 
@@ -15,7 +16,7 @@ use crate::candidates::gain::{Gain, TrainedModel};
 use crate::error::IdentifyError;
 use crate::heldout::paired::{HeldOutDecrease, Units};
 use crate::numerics::parallel;
-use crate::trace::constants::{MAX_AVERAGED, MAX_EVIDENCE_DEFICIT};
+use crate::trace::constants::{EQUIVALENT, MAX_AVERAGED, MAX_SCORE_DEFICIT};
 
 /// The unwhitened model columns and residual, divided by the noise standard deviation. Held-out errors refer to these.
 pub struct UnwhitenedModel {
@@ -51,9 +52,57 @@ struct HeldOutResiduals {
 }
 
 /// Coefficients of the model columns, and of the columns of some candidates.
+#[derive(Default)]
 struct Prediction {
     of_model: Vec<f64>,
     of_candidates: Vec<(usize, Vec<f64>)>,
+}
+
+/// An explanation of the readings of the training folds in place of an effect.
+struct Explanation {
+    candidate: usize,
+    /// Decrease of the sum of squares over the variance.
+    chi_square: f64,
+    /// Degrees of freedom of this decrease.
+    freedom: usize,
+    score: f64,
+}
+
+/// The weight of each explanation in an average. They add up to less than 1, because the coefficients are reduced.
+fn weights(explanations: &[Explanation]) -> Vec<f64> {
+    let best = explanations.iter().map(|one| one.score).fold(f64::NEG_INFINITY, f64::max);
+    let total: f64 = explanations.iter().map(|one| (one.score - best).exp()).sum();
+    let shrinkage = |one: &Explanation| (1.0 - one.freedom as f64 / one.chi_square).max(0.0);
+    explanations.iter().map(|one| shrinkage(one) * (one.score - best).exp() / total).collect()
+}
+
+impl Prediction {
+    /// From the coefficients of the model columns and of the columns of some candidates, one after another.
+    fn of(of_model: Vec<f64>, candidates: impl Iterator<Item = (usize, usize)>, mut rest: &[f64]) -> Prediction {
+        let own = |(candidate, count): (usize, usize)| {
+            let (own, others) = rest.split_at(count);
+            rest = others;
+            (candidate, own.to_vec())
+        };
+        Prediction { of_candidates: candidates.map(own).collect(), of_model }
+    }
+
+    /// Adds a multiple of another prediction.
+    fn add(&mut self, weight: f64, other: &Prediction) {
+        let add = |to: &mut Vec<f64>, from: &[f64]| {
+            to.resize(from.len(), 0.0);
+            to.iter_mut().zip(from).for_each(|(to, from)| *to += weight * from);
+        };
+        add(&mut self.of_model, &other.of_model);
+        for (candidate, from) in &other.of_candidates {
+            let place = self.of_candidates.iter().position(|(present, _)| present == candidate);
+            let place = place.unwrap_or_else(|| {
+                self.of_candidates.push((*candidate, Vec::new()));
+                self.of_candidates.len() - 1
+            });
+            add(&mut self.of_candidates[place].1, from);
+        }
+    }
 }
 
 impl Selection {
@@ -89,7 +138,7 @@ impl SearchState<'_> {
         let of_all = self.prediction_of(&branches[ALL].chosen(), &branches[ALL].folds)?;
         let by_fold = parallel::map(branches.len() - 1, &|fold| {
             let predicted = self.averaged_prediction(&branches[ALL + 1 + fold])?;
-            self.moments.keep_chosen(&branches[ALL + 1 + fold].folds, &branches[ALL + 1 + fold].chosen());
+            self.forget_unselected(ALL + 1 + fold);
             Ok((self.residuals_of_fold(fold, &predicted), self.residuals_of_fold(fold, &of_all)))
         });
         let by_fold: Vec<(Vec<f64>, Vec<f64>)> = by_fold.into_iter().collect::<Result<_, IdentifyError>>()?;
@@ -106,77 +155,83 @@ impl SearchState<'_> {
 
     /// The prediction of the model with some effects, trained on some folds.
     fn prediction_of(&self, chosen: &[usize], folds: &[usize]) -> Result<Prediction, IdentifyError> {
-        Ok(self.prediction(chosen, &self.model_of(chosen, folds)?))
+        let trained = self.model_of(chosen, folds)?;
+        let (of_model, of_chosen) = trained.coefficients();
+        Ok(Prediction::of(of_model, self.with_counts(chosen), of_chosen))
     }
 
-    fn prediction(&self, chosen: &[usize], trained: &TrainedModel<'_>) -> Prediction {
-        let (of_model, mut rest) = trained.coefficients();
-        let own = |candidate: &usize| {
-            let (own, others) = rest.split_at(self.moments.count(*candidate));
-            rest = others;
-            (*candidate, own.to_vec())
-        };
-        Prediction { of_model, of_candidates: chosen.iter().map(own).collect() }
+    /// Candidates with their numbers of columns.
+    fn with_counts(&self, candidates: &[usize]) -> impl Iterator<Item = (usize, usize)> {
+        candidates.iter().map(|candidate| (*candidate, self.moments.count(*candidate)))
     }
 
-    /// The prediction of a branch, averaged over the last effect and the candidates that explain about as much in its
-    /// place.
+    /// The prediction of a branch. For each effect it is averaged over the candidates that explain about as much in its
+    /// place beside the others; the changes by the averages add up.
     fn averaged_prediction(&self, branch: &SearchBranch) -> Result<Prediction, IdentifyError> {
         let chosen = branch.chosen();
-        let Some((last, others)) = chosen.split_last() else { return self.prediction_of(&[], &branch.folds) };
-        let trained = self.model_of(others, &branch.folds)?;
-        let mut average = self.prediction(others, &trained);
-        let without = (average.of_model.clone(), average.of_candidates.clone());
-        let averaged = self.explanations(*last, others, &trained)?;
-        let best = averaged.iter().map(|(_, _, score)| *score).fold(f64::NEG_INFINITY, f64::max);
-        let total: f64 = averaged.iter().map(|(_, _, score)| (score - best).exp()).sum();
-        for (candidate, gain, score) in averaged {
-            let reduction = (1.0 - gain.freedom as f64 / gain.gain).max(0.0);
-            let weight = reduction * (score - best).exp() / total;
-            let (with, of_candidate) = trained.with_candidate(candidate)?;
-            let (of_model, mut rest) = with.split_at(without.0.len());
-            for (average, (with, without)) in average.of_model.iter_mut().zip(of_model.iter().zip(&without.0)) {
-                *average += weight * (with - without);
+        let mut averaged = Prediction::default();
+        averaged.add(1.0 - chosen.len() as f64, &self.prediction_of(&chosen, &branch.folds)?);
+        for effect in &chosen {
+            let others: Vec<usize> = chosen.iter().copied().filter(|other| other != effect).collect();
+            let without = self.model_of(&others, &branch.folds)?;
+            let explanations = self.explanations(*effect, &others, &without)?;
+            let weights = weights(&explanations);
+            for (weight, Explanation { candidate, .. }) in weights.iter().zip(&explanations) {
+                let (of_others, of_candidate) = without.with_candidate(*candidate)?;
+                let (of_model, of_others) = of_others.split_at(self.moments.rank());
+                let mut with = Prediction::of(of_model.to_vec(), self.with_counts(&others), of_others);
+                with.of_candidates.push((*candidate, of_candidate));
+                averaged.add(*weight, &with);
             }
-            for ((_, average), (_, without)) in average.of_candidates.iter_mut().zip(&without.1) {
-                let (own, others) = rest.split_at(average.len());
-                rest = others;
-                for (average, (with, without)) in average.iter_mut().zip(own.iter().zip(without)) {
-                    *average += weight * (with - without);
-                }
-            }
-            average.of_candidates.push((candidate, of_candidate.iter().map(|c| weight * c).collect()));
+            let of_none = 1.0 - weights.iter().sum::<f64>();
+            averaged.add(of_none, &self.prediction_of(&others, &branch.folds)?);
         }
-        Ok(average)
+        Ok(averaged)
     }
 
-    /// An effect and the candidates that explain about as much in its place beside others, with gains and scores. Those
-    /// that the training folds do not determine are left out: they predict nothing.
+    /// An effect and the candidates that explain about as much in its place beside others. Candidates of one name, or
+    /// with the same score, are one explanation. Without any if the training folds do not determine the effect.
     fn explanations(
         &self,
         effect: usize,
         others: &[usize],
-        trained: &TrainedModel<'_>,
-    ) -> Result<Vec<(usize, Gain, f64)>, IdentifyError> {
-        let variance = self.variance(trained);
-        let own = trained.gain(effect)?;
-        let least = self.score(effect, &own, variance) - MAX_EVIDENCE_DEFICIT;
-        let gains = self.gains(trained)?;
-        let mut found: Vec<(usize, Gain, f64)> = Vec::new();
-        for (candidate, gain) in gains.into_iter().enumerate().filter(|(_, gain)| gain.freedom > 0) {
-            let passed_over = candidate == effect || others.contains(&candidate);
-            if !passed_over && self.most_score(candidate, &gain, variance) > least {
-                let score = self.score(candidate, &gain, variance);
-                found.push((candidate, gain, score));
+        without: &TrainedModel<'_>,
+    ) -> Result<Vec<Explanation>, IdentifyError> {
+        let variance = self.variance(without);
+        let explanation = |candidate: usize, Gain { gain, freedom }: &Gain| Explanation {
+            candidate,
+            chi_square: gain / variance,
+            freedom: *freedom,
+            score: self.score(candidate, &Gain { gain: *gain, freedom: *freedom }, variance),
+        };
+        let own = without.gain(effect)?;
+        if own.freedom == 0 {
+            return Ok(Vec::new());
+        }
+        let own = explanation(effect, &own);
+        let least = own.score - MAX_SCORE_DEFICIT;
+        let mut found: Vec<Explanation> = (self.gains(without)?.iter().enumerate())
+            .filter(|(candidate, gain)| {
+                let passed_over = *candidate == effect || others.contains(candidate) || gain.freedom == 0;
+                !passed_over && self.most_score(*candidate, gain, variance) > least
+            })
+            .map(|(candidate, gain)| explanation(candidate, gain))
+            .filter(|one| one.score > least)
+            .collect();
+        found.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.candidate.cmp(&b.candidate)));
+        let mut names = vec![self.effect(effect).id()];
+        let mut distinct = vec![own];
+        for one in found {
+            let name = self.effect(one.candidate).id();
+            let is_equal = |other: &Explanation| {
+                (one.score - other.score).abs() < EQUIVALENT * one.score.abs() && one.freedom == other.freedom
+            };
+            if distinct.len() < MAX_AVERAGED && !names.contains(&name) && !distinct.iter().any(is_equal) {
+                names.push(name);
+                distinct.push(one);
             }
         }
-        found.retain(|(_, _, score)| *score > least);
-        found.sort_by(|a, b| b.2.total_cmp(&a.2).then(a.0.cmp(&b.0)));
-        found.truncate(MAX_AVERAGED - 1);
-        if own.freedom > 0 {
-            found.push((effect, own, least + MAX_EVIDENCE_DEFICIT));
-        }
-        Ok(found)
+        Ok(distinct)
     }
 
     /// The residuals of the readings of one fold, in their order.
@@ -266,5 +321,38 @@ impl SearchState<'_> {
             self.withdraw_rejected();
         }
         self.accepted = self.selection.clone();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn explanation(chi_square: f64, freedom: usize, score: f64) -> Explanation {
+        Explanation { candidate: 0, chi_square, freedom, score }
+    }
+
+    /// A strong explanation predicts nearly alone and nearly unreduced, two equal ones share, and one no stronger than
+    /// noise predicts nothing.
+    #[test]
+    fn weights_follow_from_scores_and_shrinkage() {
+        let [strong, weak] = weights(&[explanation(400.0, 2, 190.0), explanation(380.0, 2, 180.0)])[..] else {
+            panic!()
+        };
+        assert!((strong / (1.0 - 2.0 / 400.0) - 1.0).abs() < 1e-4 && weak < 1e-4, "{strong} {weak}");
+        assert_eq!(weights(&[explanation(20.0, 5, 8.0), explanation(20.0, 5, 8.0)]), [0.375, 0.375]);
+        assert_eq!(weights(&[explanation(2.0, 2, -1.0)]), [0.0]);
+        assert!(weights(&[]).is_empty());
+    }
+
+    #[test]
+    fn predictions_of_one_candidate_add_up() {
+        let one = Prediction::of(vec![1.0, 2.0], [(3, 1), (5, 2)].into_iter(), &[10.0, 20.0, 30.0]);
+        let other = Prediction::of(vec![4.0, 4.0], [(5, 2)].into_iter(), &[1.0, 1.0]);
+        let mut sum = Prediction::default();
+        sum.add(0.5, &one);
+        sum.add(2.0, &other);
+        assert_eq!(sum.of_model, [8.5, 9.0]);
+        assert_eq!(sum.of_candidates, [(3, vec![5.0]), (5, vec![12.0, 17.0])]);
     }
 }
