@@ -23,9 +23,11 @@ pub struct DriverColumns {
 }
 
 /// `session.toml`, `machine.toml` and one data file per test.
-pub fn session_files(plan: &Plan, rows: &[Row], columns: DriverColumns) -> Vec<(String, String)> {
-    let mut files =
-        vec![("session.toml".to_string(), session_toml(plan)), ("machine.toml".to_string(), machine_toml(plan.kind))];
+pub fn session_files(plan: &Plan, rows: &[Row], columns: DriverColumns, states_noise: bool) -> Vec<(String, String)> {
+    let mut files = vec![
+        ("session.toml".to_string(), session_toml(plan, states_noise)),
+        ("machine.toml".to_string(), machine_toml(plan.kind)),
+    ];
     for (index, test) in plan.tests.iter().enumerate() {
         let rows = rows.iter().filter(|row| plan.instants[row.instant].test == index);
         files.push((format!("{}.csv", test.name), data_csv(plan, rows, columns)));
@@ -56,9 +58,10 @@ fn data_csv<'a>(plan: &Plan, rows: impl Iterator<Item = &'a Row>, columns: Drive
     text
 }
 
-fn session_toml(plan: &Plan) -> String {
+fn session_toml(plan: &Plan, states_noise: bool) -> String {
+    let noise = if states_noise { format!("noise_um = {STATED_NOISE_UM}\n") } else { String::new() };
     let mut text = format!(
-        "[machine]\nfile = \"machine.toml\"\n\n[instrument]\nkind = \"ballbar\"\nnoise_um = {STATED_NOISE_UM}\n\
+        "[machine]\nfile = \"machine.toml\"\n\n[instrument]\nkind = \"ballbar\"\n{noise}\
          resolution_um = {RESOLUTION_UM}\n"
     );
     if let Some(errors) = plan.kind.declared_unknowns() {

@@ -25,6 +25,8 @@ pub struct Recipe {
     pub dropped_share: f64,
     /// Whether all tests share one mount of the spindle ball and one bar calibration, as the session file then states.
     pub shared_mounts: bool,
+    /// Whether the session file states the noise of the sensor.
+    pub states_noise: bool,
     /// Whether the files have a temperature column. They always have one if an effect is driven by temperature.
     pub temperature_column: bool,
     /// Seed of all random numbers.
@@ -43,6 +45,7 @@ impl Recipe {
             noise: Noise::White { sigma_um: 0.3 },
             dropped_share: 0.0,
             shared_mounts: kind == Kind::TiltedTable,
+            states_noise: true,
             temperature_column: false,
             seed,
         }
@@ -134,7 +137,7 @@ impl Recipe {
             _ => None,
         });
         let columns = files::DriverColumns { temperature: self.temperature_column || follows_temperature, spindle };
-        let files = files::session_files(plan, &rows, columns);
+        let files = files::session_files(plan, &rows, columns, self.states_noise);
         SimulatedSession { files, rows, truth }
     }
 }

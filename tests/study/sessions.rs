@@ -95,13 +95,18 @@ pub fn first_number() -> usize {
     number("ABBE_STUDY_FIRST").unwrap_or(0)
 }
 
+/// The only session to run: `ABBE_STUDY_ONLY`.
+pub fn only() -> Option<usize> {
+    number("ABBE_STUDY_ONLY")
+}
+
 /// Runs a study: `make` gives kind, noise and effects for each number. `ABBE_STUDY_FIRST` is added to every number, so
 /// that a rule can be tuned on other sessions than those that validate it.
 pub fn run(
     numbers: std::ops::Range<usize>,
     make: impl Fn(usize) -> (Kind, Noise, Vec<Injected>) + Sync,
 ) -> Vec<TracedSession> {
-    let only = number("ABBE_STUDY_ONLY");
+    let only = only();
     let first = first_number();
     numbers
         .into_par_iter()
@@ -118,8 +123,8 @@ pub fn run(
         .collect()
 }
 
-/// Runs trace on the files of a simulated session.
-fn traced(draw: &SimulatedSession, session_number: usize) -> (TraceResult, f64) {
+/// Runs trace on the files of a simulated session. Returns its result and duration, s.
+pub fn traced(draw: &SimulatedSession, session_number: usize) -> (TraceResult, f64) {
     let folder = tempfile::tempdir().unwrap();
     draw.write(folder.path()).unwrap();
     if number("ABBE_STUDY_KEEP") == Some(session_number) {

@@ -142,7 +142,7 @@ fn the_machine_is_better_after_compensation_as_predicted() {
         before.truth.unknowns.iter().find(same).map(|value| value.value)
     };
     let again = Recipe { seed: 18, ..recipe.clone() }.draw_of(&standing, kept);
-    let after = written(folder, "after", &session_files(&plan, &again.rows, DriverColumns::default()));
+    let after = written(folder, "after", &session_files(&plan, &again.rows, DriverColumns::default(), true));
     let compared = folder.join("compare.json");
     let model_after = folder.join("after.json");
     run(&["trace", text(&after), "--save", text(&model_after), "--quiet"]);

@@ -120,7 +120,7 @@ pub fn write(folder: &Path, step_deg: f64, mistake: Mistake, noise: Noise, seed:
             _ => {}
         }
     }
-    for (name, text) in session_files(&plan, &rows, DriverColumns::default()) {
+    for (name, text) in session_files(&plan, &rows, DriverColumns::default(), true) {
         std::fs::write(folder.join(name), mistaken(&text, mistake, wrong_bar_mm)).unwrap();
     }
 }
