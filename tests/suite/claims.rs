@@ -43,24 +43,27 @@ fn assert_consistent(result: &TraceResult, what: &str) {
     }
 }
 
-/// Noise of 0.3 µm for which a constant and a drift exceed the whole null distribution, although the held-out error
-/// rises.
+/// Noise of 0.3 µm for which a drift exceeds the whole null distribution, although the held-out error rises.
 #[test]
 fn an_effect_that_does_not_lower_the_held_out_error_is_not_claimed() {
-    let sessions = [
-        (Kind::LinearCircles, 7316, Noise::White { sigma_um: 0.3 }, "constant"),
-        (Kind::Simultaneous, 7463, Noise::Serial { sigma_um: 0.3, coefficient: 0.8 }, "drift"),
-    ];
-    for (kind, seed, noise, shape) in sessions {
-        let recipe = Recipe::new(kind, seed).noise(noise);
-        let result = traced(&session_of(&recipe), TraceOptions::default().significance);
-        assert!(result.effects.is_empty(), "{:?}", result.effects[0].name);
-        assert_eq!(result.verdict, "clean");
-        let rejected: Vec<&str> = result.rejected_candidates.iter().map(|found| found.name.shape.as_str()).collect();
-        assert_eq!(rejected, [shape]);
-        assert!(result.rejected_candidates[0].heldout_decrease_um < 0.0);
-        assert_consistent(&result, &result.residual_before);
-    }
+    let noise = Noise::Serial { sigma_um: 0.3, coefficient: 0.8 };
+    let recipe = Recipe::new(Kind::Simultaneous, 7463).noise(noise);
+    let result = traced(&session_of(&recipe), TraceOptions::default().significance);
+    assert!(result.effects.is_empty(), "{:?}", result.effects[0].name);
+    assert_eq!(result.verdict, "clean");
+    let rejected: Vec<&str> = result.rejected_candidates.iter().map(|found| found.name.shape.as_str()).collect();
+    assert_eq!(rejected, ["drift"]);
+    assert!(result.rejected_candidates[0].heldout_decrease_um < 0.0);
+    assert_consistent(&result, &result.residual_before);
+}
+
+/// White noise of 0.3 µm in which a constant is the best candidate. Noise of this size is as slow as its null distribution,
+/// although deviations of repeats lack their slow part, and the constant does not exceed it.
+#[test]
+fn a_constant_in_noise_does_not_exceed_the_null_distribution() {
+    let result = traced(&session_of(&Recipe::new(Kind::LinearCircles, 7316)), TraceOptions::default().significance);
+    assert_eq!(result.verdict, "clean");
+    assert!(result.rejected_candidates.is_empty(), "{:?}", result.rejected_candidates);
 }
 
 /// White noise of 0.20 µm without an effect, at a significance level at which most sessions have a candidate beyond the

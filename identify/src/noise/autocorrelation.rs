@@ -56,7 +56,7 @@ impl PureError {
                 *lengths.entry(run.len()).or_default() += run.len();
             }
         }
-        if pairs[MAX_ORDER] < 100 || covariance[0] <= 0.0 {
+        if pairs[MAX_ORDER] < MIN_PAIRS || covariance[0] <= 0.0 {
             return None;
         }
         let observed: [f64; MAX_ORDER + 1] = std::array::from_fn(|lag| covariance[lag] / pairs[lag] as f64);
@@ -65,14 +65,17 @@ impl PureError {
         let (coefficients, variance) = correct_for_detrending(&observed, order, insignificant, &lengths);
         // Bartlett's standard error of the lag-1 correlation, propagated through the correction.
         let neighbours = observed[1] / observed[0];
-        let u = SCATTER_RATIO * ((1.0 - neighbours * neighbours).max(0.0) / self.freedom.max(1) as f64).sqrt();
+        let ratio = if coefficients.is_empty() { 1.0 } else { SCATTER_RATIO };
+        let u = ratio * ((1.0 - neighbours * neighbours).max(0.0) / self.freedom.max(1) as f64).sqrt();
         let mut shifted = observed;
         shifted[1..].iter_mut().for_each(|value| *value += u * observed[0]);
-        let (of_shifted, _) = correct_for_detrending(&shifted, order, insignificant, &lengths);
-        let total = |coefficients: &[f64]| coefficients.iter().sum::<f64>();
-        let sum_u = (total(&of_shifted) - total(&coefficients)).abs();
+        // A coefficient that is not significant has an estimate too.
+        let (order, insignificant) = if coefficients.is_empty() { (1, 0.0) } else { (order, insignificant) };
+        let total = |observed| correct_for_detrending(observed, order, insignificant, &lengths).0.iter().sum::<f64>();
+        let sum = total(&observed);
         Some(Autocorrelation {
-            sum_u: if coefficients.is_empty() { 0.0 } else { sum_u },
+            sum_u: (total(&shifted) - sum).abs(),
+            of_first_order: if coefficients.is_empty() { sum } else { 0.0 },
             coefficients,
             inflation: (variance * pairs[0] as f64 / enlarged).sqrt(),
         })
@@ -101,6 +104,8 @@ fn correct_for_detrending(
     (coefficients, variance)
 }
 
+/// Least number of pairs of deviations at the largest lag.
+const MIN_PAIRS: usize = 50;
 /// Maximum autoregressive order.
 const MAX_ORDER: usize = 3;
 const CORRECTIONS: usize = 8;
@@ -115,8 +120,10 @@ const LONG_RUN: usize = 600;
 pub struct Autocorrelation {
     /// Autoregressive coefficients; empty for white noise.
     pub coefficients: Vec<f64>,
-    /// Standard uncertainty of their sum.
+    /// Standard uncertainty of their sum, or of the coefficient of first order that is not significant.
     pub sum_u: f64,
+    /// The coefficient of first order that is not significant; 0 if there are significant coefficients.
+    pub of_first_order: f64,
     /// Ratio of the noise standard deviation to that of the deviations, which are rescaled as white noise.
     pub inflation: f64,
 }

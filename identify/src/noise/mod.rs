@@ -22,7 +22,9 @@ use abbe_model::session::readings::Readings;
 pub use autocorrelation::Autocorrelation;
 pub(crate) use autocorrelation::enlargement_of_mean;
 pub(crate) use stated::stated_against_repeats;
-use trends::Trends;
+#[cfg(test)]
+pub(crate) use trends::trend_terms;
+pub(crate) use trends::{TERMS, Trends};
 
 /// The noise of one scalar reading.
 #[derive(Clone, Debug, PartialEq)]
@@ -139,6 +141,11 @@ impl PureError {
         }
         pure.count();
         pure
+    }
+
+    /// The factor on the deviations of a test for the removed trends.
+    pub(crate) fn rescaling(&self, test: usize) -> f64 {
+        self.rescaling_of_tests[test]
     }
 
     fn count(&mut self) {

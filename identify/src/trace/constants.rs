@@ -23,6 +23,10 @@ pub const EXPLAINED_SHARE: f64 = 0.5;
 /// Sampling scatter of an estimated AR coefficient, and relative scatter of an estimated noise standard deviation.
 pub const SCATTER: f64 = 0.02;
 
+/// Degrees of freedom of repeats from which their standard deviation replaces a stated one. With fewer it is uncertain by
+/// more than 7 %.
+pub const MIN_AGAINST_STATED: usize = 100;
+
 /// Consecutive additions that may fail to lower the held-out error before they are withdrawn. Of two effects that
 /// partly cancel each other, the first alone explains little.
 pub const MAX_REJECTED_IN_A_ROW: usize = 2;

@@ -1,12 +1,12 @@
 //! Estimates the noise model of a trace from repeats: standard deviation and autocorrelation.
 
-use super::constants::SCATTER;
+use super::constants::{MIN_AGAINST_STATED, SCATTER};
 use super::policy::Policy;
 use crate::noise::{NoiseSource, PureError};
 use crate::problem::Problem;
 
-/// Sets the noise standard deviation and autocorrelation from repeats, if there are enough. Returns whether this
-/// changed them by more than their sampling scatter.
+/// Sets the noise standard deviation and autocorrelation from repeats, if there are enough. A stated standard deviation
+/// needs more of them. Returns whether this changed them by more than their sampling scatter.
 pub(crate) fn estimate_noise_model(problem: &mut Problem, residuals: &[Vec<f64>]) -> bool {
     if !Policy::of(problem).noise_of_repeats {
         return false;
@@ -16,9 +16,13 @@ pub(crate) fn estimate_noise_model(problem: &mut Problem, residuals: &[Vec<f64>]
     let Some(estimated) = pure.autocorrelation(&problem.tests, kept) else {
         return false;
     };
+    let white = estimated.coefficients.is_empty();
+    if white && problem.noise.source == NoiseSource::Stated && pure.freedom < MIN_AGAINST_STATED {
+        return false;
+    }
     let mut noise = problem.noise.clone();
     noise.ar_coefficients = estimated.coefficients;
-    noise.ar_sum_u = estimated.sum_u;
+    noise.ar_sum_u = if white { 0.0 } else { estimated.sum_u };
     if let Some(sigma) = pure.sigma_mm() {
         noise.sigma_mm = sigma * estimated.inflation;
         noise.source = NoiseSource::Repeats;
