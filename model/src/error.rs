@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use crate::words::{MAX_QUOTED, cut, shortened};
+
 /// A location in the user's files.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Location {
@@ -47,7 +49,11 @@ impl std::fmt::Display for Location {
 #[non_exhaustive]
 pub enum ModelError {
     /// An invalid structural code.
-    #[error("structural code `{code}`: {found}; a code goes from workpiece over bed to tool, as in `w C A b Y X Z t`")]
+    #[error(
+        "structural code `{}`: {}; a code goes from workpiece over bed to tool, as in `w C A b Y X Z t`",
+        cut(code, MAX_QUOTED),
+        shortened(found)
+    )]
     StructuralCode {
         /// The code as given.
         code: String,
@@ -55,13 +61,16 @@ pub enum ModelError {
         found: String,
     },
     /// An axis whose kind does not follow from its name.
-    #[error("axis `{axis}` is not an ISO 841 letter; state its `kind` (\"rotary\" or \"linear\") and `direction`")]
+    #[error(
+        "axis `{}` is not an ISO 841 letter; state its `kind` (\"rotary\" or \"linear\") and `direction`",
+        cut(axis, MAX_QUOTED)
+    )]
     UnknownAxisKind {
         /// The axis.
         axis: String,
     },
     /// Unusable input, with its location and a remedy.
-    #[error("{location}: {message}")]
+    #[error("{location}: {}", shortened(message))]
     Input {
         /// File and line.
         location: Location,
@@ -72,7 +81,7 @@ pub enum ModelError {
     },
     /// A file that does not exist in the searched folders, or lies outside the folders that a session may read. Other
     /// options for reading (a data folder, files outside allowed) may remedy it.
-    #[error("{location}: {message}")]
+    #[error("{location}: {}", shortened(message))]
     FileAccess {
         /// File and line that name it.
         location: Location,
@@ -82,7 +91,7 @@ pub enum ModelError {
         help: String,
     },
     /// An invalid part of a session that is built in memory.
-    #[error("{message}")]
+    #[error("{}", shortened(message))]
     Session {
         /// What was found and what was expected.
         message: String,
@@ -90,7 +99,7 @@ pub enum ModelError {
         help: String,
     },
     /// A plan that the machine cannot carry out.
-    #[error("{message}")]
+    #[error("{}", shortened(message))]
     Plan {
         /// The test and the obstacle.
         message: String,

@@ -4,6 +4,7 @@ use abbe::codegen::CodegenError;
 use abbe::identify::IdentifyError;
 use abbe::model::ModelError;
 use abbe::model::error::Location;
+use abbe::model::words::shortened;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -20,7 +21,7 @@ pub struct Failed {
 impl Failed {
     /// A failure that is no error of the session.
     pub fn new(message: impl Into<String>) -> Failed {
-        Failed { class: "Error", message: message.into(), help: None, location: None }
+        Failed { class: "Error", message: shortened(&message.into()).into_owned(), help: None, location: None }
     }
 
     /// An argument that cannot be used.
@@ -34,7 +35,7 @@ impl From<ModelError> for Failed {
         Failed {
             class: "SessionError",
             message: error.to_string(),
-            help: error.help().filter(|help| !help.is_empty()).map(str::to_string),
+            help: error.help().filter(|help| !help.is_empty()).map(|help| shortened(help).into_owned()),
             location: error.location().cloned(),
         }
     }

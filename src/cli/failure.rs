@@ -3,7 +3,9 @@
 use abbe::identify::IdentifyError;
 use abbe::model::ModelError;
 
-use super::message::{Kind, lines, tell, visible};
+use super::excerpt::excerpt;
+use super::interrupt;
+use super::message::{Kind, lines, tell};
 
 /// Why a command failed.
 #[derive(Debug, thiserror::Error)]
@@ -39,9 +41,6 @@ pub enum Failure {
     Other(String),
 }
 
-/// Exit status of an interrupted program, as in shells.
-pub const INTERRUPTED: u8 = 130;
-
 impl From<IdentifyError> for Failure {
     fn from(error: IdentifyError) -> Self {
         match error {
@@ -61,11 +60,11 @@ impl From<String> for Failure {
 }
 
 impl Failure {
-    /// The exit status: 1 for input that cannot be used, 2 for a wrong command line, 130 for an interruption.
+    /// The exit status: 1 for input that cannot be used, 2 for a wrong command line, 130 or 143 for an interruption.
     pub fn status(&self) -> u8 {
         match self {
             Failure::CommandLine(_) => 2,
-            Failure::Interrupted(_) => INTERRUPTED,
+            Failure::Interrupted(_) => interrupt::status(),
             _ => 1,
         }
     }
@@ -76,32 +75,12 @@ impl Failure {
             eprintln!("{message}");
             return;
         }
-        if let Failure::Model(error) = self
-            && let Some(location) = error.location()
-            && let Some(span) = &location.span
-            && let Ok(source) = std::fs::read_to_string(&location.file)
-            && span.end <= source.len()
-        {
-            use ariadne::{Color, Config, IndexType, Label, Report, ReportKind, Source};
-            let name = location.file.display().to_string();
-            let source = visible(&source);
-            let config = Config::default().with_index_type(IndexType::Byte);
-            let label = Label::new((name.clone(), span.clone())).with_message("here").with_color(Color::Red);
-            let report = Report::build(ReportKind::Error, (name.clone(), span.clone()))
-                .with_config(config)
-                .with_label(label)
-                .finish();
-            let mut excerpt = Vec::new();
-            if report.write((name, Source::from(source)), &mut excerpt).is_ok() {
-                tell(Kind::Error, &error.to_string());
-                // The first line of the excerpt is another `Error:`.
-                let first = excerpt.iter().position(|byte| *byte == b'\n').unwrap_or(0);
-                lines(excerpt.get(first + 1..).unwrap_or_default());
-                self.help();
-                return;
-            }
-        }
         tell(Kind::Error, &self.to_string());
+        if let Failure::Model(error) = self
+            && let Some(excerpt) = error.location().and_then(excerpt)
+        {
+            lines(&excerpt);
+        }
         self.help();
     }
 

@@ -4,7 +4,9 @@
 
 use std::io::Write;
 
+use abbe::model::words::{MAX_QUOTED, cut, shortened};
 use clap::builder::styling::{AnsiColor, Style};
+use clap::error::ContextValue;
 
 /// The kind of a message.
 #[derive(Clone, Copy)]
@@ -41,11 +43,11 @@ impl Kind {
     }
 }
 
-/// Writes a message. An error of standard error itself is ignored.
+/// Writes a message, with what it quotes of the input cut to a readable length. An error of standard error itself is ignored.
 pub fn tell(kind: Kind, text: &str) {
     let style = kind.style();
     let word = kind.word();
-    let _ = writeln!(anstream::stderr(), "{style}{word}:{style:#} {}", visible(text));
+    let _ = writeln!(anstream::stderr(), "{style}{word}:{style:#} {}", visible(&shortened(text)));
 }
 
 /// Writes lines unchanged, without their colours where colours are disabled.
@@ -73,4 +75,19 @@ pub fn print_warnings(warnings: &[String]) {
     for warning in warnings {
         tell(Kind::Warning, warning);
     }
+}
+
+/// Writes the message of a wrong command line, with the quoted arguments cut to a readable length.
+pub fn print_usage(mut error: clap::Error) {
+    let quoted: Vec<_> = error.context().map(|(kind, value)| (kind, value.clone())).collect();
+    for (kind, value) in quoted {
+        let short = |text: String| cut(&text, MAX_QUOTED).into_owned();
+        let value = match value {
+            ContextValue::String(text) => ContextValue::String(short(text)),
+            ContextValue::Strings(texts) => ContextValue::Strings(texts.into_iter().map(short).collect()),
+            other => other,
+        };
+        error.insert(kind, value);
+    }
+    let _ = write!(anstream::stderr(), "{}", shortened(&error.render().ansi().to_string()));
 }

@@ -120,7 +120,7 @@ pub fn run(arguments: &SchemaArguments) -> Result<(), Failure> {
     };
     let text = serde_json::to_string_pretty(&schema)
         .map_err(|error| Failure::Other(format!("the schema cannot be written: {error}")))?;
-    say!("{text}");
+    super::output::whole(&text);
     Ok(())
 }
 

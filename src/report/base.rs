@@ -1,7 +1,7 @@
 //! Base parameters: a minimal set of numbers that predicts the same readings.
 
 use abbe::identify::results::BaseResult;
-use abbe::model::words::counted;
+use abbe::model::words::{counted, with_exponent};
 
 use super::number::unit;
 use super::table::{Cell, Table, cells};
@@ -21,10 +21,10 @@ pub fn base_statement(base: &BaseResult) -> String {
     let held = match base.held_at_nominal.as_slice() {
         [] => "No parameter is held at nominal: all are separable.".to_string(),
         names => format!(
-            "Held at nominal ({}): {}. Predictions do not depend on this choice (largest change {:.0e} µm).",
+            "Held at nominal ({}): {}. Predictions do not depend on this choice (largest change {} µm).",
             counted(names.len(), "parameter"),
             names.join(", "),
-            base.prediction_change_um
+            with_exponent(base.prediction_change_um, 0)
         ),
     };
     match base.combinations_at_nominal {

@@ -1,13 +1,16 @@
 //! Differences between models of one machine.
 
 use abbe::identify::compare::results::{Comparison, Difference, Pair};
+use abbe::identify::results::Outlier;
 use abbe::model::words::counted;
 
-use super::number::unit;
+use super::number::{p_equals, probability, unit};
 use super::table::{Cell, Table, cells, numbers};
 
 /// Rows of the first screen that are not significant.
 const FOLDED: usize = 8;
+/// Outliers that are listed by line and residual.
+const MAX_OUTLIERS: usize = 5;
 
 /// What has changed, in a few lines.
 pub fn headline(comparison: &Comparison, pair: &Pair) -> Vec<String> {
@@ -19,12 +22,29 @@ pub fn headline(comparison: &Comparison, pair: &Pair) -> Vec<String> {
     let mut lines = vec![
         format!("{} → {}: {changed} (any false claim: probability ≤ {level})", pair.from, pair.to),
         format!(
-            "all differences together: χ² = {:.1} with {}, p = {}",
+            "all differences together: χ² = {:.1} with {}, {}",
             pair.chi_square,
             counted(pair.degrees_of_freedom, "degree of freedom"),
-            probability(pair.p_value)
+            p_equals(pair.p_value)
         ),
     ];
+    for input in [&pair.from, &pair.to] {
+        let own: Vec<&Outlier> = comparison
+            .outliers
+            .iter()
+            .filter(|excluded| excluded.input == *input)
+            .map(|found| &found.outlier)
+            .collect();
+        let place = |outlier: &&Outlier| format!("{}:{} ({:.1} µm)", outlier.file, outlier.line, outlier.residual_um);
+        match own.as_slice() {
+            [] => {}
+            few if few.len() <= MAX_OUTLIERS => {
+                let places: Vec<String> = few.iter().map(place).collect();
+                lines.push(format!("excluded as outliers from {input}: {}", places.join(", ")));
+            }
+            many => lines.push(format!("excluded as outliers from {input}: {}", counted(many.len(), "reading"))),
+        }
+    }
     if !pair.shared_setup.is_empty() {
         lines.push(format!("one object in both: {}", pair.shared_setup.join(", ")));
     }
@@ -36,10 +56,6 @@ pub fn headline(comparison: &Comparison, pair: &Pair) -> Vec<String> {
         lines.push(format!("only in {}: {}", only.model, only.id));
     }
     lines
-}
-
-fn probability(p: f64) -> String {
-    if p < 1e-3 { format!("{p:.0e}") } else { format!("{p:.3}") }
 }
 
 /// The differences of a pair, the most significant first.

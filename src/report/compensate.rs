@@ -2,7 +2,7 @@
 
 use abbe::identify::correction::Aim;
 use abbe::identify::correction::stream::Summary;
-use abbe::model::words::counted;
+use abbe::model::words::{counted, with_exponent};
 
 use super::table::{Cell, Table, cells};
 
@@ -28,7 +28,7 @@ pub fn states(summary: &Summary) -> Table {
         .collect();
     let mut size = |name: &str, um: Option<f64>, arcsec: Option<f64>| {
         if let (Some(um), Some(arcsec)) = (um, arcsec) {
-            let figure = |value: f64| if value < 1e-3 { format!("{value:.1e}") } else { format!("{value:.3}") };
+            let figure = |value: f64| if value < 1e-3 { with_exponent(value, 1) } else { format!("{value:.3}") };
             rows.push(cells![name, format!("{} µm", figure(um)), format!("{}″", figure(arcsec))]);
         }
     };

@@ -42,6 +42,21 @@ pub fn p_value(p: f64) -> String {
     if p < 5e-4 { "p < 0.001".to_string() } else { format!("p ≤ {p:.3}") }
 }
 
+/// A probability: `0.012`, `3e-7`, and `< 1e-16` where the tail is smaller than the rounding of its computation.
+pub fn probability(p: f64) -> String {
+    match p {
+        p if p < 1e-16 => "< 1e-16".to_string(),
+        p if p < 1e-3 => format!("{p:.0e}"),
+        p => format!("{p:.3}"),
+    }
+}
+
+/// A p-value as an equation: `p = 0.012`, `p < 1e-16`.
+pub fn p_equals(p: f64) -> String {
+    let shown = probability(p);
+    if shown.starts_with('<') { format!("p {shown}") } else { format!("p = {shown}") }
+}
+
 /// A residual or a noise figure in µm.
 pub fn micrometres(value_um: f64) -> String {
     let places = if value_um >= 100.0 { 1 } else { 3 };
@@ -131,6 +146,21 @@ mod tests {
         ] {
             assert_eq!(three_digits(value), printed, "{value}");
         }
+    }
+
+    #[test]
+    fn no_probability_is_zero() {
+        for (p, shown) in [
+            (0.0, "< 1e-16"),
+            (1e-300, "< 1e-16"),
+            (2e-16, "2e-16"),
+            (3.2e-5, "3e-5"),
+            (0.0123, "0.012"),
+            (1.0, "1.000"),
+        ] {
+            assert_eq!(probability(p), shown);
+        }
+        assert_eq!((p_equals(0.0).as_str(), p_equals(0.5).as_str()), ("p < 1e-16", "p = 0.500"));
     }
 
     #[test]

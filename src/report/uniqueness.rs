@@ -2,6 +2,7 @@
 //! report.
 
 use abbe::identify::results::{AliasResult, EffectName, EffectResult, SeparatingTestResult, TraceResult};
+use abbe::model::words::with_exponent;
 
 use super::number::micrometres;
 
@@ -72,7 +73,7 @@ pub fn worse_prediction(effect: &EffectResult, alias: usize) -> Option<String> {
 /// How equal an alias is: `Δχ² 1.3, likelihood ratio 0.52`.
 pub fn likelihood(alias: &AliasResult) -> String {
     let ratio = alias.likelihood_ratio;
-    let ratio = if (0.01..1000.0).contains(&ratio) { format!("{ratio:.2}") } else { format!("{ratio:.0e}") };
+    let ratio = if (0.01..1000.0).contains(&ratio) { format!("{ratio:.2}") } else { with_exponent(ratio, 0) };
     // A difference of rounding is none.
     let delta = if alias.delta_chi2.abs() < 0.05 { 0.0 } else { alias.delta_chi2 };
     format!("Δχ² {delta:.1}, likelihood ratio {ratio}").replace('-', "−")

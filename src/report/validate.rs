@@ -5,7 +5,7 @@ use abbe::identify::validate::results::RmsResult;
 use abbe::model::words::counted;
 
 use super::fit::Figures;
-use super::number::{micrometres, unit};
+use super::number::{micrometres, probability, unit};
 use super::table::{Cell, Table, cells};
 
 /// The verdict in a sentence.
@@ -92,7 +92,7 @@ pub fn residuals(result: &ValidationResult) -> Table {
 pub fn moved(result: &ValidationResult) -> Table {
     let rows = result.moved.iter().map(|moved| {
         let [value, u] = Cell::estimate(moved.value, moved.u);
-        cells![&moved.id, value, u, unit(&moved.unit), format!("{:.1e}", moved.p_value), moved.alternatives.join(", ")]
+        cells![&moved.id, value, u, unit(&moved.unit), probability(moved.p_value), moved.alternatives.join(", ")]
     });
     Table::new(["parameter", ">change", ">u", "unit", ">p", "or instead"], rows)
         .titled("Parameters that have moved since the model, with standard uncertainty u")

@@ -2,6 +2,7 @@
 
 use abbe::identify::volumetric::{Size, Summary, VolumetricPoint};
 use abbe::model::chain::Machine;
+use abbe::model::words::with_exponent;
 
 use super::table::{Cell, Column, Table, cells, numbers};
 
@@ -15,7 +16,7 @@ pub fn sizes(summary: &Summary) -> Table {
     }
     rows.extend(summary.by_axis.iter().map(|share| row(format!("from axis {} alone", share.axis), &share.size)));
     rows.extend(summary.residual.iter().map(|residual| {
-        let [largest, rms] = [residual.largest_um, residual.rms_um].map(|um| format!("{um:.1e}"));
+        let [largest, rms] = [residual.largest_um, residual.rms_um].map(|um| with_exponent(um, 1));
         cells!["after compensation", largest, rms]
     }));
     Table::new(["µm", ">largest", ">rms"], rows)

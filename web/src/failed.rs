@@ -5,6 +5,7 @@ use abbe::identify::IdentifyError;
 use abbe::model::ModelError;
 use abbe::model::error::Location;
 use abbe::model::files::store::Store;
+use abbe::model::words::shortened;
 use serde::Serialize;
 use wasm_bindgen::JsValue;
 
@@ -38,7 +39,7 @@ impl Failed {
 
 impl From<String> for Failed {
     fn from(message: String) -> Failed {
-        Failed(Box::new(Fault { message, ..Fault::default() }))
+        Failed(Box::new(Fault { message: shortened(&message).into_owned(), ..Fault::default() }))
     }
 }
 
@@ -48,7 +49,9 @@ impl From<ModelError> for Failed {
         Failed(Box::new(Fault {
             // The message without the place, which the page shows beside it.
             message: match &error {
-                ModelError::Input { message, .. } | ModelError::FileAccess { message, .. } => message.clone(),
+                ModelError::Input { message, .. } | ModelError::FileAccess { message, .. } => {
+                    shortened(message).into_owned()
+                }
                 other => other.to_string(),
             },
             help: error.help().filter(|help| !help.is_empty()).map(str::to_string),

@@ -1,5 +1,7 @@
 //! What the user may choose of NC programs.
 
+use abbe_model::words::number;
+
 use super::Control;
 use crate::error::CodegenError;
 
@@ -69,8 +71,8 @@ impl NcOptions {
                 return Ok(());
             }
             Err(CodegenError::Nc {
-                message: format!("{what} is {value}"),
-                help: format!("a value from {least} to {most} is expected"),
+                message: format!("{what} is {}", number(value)),
+                help: format!("a value from {} to {} is expected", number(least), number(most)),
             })
         };
         fault("the overshoot in degrees", self.overshoot_deg.unwrap_or(0.0), 0.0, 360.0)?;

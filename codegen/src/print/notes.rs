@@ -2,6 +2,7 @@
 
 use abbe_model::driver::DriverPart;
 use abbe_model::frames::Rotation;
+use abbe_model::words::with_exponent;
 
 use crate::check::Checked;
 use crate::equation::Equation;
@@ -64,8 +65,10 @@ pub(crate) fn notes(checked: &Checked<'_>) -> Vec<String> {
     };
     let mut notes = vec![format!(
         "Checked against {of} with dual numbers at {} points, errors to ±10 mm and ±0.1 rad: \
-         largest relative difference {:.0e} (value), {:.0e} (gradient).",
-        check.points, check.value, check.gradient
+         largest relative difference {} (value), {} (gradient).",
+        check.points,
+        with_exponent(check.value, 0),
+        with_exponent(check.gradient, 0)
     )];
     if !checked.deviations.is_empty() {
         let found = checked.deviations.iter().map(|deviation| {
