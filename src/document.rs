@@ -1,23 +1,19 @@
 //! Results as JSON documents: the result of a command with its inputs and options, so that a program can repeat the
 //! command and check what it reads.
 
-use std::path::Path;
-
 use abbe_identify::model_file::{InputFile, Provenance};
 use abbe_model::files::SourceMap;
+use abbe_model::files::stamp::FileStamp;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use crate::report::provenance::{self, Input};
-
 /// Version of the schemas of all documents.
 pub const SCHEMA_VERSION: u32 = 2;
 
-impl From<Input> for InputFile {
-    fn from(input: Input) -> InputFile {
-        InputFile { file: input.path, sha256: Some(input.sha256) }
-    }
+/// An input file with the checksum of the bytes that were read.
+fn input_file(stamp: &FileStamp) -> InputFile {
+    InputFile { file: stamp.file.display().to_string(), sha256: stamp.sha256() }
 }
 
 /// What was called: the command and its options.
@@ -35,7 +31,7 @@ pub struct Call {
 pub struct SessionFile {
     /// Path of the session file.
     file: String,
-    /// SHA-256 of the session file, in hexadecimal; `null` for a pipe.
+    /// SHA-256 of the session file as it was read, in hexadecimal.
     sha256: Option<String>,
     /// All files that were read: session, machine and data files, also of further sessions.
     inputs: Vec<InputFile>,
@@ -50,37 +46,17 @@ pub struct Origin {
 
 impl Origin {
     /// The files of a session.
-    ///
-    /// # Errors
-    /// If a file has changed since it was read, in words.
-    pub fn of_session(sources: &SourceMap) -> Result<Origin, String> {
-        let mut inputs = Vec::with_capacity(sources.files.len());
-        for stamp in &sources.files {
-            inputs.push(if stamp.is_regular() {
-                provenance::stamped(stamp).map_err(|fault| unreadable(&stamp.file, &fault))?.into()
-            } else {
-                InputFile { file: stamp.file.display().to_string(), sha256: None }
-            });
-        }
+    pub fn of_session(sources: &SourceMap) -> Origin {
+        let inputs: Vec<InputFile> = sources.files.iter().map(input_file).collect();
         let file = sources.file.display().to_string();
         let own = inputs.iter().find(|input| input.file == file);
-        Ok(Origin {
-            session: Some(SessionFile { sha256: own.and_then(|input| input.sha256.clone()), file, inputs }),
-            inputs: Vec::new(),
-        })
+        let sha256 = own.and_then(|input| input.sha256.clone());
+        Origin { session: Some(SessionFile { sha256, file, inputs }), inputs: Vec::new() }
     }
 
     /// Files that belong to no session.
-    ///
-    /// # Errors
-    /// If a file cannot be read again, in words.
-    pub fn of_files(files: &[&Path]) -> Result<Origin, String> {
-        let inputs = files.iter().map(|file| {
-            provenance::input(file.to_path_buf())
-                .map(InputFile::from)
-                .map_err(|fault| unreadable(file, &fault.to_string()))
-        });
-        Ok(Origin { session: None, inputs: inputs.collect::<Result<_, _>>()? })
+    pub fn of_files<'s>(files: impl IntoIterator<Item = &'s FileStamp>) -> Origin {
+        Origin { session: None, inputs: files.into_iter().map(input_file).collect() }
     }
 
     /// Adds the files of a further session.
@@ -103,10 +79,6 @@ impl Origin {
             session: self.session.as_ref().map_or(String::new(), |session| session.file.clone()),
         }
     }
-}
-
-fn unreadable(file: &Path, fault: &str) -> String {
-    format!("{}: cannot be read again for its checksum in the JSON document: {fault}", file.display())
 }
 
 /// The document of a command: what it was, and its result.

@@ -46,9 +46,9 @@ type Corrected<'py> =
 impl Model {
     #[staticmethod]
     fn read(path: PathBuf) -> Result<Model, Failed> {
-        let text = files::text(&path, "the model file")?;
-        let model = Arc::new(model_file::read_text(&path, &text)?);
-        Ok(Model { model, text, origin: Origin::of_files(&[&path])? })
+        let source = files::text(&path, "the model file")?;
+        let model = Arc::new(model_file::read_text(&path, &source.text)?);
+        Ok(Model { model, origin: Origin::of_files(&source.stamp), text: source.text })
     }
 
     #[staticmethod]

@@ -107,7 +107,7 @@ impl Session {
         let state = work::run(py, None, move |_| {
             let options = ReadOptions { data_directory: data, allow_outside, ..ReadOptions::default() };
             let (session, sources) = files::session_with_sources(&path, &options)?;
-            let origin = Origin::of_session(&sources)?;
+            let origin = Origin::of_session(&sources);
             Ok(State::new(session, sources, origin))
         })?;
         Ok(Session::of(state))

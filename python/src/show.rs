@@ -1,7 +1,5 @@
 //! Tables and figures of a result as the command prints them, and its report.
 
-use std::path::PathBuf;
-
 use abbe::model::files::SourceMap;
 use abbe::model::session::Session;
 use abbe::printers::page;
@@ -114,9 +112,6 @@ pub fn figures(document: Document) -> Vec<Figure> {
 /// # Errors
 /// If a file of the session has changed since it was read.
 pub fn page(document: &Document, read: (&Session, &SourceMap), call: &str, seed: u64) -> Result<String, Failed> {
-    let changed = |(path, cause): (PathBuf, String)| {
-        Failed::new(format!("{}: cannot be read again for its checksum in the report: {cause}", path.display()))
-    };
-    let provenance = Provenance { command: call.to_string(), ..Provenance::of(read, seed).map_err(changed)? };
+    let provenance = Provenance { command: call.to_string(), ..Provenance::of(read, seed) };
     Ok(page::html(document, &provenance)?)
 }

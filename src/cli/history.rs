@@ -6,6 +6,7 @@ use abbe::fleet::compensations;
 use abbe::fleet::history::{FleetHistory, history};
 use abbe::fleet::store::Store;
 use abbe::identify::history::HistoryOptions;
+use abbe::model::files;
 use clap::Args;
 
 use super::failure::Failure;
@@ -47,7 +48,7 @@ pub struct HistoryArguments {
     /// Identifier of one machine.
     ///
     /// Example: --machine SN-0412
-    #[arg(long, value_name = "ID")]
+    #[arg(long, value_name = "ID", allow_hyphen_values = true)]
     machine: Option<String>,
     /// False discovery rate over all parameters of all machines.
     ///
@@ -97,18 +98,20 @@ pub fn run(arguments: &HistoryArguments, quiet: bool) -> Result<(), Failure> {
         folder::check(path, None)?;
     }
     let store = Store::existing(&arguments.results)?;
+    let read = |file: &PathBuf| files::text(file, "the file of compensations");
+    let known = arguments.compensations.as_ref().map(read).transpose()?;
     let options = HistoryOptions {
         false_discovery_rate: arguments.false_discovery_rate,
         tolerance_u: arguments.tolerance_u,
-        compensations: arguments.compensations.as_deref().map(compensations::read).transpose()?.unwrap_or_default(),
+        compensations: known.as_ref().map(compensations::of_source).transpose()?.unwrap_or_default(),
     };
     let found = history(&store, arguments.machine.as_deref(), &options)?;
     if outputs.tables(quiet) {
         print(&found, arguments.all);
     }
     if let Some(path) = &arguments.json {
-        let files: Vec<&std::path::Path> = arguments.compensations.as_deref().into_iter().collect();
-        json::write(path, Origin::of_files(&files)?, None, &found)?;
+        let stamps = known.iter().filter_map(|source| source.stamp.as_ref());
+        json::write(path, Origin::of_files(stamps), None, &found)?;
     }
     if let Some(path) = &arguments.report {
         let document = match (&arguments.machine, found.history.machines.first()) {

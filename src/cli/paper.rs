@@ -84,7 +84,7 @@ pub struct PaperArguments {
     /// and harmonics of orders 1 and 2 of error motions, those with the largest bias].
     ///
     /// Example: --effects EZC~C:h2,EAC~C:h1
-    #[arg(long, value_name = "EFFECT,…", value_delimiter = ',')]
+    #[arg(long, value_name = "EFFECT,…", value_delimiter = ',', allow_hyphen_values = true)]
     effects: Vec<String>,
     /// Folder of the data files, if they do not lie beside the session files.
     ///
@@ -227,7 +227,6 @@ fn readme(
     let mut inputs = String::new();
     for (place, (session, sources)) in origins.iter().enumerate() {
         let found = Provenance::of((session, sources), arguments.seed);
-        let found = found.map_err(|(path, why)| Failure::Other(format!("{}: {why}", path.display())))?;
         if place == 0 {
             text.push_str(&format!("```sh\n{}\n```\n\n", found.command));
         }

@@ -29,7 +29,7 @@ pub fn run(
         let arguments = SessionArguments { session: path.to_path_buf(), ..first.clone() };
         let (session, sources) = read_session(&arguments, outputs)?;
         if common.json.is_some() {
-            origin.add(Origin::of_session(&sources)?);
+            origin.add(Origin::of_session(&sources));
         }
         let (problem, fit) = abbe::identify::fit::prepare(&session, common.seed)?;
         let report = abbe::identify::fit::report(&problem, &fit)?;

@@ -61,13 +61,7 @@ impl ReportArguments {
     /// Writes the requested files.
     pub fn write(&self, document: &Document, read: (&Session, &SourceMap), seed: u64) -> Result<(), Failure> {
         if let Some(path) = &self.report {
-            let provenance = Provenance::of(read, seed).map_err(|(path, error)| {
-                Failure::Other(format!(
-                    "{}: cannot be read again for its checksum in the report: {error}",
-                    path.display()
-                ))
-            })?;
-            let text = page::html(document, &provenance).map_err(Failure::Other)?;
+            let text = page::html(document, &Provenance::of(read, seed)).map_err(Failure::Other)?;
             output::write_whole(path, text.as_bytes())?;
         }
         if let Some(path) = &self.plots {

@@ -36,7 +36,7 @@ impl SaveArguments {
         let model = IdentifiedModel::of_fit(
             problem,
             fit,
-            json::Origin::of_session(sources)?.provenance(json::command_line(), seed),
+            json::Origin::of_session(sources).provenance(json::command_line(), seed),
         )?;
         output::write_whole(path, model.to_text()?.as_bytes())
     }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use abbe::identify::model_file;
 use abbe::identify::validate::{Validation, validate};
+use abbe::model::files;
 use clap::Args;
 
 use super::failure::Failure;
@@ -53,7 +54,8 @@ pub fn run(arguments: &ValidateArguments) -> Result<(), Failure> {
     arguments.report.check()?;
     let outputs = arguments.common.outputs(&[arguments.csv.as_ref(), arguments.report.file()])?;
     outputs.refuse_overwrite([arguments.model.as_path()])?;
-    let model = model_file::read(&arguments.model)?;
+    let source = files::text(&arguments.model, "the model file")?;
+    let model = model_file::read_text(&source.file, &source.text)?;
     let (session, sources) = read_session(&arguments.session, &outputs)?;
     let validation = validate(&model, &session)?;
     let result = &validation.result;
@@ -62,8 +64,8 @@ pub fn run(arguments: &ValidateArguments) -> Result<(), Failure> {
     }
     print_warnings(&result.warnings);
     if let Some(path) = &arguments.common.json {
-        let mut origin = Origin::of_session(&sources)?;
-        origin.add(Origin::of_files(&[&arguments.model])?);
+        let mut origin = Origin::of_session(&sources);
+        origin.add(Origin::of_files(&source.stamp));
         json::write(path, origin, Some(arguments.common.seed), result)?;
     }
     if let Some(path) = &arguments.csv {

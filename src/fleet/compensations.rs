@@ -4,6 +4,8 @@ use std::path::Path;
 
 use abbe_identify::history::events::{Compensation, KnownChange};
 
+use abbe_model::files::{self, Source};
+
 use super::FleetError;
 use super::date;
 
@@ -13,6 +15,16 @@ use super::date;
 /// # Errors
 /// If the file cannot be read; with the line of what cannot be used.
 pub fn read(file: &Path) -> Result<Vec<Compensation>, FleetError> {
+    let source =
+        files::text(file, "the file of compensations").map_err(|fault| FleetError::Request(fault.to_string()))?;
+    of_source(&source)
+}
+
+/// As [`read`], from a file that has been read.
+///
+/// # Errors
+/// As [`read`].
+pub fn of_source(source: &Source) -> Result<Vec<Compensation>, FleetError> {
     #[derive(serde::Deserialize)]
     #[serde(deny_unknown_fields)]
     struct Row {
@@ -22,16 +34,16 @@ pub fn read(file: &Path) -> Result<Vec<Compensation>, FleetError> {
         change: f64,
         unit: String,
     }
-    let name = file.display();
+    let name = source.file.display();
     let fault = |line: usize, what: String| FleetError::Request(format!("{name}:{line}: {what}"));
-    let mut contents = std::fs::read(file).map_err(|source| FleetError::Read { path: name.to_string(), source })?;
+    let mut contents = source.text.clone();
     // The line of a row is that before the place of the reader behind it.
-    if !contents.ends_with(b"\n") {
-        contents.push(b'\n');
+    if !contents.ends_with('\n') {
+        contents.push('\n');
     }
     let mut found: Vec<Compensation> = Vec::new();
     let mut reader =
-        csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(contents.as_slice());
+        csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(contents.as_bytes());
     let expected = |line: usize, error: csv::Error| {
         fault(line, format!("{error}; columns machine_id, date, parameter, change, unit are expected"))
     };

@@ -97,7 +97,7 @@ impl Folder {
         let options = ReadOptions { read_data, store: store.clone(), ..ReadOptions::default() };
         let read = files::session_with_sources(Path::new(session), &options);
         let (session, sources) = read.map_err(|fault| Failed::from(fault).within(&store))?;
-        let origin = Origin::of_session(&sources)?;
+        let origin = Origin::of_session(&sources);
         Ok(Read { session, sources, origin })
     }
 }

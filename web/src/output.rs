@@ -1,7 +1,5 @@
 //! What every result gives: its document, its report, its files.
 
-use std::path::PathBuf;
-
 use abbe::document::{Call, Document};
 use abbe::identify::fit::Fit;
 use abbe::identify::model_file::IdentifiedModel;
@@ -29,8 +27,7 @@ pub fn json<T: Serialize>(command: &str, read: &Read, seed: u64, result: &T) -> 
 
 /// The page of a report.
 pub fn report(command: &str, read: &Read, seed: u64, document: &Report) -> Result<String, Failed> {
-    let changed = |(path, cause): (PathBuf, String)| Failed::from(format!("{}: {cause}", path.display()));
-    let provenance = Provenance::of((&read.session, &read.sources), seed).map_err(changed)?;
+    let provenance = Provenance::of((&read.session, &read.sources), seed);
     let command = format!("abbe {command} {}", read.sources.file.display());
     Ok(page::html(document, &Provenance { command, ..provenance })?)
 }

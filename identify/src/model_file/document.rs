@@ -75,7 +75,7 @@ pub struct Provenance {
 pub struct InputFile {
     /// Path as the command or the session names it.
     pub file: String,
-    /// SHA-256 of the contents, in hexadecimal; `null` for a pipe, which can be read only once.
+    /// SHA-256 of the contents as they were read, in hexadecimal; `null` in models of earlier versions that came from a pipe.
     pub sha256: Option<String>,
 }
 

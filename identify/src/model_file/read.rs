@@ -34,7 +34,7 @@ const ROUNDING_OF_COVARIANCE: f64 = 1e-9;
 /// If the file cannot be read, is no model, is of a newer version, or was changed by hand: the file, the key, what was
 /// found and what to do.
 pub fn read(path: &Path) -> Result<IdentifiedModel, IdentifyError> {
-    read_text(path, &files::text(path, "the model file")?)
+    read_text(path, &files::text(path, "the model file")?.text)
 }
 
 /// As [`read`], from the text of the file.

@@ -5,7 +5,7 @@ use std::path::Path;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{ERRORS_PER_AXIS, Machine};
 use abbe_model::component::{ErrorKind, ErrorName};
-use abbe_model::files;
+use abbe_model::files::{self, Source};
 use abbe_model::session::limits;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -157,9 +157,16 @@ struct HarmonicEntry {
 /// If the file cannot be read, is not of this form, holds a number beyond [`limits::LARGEST`], or names something that
 /// the machine lacks. The message names the file and the entry.
 pub fn read(path: &Path, machine: &Machine) -> Result<Vec<ErrorFunction>, IdentifyError> {
-    let fault = |message: String| IdentifyError::Request(format!("{}: {message}", path.display()));
-    let text = files::text(path, "the file of error functions")?;
-    parse(&text, machine).map_err(fault)
+    of_source(&files::text(path, "the file of error functions")?, machine)
+}
+
+/// As [`read`], from a file that has been read.
+///
+/// # Errors
+/// As [`read`].
+pub fn of_source(source: &Source, machine: &Machine) -> Result<Vec<ErrorFunction>, IdentifyError> {
+    let fault = |message: String| IdentifyError::Request(format!("{}: {message}", source.file.display()));
+    parse(&source.text, machine).map_err(fault)
 }
 
 /// As [`read`], from text; the error is a message.

@@ -168,7 +168,7 @@ pub fn map(
         let mut point = machine_with_errors.error_at(&positions);
         if !point.error_mm.iter().all(|error| error.abs() <= LARGEST) {
             return Err(IdentifyError::Request(format!(
-                "the errors displace the tool by {:e} mm at {}; polynomials grow fast beyond their scale",
+                "the errors displace the tool by {:.2e} mm at {}; polynomials grow fast beyond their scale",
                 norm(point.error_mm),
                 machine_with_errors.position_text(&positions)
             )));

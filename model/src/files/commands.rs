@@ -5,12 +5,14 @@
 //! `i j k` (the direction of the tool's Z) or `qw qx qy qz` (a quaternion). Every other column is kept as it is. A row
 //! with a cell that is no number is marked and kept.
 
-use std::fs::File;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use csv::StringRecord;
 
 use super::quantity::{self, Unit};
+use super::stamp::FileStamp;
+use super::store::{OpenFile, Store};
 use super::table::number;
 use super::table::request::Format;
 use crate::axis::AxisKind;
@@ -47,6 +49,27 @@ pub enum PoseColumns {
     PointAndQuaternion,
 }
 
+/// Largest length of a row, bytes.
+const LONGEST_ROW: u64 = 1 << 20;
+
+/// A file whose rows have a limited length.
+struct Bounded {
+    opened: OpenFile,
+    /// Bytes that the present row may still have.
+    left: u64,
+}
+
+impl Read for Bounded {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.opened.read(buffer)?;
+        self.left = self
+            .left
+            .checked_sub(count as u64)
+            .ok_or_else(|| io::Error::other(format!("a row of more than {LONGEST_ROW} bytes, which is the limit")))?;
+        Ok(count)
+    }
+}
+
 /// A block of rows.
 #[derive(Debug)]
 pub struct Block {
@@ -67,7 +90,8 @@ pub struct Block {
 /// A file of commanded positions.
 pub struct CommandFile {
     path: PathBuf,
-    reader: csv::Reader<File>,
+    stamp: FileStamp,
+    reader: csv::Reader<Bounded>,
     header: StringRecord,
     meanings: Vec<Meaning>,
     /// Name of the column and kind of each axis of the machine.
@@ -86,7 +110,8 @@ impl CommandFile {
     /// # Errors
     /// If the file cannot be read, or its header names no axis and no pose, a quantity twice, or a part of a pose.
     pub fn open(path: &Path, machine: &Machine, at: Vec<f64>) -> Result<CommandFile, ModelError> {
-        let file = File::open(path).map_err(|cause| ModelError::Input {
+        let opened = Store::Disk.open(path).and_then(|opened| Ok((opened.state()?, opened)));
+        let (state, opened) = opened.map_err(|cause| ModelError::Input {
             location: Location::file(path),
             message: format!("the file of commands cannot be read: {cause}"),
             help: None,
@@ -96,7 +121,7 @@ impl CommandFile {
             .trim(csv::Trim::All)
             .comment(Some(b'#'))
             .flexible(true)
-            .from_reader(file);
+            .from_reader(Bounded { opened, left: LONGEST_ROW });
         let mut header = StringRecord::new();
         let found = reader.read_record(&mut header).map_err(|cause| unreadable(path, &cause))?;
         let fault = |message: String, help: String| ModelError::Input {
@@ -157,6 +182,7 @@ impl CommandFile {
         }
         Ok(CommandFile {
             path: path.to_path_buf(),
+            stamp: FileStamp::of(path, state),
             reader,
             header: header.clone(),
             meanings,
@@ -167,6 +193,11 @@ impl CommandFile {
             last_run: 0,
             last: None,
         })
+    }
+
+    /// The file; the bytes that were read are known after the last block.
+    pub fn stamp(&self) -> &FileStamp {
+        &self.stamp
     }
 
     /// The names of the columns.
@@ -224,7 +255,9 @@ impl CommandFile {
         // Rows with a fault before the first row of numbers.
         let mut leading = 0;
         while block.cells.len() < most {
+            self.reader.get_mut().left = LONGEST_ROW;
             if !self.reader.read_record(&mut record).map_err(|cause| unreadable(&self.path, &cause))? {
+                self.stamp.finish(&self.reader.get_ref().opened)?;
                 break;
             }
             let last_run = block.rows.run.last().copied().unwrap_or(self.last_run);

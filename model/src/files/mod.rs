@@ -5,7 +5,7 @@
 //! - [`template`]: files of a new machine from its structural code;
 //! - [`store`]: files on the disk or in memory; `stl`: surfaces of bodies;
 //! - [`SourceMap`]: the files and texts of a session that was read;
-//! - [`schema`]: JSON Schema of machine and session files; [`stamp`]: state of the files that were read.
+//! - [`schema`]: JSON Schema of machine and session files; [`stamp`]: the bytes of the files that were read.
 
 pub mod commands;
 mod quantity;
@@ -21,5 +21,5 @@ pub mod toml;
 mod with_readings;
 
 pub use self::source_map::SourceMap;
-pub use self::toml::{ReadOptions, machine, session, session_with_sources, text};
+pub use self::toml::{ReadOptions, Source, machine, machine_of, session, session_of, session_with_sources, text};
 pub use self::with_readings::{Changes, with_readings};

@@ -1,6 +1,7 @@
 //! Where a session comes from: its files, and their texts.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use super::stamp::FileStamp;
 
@@ -15,8 +16,19 @@ pub struct SourceMap {
     pub text: String,
     /// The text of the machine file, if the session names one.
     pub machine_text: Option<String>,
-    /// The files of the machine's bodies: each as it is named, relative to the file that names it, and its state.
-    pub bodies: Vec<(String, FileStamp)>,
+    /// The files of the machine's bodies.
+    pub bodies: Vec<BodyFile>,
     /// All files that were read, each once: the session, its machine, its bodies, its data.
     pub files: Vec<FileStamp>,
+}
+
+/// The file of a body of the machine.
+#[derive(Clone, Debug)]
+pub struct BodyFile {
+    /// As it is named, relative to the file that names it.
+    pub name: String,
+    /// The file when it was read.
+    pub stamp: FileStamp,
+    /// Its content.
+    pub contents: Arc<[u8]>,
 }

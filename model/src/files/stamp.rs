@@ -1,41 +1,53 @@
-//! State of input files when they were read, so that a result refers to exactly these inputs.
+//! Input files as they were read: a result refers to exactly the bytes from which it follows.
 
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
 
-use super::store::{FileState, OpenFile, Store};
+use super::store::{FileState, OpenFile};
 use crate::error::{Location, ModelError};
 
-/// The state of a file when it was opened.
+/// The bytes that were read from a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ReadBytes {
+    /// Their number.
+    pub count: u64,
+    /// Their SHA-256.
+    pub sha256: [u8; 32],
+}
+
+/// A file that was read once: a regular file, a pipe or a device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FileStamp {
     /// The file as named by the user or a session.
     pub file: PathBuf,
+    /// Its state when it was opened.
     state: FileState,
-    store: Store,
+    /// What was read, from the end of reading on.
+    read: Arc<OnceLock<ReadBytes>>,
 }
 
 impl FileStamp {
-    pub(crate) fn of(file: &Path, state: FileState, store: &Store) -> FileStamp {
-        FileStamp { file: file.to_path_buf(), state, store: store.clone() }
+    pub(crate) fn of(file: &Path, state: FileState) -> FileStamp {
+        FileStamp { file: file.to_path_buf(), state, read: Arc::default() }
     }
 
-    /// The content of the file.
-    ///
-    /// # Errors
-    /// If it cannot be read.
-    pub fn read(&self) -> std::io::Result<Vec<u8>> {
-        self.store.read(&self.file)
+    /// The bytes that were read; `None` while the file is being read.
+    pub fn read(&self) -> Option<ReadBytes> {
+        self.read.get().copied()
     }
 
-    /// Whether it is a regular file, not a pipe or a device whose bytes can be read only once.
-    pub fn is_regular(&self) -> bool {
-        self.state.regular
+    /// SHA-256 of the bytes that were read, in hexadecimal; `None` while the file is being read.
+    pub fn sha256(&self) -> Option<String> {
+        Some(self.read()?.sha256.iter().map(|byte| format!("{byte:02x}")).collect())
     }
 
-    /// Returns an error if the open file has changed since it was opened.
-    pub(crate) fn check(&self, opened: &OpenFile) -> Result<(), ModelError> {
+    /// Notes what was read. Returns an error if the open file has changed since it was opened.
+    pub(crate) fn finish(&self, opened: &OpenFile) -> Result<(), ModelError> {
         match opened.state() {
-            Ok(found) if found == self.state || !self.state.regular => Ok(()),
+            Ok(found) if found == self.state || !self.state.regular => {
+                let _ = self.read.set(opened.read_bytes());
+                Ok(())
+            }
             _ => Err(ModelError::Input {
                 location: Location::file(&self.file),
                 message: "the file changed while it was read".into(),
@@ -43,14 +55,27 @@ impl FileStamp {
             }),
         }
     }
+}
 
-    /// A description of the change if the file has changed since it was read.
-    pub fn changed(&self) -> Option<String> {
-        match self.store.state(&self.file) {
-            _ if !self.state.regular => Some("it is a pipe or a device, which can be read only once".into()),
-            Err(cause) => Some(format!("it no longer exists: {cause}")),
-            Ok(found) if found == self.state => None,
-            Ok(_) => Some("it has changed since it was read".into()),
-        }
+#[cfg(test)]
+mod tests {
+    use std::io::Read;
+
+    use super::*;
+    use crate::files::store::Store;
+
+    #[test]
+    fn the_checksum_is_that_of_the_bytes_that_were_read() {
+        // FIPS 180-4, example of the message "abc".
+        let store = Store::in_memory([("abc", b"abc".to_vec())]);
+        let mut opened = store.open("abc".as_ref()).unwrap();
+        let stamp = FileStamp::of("abc".as_ref(), opened.state().unwrap());
+        assert_eq!(stamp.sha256(), None);
+        let mut text = String::new();
+        opened.read_to_string(&mut text).unwrap();
+        stamp.clone().finish(&opened).unwrap();
+        assert_eq!(stamp.read().unwrap().count, 3);
+        let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!(stamp.sha256().as_deref(), Some(expected));
     }
 }

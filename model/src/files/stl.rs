@@ -6,6 +6,7 @@
 use std::collections::HashMap;
 use std::io::{Cursor, Read};
 use std::path::Path;
+use std::sync::Arc;
 
 use super::stamp::FileStamp;
 use super::store::Store;
@@ -27,6 +28,8 @@ pub(crate) struct Surface {
     pub shape: BodyShape,
     /// The file when it was read.
     pub stamp: FileStamp,
+    /// Its content.
+    pub contents: Arc<[u8]>,
     /// Number of edges that belong to one triangle only.
     pub open_edges: usize,
 }
@@ -35,14 +38,15 @@ pub(crate) struct Surface {
 pub(crate) fn surface(store: &Store, file: &Path) -> Result<Surface, (String, String)> {
     let unreadable = |cause: std::io::Error| (format!("cannot be read: {cause}"), "check the name".to_string());
     let mut opened = store.open(file).map_err(unreadable)?;
-    let stamp = FileStamp::of(file, opened.state().map_err(unreadable)?, store);
+    let stamp = FileStamp::of(file, opened.state().map_err(unreadable)?);
     let mut bytes = Vec::new();
     opened.by_ref().take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
     if bytes.len() as u64 > MAX_BYTES {
         let help = "export it with fewer triangles: a body for clearances needs no fillets and threads";
         return Err((format!("has more than {MAX_BYTES} bytes, which is the limit"), help.into()));
     }
-    stamp.check(&opened).map_err(|fault| (fault.to_string(), "wait until it is written and try again".into()))?;
+    stamp.finish(&opened).map_err(|fault| (fault.to_string(), "wait until it is written and try again".into()))?;
+    let contents = Arc::from(bytes.as_slice());
     let triangles = triangles(bytes)?;
     let open_edges = open_edges(&triangles);
     let is_closed = open_edges == 0;
@@ -50,7 +54,7 @@ pub(crate) fn surface(store: &Store, file: &Path) -> Result<Surface, (String, St
     let inside_out = is_closed && triangles.iter().map(volume).sum::<f64>() < 0.0;
     let outward = |[a, b, c]: [[f64; 3]; 3]| if inside_out { [a, c, b] } else { [a, b, c] };
     let triangles_mm = triangles.into_iter().map(outward).collect();
-    Ok(Surface { shape: BodyShape::Mesh { triangles_mm, is_closed }, stamp, open_edges })
+    Ok(Surface { shape: BodyShape::Mesh { triangles_mm, is_closed }, stamp, contents, open_edges })
 }
 
 /// The triangles of a file.
@@ -97,7 +101,7 @@ fn triangles(mut bytes: Vec<u8>) -> Result<Vec<[[f64; 3]; 3]>, (String, String)>
         if let Some(x) = corners.iter().flatten().find(|x| !x.is_finite()) {
             return Err(fault(format!("triangle {number} has the coordinate {x}")));
         }
-        if let Some(found) = corners.iter().flatten().find_map(|x| limits::too_large(*x)) {
+        if let Some(found) = corners.iter().flatten().find_map(|x| limits::too_large_for("coordinate_mm", *x)) {
             return Err((format!("triangle {number} has a coordinate that is {found}"), "the unit is mm".into()));
         }
         triangles.push(corners);

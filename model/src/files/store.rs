@@ -2,10 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, Cursor, ErrorKind, Read, Seek, SeekFrom};
+use std::io::{self, Cursor, ErrorKind, Read};
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 use std::time::SystemTime;
+
+use sha2::{Digest, Sha256};
+
+use super::stamp::ReadBytes;
 
 /// Where the files of a session lie.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -55,8 +59,10 @@ impl Store {
     /// Opens a file.
     pub(crate) fn open(&self, path: &Path) -> io::Result<OpenFile> {
         match self {
-            Store::Disk => File::open(path).map(OpenFile::Disk),
-            Store::Memory(files) => contents(files, path).map(|contents| OpenFile::Memory(Cursor::new(contents))),
+            Store::Disk => File::open(path).map(|file| OpenFile::new(Bytes::Disk(file))),
+            Store::Memory(files) => {
+                contents(files, path).map(|contents| OpenFile::new(Bytes::Memory(Cursor::new(contents))))
+            }
         }
     }
 
@@ -105,37 +111,46 @@ impl FileState {
     }
 }
 
-/// A file that is open for reading.
-pub(crate) enum OpenFile {
+/// A file that is open for reading. It counts and hashes the bytes that are read.
+pub(crate) struct OpenFile {
+    bytes: Bytes,
+    count: u64,
+    hash: Sha256,
+}
+
+enum Bytes {
     Disk(File),
     Memory(Cursor<Arc<[u8]>>),
 }
 
 impl OpenFile {
+    fn new(bytes: Bytes) -> OpenFile {
+        OpenFile { bytes, count: 0, hash: Sha256::new() }
+    }
+
     /// Its state.
     pub fn state(&self) -> io::Result<FileState> {
-        match self {
-            OpenFile::Disk(file) => file.metadata().map(|found| FileState::of_disk(&found)),
-            OpenFile::Memory(contents) => Ok(FileState::in_memory(contents.get_ref().len())),
+        match &self.bytes {
+            Bytes::Disk(file) => file.metadata().map(|found| FileState::of_disk(&found)),
+            Bytes::Memory(contents) => Ok(FileState::in_memory(contents.get_ref().len())),
         }
+    }
+
+    /// What has been read.
+    pub fn read_bytes(&self) -> ReadBytes {
+        ReadBytes { count: self.count, sha256: self.hash.clone().finalize().into() }
     }
 }
 
 impl Read for OpenFile {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        match self {
-            OpenFile::Disk(file) => file.read(buffer),
-            OpenFile::Memory(contents) => contents.read(buffer),
-        }
-    }
-}
-
-impl Seek for OpenFile {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        match self {
-            OpenFile::Disk(file) => file.seek(to),
-            OpenFile::Memory(contents) => contents.seek(to),
-        }
+        let count = match &mut self.bytes {
+            Bytes::Disk(file) => file.read(buffer)?,
+            Bytes::Memory(contents) => contents.read(buffer)?,
+        };
+        self.hash.update(&buffer[..count]);
+        self.count += count as u64;
+        Ok(count)
     }
 }
 

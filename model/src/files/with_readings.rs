@@ -2,7 +2,7 @@
 
 use std::path::{Component, Path};
 
-use super::source_map::SourceMap;
+use super::source_map::{BodyFile, SourceMap};
 use super::table::csv;
 use super::toml::{rewrite, write};
 use crate::error::ModelError;
@@ -40,18 +40,14 @@ pub fn with_readings(
     if let Some(machine) = &sources.machine_text {
         files.push(("machine.toml".into(), machine.clone().into_bytes()));
     }
-    for (name, stamp) in &sources.bodies {
+    for BodyFile { name, contents, .. } in &sources.bodies {
         if !Path::new(name).components().all(|part| matches!(part, Component::Normal(_))) {
             return Err(ModelError::Session {
                 message: format!("the body in {name} cannot be copied with the session"),
                 help: "put the STL file beside the machine file, or below".into(),
             });
         }
-        let contents = stamp.read().map_err(|cause| ModelError::Session {
-            message: format!("{name}: {cause}"),
-            help: "check the file".into(),
-        })?;
-        files.push((name.clone(), contents));
+        files.push((name.clone(), contents.to_vec()));
     }
     let mut text = write::with_data(&sources.text, file, &data)?;
     text = rewrite::with_machine_file(&text, file, "machine.toml")?;

@@ -87,7 +87,7 @@ impl Lines {
             file: file.to_path_buf(),
             encoding: format.encoding,
             skip: format.skip_lines,
-            stamp: FileStamp::of(file, found, store),
+            stamp: FileStamp::of(file, found),
             limits,
             reader: BufReader::with_capacity(1 << 16, opened),
             line: 0,
@@ -139,7 +139,7 @@ impl Lines {
         self.until_line_end()?;
         let mut read = self.buffer.len();
         if read == 0 {
-            self.stamp.check(self.reader.get_ref())?;
+            self.stamp.finish(self.reader.get_ref())?;
             return Ok(None);
         }
         self.line += 1;

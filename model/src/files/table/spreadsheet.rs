@@ -74,15 +74,16 @@ fn rows(store: &Store, file: &Path, format: &Format) -> Result<(FileStamp, Vec<R
         ));
     }
     let mut contents = Vec::new();
-    let opened = store.open(file).map_err(|cause| broken(cause.into()))?;
-    opened.take(MAX_BYTES).read_to_end(&mut contents).map_err(|cause| broken(cause.into()))?;
+    let mut opened = store.open(file).map_err(|cause| broken(cause.into()))?;
+    opened.by_ref().take(MAX_BYTES + 1).read_to_end(&mut contents).map_err(|cause| broken(cause.into()))?;
+    let stamp = FileStamp::of(file, found);
+    stamp.finish(&opened)?;
     if unpacks_beyond(&contents, MAX_UNPACKED) {
         return Err(fault(
             format!("a spreadsheet that unpacks to more than {MAX_UNPACKED} bytes, which is the limit"),
             "export it as CSV".into(),
         ));
     }
-    let stamp = FileStamp::of(file, found, store);
     let mut book = catch_panic(|| workbook(file, contents)).map_err(broken)?;
     let names = book.sheet_names();
     let sheets_to_read: Vec<String> = match &format.sheet {
@@ -99,9 +100,6 @@ fn rows(store: &Store, file: &Path, format: &Format) -> Result<(FileStamp, Vec<R
         if !rows.is_empty() {
             filled.push((name, rows));
         }
-    }
-    if let Some(what) = stamp.changed() {
-        return Err(fault(what, "wait until it is written and try again".into()));
     }
     match filled.len() {
         0 | 1 => Ok((stamp, filled.pop().map(|(_, rows)| rows).unwrap_or_default())),

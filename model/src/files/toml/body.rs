@@ -6,7 +6,7 @@ use super::{ReadOptions, data_folder, quantity};
 use crate::body::{Body, BodyShape, ClearanceSizes, Holder};
 use crate::chain::Machine;
 use crate::error::ModelError;
-use crate::files::stamp::FileStamp;
+use crate::files::source_map::BodyFile;
 use crate::files::stl;
 use crate::files::toml::document::{Table, Value};
 
@@ -16,8 +16,8 @@ pub(super) struct BodyFiles<'f> {
     /// The session file or the machine file that is read, the file that names the bodies, and the options; `None` for a
     /// text from no file.
     pub from: Option<(&'f Path, &'f Path, &'f ReadOptions)>,
-    /// Each file as it is named, and its state when it was read.
-    pub read: Vec<(String, FileStamp)>,
+    /// The files that were read.
+    pub read: Vec<BodyFile>,
     /// Warnings about usable files.
     pub warnings: Vec<String>,
 }
@@ -45,7 +45,7 @@ impl BodyFiles<'_> {
                 surface.open_edges
             ));
         }
-        self.read.push((named, surface.stamp));
+        self.read.push(BodyFile { name: named, stamp: surface.stamp, contents: surface.contents });
         Ok(surface.shape)
     }
 }

@@ -24,8 +24,9 @@ const MAX_DEPTH: usize = 80;
 /// comparison.
 const MAX_ITEMS: usize = 1000;
 
-/// A file's text with its name.
-pub(crate) struct Source {
+/// The text of a file, read once: a session, a machine, a model, a study, a file of values.
+#[derive(Clone, Debug)]
+pub struct Source {
     /// As the user named it.
     pub file: PathBuf,
     /// The text, without a byte order mark.
@@ -37,7 +38,11 @@ pub(crate) struct Source {
 }
 
 impl Source {
-    /// Reads a text file; `what` names its content in messages.
+    /// Reads a text file of UTF-8 with or without byte order mark, within the limit of its size; `what` names its content
+    /// in messages.
+    ///
+    /// # Errors
+    /// If the file cannot be read or is not such a text, with its name and what to do.
     pub fn read(store: &Store, file: &Path, what: &str) -> Result<Source, ModelError> {
         let fault = |message: String, help: &str| ModelError::Input {
             location: Location::file(file),
@@ -53,7 +58,7 @@ impl Source {
             fault(format!("{what} cannot be read: {cause}"), help)
         };
         let mut opened = store.open(file).map_err(unreadable)?;
-        let stamp = FileStamp::of(file, opened.state().map_err(unreadable)?, store);
+        let stamp = FileStamp::of(file, opened.state().map_err(unreadable)?);
         let mut bytes = Vec::new();
         // The length of a pipe is unknown in advance.
         opened.by_ref().take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
@@ -63,7 +68,7 @@ impl Source {
                 "readings belong in CSV files named by `data`",
             ));
         }
-        stamp.check(&opened)?;
+        stamp.finish(&opened)?;
         let text = String::from_utf8(bytes).map_err(|cause| {
             fault(
                 format!("byte {} is not UTF-8, the encoding of TOML", cause.utf8_error().valid_up_to() + 1),
@@ -80,7 +85,7 @@ impl Source {
     }
 
     /// The whole file as a table.
-    pub fn parse(&self) -> Result<Table<'_>, ModelError> {
+    pub(crate) fn parse(&self) -> Result<Table<'_>, ModelError> {
         let root = DeTable::parse(&self.text).map_err(|fault| {
             self.error(
                 fault.span().unwrap_or(0..0),
@@ -95,7 +100,7 @@ impl Source {
     }
 
     /// The location of some bytes of the text.
-    pub fn location(&self, span: Range<usize>) -> Location {
+    pub(crate) fn location(&self, span: Range<usize>) -> Location {
         let until = span.start.min(self.text.len());
         Location {
             file: self.file.clone(),
@@ -105,7 +110,7 @@ impl Source {
     }
 
     /// An error at a location of this file.
-    pub fn error(&self, span: Range<usize>, message: impl Into<String>, help: Option<String>) -> ModelError {
+    pub(crate) fn error(&self, span: Range<usize>, message: impl Into<String>, help: Option<String>) -> ModelError {
         ModelError::Input { location: self.location(span), message: message.into(), help }
     }
 }

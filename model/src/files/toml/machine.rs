@@ -18,9 +18,18 @@ use crate::frames::Rotation;
 /// # Errors
 /// If the file cannot be read or does not describe a machine, with its line and what to do.
 pub fn machine(path: &Path) -> Result<Machine, ModelError> {
+    machine_of(&source(&Store::Disk, path)?)
+}
+
+/// As [`machine`], from a machine file that has been read.
+///
+/// # Errors
+/// As [`machine`].
+pub fn machine_of(source: &Source) -> Result<Machine, ModelError> {
     let options = ReadOptions::default();
+    let path = source.file.as_path();
     let mut files = BodyFiles { from: Some((path, path, &options)), ..BodyFiles::default() };
-    from_table(source(&options.store, path)?.parse()?, &mut files)
+    from_table(source.parse()?, &mut files)
 }
 
 /// The text of a machine file.

@@ -25,10 +25,10 @@ pub mod write_test;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-pub use machine::machine;
+pub use machine::{machine, machine_of};
 
 use super::quantity::{self, MICROMETRE};
-use super::source_map::SourceMap;
+use super::source_map::{BodyFile, SourceMap};
 use super::stamp::FileStamp;
 use super::store::Store;
 use super::table::memory::MemoryColumn;
@@ -40,8 +40,10 @@ use crate::instrument::InstrumentKind;
 use crate::session::expression::{Constant, Length};
 use crate::session::limits;
 use crate::session::{Session, Test, setups};
+use crate::words;
 use body::BodyFiles;
-use document::{Source, Table, Value};
+pub use document::Source;
+use document::{Table, Value};
 
 /// Options for reading a session.
 #[derive(Clone, Debug)]
@@ -96,7 +98,7 @@ impl Context<'_> {
             let found = self.constants.iter().find(|known| known.name == name);
             found.map_or(f64::NAN, |constant| constant.mm)
         });
-        if let Some(fault) = limits::too_large(number) {
+        if let Some(fault) = limits::too_large_for(&value.key, number) {
             let message = format!("`{}` = \"{text}\" evaluates to {fault}", value.key);
             return Err(value.error(message, None));
         }
@@ -118,13 +120,12 @@ impl Context<'_> {
     }
 }
 
-/// Reads the text of another TOML file in the same way: UTF-8 with or without byte order mark, of a limited size,
-/// unchanged while it is read. `what` names its content in messages.
+/// Reads the text of another file in the same way. `what` names its content in messages.
 ///
 /// # Errors
-/// If the file cannot be read or is not such a text, with its name and what to do.
-pub fn text(path: &Path, what: &str) -> Result<String, ModelError> {
-    Ok(Source::read(&Store::Disk, path, what)?.text)
+/// As [`Source::read`].
+pub fn text(path: &Path, what: &str) -> Result<Source, ModelError> {
+    Source::read(&Store::Disk, path, what)
 }
 
 /// Reads a session file, its machine and, if requested, its data.
@@ -140,7 +141,15 @@ pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError
 /// # Errors
 /// As [`session`].
 pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Session, SourceMap), ModelError> {
-    let source = Source::read(&options.store, path, "the session file")?;
+    session_of(&Source::read(&options.store, path, "the session file")?, options)
+}
+
+/// As [`session_with_sources`], from a session file that has been read.
+///
+/// # Errors
+/// As [`session`].
+pub fn session_of(source: &Source, options: &ReadOptions) -> Result<(Session, SourceMap), ModelError> {
+    let path = source.file.as_path();
     let mut root = source.parse()?;
     let SessionMachine { machine, source: machine_source, bodies, warnings } =
         session_machine(path, options, &mut root)?;
@@ -185,7 +194,7 @@ pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Sessi
     root.finish()?;
     let mut files: Vec<FileStamp> = Vec::new();
     let own = source.stamp.iter().chain(machine_source.iter().filter_map(|source| source.stamp.as_ref()));
-    for stamp in own.chain(bodies.iter().map(|(_, stamp)| stamp)).chain(&found.stamps) {
+    for stamp in own.chain(bodies.iter().map(|body| &body.stamp)).chain(&found.stamps) {
         if !files.contains(stamp) {
             files.push(stamp.clone());
         }
@@ -237,8 +246,8 @@ struct Found {
 struct SessionMachine {
     machine: Machine,
     source: Option<Source>,
-    /// The files of bodies, as they are named.
-    bodies: Vec<(String, FileStamp)>,
+    /// The files of bodies.
+    bodies: Vec<BodyFile>,
     /// Warnings about usable files of bodies.
     warnings: Vec<String>,
 }
@@ -313,7 +322,7 @@ impl Instrument {
             };
             let number = value.number()?;
             if number < 0.0 {
-                let message = format!("`{key}` is {number}; it cannot be negative");
+                let message = format!("`{key}` is {}; it cannot be negative", words::number(number));
                 return Err(value.error(message, None));
             }
             if let Some(fault) = limits::too_small_um(number) {

@@ -7,6 +7,7 @@ use crate::effect::{CoefficientPrior, Component, Shape};
 use crate::error::ModelError;
 use crate::instrument::{InstrumentParameter, InternalUnit};
 use crate::session::limits::MIN_UM;
+use crate::words;
 
 /// The keys of a stated standard deviation, with the internal unit of the component that has them.
 const SCALES: [(&str, InternalUnit); 2] =
@@ -42,7 +43,7 @@ pub(super) fn read(
         }
         let scale = value.positive()?;
         if !(MIN_UM..=MAX_SCALE).contains(&scale) {
-            let message = format!("`{key}` is {scale}; it must be between {MIN_UM} and {MAX_SCALE}");
+            let message = format!("`{key}` is {}; it must be between {MIN_UM} and {MAX_SCALE}", words::number(scale));
             return Err(value.error(message, None));
         }
         prior = CoefficientPrior::Scale(scale * internal(unit));

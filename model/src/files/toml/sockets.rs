@@ -5,6 +5,7 @@ use crate::error::ModelError;
 use crate::files::toml::document::Table;
 use crate::instrument::{InstrumentKind, SharedBy};
 use crate::session::{SocketDistance, Test};
+use crate::words;
 
 /// `[[socket_distance]] between = ["0", "1"], mm = 50.0, u_um = 100`; without `u_um` the distance is exact.
 pub(super) fn socket_distances(
@@ -48,7 +49,7 @@ pub(super) fn socket_distances(
             Some(value) => {
                 let u = value.number()?;
                 if u < 0.0 {
-                    return Err(value.error(format!("`u_um` is {u}; it cannot be negative"), None));
+                    return Err(value.error(format!("`u_um` is {}; it cannot be negative", words::number(u)), None));
                 }
                 u * MICROMETRE
             }

@@ -11,6 +11,7 @@ use crate::instrument::InstrumentKind;
 use crate::instrument::set_up::{SetUp, SetUpReader, Written};
 use crate::session::Prior;
 use crate::session::limits;
+use crate::words;
 
 /// Reads the instrument's keys of a test.
 pub(super) fn set_up(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
@@ -176,7 +177,7 @@ fn priors(value: Option<Value<'_>>, count: usize) -> Result<Vec<Prior>, ModelErr
 fn prior(value: &Value<'_>) -> Result<Prior, ModelError> {
     let u = value.number_or_inf("a number or `inf`")?;
     if u < 0.0 {
-        let message = format!("`{}` is {u}; an uncertainty cannot be negative", value.key);
+        let message = format!("`{}` is {}; an uncertainty cannot be negative", value.key, words::number(u));
         let help = "0 means exactly known, `inf` means unknown";
         return Err(value.error(message, Some(help.into())));
     }

@@ -7,6 +7,7 @@ use crate::error::ModelError;
 use crate::files::spelling::known_names;
 use crate::files::toml::document::{Table, Value};
 use crate::session::tolerance::{Limit, TestFigure, Tolerance, Toleranced};
+use crate::words;
 
 /// The suffixes of limits of parameters, with their units. A slope of 1 µm/m is an angle of 1 µrad.
 const UNITS: [(&str, &str); 6] =
@@ -115,7 +116,9 @@ fn of_test(tests: &[&str], entry: Value<'_>) -> Result<Vec<Limit>, ModelError> {
         Some(value) => {
             let u = value.number()?;
             if u < 0.0 {
-                return Err(value.error(format!("`instrument_u_um` is {u}; it cannot be negative"), None));
+                return Err(
+                    value.error(format!("`instrument_u_um` is {}; it cannot be negative", words::number(u)), None)
+                );
             }
             u
         }

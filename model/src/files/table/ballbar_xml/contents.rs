@@ -58,13 +58,13 @@ fn decoded(store: &Store, file: &Path, stated: Option<&'static Encoding>) -> Res
     };
     let unreadable = |cause: std::io::Error| fault(format!("the data file cannot be read: {cause}"));
     let mut opened = store.open(file).map_err(unreadable)?;
-    let stamp = FileStamp::of(file, opened.state().map_err(unreadable)?, store);
+    let stamp = FileStamp::of(file, opened.state().map_err(unreadable)?);
     let mut bytes = Vec::new();
     opened.by_ref().take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
     if bytes.len() as u64 > MAX_BYTES {
         return Err(fault(format!("more than {MAX_BYTES} bytes, the limit of a ball-bar file in XML")));
     }
-    stamp.check(&opened)?;
+    stamp.finish(&opened)?;
     let (encoding, mark) = encoding::of_start(&bytes, stated);
     let (text, _) = encoding::decode(&bytes[mark..], encoding)
         .map_err(|encoding| fault(format!("the file is not valid {}", encoding::name_of(encoding))))?;

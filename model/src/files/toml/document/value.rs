@@ -8,6 +8,7 @@ use toml::de::{DeTable, DeValue};
 use super::{MAX_ITEMS, Source, Table};
 use crate::error::ModelError;
 use crate::session::limits;
+use crate::words;
 
 /// A value with its key.
 pub(crate) struct Value<'a> {
@@ -96,7 +97,7 @@ impl<'a> Value<'a> {
         self.value.as_bool().ok_or_else(|| self.unexpected("true or false"))
     }
 
-    /// A number within [`limits::LARGEST`], possibly infinite, never NaN.
+    /// A number within the limits of its key ([`limits::too_large_for`]), possibly infinite, never NaN.
     pub fn number_or_inf(&self, expected: &str) -> Result<f64, ModelError> {
         let number = match &self.value {
             DeValue::Integer(integer) => {
@@ -113,7 +114,7 @@ impl<'a> Value<'a> {
             Some(number) if f64::is_nan(number) => {
                 Err(self.error(format!("`{}` is NaN; {expected} is expected", self.key), None))
             }
-            Some(number) => match limits::too_large(number) {
+            Some(number) => match limits::too_large_for(&self.key, number) {
                 Some(fault) => Err(self.error(format!("`{}` is {fault}", self.key), None)),
                 None => Ok(number),
             },
@@ -137,7 +138,7 @@ impl<'a> Value<'a> {
         if number > 0.0 {
             Ok(number)
         } else {
-            Err(self.error(format!("`{}` is {number}; it must be greater than 0", self.key), None))
+            Err(self.error(format!("`{}` is {}; it must be greater than 0", self.key, words::number(number)), None))
         }
     }
 
@@ -147,8 +148,9 @@ impl<'a> Value<'a> {
         if number.fract() == 0.0 && number >= least as f64 && number <= most as f64 {
             Ok(number as usize)
         } else {
+            let found = words::number(number);
             Err(self
-                .error(format!("`{}` is {number}; a whole number from {least} to {most} is expected", self.key), None))
+                .error(format!("`{}` is {found}; a whole number from {least} to {most} is expected", self.key), None))
         }
     }
 
