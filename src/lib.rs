@@ -56,6 +56,8 @@ pub mod fleet;
 pub mod printers;
 #[doc(hidden)]
 pub mod report;
+#[cfg(feature = "fleet")]
+pub mod temporary;
 
 /// What a program needs to build or read a session, to simulate, fit, plan and trace it, and to print an equation.
 pub mod prelude {

@@ -105,7 +105,7 @@ struct FormArguments {
     /// [default: for a session its errors and declared effects, for a machine all errors].
     ///
     /// Example: --errors EX0C,EY0C,E?0A
-    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    #[arg(long, value_delimiter = ',', value_name = "NAMES", allow_hyphen_values = true)]
     errors: Vec<String>,
     /// Symbols of the errors: e_y0a (literature) or EY0A (ISO 230-1).
     ///
@@ -133,7 +133,13 @@ pub struct EquationArguments {
     /// Name of the test in the session. Its readings, if there are any, state only which axes move and how far.
     ///
     /// Example: --test A150
-    #[arg(long, value_name = "NAME", required_unless_present = "all", conflicts_with = "all")]
+    #[arg(
+        long,
+        value_name = "NAME",
+        required_unless_present = "all",
+        conflicts_with = "all",
+        allow_hyphen_values = true
+    )]
     test: Option<String>,
     /// The equations of all tests: in text, LaTeX and Typst with the derivatives of their readings by the errors as a
     /// matrix; as code with a file for each test in the folder that --out names.
@@ -230,7 +236,7 @@ impl FormArguments {
         match &self.out {
             Some(path) => output::write_whole(path, text.as_bytes()),
             None => {
-                say!("{}", text.trim_end());
+                output::whole(text.trim_end());
                 Ok(())
             }
         }
@@ -239,12 +245,13 @@ impl FormArguments {
 
 /// The session with its readings, or without them and with a note if they cannot be read.
 fn read(arguments: &super::SessionArguments) -> Result<(Session, SourceMap), Failure> {
-    let fault = match files::session_with_sources(&arguments.session, &arguments.options()) {
+    let source = files::text(&arguments.session, "the session file")?;
+    let fault = match files::session_of(&source, &arguments.options()) {
         Ok(found) => return Ok(found),
         Err(fault) => fault,
     };
     let plan_only = ReadOptions { read_data: false, ..arguments.options() };
-    match files::session_with_sources(&arguments.session, &plan_only) {
+    match files::session_of(&source, &plan_only) {
         Ok(found) => {
             tell(Kind::Note, &fault.to_string());
             tell(
@@ -319,12 +326,13 @@ fn write_all_code(arguments: &EquationArguments) -> Result<(), Failure> {
 
 /// Runs `abbe volumetric`.
 pub fn run_volumetric(arguments: &VolumetricArguments, quiet: bool) -> Result<(), Failure> {
-    let machine = files::machine(&arguments.machine)?;
+    let source = files::text(&arguments.machine, "the machine file")?;
+    let machine = files::machine_of(&source)?;
     let outputs = Outputs::new(arguments.form.out.iter().chain(arguments.map.outputs()))?;
     let read = std::iter::once(&arguments.machine).chain(arguments.map.functions());
     outputs.refuse_overwrite(read.map(PathBuf::as_path))?;
     if arguments.map.wanted() {
-        return super::map::run(&arguments.machine, &machine, &arguments.map, outputs.tables(quiet));
+        return super::map::run(&source, &machine, &arguments.map, outputs.tables(quiet));
     }
     let form = &arguments.form;
     let mut parameters = EquationParameters::parse(&form.errors, &machine, &[], &[])?;

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use abbe::temporary::{self, TemporaryFolder};
+
 use super::failure::Failure;
 
 /// A file to write: its name in the folder, with the names of folders within it, and its contents.
@@ -26,7 +28,8 @@ pub fn write(
     };
     std::fs::create_dir_all(parent).map_err(fault)?;
     // The temporary folder is on the same file system, so that renaming works.
-    let made = tempfile::Builder::new().prefix(".abbe-").tempdir_in(parent).map_err(fault)?;
+    temporary::remove_stale(parent);
+    let made = TemporaryFolder::in_folder(parent).map_err(fault)?;
     let whole = made.path().join("whole");
     std::fs::create_dir(&whole).map_err(fault)?;
     let make_folder_of = |file: &Path| file.parent().map_or(Ok(()), std::fs::create_dir_all).map_err(fault);

@@ -1,13 +1,67 @@
-//! Ctrl-C: the first interrupt ends a search and keeps its results. A second one, or one without results, ends the
-//! program.
+//! Ctrl-C and SIGTERM, which a scheduler sends: the first one ends a search and keeps its results. A second one, or one
+//! without results, ends the program. No temporary file remains.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
+use abbe::temporary;
 use indicatif::ProgressBar;
 
-use super::failure::INTERRUPTED;
 use super::message::{Kind, tell};
+
+/// Exit status of a program that Ctrl-C ended, as in shells: 128 + SIGINT.
+const INTERRUPTED: u8 = 130;
+/// Exit status of a program that SIGTERM ended: 128 + SIGTERM.
+const TERMINATED: u8 = 143;
+
+type Handler = Arc<dyn Fn() + Send + Sync>;
+
+/// Whether SIGTERM came. A signal belongs to the whole process, and so do these two.
+static IS_TERMINATED: AtomicBool = AtomicBool::new(false);
+/// What SIGTERM does; without it, it ends the program.
+static HANDLER: Mutex<Option<Handler>> = Mutex::new(None);
+
+/// Handles SIGTERM from now on.
+#[cfg(unix)]
+pub fn watch_termination() {
+    let Ok(mut signals) = signal_hook::iterator::Signals::new([signal_hook::consts::SIGTERM]) else { return };
+    let watch = move || {
+        for _ in signals.forever() {
+            IS_TERMINATED.store(true, Ordering::Relaxed);
+            let handler = HANDLER.lock().unwrap_or_else(PoisonError::into_inner).clone();
+            match handler {
+                Some(handler) => handler(),
+                None => end(),
+            }
+        }
+    };
+    // Without another thread the signal ends the program as it always does.
+    if std::thread::Builder::new().name("signals".into()).spawn(watch).is_err() {
+        tell(Kind::Warning, "SIGTERM cannot be handled; it may leave a temporary file");
+    }
+}
+
+/// Handles SIGTERM from now on: other systems have none.
+#[cfg(not(unix))]
+pub fn watch_termination() {}
+
+/// The exit status of an interrupted command.
+pub fn status() -> u8 {
+    if IS_TERMINATED.load(Ordering::Relaxed) { TERMINATED } else { INTERRUPTED }
+}
+
+/// Ends the program without its temporary files.
+fn end() -> ! {
+    temporary::remove_own();
+    std::process::exit(i32::from(status()))
+}
+
+/// Handles both signals by this function. Returns whether Ctrl-C can be handled.
+fn handle_by(handler: impl Fn() + Send + Sync + 'static) -> bool {
+    let handler: Handler = Arc::new(handler);
+    *HANDLER.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::clone(&handler));
+    ctrlc::set_handler(move || handler()).is_ok()
+}
 
 /// The state of interrupts.
 #[derive(Clone)]
@@ -18,29 +72,29 @@ pub struct Interrupts {
 }
 
 impl Interrupts {
-    /// Handles Ctrl-C from now on, with messages above the progress bar. An interrupt before
+    /// Handles Ctrl-C and SIGTERM from now on, with messages above the progress bar. An interrupt before
     /// [`Interrupts::keep_results`] ends the program.
     pub fn handled(bar: ProgressBar) -> Interrupts {
         let interrupts =
             Interrupts { came: Arc::new(AtomicBool::new(false)), at_once: Arc::new(AtomicBool::new(true)) };
         let handler = interrupts.clone();
-        if ctrlc::set_handler(move || handler.handle(&bar)).is_err() {
+        if !handle_by(move || handler.handle(&bar)) {
             tell(Kind::Warning, "Ctrl-C cannot be handled; it ends the program without a result");
         }
         interrupts
     }
 
-    /// From now on the first Ctrl-C only sets the state that [`Interrupts::came`] returns; a second one ends the program.
+    /// From now on the first signal only sets the state that [`Interrupts::came`] returns; a second one ends the program.
     pub fn noticed() -> Interrupts {
         let interrupts =
             Interrupts { came: Arc::new(AtomicBool::new(false)), at_once: Arc::new(AtomicBool::new(false)) };
         let came = Arc::clone(&interrupts.came);
         let handler = move || {
             if came.swap(true, Ordering::Relaxed) {
-                std::process::exit(i32::from(INTERRUPTED));
+                end();
             }
         };
-        if ctrlc::set_handler(handler).is_err() {
+        if !handle_by(handler) {
             tell(Kind::Warning, "Ctrl-C cannot be handled; it may leave a temporary file");
         }
         interrupts
@@ -50,7 +104,7 @@ impl Interrupts {
         let second = self.came.swap(true, Ordering::Relaxed);
         if second || self.at_once.load(Ordering::Relaxed) {
             bar.suspend(|| eprintln!("interrupted; nothing more is written"));
-            std::process::exit(i32::from(INTERRUPTED));
+            end();
         }
         bar.suspend(|| {
             eprintln!("interrupted: the effects found so far are being fitted; Ctrl-C again ends the program")

@@ -9,6 +9,7 @@ mod compare;
 mod compensate;
 mod compensation;
 mod equation;
+mod excerpt;
 mod export;
 mod failure;
 mod fit;
@@ -38,6 +39,7 @@ mod simulate;
 mod study;
 mod trace;
 mod validate;
+mod values;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -81,7 +83,7 @@ Exit status:
   0    done, whatever the verdict
   1    the input cannot be used; the message names the file, the line and what to do
   2    the command line is wrong
-  130  interrupted (Ctrl-C)";
+  130  interrupted (Ctrl-C); 143 by SIGTERM";
 
 const COMPLETIONS: &str = "Example:
   abbe completions bash
@@ -202,7 +204,7 @@ impl CommonArguments {
     /// Writes the result as JSON if it is requested.
     fn write_json<T: serde::Serialize>(&self, sources: &SourceMap, result: &T) -> Result<(), Failure> {
         match &self.json {
-            Some(path) => json::write(path, json::Origin::of_session(sources)?, Some(self.seed), result),
+            Some(path) => json::write(path, json::Origin::of_session(sources), Some(self.seed), result),
             None => Ok(()),
         }
     }
@@ -210,7 +212,16 @@ impl CommonArguments {
 
 /// Runs the command line and returns the exit status.
 pub fn run() -> ExitCode {
-    let Arguments { command, quiet } = Arguments::parse();
+    interrupt::watch_termination();
+    let Arguments { command, quiet } = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        // Help and version, to standard output.
+        Err(shown) if !shown.use_stderr() => shown.exit(),
+        Err(wrong) => {
+            message::print_usage(wrong);
+            return ExitCode::from(2);
+        }
+    };
     let outcome = match command {
         Command::Equation(arguments) => equation::run(&arguments),
         Command::Volumetric(arguments) => equation::run_volumetric(&arguments, quiet),
@@ -225,7 +236,7 @@ pub fn run() -> ExitCode {
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Arguments::command(), "abbe", &mut script);
-            say!("{}", String::from_utf8_lossy(&script).trim_end());
+            output::whole(String::from_utf8_lossy(&script).trim_end());
             Ok(())
         }
         Command::History(arguments) => history::run(&arguments, quiet),
@@ -289,6 +300,33 @@ mod tests {
             })
             .collect();
         assert!(without.is_empty(), "no example of {}", without.join(", "));
+    }
+
+    /// A test, a machine or an effect may have a name that begins as an option does.
+    #[test]
+    fn a_name_may_begin_with_a_hyphen() {
+        const NAMES: [&str; 11] = [
+            "NAME",
+            "NAMES",
+            "TEST",
+            "TEXT",
+            "ID",
+            "THING",
+            "A,B",
+            "EFFECT,…",
+            "NAME=SIZE",
+            "NAME=VALUE",
+            "AXIS=POSITION",
+        ];
+        let command = Arguments::command();
+        let named: Vec<(&Command, &Arg)> = options_with_values(&command)
+            .into_iter()
+            .filter(|(_, option)| option.get_value_names().is_some_and(|names| NAMES.contains(&names[0].as_str())))
+            .collect();
+        assert!(named.len() >= 15, "{} options", named.len());
+        for (command, option) in named {
+            assert!(option.is_allow_hyphen_values_set(), "abbe {} --{}", command.get_name(), option.get_id());
+        }
     }
 
     /// The examples in the help of options are command lines that the parser accepts.

@@ -5,6 +5,8 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use abbe::model::files::SourceMap;
+use abbe::model::words::shortened;
+use abbe::temporary::{self, TemporaryFile};
 
 use super::failure::Failure;
 use super::message::{Kind, tell};
@@ -42,21 +44,13 @@ pub fn write_streaming(
     }
     // A symbolic link stays one: what it leads to is replaced.
     let place = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
-    let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // As any other new file: what the user's mask lets through.
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let mut file = builder.tempfile_in(folder_of(&place)).map_err(fault)?;
+    let mut file = TemporaryFile::in_folder(folder_of(&place)).map_err(fault)?;
     contents(&mut file)?;
     if let Ok(old) = std::fs::metadata(&place) {
         file.as_file().set_permissions(old.permissions()).map_err(fault)?;
     }
     file.as_file().sync_all().map_err(fault)?;
-    file.persist(&place).map_err(|error| fault(error.error))?;
-    Ok(())
+    file.persist(&place).map_err(fault)
 }
 
 /// Whether the path is `-`, which stands for standard output.
@@ -122,6 +116,9 @@ impl Outputs {
                     file.display()
                 )));
             }
+            if !is_stream(file) && !outputs.iter().any(|other| folder_of(other) == folder_of(file)) {
+                temporary::remove_stale(folder_of(file));
+            }
             outputs.push(file.clone());
         }
         Ok(Outputs(outputs))
@@ -169,8 +166,19 @@ pub fn is_same(a: &Path, b: &Path) -> bool {
     a == b || place(a).is_some_and(|a| place(b) == Some(a))
 }
 
-/// Writes a line to standard output.
+/// Length of a line that no result has but by a name that it quotes, bytes.
+const MAX_LINE: usize = 1000;
+
+/// Writes lines to standard output. What a long line quotes is cut to a readable length.
 pub fn line(text: std::fmt::Arguments<'_>) {
+    let text = text.to_string();
+    let short = |line: &str| if line.len() > MAX_LINE { shortened(line).into_owned() } else { line.to_string() };
+    let lines: Vec<String> = text.split('\n').map(short).collect();
+    whole(&lines.join("\n"));
+}
+
+/// Writes a text to standard output as it is, and a line end.
+pub fn whole(text: &str) {
     write_out(format!("{text}\n").as_bytes());
 }
 
@@ -206,7 +214,7 @@ pub fn print(table: &Table) {
     if !table.title.is_empty() {
         say!("\n{}:", table.title);
     }
-    say!("{}", terminal::text(table));
+    whole(&terminal::text(table));
 }
 
 /// The table as CSV.

@@ -17,6 +17,8 @@ use super::{ready, text};
 
 /// The exit status of shells for SIGINT.
 const INTERRUPTED: i32 = 130;
+/// The exit status of shells for SIGTERM.
+const TERMINATED: i32 = 143;
 
 /// A command that runs the program of its next argument with the default action of SIGINT. Where a script starts the
 /// tests in the background, SIGINT is ignored, and a program inherits that. `env` is that of GNU coreutils 8.31 or
@@ -255,4 +257,75 @@ fn a_trace_can_be_interrupted_anywhere() {
         effects.push(found.effects.len());
     }
     assert!(effects.is_sorted() && effects.contains(&0) && effects.contains(&1), "{effects:?}");
+}
+
+/// SIGTERM, which a scheduler sends, ends a command while it writes, or computes, or searches: exit status 143, no
+/// temporary file, the old outputs.
+#[test]
+fn a_terminated_program_leaves_no_temporary_file() {
+    let place = super::faults::TestFolder::new();
+    let rows = "1\n".repeat(4_000_000);
+    place.put("commands.csv", &format!("x_mm\n{rows}"));
+    assert!(place.shell("abbe fit session.toml --save model.json --quiet").status.success());
+    let before = place.names();
+    // A command that handles Ctrl-C itself.
+    let output = place.shell(
+        "abbe compensate model.json commands.csv --out out.csv & \
+         until ls -A | grep -q '^.abbe-'; do :; done; kill -TERM $!; wait $!",
+    );
+    assert_eq!(output.status.code(), Some(TERMINATED), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(place.names(), before);
+    // Commands that do not: the pipe without a reader holds them after the first output.
+    place.put("old.json", "old");
+    let before = place.names();
+    let output = place.shell(
+        "mkfifo pipe; abbe simulate session.toml --out new --json pipe --quiet & \
+         until test -d new; do sleep 0.01; done; kill -TERM $!; wait $!; code=$?; rm -r pipe new; exit $code",
+    );
+    assert_eq!(output.status.code(), Some(TERMINATED), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(place.names(), before);
+    // At any time.
+    for number in 0..12 {
+        let delay = 0.005 * f64::from(number);
+        let line =
+            format!("abbe fit session.toml --json new.json --plots plots -q & sleep {delay}; kill -TERM $!; wait $!");
+        let output = place.shell(&line);
+        assert!(matches!(output.status.code(), Some(0 | TERMINATED)), "{:?}", output.status);
+        for name in place.names() {
+            assert!(!name.starts_with(".abbe-"), "{name} is left");
+        }
+    }
+}
+
+/// A search that SIGTERM ends reports the effects found until then, as after Ctrl-C.
+#[test]
+fn a_terminated_trace_reports_what_it_has_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let json = folder.path().join("t.json");
+    let session = ready("hermle-c600u/measured/session.toml");
+    let mut child = start(&["trace", text(&session), "--json", text(&json)]);
+    let (mut messages, mut stderr) = until_the_first_effect(&mut child);
+    assert!(Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap().success());
+    messages.read_to_string(&mut stderr).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(TERMINATED), "{stderr}");
+    let result: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
+    assert_eq!((&result["interrupted"], result["effects"].as_array().unwrap().len()), (&true.into(), 1));
+}
+
+/// What a killed program has left is removed by the next command that writes there; what a living one holds stays.
+#[test]
+fn a_later_command_removes_stale_temporary_files() {
+    let place = super::faults::TestFolder::new();
+    place.put(".abbe-aBcD12.tmp", "half of an output");
+    std::fs::create_dir_all(place.at(".abbe-eFgH34/whole")).unwrap();
+    place.put(".abbe-eFgH34/lock", "");
+    place.put(".abbe-eFgH34/whole/session.toml", "half of a folder");
+    place.put(".abbe-iJkL56.tmp", "written by another process");
+    let held = std::fs::File::open(place.at(".abbe-iJkL56.tmp")).unwrap();
+    held.lock().unwrap();
+    assert!(place.shell("abbe fit session.toml --json out.json --quiet").status.success());
+    assert_eq!(place.names(), [".abbe-iJkL56.tmp", "circle.csv", "out.json", "session.toml"]);
+    drop(held);
+    assert!(place.shell("abbe simulate session.toml --out new --quiet").status.success());
+    assert_eq!(place.names(), ["circle.csv", "new", "out.json", "session.toml"]);
 }

@@ -1,0 +1,242 @@
+//! Temporary files and folders beside the places that they will take, so that a reader finds the old file or the whole
+//! new one.
+//!
+//! A temporary file is locked while its process writes it. The lock ends with the process, however it ends: what is not
+//! locked is stale, and [`remove_stale`] removes it.
+
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use tempfile::{NamedTempFile, TempDir};
+
+/// First characters of the name of a temporary file or folder.
+const PREFIX: &str = ".abbe-";
+/// Last characters of the name of a temporary file.
+const SUFFIX: &str = ".tmp";
+/// The locked file of a temporary folder.
+const LOCK: &str = "lock";
+/// Attempts to make a file that no other process removes before it is locked, and to remove a folder that grows.
+const ATTEMPTS: usize = 100;
+
+/// Time between two attempts.
+const WAIT: std::time::Duration = std::time::Duration::from_millis(1);
+
+/// The temporary files and folders of this process. A signal ends the whole process, and so its handler has to know
+/// them all.
+static OWN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// A temporary file. It is removed when it is dropped.
+pub struct TemporaryFile {
+    file: NamedTempFile,
+    _noted: Noted,
+}
+
+impl TemporaryFile {
+    /// A new file in a folder, with the permissions of any other new file.
+    ///
+    /// # Errors
+    /// If it cannot be made. The message does not name it: the caller knows the file that was asked for.
+    pub fn in_folder(folder: &Path) -> io::Result<TemporaryFile> {
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(PREFIX).suffix(SUFFIX);
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(std::fs::Permissions::from_mode(0o666));
+        }
+        for _ in 0..ATTEMPTS {
+            let (file, noted) = noted(|| builder.tempfile_in(folder), |file| file.path())?;
+            if is_own(file.as_file(), file.path())? {
+                return Ok(TemporaryFile { file, _noted: noted });
+            }
+        }
+        Err(io::Error::other("another process removes the temporary files"))
+    }
+
+    /// The file itself.
+    pub fn as_file(&self) -> &File {
+        self.file.as_file()
+    }
+
+    /// Moves the file to its place.
+    ///
+    /// # Errors
+    /// If it cannot be moved; it is removed then.
+    pub fn persist(self, place: &Path) -> io::Result<()> {
+        self.file.persist(place).map(drop).map_err(|error| plain(error.error))
+    }
+}
+
+impl Write for TemporaryFile {
+    fn write(&mut self, contents: &[u8]) -> io::Result<usize> {
+        self.file.as_file_mut().write(contents)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.as_file_mut().flush()
+    }
+}
+
+/// A temporary folder. It is removed, with all in it, when it is dropped.
+pub struct TemporaryFolder {
+    folder: TempDir,
+    _lock: File,
+    _noted: Noted,
+}
+
+impl TemporaryFolder {
+    /// A new folder in a folder.
+    ///
+    /// # Errors
+    /// If it cannot be made.
+    pub fn in_folder(folder: &Path) -> io::Result<TemporaryFolder> {
+        for _ in 0..ATTEMPTS {
+            let builder = || tempfile::Builder::new().prefix(PREFIX).tempdir_in(folder);
+            let (made, noted) = noted(builder, TempDir::path)?;
+            let place = made.path().join(LOCK);
+            let lock = match File::create_new(&place) {
+                Ok(lock) => lock,
+                // Another process has taken the empty folder for a stale one.
+                Err(fault) if fault.kind() == io::ErrorKind::NotFound => continue,
+                Err(fault) => return Err(fault),
+            };
+            if is_own(&lock, &place)? {
+                return Ok(TemporaryFolder { folder: made, _lock: lock, _noted: noted });
+            }
+        }
+        Err(io::Error::other("another process removes the temporary folders"))
+    }
+
+    /// Its path.
+    pub fn path(&self) -> &Path {
+        self.folder.path()
+    }
+}
+
+/// An entry of [`OWN`], which ends with the file.
+struct Noted(PathBuf);
+
+impl Drop for Noted {
+    fn drop(&mut self) {
+        let mut own = OWN.lock().unwrap_or_else(PoisonError::into_inner);
+        own.retain(|path| *path != self.0);
+    }
+}
+
+/// Makes a file or a folder and notes its path, without a moment between in which a signal could end the process.
+fn noted<T>(make: impl FnOnce() -> io::Result<T>, path: impl Fn(&T) -> &Path) -> io::Result<(T, Noted)> {
+    let mut own = OWN.lock().unwrap_or_else(PoisonError::into_inner);
+    let made = make().map_err(plain)?;
+    let path = path(&made).to_path_buf();
+    own.push(path.clone());
+    Ok((made, Noted(path)))
+}
+
+/// Locks a new file. `false` if another process has taken it for a stale one.
+fn is_own(file: &File, path: &Path) -> io::Result<bool> {
+    match file.try_lock() {
+        Ok(()) => Ok(path.exists()),
+        Err(TryLockError::WouldBlock) => Ok(false),
+        // A file system without locks: no process removes files there either.
+        Err(TryLockError::Error(_)) => Ok(true),
+    }
+}
+
+/// Removes the temporary files and folders of this process, which must end now: no more can be made.
+pub fn remove_own() {
+    let own = OWN.lock().unwrap_or_else(PoisonError::into_inner);
+    for path in own.iter() {
+        for _ in 0..ATTEMPTS {
+            // Another thread may move it to its place meanwhile, or add a file to it until it needs a new temporary one.
+            let _ = if path.is_dir() { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) };
+            if !path.exists() {
+                break;
+            }
+            std::thread::sleep(WAIT);
+        }
+    }
+    std::mem::forget(own);
+}
+
+/// Removes the temporary files and folders in a folder that no process holds. What cannot be removed stays.
+pub fn remove_stale(folder: &Path) {
+    let Ok(entries) = std::fs::read_dir(folder) else { return };
+    for entry in entries.filter_map(Result::ok) {
+        let name = entry.file_name();
+        let Some(rest) = name.to_str().and_then(|name| name.strip_prefix(PREFIX)) else { continue };
+        match entry.file_type() {
+            Ok(kind) if kind.is_file() && rest.ends_with(SUFFIX) => remove_unlocked(&entry.path(), &entry.path()),
+            // The names of the crate `tempfile` have six letters and digits.
+            Ok(kind) if kind.is_dir() && rest.len() == 6 => {
+                // A folder without its lock is empty: it has just been made, or the process ended then.
+                if std::fs::remove_dir(entry.path()).is_err() {
+                    remove_unlocked(&entry.path().join(LOCK), &entry.path());
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Removes a file or a folder if its lock is free.
+fn remove_unlocked(lock: &Path, path: &Path) {
+    let Ok(file) = OpenOptions::new().read(true).write(true).open(lock) else { return };
+    if file.try_lock().is_ok() {
+        let _ = if path.is_dir() { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) };
+    }
+}
+
+/// The error of the operating system, without the path of the temporary file that `tempfile` adds.
+fn plain(error: io::Error) -> io::Error {
+    let inner =
+        error.get_ref().and_then(std::error::Error::source).and_then(|source| source.downcast_ref::<io::Error>());
+    match inner.and_then(io::Error::raw_os_error) {
+        Some(code) => io::Error::from_raw_os_error(code),
+        None => error,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_no_process_holds_is_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::write(at(".abbe-aaaaaa.tmp"), "stale").unwrap();
+        std::fs::create_dir(at(".abbe-bbbbbb")).unwrap();
+        std::fs::create_dir(at(".abbe-cccccc")).unwrap();
+        std::fs::write(at(".abbe-cccccc/lock"), "").unwrap();
+        std::fs::write(at(".abbe-cccccc/readings.csv"), "stale").unwrap();
+        // Files of others.
+        for other in [".abbe-notes.txt", ".tmpAbCdEf", "session.toml"] {
+            std::fs::write(at(other), "other").unwrap();
+        }
+        std::fs::create_dir(at(".abbe-results")).unwrap();
+        let held = TemporaryFile::in_folder(folder.path()).unwrap();
+        let held_folder = TemporaryFolder::in_folder(folder.path()).unwrap();
+        remove_stale(folder.path());
+        let mut left: Vec<PathBuf> =
+            std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
+        left.sort();
+        let mut kept: Vec<PathBuf> = [".abbe-notes.txt", ".tmpAbCdEf", "session.toml", ".abbe-results"].map(at).into();
+        kept.extend([held.file.path().to_path_buf(), held_folder.path().to_path_buf()]);
+        kept.sort();
+        assert_eq!(left, kept);
+        held.persist(&at("held")).unwrap();
+        drop(held_folder);
+        remove_stale(folder.path());
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 5);
+    }
+
+    #[test]
+    fn an_error_does_not_name_the_temporary_file() {
+        let missing = Path::new("/nowhere/at/all");
+        let Err(fault) = TemporaryFile::in_folder(missing) else { panic!("the folder does not exist") };
+        assert!(!fault.to_string().contains(PREFIX), "{fault}");
+        assert!(fault.raw_os_error().is_some());
+    }
+}
