@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use abbe::fleet::history;
 use abbe::fleet::options::Options;
-use abbe::fleet::store::Store;
+use abbe::fleet::store::{IfClaimed, Store};
 use abbe::fleet::unit::{self, Done, Places};
 use abbe::fleet::{FleetError, compensations, list, study};
 use abbe::identify::history::HistoryOptions;
@@ -42,7 +42,8 @@ pub fn run_session(
     work::run(py, None, move |caller| {
         let store = Store::open(out)?;
         let places = Places { models, allow_outside };
-        let (done, pointer) = unit::run(&file, &options, &places, &store, &|| caller.goes_on())?;
+        let done = unit::run(&file, &options, &places, &store, IfClaimed::Wait, &|| caller.goes_on())?;
+        let (done, pointer) = done.ok_or_else(|| Failed::new("another process analyses the session"))?;
         Ok((done == Done::Computed, json(&pointer)?))
     })
 }
@@ -116,8 +117,8 @@ pub fn run_draws(py: Python<'_>, file: PathBuf, out: PathBuf, numbers: Vec<usize
         let (study, store) = (study::file::read(&file)?, Store::open(out)?);
         let mut computed = 0;
         for number in numbers {
-            let (done, _) = study::run(&study, number, &store, &|| caller.goes_on())?;
-            computed += usize::from(done == Done::Computed);
+            let done = study::run(&study, number, &store, IfClaimed::Wait, &|| caller.goes_on())?;
+            computed += usize::from(done.is_some_and(|(done, _)| done == Done::Computed));
         }
         Ok(computed)
     })

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use abbe::fleet::options::Options;
-use abbe::fleet::store::{Pointer, Store};
+use abbe::fleet::store::{IfClaimed, Pointer, Store};
 use abbe::fleet::unit::{self, Done, Places};
 use abbe::fleet::{FleetError, list};
 use abbe::model::words::counted;
@@ -168,6 +168,7 @@ pub fn run(arguments: &RunArguments, quiet: bool) -> Result<(), Failure> {
         return Err(Failure::Other(message));
     }
     let store = Store::open(&arguments.out)?;
+    store.remove_stale();
     let forgotten = store.forget_missing(&paths)?;
     let bar = progress_bar(files.len(), quiet);
     let outcomes = analyse(arguments, &files, &store, &bar);
@@ -217,15 +218,16 @@ fn analyse(arguments: &RunArguments, files: &[PathBuf], store: &Store, bar: &Pro
     let interrupts = Interrupts::noticed();
     let stopped = AtomicBool::new(false);
     let goes_on = || !interrupts.came() && !stopped.load(Ordering::Relaxed);
-    let one = |file: &PathBuf| {
+    let one = |file: &PathBuf, if_claimed: IfClaimed| {
         if !goes_on() {
             return Err(FleetError::Interrupted);
         }
-        let outcome = unit::run(file, &options, &places, store, &goes_on);
-        if outcome.is_err() {
-            stopped.store(true, Ordering::Relaxed);
+        let outcome = unit::run(file, &options, &places, store, if_claimed, &goes_on);
+        match outcome {
+            Ok(None) => {}
+            Ok(Some(_)) => bar.inc(1),
+            Err(_) => stopped.store(true, Ordering::Relaxed),
         }
-        bar.inc(1);
         outcome
     };
     let pool = match rayon::ThreadPoolBuilder::new().num_threads(arguments.threads).build() {
@@ -235,12 +237,18 @@ fn analyse(arguments: &RunArguments, files: &[PathBuf], store: &Store, bar: &Pro
             return Outcomes { done: Vec::new(), ended };
         }
     };
-    let outcomes: Vec<Result<(Done, Pointer), FleetError>> =
-        pool.install(|| files.par_iter().with_max_len(1).map(one).collect());
+    let mut outcomes: Vec<Result<Option<(Done, Pointer)>, FleetError>> =
+        pool.install(|| files.par_iter().with_max_len(1).map(|file| one(file, IfClaimed::Skip)).collect());
+    // Those on which other processes are at work: they are done, or the processes have ended.
+    let claimed = files.iter().zip(&mut outcomes).filter(|(_, outcome)| matches!(outcome, Ok(None)));
+    let claimed: Vec<_> = claimed.collect();
+    pool.install(|| {
+        claimed.into_par_iter().with_max_len(1).for_each(|(file, outcome)| *outcome = one(file, IfClaimed::Wait));
+    });
     let (mut done, mut ended) = (Vec::with_capacity(files.len()), None);
     for outcome in outcomes {
         match outcome {
-            Ok(outcome) => done.push(outcome),
+            Ok(outcome) => done.extend(outcome),
             // A fault of the store, rather than the interruption that follows from it.
             Err(error) => match &ended {
                 None | Some(FleetError::Interrupted) => ended = Some(error),

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use abbe::fleet::store::Store;
+use abbe::fleet::store::{IfClaimed, Store};
 use abbe::fleet::study::draw::Draw;
 use abbe::fleet::study::file::{self, Study};
 use abbe::fleet::study::summary::summary;
@@ -88,6 +88,7 @@ pub fn run(arguments: &StudyArguments, quiet: bool) -> Result<(), Failure> {
     outputs.refuse_overwrite([arguments.study.as_path()])?;
     let study = file::read(&arguments.study)?;
     let store = Store::open(&arguments.out)?;
+    store.remove_stale();
     let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(study.draws() as u64) };
     if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos} of {len} draws, {eta} left") {
         bar.set_style(style);
@@ -109,7 +110,7 @@ pub fn run(arguments: &StudyArguments, quiet: bool) -> Result<(), Failure> {
         output::write_whole(path, &output::csv(&present::cells("", &result.cells))?)?;
     }
     if let Some(path) = &arguments.json {
-        json::write(path, Origin::of_files(&[&arguments.study])?, Some(study.file.study.seed), &result)?;
+        json::write(path, Origin::of_files(&study.stamp), Some(study.file.study.seed), &result)?;
     }
     Ok(())
 }
@@ -119,21 +120,26 @@ fn draws(study: &Study, store: &Store, threads: usize, bar: &ProgressBar) -> Res
     let interrupts = Interrupts::noticed();
     let stopped = AtomicBool::new(false);
     let goes_on = || !interrupts.came() && !stopped.load(Ordering::Relaxed);
-    let one = |number: usize| -> Result<Draw, FleetError> {
-        let draw = study::run(study, number, store, &goes_on);
-        let (_, draw) = draw.inspect_err(|_| stopped.store(true, Ordering::Relaxed))?;
-        bar.inc(1);
-        Ok(draw)
+    let one = |number: usize, if_claimed: IfClaimed| -> Result<Option<Draw>, FleetError> {
+        let draw = study::run(study, number, store, if_claimed, &goes_on);
+        let draw = draw.inspect_err(|_| stopped.store(true, Ordering::Relaxed))?;
+        Ok(draw.map(|(_, draw)| draw).inspect(|_| bar.inc(1)))
     };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|cause| Failure::Other(format!("the threads cannot be started: {cause}")))?;
-    let all: Vec<Result<Draw, FleetError>> =
-        pool.install(|| (0..study.draws()).into_par_iter().with_max_len(1).map(one).collect());
+    let numbers = (0..study.draws()).into_par_iter().with_max_len(1);
+    let mut all: Vec<Result<Option<Draw>, FleetError>> =
+        pool.install(|| numbers.map(|number| one(number, IfClaimed::Skip)).collect());
+    // Those that other processes make: they are done, or the processes have ended.
+    let claimed: Vec<_> = all.iter_mut().enumerate().filter(|(_, draw)| matches!(draw, Ok(None))).collect();
+    pool.install(|| {
+        claimed.into_par_iter().with_max_len(1).for_each(|(number, draw)| *draw = one(number, IfClaimed::Wait));
+    });
     let done = all.iter().filter(|draw| draw.is_ok()).count();
     let (mut draws, mut interrupted) = (Vec::with_capacity(done), false);
     for draw in all {
         match draw {
-            Ok(draw) => draws.push(draw),
+            Ok(draw) => draws.extend(draw),
             Err(FleetError::Interrupted) => interrupted = true,
             Err(error) => return Err(error.into()),
         }

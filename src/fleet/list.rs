@@ -8,6 +8,11 @@ use super::FleetError;
 /// The name of a session file in a folder that is searched.
 const SESSION_FILE: &str = "session.toml";
 
+/// Largest size of a list, bytes.
+const MAX_BYTES: u64 = 64 << 20;
+/// Largest number of paths of a list.
+const MAX_PATHS: usize = 1_000_000;
+
 /// Session files: each file itself, and every `session.toml` in or below each folder, in the order of their names. A
 /// file that is named twice counts once.
 ///
@@ -44,13 +49,20 @@ pub fn sessions(paths: &[PathBuf]) -> Result<Vec<PathBuf>, FleetError> {
 pub fn listed(file: &Path) -> Result<Vec<PathBuf>, FleetError> {
     let fault = |source| FleetError::Read { path: file.display().to_string(), source };
     let mut text = String::new();
-    if file.as_os_str() == "-" {
-        std::io::stdin().read_to_string(&mut text).map_err(fault)?;
-    } else {
-        text = std::fs::read_to_string(file).map_err(fault)?;
+    let opened: Box<dyn Read> = match file.as_os_str() == "-" {
+        true => Box::new(std::io::stdin()),
+        false => Box::new(std::fs::File::open(file).map_err(fault)?),
+    };
+    opened.take(MAX_BYTES + 1).read_to_string(&mut text).map_err(fault)?;
+    let lines = || text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
+    let count = lines().count();
+    if text.len() as u64 > MAX_BYTES || count > MAX_PATHS {
+        return Err(FleetError::Request(format!(
+            "{}: a list has at most {MAX_PATHS} paths and {MAX_BYTES} bytes; name folders, or split the list",
+            file.display()
+        )));
     }
-    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
-    Ok(lines.map(PathBuf::from).collect())
+    Ok(lines().map(PathBuf::from).collect())
 }
 
 /// Adds the session files of a folder. A link to a folder is not followed, so that no circle is walked.

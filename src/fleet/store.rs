@@ -5,8 +5,10 @@
 //! that a reader finds the whole file or none, whoever writes at the same time. A file that is damaged counts as
 //! missing.
 
-use std::io::{ErrorKind, Write};
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -15,9 +17,13 @@ use sha2::{Digest, Sha256};
 use super::FleetError;
 use super::record::{Record, SCHEMA_VERSION};
 use super::study::draw::Draw;
+use crate::temporary::{self, TemporaryFile};
 
 /// Records with their sessions, and what has no record: its machine where it is known, and the file.
 pub type Records = (Vec<(Pointer, Record)>, Vec<(Option<String>, String)>);
+
+/// Last characters of the name of a claim.
+const CLAIM: &str = ".claim";
 
 /// A folder of records.
 #[derive(Clone, Debug)]
@@ -54,6 +60,71 @@ impl Pointer {
             machine_id: record.machine_id.clone(),
             error: record.error.as_ref().map(|error| error.message.clone()),
         }
+    }
+}
+
+/// What to do with a session or a draw on which another process is at work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum IfClaimed {
+    /// Skip it.
+    Skip,
+    /// Wait until the other process has its result, or has ended without it.
+    Wait,
+}
+
+/// The right to make a record or a draw. It is a locked file, so that it ends with its process, on whatever computer.
+#[derive(Debug)]
+pub struct Claim {
+    place: PathBuf,
+    /// Holds the lock.
+    _file: File,
+}
+
+impl Drop for Claim {
+    /// Removes the file before it unlocks it: who has opened it meanwhile looks for the result again.
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.place);
+    }
+}
+
+/// What there is of a result.
+pub(crate) enum Search<T> {
+    /// The result.
+    Found(T),
+    /// None, and the right to make it.
+    Claimed(Claim),
+    /// None, and another process is at work on it.
+    Skipped,
+}
+
+/// Time between two looks at a result on which another process is at work.
+const WAIT: Duration = Duration::from_millis(100);
+
+/// Looks for a result, and claims it if it is missing.
+///
+/// # Errors
+/// Those of the two; [`FleetError::Interrupted`] if `goes_on` returned `false` while another process was at work.
+pub(crate) fn found_or_claimed<T>(
+    found: impl Fn() -> Result<Option<T>, FleetError>,
+    claim: impl Fn() -> Result<Option<Claim>, FleetError>,
+    if_claimed: IfClaimed,
+    goes_on: &(dyn Fn() -> bool + Sync),
+) -> Result<Search<T>, FleetError> {
+    loop {
+        if let Some(result) = found()? {
+            return Ok(Search::Found(result));
+        }
+        if let Some(claim) = claim()? {
+            // The other process may have ended its work since the look at the result.
+            return Ok(found()?.map_or(Search::Claimed(claim), Search::Found));
+        }
+        if if_claimed == IfClaimed::Skip {
+            return Ok(Search::Skipped);
+        }
+        if !goes_on() {
+            return Err(FleetError::Interrupted);
+        }
+        std::thread::sleep(WAIT);
     }
 }
 
@@ -102,6 +173,42 @@ impl Store {
     /// If it cannot be written. Nothing is left of it then.
     pub fn write(&self, record: &Record) -> Result<(), FleetError> {
         self.put(&self.place("results", &record.key), record)
+    }
+
+    /// Claims the record of a key; `None` if another process or thread has claimed it.
+    ///
+    /// # Errors
+    /// If nothing can be written there.
+    pub fn claim(&self, key: &str) -> Result<Option<Claim>, FleetError> {
+        self.claim_place(&self.place("results", key))
+    }
+
+    /// Claims a draw of a study; `None` if another process or thread has claimed it.
+    ///
+    /// # Errors
+    /// If nothing can be written there.
+    pub fn claim_draw(&self, study: &str, number: usize) -> Result<Option<Claim>, FleetError> {
+        self.claim_place(&self.place_of_draw(study, number))
+    }
+
+    fn claim_place(&self, result: &Path) -> Result<Option<Claim>, FleetError> {
+        let name = result.file_stem().unwrap_or_default().to_string_lossy();
+        let place = result.with_file_name(format!(".{name}{CLAIM}"));
+        let fault = |source| FleetError::Write { path: place.display().to_string(), source };
+        std::fs::create_dir_all(result.parent().unwrap_or(&self.folder)).map_err(fault)?;
+        let file = OpenOptions::new().create(true).truncate(false).write(true).open(&place).map_err(fault)?;
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => Ok(None),
+            // Without locks on this file system, two processes do the same work, with the same result.
+            Ok(()) | Err(TryLockError::Error(_)) => Ok(Some(Claim { place, _file: file })),
+        }
+    }
+
+    /// Removes what processes that no longer run have left: temporary files and claims.
+    pub fn remove_stale(&self) {
+        for kind in ["results", "sessions", "studies"] {
+            remove_stale_below(&self.folder.join(kind), 2);
+        }
     }
 
     /// A draw of a study; `None` if it is missing or damaged.
@@ -229,25 +336,50 @@ impl Store {
         text.push(b'\n');
         let folder = place.parent().unwrap_or(&self.folder);
         std::fs::create_dir_all(folder).map_err(fault)?;
-        let mut builder = tempfile::Builder::new();
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            builder.permissions(std::fs::Permissions::from_mode(0o666));
-        }
-        let mut file = builder.prefix(".").suffix(".part").tempfile_in(folder).map_err(fault)?;
+        let mut file = TemporaryFile::in_folder(folder).map_err(fault)?;
         file.write_all(&text).map_err(fault)?;
-        file.persist(place).map_err(|error| fault(error.error))?;
-        Ok(())
+        file.persist(place).map_err(fault)
     }
 }
 
-/// The contents of a file; `None` if there is none.
+/// Largest size of a record, a note or a draw, bytes: a thousand parameters with their covariance take a third.
+const MAX_BYTES: u64 = 64 << 20;
+
+/// The contents of a file; `None` if there is none. What this program did not write, a device or a file beyond the
+/// limit, counts as none.
 fn read(file: &Path) -> Result<Option<Vec<u8>>, FleetError> {
-    match std::fs::read(file) {
-        Ok(contents) => Ok(Some(contents)),
+    let fault = |source| FleetError::Read { path: file.display().to_string(), source };
+    // A pipe would block, and a device has no end.
+    match std::fs::metadata(file) {
+        Ok(found) if !found.is_file() || found.len() > MAX_BYTES => return Ok(None),
+        Ok(_) => {}
+        Err(source) if source.kind() == ErrorKind::NotFound => return Ok(None),
+        Err(source) => return Err(fault(source)),
+    }
+    let mut contents = Vec::new();
+    match File::open(file).and_then(|opened| opened.take(MAX_BYTES).read_to_end(&mut contents)) {
+        Ok(_) => Ok(Some(contents)),
         Err(source) if source.kind() == ErrorKind::NotFound => Ok(None),
-        Err(source) => Err(FleetError::Read { path: file.display().to_string(), source }),
+        Err(source) => Err(fault(source)),
+    }
+}
+
+/// Removes stale files in folders within a folder, so many levels deep.
+fn remove_stale_below(folder: &Path, levels: usize) {
+    temporary::remove_stale(folder);
+    for entry in entries(folder).unwrap_or_default() {
+        let name = entry.file_name().unwrap_or_default().to_string_lossy();
+        if name.starts_with('.') && name.ends_with(CLAIM) {
+            let opened = OpenOptions::new().write(true).open(&entry);
+            // A claim of a living process is locked.
+            if let Ok(file) = opened
+                && file.try_lock().is_ok()
+            {
+                drop(Claim { place: entry, _file: file });
+            }
+        } else if levels > 0 && !name.ends_with(".json") && entry.is_dir() {
+            remove_stale_below(&entry, levels - 1);
+        }
     }
 }
 

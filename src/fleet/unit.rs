@@ -12,16 +12,16 @@ use abbe_identify::results::{FitResult, TraceResult};
 use abbe_identify::trace::{Progress, TraceOptions, trace};
 use abbe_identify::validate::validate;
 use abbe_identify::{fit, model_file};
+use abbe_model::files::stamp::FileStamp;
 use abbe_model::files::toml::parts::machine_text;
-use abbe_model::files::{self, ReadOptions, SourceMap};
+use abbe_model::files::{self, ReadOptions, Source, SourceMap};
 use abbe_model::session::Session;
 use sha2::{Digest, Sha256};
 
 use super::options::Options;
 use super::record::{EffectRecord, ErrorRecord, InputRecord, MachineRecord, Record, SCHEMA_VERSION, ValidationRecord};
-use super::store::{Pointer, Store};
+use super::store::{IfClaimed, Pointer, Search, Store, found_or_claimed};
 use super::{BUILD, FleetError};
-use crate::report::provenance;
 
 /// Bits of a seed: every reader of JSON keeps an integer of this size.
 const SEED_BITS: u32 = 52;
@@ -48,10 +48,17 @@ pub enum Done {
 struct Inputs {
     read: Result<(Session, SourceMap), String>,
     record: Record,
-    model: Option<(PathBuf, String)>,
+    model: Option<Model>,
 }
 
-/// Analyses a session if the store has no record of it, and notes it in the store.
+/// The model of a machine: its text, and its checksum; `None` if it cannot be read.
+struct Model {
+    source: Result<Source, String>,
+    sha256: Option<String>,
+}
+
+/// Analyses a session if the store has no record of it, and notes it in the store. `None` if another process analyses
+/// it and `if_claimed` says to skip it.
 ///
 /// # Errors
 /// If the store cannot be read or written, or `goes_on` returned `false`. A session that cannot be analysed is a record
@@ -61,13 +68,15 @@ pub fn run(
     options: &Options,
     places: &Places,
     store: &Store,
+    if_claimed: IfClaimed,
     goes_on: &(dyn Fn() -> bool + Sync),
-) -> Result<(Done, Pointer), FleetError> {
+) -> Result<Option<(Done, Pointer)>, FleetError> {
     let inputs = inputs(file, options, places);
     let key = inputs.record.key.clone();
-    let (done, record) = match store.record(&key)? {
-        Some(record) => (Done::Kept, record),
-        None => {
+    let (done, record) = match found_or_claimed(|| store.record(&key), || store.claim(&key), if_claimed, goes_on)? {
+        Search::Skipped => return Ok(None),
+        Search::Found(record) => (Done::Kept, record),
+        Search::Claimed(_claim) => {
             let record = record(inputs, goes_on)?;
             store.write(&record)?;
             (Done::Computed, record)
@@ -75,7 +84,7 @@ pub fn run(
     };
     let pointer = Pointer::new(file, &record);
     store.note(&pointer)?;
-    Ok((done, pointer))
+    Ok(Some((done, pointer)))
 }
 
 /// The record of a session, without a store.
@@ -105,19 +114,16 @@ fn inputs(file: &Path, options: &Options, places: &Places) -> Inputs {
         ..Record::default()
     };
     let mut model = None;
-    let mut read = files::session_with_sources(file, &read_options).map_err(|error| error.to_string());
+    let text = files::text(file, "the session file");
+    let sha256 = text.as_ref().ok().and_then(|source| source.stamp.as_ref()?.sha256());
+    let read = text.and_then(|source| files::session_of(&source, &read_options)).map_err(|error| error.to_string());
     if let Ok((session, sources)) = &read {
         describe(&mut record, session);
-        match input_records(sources) {
-            Ok(inputs) => record.inputs = inputs,
-            Err(fault) => read = Err(fault),
-        }
+        record.inputs = input_records(sources);
         model = model_of(&record.machine_id, places);
-    }
-    if record.inputs.is_empty() {
+    } else {
         // A session that cannot be read is known by its own text and by what is wrong with it, so that a change of
         // another file is noticed.
-        let sha256 = std::fs::read(file).ok().map(|contents| hexadecimal(Sha256::digest(contents)));
         record.inputs = vec![InputRecord { file: name_of(file), sha256 }];
     }
     let stated = serde_json::json!({
@@ -125,7 +131,8 @@ fn inputs(file: &Path, options: &Options, places: &Places) -> Inputs {
         "tool_version": env!("CARGO_PKG_VERSION"),
         "options": options,
         "inputs": record.inputs,
-        "model": model.as_ref().map(|(_, sha256)| sha256),
+        // A model that cannot be read has no checksum: its validation fails.
+        "model": model.as_ref().map(|model| model.sha256.as_deref().unwrap_or_default()),
         "error": read.as_ref().err(),
     });
     let digest = Sha256::digest(stated.to_string());
@@ -139,12 +146,11 @@ fn name_of(file: &Path) -> String {
 }
 
 /// The files of a session with their checksums, by names that do not depend on where the folder lies.
-fn input_records(sources: &SourceMap) -> Result<Vec<InputRecord>, String> {
+fn input_records(sources: &SourceMap) -> Vec<InputRecord> {
     let folder = sources.file.parent().unwrap_or(Path::new(""));
-    let record = |stamp| {
-        let input = provenance::stamped(stamp)?;
-        let name = Path::new(&input.path).strip_prefix(folder).map(|name| name.display().to_string());
-        Ok(InputRecord { file: name.unwrap_or_else(|_| name_of(input.path.as_ref())), sha256: Some(input.sha256) })
+    let record = |stamp: &FileStamp| {
+        let name = stamp.file.strip_prefix(folder).map(|name| name.display().to_string());
+        InputRecord { file: name.unwrap_or_else(|_| name_of(&stamp.file)), sha256: stamp.sha256() }
     };
     sources.files.iter().map(record).collect()
 }
@@ -169,16 +175,16 @@ fn describe(record: &mut Record, session: &Session) {
     record.instrument = Some(session.instrument.word().to_string());
 }
 
-/// The model of a machine and its checksum; `None` if there is none. Signs that no file name should have are `_`. A
-/// model that cannot be read has no checksum: its validation fails.
-fn model_of(machine_id: &str, places: &Places) -> Option<(PathBuf, String)> {
+/// The model of a machine; `None` if there is none. Signs that no file name should have are `_`.
+fn model_of(machine_id: &str, places: &Places) -> Option<Model> {
     let plain = |sign: char| if sign.is_alphanumeric() || "-_. ".contains(sign) { sign } else { '_' };
     let file = places.models.as_ref()?.join(format!("{}.json", machine_id.chars().map(plain).collect::<String>()));
-    match std::fs::read(&file) {
-        Ok(contents) => Some((file, hexadecimal(Sha256::digest(contents)))),
-        Err(cause) if cause.kind() == std::io::ErrorKind::NotFound => None,
-        Err(_) => Some((file, String::new())),
+    if matches!(file.try_exists(), Ok(false)) {
+        return None;
     }
+    let source = files::text(&file, "the model file").map_err(|error| error.to_string());
+    let sha256 = source.as_ref().ok().and_then(|source| source.stamp.as_ref()?.sha256());
+    Some(Model { source, sha256 })
 }
 
 /// Analyses what was read.
@@ -201,13 +207,18 @@ fn record(inputs: Inputs, goes_on: &(dyn Fn() -> bool + Sync)) -> Result<Record,
         Ok(Err(error)) => return failed(record, stage, error.to_string()),
         Err(_) => return failed(record, stage, FAULT.to_string()),
     }
-    if let Some((file, sha256)) = model {
-        let validated = catch_unwind(AssertUnwindSafe(|| validate(&model_file::read(&file)?, &session)));
+    if let Some(Model { source, sha256 }) = model {
+        let source = match source {
+            Ok(source) => source,
+            Err(message) => return failed(record, "validate", message),
+        };
+        let model = || model_file::read_text(&source.file, &source.text);
+        let validated = catch_unwind(AssertUnwindSafe(|| validate(&model()?, &session)));
         match validated {
             Ok(Ok(validation)) => {
                 let result = validation.result;
                 record.validation = Some(ValidationRecord {
-                    model_sha256: sha256,
+                    model_sha256: sha256.unwrap_or_default(),
                     verdict: result.verdict,
                     rms_um: result.model.rms.rms_um,
                     moved: result.moved.into_iter().map(|moved| moved.id).collect(),

@@ -192,6 +192,86 @@ fn a_killed_run_is_continued() {
     assert_eq!([count("results/"), count("sessions/")], [12, 12]);
 }
 
+/// Starts `abbe run` on the folder.
+fn start(place: &TestFolder, summary: &str) -> std::process::Child {
+    Command::new(env!("CARGO_BIN_EXE_abbe"))
+        .args(["run", "fleet", "--out", "results", "--only", "EX", "--quiet", "--json", summary])
+        .current_dir(place.0.path())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap()
+}
+
+/// Two processes share the sessions: each is analysed once, both summaries list all, and the results are those of one
+/// process.
+#[test]
+fn two_runs_on_one_folder_share_the_work() {
+    let place = fleet(16, monthly);
+    let mut children = [start(&place, "a.json"), start(&place, "b.json")];
+    assert!(children.iter_mut().all(|child| child.wait().unwrap().success()));
+    let summaries: Vec<Value> =
+        ["a.json", "b.json"].map(|name| serde_json::from_str(&read(&place.at(name))).unwrap()).into();
+    let number = |summary: &Value, key: &str| summary[key].as_u64().unwrap();
+    assert_eq!(summaries.iter().map(|summary| number(summary, "computed")).sum::<u64>(), 16, "{summaries:?}");
+    for summary in &summaries {
+        assert_eq!(number(summary, "computed") + number(summary, "kept"), 16, "{summary}");
+    }
+    let shared = files(&place.at("results"));
+    fs::rename(place.at("results"), place.at("shared")).unwrap();
+    assert!(start(&place, "one.json").wait().unwrap().success());
+    assert_eq!(files(&place.at("results")), shared);
+}
+
+/// A claim is a lock. While another process holds it, a run waits; without its process it holds no longer.
+#[test]
+fn a_claim_ends_with_its_process() {
+    let place = fleet(1, monthly);
+    assert!(start(&place, "one.json").wait().unwrap().success());
+    let record = files(&place.at("results/results")).into_keys().next().unwrap();
+    let record = place.at("results/results").join(record);
+    let whole = read(&record);
+    fs::remove_file(&record).unwrap();
+    let claim = record.with_file_name(format!(".{}.claim", record.file_stem().unwrap().to_str().unwrap()));
+    let held = fs::File::create(&claim).unwrap();
+    held.lock().unwrap();
+    let mut child = start(&place, "two.json");
+    // The progress of the waiting process cannot be seen from outside; it must not end.
+    std::thread::sleep(Duration::from_millis(1500));
+    assert!(child.try_wait().unwrap().is_none() && !record.exists(), "the run did not wait");
+    drop(held);
+    assert!(child.wait().unwrap().success());
+    assert_eq!(read(&record), whole);
+    assert!(!claim.exists());
+    // The claim of a process that was killed, and its temporary file.
+    fs::remove_file(&record).unwrap();
+    fs::write(&claim, "").unwrap();
+    fs::write(record.with_file_name(".abbe-aBcD12.tmp"), "half").unwrap();
+    assert!(start(&place, "three.json").wait().unwrap().success());
+    assert_eq!(files(&place.at("results/results")).len(), 1);
+    assert_eq!(read(&record), whole);
+}
+
+/// Records that no `abbe` wrote: a device without an end, a pipe, a folder. They count as missing.
+#[test]
+#[cfg(target_os = "linux")]
+fn an_endless_record_counts_as_missing() {
+    let place = fleet(3, monthly);
+    run(&place, "--no-trace");
+    let results = files(&place.at("results"));
+    let names: Vec<&String> = results.keys().filter(|name| name.starts_with("results/")).collect();
+    for (name, line) in names.iter().zip(["ln -s /dev/zero", "mkfifo", "ln -s ."]) {
+        fs::remove_file(place.at("results").join(name)).unwrap();
+        assert!(place.shell(&format!("{line} results/{name}")).status.success());
+    }
+    let output = place.shell("ulimit -v 1500000; timeout 60 abbe history results");
+    assert!(output.status.success(), "{:?}: {}", output.status, String::from_utf8_lossy(&output.stderr));
+    let output = place
+        .shell("rm results/results/*/*.json; ulimit -v 1500000; timeout 60 abbe run fleet --out results --no-trace");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(files(&place.at("results")), results);
+}
+
 #[test]
 fn a_full_disk_ends_the_run_and_keeps_results() {
     let place = fleet(4, monthly);

@@ -7,6 +7,7 @@ use abbe_identify::simulate::{Simulation, simulate};
 use abbe_identify::trace::TraceOptions;
 use abbe_identify::trace::screening::screened_effects;
 use abbe_model::effect::Effect;
+use abbe_model::files::stamp::FileStamp;
 use abbe_model::files::toml::parts;
 use abbe_model::files::{self, ReadOptions};
 use abbe_model::session::Session;
@@ -122,6 +123,11 @@ pub struct Noise {
     pub outlier_share: f64,
 }
 
+/// Largest number of draws of a study, which are summarised together.
+const MAX_DRAWS: usize = 1_000_000;
+/// Largest number of plans, of effects and of kinds of noise.
+const MAX_ENTRIES: usize = 1000;
+
 /// A study with its plans.
 pub struct Study {
     /// The file.
@@ -135,6 +141,8 @@ pub struct Study {
     pub digest: String,
     /// SHA-256 of `digest` and the build of the program, in hexadecimal: draws of another build are made again.
     pub key: String,
+    /// The study file as it was read.
+    pub stamp: Option<FileStamp>,
 }
 
 /// Reads a study and its plans.
@@ -142,25 +150,23 @@ pub struct Study {
 /// # Errors
 /// With file and line or key of what cannot be used.
 pub fn read(path: &Path) -> Result<Study, FleetError> {
-    let text = std::fs::read_to_string(path)
-        .map_err(|source| FleetError::Read { path: path.display().to_string(), source })?;
+    let source = files::text(path, "the study file").map_err(|fault| FleetError::Request(fault.to_string()))?;
+    let text = &source.text;
     let fault = |what: String| FleetError::Request(format!("{}: {what}", path.display()));
-    let file: StudyFile = toml::from_str(&text).map_err(|error| fault(error.to_string()))?;
+    let file: StudyFile = toml::from_str(text).map_err(|error| fault(error.to_string()))?;
     check(&file).map_err(fault)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut digest = Sha256::new();
     digest.update(concat!("abbe study 3 ", env!("CARGO_PKG_VERSION"), "\n"));
-    digest.update(&text);
+    digest.update(text);
     let (mut plans, mut effects) = (Vec::new(), Vec::new());
     for plan in &file.plan {
         let place = folder.join(&plan.session);
         let options = ReadOptions { allow_outside: true, ..ReadOptions::default() };
         let (session, sources) =
             files::session_with_sources(&place, &options).map_err(|error| FleetError::Request(error.to_string()))?;
-        for stamp in &sources.files {
-            let contents = std::fs::read(&stamp.file)
-                .map_err(|source| FleetError::Read { path: stamp.file.display().to_string(), source })?;
-            digest.update(Sha256::digest(contents));
+        for read in sources.files.iter().filter_map(FileStamp::read) {
+            digest.update(read.sha256);
         }
         let own: Vec<Option<Effect>> =
             file.effect.iter().map(|effect| declared(path, effect, &session)).collect::<Result<_, _>>()?;
@@ -179,7 +185,7 @@ pub fn read(path: &Path) -> Result<Study, FleetError> {
     let hexadecimal = |digest: Sha256| digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect::<String>();
     let digest = hexadecimal(digest);
     let key = hexadecimal(Sha256::new().chain_update(&digest).chain_update(BUILD));
-    Ok(Study { file, plans, effects, digest, key })
+    Ok(Study { file, plans, effects, digest, key, stamp: source.stamp })
 }
 
 /// The declared effect of an entry in a plan.
@@ -222,8 +228,18 @@ fn check(file: &StudyFile) -> Result<(), String> {
             return Err(format!("two [[{kind}]] are called `{}`: give each its own name", names[twice]));
         }
     }
-    if !(1..=10_000_000).contains(&head.draws) {
-        return Err(format!("draws = {}: 1 to 10,000,000 are expected", head.draws));
+    if !(1..=MAX_DRAWS).contains(&head.draws) {
+        return Err(format!("draws = {}: 1 to {MAX_DRAWS} are expected", head.draws));
+    }
+    let lists = [file.plan.len(), file.effect.len(), file.noise.len()];
+    let all = lists.iter().try_fold(head.draws, |product, list| product.checked_mul(*list));
+    if all.is_none_or(|all| all > MAX_DRAWS) || lists.iter().any(|list| *list > MAX_ENTRIES) {
+        let [plans, effects, noises] = lists;
+        return Err(format!(
+            "{plans} plans × {effects} effects × {noises} kinds of noise × {} draws: at most {MAX_DRAWS} draws of at \
+             most {MAX_ENTRIES} plans, effects and kinds of noise are expected; state fewer of them",
+            head.draws
+        ));
     }
     for (name, list) in [("plan", file.plan.len()), ("effect", file.effect.len()), ("noise", file.noise.len())] {
         if list == 0 {

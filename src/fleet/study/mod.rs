@@ -11,12 +11,12 @@ pub mod summary;
 mod truth;
 
 use super::FleetError;
-use super::store::Store;
+use super::store::{IfClaimed, Search, Store, found_or_claimed};
 use super::unit::Done;
 use draw::Draw;
 use file::Study;
 
-/// Makes a draw if the store has none of its number.
+/// Makes a draw if the store has none of its number. `None` if another process makes it and `if_claimed` says to skip it.
 ///
 /// # Errors
 /// If the store cannot be read or written, or `goes_on` returned `false`.
@@ -24,13 +24,18 @@ pub fn run(
     study: &Study,
     number: usize,
     store: &Store,
+    if_claimed: IfClaimed,
     goes_on: &(dyn Fn() -> bool + Sync),
-) -> Result<(Done, Draw), FleetError> {
-    if let Some(draw) = store.draw(&study.key, number)? {
-        return Ok((Done::Kept, draw));
-    }
+) -> Result<Option<(Done, Draw)>, FleetError> {
+    let found = || store.draw(&study.key, number);
+    let claim = || store.claim_draw(&study.key, number);
+    let _claim = match found_or_claimed(found, claim, if_claimed, goes_on)? {
+        Search::Found(draw) => return Ok(Some((Done::Kept, draw))),
+        Search::Skipped => return Ok(None),
+        Search::Claimed(claim) => claim,
+    };
     let draw = if goes_on() { study.draw(number, goes_on) } else { None };
     let draw = draw.ok_or(FleetError::Interrupted)?;
     store.write_draw(&study.key, &draw)?;
-    Ok((Done::Computed, draw))
+    Ok(Some((Done::Computed, draw)))
 }
