@@ -72,7 +72,7 @@ pub enum IdentifyError {
     },
     /// The iterations did not converge.
     #[error(
-        "no convergence after {iterations} iterations (the sum of squares is {sum_of_squares:e}); \
+        "no convergence after {iterations} iterations (the sum of squares is {sum_of_squares:.3e}); \
          check that the readings belong to this machine and that the nominal geometry is right"
     )]
     NoConvergence {

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use abbe_model::files;
-use abbe_model::session::limits::LARGEST;
+use abbe_model::session::limits::{LARGEST, MAX_LENGTH_MM};
+use abbe_model::words::number as number_in_words;
 
 use crate::error::IdentifyError;
 use crate::unit::{ARCSEC, Unit};
@@ -76,7 +77,12 @@ impl Given {
         });
         match number {
             Some((value, _)) if value.is_finite() && value.abs() > LARGEST => Err(IdentifyError::Request(format!(
-                "`{id}={quantity}`: {value:e} is too large; the maximum is {LARGEST:e}"
+                "`{id}={quantity}`: {} is too large; the maximum is {LARGEST:e}",
+                number_in_words(value)
+            ))),
+            Some((value, unit)) if longer_than_a_kilometre(value, unit) => Err(IdentifyError::Request(format!(
+                "`{id}={quantity}`: {} {unit} is too large; the limit is 1 km",
+                number_in_words(value)
             ))),
             Some((value, unit)) if value.is_finite() && (!unit.is_empty() || value == 0.0) => {
                 Ok(Given { id: id.to_string(), value, unit: unit.to_string() })
@@ -122,6 +128,12 @@ impl Given {
     }
 }
 
+/// Whether a value is a length beyond [`MAX_LENGTH_MM`].
+fn longer_than_a_kilometre(value: f64, unit: &str) -> bool {
+    let um = LENGTHS.iter().find(|(name, _)| *name == unit).map(|(_, um)| um * value.abs());
+    um.is_some_and(|um| um > 1e3 * MAX_LENGTH_MM)
+}
+
 /// The size of the first unit in the second one.
 fn factor(from: &str, to: &str) -> Option<f64> {
     [&LENGTHS[..], &ANGLES[..], &TIMES[..], &RATIOS[..]].into_iter().find_map(|units| {
@@ -137,8 +149,8 @@ fn factor(from: &str, to: &str) -> Option<f64> {
 /// and the entry.
 pub fn read(path: &Path) -> Result<Vec<Given>, IdentifyError> {
     let fault = |message: String| IdentifyError::Request(format!("{}: {message}", path.display()));
-    let text = files::text(path, "the file of values")?;
-    let table = toml::de::DeTable::parse(&text).map_err(|cause| fault(cause.to_string()))?;
+    let source = files::text(path, "the file of values")?;
+    let table = toml::de::DeTable::parse(&source.text).map_err(|cause| fault(cause.to_string()))?;
     let mut entries: Vec<_> = table.into_inner().into_iter().collect();
     entries.sort_by_key(|(key, _)| key.span().start);
     entries

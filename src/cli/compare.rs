@@ -2,9 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use abbe::identify::compare::results::{Comparison, ExcludedReading};
 use abbe::identify::compare::{CompareOptions, Named, SIGNIFICANCE, compare, one_machine};
 use abbe::identify::fit;
 use abbe::identify::model_file::{self, IdentifiedModel, Provenance};
+use abbe::identify::results::Outlier;
 use abbe::model::chain::Machine;
 use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
@@ -49,7 +51,7 @@ pub struct CompareArguments {
     /// repeated [default: bars of the same name with the same prior].
     ///
     /// Example: --shared workpiece_ball
-    #[arg(long = "shared", value_name = "THING")]
+    #[arg(long = "shared", value_name = "THING", allow_hyphen_values = true)]
     shared: Vec<String>,
     /// Probability of any false claim of a difference between two inputs.
     ///
@@ -107,14 +109,19 @@ pub fn run(arguments: &CompareArguments) -> Result<(), Failure> {
     for (name, input) in names.iter().zip(&inputs).skip(1) {
         one_machine((&names[0], inputs[0].machine()), (name, input.machine()))?;
     }
-    let models = models(inputs, arguments.common.seed)?;
+    let (models, outliers): (Vec<IdentifiedModel>, Vec<Vec<Outlier>>) =
+        models(inputs, arguments.common.seed)?.into_iter().unzip();
+    let excluded = names.iter().zip(outliers).flat_map(|(input, outliers)| {
+        outliers.into_iter().map(|outlier| ExcludedReading { input: input.clone(), outlier })
+    });
+    let excluded: Vec<ExcludedReading> = excluded.collect();
     let named: Vec<Named<'_>> = names.into_iter().zip(&models).map(|(name, model)| Named { name, model }).collect();
     let options = CompareOptions {
         significance: arguments.significance,
         shared: (!arguments.shared.is_empty()).then(|| arguments.shared.clone()),
         places: arguments.places,
     };
-    let comparison = compare(&named, &options)?;
+    let comparison = Comparison { outliers: excluded, ..compare(&named, &options)? };
     if outputs.tables(arguments.common.quiet) {
         for (number, pair) in comparison.pairs.iter().enumerate() {
             if number > 0 {
@@ -144,26 +151,27 @@ pub fn run(arguments: &CompareArguments) -> Result<(), Failure> {
 }
 
 fn read(file: &Path, arguments: &CompareArguments, outputs: &Outputs, origin: &mut Origin) -> Result<Input, Failure> {
-    let text = files::text(file, "the session or model")?;
+    let source = files::text(file, "the session or model")?;
     // A model is JSON; no session begins with a brace.
-    if text.trim_start().starts_with('{') {
+    if source.text.trim_start().starts_with('{') {
         outputs.refuse_overwrite([file])?;
-        origin.add(Origin::of_files(&[file])?);
-        return Ok(Input::Model(Box::new(model_file::read_text(file, &text)?)));
+        origin.add(Origin::of_files(&source.stamp));
+        return Ok(Input::Model(Box::new(model_file::read_text(file, &source.text)?)));
     }
     let options = ReadOptions {
         data_directory: arguments.data.clone(),
         allow_outside: arguments.allow_outside,
         ..ReadOptions::default()
     };
-    let (session, sources) = files::session_with_sources(file, &options)?;
+    let (session, sources) = files::session_of(&source, &options)?;
     outputs.refuse_overwrite_of_sources(&sources)?;
-    origin.add(Origin::of_session(&sources)?);
+    origin.add(Origin::of_session(&sources));
     Ok(Input::Session(Box::new(session)))
 }
 
-/// The models of all inputs. Sessions are fitted with the errors and effects that any of them declares.
-fn models(inputs: Vec<Input>, seed: u64) -> Result<Vec<IdentifiedModel>, Failure> {
+/// The models of all inputs, and the readings that their fits exclude as outliers. Sessions are fitted with the errors
+/// and effects that any of them declares.
+fn models(inputs: Vec<Input>, seed: u64) -> Result<Vec<(IdentifiedModel, Vec<Outlier>)>, Failure> {
     let (mut errors, mut effects) = (Vec::new(), Vec::new());
     for input in &inputs {
         let Input::Session(session) = input else { continue };
@@ -179,13 +187,14 @@ fn models(inputs: Vec<Input>, seed: u64) -> Result<Vec<IdentifiedModel>, Failure
         }
     }
     let model = |input: Input| match input {
-        Input::Model(model) => Ok(*model),
+        Input::Model(model) => Ok((*model, Vec::new())),
         Input::Session(session) => {
             let own = session.effects.iter().filter(|effect| !effect.tests.is_empty()).cloned();
             let effects = effects.iter().cloned().chain(own).collect();
             let session = Session { unknowns: errors.clone(), effects, ..*session };
             let (problem, fit) = fit::prepare(&session, seed)?;
-            Ok(IdentifiedModel::of_fit(&problem, &fit, Provenance::default())?)
+            let outliers = fit::outliers(&problem, &fit);
+            Ok((IdentifiedModel::of_fit(&problem, &fit, Provenance::default())?, outliers))
         }
     };
     inputs.into_iter().map(model).collect()

@@ -7,14 +7,14 @@ use abbe::identify::correction::stream::{self, Output, Summary};
 use abbe::identify::correction::{Aim, Correction, EstimatedErrors};
 use abbe::identify::model_file;
 use abbe::model::chain::Machine;
-use abbe::model::files::commands::CommandFile;
-use abbe::model::session::limits::LARGEST;
+use abbe::model::files::{self, commands::CommandFile};
 use clap::Args;
 
 use super::failure::Failure;
 use super::interrupt::Interrupts;
 use super::json::{self, Origin};
 use super::output::{self, Outputs};
+use super::values;
 use crate::report::compensate as present;
 
 /// Examples of `abbe compensate`.
@@ -69,15 +69,10 @@ pub struct CompensateArguments {
 pub fn run(arguments: &CompensateArguments, quiet: bool) -> Result<(), Failure> {
     let outputs = Outputs::new(std::iter::once(&arguments.out).chain(&arguments.json))?;
     outputs.refuse_overwrite([arguments.model.as_path(), arguments.commands.as_path()])?;
-    let model = model_file::read(&arguments.model)?;
+    let source = files::text(&arguments.model, "the model file")?;
+    let model = model_file::read_text(&source.file, &source.text)?;
     let machine = &model.machine;
-    let tool_mm = match arguments.tool_mm[..] {
-        [] => model.tool_mm,
-        [x, y, z] if [x, y, z].iter().all(|mm: &f64| mm.abs() <= LARGEST) => [x, y, z],
-        _ => {
-            return Err(Failure::Other(format!("--tool-mm: three numbers of {LARGEST:e} at most, as in 0,0,-120")));
-        }
-    };
+    let tool_mm = values::point_mm("--tool-mm", &arguments.tool_mm, model.tool_mm)?;
     let at = positions(machine, &arguments.at)?;
     let mut file = CommandFile::open(&arguments.commands, machine, at.clone())?;
     let columns = file.axis_columns();
@@ -112,8 +107,8 @@ pub fn run(arguments: &CompensateArguments, quiet: bool) -> Result<(), Failure> 
     }
     match &arguments.json {
         Some(path) => {
-            let read = [arguments.model.as_path(), arguments.commands.as_path()];
-            json::write(path, Origin::of_files(&read)?, None, &summary)
+            let read = source.stamp.iter().chain([file.stamp()]);
+            json::write(path, Origin::of_files(read), None, &summary)
         }
         None => Ok(()),
     }
@@ -144,7 +139,8 @@ fn positions(machine: &Machine, stated: &[String]) -> Result<Vec<f64>, Failure> 
     for text in stated {
         let fault = || Failure::Other(format!("--at {text}: write an axis and its position in mm or degrees, `A=30`"));
         let (name, number) = text.split_once('=').ok_or_else(fault)?;
-        let number: f64 = number.trim().parse().ok().filter(|n: &f64| n.abs() <= LARGEST).ok_or_else(fault)?;
+        let number: f64 = number.trim().parse().map_err(|_| fault())?;
+        values::POSITION.check(&format!("--at {}=", name.trim()), number)?;
         let Some(axis) = machine.axis_index(name.trim()) else {
             let names: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
             let axes = names.join(", ");

@@ -9,7 +9,7 @@ use abbe::identify::export::{left_out, urdf};
 use abbe::identify::model_file::{self, IdentifiedModel};
 use abbe::identify::parameters::Role;
 use abbe::model::component::{ErrorKind, ErrorName};
-use abbe::model::session::limits::LARGEST;
+use abbe::model::files;
 use clap::{Args, ValueEnum};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -17,6 +17,7 @@ use serde::Serialize;
 use super::failure::Failure;
 use super::json::{self, Origin};
 use super::output::{self, Outputs};
+use super::values;
 use crate::report::export as present;
 
 /// Examples of `abbe export`.
@@ -112,14 +113,9 @@ pub struct ExportResult {
 pub fn run(arguments: &ExportArguments, quiet: bool) -> Result<(), Failure> {
     let outputs = Outputs::new(std::iter::once(&arguments.out).chain(&arguments.json))?;
     outputs.refuse_overwrite([arguments.model.as_path()])?;
-    let model = model_file::read(&arguments.model)?;
-    let tool_mm = match arguments.tool_mm[..] {
-        [] => model.tool_mm,
-        [x, y, z] if [x, y, z].iter().all(|mm: &f64| mm.abs() <= LARGEST) => [x, y, z],
-        _ => {
-            return Err(Failure::Other(format!("--tool-mm: three numbers of {LARGEST:e} at most, as in 0,0,120")));
-        }
-    };
+    let source = files::text(&arguments.model, "the model file")?;
+    let model = model_file::read_text(&source.file, &source.text)?;
+    let tool_mm = values::point_mm("--tool-mm", &arguments.tool_mm, model.tool_mm)?;
     let mut result = ExportResult { calibrated: None, nominal: None, kinematics: None, left_out: left_out(&model) };
     let (text, tables) = match arguments.format {
         Format::Urdf => (urdf::urdf(&model, tool_mm)?.into_bytes(), Vec::new()),
@@ -152,7 +148,7 @@ pub fn run(arguments: &ExportArguments, quiet: bool) -> Result<(), Failure> {
         }
     }
     match &arguments.json {
-        Some(path) => json::write(path, Origin::of_files(&[&arguments.model])?, None, &result),
+        Some(path) => json::write(path, Origin::of_files(&source.stamp), None, &result),
         None => Ok(()),
     }
 }

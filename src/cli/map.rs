@@ -1,17 +1,17 @@
 //! `abbe volumetric --map`: the volumetric error over a grid, and its compensation.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use abbe::identify::volumetric::{self, MachineWithErrors, Summary, functions};
 use abbe::model::axis::AxisKind;
 use abbe::model::chain::Machine;
-use abbe::model::session::limits::LARGEST;
+use abbe::model::files::{self, Source};
 use abbe::model::words::counted;
 use clap::Args;
 
 use super::failure::Failure;
 use super::json::{self, Origin};
-use super::output;
+use super::{output, values};
 use crate::report::volumetric as present;
 
 /// A map of the volumetric error.
@@ -63,18 +63,13 @@ impl MapArguments {
 }
 
 /// Runs `abbe volumetric --map`.
-pub fn run(machine_file: &Path, machine: &Machine, arguments: &MapArguments, tables: bool) -> Result<(), Failure> {
+pub fn run(machine_file: &Source, machine: &Machine, arguments: &MapArguments, tables: bool) -> Result<(), Failure> {
     let (Some(path), Some(file)) = (&arguments.map, &arguments.functions) else {
         return Err(Failure::Other("--map and --functions go together".into()));
     };
-    let functions = functions::read(file, machine)?;
-    let tool_mm = match arguments.tool_mm[..] {
-        [] => [0.0; 3],
-        [x, y, z] if [x, y, z].iter().all(|mm: &f64| mm.abs() <= LARGEST) => [x, y, z],
-        _ => {
-            return Err(Failure::Other(format!("--tool-mm: three numbers of {LARGEST:e} at most, as in 0,0,-120")));
-        }
-    };
+    let source = files::text(file, "the file of error functions")?;
+    let functions = functions::of_source(&source, machine)?;
+    let tool_mm = values::point_mm("--tool-mm", &arguments.tool_mm, [0.0; 3])?;
     let grid = grid(machine, arguments)?;
     let erring = MachineWithErrors { machine, functions: &functions, tool_mm };
     let (places, summary) = volumetric::map(&erring, &grid, arguments.compensate)?;
@@ -83,7 +78,8 @@ pub fn run(machine_file: &Path, machine: &Machine, arguments: &MapArguments, tab
         print(&summary, functions.len(), &path.display().to_string());
     }
     if let Some(path) = &arguments.json {
-        json::write(path, Origin::of_files(&[machine_file, file])?, None, &summary)?;
+        let read = machine_file.stamp.iter().chain(&source.stamp);
+        json::write(path, Origin::of_files(read), None, &summary)?;
     }
     Ok(())
 }
@@ -110,9 +106,10 @@ fn grid(machine: &Machine, arguments: &MapArguments) -> Result<Vec<Vec<f64>>, Fa
         if number.is_nan() || (sign == ':' && (number < 1.0 || number.fract() != 0.0)) {
             return Err(fault());
         }
-        let most = if sign == ':' { volumetric::MAX_POINTS as f64 } else { LARGEST };
-        if number.abs() > most {
-            return Err(Failure::Other(format!("--axis {text}: {most:e} is the most")));
+        if sign == '=' {
+            values::POSITION.check(&format!("--axis {}=", name.trim()), number)?;
+        } else if number > volumetric::MAX_POINTS as f64 {
+            return Err(Failure::Other(format!("--axis {text}: {} places are the most", volumetric::MAX_POINTS)));
         }
         let Some(axis) = machine.axis_index(name.trim()) else {
             let names: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();

@@ -27,7 +27,7 @@ pub struct NewArguments {
     /// Copy this template.
     ///
     /// Example: --template hermle-c600u
-    #[arg(long, value_name = "NAME", requires = "folder")]
+    #[arg(long, value_name = "NAME", requires = "folder", allow_hyphen_values = true)]
     template: Option<String>,
     /// Create a machine with this structural code, from workpiece over bed to tool, and a plan for it.
     ///

@@ -13,11 +13,11 @@ pub struct SearchArguments {
     /// Search only effects whose identifier contains this text; may be repeated.
     ///
     /// Example: --only EZC --only ~time --only :h2
-    #[arg(long, value_name = "TEXT")]
+    #[arg(long, value_name = "TEXT", allow_hyphen_values = true)]
     pub only: Vec<String>,
     /// Do not search effects whose identifier contains this text; may be repeated.
     ///
     /// Example: --exclude :spline --exclude ~time
-    #[arg(long, value_name = "TEXT")]
+    #[arg(long, value_name = "TEXT", allow_hyphen_values = true)]
     pub exclude: Vec<String>,
 }

@@ -31,6 +31,8 @@ pub struct DrawArguments {
 
 /// Minimum number of runs for 95 % intervals (JCGM 101, 7.2.2: 10⁴, so that 200 runs lie beyond each end).
 const MIN_RUNS: u64 = 10_000;
+/// Maximum number of runs: the coverage intervals have five digits then.
+const MAX_RUNS: u64 = 1_000_000_000;
 
 impl DrawArguments {
     /// Refuses Monte Carlo with another method.
@@ -49,6 +51,9 @@ impl DrawArguments {
         let Some(runs) = self.monte_carlo else {
             return Ok(None);
         };
+        if runs > MAX_RUNS {
+            return Err(Failure::Other(format!("`--monte-carlo {runs}`: {MAX_RUNS} runs are the most")));
+        }
         if runs < MIN_RUNS {
             return Err(Failure::Other(format!(
                 "`--monte-carlo {runs}`: at least {MIN_RUNS} runs are needed for the coverage intervals"

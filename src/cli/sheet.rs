@@ -13,7 +13,7 @@ use clap::Args;
 
 use super::failure::Failure;
 use super::message::print_warnings;
-use super::{SessionArguments, output};
+use super::{SessionArguments, output, values};
 use crate::printers::sheet as present;
 
 /// Examples of `abbe sheet`.
@@ -62,21 +62,16 @@ fn collisions(session: &Session) -> Vec<String> {
 /// Runs `abbe sheet`.
 pub fn run(arguments: &SheetArguments, quiet: bool) -> Result<(), Failure> {
     for (flag, value) in [("--setup-min", arguments.setup_min), ("--test-min", arguments.test_min)] {
-        if !(0.0..=1e4).contains(&value) {
-            return Err(Failure::Other(format!("`{flag} {value}`: a number of minutes from 0 to 10000 is expected")));
-        }
+        values::MINUTES.check(flag, value)?;
     }
-    if let Some(mm) = arguments.bar_mm
-        && !(1.0..=1e4).contains(&mm)
-    {
-        return Err(Failure::Other(format!("`--bar-mm {mm}`: a length from 1 to 10000 mm is expected")));
-    }
+    arguments.bar_mm.map(|mm| values::BAR_MM.check("--bar-mm", mm)).transpose()?;
     let outputs = output::Outputs::new([&arguments.out])?;
     let reading = ReadOptions { read_data: false, ..arguments.session.options() };
-    let (mut session, mut sources) = files::session_with_sources(&arguments.session.session, &reading)?;
+    let source = files::text(&arguments.session.session, "the session file")?;
+    let (mut session, mut sources) = files::session_of(&source, &reading)?;
     // Poses stand in the data.
     if session.tests.iter().any(|test| matches!(test.motion, None | Some(Motion::List))) {
-        (session, sources) = files::session_with_sources(&arguments.session.session, &arguments.session.options())?;
+        (session, sources) = files::session_of(&source, &arguments.session.options())?;
     }
     outputs.refuse_overwrite_of_sources(&sources)?;
     let times = SetUpTimes { setup_min: arguments.setup_min, test_min: arguments.test_min };

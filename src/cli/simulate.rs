@@ -6,14 +6,13 @@ use abbe::identify::quantity::{self, Given};
 use abbe::identify::simulate::{Simulated, Simulation, simulate};
 use abbe::model::files::{self, Changes, SourceMap, with_readings};
 use abbe::model::session::Session;
-use abbe::model::session::limits::{LARGEST, MIN_UM};
 use abbe::model::words::counted;
 use clap::Args;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::failure::Failure;
-use super::{CommonArguments, SessionArguments, folder, message, output, read_session};
+use super::{CommonArguments, SessionArguments, folder, message, output, read_session, values};
 use crate::report::number::micrometres;
 use crate::report::simulation::truth;
 use crate::report::table::Table;
@@ -93,14 +92,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
         given.retain(|other| other.id != value.id);
         given.push(value);
     }
-    if let Some(noise) = arguments.noise_um
-        && noise != 0.0
-        && !(MIN_UM..=LARGEST).contains(&noise)
-    {
-        return Err(Failure::Other(format!(
-            "`--noise-um {noise}`: a standard deviation in µm is expected: 0, or {MIN_UM:e} to {LARGEST:e}"
-        )));
-    }
+    arguments.noise_um.map(|noise| values::NOISE_UM.check("--noise-um", noise)).transpose()?;
     let simulation = Simulation {
         given,
         noise_mm: arguments.noise_um.map(|noise_um| noise_um * 1e-3),

@@ -67,7 +67,7 @@ fn invalid_requests_fail_with_the_reason() {
         (vec!["plan", &session, "--separate", "EZC~C:q2,EAC~C:h1"], "similar ones: EZC~C:h1"),
         (vec!["plan", &session, "--separate", "EZC~C:h2"], "two different effects"),
         (vec!["plan", &session, "--noise-um", "0"], "is expected"),
-        (vec!["plan", &session, "--improve", "--bars-mm", "0"], "a length of at least 1 mm"),
+        (vec!["plan", &session, "--improve", "--bars-mm", "0"], "a length from 1 to 1000000 mm"),
         (vec!["plan", &session, "--improve", "--bars-mm", "20"], "no candidate test"),
         (vec!["plan", &session, "--clearance-mm", "1,2"], "six lengths"),
         (vec!["plan", &session, "--improve", "--sweep-shares", "1.5"], "no share"),

@@ -4,11 +4,14 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::workspace::VolumetricSummary;
+use crate::results::Outlier;
 
 /// The result of `abbe compare`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Comparison {
     /// The models and sessions, the first one being that with which the others are compared.
+    // The document of a command has its files under `inputs`.
+    #[serde(rename = "models")]
     pub inputs: Vec<String>,
     /// Probability of any false claim of a difference between two of them.
     pub significance: f64,
@@ -16,8 +19,20 @@ pub struct Comparison {
     pub differences: Vec<Difference>,
     /// Summary of each pair.
     pub pairs: Vec<Pair>,
+    /// The readings that the fits of the sessions excluded as outliers.
+    pub outliers: Vec<ExcludedReading>,
     /// The volumetric error over the common range of axes, one entry per input; empty if it was not evaluated.
     pub workspace: Vec<VolumetricSummary>,
+}
+
+/// A reading of a session that its fit excluded as an outlier.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ExcludedReading {
+    /// The session.
+    pub input: String,
+    /// The reading.
+    #[serde(flatten)]
+    pub outlier: Outlier,
 }
 
 /// The difference of a parameter.

@@ -98,7 +98,7 @@ fn common_ranges(models: &[&IdentifiedModel]) -> Option<Vec<[f64; 2]>> {
 fn grid(ranges: &[[f64; 2]], places: usize) -> Readings {
     let moving = ranges.iter().filter(|[from, to]| to > from).count() as i32;
     let mut places = places.max(1);
-    while places > 2 && (places as f64).powi(moving) > MAX_POINTS as f64 {
+    while places > 1 && (places as f64).powi(moving) > MAX_POINTS as f64 {
         places -= 1;
     }
     let mut positions: Vec<Vec<f64>> = vec![vec![]];

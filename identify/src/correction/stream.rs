@@ -298,6 +298,10 @@ impl Layout {
                     self.cells(&mut text, file, &block.cells[row], &commands, row, usable, replaced);
                     let [um, arcsec] = [1e3 * found.remaining_mm, ARCSEC * found.remaining_rad];
                     let _ = match usable {
+                        // A singular matrix has no condition.
+                        true if !found.condition.is_finite() => {
+                            writeln!(text, ",{um:.6},{arcsec:.6},,{}", state.word())
+                        }
                         true => writeln!(text, ",{um:.6},{arcsec:.6},{:.4e},{}", found.condition, state.word()),
                         false => writeln!(text, ",,,,{}", state.word()),
                     };

@@ -72,6 +72,17 @@ pub(super) fn across(direction: [f64; 3]) -> [f64; 3] {
     rest.map(|x| x / length)
 }
 
+/// The candidate positions of a rotary axis that does not sweep, rad: those within its travel.
+pub(super) fn standing_positions(
+    session: &Session,
+    variations: &TestVariations,
+    axis: usize,
+) -> impl Iterator<Item = f64> {
+    let [low, high] = session.machine.axes[axis].travel.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+    let positions = variations.standing_deg.iter().map(|degrees| degrees.to_radians());
+    positions.filter(move |position| *position >= low - 1e-9 && *position <= high + 1e-9)
+}
+
 /// The positions of all axes, with the rotary axes other than the swept one at the candidate positions.
 pub(super) fn axis_positions(
     session: &Session,
@@ -84,14 +95,10 @@ pub(super) fn axis_positions(
     for &other in rotary.iter().filter(|axis| **axis != swept) {
         let mut more = Vec::new();
         for at in &all {
-            for degrees in &variations.standing_deg {
-                let position = degrees.to_radians();
-                let [low, high] = machine.axes[other].travel.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
-                if position >= low - 1e-9 && position <= high + 1e-9 {
-                    let mut at = at.clone();
-                    at[other] = position;
-                    more.push(at);
-                }
+            for position in standing_positions(session, variations, other) {
+                let mut at = at.clone();
+                at[other] = position;
+                more.push(at);
             }
         }
         all = more;

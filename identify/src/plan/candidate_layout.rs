@@ -7,7 +7,7 @@ use abbe_model::session::expression::Length;
 use abbe_model::session::motion::{FollowOffset, Motion};
 use abbe_model::session::{Prior, Session, Test, placing};
 
-use super::ball_positions::{BallPosition, axis_positions, ball_positions, dot, norm};
+use super::ball_positions::{BallPosition, axis_positions, ball_positions, dot, norm, standing_positions};
 use super::sweep::{Sweep, sweep_of};
 use super::test_variations::TestVariations;
 
@@ -26,6 +26,34 @@ pub(super) struct Draft {
     pub name: String,
     /// Whether a ball has to be mounted for it.
     pub new_setup: bool,
+}
+
+/// Largest number of combinations of the permitted choices. A candidate with its positions takes some 20 kB.
+pub(super) const MAX_DRAFTS: usize = 100_000;
+
+/// The largest possible number of combinations of the permitted choices, counted before any is made.
+pub(super) fn draft_count(session: &Session, variations: &TestVariations) -> f64 {
+    let machine = &session.machine;
+    let rotary: Vec<usize> =
+        (0..machine.axes.len()).filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary).collect();
+    let count = |list: usize| list as f64;
+    let heights: f64 = variations.heights_mm.iter().map(|height| if *height == 0.0 { 1.0 } else { 2.0 }).sum();
+    let [balls_on_table, balls_in_spindle] = [true, false].map(|on_table| {
+        let about = rotary.iter().filter(|axis| (**axis < machine.workpiece_side) == on_table).count();
+        let mounted = if on_table { session.tests.len() } else { 0 };
+        count(mounted) + count(about) * count(variations.radii_mm.len()) * heights
+    });
+    let sweeps = count(variations.ranges.len()) * count(variations.both_directions.len());
+    // The other ball lies on either side of the circle; linear axes follow in three ways.
+    let bars = 2.0 * count(variations.bars_mm.len()) + if variations.follow { 3.0 } else { 0.0 };
+    let of_axis = |axis: &usize| {
+        let balls = if *axis < machine.workpiece_side { balls_on_table } else { balls_in_spindle };
+        let others = rotary.iter().filter(|other| *other != axis);
+        let standing: f64 =
+            others.map(|other| count(standing_positions(session, variations, *other).count())).product();
+        balls * standing * sweeps * count(variations.feeds.len()) * bars
+    };
+    rotary.iter().map(of_axis).sum()
 }
 
 /// All combinations of the permitted choices, before travel and reach are checked.

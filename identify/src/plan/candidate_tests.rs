@@ -11,8 +11,9 @@ use std::sync::Arc;
 use abbe_model::axis::AxisKind;
 use abbe_model::instrument::Station;
 use abbe_model::session::{Session, Test};
+use abbe_model::words::{counted, number};
 
-use super::candidate_layout::{Draft, drafts};
+use super::candidate_layout::{Draft, MAX_DRAFTS, draft_count, drafts};
 use super::collision::{Bodies, Parts};
 use super::states;
 use super::test_variations::TestVariations;
@@ -55,6 +56,19 @@ pub fn candidate_tests(session: &Session, variations: &TestVariations) -> Result
             "candidate tests are available for ball bars only; this session uses another instrument".to_string(),
         ));
     };
+    let count = draft_count(session, variations);
+    if count > MAX_DRAFTS as f64 {
+        let TestVariations { bars_mm, radii_mm, heights_mm, feeds, ranges, .. } = variations;
+        return Err(IdentifyError::Request(format!(
+            "up to {} candidate tests; the limit is {MAX_DRAFTS}: state fewer of the {}, {}, {}, {} and {}",
+            number(count),
+            counted(bars_mm.len(), "bar"),
+            counted(radii_mm.len(), "distance of the ball from its axis"),
+            counted(heights_mm.len(), "height"),
+            counted(feeds.len(), "feed"),
+            counted(ranges.len(), "share of the range"),
+        )));
+    }
     let drafts = drafts(session, variations, last);
     let bodies = Bodies::of(&session.machine);
     let finished = parallel::map(drafts.len(), &|k| finished(session, &bodies, variations, drafts[k].clone()));

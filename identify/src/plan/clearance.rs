@@ -11,6 +11,8 @@
 //! | spindle | `Ds/2 ≥ L` | `H ≥ Dt/2` and `L > W/2` |
 //! | spindle | `Ds/2 < L` | nothing: Yamaji et al. print `H ≤ Dt/2 should be satisfied`, which is permitted and not required |
 
+use abbe_model::words::number;
+
 /// The relevant dimensions, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Clearance {
@@ -42,15 +44,16 @@ impl Clearance {
             }
         };
         let clear_of_device = format!(
-            "the shaft of {shaft_mm} mm has to be longer than half the device's width, {} mm",
-            device_width_mm / 2.0
+            "the shaft of {} mm has to be longer than half the device's width, {} mm",
+            number(shaft_mm),
+            number(device_width_mm / 2.0)
         );
         if self.device_on_table {
             if spindle_mm / 2.0 >= device_height_mm {
                 let words = format!(
                     "shaft and jig, {} mm, have to be longer than the table's radius, {} mm: the spindle reaches over its edge",
-                    shaft_mm + jig_mm,
-                    table_mm / 2.0
+                    number(shaft_mm + jig_mm),
+                    number(table_mm / 2.0)
                 );
                 need(shaft_mm + jig_mm > table_mm / 2.0, words);
             } else {
@@ -58,8 +61,9 @@ impl Clearance {
             }
         } else if spindle_mm / 2.0 >= shaft_mm {
             let words = format!(
-                "the device of {device_height_mm} mm has to be at least as high as the table's radius, {} mm",
-                table_mm / 2.0
+                "the device of {} mm has to be at least as high as the table's radius, {} mm",
+                number(device_height_mm),
+                number(table_mm / 2.0)
             );
             need(device_height_mm >= table_mm / 2.0, words);
             need(shaft_mm > device_width_mm / 2.0, clear_of_device);

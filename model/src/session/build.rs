@@ -240,7 +240,7 @@ impl NewTest {
                 && !(*u > 0.0 && u.is_finite())
             {
                 return Err((
-                    format!("the standard uncertainty of `{thing}` is {u}"),
+                    format!("the standard uncertainty of `{thing}` is {}", crate::words::number(*u)),
                     "it is greater than 0; `Prior::Known` means exactly known, `Prior::Free` unknown".into(),
                 ));
             }

@@ -1,8 +1,13 @@
 //! Limits of numbers in input. Within them nothing overflows and angles remain accurate.
 
+use crate::words;
+
 /// The largest number that input may contain, in the unit of its name. A position of 10¹² is resolved to 10⁻⁴; in
 /// degrees it is three thousand million revolutions.
 pub const LARGEST: f64 = 1e12;
+
+/// The longest length, mm: 1 km. No machine is longer, and rounding of it is far below any noise.
+pub const MAX_LENGTH_MM: f64 = 1e6;
 
 /// The least nonzero standard deviation or step, µm: a millionth of the resolution of any sensor.
 pub const MIN_UM: f64 = 1e-6;
@@ -10,15 +15,28 @@ pub const MIN_UM: f64 = 1e-6;
 /// The fault of a number that is larger than [`LARGEST`].
 pub fn too_large(number: f64) -> Option<String> {
     (number.is_finite() && number.abs() > LARGEST)
-        .then(|| format!("{number:e}, which is too large; the limit is {LARGEST:e}"))
+        .then(|| format!("{}, which is too large; the limit is {LARGEST:e}", words::number(number)))
+}
+
+/// As [`too_large`], for a number with a name: the limit of a length in mm, m or inches is [`MAX_LENGTH_MM`].
+pub fn too_large_for(name: &str, number: f64) -> Option<String> {
+    let mm = match name.rsplit_once('_').map(|(_, unit)| unit) {
+        Some("mm") => number,
+        Some("m") => 1e3 * number,
+        Some("in") => 25.4 * number,
+        _ => return too_large(number),
+    };
+    (number.is_finite() && mm.abs() > MAX_LENGTH_MM)
+        .then(|| format!("{}, which is too large; the limit is 1 km", words::number(number)))
 }
 
 /// The fault of a standard deviation or step in µm that is neither zero nor at least [`MIN_UM`].
 pub(crate) fn too_small_um(number: f64) -> Option<String> {
-    (number > 0.0 && number < MIN_UM).then(|| format!("{number:e} µm; the least value other than 0 is {MIN_UM:e} µm"))
+    (number > 0.0 && number < MIN_UM)
+        .then(|| format!("{} µm; the least value other than 0 is {MIN_UM:e} µm", words::number(number)))
 }
 
 /// The fault of a length with this name that is not above zero.
 pub(crate) fn not_positive(name: &str, number: f64) -> Option<String> {
-    (number <= 0.0).then(|| format!("`{name}` is {number}; it must be greater than 0"))
+    (number <= 0.0).then(|| format!("`{name}` is {}; it must be greater than 0", words::number(number)))
 }

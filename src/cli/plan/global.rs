@@ -21,7 +21,7 @@ pub struct GlobalArguments {
     /// parameter instead of its prior; may be repeated.
     ///
     /// Example: --global --vary EZC~C:h2=2um --vary bar=5um
-    #[arg(long = "vary", value_name = "NAME=SIZE", requires = "global")]
+    #[arg(long = "vary", value_name = "NAME=SIZE", requires = "global", allow_hyphen_values = true)]
     vary: Vec<String>,
     /// Number of samples of --global, a power of two.
     ///
@@ -47,7 +47,12 @@ impl GlobalArguments {
                 self.samples
             )));
         }
-        let vary = self.vary.iter().map(|text| Given::parse(text)).collect::<Result<_, _>>()?;
+        let vary = self.vary.iter().map(|text| Given::parse(text)).collect::<Result<Vec<_>, _>>()?;
+        if let Some((text, _)) = self.vary.iter().zip(&vary).find(|(_, given)| given.value <= 0.0) {
+            return Err(Failure::Other(format!(
+                "`--vary {text}`: half the range or a standard deviation is expected, a number above 0"
+            )));
+        }
         Ok(global(problem, &GlobalOptions { samples: self.samples, seed, vary })?)
     }
 }

@@ -15,7 +15,7 @@ use abbe::model::words::counted;
 use clap::{Args, ValueEnum};
 
 use crate::cli::failure::Failure;
-use crate::cli::{SessionArguments, next_session, output};
+use crate::cli::{SessionArguments, next_session, output, values};
 use crate::report::next_test as present;
 use crate::report::number::three_digits;
 
@@ -47,7 +47,7 @@ pub struct ImproveArguments {
     /// Propose a test that separates two effects, named by their identifiers.
     ///
     /// Example: --separate EZC~C:h2,EAC~C:h1
-    #[arg(long, value_name = "A,B")]
+    #[arg(long, value_name = "A,B", allow_hyphen_values = true)]
     separate: Option<String>,
     /// Lengths of the available bars.
     ///
@@ -130,7 +130,7 @@ impl ImproveArguments {
 
     /// Travel of the sensor in the bar, in each direction, mm.
     pub fn reach_mm(&self) -> Result<f64, Failure> {
-        not_negative("--reach-mm", self.reach_mm)
+        values::DISTANCE_MM.check("--reach-mm", self.reach_mm)
     }
 
     /// Whether gain per minute is compared.
@@ -140,43 +140,24 @@ impl ImproveArguments {
 
     fn candidate_tests(&self) -> Result<TestVariations, Failure> {
         let mut candidates = TestVariations { reach_mm: self.reach_mm()?, ..TestVariations::default() };
-        let checked = |flag: &str, list: &[f64], least: f64| match list
-            .iter()
-            .find(|value| !value.is_finite() || **value < least)
-        {
-            Some(value) => Err(Failure::Other(format!(
-                "`{flag}`: {value} mm is out of range; a length of at least {least} mm is expected"
-            ))),
-            None => Ok(list.to_vec()),
-        };
         if let Some(bars) = &self.bars_mm {
-            candidates.bars_mm = checked("--bars-mm", bars, 1.0)?;
+            candidates.bars_mm = values::LENGTH_MM.all("--bars-mm", bars)?;
         }
         if let Some(radii) = &self.radii_mm {
-            candidates.radii_mm = checked("--radii-mm", radii, 1.0)?;
+            candidates.radii_mm = values::LENGTH_MM.all("--radii-mm", radii)?;
         }
         if let Some(heights) = &self.heights_mm {
-            candidates.heights_mm = checked("--heights-mm", heights, 0.0)?;
+            candidates.heights_mm = values::DISTANCE_MM.all("--heights-mm", heights)?;
         }
         if self.by_minute() {
             candidates.ranges.push(HALF);
             candidates.both_directions.push(false);
         }
-        let shares =
-            |flag: &str, list: &[f64], most: f64| match list.iter().find(|value| !(**value > 0.0 && **value <= most)) {
-                Some(value) if most == 1.0 => Err(Failure::Other(format!(
-                    "`{flag}`: {value} is no share of a range; a number above 0 and at most 1 is expected"
-                ))),
-                Some(value) => Err(Failure::Other(format!(
-                    "`{flag}`: {value} is no multiple of a feed; a positive number is expected"
-                ))),
-                None => Ok(list.to_vec()),
-            };
         if let Some(feeds) = &self.feeds {
-            candidates.feeds = shares("--feeds", feeds, f64::MAX)?;
+            candidates.feeds = values::FEED.all("--feeds", feeds)?;
         }
         if let Some(ranges) = &self.ranges {
-            candidates.ranges = shares("--sweep-shares", ranges, 1.0)?;
+            candidates.ranges = values::SHARE.all("--sweep-shares", ranges)?;
         }
         if let Some(directions) = &self.directions {
             candidates.both_directions = directions.iter().map(|ways| *ways == Directions::Both).collect();
@@ -184,7 +165,7 @@ impl ImproveArguments {
         candidates.follow = !self.no_follow;
         candidates.keep_spindle_ball = !self.remount_spindle_ball;
         let stated = |flag: &str, value: Option<f64>, usual: f64| match value {
-            Some(value) => not_negative(flag, value),
+            Some(value) => values::MINUTES.check(flag, value),
             None => Ok(usual),
         };
         candidates.setup_min = stated("--setup-min", self.setup_min, candidates.setup_min)?;
@@ -218,15 +199,6 @@ impl ImproveArguments {
         }
         let options = ImproveOptions { goal: Goal::WorstUncertainty, tests, by_minute };
         Ok(improve(problem, &candidates, &options)?)
-    }
-}
-
-/// A number that is not negative.
-fn not_negative(flag: &str, value: f64) -> Result<f64, Failure> {
-    if value.is_finite() && value >= 0.0 {
-        Ok(value)
-    } else {
-        Err(Failure::Other(format!("`{flag} {value}`: a number of at least 0 is expected")))
     }
 }
 

@@ -12,14 +12,13 @@ use abbe::identify::plan::{self, PlanOptions};
 use abbe::model::files::{self, ReadOptions, SourceMap};
 use abbe::model::instrument::Station;
 use abbe::model::instrument::rtest::Setting;
-use abbe::model::session::limits::{LARGEST, MIN_UM};
 use abbe::model::session::{Prior, Session};
 use clap::Args;
 
 use super::failure::Failure;
 use super::message::print_warnings;
 use super::report::ReportArguments;
-use super::{CommonArguments, SessionArguments, output, read_session};
+use super::{CommonArguments, SessionArguments, output, read_session, values};
 
 /// `abbe plan SESSION`
 #[derive(Args)]
@@ -161,9 +160,10 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
 /// Poses, without the data of the session unless only they tell where a socket is.
 fn poses(arguments: &PlanArguments, outputs: &output::Outputs, tables: bool) -> Result<(), Failure> {
     let reading = ReadOptions { read_data: false, ..arguments.session.options() };
-    let (mut session, mut sources) = files::session_with_sources(&arguments.session.session, &reading)?;
+    let source = files::text(&arguments.session.session, "the session file")?;
+    let (mut session, mut sources) = files::session_of(&source, &reading)?;
     if let Some(test) = without_place(&session, &arguments.poses.tests(&session)?).first() {
-        let with_data = files::session_with_sources(&arguments.session.session, &arguments.session.options());
+        let with_data = files::session_of(&source, &arguments.session.options());
         (session, sources) = with_data.map_err(|error| {
             Failure::Other(format!(
                 "test \"{}\" states no `socket_mm`, and its data do not tell where its socket is: {error}",
@@ -233,15 +233,12 @@ fn next_test(
 /// Collisions, with the device where the R-tests of the session have it, else both on the table and in the spindle.
 fn clearance(session: &Session, sizes: &str) -> Result<Vec<String>, Failure> {
     let numbers: Vec<f64> = sizes.split(',').filter_map(|size| size.trim().parse().ok()).collect();
-    let valid = |size: &f64| size.is_finite() && *size > 0.0;
     let &[spindle_mm, table_mm, device_height_mm, device_width_mm, shaft_mm, jig_mm] = numbers.as_slice() else {
         return Err(Failure::Other(format!(
             "`--clearance-mm {sizes}`: six lengths are expected: diameters of spindle and table, height and width of the device, shaft, jig"
         )));
     };
-    if !numbers.iter().all(valid) {
-        return Err(Failure::Other(format!("`--clearance-mm {sizes}`: every length has to be positive")));
-    }
+    values::SIZE_MM.all("--clearance-mm", &numbers)?;
     let settings: Vec<Setting> = session
         .tests
         .iter()
@@ -271,11 +268,7 @@ fn clearance(session: &Session, sizes: &str) -> Result<Vec<String>, Failure> {
 
 /// A positive length in µm, converted to mm.
 fn positive(flag: &str, um: f64) -> Result<f64, Failure> {
-    if (MIN_UM..=LARGEST).contains(&um) {
-        Ok(um * 1e-3)
-    } else {
-        Err(Failure::Other(format!("`{flag} {um}`: a number of µm from {MIN_UM:e} to {LARGEST:e} is expected")))
-    }
+    Ok(values::DEVIATION_UM.check(flag, um)? * 1e-3)
 }
 
 /// Replaces the standard uncertainty of every set-up length that has a Gaussian prior.

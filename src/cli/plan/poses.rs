@@ -9,7 +9,7 @@ use abbe::model::session::{Session, Test};
 use clap::{Args, ValueEnum};
 
 use crate::cli::failure::Failure;
-use crate::cli::output;
+use crate::cli::{output, values};
 use crate::report::poses as present;
 
 /// Maximum number of poses.
@@ -44,7 +44,7 @@ pub struct PoseArguments {
     /// The test whose instrument measures the poses [default: the last; of sockets all].
     ///
     /// Example: --poses 30 --pose-test A
-    #[arg(long, value_name = "TEST", requires = "poses")]
+    #[arg(long, value_name = "TEST", requires = "poses", allow_hyphen_values = true)]
     pose_test: Option<String>,
     /// Number of candidate poses.
     ///
@@ -152,21 +152,24 @@ impl PoseArguments {
         let fault = |flag: &str, words: &str| Err(Failure::Other(format!("`{flag}`: {words}")));
         let box_mm = match self.box_mm.as_deref() {
             None => None,
-            Some(&[x, xx, y, yy, z, zz]) if x < xx && y < yy && z < zz => Some([[x, xx], [y, yy], [z, zz]]),
+            Some(sides @ &[x, xx, y, yy, z, zz]) if x < xx && y < yy && z < zz => {
+                values::COORDINATE_MM.all("--box-mm", sides)?;
+                Some([[x, xx], [y, yy], [z, zz]])
+            }
             Some(_) => return fault("--box-mm", "six numbers are expected: least and greatest X, Y, Z"),
         };
         let sight = match self.tracker_mm.as_deref() {
             None => None,
-            Some(&[x, y, z]) if [x, y, z].iter().all(|x| x.is_finite()) => Some([x, y, z]),
-            Some(_) => return fault("--tracker-mm", "three numbers are expected: X, Y, Z"),
+            Some(point) => Some(values::point_mm("--tracker-mm", point, [0.0; 3])?),
         };
-        if !(self.sight_mm.is_finite() && self.sight_mm >= 0.0) {
-            return fault("--sight-mm", "a number of at least 0 is expected");
-        }
+        values::DISTANCE_MM.check("--sight-mm", self.sight_mm)?;
         let sight = sight.map(|from_mm| LineOfSight { from_mm, clearance_mm: self.sight_mm });
         let height_mm = match self.height_mm.as_deref() {
             None => [0.0; 2],
-            Some(&[low, high]) if low <= high && low.is_finite() && high.is_finite() => [low, high],
+            Some(ends @ &[low, high]) if low <= high => {
+                values::COORDINATE_MM.all("--height-mm", ends)?;
+                [low, high]
+            }
             Some(_) => return fault("--height-mm", "two numbers are expected: the least and the greatest height"),
         };
         Ok(PoseLimits { box_mm, sight, height_mm })

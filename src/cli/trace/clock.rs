@@ -3,6 +3,8 @@
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
+use crate::cli::values;
+
 /// A clock that runs from the start of a command.
 pub struct Clock {
     start: Instant,
@@ -38,12 +40,10 @@ impl Clock {
     }
 }
 
-/// Reads a positive number of seconds.
+/// Reads a time in seconds.
 pub fn seconds(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(seconds) if seconds > 0.0 && seconds.is_finite() => Ok(seconds),
-        _ => Err("expected a positive number of seconds, for example 10".to_string()),
-    }
+    let seconds = text.parse::<f64>().map_err(|_| "a number of seconds is expected, for example 10".to_string())?;
+    values::SECONDS.reason(seconds).map_or(Ok(seconds), Err)
 }
 
 #[cfg(test)]
@@ -61,7 +61,7 @@ mod tests {
     #[test]
     fn a_limit_is_a_positive_number() {
         assert_eq!(seconds("2.5"), Ok(2.5));
-        for wrong in ["0", "-1", "nan", "inf", "soon"] {
+        for wrong in ["0", "-1", "nan", "inf", "1e300", "soon"] {
             assert!(seconds(wrong).is_err(), "{wrong}");
         }
     }

@@ -55,11 +55,12 @@ fn arguments_of_a_map() {
     for (more, message) in [
         (["--places", "18446744073709551615"], "a map has at most 1000000 places"),
         (["--places", "1000000000000"], "a map has at most 1000000 places"),
-        (["--axis", "X:1e18"], "--axis X:1e18: 1e6 is the most"),
-        (["--axis", "A=1e300"], "--axis A=1e300: 1e12 is the most"),
-        (["--axis", "A=inf"], "--axis A=inf: 1e12 is the most"),
+        (["--axis", "X:1e18"], "--axis X:1e18: 1000000 places are the most"),
+        (["--axis", "A=1e300"], "`--axis A=1e300`: a position in mm or degrees from -1000000 to 1000000 is expected"),
+        (["--axis", "A=inf"], "`--axis A=inf`: a position in mm or degrees from -1000000 to 1000000 is expected"),
         (["--axis", "A=nan"], "write where the axis stands"),
-        (["--tool-mm", "1e300,0,0"], "three numbers of 1e12 at most"),
+        (["--tool-mm", "1e300,0,0"], "`--tool-mm 1e300`: a length from -1000000 to 1000000 mm is expected"),
+        (["--tool-mm", "0,0,-1e9"], "`--tool-mm -1e9`: a length from -1000000 to 1000000 mm is expected"),
         (["--places", "100"], "a map needs 1 to 1000000 points"),
     ] {
         let stderr = message_of(&folder, &ready, &more);

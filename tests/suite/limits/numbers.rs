@@ -60,13 +60,14 @@ fn infinite_and_huge_readings() {
 fn huge_numbers_in_a_session() {
     let case = Case::default();
     for (from, to, place) in [
-        ("bar_mm = 100.0", "bar_mm = 1e300", "`bar_mm` is 1e300, which is too large; the limit is 1e12"),
-        ("[0, 100.0, 0]", "[0, 1e300, 0]", "is 1e300, which is too large; the limit is 1e12"),
-        ("[0, 100.0, 0]", "[0, \"1e200 * 1e10\", 0]", "which is too large; the limit is 1e12"),
+        ("bar_mm = 100.0", "bar_mm = 1e300", "`bar_mm` is 1e300, which is too large; the limit is 1 km"),
+        ("[0, 100.0, 0]", "[0, 1e300, 0]", "is 1e300, which is too large; the limit is 1 km"),
+        ("[0, 100.0, 0]", "[0, 1000001, 0]", "is 1000001, which is too large; the limit is 1 km"),
+        ("[0, 100.0, 0]", "[0, \"1e200 * 1e10\", 0]", "which is too large; the limit is 1 km"),
         (
             "data = \"C.csv\"",
             "data = \"C.csv\"\nat = { x_mm = 1e300 }",
-            "`x_mm` is 1e300, which is too large; the limit is 1e12",
+            "`x_mm` is 1e300, which is too large; the limit is 1 km",
         ),
     ] {
         assert!(case.session().contains(from));

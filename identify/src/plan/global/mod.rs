@@ -41,6 +41,8 @@ pub use indices::SobolIndex;
 
 /// Maximum number of steps of the chord method.
 const MAX_STEPS: usize = 60;
+/// Largest number of estimates of all fits, which are kept: 800 MB.
+const MAX_ESTIMATES: usize = 100_000_000;
 /// Step, in standard uncertainties, at which the chord method ends.
 const SMALL_STEP: f64 = 1e-4;
 
@@ -158,6 +160,15 @@ pub fn global(problem: &Problem, options: &GlobalOptions) -> Result<GlobalAnalys
         return Err(IdentifyError::Request(format!("{} samples: at least 8 are expected", options.samples)));
     }
     let plan = Plan::new(problem, options)?;
+    let (fits, estimates) = (options.samples * (plan.inputs.len() + 2), plan.errors.len());
+    if fits.saturating_mul(estimates) > MAX_ESTIMATES {
+        return Err(IdentifyError::Request(format!(
+            "{} samples of {} inputs are {fits} fits of {estimates} errors; the limit is {MAX_ESTIMATES} estimates: state \
+             fewer samples",
+            options.samples,
+            plan.inputs.len()
+        )));
+    }
     let design = Design::evaluate(plan.inputs.len(), options.samples, options.seed, &|point| plan.estimate(point))?;
     let shares = plan.linear_variances()?;
     let list = &problem.parameters.list;

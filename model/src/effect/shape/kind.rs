@@ -210,6 +210,6 @@ pub(super) fn positive(value: f64, what: &str) -> Result<(), ShapeFault> {
     if value.is_finite() && value > 0.0 {
         Ok(())
     } else {
-        Err(ShapeFault(format!("{what} is {value}; it must be a positive number")))
+        Err(ShapeFault(format!("{what} is {}; it must be a positive number", crate::words::number(value))))
     }
 }
