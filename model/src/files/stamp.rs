@@ -3,17 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-use super::store::{FileState, OpenFile};
+use super::store::{FileState, OpenFile, ReadBytes};
 use crate::error::{Location, ModelError};
-
-/// The bytes that were read from a file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ReadBytes {
-    /// Their number.
-    pub count: u64,
-    /// Their SHA-256.
-    pub sha256: [u8; 32],
-}
 
 /// A file that was read once: a regular file, a pipe or a device.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -9,8 +9,6 @@ use std::time::SystemTime;
 
 use sha2::{Digest, Sha256};
 
-use super::stamp::ReadBytes;
-
 /// Where the files of a session lie.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Store {
@@ -109,6 +107,15 @@ impl FileState {
     fn in_memory(bytes: usize) -> FileState {
         FileState { bytes: bytes as u64, modified: None, regular: true, folder: false }
     }
+}
+
+/// The bytes that were read from a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ReadBytes {
+    /// Their number.
+    pub count: u64,
+    /// Their SHA-256.
+    pub sha256: [u8; 32],
 }
 
 /// A file that is open for reading. It counts and hashes the bytes that are read.
