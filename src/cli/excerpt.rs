@@ -21,10 +21,13 @@ pub fn excerpt(location: &Location) -> Option<Vec<u8>> {
     let name = location.file.display().to_string();
     let column = line[..place.start].chars().count() + 1;
     let is_cut = line.starts_with('…');
+    // Empty lines before it give the line its number.
+    let lead = location.line - 1;
+    let place = place.start + lead..place.end + lead;
     let config = Config::default().with_index_type(IndexType::Byte);
     let label = Label::new((name.clone(), place.clone())).with_message("here").with_color(Color::Red);
     let report = Report::build(ReportKind::Error, (name.clone(), place)).with_config(config).with_label(label).finish();
-    let source = Source::from(visible(&line)).with_display_line_offset(location.line - 1);
+    let source = Source::from("\n".repeat(lead) + &visible(&line));
     let mut written = Vec::new();
     report.write((name, source), &mut written).ok()?;
     // The first line is another `Error:`.

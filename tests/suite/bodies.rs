@@ -106,7 +106,7 @@ fn surfaces_that_cannot_be_used_are_errors() {
         (binary("", 3, &facets), "states 3 triangles, but has 200 bytes for them in place of 150"),
         (binary("", u32::MAX, &facets), "states 4294967295 triangles, but ends in triangle 5"),
         (binary("", 4, &infinite), "triangle 3 has the coordinate NaN"),
-        (binary("", 4, &far), "triangle 1 has a coordinate that is 9.99"),
+        (binary("", 4, &far), "triangle 1 has a coordinate that is 1e13, which is too large; the limit is 1 km"),
         (two.into_bytes(), "has 8 triangles in several solids, of which the first has 4"),
         (text_of.as_bytes()[..text_of.len() - 28].to_vec(), "triangle 4: EOF while expecting"),
         (text_of.replace("vertex 10 0 100", "vertex 10 zero 100").into_bytes(), "triangle 1: invalid float literal"),

@@ -64,7 +64,7 @@ fn messages_have_one_form() {
     }
     // The message shows the line.
     let stderr = String::from_utf8(run(&place, &["fit", "key.toml"], &[]).stderr).unwrap();
-    assert!(stderr.contains("key.toml:8") && stderr.contains("noise_umm = 0.3"), "{stderr}");
+    assert!(stderr.contains("key.toml:8") && stderr.contains(" 8 │ noise_umm = 0.3"), "{stderr}");
 }
 
 #[test]
