@@ -294,7 +294,9 @@ fn mutated(original: &[u8], random: &mut Pcg64Mcg) -> Vec<u8> {
                     bytes.split_inclusive(|byte| *byte == b'\n').map(<[u8]>::to_vec).collect();
                 if !lines.is_empty() {
                     let line = lines.remove(random.random_range(0..lines.len()));
-                    for _ in 0..[0, 1, 2, 2000][random.random_range(0..4)] {
+                    // Two thousand long lines would be a large file, not a wrong one.
+                    let most = 1 + (1 << 20) / (line.len() + 1);
+                    for _ in 0..[0, 1, 2, 2000][random.random_range(0..4)].min(most) {
                         lines.insert(random.random_range(0..=lines.len()), line.clone());
                     }
                     bytes = lines.concat();
