@@ -137,3 +137,47 @@ fn an_unusable_test_is_refused_and_the_session_unchanged() {
 fn test_at(axis: &str, position: f64) -> NewTest {
     NewTest::new("low", ball_bar()).at(axis, position).readings(columns())
 }
+
+/// A reading of which a value is missing is left out; the session tells how many and where, and faults of the others keep
+/// their places among all items.
+#[test]
+fn missing_readings_are_left_out_and_told() {
+    use abbe_model::files::table::memory::{MemoryColumn, Values};
+    use abbe_model::files::toml::memory;
+
+    let (head, tests) = SESSION.split_once("[[test]]").unwrap();
+    let test = format!("[[test]]{tests}");
+    let c = [0.0, f64::NAN, 60.0, 90.0, 120.0, 180.0];
+    let time = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
+    let length = [125.0, 125.0, 1e99, 125.001, 125.002, 125.003];
+    let marks = |items: &[usize]| -> Vec<bool> { (0..6).map(|item| items.contains(&item)).collect() };
+    let (of_c, of_length) = (marks(&[1]), marks(&[2, 3]));
+    let added = |length: &[f64], time: &[f64], of_length: &[bool]| {
+        let columns = [
+            MemoryColumn { name: "c_deg", values: Values::Numbers(&c), missing: &of_c },
+            MemoryColumn { name: "time_s", values: Values::Numbers(time), missing: &[] },
+            MemoryColumn { name: "length_mm", values: Values::Numbers(length), missing: of_length },
+        ];
+        let mut session = memory::session(head).unwrap();
+        memory::add(&mut session, &test, &columns).map(|()| session).map_err(|fault| fault.to_string())
+    };
+    let session = added(&length, &time, &of_length).unwrap();
+    let told = "test \"C100\": 3 of 6 readings are missing: `c_deg` item 1; `length_mm` items 2, 3";
+    assert_eq!(session.warnings, [told]);
+    let readings = session.tests[0].readings.as_ref().unwrap();
+    assert_eq!(readings.observed, [125.0, 125.002, 125.003]);
+    assert_eq!(readings.time_s, [0.0, 4.0, 5.0]);
+    let c_axis = session.machine.axis_index("C").unwrap();
+    assert_eq!(readings.positions[c_axis], [0.0_f64, 120.0, 180.0].map(f64::to_radians));
+
+    // The fifth item is no number, the last time decreases: places among all items, not among the present ones.
+    let fault = added(&[125.0, 125.0, 1e99, 125.0, f64::NAN, 125.0], &time, &of_length).unwrap_err();
+    assert!(fault.contains("length_mm") && fault.contains("item 4"), "{fault}");
+    let fault = added(&length, &[0.0, 1.0, 2.0, 3.0, 4.0, 3.5], &of_length).unwrap_err();
+    assert!(fault.contains("`time_s`, item 5"), "{fault}");
+    // One reading is left.
+    let fault = added(&length, &time, &marks(&[1, 2, 3, 4, 5])).unwrap_err();
+    assert!(fault.contains("5 of 6 readings are missing"), "{fault}");
+    let fault = added(&length, &time, &[true]).unwrap_err();
+    assert!(fault.contains("`length_mm` has 6 values, and marks 1"), "{fault}");
+}

@@ -1,7 +1,8 @@
 //! Keywords of Python as the keys of a session file, and as columns of readings.
 //!
 //! A keyword whose value is an array is a column, unless it is a key of the set-up such as `workpiece_ball_mm`. A
-//! number for the position of an axis is where the test holds the axis. Everything else is a key of `[[test]]`.
+//! number for the position of an axis is where the test holds the axis. Everything else is a key of `[[test]]`. `None`
+//! states nothing.
 
 use abbe::model::files::table::memory::{MemoryColumn, Values};
 use abbe::model::session::Session;
@@ -19,7 +20,15 @@ const TEST_KEYS: [&str; 6] = ["setup", "spindle_setup", "at", "sweep", "path", "
 pub struct Keywords<'py> {
     /// The keys of `[[test]]`.
     pub table: Table,
-    columns: Vec<(String, Held<'py>)>,
+    columns: Vec<Column<'py>>,
+}
+
+/// A column of readings.
+struct Column<'py> {
+    name: String,
+    values: Held<'py>,
+    /// Which values are missing; empty if none is.
+    missing: Vec<bool>,
 }
 
 /// The values of a column, for as long as they are read.
@@ -40,11 +49,12 @@ impl<'py> Keywords<'py> {
         let mut at = Table::new();
         for (name, value) in keywords.iter() {
             let name: String = name.extract()?;
-            if is_key(&name) {
+            if value.is_none() {
+                continue;
+            } else if is_key(&name) {
                 sorted.table.insert(name.clone(), toml_value(&name, &value)?);
             } else if is_sequence(&value) {
-                let held = column(&name, &value)?;
-                sorted.columns.push((name, held));
+                sorted.columns.push(column(name, &value)?);
             } else if is_position(session, &name) {
                 at.insert(name.clone(), toml_value(&name, &value)?);
             } else {
@@ -69,13 +79,13 @@ impl<'py> Keywords<'py> {
     pub fn columns(&self) -> PyResult<Vec<MemoryColumn<'_>>> {
         self.columns
             .iter()
-            .map(|(name, held)| {
-                let values = match held {
+            .map(|Column { name, values, missing }| {
+                let values = match values {
                     Held::Array(array) => Values::Numbers(array.as_slice()?),
                     Held::Numbers(numbers) => Values::Numbers(numbers),
                     Held::Words(words) => Values::Words(words),
                 };
-                Ok(MemoryColumn { name, values })
+                Ok(MemoryColumn { name, values, missing })
             })
             .collect()
     }
@@ -99,8 +109,15 @@ fn is_sequence(value: &Bound<'_, PyAny>) -> bool {
     array || (!number && !text && value.len().is_ok())
 }
 
-/// A column: an array of float64 without gaps as it is, anything else as numbers or words.
-fn column<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Held<'py>> {
+/// A column, and which of its values are marked as missing (`abbe/_missing.py`).
+fn column<'py>(name: String, value: &Bound<'py, PyAny>) -> PyResult<Column<'py>> {
+    let separated = value.py().import("abbe._missing")?.call_method1("separated", (value,))?;
+    let (value, missing): (Bound<'py, PyAny>, Option<Vec<bool>>) = separated.extract()?;
+    Ok(Column { values: held(&name, &value)?, missing: missing.unwrap_or_default(), name })
+}
+
+/// The values of a column: an array of float64 without gaps as it is, anything else as numbers or words.
+fn held<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Held<'py>> {
     let py = value.py();
     if let Ok(array) = value.extract::<PyReadonlyArray1<'py, f64>>()
         && array.as_slice().is_ok()
@@ -132,7 +149,8 @@ fn column<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Held<'py>> {
 pub fn toml_value(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
     if let Ok(table) = value.cast::<PyDict>() {
         let mut converted = Table::new();
-        for (key, value) in table.iter() {
+        // `None` is what a caller has who states nothing.
+        for (key, value) in table.iter().filter(|(_, value)| !value.is_none()) {
             let key: String = key.extract()?;
             let value = toml_value(&key, &value)?;
             converted.insert(key, value);

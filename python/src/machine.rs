@@ -7,8 +7,10 @@ use abbe::model;
 use abbe::model::files;
 use abbe::model::files::toml::parts;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::failed::Failed;
+use crate::keywords::toml_value;
 
 /// A kinematic chain.
 #[pyclass(frozen, module = "abbe._abbe")]
@@ -32,6 +34,15 @@ impl Machine {
     #[staticmethod]
     fn from_toml(text: &str) -> Result<Machine, Failed> {
         Ok(Machine { machine: Arc::new(parts::machine_of_text("machine.toml".as_ref(), text)?) })
+    }
+
+    /// The machine of the tables of a machine file.
+    #[staticmethod]
+    fn from_tables(tables: &Bound<'_, PyDict>) -> PyResult<Machine> {
+        let tables = toml_value("machine", tables)?;
+        let text = toml::to_string(&tables)
+            .map_err(|cause| Failed::new(format!("the machine cannot be written as TOML: {cause}")))?;
+        Ok(Machine::from_toml(&text)?)
     }
 
     fn to_toml(&self) -> String {

@@ -101,7 +101,7 @@ class Fit(Shown, FitResult):
 
     def model(self) -> Model:
         """Return the identified model, which other sessions can validate."""
-        return Model(self._handle.model())
+        return Model._of(self._handle.model())
 
     def _tables(self) -> list[_abbe.Table]:
         return self._handle.tables()

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _abbe
 from ._errors import SessionError
 from ._machine import Machine
+from ._missing import absent
 from ._shown import Shown, rows_of, write_whole
 from .results import ValidationResult
 
@@ -51,11 +52,27 @@ class Compensated(NamedTuple):
 class Model:
     """An identified model: machine, errors with covariance, effects, noise and range.
 
-    :meth:`Fit.model`, :meth:`Trace.model` and :meth:`read` make it.
+    :meth:`Fit.model` and :meth:`Trace.model` make it.
+
+    Parameters
+    ----------
+    path : path-like
+        A file of ``--save``, as for :meth:`read`.
     """
 
-    def __init__(self, handle: _abbe.Model) -> None:
-        self._handle = handle
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        if not isinstance(path, (str, os.PathLike)):
+            raise TypeError(
+                f"a model is read from a file of `abbe fit --save`, not made of {type(path).__name__}: "
+                f"Model(\"model.json\"), session.fit().model() or session.trace().model()"
+            )
+        self._handle = _abbe.Model.read(path)
+
+    @classmethod
+    def _of(cls, handle: _abbe.Model) -> Model:
+        model = cls.__new__(cls)
+        model._handle = handle
+        return model
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Model:
@@ -66,7 +83,7 @@ class Model:
         path : path-like
             The file.
         """
-        return cls(_abbe.Model.read(path))
+        return cls._of(_abbe.Model.read(path))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the model as ``--save`` does.
@@ -86,7 +103,7 @@ class Model:
     @property
     def machine(self) -> Machine:
         """The machine."""
-        return Machine(self._handle.machine)
+        return Machine._of(self._handle.machine)
 
     @property
     def parameters(self) -> tuple[ModelParameter, ...]:
@@ -123,7 +140,8 @@ class Model:
         time_s, temperature_c : array, optional
             Time and temperature, if errors depend on them.
         """
-        found = self._handle.correct(self._positions(positions), tool_mm, _column(time_s), _column(temperature_c))
+        driven = _column(time_s, "time_s"), _column(temperature_c, "temperature_c")
+        found = self._handle.correct(self._positions(positions), tool_mm, *driven)
         return Compensated(found[0], tuple(found[1]), found[2], found[3])
 
     def pose_errors(
@@ -146,18 +164,19 @@ class Model:
         ndarray
             Six columns: displacements along X, Y, Z in µm, rotations about them in arcsec.
         """
-        return self._handle.pose_errors(
-            self._positions(positions), tool_mm, _column(time_s), _column(temperature_c)
-        )
+        driven = _column(time_s, "time_s"), _column(temperature_c, "temperature_c")
+        return self._handle.pose_errors(self._positions(positions), tool_mm, *driven)
 
     def _positions(self, positions: Mapping[str, ArrayLike] | ArrayLike) -> NDArray[np.float64]:
         if not isinstance(positions, Mapping):
+            absent(positions, "positions")
             return np.atleast_2d(np.asarray(positions, dtype=np.float64))
         known = [name.lower() for name in self._handle.columns()]
         columns = [np.zeros(1) for _ in known]
         for name, values in positions.items():
             if name.lower() not in known:
                 raise SessionError(f"no axis position `{name}`", help=f"known: {', '.join(known)}")
+            absent(values, name)
             columns[known.index(name.lower())] = np.atleast_1d(np.asarray(values, dtype=np.float64))
         return np.stack(np.broadcast_arrays(*columns), axis=1)
 
@@ -169,11 +188,14 @@ class Model:
 
 
 def _of_text(text: str) -> Model:
-    return Model(_abbe.Model.from_text(text))
+    return Model._of(_abbe.Model.from_text(text))
 
 
-def _column(values: ArrayLike | None) -> NDArray[np.float64] | None:
-    return None if values is None else np.asarray(values, dtype=np.float64)
+def _column(values: ArrayLike | None, name: str) -> NDArray[np.float64] | None:
+    if values is None:
+        return None
+    absent(values, name)
+    return np.asarray(values, dtype=np.float64)
 
 
 class Validation(Shown, ValidationResult):

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _abbe
 from ._errors import SessionError
 from ._fit import Fit
+from ._missing import absent
 
 
 class SessionParameter(NamedTuple):
@@ -94,4 +95,5 @@ class Predicting:
                     raise SessionError(f"no parameter `{name}`", help=f"the session has {', '.join(ids)}")
                 values[ids.index(name)] = value
             return values
+        absent(parameters, "parameters")
         return np.ascontiguousarray(parameters, dtype=np.float64)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -12,10 +11,10 @@ from typing import Any
 from numpy.typing import NDArray
 
 from . import _abbe
+from ._arguments import quantity, texts, whole_session
 from ._equation import Equation
-from ._errors import SessionError
 from ._fit import Fit
-from ._machine import Machine
+from ._machine import Machine, is_code
 from ._plan import Plan
 from ._predicting import Predicting
 from ._trace import Trace
@@ -26,10 +25,11 @@ class Session(Predicting):
 
     Parameters
     ----------
-    machine : Machine
-        The machine.
+    machine : Machine, str, path-like or mapping
+        The machine, or its structural code. The path of a session file, as for :meth:`read`, or a mapping with the
+        keys of a session file, whose tests may have arrays, gives the whole session.
     instrument : str
-        ``"ballbar"``, ``"r-test"``, ``"probe"``, ``"tracker"`` or ``"socket"``.
+        ``"ballbar"`` (the default), ``"r-test"``, ``"probe"``, ``"tracker"`` or ``"socket"``.
     noise_um : float, optional
         Standard deviation of one scalar reading; estimated from the readings by default.
     resolution_um : float, optional
@@ -60,8 +60,8 @@ class Session(Predicting):
 
     def __init__(
         self,
-        machine: Machine,
-        instrument: str = "ballbar",
+        machine: Machine | str | os.PathLike[str] | Mapping[str, Any],
+        instrument: str | None = None,
         *,
         noise_um: float | None = None,
         resolution_um: float | None = None,
@@ -69,6 +69,22 @@ class Session(Predicting):
         constants: Mapping[str, float] | None = None,
         about: Mapping[str, str] | None = None,
     ) -> None:
+        is_path = isinstance(machine, (str, os.PathLike)) and not is_code(machine)
+        if not isinstance(machine, Machine) and (is_path or isinstance(machine, Mapping) and "machine" in machine):
+            keys = (instrument, noise_um, resolution_um, errors, constants, about)
+            if any(key is not None for key in keys):
+                raise TypeError(
+                    "a session file states instrument, noise, errors, constants and notes itself: "
+                    "Session(path) without them, or Session(Machine(path), ...) for the path of a machine file"
+                )
+            self._handle = whole_session(machine)
+            return
+        if not isinstance(machine, (Machine, str, Mapping)):
+            raise TypeError(
+                f"a session begins with a Machine, a structural code or the path of a session file, not with "
+                f"{type(machine).__name__}: Session(Machine(...), \"ballbar\") or Session(\"session.toml\")"
+            )
+        instrument = "ballbar" if instrument is None else instrument
         stated = {"kind": instrument, "noise_um": noise_um, "resolution_um": resolution_um}
         head: dict[str, Any] = {"instrument": {key: value for key, value in stated.items() if value is not None}}
         if errors is not None:
@@ -77,7 +93,7 @@ class Session(Predicting):
             head["constants"] = dict(constants)
         if about is not None:
             head["about"] = dict(about)
-        self._handle = _abbe.Session.new(machine._handle, head)
+        self._handle = _abbe.Session.new(Machine(machine)._handle, head)
 
     @classmethod
     def _of(cls, handle: _abbe.Session) -> Session:
@@ -125,6 +141,11 @@ class Session(Predicting):
             - A number for the position of an axis is where the test holds it: ``z_mm=111.803``.
             - Everything else is a key of ``[[test]]`` of a session file: ``bar_mm``, ``workpiece_ball_mm``, ``setup``,
               ``bar_u_um``, ``sweep``, ...
+            - ``None`` states nothing.
+
+            A reading of which a value is missing is left out, and ``warnings`` tells how many they are and where:
+            masked items of NumPy, ``None``, ``pandas.NA``, nulls of polars and pyarrow, NaN in a Series of pandas. NaN
+            in an array of NumPy or in a list is an error.
 
         Raises
         ------
@@ -167,7 +188,7 @@ class Session(Predicting):
     @property
     def machine(self) -> Machine:
         """The machine."""
-        return Machine(self._handle.machine)
+        return Machine._of(self._handle.machine)
 
     @property
     def instrument(self) -> str:
@@ -252,7 +273,7 @@ class Session(Predicting):
         >>> abs(fit["EX0C"].value - 10.0) < 4 * fit["EX0C"].u
         True
         """
-        given = [(name, *_quantity(name, value)) for name, value in (values or {}).items()]
+        given = [(name, *quantity(name, value)) for name, value in (values or {}).items()]
         return Session._of(self._handle.simulate(given, seed, noise_um, draw_setups)[0])
 
     def fit(self, *, seed: int = 1) -> Fit:
@@ -294,7 +315,7 @@ class Session(Predicting):
         seed : int
             Seed of the folds and the null distribution.
         """
-        return Trace(self, progress, max_effects, _texts("only", only), _texts("exclude", exclude), time_limit, seed)
+        return Trace(self, progress, max_effects, texts("only", only), texts("exclude", exclude), time_limit, seed)
 
     def plan(self, *, noise_um: float | None = None, planned: bool = False, effects: bool = True) -> Plan:
         """Analyse identifiability and predicted uncertainty of the tests, as ``abbe plan``.
@@ -381,19 +402,3 @@ class Session(Predicting):
 
 def _unpickled(state: dict[str, Any]) -> Session:
     return Session._of(_abbe.unpickled(state))
-
-
-def _quantity(name: str, value: float | str) -> tuple[float, str | None]:
-    """A number with its unit, if it is written with one."""
-    if not isinstance(value, str):
-        return float(value), None
-    found = re.fullmatch(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\D\S*)\s*", value)
-    if found is None:
-        raise SessionError(f"`{name}` = {value!r} is no number with a unit", help='write it as in "35.3um"')
-    return float(found[1]), found[2]
-
-
-def _texts(name: str, texts: Sequence[str]) -> list[str]:
-    if isinstance(texts, str):
-        raise TypeError(f"{name}: a list of texts is expected, such as [{texts!r}]")
-    return list(texts)

@@ -73,7 +73,7 @@ class Trace(Shown, TraceResult):
 
     def model(self) -> Model:
         """Return the identified model with the found effects, which other sessions can validate."""
-        return Model(self._handle.model())
+        return Model._of(self._handle.model())
 
     def session(self) -> Session:
         """Return the session with the found effects declared, as ``--write`` does."""

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::columns::{Column, Role, known, listed};
 use super::fill::{self, BySocket};
+use super::missing::{self, Marks};
 use super::request::Request;
 use super::{duplicates, required};
 use crate::error::ModelError;
@@ -14,6 +15,8 @@ use crate::instrument::column::Quantity;
 use crate::session::readings::Readings;
 use crate::session::{check, columns};
 
+const NOT_ENOUGH: &str = "a test needs at least two readings, and as many as it has parameters";
+
 /// A column of readings in memory.
 #[derive(Clone, Copy, Debug)]
 pub struct MemoryColumn<'a> {
@@ -21,6 +24,9 @@ pub struct MemoryColumn<'a> {
     pub name: &'a str,
     /// Its values, one for each reading.
     pub values: Values<'a>,
+    /// Which of the values are missing, one for each reading; empty if none is. A reading of which a value is missing is
+    /// left out, and a warning tells how many they are and where.
+    pub missing: &'a [bool],
 }
 
 /// The values of a column.
@@ -40,10 +46,33 @@ impl Values<'_> {
         }
     }
 
+    /// The values of some rows.
+    fn of_rows(self, rows: &[usize]) -> OwnValues {
+        match self {
+            Values::Numbers(numbers) => OwnValues::Numbers(rows.iter().map(|row| numbers[*row]).collect()),
+            Values::Words(words) => OwnValues::Words(rows.iter().map(|row| words[*row].clone()).collect()),
+        }
+    }
+
     fn hash(self, row: usize, hasher: &mut DefaultHasher) {
         match self {
             Values::Numbers(numbers) => numbers[row].to_bits().hash(hasher),
             Values::Words(words) => words[row].hash(hasher),
+        }
+    }
+}
+
+/// The values of the readings that are not missing.
+enum OwnValues {
+    Numbers(Vec<f64>),
+    Words(Vec<String>),
+}
+
+impl OwnValues {
+    fn borrowed(&self) -> Values<'_> {
+        match self {
+            OwnValues::Numbers(numbers) => Values::Numbers(numbers),
+            OwnValues::Words(words) => Values::Words(words),
         }
     }
 }
@@ -57,7 +86,24 @@ pub(crate) fn read(given: &[MemoryColumn<'_>], request: &Request<'_>) -> Result<
     let columns = roles(given, request).map_err(fault)?;
     let names: Vec<String> = given.iter().map(|column| column.name.to_string()).collect();
     required::required(request, Path::new(""), 0, &columns, Some(&names))?;
-    filled(given, &columns, request).map_err(fault)
+    let rows = given.first().map_or(0, |column| column.values.len());
+    let marks: Vec<Marks<'_>> =
+        given.iter().map(|column| Marks { name: column.name, missing: column.missing }).collect();
+    let Some(present) = missing::present(&marks, rows).map_err(fault)? else {
+        return filled(given, None, &columns, request).map_err(fault);
+    };
+    if present.len() < check::MIN_READINGS {
+        let message =
+            format!("{} of {rows} readings are missing, the rest is not enough for a fit", rows - present.len());
+        return Err(fault((message, NOT_ENOUGH.into())));
+    }
+    let values: Vec<OwnValues> = given.iter().map(|column| column.values.of_rows(&present)).collect();
+    let kept = given.iter().zip(&values);
+    let kept: Vec<MemoryColumn<'_>> =
+        kept.map(|(column, own)| MemoryColumn { values: own.borrowed(), missing: &[], ..*column }).collect();
+    let (readings, mut warnings) = filled(&kept, Some(&present), &columns, request).map_err(fault)?;
+    warnings.insert(0, missing::warning(&request.test.name, &marks, rows, present.len()));
+    Ok((readings, warnings))
 }
 
 fn fault((message, help): Fault) -> ModelError {
@@ -67,7 +113,7 @@ fn fault((message, help): Fault) -> ModelError {
 /// The role of each column.
 fn roles(given: &[MemoryColumn<'_>], request: &Request<'_>) -> Result<Vec<Column>, Fault> {
     let mut columns: Vec<Column> = Vec::with_capacity(given.len());
-    for (index, MemoryColumn { name, values }) in given.iter().enumerate() {
+    for (index, MemoryColumn { name, values, .. }) in given.iter().enumerate() {
         let Some(role) = Role::of(name, request).or_else(|| Role::of(&name.to_lowercase(), request)) else {
             let known = known(request);
             let like: Vec<&str> = known.iter().map(String::as_str).collect();
@@ -95,17 +141,17 @@ fn roles(given: &[MemoryColumn<'_>], request: &Request<'_>) -> Result<Vec<Column
     Ok(columns)
 }
 
+/// Readings of columns without gaps. `items` are the places of their rows among all that were given, if some are missing.
 fn filled(
     given: &[MemoryColumn<'_>],
+    items: Option<&[usize]>,
     columns: &[Column],
     request: &Request<'_>,
 ) -> Result<(BySocket, Vec<String>), Fault> {
     let rows = given.first().map_or(0, |column| column.values.len());
+    let item = |row: usize| items.map_or(row, |items| items[row]);
     if rows < check::MIN_READINGS {
-        return Err((
-            format!("{rows} readings, which is not enough for a fit"),
-            "a test needs at least two readings, and as many as it has parameters".into(),
-        ));
+        return Err((format!("{rows} readings, which is not enough for a fit"), NOT_ENOUGH.into()));
     }
     let coordinates = request.instrument().coordinates();
     let mut readings = Readings {
@@ -115,7 +161,7 @@ fn filled(
         ..Readings::default()
     };
     let (mut sockets, mut socket): (Vec<String>, Vec<usize>) = (Vec::new(), Vec::new());
-    for (column, MemoryColumn { name, values }) in columns.iter().zip(given) {
+    for (column, MemoryColumn { name, values, .. }) in columns.iter().zip(given) {
         let numbers = match values {
             Values::Numbers(numbers) => *numbers,
             Values::Words(words) => {
@@ -126,10 +172,11 @@ fn filled(
             }
         };
         for (row, number) in numbers.iter().enumerate() {
-            columns::number(name, *number).map_err(|(message, help)| (format!("{message} (item {row})"), help))?;
+            columns::number(name, *number)
+                .map_err(|(message, help)| (format!("{message} (item {})", item(row)), help))?;
         }
         match &column.role {
-            Role::Time => readings.time_s = times(name, numbers)?,
+            Role::Time => readings.time_s = times(name, numbers, &item)?,
             Role::Run => {
                 readings.run =
                     numbers.iter().map(|number| fill::run_number(*number)).collect::<Option<_>>().ok_or((
@@ -159,22 +206,27 @@ fn filled(
             *positions = vec![*at; rows];
         }
     }
-    let warning = without_copies(&mut readings, &mut socket, given);
+    let warning = without_copies(&mut readings, &mut socket, given, &item);
     let warnings = warning.map(|warning| format!("test \"{}\": {warning}", request.test.name));
     Ok((fill::by_socket(readings, sockets, &socket), warnings.into_iter().collect()))
 }
 
-fn times(name: &str, numbers: &[f64]) -> Result<Vec<f64>, Fault> {
+fn times(name: &str, numbers: &[f64], item: &dyn Fn(usize) -> usize) -> Result<Vec<f64>, Fault> {
     for (row, pair) in numbers.windows(2).enumerate() {
         if let Some(fault) = check::decreasing_time(pair[0], pair[1]) {
-            return Err((format!("`{name}`, item {}: {fault}", row + 1), "sort the readings by time".into()));
+            return Err((format!("`{name}`, item {}: {fault}", item(row + 1)), "sort the readings by time".into()));
         }
     }
     Ok(numbers.to_vec())
 }
 
 /// Removes rows that are copies of earlier ones, as in a file, with a message.
-fn without_copies(readings: &mut Readings, socket: &mut Vec<usize>, given: &[MemoryColumn<'_>]) -> Option<String> {
+fn without_copies(
+    readings: &mut Readings,
+    socket: &mut Vec<usize>,
+    given: &[MemoryColumn<'_>],
+    item: &dyn Fn(usize) -> usize,
+) -> Option<String> {
     // Hashes of all rows take as much memory as the rows themselves.
     if readings.time_s.is_empty() && readings.run.is_empty() || duplicates::cannot_occur(readings) {
         return None;
@@ -187,7 +239,7 @@ fn without_copies(readings: &mut Readings, socket: &mut Vec<usize>, given: &[Mem
     };
     let cells: Vec<u64> = (0..rows).map(hash_of).collect();
     let kept = duplicates::kept(readings, &cells)?;
-    let lines: Vec<usize> = (1..=rows).collect();
+    let lines: Vec<usize> = (0..rows).map(|row| item(row) + 1).collect();
     let message = duplicates::message(Path::new("the arrays"), &lines, &kept);
     *readings = readings.of_rows(&kept);
     if !socket.is_empty() {

@@ -5,7 +5,7 @@
 //!   `json_lines`;
 //! - `request`: what a test requires of its file; `columns`, `required`: roles of columns; `fill`: readings
 //!   from rows;
-//! - [`memory`]: columns in memory in place of a file;
+//! - [`memory`]: columns in memory in place of a file; `missing`: readings that they lack;
 //! - `lines`, `encoding`, `row`, `number`: lines of a text, rows and cells.
 
 mod ballbar_xml;
@@ -19,6 +19,7 @@ mod formats;
 mod json_lines;
 mod lines;
 pub mod memory;
+mod missing;
 pub(crate) mod number;
 pub(crate) mod request;
 mod required;

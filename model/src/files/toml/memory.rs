@@ -13,7 +13,7 @@
 //! let test = "[[test]]\nname = \"C125\"\nbar_mm = 125\nworkpiece_ball_mm = [0, 100, 0]\n\
 //!             spindle_ball_mm = [0, 0, 0]\nat = { z_mm = 75 }\ndata = \"C125.csv\"\n";
 //! let columns = [("c_deg", [0.0, 90.0]), ("length_mm", [125.0, 125.0])];
-//! let columns = columns.each_ref().map(|(name, values)| MemoryColumn { name, values: Values::Numbers(values) });
+//! let columns = columns.each_ref().map(|(name, values)| MemoryColumn { name, values: Values::Numbers(values), missing: &[] });
 //! memory::add(&mut session, test, &columns)?;
 //! assert_eq!(session.tests[0].readings.as_ref().map(|readings| readings.rows()), Some(2));
 //! # Ok::<(), abbe_model::ModelError>(())
