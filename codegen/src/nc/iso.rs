@@ -239,7 +239,7 @@ impl Writer<'_> {
                 // From the start to the centre, both as the control has them.
                 let centre = [0, 1].map(|i| {
                     let (axis, start) = from[i];
-                    (letters[i], change(&vec![(axis, start)], (axis, centre_at[i]), self.decimals))
+                    (letters[i], change(&[(axis, start)], (axis, centre_at[i]), self.decimals))
                 });
                 let turn = if *counterclockwise { "G3" } else { "G2" };
                 self.push(&format!("{plane} {turn}{}{} F{}", self.words(to), self.words(&centre), number(*feed, 3)));
