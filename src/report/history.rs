@@ -12,6 +12,9 @@ use super::conformity::limits;
 use super::number::unit;
 use super::table::{Cell, Table, cells};
 
+/// Parameters that a cell names.
+const MOST_NAMES: usize = 4;
+
 /// What was tested, in a sentence.
 pub fn headline(found: &FleetHistory) -> String {
     let history = &found.history;
@@ -52,6 +55,13 @@ pub fn next_check(machine: &MachineHistory) -> String {
     }
 }
 
+/// The first names of a list, and the number of the others.
+pub fn named(names: &[String]) -> String {
+    let more = names.len().saturating_sub(MOST_NAMES);
+    let first = names[..names.len() - more].join(", ");
+    if more > 0 { format!("{first} and {more} more") } else { first }
+}
+
 /// The machines, those with the earliest due date first.
 pub fn machines(found: &FleetHistory) -> Table {
     let mut sorted: Vec<&MachineHistory> = found.history.machines.iter().collect();
@@ -59,20 +69,19 @@ pub fn machines(found: &FleetHistory) -> Table {
     sorted.sort_by(|a, b| due(a).total_cmp(&due(b)).then_with(|| a.machine_id.cmp(&b.machine_id)));
     let rows = sorted.into_iter().map(|machine| {
         let drifting = machine.parameters.iter().filter(|one| one.drift_per_year.is_some()).count();
-        let out = machine.parameters.iter().filter(|one| one.points.last().is_some_and(|last| last.out_of_control));
         cells![
             machine.machine_id.clone(),
             machine.sessions.to_string(),
             date(machine.last_days),
             drifting.to_string(),
             machine.changes.len().to_string(),
-            out.count().to_string(),
+            named(&machine.out_of_control),
             next_check(machine),
             machine.due_parameter.clone().unwrap_or_default()
         ]
     });
     let headings =
-        ["machine", ">sessions", "last session", ">drifts", ">changes", ">out of control", "next check", "due by"];
+        ["machine", ">sessions", "last session", ">drifts", ">changes", "out of control", "next check", "due by"];
     Table::new(headings, rows.collect::<Vec<_>>())
 }
 

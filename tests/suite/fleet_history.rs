@@ -114,14 +114,13 @@ fn sessions_that_do_not_fit_together_are_named_and_isolated() {
     assert_eq!(history["machines"][0]["sessions"], 7);
 }
 
-/// One machine with a step that a table explains.
-#[test]
-fn a_history_has_pages_and_names_a_compensation() {
-    let place = fleet(20, |k| format!("serial_number = \"M\"\ndate = 20{:02}-{:02}-05", 24 + k / 12, k % 12 + 1));
+/// Sessions of one machine, one a month, with a squareness of 20″ before one of them.
+fn sessions_with_a_step(count: usize, at: usize) -> TestFolder {
+    let place = fleet(count, |k| format!("serial_number = \"M\"\ndate = 20{:02}-{:02}-05", 24 + k / 12, k % 12 + 1));
     let table = read(&place.at("fleet/s00/circle.csv"));
-    for k in 0..20 {
-        // A squareness of 20″ before the compensation; the bar measures the change along the diagonals.
-        let squareness = if k < 10 { 20.0 / 206_264.8 } else { 0.0 };
+    for k in 0..count {
+        // The bar measures the change of a squareness along the diagonals.
+        let squareness = if k < at { 20.0 / 206_264.8 } else { 0.0 };
         let rows = table.lines().enumerate().map(|(row, line)| {
             let cells: Vec<&str> = line.split(',').collect();
             let Ok(length) = cells[3].parse::<f64>() else { return line.to_string() };
@@ -132,6 +131,37 @@ fn a_history_has_pages_and_names_a_compensation() {
         let contents = rows.collect::<Vec<_>>().join("\n") + "\n";
         fs::write(place.at(&format!("fleet/s{k:02}/circle.csv")), contents).unwrap();
     }
+    place
+}
+
+/// Ten sessions of one machine are enough for a step far above the uncertainty, and the screen names the parameter.
+#[test]
+fn a_step_of_a_short_series_is_found_and_named() {
+    let place = sessions_with_a_step(10, 5);
+    run(&place, "--no-trace");
+    let found = history(&place, "");
+    let parameters = found["machines"][0]["parameters"].as_array().unwrap();
+    let squareness = parameters.iter().find(|one| one["id"] == "EC0Y").unwrap();
+    let steps = squareness["steps"].as_array().unwrap();
+    assert_eq!(steps.len(), 1, "{squareness:#}");
+    assert!((steps[0]["value"].as_f64().unwrap().abs() - 20.0).abs() < 1.0, "{squareness:#}");
+    assert!(squareness["u_enlargement"].as_f64().unwrap() < 3.0, "{squareness:#}");
+    // A step before the last session: there is no later one to start the charts again.
+    let last = sessions_with_a_step(7, 6);
+    run(&last, "--no-trace");
+    let output = last.shell("abbe history results --json history.json");
+    let screen = String::from_utf8_lossy(&output.stdout).to_string();
+    let out = &serde_json::from_str::<Value>(&read(&last.at("history.json"))).unwrap()["machines"][0]["out_of_control"];
+    for id in out.as_array().unwrap() {
+        assert!(screen.contains(id.as_str().unwrap()), "{screen}");
+    }
+    assert!(screen.contains("EC0Y"), "{screen}");
+}
+
+/// One machine with a step that a table explains.
+#[test]
+fn a_history_has_pages_and_names_a_compensation() {
+    let place = sessions_with_a_step(20, 10);
     run(&place, "--no-trace");
     let plain = place.shell("abbe history results --json -");
     let plain: Value = serde_json::from_slice(&plain.stdout).unwrap();

@@ -11,7 +11,6 @@ use super::sessions::{MachineSessions, SessionValues};
 use super::{DAYS_PER_YEAR, chart};
 use crate::numerics::regression::Regression;
 use crate::numerics::symmetric::Symmetric;
-use crate::numerics::tails::normal_tail;
 
 /// Smallest eigenvalue of a correlation matrix that counts. Below it, parameters of a session are fully correlated.
 const LEAST_EIGENVALUE: f64 = 1e-9;
@@ -181,6 +180,7 @@ impl<'m> Fitted<'m> {
             due,
             due_days: first_due.as_ref().map(|due| due.0),
             due_parameter: first_due.map(|due| due.1),
+            out_of_control: parameters.iter().filter(|one| one.is_out_of_control()).map(|one| one.id.clone()).collect(),
             parameters,
         }
     }
@@ -207,7 +207,7 @@ impl<'m> Fitted<'m> {
                 before_days: self.machine.sessions[series.sessions[*at]].days,
                 value: change.value,
                 u: change.u,
-                p_value: (2.0 * normal_tail((change.value / change.u).abs())).min(1.0),
+                p_value: series.p_value_of_term(change.value, change.u),
             })
         });
         let (due, due_days) = self.due(series, options);

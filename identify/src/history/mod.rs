@@ -1,7 +1,8 @@
 //! The parameters of machines over time: trends, change points, control charts, the next check.
 //!
 //! - `sessions`: the parameters of one machine in each session; `series`: one parameter of one machine over time,
-//!   and its search for drift and steps;
+//!   and its search for drift and steps; `change_test`: whether it has any; `scatter`, `prior`: how
+//!   much sessions scatter;
 //! - `machine`: all parameters of one machine together, by generalised least squares with the covariances of the
 //!   sessions;
 //! - [`events`]: steps of several parameters at one time, and what they are;
@@ -10,22 +11,27 @@
 //! Every series is tested for any change. Benjamini and Hochberg (1995, J. R. Stat. Soc. B 57, 289) control the false
 //! discovery rate over all series of all machines.
 
+mod change_test;
 pub mod chart;
 pub mod events;
 pub mod faults;
 mod machine;
+mod prior;
 pub mod results;
+mod scatter;
 mod series;
 mod sessions;
 
 pub use sessions::{MachineSessions, SessionValues};
 
+use change_test::most_significant;
 use machine::Fitted;
+use prior::Prior;
 use results::{History, MachineHistory};
-use series::{Costs, Series};
+use scatter::{priors_of_differences, priors_of_models};
+use series::Series;
 
 use crate::numerics::parallel;
-use crate::numerics::tails::chi_square_quantile;
 
 /// Days of a year.
 pub const DAYS_PER_YEAR: f64 = 365.25;
@@ -49,23 +55,41 @@ impl Default for HistoryOptions {
 
 /// Analyses machines. The sessions of each are sorted by time.
 pub fn analyse(machines: &[MachineSessions], options: &HistoryOptions) -> History {
-    let all = Series::of_fleet(machines);
-    let p_values: Vec<f64> = all.iter().flatten().map(Series::p_value).collect();
-    let threshold = benjamini_hochberg(&p_values, options.false_discovery_rate);
-    let fitted: Vec<MachineHistory> = parallel::map(machines.len(), &|k| {
-        let series = all[k].iter().map(|series| {
-            let costs = Costs::of(threshold, series.positions());
-            // A series that is not significant keeps its level.
-            if series.p_value() <= threshold { series.clone().searched(&costs) } else { series.clone() }
-        });
-        Fitted::of(&machines[k], series.collect()).history(options)
-    });
+    let plain = Series::of_fleet(machines);
+    let (_, first) = modelled(&plain, &priors_of_differences(machines, &plain), options);
+    let (threshold, mut all) = modelled(&plain, &priors_of_models(machines, &first), options);
+    all.iter_mut().flatten().for_each(Series::enlarge);
+    let fitted: Vec<MachineHistory> =
+        parallel::map(machines.len(), &|k| Fitted::of(&machines[k], all[k].clone()).history(options));
     History {
         false_discovery_rate: options.false_discovery_rate,
         p_value_threshold: threshold,
-        tested_series: p_values.len(),
+        tested_series: all.iter().map(Vec::len).sum(),
         machines: fitted,
     }
+}
+
+/// The series with their models for given priors of their scatter, and the largest p value that is significant. A series
+/// that is not significant keeps its level.
+fn modelled(all: &[Vec<Series>], priors: &[Vec<Prior>], options: &HistoryOptions) -> (f64, Vec<Vec<Series>>) {
+    let tested = parallel::map(all.len(), &|k| {
+        let test = |(series, prior): (&Series, &Prior)| {
+            let change = most_significant(series, prior);
+            (series.clone().tested(*prior, change.p_value), change.steps)
+        };
+        all[k].iter().zip(&priors[k]).map(test).collect::<Vec<_>>()
+    });
+    let p_values: Vec<f64> = tested.iter().flatten().map(|(series, _)| series.p_value()).collect();
+    let threshold = benjamini_hochberg(&p_values, options.false_discovery_rate);
+    let models = parallel::map(tested.len(), &|k| {
+        let series = tested[k].iter().cloned();
+        let model = |(series, steps): (Series, Vec<usize>)| match series.p_value() <= threshold {
+            true => series.searched(&steps, threshold),
+            false => series,
+        };
+        series.map(model).collect()
+    });
+    (threshold, models)
 }
 
 /// The largest p value that is significant at a false discovery rate; below every p value if none is.
@@ -77,11 +101,6 @@ pub fn benjamini_hochberg(p_values: &[f64], rate: f64) -> f64 {
     let count = sorted.len() as f64;
     let limits = sorted.iter().enumerate().map(|(k, p)| (*p, (k + 1) as f64 * rate / count));
     limits.filter(|(p, limit)| p <= limit).map(|(_, limit)| limit).fold(0.0, f64::max)
-}
-
-/// The value that χ² with one degree of freedom exceeds with this probability, for probabilities down to zero.
-fn quantile(probability: f64) -> f64 {
-    chi_square_quantile(probability.clamp(1e-15, 1.0), 1.0)
 }
 
 #[cfg(test)]
@@ -102,5 +121,7 @@ mod tests {
     }
 }
 
+#[cfg(test)]
+mod short_series;
 #[cfg(test)]
 mod simulated;

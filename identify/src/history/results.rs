@@ -53,6 +53,8 @@ pub struct MachineHistory {
     pub due_days: Option<f64>,
     /// The parameter that determines it.
     pub due_parameter: Option<String>,
+    /// The parameters that are out of control in their latest session.
+    pub out_of_control: Vec<String>,
     /// The parameters.
     pub parameters: Vec<ParameterHistory>,
 }
@@ -77,12 +79,13 @@ pub struct ParameterHistory {
     pub meaning: String,
     /// The sessions that identify it.
     pub points: Vec<PointResult>,
-    /// Probability of a change as large as the largest one if there is none. All positions of a step are counted.
+    /// Probability of a drift, a step or a pair of steps as significant as the most significant one if there is none.
+    /// All positions are counted.
     pub p_value: f64,
-    /// Scatter between neighbouring sessions, less the drift, over that which the uncertainties predict.
+    /// Scatter of the sessions about the model (level, drift and steps) over that which the uncertainties predict.
     pub scatter_ratio: f64,
-    /// Factor by which `u` is enlarged: the scatter of all parameters of all machines where it is above 1; that of the
-    /// machine, or `scatter_ratio`, where it is significantly larger; else 1.
+    /// Factor by which `u` is enlarged: `scatter_ratio` beside the scatter of the other parameters of the machine and of
+    /// the other machines, by their degrees of freedom; at least 1.
     pub u_enlargement: f64,
     /// Level: at the mean date of a series with drift, before the first step; `null` if the model is not separable.
     pub level: Option<Estimate>,
@@ -96,6 +99,13 @@ pub struct ParameterHistory {
     pub due: Due,
     /// Day on which it is due; `null` without a date.
     pub due_days: Option<f64>,
+}
+
+impl ParameterHistory {
+    /// Whether the latest session is out of control.
+    pub fn is_out_of_control(&self) -> bool {
+        self.points.last().is_some_and(|last| last.out_of_control)
+    }
 }
 
 /// A session of a parameter.

@@ -1,44 +1,44 @@
 //! One parameter of one machine over time: a level, perhaps a drift, and steps between sessions.
 //!
-//! The values are independent with known standard uncertainties. The test of "no change" compares the best drift or
-//! step with a level alone; its p value counts all positions of a step (Bonferroni). In a series with a change, terms
-//! are added, removed and moved until χ² plus the costs of the terms no longer decreases.
+//! The values are independent, with uncertainties that are known but for a factor, the scatter. In a series with a
+//! change, terms are added, removed and moved while the model improves. The scatter is estimated under each model, the
+//! residual within the segments beside the prior of the other series, so that a change is no scatter.
 
+use super::DAYS_PER_YEAR;
+use super::prior::Prior;
 use super::sessions::MachineSessions;
-use super::{DAYS_PER_YEAR, quantile};
 use crate::numerics::regression::Regression;
-use crate::numerics::tails::student_tail;
+use crate::numerics::tails::{student_quantile, student_tail};
 use crate::numerics::{median, parallel};
 
 /// Fewest sessions in which a parameter is a series.
 pub(super) const FEWEST: usize = 4;
 /// Most steps of a series.
 const MOST_STEPS: usize = 12;
-/// Standard deviation of the scatter over its predicted value, times the root of the number of differences. It counts
-/// that neighbouring differences share a session.
-const SCATTER_DEVIATION: f64 = 1.4;
-/// Standard deviations above 1 at which the scatter of all series of a fleet enlarges their uncertainties: the many
-/// differences make it precise.
-const FLEET_EXCESS: f64 = 1.0;
-/// Standard deviations above the scatter of the fleet at which that of a machine, and that of one series, take its
-/// place. Few differences determine a scatter badly, and its degrees of freedom cost power.
-const MACHINE_EXCESS: f64 = 2.0;
-const OWN_EXCESS: f64 = 3.0;
-/// Differences of correlated parameters that count as one independent difference.
-const CORRELATED: f64 = 1.6;
-/// Standard deviation of a normal distribution over its median absolute deviation.
-const NORMAL: f64 = 1.4826;
+/// Intervals between sessions at which a drift is half as probable as a step. Each interval is as likely to hold a step as
+/// any other; a drift is the likelier the longer the series is, by the square of its length.
+const INTERVALS_OF_DRIFT: f64 = 9.0;
 
-/// What each term of a model has to gain in χ².
-pub(super) struct Costs {
-    drift: f64,
-    step: f64,
+/// What each term of a model has to gain, by the number of terms that the model then has.
+struct Costs {
+    /// Squared t of a drift, then of a step, with so many terms.
+    drift: Vec<f64>,
+    step: Vec<f64>,
 }
 
 impl Costs {
     /// The costs at which a term is as significant as a whole series at the threshold.
-    pub fn of(threshold: f64, positions: usize) -> Costs {
-        Costs { drift: quantile(threshold / 2.0), step: quantile(threshold / (2.0 * positions.max(1) as f64)) }
+    fn of(threshold: f64, series: &Series) -> Costs {
+        let count = series.values.len();
+        let positions = (count - 1) as f64;
+        // The odds of a drift against a step reduce the positions that a step has to count.
+        let odds = positions * positions / (positions * positions + INTERVALS_OF_DRIFT * INTERVALS_OF_DRIFT);
+        let total = series.prior.freedom + positions;
+        let costs = |probability: f64| -> Vec<f64> {
+            let terms = 0..=(MOST_STEPS + 1).min(count - 2);
+            terms.map(|terms| student_quantile(0.5 * probability, total - terms as f64).powi(2)).collect()
+        };
+        Costs { drift: costs(0.5 * threshold), step: costs(0.5 * threshold / (positions * odds).max(1.0)) }
     }
 }
 
@@ -53,9 +53,9 @@ pub(super) struct Series {
     pub years: Vec<f64>,
     /// The values.
     pub values: Vec<f64>,
-    /// Their standard uncertainties, enlarged by `scatter` where that is significant.
+    /// Their standard uncertainties, after [`Series::enlarge`] with the scatter.
     pub u: Vec<f64>,
-    /// Scatter between neighbouring sessions over that which the uncertainties predict.
+    /// Scatter of the sessions about the model over that which the stated uncertainties predict.
     pub scatter: f64,
     /// Factor of the uncertainties.
     pub enlargement: f64,
@@ -63,61 +63,18 @@ pub(super) struct Series {
     pub drift: bool,
     /// The sessions in front of which the model has a step, as positions in `sessions`.
     pub steps: Vec<usize>,
-    /// Degrees of freedom of the enlargement; infinite without one.
-    freedom: f64,
+    /// What the other series say of the scatter.
+    prior: Prior,
+    /// Variance of the sessions about the model, in units of the stated one, beside the prior, and its degrees of
+    /// freedom.
+    variance: (f64, f64),
     p_value: f64,
 }
 
-/// Scatter between neighbouring sessions.
-#[derive(Clone, Copy)]
-struct Scatter {
-    /// Over that which the uncertainties predict.
-    ratio: f64,
-    /// Number of independent differences.
-    differences: f64,
-}
-
-impl Scatter {
-    /// That of all these series together.
-    fn of<'a>(series: impl Iterator<Item = &'a Series>) -> Scatter {
-        let (mut pulls, mut count) = (Vec::new(), 0);
-        for one in series {
-            pulls.extend(one.pulls());
-            count += 1;
-        }
-        let differences = pulls.len() as f64 / if count > 1 { CORRELATED } else { 1.0 };
-        Scatter { ratio: if pulls.is_empty() { 1.0 } else { NORMAL * median(&mut pulls) }, differences }
-    }
-
-    /// Whether this is above another ratio by a number of standard deviations.
-    fn exceeds(&self, ratio: f64, deviations: f64) -> bool {
-        self.ratio > ratio * (1.0 + deviations * SCATTER_DEVIATION / self.differences.sqrt())
-    }
-
-    /// Degrees of freedom of a variance with the relative standard deviation of this estimate.
-    fn freedom(&self) -> f64 {
-        self.differences / (2.0 * SCATTER_DEVIATION * SCATTER_DEVIATION)
-    }
-}
-
 impl Series {
-    /// The series of each machine of a fleet, each with its test.
+    /// The series of each machine of a fleet.
     pub fn of_fleet(machines: &[MachineSessions]) -> Vec<Vec<Series>> {
-        let mut all: Vec<Vec<Series>> = parallel::map(machines.len(), &|k| Series::of_machine(&machines[k]));
-        let fleet = Scatter::of(all.iter().flatten());
-        let fleet = fleet.exceeds(1.0, FLEET_EXCESS).then_some(fleet);
-        let usual = fleet.map_or(1.0, |fleet| fleet.ratio);
-        for series in &mut all {
-            let machine = Scatter::of(series.iter());
-            let machine = machine.exceeds(usual, MACHINE_EXCESS).then_some(machine);
-            for one in series {
-                let own = Scatter::of(std::iter::once(&*one));
-                let own = own.exceeds(usual, OWN_EXCESS).then_some(own);
-                let largest = [fleet, machine, own].into_iter().flatten().max_by(|a, b| a.ratio.total_cmp(&b.ratio));
-                one.enlarge(largest);
-            }
-        }
-        all
+        parallel::map(machines.len(), &|k| Series::of_machine(&machines[k]))
     }
 
     fn of_machine(machine: &MachineSessions) -> Vec<Series> {
@@ -135,8 +92,8 @@ impl Series {
             .collect()
     }
 
-    fn new(parameter: usize, known: &[(usize, f64, f64, f64)]) -> Series {
-        let mut series = Series {
+    pub(super) fn new(parameter: usize, known: &[(usize, f64, f64, f64)]) -> Series {
+        Series {
             parameter,
             sessions: known.iter().map(|known| known.0).collect(),
             years: known.iter().map(|known| known.1).collect(),
@@ -144,43 +101,27 @@ impl Series {
             u: known.iter().map(|known| known.3).collect(),
             scatter: 1.0,
             enlargement: 1.0,
-            freedom: f64::INFINITY,
+            variance: (1.0, f64::INFINITY),
             drift: false,
             steps: Vec::new(),
+            prior: Prior { variance: 1.0, freedom: 0.0 },
             p_value: 1.0,
-        };
-        series.scatter = Scatter::of(std::iter::once(&series)).ratio;
-        series
-    }
-
-    /// Enlarges the uncertainties by a scatter, and tests.
-    fn enlarge(&mut self, scatter: Option<Scatter>) {
-        if let Some(scatter) = scatter {
-            self.enlargement = scatter.ratio;
-            self.freedom = scatter.freedom();
-            self.u.iter_mut().for_each(|u| *u *= scatter.ratio);
         }
-        self.p_value = self.test();
     }
 
-    /// The differences of neighbouring sessions, less the drift, over their uncertainties. Steps hardly change their
-    /// median. The estimated drift takes 5 % of their variance for four sessions, and less for more.
-    fn pulls(&self) -> impl Iterator<Item = f64> {
-        let drift = self.median_slope();
-        (1..self.values.len()).map(move |i| {
-            let expected = drift * (self.years[i] - self.years[i - 1]);
-            ((self.values[i] - self.values[i - 1] - expected) / self.u[i].hypot(self.u[i - 1])).abs()
-        })
-    }
-
-    /// Drift per year as the median of the slopes between all pairs of sessions (Theil and Sen); 0 with one date only.
-    fn median_slope(&self) -> f64 {
+    /// The differences of neighbouring sessions, less the median drift between them, over their uncertainties. A step
+    /// is in one of them.
+    pub fn pulls(&self) -> Vec<f64> {
         let count = self.values.len();
-        let pairs = (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j)));
-        let pairs = pairs.filter(|(i, j)| self.years[*j] > self.years[*i]);
-        let slope = |(i, j): (usize, usize)| (self.values[j] - self.values[i]) / (self.years[j] - self.years[i]);
-        let mut slopes: Vec<f64> = pairs.map(slope).collect();
-        if slopes.is_empty() { 0.0 } else { median(&mut slopes) }
+        let time = |i: usize| self.years[i] - self.years[i - 1];
+        let mut rates: Vec<f64> =
+            (1..count).filter(|i| time(*i) > 0.0).map(|i| (self.values[i] - self.values[i - 1]) / time(i)).collect();
+        let drift = if rates.is_empty() { 0.0 } else { median(&mut rates) };
+        let pull = |i: usize| {
+            let difference = self.values[i] - self.values[i - 1] - drift * time(i);
+            (difference / self.u[i].hypot(self.u[i - 1])).abs()
+        };
+        (1..count).map(pull).collect()
     }
 
     /// Whether the sessions determine a drift and steps in front of these sessions of the machine.
@@ -192,23 +133,42 @@ impl Series {
         distinct && inside && self.solved(drift, &steps).is_some()
     }
 
-    /// Number of positions of a step.
-    pub fn positions(&self) -> usize {
-        self.values.len() - 1
-    }
-
     /// Probability of a change as large as the largest of this series if there is none.
     pub fn p_value(&self) -> f64 {
         self.p_value
     }
 
-    fn test(&self) -> f64 {
-        let Some(level) = self.solved(false, &[]) else { return 1.0 };
-        let columns = self.columns(false, &[]);
-        let tail = |gain: f64| 2.0 * student_tail(gain.max(0.0).sqrt(), self.freedom);
-        let drift = 2.0 * tail(level.gain(&columns, &[self.drift_column()]));
-        let step = (1..self.values.len()).map(|at| level.gain(&columns, &[self.step_column(at)])).fold(0.0, f64::max);
-        drift.min(2.0 * self.positions() as f64 * tail(step)).min(1.0)
+    /// The series as a level, with a prior of its scatter and the p value of its most significant change.
+    pub fn tested(mut self, prior: Prior, p_value: f64) -> Series {
+        (self.prior, self.p_value) = (prior, p_value);
+        (self.drift, self.steps) = (false, Vec::new());
+        self
+    }
+
+    /// χ² of the residual about the model, by the stated uncertainties, and its degrees of freedom; `None` if the model
+    /// leaves none.
+    pub fn residual(&self) -> Option<(f64, f64)> {
+        let terms = 1 + usize::from(self.drift) + self.steps.len();
+        let solved = self.solved(self.drift, &self.steps)?;
+        Some((solved.sum_of_squares(), (self.values.len() - terms) as f64)).filter(|(_, freedom)| *freedom > 0.0)
+    }
+
+    /// Enlarges the uncertainties by the scatter about the model, if that is above 1.
+    pub fn enlarge(&mut self) {
+        let (sum, own) = self.residual().unwrap_or((0.0, 0.0));
+        let freedom = self.prior.freedom + own;
+        if own > 0.0 {
+            self.scatter = (sum / own).sqrt();
+            self.variance = ((self.prior.sum_of_squares() + sum) / freedom, freedom);
+        }
+        self.enlargement = self.variance.0.max(1.0).sqrt();
+        self.u.iter_mut().for_each(|u| *u *= self.enlargement);
+    }
+
+    /// The probability of a term as large as this one, with its enlarged uncertainty, if there is none.
+    pub fn p_value_of_term(&self, value: f64, u: f64) -> f64 {
+        let (variance, freedom) = self.variance;
+        (2.0 * student_tail((value / u).abs() * self.enlargement / variance.sqrt(), freedom)).min(1.0)
     }
 
     fn whitened(&self, value: impl Fn(usize) -> f64) -> Vec<f64> {
@@ -241,9 +201,12 @@ impl Series {
         Some((solved.beta[1], solved.u(&[(1, 1.0)], 1.0)))
     }
 
-    /// The series with the model of the least χ² plus costs that a search from no term and one from a drift reach.
-    pub fn searched(mut self, costs: &Costs) -> Series {
-        let found = [false, true].map(|drift| self.search(drift, costs));
+    /// The series with the best model that a search from a level, from a drift and from the steps of its most significant
+    /// change reaches.
+    pub fn searched(mut self, steps: &[usize], threshold: f64) -> Series {
+        let costs = Costs::of(threshold, &self);
+        let starts = [(false, &[] as &[usize]), (true, &[]), (false, steps)];
+        let found = starts.map(|(drift, steps)| self.search(drift, steps, &costs));
         let best = found.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
         if let Some((_, drift, steps)) = best {
             (self.drift, self.steps) = (drift, steps);
@@ -251,15 +214,23 @@ impl Series {
         self
     }
 
-    /// χ² plus the costs of the terms; infinite for terms that the sessions do not separate.
+    /// Logarithm of the sum of squares plus the costs of the terms. A further term lowers it if its F statistic, with
+    /// the variance under the larger model, exceeds its cost. Infinite for terms that the sessions do not separate.
     fn objective(&self, drift: bool, steps: &[usize], costs: &Costs) -> f64 {
         let Some(solved) = self.solved(drift, steps) else { return f64::INFINITY };
-        solved.sum_of_squares() + costs.drift * f64::from(u8::from(drift)) + costs.step * steps.len() as f64
+        let drifts = drift.then_some(&costs.drift).into_iter();
+        let terms = drifts.chain(steps.iter().map(|_| &costs.step)).enumerate();
+        let freedom = self.prior.freedom + (self.values.len() - 1) as f64;
+        let costs = terms.map(|(before, costs)| match costs.get(before + 1) {
+            Some(cost) => (cost / (freedom - (before + 1) as f64)).ln_1p(),
+            None => f64::INFINITY,
+        });
+        freedom * ((self.prior.sum_of_squares() + solved.sum_of_squares()).ln() + costs.sum::<f64>())
     }
 
     /// Adds, removes, exchanges and moves terms one at a time while that lowers the objective.
-    fn search(&self, drift: bool, costs: &Costs) -> (f64, bool, Vec<usize>) {
-        let mut best = (self.objective(drift, &[], costs), drift, Vec::new());
+    fn search(&self, drift: bool, steps: &[usize], costs: &Costs) -> (f64, bool, Vec<usize>) {
+        let mut best = (self.objective(drift, steps, costs), drift, steps.to_vec());
         loop {
             let (_, drift, steps) = &best;
             let mut next: Option<(f64, bool, Vec<usize>)> = None;

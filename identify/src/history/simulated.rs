@@ -7,17 +7,27 @@ use rand_pcg::Pcg64;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
 use super::events::{ChangeEvent, Compensation, Kind, KnownChange};
-use super::results::{Due, History};
+use super::results::{Due, History, ParameterHistory};
 use super::sessions::{MachineSessions, SessionValues};
 use super::{HistoryOptions, analyse};
 
 /// Parameters of a machine: eight location errors.
-const PARAMETERS: usize = 8;
+pub(super) const PARAMETERS: usize = 8;
 /// Three years, one session a month.
 const SESSIONS: usize = 36;
 
-/// A machine with correlated estimates of known uncertainty about its true values.
-fn machine(number: usize, truth: impl Fn(usize, f64, usize) -> f64, random: &mut Pcg64) -> MachineSessions {
+/// A machine of three years.
+pub(super) fn machine(number: usize, truth: impl Fn(usize, f64, usize) -> f64, random: &mut Pcg64) -> MachineSessions {
+    machine_of(SESSIONS, number, truth, random)
+}
+
+/// A machine with correlated estimates of known uncertainty about its true values, one session a month.
+pub(super) fn machine_of(
+    sessions: usize,
+    number: usize,
+    truth: impl Fn(usize, f64, usize) -> f64,
+    random: &mut Pcg64,
+) -> MachineSessions {
     let u = |parameter: usize| 0.5 + 0.2 * parameter as f64;
     // Neighbouring parameters are correlated by 0.5: estimates of one set-up.
     let root = Mat::from_fn(PARAMETERS, PARAMETERS, |i, j| match i as isize - j as isize {
@@ -29,7 +39,7 @@ fn machine(number: usize, truth: impl Fn(usize, f64, usize) -> f64, random: &mut
     let correlation = &root * root.transpose();
     let covariance: Vec<Vec<f64>> =
         (0..PARAMETERS).map(|i| (0..PARAMETERS).map(|j| correlation[(i, j)] * u(i) * u(j)).collect()).collect();
-    let sessions = (0..SESSIONS)
+    let sessions = (0..sessions)
         .map(|session| {
             let days = 30.4375 * session as f64;
             let normal: Vec<f64> = (0..PARAMETERS).map(|_| StandardNormal.sample(random)).collect();
@@ -102,13 +112,13 @@ impl Counts {
 
 /// Whether a proportion is consistent with at least (at most) a rate: a smaller (larger) count has a probability above
 /// 0.1 %.
-fn consistent(count: [u64; 2], at_least: bool, rate: f64) -> bool {
+pub(super) fn consistent(count: [u64; 2], at_least: bool, rate: f64) -> bool {
     let law = Binomial::new(rate, count[1]).unwrap();
     if at_least { law.cdf(count[0]) > 1e-3 } else { count[0] == 0 || law.sf(count[0] - 1) > 1e-3 }
 }
 
 /// The number of fleets of a test: this, or that of a study.
-fn number_of_fleets(usual: u64) -> u64 {
+pub(super) fn number_of_fleets(usual: u64) -> u64 {
     std::env::var("ABBE_STUDY").ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
 }
 
@@ -137,17 +147,13 @@ fn drifts_and_steps_of_a_fleet_are_found() {
         // A fleet in which nothing changes.
         let quiet: Vec<MachineSessions> = (0..20).map(|number| machine(number, |_, _, _| 3.0, &mut random)).collect();
         let history = analyse(&quiet, &HistoryOptions::default());
-        let claimed = |parameter: &super::results::ParameterHistory| {
-            parameter.drift_per_year.is_some() || !parameter.steps.is_empty()
-        };
-        any[0] += u64::from(history.machines.iter().flat_map(|machine| &machine.parameters).any(claimed));
+        any[0] += u64::from(history.machines.iter().flat_map(|machine| &machine.parameters).any(has_change));
         any[1] += 1;
     }
     let Counts { drifts, steps, claims, other_terms } = &counts;
     println!(
         "drifts {drifts:?}, steps {steps:?}, false of all claims {claims:?}, other terms {other_terms:?}, fleets \
-        without \
-         a change that have a claim {any:?}"
+         without a change that have a claim {any:?}"
     );
     assert!(consistent(counts.drifts, true, 0.9), "{:?}", counts.drifts);
     assert!(consistent(counts.steps, true, 0.9), "{:?}", counts.steps);
@@ -276,13 +282,17 @@ fn scatter_is_no_change() {
                 *value *= scatter;
             }
             let history = analyse(&quiet, &HistoryOptions::default());
-            let mut parameters = history.machines.iter().flat_map(|machine| &machine.parameters);
-            any[0] += u64::from(parameters.any(|one| one.drift_per_year.is_some() || !one.steps.is_empty()));
+            any[0] += u64::from(history.machines.iter().flat_map(|machine| &machine.parameters).any(has_change));
             any[1] += 1;
         }
         println!("scatter {scatter}: fleets without a change that have a claim {any:?}");
         assert!(consistent(any, false, 0.05), "{scatter}: {any:?}");
     }
+}
+
+/// Whether a parameter is claimed to have changed.
+pub(super) fn has_change(parameter: &ParameterHistory) -> bool {
+    parameter.drift_per_year.is_some() || !parameter.steps.is_empty()
 }
 
 /// Half a year of a small fleet: a drift far above the noise is found, although few sessions determine the scatter
@@ -306,7 +316,6 @@ fn a_large_drift_of_a_small_fleet_is_found() {
     };
     let (mut found, mut others, mut any) = ([0, 0], [0, 0], [0, 0]);
     for _ in 0..number_of_fleets(200) {
-        let has_change = |one: &super::results::ParameterHistory| one.drift_per_year.is_some() || !one.steps.is_empty();
         let changed = |history: &History| -> Vec<bool> {
             history.machines.iter().flat_map(|machine| &machine.parameters).map(has_change).collect()
         };

@@ -35,6 +35,12 @@ pub fn normal_quantile(probability: f64) -> f64 {
     -Normal::standard().inverse_cdf(probability)
 }
 
+/// The value that a variable of Student's t distribution exceeds with a probability of at most a half.
+pub fn student_quantile(probability: f64, freedom: f64) -> f64 {
+    let probability = probability.clamp(f64::MIN_POSITIVE, 0.5);
+    StudentsT::new(0.0, 1.0, freedom).map_or(f64::INFINITY, |law| -law.inverse_cdf(probability))
+}
+
 /// `ln P(χ²ₖ > x)`.
 pub fn ln_chi_square_tail(x: f64, k: usize) -> f64 {
     if k == 0 || x <= 0.0 {

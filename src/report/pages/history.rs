@@ -16,16 +16,17 @@ use crate::report::history as present;
 use crate::report::table::Table;
 
 /// Method of a history.
-const METHOD: &str = "The value of a parameter in a session has the standard uncertainty of the fit, enlarged by the \
-     scatter between neighbouring sessions, less the drift, of all parameters of all machines where that is \
-     larger, or of the machine or the parameter where that is significantly larger. A parameter over time has \
-     a level, perhaps a drift, and steps. The test of no change compares the best drift or step with a level \
-     alone; its p value counts all positions of a step (Bonferroni). The procedure of Benjamini and Hochberg \
-     (1995) bounds the rate of false claims over all parameters of all machines. Levels, drifts and steps of \
-     one machine are estimated together by generalised least squares with the covariances of its sessions. A \
-     change is a compensation if it agrees with the known tables (p at least 0.001, and a cosine of at least \
-     0.9). Control charts: Shewhart with limits of 3 standard deviations, EWMA with weight 0.2 and limits of \
-     2.962 (Lucas and Saccucci 1990), about the mean of the first six sessions, and again after each step.";
+const METHOD: &str = "A parameter over time has a level, perhaps a drift, and steps. A drift, a step and a pair of steps \
+     compete against the level alone by the p values of their F statistics. The variance is estimated under each of \
+     them, about the line or within the segments, beside the scatter of the other parameters of the machine and of \
+     the other machines (moderated as by Smyth 2004); p values count all positions (Bonferroni). The procedure of \
+     Benjamini and Hochberg (1995) bounds the rate of false claims over all parameters of all machines. The value of \
+     a parameter in a session has the standard uncertainty of the fit, enlarged by this scatter where it is above 1. \
+     Levels, drifts and steps of one machine are estimated together by generalised least squares with the \
+     covariances of its sessions. A change is a compensation if it agrees with the known tables (p at least 0.001, \
+     and a cosine of at least 0.9). Control charts: Shewhart with limits of 3 standard deviations, EWMA with weight \
+     0.2 and limits of 2.962 (Lucas and Saccucci 1990), about the mean of the first six sessions, and again after \
+     each step.";
 
 /// Days of a year in the figures.
 const DAYS_PER_YEAR: f64 = 365.25;
@@ -69,6 +70,11 @@ pub fn machine(machine: &MachineHistory, conformity: &[MachineConformity]) -> Do
         key_figures: vec![
             KeyFigure::new("Sessions", machine.sessions.to_string(), date(machine.first_days)),
             KeyFigure::new("Last session", date(machine.last_days), ""),
+            KeyFigure::new(
+                "Out of control",
+                machine.out_of_control.len().to_string(),
+                present::named(&machine.out_of_control),
+            ),
             KeyFigure::new(
                 "Next check",
                 present::next_check(machine),
