@@ -1,6 +1,7 @@
 //! Exported descriptions as tables.
 
-use abbe::identify::export::control::KinematicTable;
+use abbe::identify::compare::workspace::AxisRange;
+use abbe::identify::export::control::{EntryChoice, KinematicTable};
 use abbe::identify::export::dh::{DhTable, FixedPose};
 
 use super::table::{Cell, Column, Table, cells, numbers};
@@ -41,10 +42,57 @@ pub fn kinematics_header(table: &KinematicTable) -> String {
         "# {}\n# Source of the model: {}\n# Add each change to the present entry. u is one standard uncertainty.\n",
         table.control, table.source
     );
+    for note in notes(table) {
+        text += &format!("# {note}\n");
+    }
     for missing in &table.left_out {
         text += &format!("# left out: {missing}\n");
     }
     text
+}
+
+/// A position to a thousandth, without zeros at its end.
+fn short(value: f64) -> f64 {
+    (value * 1e3).round() / 1e3 + 0.0
+}
+
+/// Which entries are written, over what travel, and what remains.
+fn notes(table: &KinematicTable) -> Vec<String> {
+    let entries = match table.entries {
+        EntryChoice::Best => "Entries: those of the least rms of the volumetric error over the travel.",
+        EntryChoice::Plain => "Entries: plain, the displacements of the axis lines.",
+    };
+    let range = |axis: &AxisRange| match axis.from < axis.to {
+        true => format!("{} {} to {} {}", axis.axis, short(axis.from), short(axis.to), axis.unit),
+        false => format!("{} at {} {}", axis.axis, short(axis.from), axis.unit),
+    };
+    let source = if table.is_measured_travel { "the measured range" } else { "as requested" };
+    let travel: Vec<String> = table.travel.iter().map(range).collect();
+    let [x, y, z] = table.tool_mm.map(short);
+    let mut notes = vec![
+        entries.to_string(),
+        format!("Travel, {source}: {}. Tool point {x}, {y}, {z} mm.", travel.join(", ")),
+        "Volumetric error over the travel, the zero of the workpiece measured on the table:".to_string(),
+    ];
+    let remaining = &table.remaining;
+    let sizes = [
+        ("without entries", remaining.without),
+        ("plain entries", remaining.plain),
+        ("these entries", remaining.written),
+    ];
+    notes.extend(
+        sizes
+            .iter()
+            .map(|(what, size)| format!("  {what}: rms {:.2} um, largest {:.2} um", size.rms_um, size.largest_um)),
+    );
+    if !table.not_represented.is_empty() {
+        let each = table.not_represented.iter().map(|one| format!("{} {:.2} um", one.id, one.rms_um));
+        notes.push(format!(
+            "Not represented by the control's model, rms of each alone: {}",
+            each.collect::<Vec<String>>().join(", ")
+        ));
+    }
+    notes
 }
 
 /// The changes of a control's parameters.
@@ -54,10 +102,15 @@ pub fn kinematics(table: &KinematicTable) -> Table {
             parameter.field.clone(),
             parameter.meaning.clone(),
             Cell::fixed(parameter.change_mm, 6),
-            Cell::fixed(parameter.u_mm, 6)
+            Cell::fixed(parameter.u_mm, 6),
+            Cell::fixed(parameter.plain_change_mm, 6)
         ]
     });
-    Table::new([Column::from("field"), Column::from("meaning"), numbers("change_mm"), numbers("u_mm")], rows)
+    let columns = ["change_mm", "u_mm", "plain_change_mm"].map(numbers);
+    let columns = [Column::from("field"), Column::from("meaning")].into_iter().chain(columns);
+    let mut printed = Table::new(columns, rows);
+    printed.notes = notes(table);
+    printed
 }
 
 #[cfg(test)]

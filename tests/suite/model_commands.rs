@@ -215,6 +215,52 @@ fn an_error_motion_is_not_exported_as_a_location_error() {
     assert!(table.contains("Y0C") && !table.contains("XC"), "{table}");
 }
 
+/// The entries of a control state what remains, over the measured range or a travel that is requested.
+#[test]
+fn entries_of_a_control_state_what_remains() {
+    let folder = folder();
+    let model = model(folder.path());
+    let (out, json) = (folder.path().join("table.csv"), folder.path().join("table.json"));
+    let export = |options: &[&str]| {
+        let run = [&["export", text(&model), "--as", "linuxcnc", "--out", text(&out), "--json", text(&json)], options];
+        let printed = success(&abbe(&run.concat()));
+        let result: Value = serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
+        (result["kinematics"].clone(), std::fs::read_to_string(&out).unwrap(), printed)
+    };
+    let rms = |table: &Value, which: &str| table["remaining"][which]["rms_um"].as_f64().unwrap();
+    let (best, file, printed) = export(&[]);
+    assert!(rms(&best, "written") < rms(&best, "plain") && rms(&best, "plain") < rms(&best, "without"), "{best:#}");
+    assert_eq!(best["is_measured_travel"], true);
+    for said in [&file, &printed] {
+        assert!(said.contains("the measured range: C ") && said.contains("these entries: rms "), "{said}");
+        assert!(said.contains("Not represented by the control's model"), "{said}");
+    }
+    assert!(file.lines().any(|line| line.starts_with("field,meaning,change_mm,u_mm,plain_change_mm")), "{file}");
+    let (plain, ..) = export(&["--entries", "plain"]);
+    assert_eq!(plain["remaining"]["written"], best["remaining"]["plain"]);
+    for (plain, best) in plain["parameters"].as_array().unwrap().iter().zip(best["parameters"].as_array().unwrap()) {
+        assert_eq!(plain["change_mm"], best["plain_change_mm"]);
+    }
+    let (stated, file, _) = export(&["--travel", "A=-30..60", "--travel", "Z=-50..50"]);
+    assert!(file.contains("as requested: C ") && file.contains("A -30 to 60 deg"), "{file}");
+    assert!(stated["is_measured_travel"] == false && rms(&stated, "written") != rms(&best, "written"));
+    let schema: Value = serde_json::from_slice(&abbe(&["schema", "export"]).stdout).unwrap();
+    assert!(jsonschema::is_valid(&schema, &serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap()));
+    for (format, option, because) in [
+        ("fanuc", "--travel=A=60..-30", "the first number is not below the second"),
+        ("fanuc", "--travel=Q=0..1", "no such axis"),
+        ("fanuc", "--travel=A=x..1", "no two numbers"),
+        ("dh", "--travel=A=0..1", "belongs to `--as linuxcnc`"),
+        ("beckhoff", "--entries=plain", "belongs to `--as linuxcnc`"),
+    ] {
+        let done = abbe(&["export", text(&model), "--as", format, "--out", text(&out), option]);
+        let message = String::from_utf8_lossy(&done.stderr);
+        assert!(done.status.code() == Some(2) && message.contains(because), "{option}: {message}");
+    }
+    let far = abbe(&["export", text(&model), "--as", "fanuc", "--out", text(&out), "--travel=A=0..1e300"]);
+    refused(&far, "a position in mm or degrees");
+}
+
 /// MuJoCo reads the exported chain and moves the tool as the model does.
 #[test]
 fn mujoco_reads_the_exported_urdf() {

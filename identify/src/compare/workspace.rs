@@ -6,7 +6,7 @@
 //!
 //! `J` is the derivative of the tool point by the errors, from dual numbers, times the basis functions of effects.
 
-use abbe_model::axis::AxisKind;
+use abbe_model::axis::{Axis, AxisKind};
 use abbe_model::chain::{AxisPosition, ERRORS_PER_AXIS, Machine};
 use abbe_model::driver::Driver;
 use abbe_model::frames::Point;
@@ -53,6 +53,18 @@ pub struct AxisRange {
     pub unit: String,
 }
 
+impl AxisRange {
+    /// The range of an axis from internal units.
+    pub(crate) fn of(axis: &Axis, [from, to]: [f64; 2]) -> AxisRange {
+        AxisRange {
+            axis: axis.name.clone(),
+            from: axis.kind.to_display(from),
+            to: axis.kind.to_display(to),
+            unit: axis.kind.unit().to_string(),
+        }
+    }
+}
+
 /// The volumetric error of each model over a grid with a number of places along each axis that moves. Empty if the
 /// ranges have nothing in common. Time and driver columns have the reference values of each model.
 ///
@@ -63,17 +75,8 @@ pub fn evaluate(models: &[&IdentifiedModel], places: usize) -> Result<Vec<Volume
     let machine = &first.machine;
     let Some(ranges) = common_ranges(models) else { return Ok(Vec::new()) };
     let grid = grid(&ranges, places);
-    let axes: Vec<AxisRange> = machine
-        .axes
-        .iter()
-        .zip(&ranges)
-        .map(|(axis, [from, to])| AxisRange {
-            axis: axis.name.clone(),
-            from: axis.kind.to_display(*from),
-            to: axis.kind.to_display(*to),
-            unit: axis.kind.unit().to_string(),
-        })
-        .collect();
+    let axes: Vec<AxisRange> =
+        machine.axes.iter().zip(&ranges).map(|(axis, range)| AxisRange::of(axis, *range)).collect();
     models.iter().map(|model| of_model(model, first.tool_mm, &grid, axes.clone())).collect()
 }
 
@@ -168,7 +171,7 @@ fn of_model(
 }
 
 /// The derivative of the tool point in the table frame by an error of the machine without errors.
-fn point_by(machine: &Machine, state: &[AxisPosition<f64>], tool_mm: [f64; 3], slot: usize) -> Vector3<f64> {
+pub(crate) fn point_by(machine: &Machine, state: &[AxisPosition<f64>], tool_mm: [f64; 3], slot: usize) -> Vector3<f64> {
     let errors = machine.body_errors(|own| own == slot, |own| Dual64::new(0.0, f64::from(u8::from(own == slot))));
     let reference = machine.tool_point(state, &errors, Point::nominal(tool_mm));
     let point = machine.table_point(state, &errors, reference);

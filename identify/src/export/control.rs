@@ -1,22 +1,27 @@
-//! Location errors as kinematic parameters of controls, as far as the control's own model is publicly documented.
+//! Kinematic parameters of controls, as far as the control's own model is publicly documented.
 //!
 //! A control computes the position of the tool over the table from the positions of its rotary axes. The tables hold the
-//! change of each entry: the identified line of an axis less the nominal one. What the control's model cannot express,
-//! such as the orientation of an axis, is listed as left out.
-//!
-//! For two rotary axes under the workpiece, the first `T` next to the bed (A or B) and the second `C` on it, with the
+//! change of each entry. The model of a control is two lines, of which it knows the positions and not the directions:
+//! for two rotary axes under the workpiece, the first `T` next to the bed (A or B) and the second `C` on it, with the
 //! location errors of this project, the lines at zero are displaced by
 //!
 //! ```text
 //! line of T: (·, EY0T, EZ0T) for T = A,  (EX0T, ·, EZ0T) for T = B;    line of C: (EX0C + EX0T, EY0C + EY0T, ·)
 //! ```
+//!
+//! The plain entries are these displacements. The best entries are those that make the volumetric error of the machine
+//! with all its errors least over a travel ([`super::entries`]). What the control's model cannot express is listed.
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
+use nalgebra::DVector;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::entries::{Lines, NotRepresented, Remaining};
+use super::travel::Travel;
+use crate::compare::workspace::AxisRange;
 use crate::error::IdentifyError;
 use crate::model_file::IdentifiedModel;
 use crate::parameters::Role;
@@ -29,16 +34,43 @@ pub struct ControlKinematics {
     pub about: &'static str,
     /// Where the model is documented.
     pub source: &'static str,
-    /// The entries for a machine: field, meaning, and its change as a sum of errors of the first and the second axis.
+    /// The entries for a machine whose first axis has this letter.
     entries: fn(first: char) -> Vec<Entry>,
 }
 
-/// An entry: field, meaning, terms.
+/// A displacement of an axis line that a control's model holds.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Line {
+    /// The first axis across itself in the plane of the table.
+    FirstAcross,
+    /// The first axis in Z.
+    FirstHeight,
+    /// The second axis along the first.
+    SecondAlong,
+    /// The second axis across the first, less the first.
+    SecondAcross,
+}
+
+const LINES: [Line; 4] = [Line::FirstAcross, Line::FirstHeight, Line::SecondAlong, Line::SecondAcross];
+
+impl Line {
+    /// The location errors that add up to it: axis (0 first, 1 second) and freedom. The first one displaces the line.
+    fn errors(self, first: char) -> Vec<(usize, Freedom)> {
+        let [along, across] = if first == 'A' { [0, 1] } else { [1, 0] }.map(|place: usize| Freedom::ALL[place]);
+        match self {
+            Line::FirstAcross => vec![(0, across)],
+            Line::FirstHeight => vec![(0, Freedom::ALL[2])],
+            Line::SecondAlong => vec![(1, along), (0, along)],
+            Line::SecondAcross => vec![(1, across)],
+        }
+    }
+}
+
+/// An entry: field, meaning, and its change as a sum of displacements.
 struct Entry {
     field: &'static str,
     meaning: &'static str,
-    /// Coefficient, axis (0 first, 1 second), freedom.
-    terms: Vec<(f64, usize, Freedom)>,
+    terms: Vec<(f64, Line)>,
 }
 
 /// A control whose kinematic model is not exported, with the reason.
@@ -74,40 +106,53 @@ pub const KINEMATICS: &[ControlKinematics] = &[
 
 /// `tran = Rz(−c)·(Rx(−a)·(J − r − d) + d) + r`: the line of C is at `r`, that of A at `r + d`.
 fn linuxcnc(first: char) -> Vec<Entry> {
-    let (x, y, z) = (Freedom::ALL[0], Freedom::ALL[1], Freedom::ALL[2]);
-    let offset = if first == 'A' {
-        Entry { field: "y-offset", meaning: "line of A less line of C in Y", terms: vec![(-1.0, 1, y)] }
+    let across = vec![(1.0, Line::SecondAcross), (1.0, Line::FirstAcross)];
+    let along = vec![(1.0, Line::SecondAlong)];
+    let offset = vec![(-1.0, Line::SecondAcross)];
+    let (x, y, offset) = if first == 'A' {
+        (along, across, Entry { field: "y-offset", meaning: "line of A less line of C in Y", terms: offset })
     } else {
-        Entry { field: "x-offset", meaning: "line of B less line of C in X", terms: vec![(-1.0, 1, x)] }
+        (across, along, Entry { field: "x-offset", meaning: "line of B less line of C in X", terms: offset })
     };
     vec![
-        Entry { field: "x-rot-point", meaning: "line of C in X", terms: vec![(1.0, 1, x), (1.0, 0, x)] },
-        Entry { field: "y-rot-point", meaning: "line of C in Y", terms: vec![(1.0, 1, y), (1.0, 0, y)] },
-        Entry { field: "z-rot-point", meaning: "line of the tilting axis in Z", terms: vec![(1.0, 0, z)] },
+        Entry { field: "x-rot-point", meaning: "line of C in X", terms: x },
+        Entry { field: "y-rot-point", meaning: "line of C in Y", terms: y },
+        Entry { field: "z-rot-point", meaning: "line of the tilting axis in Z", terms: vec![(1.0, Line::FirstHeight)] },
         offset,
     ]
 }
 
-/// Point A on the first axis in machine coordinates, and the vector from A to point B on the second axis.
+/// Point A on the first axis in machine coordinates, and the vector from A to point B on the second axis. Along the first
+/// axis point A stays where it was: the displacement of the second axis there goes into the vector.
 fn fanuc(first: char) -> Vec<Entry> {
-    let (x, y, z) = (Freedom::ALL[0], Freedom::ALL[1], Freedom::ALL[2]);
-    let point = |freedom: Freedom, along: bool| if along { Vec::new() } else { vec![(1.0, 0, freedom)] };
-    // Along the first axis point A is where it was: what the second axis is displaced there goes into the vector.
-    let vector = |freedom: Freedom, along: bool| {
-        let mut terms = vec![(1.0, 1, freedom)];
-        if along {
-            terms.push((1.0, 0, freedom));
-        }
-        terms
+    let of_first = vec![(1.0, Line::FirstAcross)];
+    let (along, across) = (vec![(1.0, Line::SecondAlong)], vec![(1.0, Line::SecondAcross)]);
+    let [point, vector] = if first == 'A' {
+        [[Vec::new(), of_first], [along, across]]
+    } else {
+        [[of_first, Vec::new()], [across, along]]
     };
+    let ([point_x, point_y], [vector_x, vector_y]) = (point, vector);
+    let point_z = vec![(1.0, Line::FirstHeight)];
     vec![
-        Entry { field: "19700", meaning: "rotary table position, X", terms: point(x, first == 'A') },
-        Entry { field: "19701", meaning: "rotary table position, Y", terms: point(y, first == 'B') },
-        Entry { field: "19702", meaning: "rotary table position, Z", terms: point(z, false) },
-        Entry { field: "19703", meaning: "vector from first to second axis, X", terms: vector(x, first == 'A') },
-        Entry { field: "19704", meaning: "vector from first to second axis, Y", terms: vector(y, first == 'B') },
+        Entry { field: "19700", meaning: "rotary table position, X", terms: point_x },
+        Entry { field: "19701", meaning: "rotary table position, Y", terms: point_y },
+        Entry { field: "19702", meaning: "rotary table position, Z", terms: point_z },
+        Entry { field: "19703", meaning: "vector from first to second axis, X", terms: vector_x },
+        Entry { field: "19704", meaning: "vector from first to second axis, Y", terms: vector_y },
         Entry { field: "19705", meaning: "vector from first to second axis, Z", terms: Vec::new() },
     ]
+}
+
+/// Which entries are written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum EntryChoice {
+    /// Those that make the volumetric error least over the travel.
+    #[default]
+    Best,
+    /// The displacements of the axis lines themselves.
+    Plain,
 }
 
 /// The change of one entry.
@@ -121,6 +166,8 @@ pub struct KinematicParameter {
     pub change_mm: f64,
     /// Standard uncertainty, mm.
     pub u_mm: f64,
+    /// The plain change: that of the axis lines themselves, mm.
+    pub plain_change_mm: f64,
 }
 
 /// The changes of a control's kinematic parameters.
@@ -130,24 +177,38 @@ pub struct KinematicTable {
     pub control: String,
     /// Where its model is documented.
     pub source: String,
+    /// Which entries are written.
+    pub entries: EntryChoice,
     /// The entries.
     pub parameters: Vec<KinematicParameter>,
+    /// The travel of each axis.
+    pub travel: Vec<AxisRange>,
+    /// Whether the travel is that of the readings of the model.
+    pub is_measured_travel: bool,
+    /// The tool point in the tool frame, mm.
+    pub tool_mm: [f64; 3],
+    /// The volumetric error over the travel. A constant vector in the table frame, the zero of the workpiece, is none.
+    pub remaining: Remaining,
+    /// What the control's model does not represent, by error or effect: rms over the travel that the best entries leave
+    /// of each alone, the largest first.
+    pub not_represented: Vec<NotRepresented>,
     /// Entries that the readings do not determine, and identified errors that the entries cannot hold, with the reason.
     pub left_out: Vec<String>,
 }
 
-/// The table of a control.
+/// The table of a control for a travel and a tool point in the tool frame, mm.
 ///
 /// # Errors
-/// If the control's model is not documented, or is not one of this machine.
-pub fn table(model: &IdentifiedModel, word: &str) -> Result<KinematicTable, IdentifyError> {
-    if let Some((_, why)) = NOT_DOCUMENTED.iter().find(|(own, _)| *own == word) {
-        return Err(IdentifyError::Request(format!("no table for `{word}`: {why}; no sign is guessed")));
-    }
-    let Some(control) = KINEMATICS.iter().find(|control| control.word == word) else {
-        let words: Vec<&str> = KINEMATICS.iter().map(|control| control.word).collect();
-        return Err(IdentifyError::Request(format!("no control `{word}`; known are {}", words.join(", "))));
-    };
+/// If the control's model is not documented, or is not one of this machine, or an error of the model cannot be evaluated
+/// over the travel.
+pub fn table(
+    model: &IdentifiedModel,
+    word: &str,
+    choice: EntryChoice,
+    travel: &Travel,
+    tool_mm: [f64; 3],
+) -> Result<KinematicTable, IdentifyError> {
+    let control = control(word)?;
     let (first, second) = tilting_table(&model.machine).ok_or_else(|| {
         IdentifyError::Request(format!(
             "{} describes two rotary axes under the workpiece, a tilting A (along X) or B (along Y) with C (along Z) on it; this \
@@ -156,52 +217,115 @@ pub fn table(model: &IdentifiedModel, word: &str) -> Result<KinematicTable, Iden
             model.machine.code()
         ))
     })?;
-    let axes = [first, second].map(|axis| model.machine.axes[axis].name.clone());
+    let axes = [first, second];
     let letter = if model.machine.axes[first].direction[0].abs() == 1.0 { 'A' } else { 'B' };
-    let name = |axis: usize, freedom: Freedom| {
-        ErrorName { kind: ErrorKind::Location, freedom, axis: axes[axis].clone() }.to_string()
+    let name = |axis: usize, freedom: Freedom| ErrorName {
+        kind: ErrorKind::Location,
+        freedom,
+        axis: model.machine.axes[axes[axis]].name.clone(),
     };
-    let index = |axis: usize, freedom: Freedom| {
-        let own = |id: &str| model.parameters.iter().position(|p| p.role == Role::Error && p.id == id);
-        own(&name(axis, freedom)).filter(|index| model.is_estimated(*index))
+    let index = |name: &ErrorName| {
+        let id = name.to_string();
+        let own = model.parameters.iter().position(|p| p.role == Role::Error && p.id == id);
+        own.filter(|index| model.is_estimated(*index))
     };
-    let mut used: Vec<usize> = Vec::new();
-    let mut parameters = Vec::new();
-    let mut left_out: Vec<String> = Vec::new();
-    for entry in (control.entries)(letter) {
-        let terms: Vec<(f64, usize)> =
-            entry.terms.iter().filter_map(|(share, axis, freedom)| Some((*share, index(*axis, *freedom)?))).collect();
-        if terms.is_empty() && !entry.terms.is_empty() {
-            let names: Vec<String> = entry.terms.iter().map(|(_, axis, freedom)| name(*axis, *freedom)).collect();
-            let names = names.join(" or ");
-            left_out.push(format!("{}: {}: the readings do not determine {names}", entry.field, entry.meaning));
-            continue;
-        }
-        used.extend(terms.iter().map(|(_, parameter)| *parameter));
-        let variance: f64 =
-            terms.iter().map(|(a, i)| terms.iter().map(|(b, j)| a * b * model.covariance[(*i, *j)]).sum::<f64>()).sum();
-        parameters.push(KinematicParameter {
-            field: entry.field.to_string(),
-            meaning: entry.meaning.to_string(),
-            change_mm: terms.iter().fold(0.0, |sum, (share, i)| sum + share * model.parameters[*i].value),
-            u_mm: variance.max(0.0).sqrt(),
-        });
-    }
-    if used.is_empty() {
+    // The errors of each line, and those of them that the readings determine.
+    let names = LINES.map(|line| {
+        line.errors(letter).into_iter().map(|(axis, freedom)| name(axis, freedom)).collect::<Vec<ErrorName>>()
+    });
+    let known = names.each_ref().map(|names| names.iter().filter_map(index).collect::<Vec<usize>>());
+    let free = known.each_ref().map(|known| !known.is_empty());
+    if !free.contains(&true) {
         return Err(IdentifyError::Request(format!(
             "{} has no entry for an error that the readings of the model determine",
             control.about
         )));
     }
+    let slots: Vec<usize> = names.iter().filter_map(|names| model.machine.error_slot(&names[0])).collect();
+    let plain = known.each_ref().map(|known| known.iter().map(|k| model.parameters[*k].value).sum::<f64>());
+    let lines = Lines::of(model, slots, travel, tool_mm)?;
+    let (by_parameter, not_represented) = lines.by_parameter(&free)?;
+    let (written, by_parameter) = match choice {
+        EntryChoice::Best => (lines.best(&plain, &free), by_parameter),
+        EntryChoice::Plain => (plain.to_vec(), plain_by_parameter(&known)),
+    };
+    let remaining = Remaining {
+        without: lines.remaining(&[0.0; LINES.len()]),
+        plain: lines.remaining(&plain),
+        written: lines.remaining(&written),
+    };
+    let mut parameters = Vec::new();
+    let mut left_out: Vec<String> = Vec::new();
+    for entry in (control.entries)(letter) {
+        let mut shares = [0.0; LINES.len()];
+        for (share, line) in &entry.terms {
+            shares[*line as usize] += share;
+        }
+        let used = (0..LINES.len()).filter(|line| shares[*line] != 0.0);
+        if !entry.terms.is_empty() && used.clone().all(|line| !free[line]) {
+            let names: Vec<String> = used.flat_map(|line| &names[line]).map(ToString::to_string).collect();
+            let names = names.join(" or ");
+            left_out.push(format!("{}: {}: the readings do not determine {names}", entry.field, entry.meaning));
+            continue;
+        }
+        let sum = |values: &[f64]| shares.iter().zip(values).map(|(share, value)| share * value).sum::<f64>();
+        let weights: Vec<(usize, f64)> =
+            by_parameter.iter().map(|(parameter, change)| (*parameter, sum(change.as_slice()))).collect();
+        let variance: f64 = weights
+            .iter()
+            .map(|(i, a)| weights.iter().map(|(j, b)| a * b * model.covariance[(*i, *j)]).sum::<f64>())
+            .sum();
+        parameters.push(KinematicParameter {
+            field: entry.field.to_string(),
+            meaning: entry.meaning.to_string(),
+            change_mm: sum(&written),
+            u_mm: variance.max(0.0).sqrt(),
+            plain_change_mm: sum(&plain),
+        });
+    }
+    left_out.extend(no_entry(model, &known));
+    Ok(KinematicTable {
+        control: control.about.to_string(),
+        source: control.source.to_string(),
+        entries: choice,
+        parameters,
+        travel: travel.axes(model),
+        is_measured_travel: travel.is_measured,
+        tool_mm,
+        remaining,
+        not_represented,
+        left_out,
+    })
+}
+
+/// The control of a word.
+fn control(word: &str) -> Result<&'static ControlKinematics, IdentifyError> {
+    if let Some((_, why)) = NOT_DOCUMENTED.iter().find(|(own, _)| *own == word) {
+        return Err(IdentifyError::Request(format!("no table for `{word}`: {why}; no sign is guessed")));
+    }
+    KINEMATICS.iter().find(|control| control.word == word).ok_or_else(|| {
+        let words: Vec<&str> = KINEMATICS.iter().map(|control| control.word).collect();
+        IdentifyError::Request(format!("no control `{word}`; known are {}", words.join(", ")))
+    })
+}
+
+/// The change of the plain displacements by each location error of the lines.
+fn plain_by_parameter(known: &[Vec<usize>; LINES.len()]) -> Vec<(usize, DVector<f64>)> {
+    let of_line = |(line, known): (usize, &Vec<usize>)| {
+        let unit = move |k: usize, _: usize| f64::from(u8::from(k == line));
+        known.iter().map(move |parameter| (*parameter, DVector::from_fn(LINES.len(), unit))).collect::<Vec<_>>()
+    };
+    known.iter().enumerate().flat_map(of_line).collect()
+}
+
+/// The identified errors and the effects that no entry holds by itself.
+fn no_entry(model: &IdentifiedModel, known: &[Vec<usize>; LINES.len()]) -> Vec<String> {
     let errors = model.parameters.iter().enumerate().filter(|(_, parameter)| parameter.role == Role::Error);
-    left_out.extend(
-        errors
-            .filter(|(index, _)| !used.contains(index) && model.is_estimated(*index))
-            .map(|(_, parameter)| format!("{}: the control's model has no entry for it", parameter.id)),
-    );
+    let errors = errors
+        .filter(|(index, _)| !known.iter().flatten().any(|known| known == index) && model.is_estimated(*index))
+        .map(|(_, parameter)| format!("{}: the control's model has no entry for it", parameter.id));
     let effects = model.effects.iter().map(|effect| format!("{}: not a fixed geometry", effect.id()));
-    left_out.extend(effects);
-    Ok(KinematicTable { control: control.about.to_string(), source: control.source.to_string(), parameters, left_out })
+    errors.chain(effects).collect()
 }
 
 /// The tilting axis next to the bed and the axis on it, by index, of a machine with a tilting rotary table.

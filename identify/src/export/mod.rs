@@ -3,14 +3,17 @@
 //! - [`frames`]: the chain at its zero position with location errors;
 //! - [`urdf`]: the calibrated chain as URDF; [`dh`]: Denavit–Hartenberg parameters, modified form of Craig with Hayati's
 //!   angle for parallel axes;
-//! - [`control`]: kinematic parameters of controls, as far as their models are publicly documented.
+//! - [`control`]: kinematic parameters of controls, as far as their models are publicly documented; [`entries`]: those
+//!   that leave the least error over a [`travel`].
 //!
 //! A description of fixed geometry holds location errors only. Effects and constant error motions are listed as left
 //! out.
 
 pub mod control;
 pub mod dh;
+pub mod entries;
 pub mod frames;
+pub mod travel;
 pub mod urdf;
 
 use abbe_model::component::{ErrorKind, ErrorName};
@@ -30,5 +33,7 @@ pub fn left_out(model: &IdentifiedModel) -> Vec<String> {
     left_out
 }
 
+#[cfg(test)]
+mod control_tests;
 #[cfg(test)]
 mod tests;

@@ -8,15 +8,17 @@ use faer::Mat;
 use nalgebra::{Matrix4, Rotation3, Vector3};
 use rand::{Rng, RngExt, SeedableRng};
 
+use super::control::{EntryChoice, KinematicTable};
 use super::dh::{DhTable, FixedPose};
 use super::frames::location_errors;
-use super::{control, dh, urdf};
+use super::travel::Travel;
+use super::{dh, urdf};
 use crate::model_file::{IdentifiedModel, ModelParameter, Provenance, Quality};
 use crate::noise::{Noise, NoiseSource};
 use crate::parameters::Role;
 use crate::unit::Unit;
 
-fn model(machine: Machine, errors: &[(String, f64)]) -> IdentifiedModel {
+pub(super) fn model(machine: Machine, errors: &[(String, f64)]) -> IdentifiedModel {
     let parameters: Vec<ModelParameter> = errors
         .iter()
         .map(|(id, value)| ModelParameter {
@@ -48,12 +50,12 @@ fn model(machine: Machine, errors: &[(String, f64)]) -> IdentifiedModel {
     }
 }
 
-fn robot() -> Machine {
+pub(super) fn robot() -> Machine {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
     abbe_model::files::machine(&folder.join("../sessions/ur10/machine.toml")).unwrap()
 }
 
-fn random_errors(machine: &Machine, random: &mut impl Rng) -> Vec<(String, f64)> {
+pub(super) fn random_errors(machine: &Machine, random: &mut impl Rng) -> Vec<(String, f64)> {
     let mut errors = Vec::new();
     for axis in &machine.axes {
         for (place, freedom) in ["X", "Y", "Z", "A", "B", "C"].into_iter().enumerate() {
@@ -162,84 +164,4 @@ fn a_urdf_gives_the_tool_positions_of_the_model() {
         let off = (metres * 1e3 - of_chain(&model, &q, tool_mm)).norm();
         assert!(off < 1e-6, "{off:e} mm");
     }
-}
-
-/// The position of the tool over the table as `xyzac-trt-kins` computes it from its joints, mm.
-fn linuxcnc(joints: [f64; 3], a: f64, c: f64, rot_point: [f64; 3], y_offset: f64) -> [f64; 3] {
-    let (y, z) = (joints[1] - y_offset - rot_point[1], joints[2] - rot_point[2]);
-    let x = joints[0] - rot_point[0];
-    let (tilted_y, tilted_z) = (a.cos() * y + a.sin() * z + y_offset, -a.sin() * y + a.cos() * z);
-    [
-        c.cos() * x + c.sin() * tilted_y + rot_point[0],
-        -c.sin() * x + c.cos() * tilted_y + rot_point[1],
-        tilted_z + rot_point[2],
-    ]
-}
-
-#[test]
-fn tables_of_controls_give_the_tool_positions_of_the_model() {
-    let errors = [("EY0A", 0.031), ("EZ0A", -0.022), ("EX0C", 0.044), ("EY0C", -0.017)];
-    let errors: Vec<(String, f64)> = errors.iter().map(|(id, value)| (id.to_string(), *value)).collect();
-    let model = model(Machine::from_code("w C A b Y X Z t").unwrap(), &errors);
-    let slots = location_errors(&model);
-    let value = |table: &control::KinematicTable, field: &str| {
-        table.parameters.iter().find(|parameter| parameter.field == field).unwrap().change_mm
-    };
-    let machine = &model.machine;
-    let bodies = machine.body_errors(|slot| slots[slot] != 0.0, |slot| slots[slot]);
-    let table_point = |joints: [f64; 3], a: f64, c: f64| {
-        let q = [c, a, joints[1], joints[0], joints[2]];
-        let state: Vec<AxisPosition<f64>> =
-            machine.axes.iter().zip(q).map(|(axis, q)| AxisPosition::new(axis.kind, q)).collect();
-        let tool = machine.tool_point(&state, &bodies, Point([0.0; 3]));
-        Vector3::from(machine.table_point(&state, &bodies, tool).0)
-    };
-    let of_linuxcnc = control::table(&model, "linuxcnc").unwrap();
-    let rot_point = ["x-rot-point", "y-rot-point", "z-rot-point"].map(|field| value(&of_linuxcnc, field));
-    let y_offset = value(&of_linuxcnc, "y-offset");
-    let of_fanuc = control::table(&model, "fanuc").unwrap();
-    let position = ["19700", "19701", "19702"].map(|field| value(&of_fanuc, field));
-    let vector = ["19703", "19704", "19705"].map(|field| value(&of_fanuc, field));
-    let origin = table_point([0.0; 3], 0.0, 0.0);
-    for (joints, a, c) in
-        [([100.0, -50.0, 30.0], 0.7, 1.9), ([-80.0, 20.0, 150.0], -0.4, -2.5), ([10.0, 120.0, -60.0], 1.3, 0.2)]
-    {
-        let expected = table_point(joints, a, c) - origin;
-        let found = Vector3::from(linuxcnc(joints, a, c, rot_point, y_offset));
-        assert!((found - expected).norm() < 1e-9, "{found} {expected}");
-        // Fanuc: the table turns about the line through A, and what stands on it about the line through B.
-        let (first, second) = (Vector3::from(position), Vector3::from(position) + Vector3::from(vector));
-        let tilt = Rotation3::new(Vector3::x() * a).inverse();
-        let spin = Rotation3::new(Vector3::z() * c).inverse();
-        let tilted = tilt * (Vector3::from(joints) - first) + first;
-        let found = spin * (tilted - second) + second;
-        assert!((found - expected).norm() < 1e-9, "{found} {expected}");
-    }
-    assert!(control::table(&model, "siemens").unwrap_err().to_string().contains("no sign is guessed"));
-    assert!(control::table(&self::model(robot(), &[]), "fanuc").is_err());
-}
-
-/// An entry without an identified error has no change of 0 with an uncertainty of 0: it is not in the table.
-#[test]
-fn entries_that_the_readings_do_not_determine_are_left_out() {
-    let machine = || Machine::from_code("w C A b Y X Z t").unwrap();
-    let errors = [("EX0C", 0.044), ("EY0C", -0.017), ("EZ0A", 0.0), ("EC0C", 1e-4)];
-    let errors: Vec<(String, f64)> = errors.iter().map(|(id, value)| (id.to_string(), *value)).collect();
-    let mut model = model(machine(), &errors);
-    model.parameters[2].held = true;
-    model.covariance[(2, 2)] = 0.0;
-    let table = control::table(&model, "fanuc").unwrap();
-    let fields: Vec<&str> = table.parameters.iter().map(|parameter| parameter.field.as_str()).collect();
-    assert_eq!(fields, ["19700", "19703", "19704", "19705"]);
-    assert!(table.parameters.iter().all(|parameter| parameter.change_mm.is_sign_positive() || parameter.u_mm > 0.0));
-    assert_eq!(
-        table.left_out,
-        [
-            "19701: rotary table position, Y: the readings do not determine EY0A",
-            "19702: rotary table position, Z: the readings do not determine EZ0A",
-            "EC0C: the control's model has no entry for it",
-        ]
-    );
-    let angle = self::model(machine(), &errors[3..]);
-    assert!(control::table(&angle, "fanuc").unwrap_err().to_string().contains("no entry"));
 }
