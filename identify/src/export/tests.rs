@@ -8,10 +8,8 @@ use faer::Mat;
 use nalgebra::{Matrix4, Rotation3, Vector3};
 use rand::{Rng, RngExt, SeedableRng};
 
-use super::control::{EntryChoice, KinematicTable};
 use super::dh::{DhTable, FixedPose};
 use super::frames::location_errors;
-use super::travel::Travel;
 use super::{dh, urdf};
 use crate::model_file::{IdentifiedModel, ModelParameter, Provenance, Quality};
 use crate::noise::{Noise, NoiseSource};
