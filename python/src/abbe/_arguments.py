@@ -9,11 +9,25 @@ from typing import Any
 
 from . import _abbe
 from ._errors import SessionError
-from ._machine import Machine
+from ._machine import Machine, is_code
 
 
-def whole_session(source: str | os.PathLike[str] | Mapping[str, Any]) -> _abbe.Session:
-    """The session of a file, or of its tables."""
+def whole_session(
+    source: Machine | str | os.PathLike[str] | Mapping[str, Any], stated: tuple[object, ...]
+) -> _abbe.Session | None:
+    """The session of a file, or of its tables, which states all that is ``stated`` elsewhere; ``None`` of a machine."""
+    if not isinstance(source, (Machine, str, os.PathLike, Mapping)):
+        raise TypeError(
+            f"a session begins with a Machine, a structural code or the path of a session file, not with "
+            f"{type(source).__name__}: Session(Machine(...), \"ballbar\") or Session(\"session.toml\")"
+        )
+    if isinstance(source, Machine) or is_code(source) or isinstance(source, Mapping) and "machine" not in source:
+        return None
+    if any(argument is not None for argument in stated):
+        raise TypeError(
+            "a session file states instrument, noise, errors, constants and notes itself: "
+            "Session(path) without them, or Session(Machine(path), ...) for the path of a machine file"
+        )
     if not isinstance(source, Mapping):
         return _abbe.Session.read(source)
     head = {key: value for key, value in source.items() if key not in ("machine", "test", "effect", "socket_distance")}

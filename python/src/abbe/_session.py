@@ -14,7 +14,7 @@ from . import _abbe
 from ._arguments import quantity, texts, whole_session
 from ._equation import Equation
 from ._fit import Fit
-from ._machine import Machine, is_code
+from ._machine import Machine
 from ._plan import Plan
 from ._predicting import Predicting
 from ._trace import Trace
@@ -69,21 +69,10 @@ class Session(Predicting):
         constants: Mapping[str, float] | None = None,
         about: Mapping[str, str] | None = None,
     ) -> None:
-        is_path = isinstance(machine, (str, os.PathLike)) and not is_code(machine)
-        if not isinstance(machine, Machine) and (is_path or isinstance(machine, Mapping) and "machine" in machine):
-            keys = (instrument, noise_um, resolution_um, errors, constants, about)
-            if any(key is not None for key in keys):
-                raise TypeError(
-                    "a session file states instrument, noise, errors, constants and notes itself: "
-                    "Session(path) without them, or Session(Machine(path), ...) for the path of a machine file"
-                )
-            self._handle = whole_session(machine)
+        known = whole_session(machine, (instrument, noise_um, resolution_um, errors, constants, about))
+        if known is not None:
+            self._handle = known
             return
-        if not isinstance(machine, (Machine, str, Mapping)):
-            raise TypeError(
-                f"a session begins with a Machine, a structural code or the path of a session file, not with "
-                f"{type(machine).__name__}: Session(Machine(...), \"ballbar\") or Session(\"session.toml\")"
-            )
         instrument = "ballbar" if instrument is None else instrument
         stated = {"kind": instrument, "noise_um": noise_um, "resolution_um": resolution_um}
         head: dict[str, Any] = {"instrument": {key: value for key, value in stated.items() if value is not None}}
