@@ -18,7 +18,7 @@ def session():
 
 def test_the_jacobian_is_the_derivative(session):
     fit = session.fit()
-    at = fit.estimates
+    at = fit.solution
     jacobian = session.jacobian(fit)
     assert jacobian.shape == (session.observed.size, len(session.parameters))
     for column in range(at.size):
@@ -49,8 +49,8 @@ def test_least_squares_ends_at_the_estimates(session):
 
     tight = {"xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15}
     found = least_squares(residuals, np.zeros(prior_u.size), jacobian, method="trf", x_scale="jac", **tight)
-    scale = np.maximum(np.abs(fit.estimates), np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac))))
-    assert np.max(np.abs(found.x - fit.estimates) / scale) < 1e-9
+    scale = np.maximum(np.abs(fit.solution), np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac))))
+    assert np.max(np.abs(found.x - fit.solution) / scale) < 1e-9
 
 
 def test_a_mapping_states_some_parameters(session):

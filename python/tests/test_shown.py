@@ -31,6 +31,44 @@ def test_tables(results):
     assert len(rows) == sum(results[0].residuals[test].shape[0] for test in results[0].residuals)
 
 
+def test_estimates_agree_with_the_refusals():
+    c_deg = np.arange(0.0, 360.0, 10.0)
+    c = np.radians(c_deg)
+    # A circle of one height cannot tell a tilt of the axis from its offset.
+    session = abbe.Session("w C A b Y X Z t", noise_um=0.1, errors=["EX0C", "EY0C", "EB0C"])
+    bar = {"bar_mm": 125, "workpiece_ball_mm": (0, 100, 0), "spindle_ball_mm": (0, 0, 0), "z_mm": 75}
+    length_mm = np.hypot(np.hypot(0.012 - 100 * np.sin(c), 100 * np.cos(c)), 75.0)
+    session.add_test("C", **bar, c_deg=c_deg, length_mm=length_mm)
+    fit = session.fit()
+    ids = [parameter.id for parameter in session.parameters]
+    refused = [id for id, estimate in zip(ids, fit.estimates) if np.isnan(estimate)]
+    assert "EX0C" in refused and "EY0C" not in refused and np.isfinite(fit.solution).all()
+    for id, estimate in zip(ids, fit.estimates):
+        if id in refused:
+            with pytest.raises(KeyError, match="no estimate of"):
+                fit[id]
+        else:
+            assert fit[id].value == pytest.approx(estimate, rel=1e-9, abs=1e-9)
+    # Predictions need the whole of it.
+    assert session.predict(fit) == pytest.approx(length_mm, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    "guess, ours",
+    [
+        ("params", "use parameters"),
+        ("summary", r"use print\(result\)"),
+        ("chi2", "use chi_square"),
+        ("to_pandas", r"use table\.to_pandas\(\)"),
+        ("uncertainties", "no attribute 'uncertainties'"),
+    ],
+)
+def test_guesses_lead_on(results, guess, ours):
+    with pytest.raises(AttributeError, match=ours):
+        getattr(results[0], guess)
+    assert not hasattr(results[0], guess)
+
+
 def test_figures(results):
     matplotlib = pytest.importorskip("matplotlib")
     matplotlib.use("agg")

@@ -81,7 +81,17 @@ class Fit(Shown, FitResult):
     def estimates(self) -> NDArray[np.float64]:
         """Estimates of all parameters of the session in the order of ``Session.parameters``, each in its unit.
 
-        The part of a parameter in a null-space direction is its nominal value.
+        NaN where a parameter is not identifiable: it has no estimate of its own, and ``fit["EY0C"]`` refuses it.
+        """
+        known = set(self.identifiable)
+        own = np.array([parameter.id in known for parameter in self._session.parameters])
+        return np.where(own, self.solution, np.nan)
+
+    @property
+    def solution(self) -> NDArray[np.float64]:
+        """The parameters with which the model predicts the readings, in the order of ``Session.parameters``.
+
+        The part of a parameter in a null-space direction is its nominal value: predictions do not depend on it.
         """
         return self._handle.estimates()
 
@@ -108,6 +118,9 @@ class Fit(Shown, FitResult):
 
     def _figures(self) -> list[_abbe.Figure]:
         return self._handle.figures()
+
+    def _shown(self) -> tuple[str, str]:
+        return self._handle.shown()
 
     def _page(self) -> str:
         return self._handle.page()

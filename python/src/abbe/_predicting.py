@@ -84,7 +84,7 @@ class Predicting:
 
     def _values(self, parameters: Fit | Mapping[str, float] | ArrayLike | None) -> NDArray[np.float64]:
         if isinstance(parameters, Fit):
-            return parameters.estimates
+            return parameters.solution
         if parameters is None:
             parameters = {}
         if isinstance(parameters, Mapping):

@@ -3,15 +3,41 @@
 from __future__ import annotations
 
 import copy
+import difflib
 import keyword
+import re
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 _HEAD = ("schema_version", "tool_version", "command", "session", "inputs", "seed", "options")
 """The keys of a document before its result."""
+
+_OURS = {
+    "chi2": "chi_square",
+    "chisq": "chi_square",
+    "chisqr": "chi_square",
+    "cov": "covariance",
+    "dof": "degrees_of_freedom",
+    "nfree": "degrees_of_freedom",
+    "params": "parameters",
+    "popt": "parameters",
+    "pcov": "covariance",
+    "resid": "residuals",
+    "rms": "rms_um",
+    "std": "u",
+    "stderr": "u",
+    "summary": "print(result)",
+    "to_csv": "table.to_csv()",
+    "to_dataframe": "table.to_pandas()",
+    "to_html": "report(path)",
+    "to_json": "to_dict",
+    "to_pandas": "table.to_pandas()",
+    "uncertainty": "u",
+}
+"""What other packages call it, and what it is called here."""
 
 
 class Record:
@@ -42,6 +68,19 @@ class Record:
             self.__dict__[name] = value
         else:
             raise AttributeError(f"`{name}` cannot be set: results do not change")
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            message = f"{type(self).__name__!r} has no attribute {name!r}"
+            if not name.startswith("_"):
+                own = [known for known in dir(self) if not known.startswith("_")]
+                ours = _OURS.get(name, "")
+                if re.split(r"[.(]", ours)[0] in [*own, "print"]:
+                    message += f"; use {ours}"
+                elif alike := difflib.get_close_matches(name, own, 3):
+                    message += f"; alike: {', '.join(alike)}"
+            raise AttributeError(message)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object as a dict.
