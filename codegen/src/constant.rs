@@ -109,7 +109,7 @@ mod tests {
         assert_eq!(exact(2.0 / 3.0), is("2/3", 1));
         assert_eq!(exact(0.0), is("0", 1));
         // Typed with nine digits it is that number, and not the root.
-        assert_eq!(exact(0.707106781), is("707106781/1000000000", 1));
+        assert_eq!(exact(0.866025403), is("866025403/1000000000", 1));
     }
 
     /// None of many drawn numbers is taken for another one.

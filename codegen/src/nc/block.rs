@@ -16,13 +16,13 @@ pub(super) fn turns(from: &Positions, to: &Positions) -> bool {
 }
 
 /// The position of an axis before a motion, if it is known.
-pub(super) fn before(from: &[(char, f64)], letter: char) -> Option<f64> {
+pub(super) fn before(from: &Positions, letter: char) -> Option<f64> {
     from.iter().find(|(own, _)| *own == letter).map(|(_, q)| *q)
 }
 
 /// The change of an axis between positions of so many decimals, so that the changes of a program add up to its
 /// positions; the position itself if the one before is not known.
-pub(super) fn change(from: &[(char, f64)], (letter, to): (char, f64), decimals: usize) -> f64 {
+pub(super) fn change(from: &Positions, (letter, to): (char, f64), decimals: usize) -> f64 {
     let unit = 10_f64.powi(-(decimals as i32));
     let steps = |q: f64| (q / unit).round();
     before(from, letter).map_or(to, |before| (steps(to) - steps(before)) * unit)
