@@ -1,12 +1,13 @@
-"""Tests mutants of `model` and `identify`, many in one build.
+"""Tests mutants of `model`, `identify` and `codegen`, many in one build.
 
 cargo-mutants builds the workspace for each mutant, which takes longer than the tests. This script takes its list of mutants and writes a systematic
 sample into a copy of the workspace, each behind a condition (`if crate::mutant(17) { changed body } else { body }`). It builds the copy once and selects
-each mutant by ABBE_MUTANT. Tests run in stages until one fails, the cheapest first and examples of the documentation last. The order of the mutants is
-random, so that an interrupted run is a random sample too. Mutants with a result in the output file are not tested again.
+each mutant by ABBE_MUTANT. Tests run in stages until one fails, the cheapest first, then examples of the documentation, and kept answers last: what only
+they catch is reported apart, since a kept answer shows that a figure changed, not that it is wrong. The order of the mutants is random, so that an
+interrupted run is a random sample too. Mutants with a result in the output file are not tested again. The last lines are the rates by package.
 
     git worktree add ../mutants
-    python tests/mutants.py --sample abbe-identify=86 --sample abbe-model=45 --copy ../mutants --out mutants.jsonl
+    python tests/mutants.py --sample abbe-identify=200 --sample abbe-model=120 --sample abbe-codegen=80 --seed 2 --copy ../mutants --out mutants.jsonl
 """
 
 import argparse
@@ -29,8 +30,9 @@ pub fn mutant(number: usize) -> bool {
 }
 """
 
-# Tests of the workspace, of compiler products or of the operating system, not of the computations of the two crates.
-EXCLUDED_TESTS = ("supply_chain", "kill::", "another_build", "report_browser", "repeatability", "codes::")
+# Tests of the workspace or of the operating system, not of the computations of the crates.
+EXCLUDED_TESTS = ("supply_chain", "early_returns", "kill::", "another_build", "report_browser", "repeatability", "codes::")
+KEPT = "::kept::"
 PROFILE = ["--profile", "checked"]
 
 
@@ -117,12 +119,12 @@ def exclude_mutants_that_do_not_build(copy, originals, mutants, packages):
 
 
 # Folders whose tests cover a package, its own first.
-TESTED_BY = {"abbe-model": ("model", "codegen", "identify", "."), "abbe-identify": ("identify", ".")}
+TESTED_BY = {"abbe-model": ("model", "codegen", "identify", "."), "abbe-identify": ("identify", "."), "abbe-codegen": ("codegen", ".")}
 
 
-def binaries(copy):
-    """The test programs, each with the working folder of its tests."""
-    run = subprocess.run(["cargo", "test", "--workspace", "--no-run", "--message-format=json", *PROFILE], cwd=copy, stdout=subprocess.PIPE, text=True, check=True)
+def binaries(copy, asked):
+    """The test programs of packages, each with the working folder of its tests."""
+    run = subprocess.run(["cargo", "test", *asked, "--no-run", "--message-format=json", *PROFILE], cwd=copy, stdout=subprocess.PIPE, text=True, check=True)
     found = []
     for line in run.stdout.splitlines():
         message = json.loads(line)
@@ -170,9 +172,9 @@ def timed_tests(programs, slowest_s):
     return sorted(test for test in timed if test[0] <= slowest_s)
 
 
-def stages_of(timed, folders):
-    """Stages of growing cost of the tests in these folders, in their order: (program, folder, names, seconds)."""
-    timed = [test for test in timed if test[2] in folders]
+def stages_of(timed, folders, kept):
+    """Stages of growing cost of the tests in these folders, in their order: (program, folder, names, seconds). Either of kept answers or of all others."""
+    timed = [test for test in timed if test[2] in folders and (KEPT in test[3]) == kept]
     programs = sorted({test[1:3] for test in timed}, key=lambda program: folders.index(program[1]))
     stages, bound = [], 0.5
     while timed:
@@ -194,10 +196,38 @@ def listed(copy, asked, only):
     return found[int(first or 0)::int(every)]
 
 
+def first_failing(stages, mutant):
+    """Verdict of the first stage that fails, and the tests that fail in it."""
+    for program, folder, names, seconds in stages:
+        status, printed = run_tests(program, folder, names, mutant["number"], 60 + 10 * seconds)
+        if status:
+            return ["", "caught", "out of time"][status], " ".join(re.findall(r"^test (\S+) \.\.\. FAILED", printed, re.M)[:3])
+    return "missed", ""
+
+
+def rates(results):
+    """Lines with the share of caught mutants by package and of all, with and without the kept answers. A mutant that runs out of time is caught."""
+    packages = sorted({result["package"] for result in results})
+    for package in [*packages, "all"]:
+        mine = [result for result in results if package in (result["package"], "all")]
+        caught = [result for result in mine if result["verdict"] != "missed"]
+        without = [result for result in caught if not result["kept_only"]]
+        share = [f"{len(part)} of {len(mine)} = {100 * len(part) / len(mine):.0f} ± {100 * error(len(part), len(mine)):.0f} %" for part in (caught, without)]
+        yield f"{package}: caught {share[0]}; without the kept answers {share[1]}"
+
+
+def error(hits, count):
+    """Standard error of a share, from a uniform prior: never zero."""
+    share = (hits + 1) / (count + 2)
+    return (share * (1 - share) / (count + 3)) ** 0.5
+
+
 def main():
     ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     ask.add_argument("--sample", required=True, action="append", metavar="PACKAGE=N[+FIRST]", help="one mutant of N of a package; may be repeated")
     ask.add_argument("--only", help="only mutants whose names match this regular expression")
+    ask.add_argument("--own", action="store_true", help="only the tests of the package itself: quick, and a lower bound of what is caught")
+    ask.add_argument("--seed", type=int, default=1, help="of the order of the mutants")
     ask.add_argument("--slowest", type=float, default=32.0, help="tests that take longer are excluded, s")
     ask.add_argument("--copy", type=pathlib.Path, required=True, help="a copy of the workspace, which is overwritten")
     ask.add_argument("--out", type=pathlib.Path, required=True, help="results, one line of JSON per mutant")
@@ -218,26 +248,31 @@ def main():
             library.write_text(text + SWITCH)
         kept, unviable = exclude_mutants_that_do_not_build(copy, originals, list(sample), packages)
         print(f"{len(sample)} mutants, {len(unviable)} do not build", flush=True)
-        random.Random(1).shuffle(kept)
-        timed = timed_tests(binaries(copy), given.slowest)
-        stages = {package: stages_of(timed, [str((copy / folder).resolve()) for folder in TESTED_BY[package]]) for package in packages}
+        random.Random(given.seed).shuffle(kept)
+        asked = [word for package in packages for word in ("-p", package)] if given.own else ["--workspace"]
+        timed = timed_tests(binaries(copy, asked), given.slowest)
+        tested_by = {package: TESTED_BY[package][:1] if given.own else TESTED_BY[package] for package in packages}
+        folders = {package: [str((copy / folder).resolve()) for folder in tested_by[package]] for package in packages}
+        stages = {package: [stages_of(timed, folders[package], kept_answers) for kept_answers in (False, True)] for package in packages}
         for package in packages:
-            print(f"{package}: tests of {sum(stage[3] for stage in stages[package]):.0f} s in {len(stages[package])} stages", flush=True)
+            both = sum(stages[package], [])
+            print(f"{package}: tests of {sum(stage[3] for stage in both):.0f} s in {len(both)} stages", flush=True)
         tried = {json.loads(line)["name"] for line in given.out.read_text().splitlines()} if given.out.exists() else set()
         with given.out.open("a") as out:
             for mutant in (m for m in kept if m["name"] not in tried):
-                begin, verdict, by = time.time(), "missed", ""
-                for program, folder, names, seconds in stages[mutant["package"]]:
-                    status, printed = run_tests(program, folder, names, mutant["number"], 60 + 10 * seconds)
-                    if status:
-                        verdict = ["", "caught", "out of time"][status]
-                        by = " ".join(re.findall(r"^test (\S+) \.\.\. FAILED", printed, re.M)[:3])
-                        break
+                begin = time.time()
+                others, kept_answers = stages[mutant["package"]]
+                verdict, by = first_failing(others, mutant)
                 if verdict == "missed" and examples_fail(copy, mutant["package"], mutant["number"]):
                     verdict, by = "caught", "an example of the documentation"
-                result = {"name": mutant["name"], "verdict": verdict, "by": by, "seconds": round(time.time() - begin, 1)}
+                kept_only = verdict == "missed"
+                if kept_only:
+                    verdict, by = first_failing(kept_answers, mutant)
+                result = {"name": mutant["name"], "package": mutant["package"], "verdict": verdict, "by": by, "kept_only": kept_only and verdict != "missed"}
+                result["seconds"] = round(time.time() - begin, 1)
                 print(json.dumps(result), file=out, flush=True)
                 print(f"{verdict:12} {mutant['name']}", flush=True)
+        print(*rates([json.loads(line) for line in given.out.read_text().splitlines()]), sep="\n")
     finally:
         for file, text in (plain | {copy / file: text for file, text in originals.items()}).items():
             file.write_text(text)

@@ -138,3 +138,49 @@ pub fn tolerance(u: f64) -> f64 {
     // Dividing by a whole power of ten keeps decimals exact.
     if power < 0 { 0.5 / 10.0_f64.powi(-power) } else { 0.5 * 10.0_f64.powi(power) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FACTOR: f64 = 1.959_964;
+
+    /// The verdict on a parameter of 10 ± 2 whose drawn interval is wider by `off` at each end, after `runs` draws.
+    fn verdict(off: f64, runs: u64) -> DrawnParameter {
+        let reach = FACTOR * 2.0 + off;
+        let drawn = Distribution {
+            mean: 10.0,
+            u: 2.0,
+            shortest: [10.0 - reach, 10.0 + reach],
+            symmetric: [10.0 - reach, 10.0 + reach],
+            from: 0.0,
+            to: 20.0,
+            counts: Vec::new(),
+            outside: [0; 3],
+        };
+        compared("EX0C", 10.0, 2.0, "um", &drawn, &MonteCarlo { runs, seed: 1, coverage: 0.95 })
+    }
+
+    /// The tolerance of u = 2 is 0.5. After a million draws the ends of an interval are known to 0.005, after a hundred to
+    /// 0.5: two such uncertainties decide.
+    #[test]
+    fn the_verdict_allows_for_the_uncertainty_of_the_draws() {
+        let known = verdict(0.0, 1_000_000);
+        assert!((known.gum_interval.low - (10.0 - FACTOR * 2.0)).abs() < 1e-5, "{known:?}");
+        assert!((known.gum_interval.high - (10.0 + FACTOR * 2.0)).abs() < 1e-5, "{known:?}");
+        assert_eq!((known.id.as_str(), known.unit.as_str(), known.value), ("EX0C", "um", 10.0));
+        for (off, runs, wanted) in [
+            (0.0, 1_000_000, Verdict::Agree),
+            (0.499, 1_000_000, Verdict::Agree),
+            (0.503, 1_000_000, Verdict::Undecided),
+            (0.52, 1_000_000, Verdict::Differ),
+            (-0.52, 1_000_000, Verdict::Differ),
+            (0.0, 100, Verdict::Undecided),
+            (1.2, 100, Verdict::Undecided),
+            (2.0, 100, Verdict::Differ),
+        ] {
+            let found = verdict(off, runs);
+            assert_eq!(found.verdict, wanted, "{off} after {runs}: {found:?}");
+        }
+    }
+}

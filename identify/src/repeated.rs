@@ -262,3 +262,37 @@ fn deviating_from_others(values: &[(f64, f64)], significance: f64) -> Vec<(usize
     }
     found
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIGNIFICANCE: f64 = 0.01;
+
+    /// Two values of ten deviate. After the larger one is removed, the other one is compared with the eight that agree.
+    #[test]
+    fn deviating_values_are_found_one_after_another() {
+        let values = [0.5, 40.0, -0.5, 0.5, -30.0, -0.5, 0.5, -0.5, 0.5, -0.5].map(|x| (x, 1.0));
+        let found = deviating_from_others(&values, SIGNIFICANCE);
+        assert_eq!(found.iter().map(|(k, ..)| *k).collect::<Vec<_>>(), [1, 4], "{found:?}");
+        // The mean of the others is −30/9, then 0; its uncertainty 1/√9, then 1/√8.
+        let expected = [(40.0 + 30.0 / 9.0, (1.0 + 1.0 / 9.0_f64).sqrt()), (-30.0, (1.0 + 1.0 / 8.0_f64).sqrt())];
+        for ((_, by, u, p_value), (by_wanted, u_wanted)) in found.iter().zip(expected) {
+            assert!((by - by_wanted).abs() < 1e-12 && (u - u_wanted).abs() < 1e-12, "{found:?}");
+            assert!(*p_value < 1e-50, "{found:?}");
+        }
+    }
+
+    /// One value of three beyond 2.576 of its standard uncertainty is significant at 1 %, one below is not. Of two values
+    /// neither is the wrong one, and without uncertainties there is no probability.
+    #[test]
+    fn a_value_deviates_beyond_its_quantile_only() {
+        let u = 1.5_f64.sqrt();
+        for (factor, count) in [(2.57, 0), (2.59, 1), (-2.57, 0), (-2.59, 1)] {
+            let found = deviating_from_others(&[(0.0, 1.0), (factor * u, 1.0), (0.0, 1.0)], SIGNIFICANCE);
+            assert_eq!(found.len(), count, "{factor}: {found:?}");
+        }
+        assert!(deviating_from_others(&[(0.0, 1.0), (100.0, 1.0)], SIGNIFICANCE).is_empty());
+        assert!(deviating_from_others(&[(0.0, 0.0), (0.0, 0.0), (0.0, 0.0)], SIGNIFICANCE).is_empty());
+    }
+}

@@ -119,3 +119,54 @@ pub(super) fn norm(a: [f64; 3]) -> f64 {
 fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     norm(std::array::from_fn(|i| a[i] - b[i]))
 }
+
+#[cfg(test)]
+mod tests {
+    use abbe_model::chain::Machine;
+    use abbe_model::instrument::InstrumentKind;
+
+    use super::*;
+
+    /// New balls lie at the radius from the axis and at the height along it: above the table only about the axis that
+    /// carries it, at both sides otherwise, and once where the height is zero.
+    #[test]
+    fn new_balls_lie_at_the_radii_and_heights() {
+        let mut machine = Machine::from_code("w C A b Y X Z t").unwrap();
+        machine.axes[0].origin_mm = [10.0, 20.0, 30.0];
+        machine.axes[1].origin_mm = [0.0, 5.0, -40.0];
+        let session = Session::new(machine, InstrumentKind::BallBar);
+        let variations =
+            TestVariations { radii_mm: vec![60.0, 90.0], heights_mm: vec![0.0, 25.0], ..TestVariations::default() };
+        let balls_about = |about: usize| -> Vec<[f64; 2]> {
+            let axis = &session.machine.axes[about];
+            let found = ball_positions(&session, &variations, &[about], true);
+            let along_and_off = found.iter().map(|position| {
+                assert!(position.new && position.setup.is_empty());
+                let from: [f64; 3] = std::array::from_fn(|i| position.ball[i] - axis.origin_mm[i]);
+                let along: f64 = (0..3).map(|i| from[i] * axis.direction[i]).sum();
+                [along, (from.iter().map(|x| x * x).sum::<f64>() - along * along).sqrt()]
+            });
+            along_and_off.collect()
+        };
+        let near = |found: Vec<[f64; 2]>, wanted: &[[f64; 2]]| {
+            assert_eq!(found.len(), wanted.len(), "{found:?}");
+            for (found, wanted) in found.iter().zip(wanted) {
+                assert!((0..2).all(|i| (found[i] - wanted[i]).abs() < 1e-9), "{found:?} {wanted:?}");
+            }
+        };
+        near(balls_about(0), &[[0.0, 60.0], [25.0, 60.0], [0.0, 90.0], [25.0, 90.0]]);
+        let both = [[0.0, 60.0], [25.0, 60.0], [-25.0, 60.0], [0.0, 90.0], [25.0, 90.0], [-25.0, 90.0]];
+        near(balls_about(1), &both);
+        // Axes of the other side carry no ball of the table.
+        assert!(ball_positions(&session, &variations, &[0, 1], false).is_empty());
+    }
+
+    #[test]
+    fn across_is_a_unit_vector_across() {
+        for direction in [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.6, 0.8], [0.48, 0.6, 0.64]] {
+            let found = across(direction);
+            let dot: f64 = (0..3).map(|i| found[i] * direction[i]).sum();
+            assert!(dot.abs() < 1e-12 && (norm(found) - 1.0).abs() < 1e-12, "{direction:?}: {found:?}");
+        }
+    }
+}

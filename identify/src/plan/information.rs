@@ -140,3 +140,59 @@ pub fn sum(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Root {
         Mat::from_fn(a.nrows() + b.nrows(), k, |i, j| if i < a.nrows() { a[(i, j)] } else { b[(i - a.nrows(), j)] });
     upper(stacked)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use abbe_model::files::{self, ReadOptions};
+    use faer::linalg::solvers::Solve;
+
+    use super::*;
+    use crate::noise::{Noise, NoiseSource};
+    use crate::parameters::Role;
+    use crate::plan::states;
+
+    /// The information on the errors of the machine is the Schur complement of that on the set-up, whose priors are those
+    /// of the session: `A − B (C + diag(u⁻²))⁻¹ Bᵀ`.
+    #[test]
+    fn a_test_informs_within_the_priors_of_its_set_up() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/chapter5.toml");
+        let mut session = files::session(&file, &ReadOptions::default()).unwrap();
+        session.tests.truncate(1);
+        let plan = states::complete(&session, true).unwrap();
+        let problem = states::problem_by_test(&plan, Noise::white(3e-4, NoiseSource::Stated)).unwrap();
+        let list = &problem.parameters.list;
+        let linear = Linearisation::of(&problem, &vec![0.0; list.len()]).unwrap();
+        let (shared, own): (Vec<usize>, Vec<usize>) = (0..list.len()).partition(|j| list[*j].role == Role::Error);
+        let gaussian =
+            |j: &&usize| matches!(list[**j].prior, Prior::Gaussian(u) if (u / list[**j].size - 1.0).abs() > 0.5);
+        assert!(own.iter().filter(gaussian).count() >= 3, "priors that differ from the physical sizes");
+        let shared_parameters = SharedParameters::of(&problem, &[], &shared);
+        let r = linear.readings.r();
+        let root = shared_parameters.root_of_test(&problem, r.as_ref(), str::to_string);
+
+        let whole = r.transpose() * &r;
+        let part = |rows: &[usize], columns: &[usize]| {
+            Mat::from_fn(rows.len(), columns.len(), |i, j| whole[(rows[i], columns[j])])
+        };
+        let mut of_own = part(&own, &own);
+        for (k, j) in own.iter().enumerate() {
+            let u = if let Prior::Gaussian(u) = list[*j].prior { u } else { list[*j].size };
+            of_own[(k, k)] += 1.0 / (u * u);
+        }
+        let cross = part(&shared, &own);
+        let before = part(&shared, &shared);
+        let wanted = &before - &cross * of_own.partial_piv_lu().solve(cross.transpose());
+        let found = root.transpose() * &root;
+        for (i, j) in (0..shared.len()).flat_map(|i| (0..shared.len()).map(move |j| (i, j))) {
+            let scale = (before[(i, i)] * before[(j, j)]).sqrt().max(1.0);
+            assert!(
+                (found[(i, j)] - wanted[(i, j)]).abs() < 1e-10 * scale,
+                "{i} {j}: {} {}",
+                found[(i, j)],
+                wanted[(i, j)]
+            );
+        }
+    }
+}

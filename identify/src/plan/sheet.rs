@@ -232,3 +232,28 @@ fn poses(machine: &Machine, readings: &Readings) -> Vec<Vec<f64>> {
     };
     (0..readings.rows()).map(|row| (0..machine.axes.len()).map(|axis| display(axis, row)).collect()).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use abbe_model::files::{self, ReadOptions};
+
+    use super::uncertainty_mm;
+
+    #[test]
+    fn balls_have_the_uncertainty_that_the_session_states() {
+        let of = |name: &str| {
+            let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions").join(name);
+            files::session(&file, &ReadOptions::default()).unwrap().tests.remove(0)
+        };
+        // `workpiece_ball_u_um = [2, 2, 2]`, `spindle_ball_u_um = [1, 1, 1]`.
+        let test = of("hermle-c600u/chapter5.toml");
+        for (first, wanted) in [(0, 2e-3), (3, 1e-3)] {
+            let found = uncertainty_mm(&test, first).unwrap();
+            assert!(found.iter().all(|u| (u - wanted).abs() < 1e-15), "{found:?}");
+        }
+        assert!(uncertainty_mm(&test, test.priors.len() - 2).is_none());
+        assert!(uncertainty_mm(&of("r-test/plan.toml"), 0).is_none());
+    }
+}

@@ -174,3 +174,22 @@ pub(super) fn states_of(machine: &Machine, poses: &[&[f64]], coordinates: usize)
         ..Readings::default()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::shortened;
+
+    /// A line of 13 mm along (3, 4, 12).
+    #[test]
+    fn a_line_is_shortened_at_its_end() {
+        let (from, to) = ([1.0, 2.0, 3.0], [4.0, 6.0, 15.0]);
+        let found = shortened(from, to, 6.5);
+        let middle = [2.5, 4.0, 9.0];
+        assert!((0..3).all(|i| (found[i] - middle[i]).abs() < 1e-12), "{found:?}");
+        assert_eq!(shortened(from, to, 0.0), to);
+        for by in [13.0, 20.0] {
+            assert_eq!(shortened(from, to, by), from);
+        }
+        assert_eq!(shortened(from, from, 0.0), from);
+    }
+}

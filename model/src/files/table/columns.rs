@@ -286,3 +286,17 @@ fn name_in(name: &str, request: &Request<'_>, file: &Path, header: Option<&Row>)
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::listed;
+
+    #[test]
+    fn a_list_of_names_ends_after_forty() {
+        let names: Vec<String> = (0..42).map(|k| format!("n{k}")).collect();
+        assert!(listed(&names[..40]).ends_with("n38, n39"));
+        for count in [41, 42] {
+            assert!(listed(&names[..count]).ends_with("n38, n39, …"));
+        }
+    }
+}

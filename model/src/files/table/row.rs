@@ -57,3 +57,35 @@ impl Row {
         Some(start..start + cell.len())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(text: &str, bytes: Range<usize>) -> Row {
+        let cells = text.split(',').map(|cell| cell.trim().to_string()).collect();
+        Row::of_line(Line { number: 3, text: text.to_string(), bytes, encoding: None }, cells)
+    }
+
+    /// A message points at the cell; at the whole line if the text of the cell occurs twice, or another encoding has moved
+    /// it; nowhere if there is no cell.
+    #[test]
+    fn the_bytes_of_a_cell_are_its_place_in_the_file() {
+        let plain = row("1, 90.5,abc", 20..31);
+        assert_eq!(plain.span(0), Some(20..21));
+        assert_eq!(plain.span(1), Some(23..27));
+        assert_eq!(plain.span(2), Some(28..31));
+        assert_eq!(plain.span(3), None);
+        assert_eq!(row("1,10", 20..24).span(0), Some(20..24));
+        assert_eq!(row("1,,3", 20..24).span(1), None);
+        assert_eq!(row("1,abc", 20..30).span(1), Some(20..30));
+        assert_eq!(Row::of_cells(1, vec!["7".into()]).span(0), None);
+    }
+
+    #[test]
+    fn a_cell_is_named_by_its_column_or_its_key() {
+        let plain = row("1,2", 0..3);
+        assert_eq!(plain.place(1, "c_deg"), "column 2 (`c_deg`)");
+        assert_eq!(plain.with_keys().place(1, "c_deg"), "key `c_deg`");
+    }
+}
