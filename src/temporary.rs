@@ -169,14 +169,17 @@ pub fn remove_stale(folder: &Path) {
         match entry.file_type() {
             Ok(kind) if kind.is_file() && rest.ends_with(SUFFIX) => remove_unlocked(&entry.path(), &entry.path()),
             // The names of the crate `tempfile` have six letters and digits.
-            Ok(kind) if kind.is_dir() && rest.len() == 6 => {
-                // A folder without its lock is empty: it has just been made, or the process ended then.
-                if std::fs::remove_dir(entry.path()).is_err() {
-                    remove_unlocked(&entry.path().join(LOCK), &entry.path());
-                }
-            }
+            Ok(kind) if kind.is_dir() && rest.len() == 6 => remove_folder(&entry.path()),
             _ => {}
         }
+    }
+}
+
+/// Removes a temporary folder if its lock is free. One without its lock is empty: it has just been made, or the process
+/// ended then.
+fn remove_folder(path: &Path) {
+    if std::fs::remove_dir(path).is_err() {
+        remove_unlocked(&path.join(LOCK), path);
     }
 }
 
