@@ -159,7 +159,7 @@ impl EquationArguments {
     /// The test with its symbols.
     fn source<'s>(&self, session: &'s Session, test: &'s Test) -> Result<SessionTest<'s>, Failure> {
         let source = SessionTest::new(session, test)?;
-        let symbols = match self.symbols.as_deref() {
+        let symbols: &[String] = match self.symbols.as_deref() {
             None if self.form.language.keeps_symbols() => return Ok(source),
             None => &[],
             Some([none]) if none == "none" => &[],
