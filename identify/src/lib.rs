@@ -85,6 +85,7 @@ pub mod separating_tests;
 pub mod series;
 pub mod simulate;
 mod start;
+mod statements;
 pub mod tolerance;
 pub mod trace;
 pub mod unit;

@@ -67,7 +67,8 @@ pub fn add_monte_carlo(
         }
     }
     phases_follow_amplitudes(&mut result.parameters);
-    result.conformity = conformity(&problem.session, &result.parameters, &result.circular, result.noise_um);
+    let goodness = result.outcome.goodness.verdict;
+    result.conformity = conformity(&problem.session, &result.parameters, &result.circular, result.noise_um, goodness);
     result.covariance = fit::covariance_of_parameters(problem, fit, &result.parameters);
     if unconverged > 0 {
         result

@@ -3,7 +3,9 @@
 mod base;
 mod cross_validation;
 mod monte_carlo;
+mod outcome;
 mod parameter;
+mod statements;
 mod trace;
 
 use std::collections::BTreeMap;
@@ -12,13 +14,21 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::circular::CircularTest;
+use crate::noise::NoiseSource;
 use crate::plausibility::Plausibility;
 use crate::tolerance::Conformity;
 pub use base::BaseResult;
 pub use cross_validation::{CrossValidation, TestNotLeftOut};
 pub use monte_carlo::{DrawnParameter, FitMonteCarlo, Verdict};
+pub use outcome::{
+    Assumption, AssumptionKind, AssumptionVerdict, DataRange, DeterminedByPrior, Goodness, GoodnessVerdict,
+    NotEstimated, Outcome, TraceVerdict,
+};
 pub(crate) use parameter::phases_follow_amplitudes;
-pub use parameter::{Combination, Covariance, Interval, NullSpace, ParameterResult, Unobservable};
+pub use parameter::{
+    Combination, Covariance, DeterminedBy, EnlargedBy, Interval, NullSpace, ParameterResult, Unobservable,
+};
+pub use statements::{AxisCorrection, GoodStatement, LineQuantity, MeasureStatement, NextStep, Statements};
 pub use trace::{
     AliasResult, AlternativeResult, ChangedParameter, CurvePoint, EffectName, EffectResult, LargestOrder, ModelResult,
     PriorResult, RejectedCandidate, Remainder, SeparatingTestResult, SeparationResult, ShapeParameter, TraceResult,
@@ -44,7 +54,7 @@ pub struct FitResult {
     pub noise_um: f64,
     /// Source of `noise_um`: `stated` by the session, `repeats` (repeated readings), or `residual` where there is
     /// neither. The residual of the declared model also holds what the model lacks.
-    pub noise_source: String,
+    pub noise_source: NoiseSource,
     /// Autoregressive coefficients of the noise along a run; empty for white noise.
     pub noise_ar_coefficients: Vec<f64>,
     /// Number of readings without outliers.
@@ -77,6 +87,8 @@ pub struct FitResult {
     /// Factor by which the uncertainties are enlarged: the Birge ratio where it is significantly above 1 (p < 0.001),
     /// else 1.
     pub u_enlargement: f64,
+    /// What the result is worth: the residual against the noise, what determines the estimates, what is assumed.
+    pub outcome: Outcome,
     /// The identifiable parameters.
     pub parameters: Vec<ParameterResult>,
     /// Identifiers of all identifiable parameters, set-up parameters included.

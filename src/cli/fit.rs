@@ -65,6 +65,12 @@ pub struct FitArguments {
     /// that are held at nominal because the readings do not separate them.
     #[arg(long)]
     base: bool,
+    /// Explanation of a declared effect that is accepted on the user's word: the effect, or one of its aliases, which then
+    /// takes its place. Uncertainties do not cover the others; every output says so. May be repeated.
+    ///
+    /// Example: --assume EZC~C:h2
+    #[arg(long, value_name = "EFFECT")]
+    assume: Vec<String>,
     /// List everything that the first screen folds: set-up parameters, directions and diagnosis of ball-bar figures,
     /// null-space directions, outliers.
     #[arg(long)]
@@ -126,6 +132,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
         return repeated::run(&arguments.session, &arguments.repeat, &arguments.common, &outputs);
     }
     let (session, sources) = read_session(&arguments.session, &outputs)?;
+    let session = abbe::identify::fit::assume(&session, &arguments.assume)?;
     if arguments.views.is_some() && arguments.method != Method::Full {
         let message = "`--views` writes residuals of the full fit: leave out `--method`";
         return Err(Failure::CommandLine(message.into()));

@@ -35,7 +35,7 @@ pub fn run(
 }
 
 fn print(result: &Comparison) {
-    say!("{}, {}", counted(result.readings, "reading"), noise(result.noise_um, &result.noise_source));
+    say!("{}, {}", counted(result.readings, "reading"), noise(result.noise_um, result.noise_source));
     output::print(&centres(result));
     output::print(&errors(result));
     say!(

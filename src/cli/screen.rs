@@ -4,13 +4,16 @@ use std::path::Path;
 
 use abbe::identify::circular::CircularTest;
 use abbe::identify::plausibility::Plausibility;
-use abbe::identify::results::{Outlier, Unobservable};
+use abbe::identify::results::{DeterminedByPrior, Goodness, Outlier, Statements, Unobservable};
 use abbe::identify::tolerance::Conformity;
 use abbe::model::words::counted;
 
 use super::{SessionArguments, output};
+use crate::report::confounded::BY_PRIOR;
+use crate::report::fit::reservation;
 use crate::report::parameters::{self, Estimates};
 use crate::report::plausibility::conflicts;
+use crate::report::statements as present;
 use crate::report::table::Table;
 use crate::report::{circular, conformity, confounded};
 
@@ -34,12 +37,15 @@ pub fn list(lines: &[String], indent: &str, all: bool) {
 }
 
 /// Prints the errors in a table and the set-up parameters in one line; the set-up parameters in a table too with `all`.
-pub fn print_estimates(estimates: &Estimates<'_>, all: bool) {
+pub fn print_estimates(estimates: &Estimates<'_>, goodness: Goodness, all: bool) {
     let shown = estimates.most_significant(if all { usize::MAX } else { MAX_ERRORS });
     if !shown.is_empty() {
         output::print(&parameters::table(&shown, None));
         if shown.len() < estimates.errors.len() {
             say!("  … {} less significant; --all lists them", estimates.errors.len() - shown.len());
+        }
+        if let Some(reservation) = reservation(goodness) {
+            say!("  {reservation}");
         }
     }
     if all && !estimates.setup.is_empty() {
@@ -105,15 +111,25 @@ fn fold_rows(table: &mut Table, max: usize, how: &str) {
     }
 }
 
-/// Prints what the readings leave open: null-space directions, then outliers. One line where there is nothing.
-pub fn print_missing(null_space: &[Unobservable], outliers: &[Outlier], all: bool) {
-    if null_space.is_empty() && outliers.is_empty() {
+/// Prints what the readings leave open: null-space directions, errors that set-up priors determine, then outliers. One
+/// line where there is nothing.
+pub fn print_missing(null_space: &[Unobservable], by_prior: &[DeterminedByPrior], outliers: &[Outlier], all: bool) {
+    if null_space.is_empty() && by_prior.is_empty() && outliers.is_empty() {
         say!("\nNo parameters are confounded. No reading is an outlier.");
         return;
     }
-    if null_space.is_empty() {
+    if null_space.is_empty() && by_prior.is_empty() {
         say!("\nNo parameters are confounded.");
-    } else {
+    }
+    if !by_prior.is_empty() {
+        say!("\n{BY_PRIOR}");
+        let errors: Vec<&str> = by_prior.iter().map(|item| item.error.as_str()).collect();
+        match all {
+            true => list(&confounded::by_prior(by_prior), "  ", all),
+            false => say!("  {}; --all lists with what they are confounded", errors.join(", ")),
+        }
+    }
+    if !null_space.is_empty() {
         let directions = counted(null_space.len(), "null-space direction");
         say!("\nConfounded: {directions} (a combination that leaves every reading unchanged)");
         list(&confounded::sentences(null_space), "  ", all);
@@ -130,6 +146,29 @@ pub fn print_missing(null_space: &[Unobservable], outliers: &[Outlier], all: boo
         fold_rows(&mut table, MAX_LISTED, "; --all lists them");
     }
     output::print(&table);
+}
+
+/// The session file that the proposed commands write, and another for a session of this name.
+const NEXT: &str = "next.toml";
+const AFTER_NEXT: &str = "after-next.toml";
+
+/// Prints the three statements that answer first: is it good, what to correct, what to measure next.
+pub fn print_statements(of: &str, statements: &Statements, degrees_of_freedom: usize, session: &SessionArguments) {
+    say!("{}", present::good(of, &statements.good, degrees_of_freedom));
+    say!("{}", present::correct(statements));
+    let is_next = session.session.file_name().is_some_and(|name| name == NEXT);
+    let next = if is_next { AFTER_NEXT } else { NEXT };
+    for line in present::measure(statements, next, |verb, options| command(verb, session, options)) {
+        say!("{line}");
+    }
+    say!("");
+}
+
+/// Prints the line of each axis, with `all`.
+pub fn print_corrections(statements: &Statements, all: bool) {
+    if all && !statements.correct.is_empty() {
+        output::print(&present::corrections(statements));
+    }
 }
 
 /// A next step: what to type or to do, and what it is for.

@@ -90,7 +90,7 @@ fn print(result: &SelfCalibration) {
     say!(
         "{}, {}, residual {}",
         counted(result.readings, "reading"),
-        noise(result.noise_um, &result.noise_source),
+        noise(result.noise_um, result.noise_source),
         micrometres(result.rms_um)
     );
     say!(
@@ -122,7 +122,7 @@ fn print(result: &SelfCalibration) {
         let title = format!("Error motions of axis {axis}, µm");
         output::print(&present::functions(&result.error_motions).titled(title));
     }
-    screen::print_missing(&result.unobservable, &[], true);
+    screen::print_missing(&result.unobservable, &[], &[], true);
     if let Some(drawn) = &result.monte_carlo {
         output::print(&present::intervals(drawn).titled(format!(
             "Monte Carlo, {}, seed {}; coverage intervals of {} %, µm",

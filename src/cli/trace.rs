@@ -62,6 +62,12 @@ pub struct TraceArguments {
     all: bool,
     #[command(flatten)]
     search: SearchArguments,
+    /// Explanation that is accepted on the user's word: a found effect, or one of its aliases, which then takes its place.
+    /// Uncertainties do not cover the others; every output says so. May be repeated.
+    ///
+    /// Example: --assume EAC~C:h1
+    #[arg(long, value_name = "EFFECT")]
+    assume: Vec<String>,
     /// End the search after this many seconds. The effects found until then are fitted and reported, and every output
     /// states that the result is incomplete.
     ///
@@ -111,6 +117,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         max_effects: arguments.search.max_effects,
         only: arguments.search.only.clone(),
         exclude: arguments.search.exclude.clone(),
+        assume: arguments.assume.clone(),
         ..TraceOptions::default()
     };
     if arguments.list {

@@ -2,8 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use abbe_identify::results::{Covariance, EffectName, ParameterResult, Unobservable};
+use abbe_identify::noise::NoiseSource;
+use abbe_identify::results::{Covariance, EffectName, ParameterResult, TraceVerdict, Unobservable};
 use abbe_identify::tolerance::Conformity;
+use abbe_identify::validate::ValidationVerdict;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -49,9 +51,9 @@ pub struct Record {
     /// Standard deviation of one scalar reading, µm.
     pub noise_um: Option<f64>,
     /// Source of `noise_um`: `stated`, `repeats` or `residual`.
-    pub noise_source: Option<String>,
+    pub noise_source: Option<NoiseSource>,
     /// Verdict of the trace; `null` without a trace.
-    pub verdict: Option<String>,
+    pub verdict: Option<TraceVerdict>,
     /// Rms of the residual of the declared model, µm.
     pub rms_before_um: Option<f64>,
     /// Rms of the residual of the final model, µm: with the found effects if there was a trace.
@@ -160,7 +162,7 @@ pub struct ValidationRecord {
     /// SHA-256 of the model file, in hexadecimal.
     pub model_sha256: String,
     /// `holds`, `holds-in-range`, `degraded` or `does-not-hold`.
-    pub verdict: String,
+    pub verdict: ValidationVerdict,
     /// Rms of the residual of the model, µm.
     pub rms_um: f64,
     /// The parameters that have moved, the most significant first.

@@ -267,7 +267,7 @@ fn set_fit(record: &mut Record, fit: &FitResult) {
     record.readings = Some(fit.readings);
     record.outliers = Some(fit.outliers.len());
     record.noise_um = Some(fit.noise_um);
-    record.noise_source = Some(fit.noise_source.clone());
+    record.noise_source = Some(fit.noise_source);
     record.rms_before_um = Some(fit.rms_um);
     record.rms_um = Some(fit.rms_um);
     record.heldout_rms_um = Some(fit.heldout_rms_um);
@@ -283,8 +283,8 @@ fn set_trace(record: &mut Record, trace: &TraceResult) {
     record.readings = Some(trace.readings);
     record.outliers = Some(trace.outliers.len());
     record.noise_um = Some(trace.noise_um);
-    record.noise_source = Some(trace.noise_source.clone());
-    record.verdict = Some(trace.verdict.clone());
+    record.noise_source = Some(trace.noise_source);
+    record.verdict = Some(trace.verdict);
     record.rms_before_um = Some(trace.before.rms_um);
     record.rms_um = Some(trace.after.rms_um);
     record.heldout_rms_um = Some(trace.after.heldout_rms_um);

@@ -1,7 +1,10 @@
 //! The result of a fit: goodness of fit, both propagations of uncertainty, all figures for a spreadsheet.
 
 use abbe::identify::circular::CircularTest;
-use abbe::identify::results::{CrossValidation, FitMonteCarlo, FitResult, ParameterResult, Verdict};
+use abbe::identify::noise::NoiseSource;
+use abbe::identify::results::{
+    CrossValidation, FitMonteCarlo, FitResult, Goodness, GoodnessVerdict, ParameterResult, Verdict,
+};
 use abbe::identify::tolerance::Conformity;
 use abbe::model::words::counted;
 
@@ -9,22 +12,32 @@ use super::cross_validation;
 use super::number::{fixed, micrometres, places, unit};
 use super::table::{Cell, Column, Table, cells, numbers, words};
 
-/// χ²/ν below which the noise is said to be overstated.
-const MIN_RATIO: f64 = 0.5;
-
 /// Whether the residual agrees with the noise.
-pub fn agreement(result: &FitResult) -> String {
-    let ratio = result.chi_square / result.degrees_of_freedom.max(1) as f64;
-    let figures = format!("χ²/ν = {ratio:.2}, ν = {}", result.degrees_of_freedom);
-    if result.noise_source == "residual" {
-        "no statement: no noise is stated and no reading repeats, so the residual is taken for noise".to_string()
-    } else if result.u_enlargement > 1.0 {
-        format!("the residual exceeds the noise ({figures}): the model lacks an effect")
-    } else if ratio < MIN_RATIO {
-        format!("the residual is smaller than the noise ({figures}): the noise is overstated")
-    } else {
-        format!("the residual agrees with the noise ({figures})")
+pub fn agreement(goodness: Goodness, degrees_of_freedom: usize) -> String {
+    let figures = format!("χ²/ν = {:.2}, ν = {degrees_of_freedom}", goodness.chi_square_ratio);
+    match goodness.verdict {
+        GoodnessVerdict::NotJudged => {
+            "cannot be judged: no noise is stated and no reading repeats, so the residual is taken for noise"
+                .to_string()
+        }
+        GoodnessVerdict::Exceeds => format!("the residual exceeds the noise ({figures}): the model lacks an effect"),
+        GoodnessVerdict::Structured => {
+            format!(
+                "the residual is no larger than the noise ({figures}), but it has structure: the model lacks an effect"
+            )
+        }
+        GoodnessVerdict::NoiseOverstated => {
+            format!("the residual is smaller than the noise ({figures}): the noise is overstated")
+        }
+        GoodnessVerdict::Agrees => format!("the residual agrees with the noise ({figures})"),
     }
+}
+
+/// What the estimates of a model are not good for; `None` if they may be quoted.
+pub fn reservation(goodness: Goodness) -> Option<&'static str> {
+    (!goodness.quotable).then_some(
+        "not to be quoted: the model lacks an effect, and u does not cover the bias that it causes in the estimates",
+    )
 }
 
 /// `identifiable` of `count` parameters, and the rank.
@@ -33,10 +46,10 @@ pub fn rank(identifiable: usize, count: usize, rank: usize) -> String {
 }
 
 /// The noise and its source in words. A residual is not called noise.
-pub fn noise(noise_um: f64, source: &str) -> String {
+pub fn noise(noise_um: f64, source: NoiseSource) -> String {
     let figure = micrometres(noise_um);
     match source {
-        "residual" => format!("residual of the declared model {figure} (no noise stated, no repeats)"),
+        NoiseSource::Residual => format!("residual of the declared model {figure} (no noise stated, no repeats)"),
         other => format!("noise {figure} ({other})"),
     }
 }

@@ -37,6 +37,7 @@ pub mod repeated;
 pub mod self_calibration;
 pub mod simulation;
 #[cfg(feature = "fleet")]
+pub mod statements;
 pub mod study;
 pub mod table;
 pub mod trace;

@@ -4,11 +4,14 @@ use abbe::identify::fit::Fit;
 use abbe::identify::parameters::{Parameter, Role};
 use abbe::identify::plausibility::{Pull, Pulls};
 use abbe::identify::problem::Problem;
-use abbe::identify::results::ParameterResult;
+use abbe::identify::results::{DeterminedBy, ParameterResult};
 use abbe::model::words::counted;
 
 use super::number::{places, unit, value_and_u};
 use super::table::{Cell, Table, cells};
+
+/// The mark of an estimate that exceeds `U` by the set-up priors.
+pub const PRIOR: &str = "†";
 
 /// The parameters of a fit.
 pub struct Estimates<'r> {
@@ -81,12 +84,30 @@ pub fn table(parameters: &[&ParameterResult], before: Option<&[ParameterResult]>
         let [value, u] = Cell::estimate(p.value, p.u);
         // Rounded to the same place.
         let expanded = Cell::fixed(p.expanded_u, places(p.u));
-        let mark = if p.significant { "*" } else { "" };
+        let mark = match p.determined_by {
+            DeterminedBy::Readings if p.significant && p.quotable => "*",
+            DeterminedBy::Prior if p.exceeds_u() => PRIOR,
+            _ => "",
+        };
         cells![&p.id, value, u, expanded, unit(&p.unit), mark, &p.meaning]
     });
     let columns = ["parameter", ">value", ">u", ">U", "unit", "", "meaning"];
-    let table = Table::new(columns, rows)
+    let mut table = Table::new(columns, rows)
         .titled("Estimates with standard uncertainty u and expanded uncertainty U = 2u (*: significant, |value| > U)");
+    if parameters.iter().any(|p| !p.enlarged_by.is_empty()) {
+        let without = parameters.iter().map(|p| p.u_without_aliases.map_or("".into(), |u| Cell::fixed(u, places(u))));
+        table.push(">u without aliases", without);
+        let by = |p: &&ParameterResult| {
+            let aliases: Vec<&str> = p.enlarged_by.iter().map(|by| by.alias.as_str()).collect();
+            Cell::from(aliases.join(", "))
+        };
+        table.push("u enlarged by alias", parameters.iter().map(by));
+    }
+    if parameters.iter().any(|p| p.determined_by == DeterminedBy::Prior && p.exceeds_u()) {
+        table
+            .notes
+            .push(format!("{PRIOR}: |value| > U, if the set-up is as stated; the readings alone do not show it"));
+    }
     beside(table, parameters, before)
 }
 

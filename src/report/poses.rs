@@ -16,7 +16,7 @@ pub fn sentence(found: &PoseSelection) -> String {
         unit(&found.criterion),
         three_digits(found.value),
         three_digits(found.random_median),
-        noise(found.noise_um, &found.noise_source)
+        noise(found.noise_um, found.noise_source)
     )
 }
 

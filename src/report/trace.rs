@@ -11,8 +11,8 @@ use super::table::{Cell, Table, cells};
 
 /// The noise and its source in words. A residual is not called noise.
 pub fn noise(result: &TraceResult) -> String {
-    if result.noise_source != "residual" || result.effects.is_empty() {
-        return noise_in_words(result.noise_um, &result.noise_source);
+    if result.noise_source.judges() || result.effects.is_empty() {
+        return noise_in_words(result.noise_um, result.noise_source);
     }
     format!(
         "residual of the declared model {}, with the effects {} (no noise stated, no repeats)",
@@ -24,7 +24,7 @@ pub fn noise(result: &TraceResult) -> String {
 /// The residual of the declared model, and with the effects.
 pub fn before_and_after(result: &TraceResult) -> Table {
     // The residual itself is no measure of the noise.
-    let judges = result.noise_source != "residual";
+    let judges = result.noise_source.judges();
     let row = |name: &str, model: &ModelResult| {
         let mut cells = cells![name, Cell::fixed(model.rms_um, 3), Cell::fixed(model.heldout_rms_um, 3)];
         if let (Some(rms), Some(held)) = (model.rms_3d_um, model.heldout_rms_3d_um) {

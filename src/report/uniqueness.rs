@@ -76,7 +76,11 @@ pub fn likelihood(alias: &AliasResult) -> String {
     let ratio = if (0.01..1000.0).contains(&ratio) { format!("{ratio:.2}") } else { with_exponent(ratio, 0) };
     // A difference of rounding is none.
     let delta = if alias.delta_chi2.abs() < 0.05 { 0.0 } else { alias.delta_chi2 };
-    format!("Δχ² {delta:.1}, likelihood ratio {ratio}").replace('-', "−")
+    let less_plausible = match alias.prior_cost > 0.0 {
+        true => format!(", mechanically less plausible: probability ratio {:.2}", alias.probability_ratio),
+        false => String::new(),
+    };
+    format!("Δχ² {delta:.1}, likelihood ratio {ratio}{less_plausible}").replace('-', "−")
 }
 
 /// The first explanations and the number of the others. A part of the machine is named once where it repeats.

@@ -1,7 +1,7 @@
 //! A validated model: verdict, residuals of each machine, moved parameters, share of each effect.
 
-use abbe::identify::validate::ValidationResult;
 use abbe::identify::validate::results::RmsResult;
+use abbe::identify::validate::{ValidationResult, ValidationVerdict};
 use abbe::model::words::counted;
 
 use super::fit::Figures;
@@ -16,13 +16,13 @@ pub fn sentence(result: &ValidationResult) -> String {
         count => format!("{} have moved", counted(count, "parameter")),
     };
     let other = if result.without.is_empty() { "the nominal machine" } else { "the location errors alone" };
-    match result.verdict.as_str() {
-        "holds" => "the model predicts the readings within noise and its uncertainty".to_string(),
-        "holds-in-range" => {
+    match result.verdict {
+        ValidationVerdict::Holds => "the model predicts the readings within noise and its uncertainty".to_string(),
+        ValidationVerdict::HoldsInRange => {
             "the model predicts the readings inside the range of its data, not those outside it".to_string()
         }
-        "degraded" => format!("{cause}; the model is still better than {other}"),
-        _ => format!("{cause}, and the model is no better than {other}"),
+        ValidationVerdict::Degraded => format!("{cause}; the model is still better than {other}"),
+        ValidationVerdict::DoesNotHold => format!("{cause}, and the model is no better than {other}"),
     }
 }
 
@@ -124,7 +124,7 @@ pub fn set_up(result: &ValidationResult) -> Table {
 /// Every figure with all its digits, one row per figure.
 pub fn figures(result: &ValidationResult) -> Table {
     let mut figures = Figures::default();
-    figures.statement("verdict", &result.verdict, &sentence(result));
+    figures.statement("verdict", result.verdict.word(), &sentence(result));
     let mut rms = |id: &str, rms: &RmsResult| {
         figures.figure("residual", id, "rms over scalar readings", rms.rms_um, "um");
         if let Some(length) = rms.rms_3d_um {

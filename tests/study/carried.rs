@@ -1,5 +1,6 @@
 //! A model that is traced on a first session predicts a second one, with other radii, another set-up and other noise.
 
+use abbe::identify::validate::ValidationVerdict;
 use std::path::Path;
 
 use abbe::identify::model_file::{IdentifiedModel, Provenance, read_text};
@@ -121,11 +122,11 @@ fn a_model_holds_on_a_second_session_and_changes_are_named() {
     let mut coverage = Vec::new();
     for (pair, [unchanged, changed], oracle_um, id) in &outcomes {
         let ratio = unchanged.model.rms.rms_um / oracle_um;
-        holds.count(unchanged.verdict == "holds");
+        holds.count(unchanged.verdict == ValidationVerdict::Holds);
         near.count((ratio - 1.0).abs() <= 0.05);
         covered.count((0.90..=0.98).contains(&unchanged.model.coverage_95));
         coverage.push(unchanged.model.coverage_95);
-        said.count(changed.verdict != "holds");
+        said.count(changed.verdict != ValidationVerdict::Holds);
         named.count(changed.moved.iter().any(|moved| moved.id == *id || moved.alternatives.contains(id)));
         first.count(changed.moved.iter().any(|moved| moved.id == *id));
         if verbose() {

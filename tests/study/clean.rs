@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use abbe::identify::results::{EffectName, TraceResult};
+use abbe::identify::results::{EffectName, TraceResult, TraceVerdict};
 use rayon::prelude::*;
 
 use super::judging::short;
@@ -90,7 +90,7 @@ struct Outcome {
 impl Outcome {
     fn count(&mut self, result: &TraceResult) {
         self.claimed.count(!result.effects.is_empty());
-        self.not_clean.count(result.verdict != "clean");
+        self.not_clean.count(result.verdict != TraceVerdict::Clean);
         self.rejected.count(!result.rejected_candidates.is_empty());
     }
 }

@@ -15,6 +15,7 @@ mod carried;
 mod clean;
 mod columns;
 mod fleet;
+mod gate;
 mod outside;
 mod pairs;
 mod single;

@@ -5,6 +5,7 @@ use super::rates::Rate;
 use super::sessions::{TracedSession, at_multiple, case, oracle, random, run, sessions, skipped, verbose};
 use crate::plant::families::outside_library;
 use crate::plant::{Injected, Kind, Noise};
+use abbe::identify::results::TraceVerdict;
 
 fn outside_case(number: usize) -> (Kind, Noise, Vec<Injected>) {
     let (kind, noise) = case(number);
@@ -17,7 +18,7 @@ fn outside_case(number: usize) -> (Kind, Noise, Vec<Injected>) {
 fn is_honest(outcome: &TracedSession) -> bool {
     let result = &outcome.result;
     let curve = result.effects.iter().any(|effect| effect.name.shape == "curve");
-    curve || result.verdict == "unexplained"
+    curve || result.verdict == TraceVerdict::Unexplained
 }
 
 #[test]

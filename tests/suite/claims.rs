@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use abbe::identify::results::{EffectName, TraceResult};
+use abbe::identify::results::{EffectName, TraceResult, TraceVerdict};
 use abbe::identify::trace::{TraceOptions, trace};
 use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
@@ -27,9 +27,11 @@ fn traced(session: &Session, significance: f64) -> TraceResult {
 /// Asserts that the parts of a result agree.
 fn assert_consistent(result: &TraceResult, what: &str) {
     let found = !result.effects.is_empty();
-    let named = matches!(result.verdict.as_str(), "explained" | "partly-explained");
+    let named = matches!(result.verdict, TraceVerdict::Explained | TraceVerdict::PartlyExplained);
     assert!(found || !named, "{what}: {}", result.verdict);
-    assert_eq!(result.verdict == "clean", !found && !result.remainder.structured, "{what}");
+    let complete = !result.outcome.goodness.verdict.lacks_an_effect();
+    assert_eq!(result.verdict == TraceVerdict::Clean, !found && complete, "{what}");
+    assert!(!(complete && result.remainder.structured), "{what}");
     if found {
         assert_ne!(result.residual_before, "no structure beyond noise", "{what}");
         let (before, after) = (result.before.heldout_rms_um, result.after.heldout_rms_um);
@@ -50,7 +52,7 @@ fn an_effect_that_does_not_lower_the_held_out_error_is_not_claimed() {
     let recipe = Recipe::new(Kind::Simultaneous, 7463).noise(noise);
     let result = traced(&session_of(&recipe), TraceOptions::default().significance);
     assert!(result.effects.is_empty(), "{:?}", result.effects[0].name);
-    assert_eq!(result.verdict, "clean");
+    assert_eq!(result.verdict, TraceVerdict::Clean);
     let rejected: Vec<&str> = result.rejected_candidates.iter().map(|found| found.name.shape.as_str()).collect();
     assert_eq!(rejected, ["drift"]);
     assert!(result.rejected_candidates[0].heldout_decrease_um < 0.0);
@@ -62,7 +64,7 @@ fn an_effect_that_does_not_lower_the_held_out_error_is_not_claimed() {
 #[test]
 fn a_constant_in_noise_does_not_exceed_the_null_distribution() {
     let result = traced(&session_of(&Recipe::new(Kind::LinearCircles, 7316)), TraceOptions::default().significance);
-    assert_eq!(result.verdict, "clean");
+    assert_eq!(result.verdict, TraceVerdict::Clean);
     assert!(result.rejected_candidates.is_empty(), "{:?}", result.rejected_candidates);
 }
 
@@ -129,9 +131,9 @@ fn mislabelled_runs_cause_neither_false_claims_nor_missed_effects() {
                 let alike =
                     is_axial_motion(&effect.name) || effect.aliases.iter().any(|alias| is_axial_motion(&alias.name));
                 assert!(alike, "{what}: {:?}", effect.name);
-                assert_eq!(result.verdict, "explained", "{what}");
+                assert_eq!(result.verdict, TraceVerdict::Explained, "{what}");
             } else {
-                assert_eq!(result.verdict, "clean", "{what}");
+                assert_eq!(result.verdict, TraceVerdict::Clean, "{what}");
             }
             let named = result.warnings.iter().any(|warning| warning.contains("`run` column"));
             assert_eq!(named, how != "all one", "{what}: {:?}", result.warnings);

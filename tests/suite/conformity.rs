@@ -19,6 +19,9 @@ fn with_limits(folder: &std::path::Path, limits: &str) -> std::path::PathBuf {
     file
 }
 
+/// The effect that the bundled session does not declare.
+const EFFECT: &str = "[[effect]]\ncomponent = \"EZC\"\nshape = \"harmonic\"\norder = 2\n";
+
 fn json(command: &str, session: &std::path::Path, more: &[&str]) -> Value {
     let file = session.with_extension("json");
     let fixed = [command, text(session), "--quiet", "--json", text(&file)];
@@ -34,7 +37,7 @@ fn decisions_follow_from_value_and_uncertainty() {
     let limits = "[tolerance]\nprobability = 0.95\n[tolerance.errors]\nEY0A_um = 60\nEX0C_um = [-0.01, 0.01]\nEB0A_um_m = 1\n\
                   EC0B_arcsec = 5\n[tolerance.tests.C150]\nbidirectional_circular_deviation_um = 20\nradial_deviation_um = 50\n\
                   synchronous_error_motion_um = 0.1\nasynchronous_error_motion_um = 0.2\ninstrument_u_um = 0.2\n";
-    let session = with_limits(folder.path(), &limits.replace("EC0B_arcsec = 5\n", ""));
+    let session = with_limits(folder.path(), &(limits.replace("EC0B_arcsec = 5\n", "") + EFFECT));
     let fit = json("fit", &session, &[]);
     let normal = Normal::standard();
     let items = fit["conformity"]["items"].as_array().unwrap();
@@ -73,6 +76,18 @@ fn decisions_follow_from_value_and_uncertainty() {
     assert!((slope["upper"].as_f64().unwrap() - 0.206_265).abs() < 1e-5, "{slope}");
     let trace = json("trace", &session, &["--only", "EZC~C:h"]);
     assert_eq!(trace["conformity"]["items"].as_array().unwrap().len(), 7);
+    // Without the effect the model is not complete: no parameter is decided, and figures of tests are as before.
+    let incomplete = tempfile::tempdir().unwrap();
+    let incomplete = with_limits(incomplete.path(), &limits.replace("EC0B_arcsec = 5\n", ""));
+    let fit = json("fit", &incomplete, &[]);
+    for (item, before) in fit["conformity"]["items"].as_array().unwrap().iter().zip(items) {
+        if item["id"].as_str().unwrap().contains('[') {
+            assert_eq!(item["decision"], before["decision"], "{item}");
+        } else {
+            assert_eq!(item["decision"], "undecided", "{item}");
+            assert!(item["why"].as_str().unwrap().contains("the model lacks an effect"), "{item}");
+        }
+    }
 }
 
 #[test]
@@ -82,14 +97,14 @@ fn decisions_stand_on_the_terminal_in_csv_and_in_the_report() {
     let [csv, page] = ["fit.csv", "fit.html"].map(|name| folder.path().join(name));
     let run = abbe(&["fit", text(&session), "--csv", text(&csv), "--report", text(&page)]);
     let shown = String::from_utf8_lossy(&run.stdout).into_owned();
-    let sentence = "undecided: 1 of 2 items pass, 0 fail, 1 undecided (rule of ISO 14253-1, probability 95 %)";
+    let sentence = "undecided: 0 of 2 items pass, 0 fail, 2 undecided (rule of ISO 14253-1, probability 95 %)";
     assert!(shown.contains(&format!("Conformity: {sentence}")), "{shown}");
     assert!(
         shown.contains("EZC~C:h2.amplitude is not identifiable from these readings, or is no parameter"),
         "{shown}"
     );
     let csv = std::fs::read_to_string(csv).unwrap();
-    assert!(csv.contains("conformity,EY0A,pass,"), "{csv}");
+    assert!(csv.contains("conformity,EY0A,undecided,"), "{csv}");
     assert!(std::fs::read_to_string(page).unwrap().contains("<section id=\"conformity\">"));
     // The effect has a value after the trace.
     let trace = json("trace", &session, &["--only", "EZC~C:h"]);

@@ -1,6 +1,7 @@
 //! Figures of rotary sweeps and the set-up of the balls: uncertainty, coverage and decisions against readings of a closed
 //! form; what a bar beside the radius and a bar of unknown length do not tell.
 
+use abbe::identify::results::GoodnessVerdict;
 use std::f64::consts::TAU;
 
 use abbe::identify::circular::{CircularTest, of_session};
@@ -62,7 +63,7 @@ fn decided(session: &mut Session, figure: TestFigure, lower: f64, upper: f64, no
     let of = Toleranced::Figure { test: "C".into(), figure, instrument_u_um: 0.0 };
     let limits = vec![Limit { of, lower: Some(lower), upper, unit: "um" }];
     session.tolerance = Some(Tolerance { probability: 0.95, limits });
-    conformity(session, &[], &figures(session), noise_um).unwrap().items.remove(0)
+    conformity(session, &[], &figures(session), noise_um, GoodnessVerdict::Agrees).unwrap().items.remove(0)
 }
 
 fn with_priors(mut session: Session) -> Session {

@@ -1,6 +1,7 @@
 //! Ctrl-C: an interrupted trace reports the effects found until then, and every output states that it is incomplete.
 #![cfg(unix)]
 
+use abbe::identify::results::TraceVerdict;
 use std::io::{BufRead, BufReader, Read};
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
@@ -238,7 +239,7 @@ fn a_trace_can_be_interrupted_anywhere() {
         // Models that are trained in parallel may query at the same time.
         assert!(asked <= until + 16, "asked {} times more", asked - until);
         let result: &TraceResult = &found.result;
-        assert!(result.interrupted && result.verdict == "incomplete", "{until}: {}", result.verdict);
+        assert!(result.interrupted && result.verdict == TraceVerdict::Incomplete, "{until}: {}", result.verdict);
         assert_eq!(result.effects.len(), found.effects.len());
         assert_eq!(
             result.interruption(),

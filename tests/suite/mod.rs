@@ -12,6 +12,7 @@ mod compensation;
 mod conformity;
 mod conformity_set_up;
 mod conformity_shares;
+mod doors;
 mod early_returns;
 mod effect_description;
 mod equation_command;

@@ -1,6 +1,7 @@
 //! The three methods of the thesis: identifiability and uncertainty, and the disagreement of chapters 4 and 5 on θ_y0a
 //! and θ_y0c.
 
+use abbe::identify::plan::results::Detectability;
 use abbe::identify::plan::results::PlanAnalysis;
 use abbe::identify::plan::{PlanOptions, analyse};
 use abbe::model::session::{Prior, Session};
@@ -106,7 +107,7 @@ fn an_offset_of_the_spindle_ball_between_two_tests_explains_both_differences_wit
     // Each is completely confounded: the residual is clean at any size.
     for effect in [height, sideways] {
         let found = plan.effects.as_ref().unwrap().effects.iter().find(|found| found.id == effect).unwrap();
-        assert_eq!(found.verdict, "confounded", "{effect}");
+        assert_eq!(found.verdict, Detectability::Confounded, "{effect}");
         assert!(found.detectable_amplitude.is_none());
     }
     println!("4.3 µm: EB0A {:+.2}″, EB0C {:+.2}″", 4.3 * per_um, 4.3 * bias(&plan, height, c));
@@ -122,11 +123,11 @@ fn an_effect_without_an_arm_has_no_signal_and_one_with_a_constant_arm_is_confoun
         let effects = &plan.effects.as_ref().unwrap().effects;
         let of = |id: &str| effects.iter().find(|effect| effect.id == format!("{id}~none:constant")).unwrap();
         for effect in [of("EA0Y"), of("EC0Y")] {
-            assert_eq!((effect.verdict.as_str(), effect.residual_share), ("no signal", 0.0), "{}", effect.id);
+            assert_eq!((effect.verdict, effect.residual_share), (Detectability::NoSignal, 0.0), "{}", effect.id);
             assert!(effect.detectable_amplitude.is_none() && effect.biases.is_empty(), "{}", effect.id);
         }
         for effect in [of("EB0X"), of("EC0X")] {
-            assert_eq!(effect.verdict, "confounded", "{}", effect.id);
+            assert_eq!(effect.verdict, Detectability::Confounded, "{}", effect.id);
             assert!(effect.residual_share < 1e-9, "{}: {}", effect.id, effect.residual_share);
         }
         if setup_um == 0.0 {

@@ -1,6 +1,7 @@
 //! The effects that Yamaji, Hamabata & Ihara (HPC 2014, Section 7) found with an R-test, found by trace in readings of
 //! the plant. The session files declare no effect; only the assertions use the true effects.
 
+use abbe::identify::results::TraceVerdict;
 use std::f64::consts::FRAC_PI_2;
 
 use abbe::identify::trace::{TraceOptions, TraceOutcome, trace};
@@ -143,7 +144,7 @@ fn steps_of_pitch_compensation_are_found_in_x_and_in_y() {
     let tests = vec![bk2(), c_alone()];
     let session = session(NestOn::Table, tests, errors_of(AxisName::C), pitch_compensation());
     traced(&session, |outcome| {
-        assert_eq!(outcome.result.verdict, "explained");
+        assert_eq!(outcome.result.verdict, TraceVerdict::Explained);
         assert_eq!(outcome.effects.len(), 2);
         let x = furthest(&staircase(outcome, "EXX").unwrap(), &pairs(&X_STEPS_MM, &X_HEIGHTS_UM));
         let y = furthest(&staircase(outcome, "EYY").unwrap(), &pairs(&Y_STEPS_MM, &Y_HEIGHTS_UM));
@@ -165,7 +166,7 @@ fn the_test_of_c_alone_separates_steps_of_c_from_steps_of_x() {
         assert!(staircase(outcome, "EXX").is_some(), "BK2 alone blames X: {:?}", outcome.result.effects);
     });
     traced(&of(vec![bk2(), c_alone()]), |outcome| {
-        assert_eq!(outcome.result.verdict, "explained");
+        assert_eq!(outcome.result.verdict, TraceVerdict::Explained);
         assert!(!outcome.effects.is_empty());
         for effect in &outcome.effects {
             assert_eq!(effect.driver.to_string(), "C", "{}", effect.id());
@@ -200,7 +201,7 @@ fn squareness_and_cyclic_straightness_of_y_are_found_in_bk1() {
         let session = session(on, vec![bk1()], errors_of(AxisName::A), effects.clone());
         traced(&session, |outcome| {
             let result = &outcome.result;
-            assert_eq!(result.verdict, "explained");
+            assert_eq!(result.verdict, TraceVerdict::Explained);
             assert_eq!(result.effects.len(), 2);
             // BK1 determines the squareness of Y and Z, not which of the two axes is tilted.
             let square = &result.effects[0];

@@ -250,6 +250,7 @@ fn results_hold_and_have_the_fields_of_the_design() {
                 "degrees_of_freedom",
                 "birge_ratio",
                 "u_enlargement",
+                "outcome",
                 "identifiable",
                 "covariance",
                 "null_space",
@@ -260,7 +261,7 @@ fn results_hold_and_have_the_fields_of_the_design() {
         ]
         .concat(),
     );
-    let of_a_parameter = ["expanded_u", "significant", "meaning"];
+    let of_a_parameter = ["expanded_u", "significant", "meaning", "determined_by", "quotable"];
     has_exactly(&fit["parameters"][0], &["id", "value", "u", "unit"], &of_a_parameter);
     has_exactly(&schema("fit")["$defs"]["Unobservable"]["properties"], &["combination", "why"], &[]);
     let mut other = fit.clone();
@@ -292,6 +293,7 @@ fn results_hold_and_have_the_fields_of_the_design() {
                 "outliers",
                 "warnings",
                 "interrupted",
+                "outcome",
             ],
         ]
         .concat(),
@@ -303,7 +305,7 @@ fn results_hold_and_have_the_fields_of_the_design() {
             &[
                 &LEFT_OUT[..],
                 &["noise_um", "rank", "parameter_count", "chi_square", "degrees_of_freedom", "identifiable"],
-                &["covariance"],
+                &["covariance", "goodness"],
             ]
             .concat(),
         );

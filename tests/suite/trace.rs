@@ -2,6 +2,7 @@
 //! effects are in other files or in the literature.
 
 use abbe::identify::model_file::{IdentifiedModel, Provenance};
+use abbe::identify::results::TraceVerdict;
 use abbe::identify::results::{EffectName, TraceResult};
 use abbe::identify::trace::{TraceOptions, trace};
 use abbe::identify::validate::validate;
@@ -38,7 +39,7 @@ fn a_clean_session_has_the_verdict_clean() {
         return;
     };
     let result = traced(&session, &TraceOptions::default());
-    assert_eq!(result.verdict, "clean");
+    assert_eq!(result.verdict, TraceVerdict::Clean);
     assert!(result.effects.is_empty() && !result.remainder.structured);
     assert_eq!(result.before.parameters, result.after.parameters);
 }
@@ -57,7 +58,7 @@ fn without_an_effect_no_addition_lowers_the_held_out_error() {
     for rejected in &result.rejected_candidates {
         assert!(rejected.heldout_decrease_um <= rejected.u_heldout_decrease_um, "{rejected:?}");
     }
-    assert_eq!(result.verdict, "clean");
+    assert_eq!(result.verdict, TraceVerdict::Clean);
     let (before, after) = (result.before.heldout_rms_um, result.after.heldout_rms_um);
     assert!((after / before - 1.0).abs() < 1e-9, "{before} {after}");
 }
@@ -69,7 +70,7 @@ fn an_axial_motion_is_found_or_is_among_the_aliases() {
         return;
     };
     let result = traced(&session, &TraceOptions::default());
-    assert_eq!(result.verdict, "explained");
+    assert_eq!(result.verdict, TraceVerdict::Explained);
     assert_eq!(result.effects.len(), 1);
     assert!(named_or_alias(&result, &|effect| is(effect, "EZC", "harmonic", Some(3.0))));
     // At one ball radius it is confounded with a tilt of one order less (docs/reference/effects.md).
@@ -83,7 +84,7 @@ fn lost_motion_is_found_with_its_amplitude() {
         return;
     };
     let result = traced(&session, &TraceOptions::default());
-    assert_eq!(result.verdict, "explained");
+    assert_eq!(result.verdict, TraceVerdict::Explained);
     assert_eq!(result.effects.len(), 1);
     assert!(is(&result.effects[0].name, "EYY", "backlash", None));
     let lost = &result.effects[0].parameters[0];

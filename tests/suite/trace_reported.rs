@@ -1,6 +1,7 @@
 //! Consistency of the result of a trace: effects, coefficients, residuals before and after, and uncertainties that
 //! cover aliases.
 
+use abbe::identify::results::TraceVerdict;
 use std::sync::Arc;
 
 use abbe::identify::fit::fit;
@@ -71,7 +72,7 @@ fn the_reported_model_has_the_reported_effects() {
     // The noise is 0.3 µm, and the curve describes the local feature.
     let result = &trace.result;
     assert!(result.before.rms_um > 0.4 && result.after.rms_um < 0.32, "{}", result.after.rms_um);
-    assert_eq!(result.verdict, "explained");
+    assert_eq!(result.verdict, TraceVerdict::Explained);
 }
 
 /// At radius R, EAC = a cos 3C raises the ball by a R sin C cos 3C = a R (sin 4C − sin 2C) / 2. It is confounded with

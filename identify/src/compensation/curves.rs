@@ -180,11 +180,11 @@ pub fn of_fit(problem: &Problem, fit: &Fit) -> Compensation {
             covariance: Vec::new(),
         });
     }
-    let enlarged = fit.u_enlargement.powi(2);
+    let covariance = fit.covariance_with_aliases();
     for curve in &mut result.curves {
         let row = |j: &usize| -> Vec<f64> {
             let columns = curve.coefficients.iter();
-            columns.map(|k| fit.covariance[(*j, *k)] * enlarged).collect()
+            columns.map(|k| covariance[(*j, *k)]).collect()
         };
         curve.covariance = curve.coefficients.iter().map(row).collect();
     }

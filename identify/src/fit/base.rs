@@ -122,8 +122,7 @@ pub fn base_parameters(problem: &Problem, fit: &Fit, gauge: Gauge) -> Result<Bas
     held.sort_unstable();
     held.iter().for_each(|pivot| beta[*pivot] = 0.0);
     let prediction_change_mm = restore_predictions(problem, fit, &held, &mut beta)?;
-    let enlargement = faer::Scale(fit.u_enlargement * fit.u_enlargement);
-    let mut covariance = &transfer * &fit.covariance * transfer.transpose() * enlargement;
+    let mut covariance = &transfer * fit.covariance_with_aliases() * transfer.transpose();
     for pivot in &held {
         for j in 0..list.len() {
             covariance[(j, *pivot)] = 0.0;

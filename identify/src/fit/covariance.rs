@@ -3,13 +3,14 @@
 use faer::Mat;
 
 use super::Fit;
-use super::quantities::{Quantity, quantities, rms_of_waves};
+use super::aliases::add_to_covariance;
+use super::quantities::{Quantity, quantities, rms_of_waves, values_at};
 use crate::numerics::rank::Rank;
 use crate::problem::Problem;
 use crate::results::{Covariance, NullSpace, ParameterResult};
 
 /// Covariance of the reported parameters by the law of propagation of uncertainty, in their order and units. It has the
-/// same factor as the standard uncertainties, so its diagonal holds their squares.
+/// same factor as the standard uncertainties and covers aliases as they do, so its diagonal holds their squares.
 pub(crate) fn of_parameters(problem: &Problem, fit: &Fit, parameters: &[ParameterResult]) -> Covariance {
     let list = &problem.parameters.list;
     // Rows of the Jacobian of the reported quantities: their parameters, and the derivative by each.
@@ -38,6 +39,12 @@ pub(crate) fn of_parameters(problem: &Problem, fit: &Fit, parameters: &[Paramete
         products.sum::<f64>() * enlargement
     };
     let mut matrix = Mat::from_fn(rows.len(), rows.len(), |i, j| entry(&rows[i], &rows[j]));
+    let quantities = quantities(problem, &fit.rank);
+    add_to_covariance(&mut matrix, fit, |beta| {
+        let mut values = Vec::with_capacity(parameters.len());
+        values_at(problem, fit, &quantities, beta, |value| values.push(value));
+        values
+    });
     adapt_diagonal(&mut matrix, parameters);
     Covariance {
         ids: parameters.iter().map(|parameter| parameter.id.clone()).collect(),

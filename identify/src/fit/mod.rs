@@ -5,9 +5,12 @@
 //! number. The law of propagation gives the uncertainties, `Cov = N (Nᵀ JᵀV⁻¹J N)⁻¹ Nᵀ`. The columns of `N` span the
 //! identifiable directions (JCGM 100, 5.2; JCGM 102, 6.2).
 
+pub(crate) mod aliases;
+pub(crate) mod assume;
 pub mod base;
 mod covariance;
 pub(crate) mod families;
+pub(crate) mod outcome;
 mod prepare;
 mod quantities;
 mod reported;
@@ -20,17 +23,20 @@ use faer::Mat;
 
 use crate::error::IdentifyError;
 use crate::heldout::{HeldOut, held_out};
+use crate::noise::{NoiseSource, PureError};
 use crate::numerics::least_squares::{LeastSquares, Scaling, minimise};
 use crate::numerics::rank::Rank;
-use crate::numerics::tails::chi_square_tail;
+use crate::numerics::tails::{chi_square_tail, residual_tail};
 use crate::numerics::triangle::Triangle;
 use crate::problem::Problem;
 
+pub use aliases::{AliasChange, EffectAliases};
+pub use assume::assume;
 pub(crate) use covariance::{null_space, of_parameters as covariance_of_parameters};
 pub use prepare::prepare;
 pub(crate) use prepare::{prepare_with, with_families};
 pub(crate) use quantities::{Quantity, quantities, values_at};
-pub(crate) use reported::{ids, u_of_undetermined_phase_deg};
+pub(crate) use reported::ids;
 pub use reported::{outliers, parameters, report, unobservable};
 pub use session::SessionFit;
 
@@ -55,8 +61,13 @@ pub struct Fit {
     pub degrees_of_freedom: usize,
     /// The Birge ratio `√(χ²/ν)`. It is below 1 if the readings scatter less than the assumed noise.
     pub birge_ratio: f64,
+    /// Probability of a larger χ² if the model lacks nothing. A noise from repeats has the degrees of freedom of their
+    /// pure error.
+    pub p_value: f64,
     /// Factor on the standard uncertainties: the Birge ratio if it is significantly above 1, else 1.
     pub u_enlargement: f64,
+    /// How the parameters change if an alias takes the place of an effect, for each effect with aliases.
+    pub aliases: Vec<EffectAliases>,
 }
 
 /// Significance level of the χ² test of the residual against the noise.
@@ -176,6 +187,9 @@ fn finish(problem: &Problem, minimum: Minimum) -> Result<Fit, IdentifyError> {
         .saturating_sub(rank.identifiable_basis.ncols())
         .max(1);
     let free = degrees_of_freedom as f64;
+    let p_value = residual_tail(chi_square, free, freedom_of_noise(problem, &residuals));
+    let birge_ratio = (chi_square / free).sqrt();
+    let aliases = aliases::at_solution(problem, &beta)?;
     Ok(Fit {
         beta,
         rank,
@@ -185,9 +199,17 @@ fn finish(problem: &Problem, minimum: Minimum) -> Result<Fit, IdentifyError> {
         held_out,
         chi_square,
         degrees_of_freedom,
-        birge_ratio: (chi_square / free).sqrt(),
-        u_enlargement: u_enlargement(chi_square, free),
+        birge_ratio,
+        p_value,
+        u_enlargement: if p_value < BIRGE_SIGNIFICANCE { birge_ratio.max(1.0) } else { 1.0 },
+        aliases,
     })
+}
+
+/// Degrees of freedom of a noise that follows from repeats; `None` for a noise that is known.
+fn freedom_of_noise(problem: &Problem, residuals: &[Vec<f64>]) -> Option<usize> {
+    let kept = |test: usize, row: usize| !problem.rejected[test][row];
+    (problem.noise.source == NoiseSource::Repeats).then(|| PureError::of(&problem.tests, residuals, kept).freedom)
 }
 
 /// Factor on the standard uncertainties: the Birge ratio `√(χ²/ν)` if it is significantly above 1, else 1.

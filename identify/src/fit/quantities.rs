@@ -21,6 +21,11 @@ pub(crate) fn rms_of_waves(coefficients: &[f64]) -> f64 {
     (0.5 * coefficients.iter().map(|c| c * c).sum::<f64>()).sqrt()
 }
 
+/// Standard uncertainty of an undetermined phase, °: the standard deviation of a uniform distribution over one turn.
+pub(crate) fn u_of_undetermined_phase_deg() -> f64 {
+    180.0 / 3.0_f64.sqrt()
+}
+
 /// The reported quantities in their order: those of the identifiable parameters.
 pub(crate) fn quantities(problem: &Problem, rank: &Rank) -> Vec<Quantity> {
     let list = &problem.parameters.list;

@@ -2,8 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use super::quantities::{Quantity, quantities, rms_of_waves};
+use super::outcome::{self, Determined};
+use super::quantities::{Quantity, quantities, rms_of_waves, u_of_undetermined_phase_deg};
 use super::{Fit, covariance, enlargement_warning};
+use super::{aliases, assume};
 use crate::circular;
 use crate::error::IdentifyError;
 use crate::heldout::figures::cross_validation;
@@ -31,12 +33,16 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> 
     warnings.extend(noise::stated_against_repeats(problem, &fit.residuals));
     warnings.extend(mislabelled_runs(&problem.tests));
     warnings.extend(enlargement_warning(fit.u_enlargement));
-    let parameters = parameters(problem, fit);
+    warnings.extend(assume::statements(problem));
+    let goodness = outcome::goodness(problem, fit);
+    let determined = Determined::of(problem, &fit.rank)?;
+    let mut parameters = parameters(problem, fit);
+    determined.mark(problem, &mut parameters, goodness);
     let noise_um = problem.noise.sigma_mm * 1e3;
     let circular = circular::of_session(&problem.session, problem.noise.sigma_mm, &problem.rejected);
     Ok(FitResult {
         noise_um,
-        noise_source: problem.noise.source.word().to_string(),
+        noise_source: problem.noise.source,
         noise_ar_coefficients: problem.noise.ar_coefficients.clone(),
         readings: problem.readings(),
         rms_um: rms * 1e3,
@@ -56,7 +62,8 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> 
         unobservable: unobservable(problem, &fit.rank),
         null_space: covariance::null_space(problem, &fit.rank),
         outliers: outliers(problem, fit),
-        conformity: conformity(&problem.session, &parameters, &circular, noise_um),
+        conformity: conformity(&problem.session, &parameters, &circular, noise_um, goodness.verdict),
+        outcome: outcome::outcome(problem, fit, goodness, &determined),
         circular,
         parameters,
         plausibility,
@@ -67,7 +74,7 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> 
     })
 }
 
-/// The identifiable parameters, in display units. A harmonic has amplitude and phase of
+/// The identifiable parameters, in display units, with uncertainties that cover aliases. A harmonic has amplitude and phase of
 /// `amplitude · cos(order · angle + phase)`.
 pub fn parameters(problem: &Problem, fit: &Fit) -> Vec<ParameterResult> {
     let list = &problem.parameters.list;
@@ -88,6 +95,7 @@ pub fn parameters(problem: &Problem, fit: &Fit) -> Vec<ParameterResult> {
             }
         }
     }
+    aliases::cover(&mut results, problem, fit);
     results
 }
 
@@ -143,11 +151,6 @@ fn amplitude_and_phase(problem: &Problem, fit: &Fit, j: usize) -> [ParameterResu
 /// The identifiers of parameters.
 pub(crate) fn ids(parameters: &[ParameterResult]) -> Vec<String> {
     parameters.iter().map(|parameter| parameter.id.clone()).collect()
-}
-
-/// Standard uncertainty of an undetermined phase, °: the standard deviation of a uniform distribution over one turn.
-pub(crate) fn u_of_undetermined_phase_deg() -> f64 {
-    180.0 / 3.0_f64.sqrt()
 }
 
 /// The null-space combinations, in display units and in words.

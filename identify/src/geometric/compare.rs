@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::{Estimate, Estimator, Method};
 use crate::error::IdentifyError;
 use crate::fit::{self, Fit};
+use crate::noise::NoiseSource;
 use crate::parameters::Role;
 use crate::problem::Problem;
 
@@ -85,7 +86,7 @@ pub struct Comparison {
     /// Standard uncertainty of a reading, µm.
     pub noise_um: f64,
     /// Source of the noise standard deviation.
-    pub noise_source: String,
+    pub noise_source: NoiseSource,
     /// Residual of the full fit, µm.
     pub rms_um: f64,
     /// Residual of the readings of the method with its estimates, set-ups nominal, µm.
@@ -171,7 +172,7 @@ pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Compariso
         method: method.word().into(),
         readings: problem.readings(),
         noise_um: problem.noise.sigma_mm * 1e3,
-        noise_source: problem.noise.source.word().into(),
+        noise_source: problem.noise.source,
         rms_um: crate::heldout::rms_mm(&problem, &full.residuals) * 1e3,
         method_rms_um: rms_um(&by_method),
         nominal_rms_um: rms_um(&vec![0.0; list.len()]),

@@ -19,6 +19,9 @@ mod waves;
 use abbe_model::session::Test;
 use abbe_model::session::readings::Readings;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 pub use autocorrelation::Autocorrelation;
 pub(crate) use autocorrelation::enlargement_of_mean;
 pub(crate) use stated::stated_against_repeats;
@@ -45,7 +48,8 @@ pub struct Noise {
 }
 
 /// Source of a noise standard deviation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
 pub enum NoiseSource {
     /// Stated in the session.
     Stated,
@@ -55,6 +59,8 @@ pub enum NoiseSource {
     Repeats,
     /// The residual of the model: noise and unmodelled effects.
     Residual,
+    /// The saved model that a session is compared with.
+    Model,
 }
 
 impl NoiseSource {
@@ -65,7 +71,19 @@ impl NoiseSource {
             NoiseSource::Assumed => "assumed",
             NoiseSource::Repeats => "repeats",
             NoiseSource::Residual => "residual",
+            NoiseSource::Model => "model",
         }
+    }
+
+    /// Whether the noise is known without the residual, so that the residual can be judged by it.
+    pub fn judges(self) -> bool {
+        matches!(self, NoiseSource::Stated | NoiseSource::Repeats | NoiseSource::Model)
+    }
+}
+
+impl std::fmt::Display for NoiseSource {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.word())
     }
 }
 

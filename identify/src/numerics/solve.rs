@@ -62,6 +62,17 @@ impl Directions {
         solution
     }
 
+    /// The solution of least norm of `min ‖c − A·x‖²` over the identifiable directions.
+    pub fn solve_identifiable(&self, c: &[f64]) -> Vec<f64> {
+        let mut solution = vec![0.0; self.right().nrows()];
+        for k in 0..self.identifiable_rank() {
+            let projected: f64 = self.left().col(k).iter().zip(c).map(|(u, c)| u * c).sum();
+            let along = projected / self.singular_values[k];
+            solution.iter_mut().zip(self.right().col(k).iter()).for_each(|(x, v)| *x += v * along);
+        }
+        solution
+    }
+
     /// By how much the undamped solution lowers `‖c − A·x‖²`.
     pub fn explained(&self, c: &[f64]) -> f64 {
         let along = |k: usize| self.left().col(k).iter().zip(c).map(|(u, c)| u * c).sum::<f64>();

@@ -2,7 +2,7 @@
 //!
 //! At real effect sizes the tail of χ² underflows, so that a search compares its logarithm.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Normal, StudentsT};
 use statrs::function::gamma::{gamma_ur, ln_gamma};
 
 /// `P(χ² > x)` for so many degrees of freedom; 1 for none.
@@ -13,6 +13,15 @@ pub fn chi_square_tail(x: f64, freedom: f64) -> f64 {
 /// `P(χ² < x)` and `P(χ² > x)`; `None` for no degrees of freedom.
 pub fn chi_square_tails(x: f64, freedom: f64) -> Option<[f64; 2]> {
     ChiSquared::new(freedom).ok().map(|law| [law.cdf(x), law.sf(x)])
+}
+
+/// `P(χ² > x)` for so many degrees of freedom; with a noise of so many degrees of freedom, that of the ratio
+/// `F = (χ²/ν)/1`.
+pub fn residual_tail(x: f64, freedom: f64, freedom_of_noise: Option<usize>) -> f64 {
+    match freedom_of_noise.map(|of_noise| FisherSnedecor::new(freedom, of_noise.max(1) as f64)) {
+        Some(Ok(law)) => law.sf(x / freedom),
+        _ => chi_square_tail(x, freedom),
+    }
 }
 
 /// The value that χ² exceeds with a probability; 0 for no degrees of freedom.

@@ -112,7 +112,7 @@ fn analyse_problem(problem: &Problem, travel_mm: f64) -> Result<PlanAnalysis, Id
     warnings.extend(collision::warnings(&problem.session, &clearances));
     Ok(PlanAnalysis {
         noise_um: problem.noise.sigma_mm * 1e3,
-        noise_source: problem.noise.source.word().to_string(),
+        noise_source: problem.noise.source,
         readings: problem.readings(),
         rank: linear.rank.identifiable_basis.ncols(),
         parameter_count: list.len(),

@@ -38,8 +38,12 @@ pub fn budget(problem: &Problem, linear: &Linearisation, error: usize) -> Vec<Co
         parts.push(Contribution { source: parameter.id.clone(), u: part.sqrt() * scale, share: part / variance });
     }
     let noise = noise_variance(linear, error);
-    parts.push(Contribution { source: "noise".to_string(), u: noise.sqrt() * scale, share: noise / variance });
-    parts.retain(|part| part.share >= MIN_SHARE || part.source == "noise");
+    parts.push(Contribution {
+        source: Contribution::NOISE.to_string(),
+        u: noise.sqrt() * scale,
+        share: noise / variance,
+    });
+    parts.retain(|part| part.share >= MIN_SHARE || part.is_noise());
     parts.sort_by(|a, b| largest_first((a.share, &a.source), (b.share, &b.source)));
     parts
 }

@@ -18,7 +18,7 @@ use faer::{Mat, MatRef};
 use super::detectability::{POWER, SIGNIFICANCE, corrected};
 use super::linear::{Linearisation, is_of_interest};
 use super::ranking::{largest_first, smallest_first};
-use super::results::{Bias, EffectDetectability, EffectsAnalysis};
+use super::results::{Bias, Detectability, EffectDetectability, EffectsAnalysis};
 use crate::candidates::columns::{Columns, EffectColumns, chunked};
 use crate::candidates::library::{self, LibraryEffect};
 use crate::error::IdentifyError;
@@ -130,8 +130,6 @@ struct EffectProjection<'m> {
     moved: MatRef<'m, f64>,
 }
 
-/// The verdict on an effect that moves no reading.
-const NO_SIGNAL: &str = "no signal";
 /// Phases whose information differs by less than this share of the largest count as equally weak.
 const EQUAL_WITHIN: f64 = 1e-6;
 
@@ -173,13 +171,13 @@ fn judge(
     let detectable = amplitude(threshold[0]);
     let confounded = surviving_share < CONFOUNDED_BELOW || detectable.is_none();
     let verdict = if !has_signal {
-        NO_SIGNAL
+        Detectability::NoSignal
     } else if !confounded {
-        "detectable"
+        Detectability::Detectable
     } else if strongest > CONFOUNDED_BELOW * largest_own {
-        "confounded at one phase"
+        Detectability::ConfoundedAtOnePhase
     } else {
-        "confounded"
+        Detectability::Confounded
     };
     Ok(EffectDetectability {
         id: effect.id(),
@@ -188,7 +186,7 @@ fn judge(
         detectable_amplitude: detectable,
         detectable_amplitude_screened: amplitude(threshold[1]),
         residual_share: surviving_share,
-        verdict: verdict.to_string(),
+        verdict,
         biases: biases(problem, products.moved, &unit),
     })
 }
@@ -241,7 +239,9 @@ fn grouped(
                 let needed = |entry: &EffectDetectability| entry.detectable_amplitude_screened.unwrap_or(f64::INFINITY);
                 let harder = smallest_first(needed(present), needed(&entry))
                     .then_with(|| smallest_first(entry.residual_share, present.residual_share))
-                    .then_with(|| (present.verdict == NO_SIGNAL).cmp(&(entry.verdict == NO_SIGNAL)));
+                    .then_with(|| {
+                        (present.verdict == Detectability::NoSignal).cmp(&(entry.verdict == Detectability::NoSignal))
+                    });
                 if harder.is_lt() {
                     *present = EffectDetectability { id: key, ..entry };
                 }
@@ -258,7 +258,7 @@ fn grouped(
 /// The confounded effects that bias each error most, by error. A small residual does not exclude these.
 pub fn confounded_by_error(analysis: &EffectsAnalysis) -> BTreeMap<String, Vec<(String, f64, String)>> {
     let mut by_error: BTreeMap<String, Vec<(String, f64, String)>> = BTreeMap::new();
-    for effect in analysis.effects.iter().filter(|effect| effect.verdict.starts_with("confounded")) {
+    for effect in analysis.effects.iter().filter(|effect| effect.verdict.is_confounded()) {
         for bias in &effect.biases {
             let entry = (effect.id.clone(), bias.per_unit, bias.unit.clone());
             by_error.entry(bias.id.clone()).or_default().push(entry);

@@ -5,14 +5,14 @@ use faer::Mat;
 
 use super::linear::{Linearisation, is_of_interest};
 use super::ranking::smallest_first;
-use super::results::{DeterminedByPrior, NearDependency};
+use super::results::NearDependency;
 use crate::error::IdentifyError;
 use crate::numerics::null_space::{combinations, echelon};
 use crate::numerics::rank::Rank;
 use crate::numerics::solve::Directions;
 use crate::parameters::{Parameter, Role};
 use crate::problem::Problem;
-use crate::results::Unobservable;
+use crate::results::{DeterminedByPrior, Unobservable};
 
 /// Coefficients below this value, relative to the largest, are rounding errors.
 const NEGLIGIBLE: f64 = 1e-5;

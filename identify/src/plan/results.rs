@@ -4,7 +4,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::collision::TestClearance;
-use crate::results::{Combination, Unobservable};
+use crate::noise::NoiseSource;
+use crate::results::{Combination, DeterminedByPrior, Unobservable};
 
 /// Identifiability and predicted uncertainties of planned tests.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -12,7 +13,7 @@ pub struct PlanAnalysis {
     /// Standard deviation of one scalar reading, µm.
     pub noise_um: f64,
     /// Source of `noise_um`: `stated` by session or user, `repeats` or `residual` of its readings, or `assumed`.
-    pub noise_source: String,
+    pub noise_source: NoiseSource,
     /// Number of readings.
     pub readings: usize,
     /// Numerical rank: number of independent combinations of the parameters that are identifiable.
@@ -113,6 +114,16 @@ pub struct Contribution {
     pub share: f64,
 }
 
+impl Contribution {
+    /// The `source` of the noise of the readings.
+    pub(super) const NOISE: &str = "noise";
+
+    /// Whether the noise of the readings contributes, not a set-up parameter.
+    pub fn is_noise(&self) -> bool {
+        self.source == Contribution::NOISE
+    }
+}
+
 /// An error that is correlated with an error.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct CorrelatedWith {
@@ -131,20 +142,6 @@ pub struct Curve {
     /// Change of the reading (for three coordinates: length of the vector) per unit of the error, in the unit of the
     /// sensitivity, evenly thinned.
     pub values: Vec<f64>,
-}
-
-/// An error that is confounded with set-up parameters and determined by their priors only.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct DeterminedByPrior {
-    /// The error.
-    pub error: String,
-    /// A change of the error and the set-up parameters in this proportion changes no reading. Display units; the error
-    /// first.
-    #[serde(serialize_with = "Combination::serialize_pairs")]
-    #[schemars(with = "Combination")]
-    pub combination: Vec<(String, f64)>,
-    /// Explanation in words.
-    pub why: String,
 }
 
 /// A combination of parameters whose columns are nearly collinear.
@@ -257,9 +254,49 @@ pub struct EffectDetectability {
     pub residual_share: f64,
     /// `detectable`; `confounded` with the parameters (less than a hundredth remains); `confounded at one phase`;
     /// `no signal` (these tests do not change with it).
-    pub verdict: String,
+    pub verdict: Detectability,
     /// The errors that it biases, the most biased first.
     pub biases: Vec<Bias>,
+}
+
+/// Whether planned tests detect an effect.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub enum Detectability {
+    /// They do.
+    #[serde(rename = "detectable")]
+    Detectable,
+    /// Less than a hundredth of its signal remains beside the parameters.
+    #[serde(rename = "confounded")]
+    Confounded,
+    /// The same at one phase only.
+    #[serde(rename = "confounded at one phase")]
+    ConfoundedAtOnePhase,
+    /// These tests do not change with it.
+    #[serde(rename = "no signal")]
+    NoSignal,
+}
+
+impl Detectability {
+    /// The words in results.
+    pub fn word(self) -> &'static str {
+        match self {
+            Detectability::Detectable => "detectable",
+            Detectability::Confounded => "confounded",
+            Detectability::ConfoundedAtOnePhase => "confounded at one phase",
+            Detectability::NoSignal => "no signal",
+        }
+    }
+
+    /// Whether it is confounded with the parameters, be it at one phase.
+    pub fn is_confounded(self) -> bool {
+        matches!(self, Detectability::Confounded | Detectability::ConfoundedAtOnePhase)
+    }
+}
+
+impl std::fmt::Display for Detectability {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.word())
+    }
 }
 
 /// Bias of an error by an effect.

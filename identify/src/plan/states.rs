@@ -77,7 +77,7 @@ pub(crate) fn noise_warning(noise: &Noise) -> Option<String> {
     let found = match noise.source {
         NoiseSource::Stated => return None,
         NoiseSource::Assumed => "is assumed",
-        NoiseSource::Repeats | NoiseSource::Residual => "is estimated from its data",
+        NoiseSource::Repeats | NoiseSource::Residual | NoiseSource::Model => "is estimated from its data",
     };
     Some(format!("the session states no `noise_um`: {:.2} µm {found}", noise.sigma_mm * 1e3))
 }

@@ -1,12 +1,58 @@
 //! Parameters with their uncertainties, covariance and null space, as JSON has them.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, Serializer};
 
 /// Coverage factor of the expanded uncertainty `U = k u` (JCGM 100, 6.2).
 const COVERAGE_FACTOR: f64 = 2.0;
+
+/// What determines the estimate of a parameter.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum DeterminedBy {
+    /// The readings.
+    #[default]
+    Readings,
+    /// Readings and set-up priors: the readings determine a sum of the parameter and set-up parameters, and only the
+    /// priors of these separate it.
+    Prior,
+    /// Nothing by itself: the readings determine a combination of it and others.
+    BaseCombination,
+    /// Nothing: no reading changes with it.
+    Nothing,
+}
+
+impl DeterminedBy {
+    /// The word in results.
+    pub fn word(self) -> &'static str {
+        match self {
+            DeterminedBy::Readings => "readings",
+            DeterminedBy::Prior => "prior",
+            DeterminedBy::BaseCombination => "base-combination",
+            DeterminedBy::Nothing => "nothing",
+        }
+    }
+}
+
+impl fmt::Display for DeterminedBy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.word())
+    }
+}
+
+/// An alias of an effect that enlarges an uncertainty.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct EnlargedBy {
+    /// The effect.
+    pub effect: String,
+    /// The alias that would change the parameter most in its place.
+    pub alias: String,
+    /// The change, in the unit of the parameter.
+    pub change: f64,
+}
 
 /// A value with its standard uncertainty.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -22,8 +68,19 @@ pub struct ParameterResult {
     /// Unit of `value`, `u` and `expanded_u`: `um`, `arcsec`, `deg`, …
     pub unit: String,
     /// Whether `|value|` exceeds `expanded_u`. For a phase: whether its amplitude does. `false` where `u` is not
-    /// quantified.
+    /// quantified, and where the readings alone do not determine the parameter.
     pub significant: bool,
+    /// What determines the estimate: the readings, or the set-up priors only.
+    pub determined_by: DeterminedBy,
+    /// Whether the estimate may be quoted with its uncertainty: the readings determine it, and the model lacks no
+    /// effect.
+    pub quotable: bool,
+    /// The aliases of effects that enlarge `u`, one for each effect, if any does.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub enlarged_by: Vec<EnlargedBy>,
+    /// Standard uncertainty without aliases, in `unit`, if an alias enlarges it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub u_without_aliases: Option<f64>,
     /// What the parameter is, in words: `C table: inclination of the axis about Y (squareness to X)`.
     pub meaning: String,
 }
@@ -38,6 +95,10 @@ impl ParameterResult {
             expanded_u: 0.0,
             unit: unit.into(),
             significant: false,
+            determined_by: DeterminedBy::Readings,
+            quotable: true,
+            enlarged_by: Vec::new(),
+            u_without_aliases: None,
             meaning: String::new(),
         };
         parameter.set_u(u);
@@ -53,7 +114,19 @@ impl ParameterResult {
     pub fn set_u(&mut self, u: f64) {
         self.u = u;
         self.expanded_u = COVERAGE_FACTOR * u;
-        self.significant = u > 0.0 && self.value.abs() > self.expanded_u;
+        self.significant = self.exceeds_u() && self.determined_by == DeterminedBy::Readings;
+    }
+
+    /// Whether `|value|` exceeds `expanded_u`, be it by the readings or by the set-up priors.
+    pub fn exceeds_u(&self) -> bool {
+        self.u > 0.0 && self.value.abs() > self.expanded_u
+    }
+
+    /// States what determines the estimate, and what follows from it.
+    pub fn set_determined_by(&mut self, determined_by: DeterminedBy) {
+        self.determined_by = determined_by;
+        self.quotable &= determined_by == DeterminedBy::Readings;
+        self.set_u(self.u);
     }
 }
 

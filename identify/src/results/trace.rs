@@ -7,7 +7,9 @@ use serde::{Serialize, Serializer};
 
 use super::Outlier;
 use super::cross_validation::CrossValidation;
+use super::outcome::{Goodness, Outcome, TraceVerdict};
 use super::parameter::{Covariance, NullSpace, ParameterResult, Unobservable};
+use crate::noise::NoiseSource;
 use crate::plausibility::Plausibility;
 use crate::tolerance::Conformity;
 
@@ -38,6 +40,8 @@ pub struct ModelResult {
     pub chi_square: f64,
     /// Degrees of freedom of χ²: scalar readings plus priors less rank.
     pub degrees_of_freedom: usize,
+    /// The residual against the noise, and whether estimates may be quoted.
+    pub goodness: Goodness,
     /// The identifiable parameters.
     pub parameters: Vec<ParameterResult>,
     /// Identifiers of all identifiable parameters, set-up parameters included.
@@ -144,6 +148,11 @@ pub struct AliasResult {
     pub delta_chi2: f64,
     /// Likelihood with the alias over likelihood with the found effect: exp(−`delta_chi2`/2).
     pub likelihood_ratio: f64,
+    /// Prior cost of the alias less that of the found effect, −ln of a probability: how much less plausible it is
+    /// mechanically.
+    pub prior_cost: f64,
+    /// Probability of the alias over that of the found effect: `likelihood_ratio` · exp(−`prior_cost`).
+    pub probability_ratio: f64,
 }
 
 /// An effect that the search has found.
@@ -184,7 +193,8 @@ pub struct EffectResult {
     /// All of these explanations in words, by part of the machine:
     /// `C table: axial motion twice per turn, or tilt about X once per turn`.
     pub explanations: String,
-    /// The competing explanations, nearest first. Those that predict left-out tests clearly worse come last.
+    /// The competing explanations, the most probable first, by likelihood and mechanical plausibility. Those that predict
+    /// left-out tests clearly worse come last.
     pub aliases: Vec<AliasResult>,
     /// Rms of the left-out tests that this effect predicts, µm, for an effect with aliases.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -292,8 +302,9 @@ pub struct ChangedParameter {
 /// Effects that the declared model lacks, and the model before and after they are added.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct TraceResult {
-    /// `clean`, `explained`, `partly-explained`, `unexplained`; `incomplete` for an interrupted trace.
-    pub verdict: String,
+    /// `clean`, `explained`, `partly-explained`, `unexplained`; `not-judged` without a known noise; `incomplete` for an
+    /// interrupted trace.
+    pub verdict: TraceVerdict,
     /// Whether the trace was interrupted. Effects may then be missing.
     pub interrupted: bool,
     /// The time limit that interrupted it, s; absent if none did.
@@ -305,7 +316,7 @@ pub struct TraceResult {
     pub noise_um: f64,
     /// Source of `noise_um`: `stated` by the session, `repeats` (repeated readings), or `residual` where there is
     /// neither. The residual of the model with its effects also holds what that model lacks.
-    pub noise_source: String,
+    pub noise_source: NoiseSource,
     /// Autoregressive coefficients of the noise along a run; empty for white noise.
     pub noise_ar_coefficients: Vec<f64>,
     /// Number of readings without outliers.
@@ -316,6 +327,9 @@ pub struct TraceResult {
     pub before: ModelResult,
     /// The model with the found effects.
     pub after: ModelResult,
+    /// What the result is worth: the residual of the model with the found effects against the noise, what determines
+    /// its estimates, what is assumed.
+    pub outcome: Outcome,
     /// The effects, in the order in which they were found.
     pub effects: Vec<EffectResult>,
     /// The residual of the model with the found effects.

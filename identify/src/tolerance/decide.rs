@@ -8,14 +8,16 @@ use super::results::{Conformity, ConformityItem};
 use super::rule::{Decision, Rule};
 use crate::circular::CircularTest;
 use crate::quantity::Given;
-use crate::results::ParameterResult;
+use crate::results::{GoodnessVerdict, ParameterResult};
 
-/// The decisions about the results of a session; `None` if it states no limits.
+/// The decisions about the results of a session; `None` if it states no limits. None is made about a parameter while the
+/// model lacks an effect, or cannot be judged.
 pub fn conformity(
     session: &Session,
     parameters: &[ParameterResult],
     circular: &[CircularTest],
     noise_um: f64,
+    goodness: GoodnessVerdict,
 ) -> Option<Conformity> {
     let Tolerance { probability, limits } = session.tolerance.as_ref()?;
     let items: Vec<ConformityItem> = limits
@@ -27,7 +29,12 @@ pub fn conformity(
                     figures::measured(session, circular, test, *figure, noise_um, *instrument_u_um)
                 }
             };
-            item(limit, *probability, measured)
+            let forbidden = match limit.of {
+                Toleranced::Parameter(_) => goodness.forbids_decisions(),
+                // A figure of a test follows from its readings without the model.
+                Toleranced::Figure { .. } => None,
+            };
+            item(limit, *probability, measured, forbidden)
         })
         .collect();
     let any = |decision: Decision| items.iter().any(|item| item.decision == decision);
@@ -49,7 +56,12 @@ fn of_parameter(parameters: &[ParameterResult], id: &str) -> Result<Measured, St
     Ok(Measured { values: vec![(found.value, found.u)], unit: found.unit.clone() })
 }
 
-fn item(limit: &Limit, probability: f64, measured: Result<Measured, String>) -> ConformityItem {
+fn item(
+    limit: &Limit,
+    probability: f64,
+    measured: Result<Measured, String>,
+    forbidden: Option<&str>,
+) -> ConformityItem {
     let in_unit = |value: f64, unit: &str| {
         Given { id: limit.of.to_string(), value, unit: limit.unit.to_string() }
             .in_unit(unit)
@@ -82,10 +94,12 @@ fn item(limit: &Limit, probability: f64, measured: Result<Measured, String>) -> 
             };
         }
     };
-    let (decision, zone) = (rule.decide(value), rule.acceptance_zone());
-    let why = (decision == Decision::Undecided).then(|| match zone {
-        None => "the uncertainty is too large for these limits: no measured value passes".to_string(),
-        Some(_) => "the value is nearer to a limit than its uncertainty allows".to_string(),
+    let zone = rule.acceptance_zone();
+    let decision = if forbidden.is_some() { Decision::Undecided } else { rule.decide(value) };
+    let why = (decision == Decision::Undecided).then(|| match (forbidden, zone) {
+        (Some(why), _) => why.to_string(),
+        (None, None) => "the uncertainty is too large for these limits: no measured value passes".to_string(),
+        (None, Some(_)) => "the value is nearer to a limit than its uncertainty allows".to_string(),
     });
     ConformityItem {
         id: limit.of.to_string(),

@@ -4,7 +4,8 @@
 //! model. Either its evidence is then at most 2 lower, or χ² is at most 4 higher: 2 in the log-likelihood. Every tuned
 //! number of the alias that the found effect does not have has to lower χ² by 4. Selected positions count with their
 //! penalty if the found effect has positions too. The alias also reproduces at least half of the found effect's signature in the readings. The search reports the
-//! candidate with the shortest description. The others are listed, nearest first.
+//! candidate with the shortest description. The others are listed, the most probable first: by likelihood and by mechanical
+//! plausibility ([`super::plausible`]).
 
 use std::cmp::Ordering;
 use std::collections::HashSet;
@@ -12,6 +13,7 @@ use std::collections::HashSet;
 use abbe_model::effect::Shape;
 
 use super::constants::{INDISTINGUISHABLE, MAX_COMPETING, MIN_COSINE};
+use super::plausible::prior_cost;
 use super::state::{ALL, SearchState};
 use crate::candidates::gain::{Gain, TrainedModel};
 use crate::error::IdentifyError;
@@ -26,8 +28,15 @@ pub(super) struct Alias {
     pub cosine: f64,
     /// Increase of χ² if the alias replaces the effect.
     pub delta_chi2: f64,
-    /// Coefficients of the model's base columns if the alias replaces the effect.
-    pub model_coefficients: Vec<f64>,
+    /// Its prior cost less that of the found effect ([`super::plausible`]).
+    pub prior_cost: f64,
+}
+
+impl Alias {
+    /// `ln` of its probability over that of the found effect, by likelihood and mechanical plausibility.
+    fn ln_probability_ratio(&self) -> f64 {
+        -0.5 * self.delta_chi2 - self.prior_cost
+    }
 }
 
 /// A candidate that competes with a found effect.
@@ -100,7 +109,7 @@ fn competing_effects(
     competing_effects
 }
 
-/// The aliases of the `k`-th selected effect, nearest first, and its competing explanations. `model` is the model
+/// The aliases of the `k`-th selected effect, the most probable first, and its competing explanations. `model` is the model
 /// without that effect.
 pub(super) fn aliases(
     search: &SearchState<'_>,
@@ -143,25 +152,23 @@ pub(super) fn aliases(
         })
         .map(|(candidate, gain)| (candidate, gain.gain))
         .collect();
-    let mut aliases = Vec::new();
+    let cost = |candidate: usize| prior_cost(search.effect(candidate));
+    let mut aliases: Vec<Alias> = Vec::new();
     for (candidate, gain) in near {
         let cosine = model.explained_by_signature(candidate, selected.candidate, &signature)?.sqrt();
         if cosine >= MIN_COSINE {
             let delta_chi2 = (of_named.gain - gain) / variance;
-            aliases.push(Alias {
-                candidate,
-                cosine,
-                delta_chi2,
-                model_coefficients: model.with_candidate(candidate)?.0,
-            });
+            let prior_cost = cost(candidate) - cost(selected.candidate);
+            aliases.push(Alias { candidate, cosine, delta_chi2, prior_cost });
         }
     }
     aliases.sort_by(|a, b| {
-        to_six_decimals(b.cosine)
-            .total_cmp(&to_six_decimals(a.cosine))
+        to_six_decimals(b.ln_probability_ratio())
+            .total_cmp(&to_six_decimals(a.ln_probability_ratio()))
+            .then_with(|| to_six_decimals(b.cosine).total_cmp(&to_six_decimals(a.cosine)))
             .then_with(|| simplest_first(search, a.candidate, b.candidate))
     });
-    // The nearest candidate represents all candidates with its identifier. Candidates with the found effect's own
+    // The most probable candidate represents all candidates with its identifier. Candidates with the found effect's own
     // identifier are excluded.
     let named = search.effect(selected.candidate).id();
     let mut ids = HashSet::from([named]);

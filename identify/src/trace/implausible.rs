@@ -9,7 +9,7 @@ use crate::error::IdentifyError;
 use crate::fit::{self, Fit};
 use crate::plausibility::{self, Plausibility, Pulls, is_another_session, with_set_ups_freed};
 use crate::problem::Problem;
-use crate::results::{Remainder, TraceResult};
+use crate::results::{Remainder, TraceResult, TraceVerdict};
 
 /// The contradictions between the readings and a session.
 pub(super) struct Contradicted {
@@ -78,7 +78,7 @@ impl Contradicted {
     /// The trace that ends before its search.
     pub fn outcome_without_search(&self, problem: Problem, fit: Fit) -> Result<TraceOutcome, IdentifyError> {
         let mut result = TraceResult {
-            verdict: "unexplained".to_string(),
+            verdict: TraceVerdict::Unexplained,
             remainder: Remainder {
                 structured: true,
                 p_value: 0.0,

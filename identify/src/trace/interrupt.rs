@@ -5,10 +5,7 @@ use super::{Progress, TraceOutcome};
 use crate::error::IdentifyError;
 use crate::fit::Fit;
 use crate::problem::Problem;
-use crate::results::TraceResult;
-
-/// The verdict of a trace that was interrupted.
-const INCOMPLETE: &str = "incomplete";
+use crate::results::{TraceResult, TraceVerdict};
 
 /// Asks the caller of a trace whether to continue.
 #[derive(Clone, Copy)]
@@ -28,7 +25,7 @@ impl TraceResult {
     /// Marks a result as that of an interrupted trace: a field, the verdict, and a warning.
     pub(crate) fn mark_interrupted(&mut self) {
         self.interrupted = true;
-        self.verdict = INCOMPLETE.to_string();
+        self.verdict = TraceVerdict::Incomplete;
         self.warnings.push(self.incompleteness());
     }
 

@@ -2,7 +2,7 @@
 
 use abbe_model::effect::Effect;
 
-use super::constants::{SCATTER, SINGLE};
+use super::constants::SINGLE;
 use super::remainder::{self, Structure};
 use super::start::Start;
 use super::state::SearchState;
@@ -73,11 +73,15 @@ fn selected_effects<'s>(search: &'s SearchState<'_>) -> impl Iterator<Item = &'s
     selected.map(|selected| search.effect(selected.candidate))
 }
 
+/// Relative difference of two standard deviations of the noise up to which the model is reported with that of a fit, so
+/// that a fit of the session with the found effects gives the same uncertainties.
+const SAME_NOISE: f64 = 0.1;
+
 /// Whether the search used a noise model from repeats along runs that differs from that of a fit: autocorrelated, or
 /// with another standard deviation.
 fn noise_is_from_residual(search: &Problem, fit: &Problem) -> bool {
     let (of_search, of_fit) = (&search.noise, &fit.noise);
-    let of_one_size = (of_search.sigma_mm / of_fit.sigma_mm - 1.0).abs() < SCATTER;
+    let of_one_size = (of_search.sigma_mm / of_fit.sigma_mm - 1.0).abs() < SAME_NOISE;
     of_search.source == NoiseSource::Repeats && !(of_search.ar_coefficients.is_empty() && of_one_size)
 }
 

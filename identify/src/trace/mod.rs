@@ -22,6 +22,7 @@ mod lines;
 mod moves;
 pub(crate) mod noise_model;
 mod null;
+mod plausible;
 mod policy;
 mod remainder;
 pub(crate) mod result;
@@ -73,6 +74,9 @@ pub struct TraceOptions {
     /// The noise model is estimated, which increases this probability. The documentation of the method gives measured
     /// rates.
     pub significance: f64,
+    /// Explanations that the user accepts, each by the identifier of a found effect or of one of its aliases, which then
+    /// takes its place. Uncertainties do not cover the other explanations.
+    pub assume: Vec<String>,
 }
 
 impl Default for TraceOptions {
@@ -84,6 +88,7 @@ impl Default for TraceOptions {
             exclude: Vec::new(),
             draws: 199,
             significance: SIGNIFICANCE,
+            assume: Vec::new(),
         }
     }
 }
@@ -165,8 +170,9 @@ pub fn trace(
     progress(Progress::Fitting);
     let mut found = without_conformity(session, options, progress)?;
     let (after, noise_um) = (&found.after, found.result.noise_um);
+    let goodness = found.result.outcome.goodness.verdict;
     let circular = circular::of_session(&after.session, after.noise.sigma_mm, &after.rejected);
-    found.result.conformity = conformity(&after.session, &found.result.after.parameters, &circular, noise_um);
+    found.result.conformity = conformity(&after.session, &found.result.after.parameters, &circular, noise_um, goodness);
     Ok(found)
 }
 
@@ -319,14 +325,15 @@ fn trace_or_interrupted(
         // The effects found so far are fitted. Their residual is not tested for structure.
         None => (None, RefittedModel::of(problem, before_fit, &search, options, None)?),
     };
-    let RefittedModel { after, after_fit, effects, structure: structure_after } = judged;
+    let RefittedModel { after, after_fit, structure: structure_after, .. } = judged;
     let mut reported = result::report(&result::TraceFindings {
         before: problem,
         before_fit,
         after: &after,
         after_fit: &after_fit,
         search: &search,
-        start: &start,
+        assume: &options.assume,
+        seed: options.seed,
         structure_before,
         structure_after: structure_after.as_ref(),
         last_p_value: ended.unwrap_or(1.0),
@@ -341,9 +348,9 @@ fn trace_or_interrupted(
     Ok(TraceOutcome {
         before: problem.clone(),
         before_fit: before_fit.clone(),
-        after,
-        after_fit,
-        effects,
+        effects: reported.after.parameters.effects[problem.parameters.effects.len()..].to_vec(),
+        after: reported.after,
+        after_fit: reported.after_fit,
         alias_effects: reported.alias_effects,
         competing_effects: reported.competing_effects,
         steps: record.steps,

@@ -45,8 +45,8 @@ pub(super) struct KnownErrors<'m> {
     pub columns: Vec<usize>,
     /// Effects of the model that do not belong to the machine.
     pub not_carried: Vec<String>,
-    /// Where the noise comes from: `stated`, `repeats` or `model`.
-    pub noise_source: &'static str,
+    /// Where the noise comes from: stated, repeats or the model.
+    pub noise_source: NoiseSource,
 }
 
 /// The session linearised at known errors and an estimated set-up.
@@ -176,7 +176,7 @@ impl<'m> KnownErrors<'m> {
                 }
             }
             if problem.noise.source == NoiseSource::Repeats {
-                self.noise_source = NoiseSource::Repeats.word();
+                self.noise_source = NoiseSource::Repeats;
             }
             settled &= !estimated;
             if settled {
@@ -189,7 +189,7 @@ impl<'m> KnownErrors<'m> {
             let lacking = self.model.quality.heldout_rms_um * 1e-3;
             if problem.noise.sigma_mm < lacking {
                 problem.noise = Noise::white(lacking, NoiseSource::Residual);
-                self.noise_source = "model";
+                self.noise_source = NoiseSource::Model;
                 beta = minimum(&problem, None)?.beta;
             }
         }
@@ -298,7 +298,7 @@ impl<'m> KnownErrors<'m> {
 
     /// A warning if the noise is not that of the session.
     pub fn noise_warning(&self) -> Option<String> {
-        (self.noise_source == "model").then(|| {
+        (self.noise_source == NoiseSource::Model).then(|| {
             format!(
                 "the model's {} of {:.2} µm counts as noise",
                 match self.model.noise.source {
@@ -317,9 +317,9 @@ fn whitened_readings(problem: &Problem) -> usize {
 }
 
 /// The noise before repeats are examined, and its source.
-fn first_noise(model: &IdentifiedModel, session: &Session) -> (Noise, &'static str) {
+fn first_noise(model: &IdentifiedModel, session: &Session) -> (Noise, NoiseSource) {
     if let Some(sigma) = session.noise_mm.filter(|sigma| *sigma > 0.0) {
-        return (Noise::white(sigma, NoiseSource::Stated), NoiseSource::Stated.word());
+        return (Noise::white(sigma, NoiseSource::Stated), NoiseSource::Stated);
     }
     let noise = match model.noise.source {
         // A residual contains what the model lacks; on readings that it has not seen, that is the held-out error.
@@ -327,9 +327,9 @@ fn first_noise(model: &IdentifiedModel, session: &Session) -> (Noise, &'static s
             Noise::white((model.quality.heldout_rms_um * 1e-3).max(model.noise.sigma_mm), NoiseSource::Residual)
         }
         // The inflation belongs to the likelihood of the model's families; it is no noise.
-        NoiseSource::Stated | NoiseSource::Assumed | NoiseSource::Repeats => {
+        NoiseSource::Stated | NoiseSource::Assumed | NoiseSource::Repeats | NoiseSource::Model => {
             Noise { source: NoiseSource::Residual, inflation: 1.0, ..model.noise.clone() }
         }
     };
-    (noise, "model")
+    (noise, NoiseSource::Model)
 }

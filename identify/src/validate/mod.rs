@@ -26,8 +26,8 @@ use crate::model_file::{IdentifiedModel, range};
 use crate::parameters::Role;
 use known::KnownErrors;
 use prediction::Prediction;
-pub use results::ValidationResult;
 use results::{InRangeResult, RmsResult, ValidatedModel, WithoutResult};
+pub use results::{ValidationResult, ValidationVerdict};
 use verdict::{Evidence, verdict};
 
 /// A validated model: what plots and tables need beside the result.
@@ -130,13 +130,13 @@ pub fn validate(model: &IdentifiedModel, session: &Session) -> Result<Validation
     warnings.extend(known.noise_warning());
     let prediction = &all.prediction;
     let result = ValidationResult {
-        verdict: verdict(&evidence).to_string(),
+        verdict: verdict(&evidence),
         readings,
         readings_in_range,
         outside: left,
         outliers: rejected.iter().flatten().filter(|rejected| **rejected).count(),
         noise_um: known.set_up.noise.sigma_mm * 1e3,
-        noise_source: known.noise_source.to_string(),
+        noise_source: known.noise_source,
         nominal: RmsResult::of(&nominal),
         locations: RmsResult::of(&locations),
         model: ValidatedModel {

@@ -10,15 +10,14 @@
 //! The interval `±1.96 s` covers the residual with a probability of 95 %.
 
 use faer::Mat;
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::known::{KnownErrors, Linearised};
 use crate::error::IdentifyError;
-use crate::noise::PureError;
+use crate::noise::{NoiseSource, PureError};
 use crate::numerics::parallel;
 use crate::numerics::solve::{Directions, solve_square};
 use crate::numerics::symmetric::Symmetric;
-use crate::numerics::tails::{chi_square_tail, normal_quantile};
+use crate::numerics::tails::{normal_quantile, residual_tail};
 use crate::numerics::tolerances::MIN_IDENTIFIABLE;
 
 /// Probability of the intervals.
@@ -68,7 +67,7 @@ impl Prediction {
             }
         }
         let freedom_of_noise = match known.noise_source {
-            "repeats" => {
+            NoiseSource::Repeats => {
                 let kept = |test: usize, row: usize| !known.full.rejected[test][row];
                 Some(PureError::of(&known.full.tests, &residuals, kept).freedom)
             }
@@ -80,7 +79,7 @@ impl Prediction {
             coverage_95: inside as f64 / count.max(1) as f64,
             chi_square,
             freedom,
-            p_value: tail(chi_square, freedom as f64, freedom_of_noise),
+            p_value: residual_tail(chi_square, freedom as f64, freedom_of_noise),
         })
     }
 
@@ -93,14 +92,6 @@ impl Prediction {
     pub fn is_as_predicted(&self) -> bool {
         let small = self.ratio() <= LARGEST_RATIO || self.p_value >= SIGNIFICANCE;
         small && self.coverage_95 >= LEAST_COVERAGE
-    }
-}
-
-/// `P(χ² > x)`; with a noise of so many degrees of freedom, that of the ratio `F = (χ²/ν)/1`.
-fn tail(chi_square: f64, freedom: f64, freedom_of_noise: Option<usize>) -> f64 {
-    match freedom_of_noise.map(|of_noise| FisherSnedecor::new(freedom, of_noise.max(1) as f64)) {
-        Some(Ok(law)) => law.sf(chi_square / freedom),
-        _ => chi_square_tail(chi_square, freedom),
     }
 }
 

@@ -1,16 +1,51 @@
 //! The result of a validation, as JSON has it.
 
+use std::fmt;
+
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::known::Rms;
+use crate::noise::NoiseSource;
 use crate::results::ParameterResult;
+
+/// The verdict on a saved model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ValidationVerdict {
+    /// All readings are consistent with the model.
+    Holds,
+    /// Those inside the range of the model's data are.
+    HoldsInRange,
+    /// Neither, but the model is better than the location errors alone.
+    Degraded,
+    /// Neither, and the model is no better than those.
+    DoesNotHold,
+}
+
+impl ValidationVerdict {
+    /// The word in results.
+    pub fn word(self) -> &'static str {
+        match self {
+            ValidationVerdict::Holds => "holds",
+            ValidationVerdict::HoldsInRange => "holds-in-range",
+            ValidationVerdict::Degraded => "degraded",
+            ValidationVerdict::DoesNotHold => "does-not-hold",
+        }
+    }
+}
+
+impl fmt::Display for ValidationVerdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.word())
+    }
+}
 
 /// A saved model against readings that it never saw.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ValidationResult {
     /// `holds`, `holds-in-range`, `degraded` or `does-not-hold`.
-    pub verdict: String,
+    pub verdict: ValidationVerdict,
     /// Number of readings without outliers.
     pub readings: usize,
     /// Number of them inside the range of the model's data.
@@ -23,7 +58,7 @@ pub struct ValidationResult {
     pub noise_um: f64,
     /// Source of `noise_um`: `repeats` or `stated` by the session, or `model`: the noise of the model's readings where
     /// the session has neither; the model's held-out rms where the model's readings have neither.
-    pub noise_source: String,
+    pub noise_source: NoiseSource,
     /// The machine without errors.
     pub nominal: RmsResult,
     /// Location errors as the model's readings give them without any effect.

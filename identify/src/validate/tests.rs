@@ -1,3 +1,4 @@
+use crate::noise::NoiseSource;
 use std::path::Path;
 
 use abbe_model::component::ErrorName;
@@ -102,7 +103,7 @@ fn the_inflation_of_families_is_no_noise() {
     let mut inflated = model.clone();
     inflated.noise.inflation = 40.0;
     let [plain, inflated] = [&model, &inflated].map(|model| validate(model, &second).unwrap().result);
-    assert_eq!(plain.noise_source, "model");
+    assert_eq!(plain.noise_source, NoiseSource::Model);
     assert_eq!(inflated.model, plain.model);
     assert_eq!(inflated.verdict, plain.verdict);
 }

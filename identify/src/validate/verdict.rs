@@ -15,6 +15,8 @@
 //!
 //! A model without effects is compared with the nominal machine.
 
+use super::results::ValidationVerdict;
+
 /// What the verdict follows from.
 pub(super) struct Evidence {
     /// Whether all readings are consistent with the model.
@@ -27,12 +29,12 @@ pub(super) struct Evidence {
     pub better_than_reference: bool,
 }
 
-/// The verdict as a word.
-pub(super) fn verdict(evidence: &Evidence) -> &'static str {
+/// The verdict.
+pub(super) fn verdict(evidence: &Evidence) -> ValidationVerdict {
     match evidence {
-        Evidence { all: true, .. } => "holds",
-        Evidence { in_range: Some(true), as_predicted: false, .. } => "holds-in-range",
-        Evidence { better_than_reference: true, .. } => "degraded",
-        _ => "does-not-hold",
+        Evidence { all: true, .. } => ValidationVerdict::Holds,
+        Evidence { in_range: Some(true), as_predicted: false, .. } => ValidationVerdict::HoldsInRange,
+        Evidence { better_than_reference: true, .. } => ValidationVerdict::Degraded,
+        _ => ValidationVerdict::DoesNotHold,
     }
 }

@@ -49,13 +49,34 @@ pub struct Effect {
     pub tests: Vec<String>,
     /// The prior of its coefficients.
     pub prior: CoefficientPrior,
+    /// The effects that explain the readings equally well in its place, the most probable first. Uncertainties cover
+    /// what each would change. An alias has no aliases of its own.
+    pub aliases: Vec<Effect>,
+    /// Whether the effect is taken for the explanation on the user's word, so that uncertainties do not cover its
+    /// aliases.
+    pub assumed: bool,
 }
 
 impl Effect {
     /// An effect in all tests, with the prior of its shape.
     pub fn new(component: Component, driver: Driver, shape: Shape) -> Effect {
         let prior = CoefficientPrior::default_of(&shape);
-        Effect { component, driver, shape, tests: Vec::new(), prior }
+        Effect { component, driver, shape, tests: Vec::new(), prior, aliases: Vec::new(), assumed: false }
+    }
+
+    /// The effect without its aliases.
+    pub fn alone(&self) -> Effect {
+        Effect { aliases: Vec::new(), assumed: false, ..self.clone() }
+    }
+
+    /// Whether another effect is the same, whatever the aliases of both.
+    pub fn is_same(&self, other: &Effect) -> bool {
+        self.alone() == other.alone()
+    }
+
+    /// The aliases that uncertainties cover: none if the effect is assumed.
+    pub fn covered_aliases(&self) -> &[Effect] {
+        if self.assumed { &[] } else { &self.aliases }
     }
 
     /// The family whose prior standard deviation is estimated from the readings: the one that it names, or its own

@@ -4,7 +4,7 @@
 use abbe::identify::fit::Fit;
 use abbe::identify::plan::candidate_tests;
 use abbe::identify::problem::Problem;
-use abbe::identify::results::{FitMonteCarlo, FitResult};
+use abbe::identify::results::{FitMonteCarlo, FitResult, GoodnessVerdict, Statements};
 use abbe::model::words::counted;
 
 use crate::cli::screen::{self, Step, command};
@@ -17,30 +17,32 @@ use crate::report::parameters::Estimates;
 
 /// Prints the result of a fit of a session. With `all`, no list is folded.
 pub fn print(problem: &Problem, fit: &Fit, result: &FitResult, session: &SessionArguments, all: bool) {
+    let statements = Statements::of_fit(problem, result);
     screen::print_conflicts(&result.plausibility);
+    screen::print_statements("Goodness of fit", &statements, result.degrees_of_freedom, session);
     quality(result);
     let estimates = Estimates::new(problem, fit, &result.parameters);
     match &result.monte_carlo {
         Some(drawn) => print_drawn(drawn, &estimates, all),
-        None => screen::print_estimates(&estimates, all),
+        None => screen::print_estimates(&estimates, result.outcome.goodness, all),
     }
     if let Some(base) = &result.base {
         output::print(&base_parameters(base));
         say!("{}", base_statement(base));
     }
+    screen::print_corrections(&statements, all);
     screen::print_circular(&result.circular, all);
     screen::print_conformity(result.conformity.as_ref());
-    screen::print_missing(&result.unobservable, &result.outliers, all);
+    screen::print_missing(&result.unobservable, &result.outcome.determined_by_prior, &result.outliers, all);
     screen::print_next(&next(problem, result, session));
 }
 
 /// Goodness of fit, held-out error and rank.
 fn quality(result: &FitResult) {
-    say!("Goodness of fit: {}", present::agreement(result));
     say!(
         "{}, {}; residual {} rms, held out {} rms (leaving out {})",
         counted(result.readings, "reading"),
-        present::noise(result.noise_um, &result.noise_source),
+        present::noise(result.noise_um, result.noise_source),
         micrometres(result.rms_um),
         micrometres(result.heldout_rms_um),
         result.heldout_by
@@ -69,11 +71,12 @@ fn next(problem: &Problem, result: &FitResult, session: &SessionArguments) -> Ve
     if !result.plausibility.conflicts.is_empty() {
         steps.push(("correct the session".into(), "the readings contradict it".into()));
     }
-    if result.u_enlargement > 1.0 || result.noise_source == "residual" {
+    let goodness = result.outcome.goodness.verdict;
+    if goodness.forbids_decisions().is_some() {
         let purpose = "find the unmodelled effect behind the residual";
         steps.push((command("trace", session, ""), purpose.into()));
     }
-    if result.noise_source == "residual" {
+    if goodness == GoodnessVerdict::NotJudged {
         let step = "state `noise_um` or repeat a run";
         steps.push((step.into(), "χ² then judges the model".into()));
     }

@@ -64,7 +64,7 @@ pub fn print(found: &GlobalAnalysis) {
         found.samples,
         found.evaluations,
         found.inputs.len(),
-        noise(found.noise_um, &found.noise_source)
+        noise(found.noise_um, found.noise_source)
     );
     output::print(&present::errors(found));
     output::print(&present::indices(found));

@@ -6,6 +6,7 @@ pub mod patterns;
 mod poses;
 mod screen;
 
+use abbe::identify::noise::NoiseSource;
 use abbe::identify::plan::clearance::Clearance;
 use abbe::identify::plan::poses::without_place;
 use abbe::identify::plan::{self, PlanOptions};
@@ -184,7 +185,7 @@ pub struct NextTest {
     /// Standard deviation of one scalar reading, µm.
     noise_um: f64,
     /// Source of `noise_um`: `stated` by session or user, `repeats` or `residual` of its readings, or `assumed`.
-    noise_source: String,
+    noise_source: NoiseSource,
     /// The tests that `--improve` or `--separate` proposes.
     #[serde(skip_serializing_if = "Option::is_none")]
     improvement: Option<plan::improve::Improvement>,
@@ -201,8 +202,8 @@ fn next_test(
 ) -> Result<(), Failure> {
     let (complete, noise) = plan::prepared(session, options)?;
     let problem = plan::states::problem_by_test(&complete, noise)?;
-    let (noise_um, noise_source) = (problem.noise.sigma_mm * 1e3, problem.noise.source.word().to_string());
-    let of_noise = crate::report::fit::noise(noise_um, &noise_source);
+    let (noise_um, noise_source) = (problem.noise.sigma_mm * 1e3, problem.noise.source);
+    let of_noise = crate::report::fit::noise(noise_um, noise_source);
     let improvement = if arguments.improve.asked() {
         let improvement = arguments.improve.run(&problem)?;
         if tables {

@@ -6,6 +6,7 @@ use abbe::model::words::counted;
 
 use crate::cli::screen::{self, Step, command};
 use crate::cli::{SessionArguments, output};
+use crate::report::confounded::{BY_PRIOR, by_prior};
 use crate::report::fit::noise;
 use crate::report::number::with_symbols;
 use crate::report::plan::verdict::verdict;
@@ -42,7 +43,7 @@ fn header(analysis: &PlanAnalysis) {
         counted(analysis.readings, "reading"),
         counted(analysis.tests.len(), "test"),
         counted(analysis.setup_count, "set-up"),
-        noise(analysis.noise_um, &analysis.noise_source)
+        noise(analysis.noise_um, analysis.noise_source)
     );
 }
 
@@ -58,11 +59,7 @@ fn unidentifiable(analysis: &PlanAnalysis, all: bool) {
         "Confounded: null-space directions, which leave every reading unchanged:",
         null_space.map(|item| with_symbols(&item.why)).collect(),
     );
-    let by_setup = analysis.determined_by_prior.iter();
-    list(
-        "Determined by the set-up priors only, because the readings alone do not separate them:",
-        by_setup.map(|item| with_symbols(&item.why)).collect(),
-    );
+    list(BY_PRIOR, by_prior(&analysis.determined_by_prior));
     let near = analysis.nearly_collinear.iter();
     list("Nearly collinear:", near.map(|item| with_symbols(&item.why)).collect());
 }

@@ -1,7 +1,7 @@
 //! The first screen of `abbe trace`: verdict and uniqueness, the residual before and after, the effects with their
 //! aliases, the next measurement.
 
-use abbe::identify::results::{AliasResult, EffectResult, TraceResult};
+use abbe::identify::results::{AliasResult, EffectResult, Statements, TraceResult};
 use abbe::identify::trace::TraceOutcome;
 use abbe::model::words::counted;
 
@@ -15,7 +15,10 @@ use crate::report::{trace as present, uniqueness};
 /// Prints the result of a trace of a session. With `all`, no list is folded.
 pub fn print(trace: &TraceOutcome, session: &SessionArguments, all: bool) {
     let result = &trace.result;
+    let statements = Statements::of_trace(&trace.after, result);
     verdict(result);
+    screen::print_statements("Goodness of fit", &statements, result.after.degrees_of_freedom, session);
+    readings(result);
     screen::print_conflicts(&result.plausibility);
     say!("Residual of the declared model: {}", result.residual_before);
     say!("");
@@ -30,23 +33,28 @@ pub fn print(trace: &TraceOutcome, session: &SessionArguments, all: bool) {
     };
     let mut estimates = Estimates::new(&trace.after, &trace.after_fit, &result.after.parameters);
     estimates.errors.retain(|parameter| !with_its_effect(&parameter.id));
-    screen::print_estimates(&estimates, all);
-    if result.effects.iter().any(|effect| !effect.unique) {
+    screen::print_estimates(&estimates, result.outcome.goodness, all);
+    if result.after.parameters.iter().any(|parameter| !parameter.enlarged_by.is_empty()) {
         say!("  u covers the change of the parameter if an alias takes the place of an effect");
     }
+    screen::print_corrections(&statements, all);
     changes(result, all);
     screen::print_conformity(result.conformity.as_ref());
-    screen::print_missing(&result.unobservable, &result.outliers, all);
+    screen::print_missing(&result.unobservable, &result.outcome.determined_by_prior, &result.outliers, all);
     measure_next(result);
     screen::print_next(&next(result, session));
 }
 
-/// The verdict and the number of effects, then the uniqueness of the effects, then readings, noise and candidates.
+/// The verdict and the number of effects, then their uniqueness.
 fn verdict(result: &TraceResult) {
     say!("Verdict: {}, {}", result.verdict, counted(result.effects.len(), "effect"));
     if let Some(headline) = uniqueness::headline(result) {
         say!("{headline}");
     }
+}
+
+/// Readings, noise and candidates.
+fn readings(result: &TraceResult) {
     say!(
         "{}, {}; {} of {} detectable",
         counted(result.readings, "reading"),
@@ -121,7 +129,7 @@ fn measure_next(result: &TraceResult) {
     if sentences.is_empty() {
         return;
     }
-    say!("\nWhat to measure next:");
+    say!("\nTests that separate an effect from its aliases:");
     for sentence in sentences {
         say!("  {sentence}");
     }

@@ -6,7 +6,7 @@ use abbe_identify::noise::{Noise as NoiseModel, NoiseSource};
 use abbe_identify::parameters::{Parameter, Role, largest_plausible_share};
 use abbe_identify::problem::Problem;
 use abbe_identify::quantity::Given;
-use abbe_identify::results::ParameterResult;
+use abbe_identify::results::{ParameterResult, TraceVerdict};
 use abbe_identify::simulate::{Simulation, simulate};
 use abbe_identify::trace::screening::screened_effects;
 use abbe_identify::trace::{Progress, TraceOptions, trace};
@@ -52,7 +52,7 @@ pub struct Draw {
     /// Whether the plan does not observe the effect: it is confounded with the plan's parameters. Nothing is simulated.
     pub not_observed: bool,
     /// Verdict of the trace.
-    pub verdict: Option<String>,
+    pub verdict: Option<TraceVerdict>,
     /// Whether the true effect was found: named, or among the aliases of a found effect, by its name or as an effect
     /// that changes the readings equally.
     pub found: bool,
@@ -197,7 +197,7 @@ impl Study {
             Analysis::Trace => {
                 let options = TraceOptions { seed, ..TraceOptions::default() };
                 let found = trace(session, &options, &|_: Progress| goes_on())?;
-                draw.verdict = Some(found.result.verdict.clone());
+                draw.verdict = Some(found.result.verdict);
                 draw.rms_um = found.result.after.rms_um;
                 draw.compare(&found.result.after.parameters, &truth.locations);
                 let is_named = |effect: &Effect| truth.effect.as_ref().is_some_and(|own| own.id == effect.id());

@@ -4,7 +4,7 @@ use abbe::identify::IdentifyError;
 use abbe::identify::fit::Fit;
 use abbe::identify::plan::candidate_tests;
 use abbe::identify::problem::Problem;
-use abbe::identify::results::FitResult;
+use abbe::identify::results::{FitResult, GoodnessVerdict};
 use abbe::identify::series::{spectrum, views};
 use abbe::model::words::counted;
 use maud::{Markup, html};
@@ -23,7 +23,7 @@ fn method(result: &FitResult) -> String {
         "Least squares on the kinematic chain. All parameters are estimated together in the identifiable subspace. The \
          covariance follows from the law of propagation of uncertainty (JCGM 100, JCGM 102). {}. Held-out error: each \
          fold leaves out {}.",
-        noise_sentence(result.noise_um, &result.noise_source),
+        noise_sentence(result.noise_um, result.noise_source),
         result.heldout_by
     )
 }
@@ -82,12 +82,14 @@ fn verdict(result: &FitResult) -> String {
             result.rank
         ),
     };
-    let agreement = if result.noise_source == "residual" {
-        "The noise is estimated from the residual, so that the residual cannot test the model. `abbe trace` searches for unmodelled effects.".to_string()
-    } else if result.u_enlargement > 1.0 {
-        format!("The residual exceeds the noise by a factor of {:.2}: the model lacks an effect.", result.u_enlargement)
-    } else {
-        "The residual agrees with the noise.".to_string()
+    let agreement = match result.outcome.goodness.verdict {
+        GoodnessVerdict::NotJudged => "The noise is estimated from the residual, so that the residual cannot test the model. `abbe trace` searches for unmodelled effects.".to_string(),
+        GoodnessVerdict::Exceeds | GoodnessVerdict::Structured => format!(
+            "The residual exceeds the noise by a factor of {:.2}: the model lacks an effect, and its estimates are not to be quoted.",
+            result.u_enlargement
+        ),
+        GoodnessVerdict::NoiseOverstated => "The residual is smaller than the noise: the noise is overstated.".to_string(),
+        GoodnessVerdict::Agrees => "The residual agrees with the noise.".to_string(),
     };
     format!("{identifiable} {agreement}")
 }
@@ -103,7 +105,7 @@ fn key_figures(problem: &Problem, result: &FitResult) -> Vec<KeyFigure> {
         rank: result.rank,
         parameters: result.parameter_count,
         noise_um: result.noise_um,
-        noise_source: &result.noise_source,
+        noise_source: result.noise_source,
     };
     let mut figures = vec![
         summary::chi_square(&quality, None),

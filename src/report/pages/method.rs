@@ -20,7 +20,7 @@ fn method(result: &Comparison) -> String {
          methods are applied to noise-free readings that are simulated with the errors of the full fit; these errors \
          are subtracted.",
         result.method,
-        noise_sentence(result.noise_um, &result.noise_source)
+        noise_sentence(result.noise_um, result.noise_source)
     )
 }
 

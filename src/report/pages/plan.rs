@@ -94,7 +94,7 @@ fn key_figures(problem: &Problem, analysis: &PlanAnalysis) -> Vec<KeyFigure> {
     figures.push(KeyFigure::new(
         "Readings",
         integer(analysis.readings),
-        format!("{}; {}", counted(problem.tests.len(), "test"), noise(analysis.noise_um, &analysis.noise_source)),
+        format!("{}; {}", counted(problem.tests.len(), "test"), noise(analysis.noise_um, analysis.noise_source)),
     ));
     figures
 }

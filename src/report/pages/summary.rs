@@ -1,5 +1,6 @@
 //! Key figures of the summary: agreement of residual and noise, held-out error, rank and readings.
 
+use abbe::identify::noise::NoiseSource;
 use abbe::identify::problem::Problem;
 use abbe::identify::results::CrossValidation;
 use abbe::model::words::counted;
@@ -27,8 +28,8 @@ pub struct Quality<'r> {
     pub parameters: usize,
     /// Noise standard deviation of one scalar reading, µm.
     pub noise_um: f64,
-    /// Source of the noise: `stated`, `repeats` or `residual`.
-    pub noise_source: &'r str,
+    /// Source of the noise.
+    pub noise_source: NoiseSource,
 }
 
 impl Quality<'_> {
@@ -39,7 +40,7 @@ impl Quality<'_> {
 
     /// Whether the noise is known independently of the residual, so that χ²/ν is a test of the model.
     pub fn is_testable(&self) -> bool {
-        self.noise_source != "residual"
+        self.noise_source.judges()
     }
 
     fn ratio(&self) -> String {
@@ -107,9 +108,9 @@ pub fn readings(problem: &Problem, readings: usize, outliers: usize) -> KeyFigur
 }
 
 /// The noise of a result and its source. The residual of a model is not called noise.
-pub fn noise_sentence(noise_um: f64, source: &str) -> String {
+pub fn noise_sentence(noise_um: f64, source: NoiseSource) -> String {
     match source {
-        "residual" => format!(
+        NoiseSource::Residual => format!(
             "No noise is stated and there are no repeated readings. The uncertainties follow from the residual of the model, {}",
             micrometres(noise_um)
         ),

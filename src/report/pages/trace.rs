@@ -2,7 +2,7 @@
 
 use abbe::identify::IdentifyError;
 use abbe::identify::plan::candidate_tests;
-use abbe::identify::results::{ModelResult, TraceResult};
+use abbe::identify::results::{GoodnessVerdict, ModelResult, TraceResult, TraceVerdict};
 use abbe::identify::series::{spectrum, views};
 use abbe::identify::trace::TraceOutcome;
 use abbe::model::words::counted;
@@ -26,9 +26,19 @@ fn method(result: &TraceResult) -> String {
          out {}; the search is repeated in each fold.",
         integer(result.candidates),
         integer(result.candidates_detectable),
-        noise_sentence(result.noise_um, &result.noise_source),
+        noise_sentence(result.noise_um, result.noise_source),
         result.heldout_by
     )
+}
+
+/// What remains of the residual.
+fn remains(result: &TraceResult) -> &'static str {
+    match result.outcome.goodness.verdict {
+        GoodnessVerdict::Exceeds if !result.remainder.structured => {
+            "The residual exceeds the noise: the model lacks an effect, and its estimates are not to be quoted."
+        }
+        _ => "Structure remains: the model lacks an effect, and its estimates are not to be quoted.",
+    }
 }
 
 /// Verdict as a sentence.
@@ -37,14 +47,21 @@ fn verdict(result: &TraceResult) -> String {
         1 => "1 effect explains".to_string(),
         n => format!("{n} effects explain"),
     };
-    let sentence = match result.verdict.as_str() {
-        "clean" => "The residual of the declared model agrees with noise.".to_string(),
-        "incomplete" => format!("The search was {}. Effects may be missing.", result.interruption()),
-        "explained" => format!("{subject} the residual of the declared model."),
-        "partly-explained" => {
-            format!("{subject} a part of the residual of the declared model. Structure remains.")
+    let sentence = match result.verdict {
+        TraceVerdict::Clean => "The residual of the declared model agrees with noise.".to_string(),
+        TraceVerdict::Incomplete => format!("The search was {}. Effects may be missing.", result.interruption()),
+        TraceVerdict::Explained => format!("{subject} the residual of the declared model."),
+        TraceVerdict::PartlyExplained => {
+            format!("{subject} a part of the residual of the declared model. {}", remains(result))
         }
-        _ => "The residual of the declared model has structure that no effect of the library explains.".to_string(),
+        TraceVerdict::NotJudged => format!(
+            "{} No noise is stated and no reading repeats, so that whether the remaining residual is noise cannot be judged.",
+            match result.effects.len() {
+                0 => "The search finds no effect.".to_string(),
+                _ => format!("{subject} a part of the residual of the declared model."),
+            }
+        ),
+        TraceVerdict::Unexplained => format!("No effect of the library explains the residual. {}", remains(result)),
     };
     match uniqueness::headline(result) {
         Some(headline) => format!("{sentence} {}.", capitalised(&headline)),
@@ -64,7 +81,7 @@ pub fn document(trace: &TraceOutcome) -> Result<Document, IdentifyError> {
     let spectra = spectrum::spectra(problem, &series);
     let mut document = Document {
         title: format!("Trace of {}", problem.session.machine.name),
-        word: result.verdict.clone(),
+        word: result.verdict.to_string(),
         verdict: verdict(result),
         key_figures: key_figures(trace),
         warnings: result.warnings.clone(),
@@ -120,7 +137,7 @@ fn quality<'r>(result: &'r TraceResult, model: &'r ModelResult) -> Quality<'r> {
         rank: model.rank,
         parameters: model.parameter_count,
         noise_um: model.noise_um,
-        noise_source: &result.noise_source,
+        noise_source: result.noise_source,
     }
 }
 

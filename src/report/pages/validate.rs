@@ -23,7 +23,7 @@ pub fn document(session: &Session, validation: &Validation) -> Document {
     let result = &validation.result;
     let mut document = Document {
         title: format!("Validation of a model of {}", session.machine.name),
-        word: result.verdict.clone(),
+        word: result.verdict.to_string(),
         verdict: format!("{}.", crate::printers::html::capitalised(&present::sentence(result))),
         key_figures: figures(result),
         warnings: result.warnings.clone(),

@@ -1,5 +1,6 @@
 //! The text of a methods section: machine, tests, parameters, estimation and uncertainty, every number from the result.
 
+use abbe::identify::noise::NoiseSource;
 use abbe::identify::parameters::Role;
 use abbe::model::instrument::InstrumentKind;
 use abbe::model::words::counted;
@@ -21,9 +22,9 @@ pub fn section(study: &Study) -> Section {
         } else {
             String::new()
         };
-        let source = match result.noise_source.as_str() {
-            "stated" => "is that of the instrument",
-            "repeats" => "is estimated from repeated readings",
+        let source = match result.noise_source {
+            NoiseSource::Stated => "is that of the instrument",
+            NoiseSource::Repeats => "is estimated from repeated readings",
             _ => "is estimated from the residual",
         };
         Item::Text(format!(

@@ -1,7 +1,7 @@
 //! Undeclared effects that the tests of a plan detect, and those that are confounded with the errors.
 
 use abbe::identify::plan::effects::confounded_by_error;
-use abbe::identify::plan::results::{EffectDetectability, EffectsAnalysis};
+use abbe::identify::plan::results::{Detectability, EffectDetectability, EffectsAnalysis};
 
 use super::optional;
 use crate::report::number::{three_digits, unit};
@@ -24,17 +24,18 @@ pub struct Counts {
 
 /// Counts the effects by their verdict.
 pub fn counts(found: &EffectsAnalysis) -> Counts {
-    let count = |verdict: fn(&str) -> bool| found.effects.iter().filter(|effect| verdict(&effect.verdict)).count();
+    let count =
+        |verdict: fn(Detectability) -> bool| found.effects.iter().filter(|effect| verdict(effect.verdict)).count();
     Counts {
-        detectable: count(|verdict| verdict == "detectable"),
-        confounded: count(|verdict| verdict.starts_with("confounded")),
-        without_signal: count(|verdict| verdict == "no signal"),
+        detectable: count(|verdict| verdict == Detectability::Detectable),
+        confounded: count(Detectability::is_confounded),
+        without_signal: count(|verdict| verdict == Detectability::NoSignal),
     }
 }
 
 /// The effects that the tests detect.
 pub fn detectable(found: &EffectsAnalysis) -> Table {
-    table(found.effects.iter().filter(|effect| effect.verdict == "detectable")).titled(format!(
+    table(found.effects.iter().filter(|effect| effect.verdict == Detectability::Detectable)).titled(format!(
         "Detectable: smallest amplitude that is found with {:.0} % power at {:.0} % significance by a single test of that effect and by a search of\n\
          the library of {} effects (Šidák, conservative); share of the signal that remains in the residual; bias of the errors while it is\n\
          undeclared; number of further effects of the same component and driver. A power has its amplitude at 100 mm, or at 180°",
@@ -46,7 +47,7 @@ pub fn detectable(found: &EffectsAnalysis) -> Table {
 
 /// The effects that are confounded with the errors.
 pub fn confounded(found: &EffectsAnalysis) -> Table {
-    table(found.effects.iter().filter(|effect| effect.verdict.starts_with("confounded"))).titled(
+    table(found.effects.iter().filter(|effect| effect.verdict.is_confounded())).titled(
         "Confounded: less than 1 % of the signal remains in the residual. A clean residual does not exclude these effects, and they bias",
     )
 }

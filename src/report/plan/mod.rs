@@ -28,7 +28,7 @@ fn optional(value: Option<f64>) -> String {
 pub fn uncertainties(errors: &[ErrorAnalysis]) -> Table {
     let rows = errors.iter().map(|error| {
         let part = |noise: bool| {
-            let parts = error.budget.iter().filter(|part| (part.source == "noise") == noise);
+            let parts = error.budget.iter().filter(|part| part.is_noise() == noise);
             let part = parts.map(|part| part.u.powi(2)).sum::<f64>().sqrt();
             error.u.map(|_| part)
         };

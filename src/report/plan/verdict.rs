@@ -53,7 +53,7 @@ fn uncertainty(error: &ErrorAnalysis, u: f64) -> String {
 /// What limits the error: the noise or the largest set-up contributions to its variance; and whether more readings
 /// help.
 fn limit(error: &ErrorAnalysis) -> [String; 2] {
-    let noise = error.budget.iter().filter(|part| part.source == "noise");
+    let noise = error.budget.iter().filter(|part| part.is_noise());
     let noise: f64 = noise.map(|part| part.share).sum();
     if noise >= 0.5 {
         let share = percent(noise);
@@ -62,7 +62,7 @@ fn limit(error: &ErrorAnalysis) -> [String; 2] {
             "More readings or less noise reduce it.".to_string(),
         ];
     }
-    let setup = error.budget.iter().filter(|part| part.source != "noise").enumerate();
+    let setup = error.budget.iter().filter(|part| !part.is_noise()).enumerate();
     let named = setup.take_while(|(k, part)| *k == 0 || (*k < MAX_NAMED && part.share >= MIN_NAMED_SHARE));
     let named: Vec<String> =
         named.map(|(_, part): (usize, &Contribution)| format!("{} {}", part.source, percent(part.share))).collect();

@@ -6,6 +6,7 @@ mod sessions;
 
 use abbe::identify::fit::{prepare, report};
 use abbe::identify::plausibility::{Plausibility, Pulls, Suggestion, SuggestionKind, examine, warnings};
+use abbe::identify::results::TraceVerdict;
 use abbe::identify::trace::{TraceOptions, trace};
 use abbe::model::files::{self, ReadOptions};
 
@@ -178,7 +179,7 @@ fn trace_stops_at_the_readings_of_another_session() {
     let session = files::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
     let found = trace(&session, &TraceOptions::default(), &|_| true).unwrap().result;
     println!("{} {:?}", found.verdict, found.plausibility);
-    assert_eq!(found.verdict, "unexplained");
+    assert_eq!(found.verdict, TraceVerdict::Unexplained);
     assert!(found.effects.is_empty() && found.candidates == 0);
     let best = &found.plausibility.suggestions[0];
     assert_eq!((best.kind, best.subject.as_str()), (SuggestionKind::ColumnUnit, "C, A"));

@@ -1,5 +1,6 @@
 //! Poses of the UR10 whose columns are misread.
 
+use abbe::identify::results::TraceVerdict;
 use std::sync::Arc;
 
 use abbe::identify::IdentifyError;
@@ -86,7 +87,9 @@ fn two_exchanged_joint_columns_are_named() {
     }
     let traced = trace(&session, &TraceOptions::default(), &|_| true).map(|found| found.result);
     match traced {
-        Ok(found) => assert!(found.verdict == "unexplained" && found.effects.is_empty(), "{}", found.verdict),
+        Ok(found) => {
+            assert!(found.verdict == TraceVerdict::Unexplained && found.effects.is_empty(), "{}", found.verdict)
+        }
         Err(error) => assert!(error.to_string().contains("are exchanged"), "{error}"),
     }
 }

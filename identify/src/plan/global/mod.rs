@@ -64,7 +64,7 @@ pub struct GlobalAnalysis {
     /// Standard deviation of one scalar reading, µm.
     pub noise_um: f64,
     /// Source of `noise_um`: `stated` by session or user, `repeats` or `residual` of its readings, or `assumed`.
-    pub noise_source: String,
+    pub noise_source: crate::noise::NoiseSource,
     /// Number of samples.
     pub samples: usize,
     /// Number of fits: samples times inputs plus two.
@@ -199,7 +199,7 @@ pub fn global(problem: &Problem, options: &GlobalOptions) -> Result<GlobalAnalys
     });
     Ok(GlobalAnalysis {
         noise_um: problem.noise.sigma_mm * 1e3,
-        noise_source: problem.noise.source.word().to_string(),
+        noise_source: problem.noise.source,
         samples: options.samples,
         evaluations: options.samples * (plan.inputs.len() + 2),
         errors: errors.collect(),

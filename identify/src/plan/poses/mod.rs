@@ -104,7 +104,7 @@ pub struct PoseSelection {
     /// Standard deviation of a scalar reading, µm.
     pub noise_um: f64,
     /// Source of `noise_um`: `stated` by the session or the user, or `assumed`.
-    pub noise_source: String,
+    pub noise_source: NoiseSource,
     /// Number of candidate poses.
     pub candidates: usize,
     /// Number of drawn poses at which the instrument cannot measure, or that the limits excluded.
@@ -203,7 +203,7 @@ pub fn select(session: &Session, tests: &[&Test], options: &PoseOptions) -> Resu
         value: exchange.value(&chosen),
         random_median: median(&mut values),
         noise_um: problem.noise.sigma_mm * 1e3,
-        noise_source: problem.noise.source.word().to_string(),
+        noise_source: problem.noise.source,
         candidates: candidates.len(),
         excluded,
         uncertainties: targets

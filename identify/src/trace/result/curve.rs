@@ -7,8 +7,8 @@ use abbe_model::driver::{Driver, DriverSample};
 use abbe_model::effect::{Effect, Shape};
 use faer::Mat;
 
-use super::{Moves, alias_shifts};
 use crate::fit::Fit;
+use crate::fit::aliases::contribution;
 use crate::parameters::Role;
 use crate::problem::Problem;
 use crate::results::CurvePoint;
@@ -83,7 +83,7 @@ fn range(values: &[f64]) -> Option<[f64; 2]> {
 }
 
 /// The points of the curve of the `number`-th effect with their standard uncertainty; empty if it is no curve.
-pub(super) fn curve_of(problem: &Problem, fit: &Fit, number: usize, moves: &Moves) -> Vec<CurvePoint> {
+pub(super) fn curve_of(problem: &Problem, fit: &Fit, number: usize) -> Vec<CurvePoint> {
     let Some(effect) = problem.parameters.effects.get(number) else {
         return Vec::new();
     };
@@ -109,7 +109,7 @@ pub(super) fn curve_of(problem: &Problem, fit: &Fit, number: usize, moves: &Move
             let value = value_at(&fit.beta);
             let column = Mat::from_fn(basis.len(), 1, |k, _| basis[k]);
             let variance = (column.transpose() * (&covariance * &column))[(0, 0)];
-            let moved = alias_shifts(moves, &[value], |beta| vec![value_at(beta)], &fit.beta);
+            let moved = contribution(fit, 1, |beta| vec![value_at(beta)]);
             CurvePoint {
                 at: q * at_outside,
                 value: value * outside,
@@ -141,7 +141,7 @@ mod tests {
     use abbe_model::files::{self, ReadOptions};
 
     use super::*;
-    use crate::fit::{fit, prepare};
+    use crate::fit::{AliasChange, EffectAliases, fit, prepare};
 
     #[test]
     fn the_band_of_a_curve_is_enlarged_as_every_uncertainty_is_and_covers_what_aliases_move() {
@@ -159,9 +159,9 @@ mod tests {
         let mut fit = fit(&problem, None).unwrap();
         let number = problem.parameters.effects.len() - 1;
         fit.u_enlargement = 1.0;
-        let by_noise = curve_of(&problem, &fit, number, &[]);
+        let by_noise = curve_of(&problem, &fit, number);
         fit.u_enlargement = 1.5;
-        let enlarged = curve_of(&problem, &fit, number, &[]);
+        let enlarged = curve_of(&problem, &fit, number);
         assert_eq!(by_noise.len(), CURVE_POINTS);
         for (by_noise, enlarged) in by_noise.iter().zip(&enlarged) {
             assert!(by_noise.u > 0.0);
@@ -173,7 +173,9 @@ mod tests {
         let of_curve =
             |j: usize| matches!(problem.parameters.list[j].role, Role::Coefficient { effect, .. } if effect == number);
         let alias: Vec<f64> = (0..fit.beta.len()).map(|j| if of_curve(j) { 1e-3 } else { 0.0 }).collect();
-        let covered = curve_of(&problem, &fit, number, &[vec![alias]]);
+        let alias = AliasChange { alias: 0, changes: alias, delta_chi2: 0.0 };
+        fit.aliases = vec![EffectAliases { effect: number, aliases: vec![alias] }];
+        let covered = curve_of(&problem, &fit, number);
         for (enlarged, covered) in enlarged.iter().zip(&covered) {
             assert!((covered.u - enlarged.u.hypot(1.0)).abs() < 1e-9);
             assert_eq!(covered.value, enlarged.value);

@@ -6,7 +6,7 @@ use abbe_model::session::Prior;
 
 use super::curve::{curve_of, curve_units};
 use super::prediction::Predictions;
-use super::{HeldOut, Moves, TraceFindings};
+use super::{HeldOut, TraceFindings};
 use crate::candidates::library::Family;
 use crate::fit::Fit;
 use crate::fit::families::effective_parameters;
@@ -36,16 +36,20 @@ pub fn effect_name(machine: &Machine, effect: &Effect) -> EffectName {
 pub(super) struct Found<'f> {
     /// Index among the found effects.
     pub number: usize,
+    /// Its candidate.
+    pub candidate: usize,
+    /// The model with the found effects and their aliases.
+    pub after: &'f Problem,
+    /// Its fit.
+    pub after_fit: &'f Fit,
     /// All parameters after the search; their `u` cover the changes by aliases.
     pub parameters: &'f [ParameterResult],
-    /// Changes of the parameters by the aliases of each found effect.
-    pub moves: &'f Moves,
     /// Decrease of the residual by the effect, µm.
     pub rms_gain_um: f64,
     /// The effects with which it is confounded.
     pub alias_effects: &'f [Effect],
-    /// Increase of χ² by each of these in its place.
-    pub delta_chi2: &'f [f64],
+    /// Increase of χ² and of the prior cost by each of these in its place.
+    pub costs: &'f [[f64; 2]],
     /// The left-out tests that the effect and its aliases predict.
     pub predicted: &'f Predictions,
 }
@@ -57,18 +61,21 @@ pub(super) fn result(
     held_out: &HeldOut<'_>,
     found: &Found<'_>,
 ) -> EffectResult {
-    let (after, search) = (findings.after, findings.search);
+    let (after, search) = (found.after, findings.search);
     let taken = search.selected()[found.number];
-    let candidate = &search.candidates[taken.candidate];
+    let candidate = &search.candidates[found.candidate];
     let number = found.number + findings.before.parameters.effects.len();
     let machine = &after.session.machine;
     let alike = std::iter::once(&candidate.effect).chain(found.alias_effects);
     let meanings: Vec<_> = alike.map(|effect| meaning(machine, effect)).collect();
-    let alias = |(effect, delta_chi2): (&Effect, &f64)| AliasResult {
+    let ratio = |logarithm: f64| logarithm.min(LARGEST_EXPONENT).exp();
+    let alias = |(effect, [delta_chi2, prior_cost]): (&Effect, &[f64; 2])| AliasResult {
         name: effect_name(machine, effect),
         shape_parameters: shape_parameters_of(after, effect),
         delta_chi2: *delta_chi2,
-        likelihood_ratio: (-0.5 * delta_chi2).min(LARGEST_EXPONENT).exp(),
+        likelihood_ratio: ratio(-0.5 * delta_chi2),
+        prior_cost: *prior_cost,
+        probability_ratio: ratio(-0.5 * delta_chi2 - prior_cost),
     };
     EffectResult {
         family: families.get(candidate.family).map(|family| family.name.clone()).unwrap_or_default(),
@@ -78,24 +85,18 @@ pub(super) fn result(
         unique: found.alias_effects.is_empty(),
         explanation_count: meanings.len(),
         explanations: explanations(&meanings),
-        aliases: found.alias_effects.iter().zip(found.delta_chi2).map(alias).collect(),
+        aliases: found.alias_effects.iter().zip(found.costs).map(alias).collect(),
         left_out_test_rms_um: found.predicted.found_um,
         aliases_left_out_test_rms_um: match found.predicted.found_um {
             Some(_) => found.predicted.aliases_um.clone(),
             None => Vec::new(),
         },
-        ..described(after, findings.after_fit, number, found.parameters, found.moves)
+        ..described(after, found.after_fit, number, found.parameters)
     }
 }
 
 /// The `number`-th effect of a fitted problem without the results of a search: name, numbers, parameters, prior, curve.
-pub(super) fn described(
-    problem: &Problem,
-    fit: &Fit,
-    number: usize,
-    parameters: &[ParameterResult],
-    moves: &Moves,
-) -> EffectResult {
+pub(super) fn described(problem: &Problem, fit: &Fit, number: usize, parameters: &[ParameterResult]) -> EffectResult {
     let (machine, effect) = (&problem.session.machine, &problem.parameters.effects[number]);
     let (curve_at_unit, curve_unit) = curve_units(problem, effect);
     let meaning = meaning(machine, effect);
@@ -105,7 +106,7 @@ pub(super) fn described(
         shape_parameters: shape_parameters_of(problem, effect),
         parameters: parameters_of(problem, parameters, number),
         prior: prior_of(problem, fit, number),
-        curve: curve_of(problem, fit, number, moves),
+        curve: curve_of(problem, fit, number),
         curve_at_unit,
         curve_unit,
         p_value: 1.0,

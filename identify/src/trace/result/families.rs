@@ -10,7 +10,7 @@ use crate::error::IdentifyError;
 use crate::fit::Fit;
 use crate::parameters::Role;
 use crate::problem::Problem;
-use crate::results::{EffectResult, Remainder, TraceResult};
+use crate::results::{EffectResult, Remainder, TraceResult, TraceVerdict};
 use crate::trace::families::AcceptedFamilies;
 use crate::trace::{SearchStep, TraceOutcome};
 
@@ -53,10 +53,10 @@ pub(in crate::trace) fn outcome_with_families(
             p_value: accepted.p_value,
             heldout_rms_um: accepted.heldout_rms_mm * 1e3,
             rms_gain_um: rms_gain_mm(&after, &after_fit, declared + k) * 1e3,
-            ..described(&after, &after_fit, declared + k, &after_result.parameters, &[])
+            ..described(&after, &after_fit, declared + k, &after_result.parameters)
         })
         .collect();
-    let verdict = if ended.stopped_early { "partly-explained" } else { "explained" };
+    let verdict = if ended.stopped_early { TraceVerdict::PartlyExplained } else { TraceVerdict::Explained };
     let steps = (accepted.iter().enumerate())
         .map(|(k, accepted)| SearchStep {
             id: accepted.effect.id(),
@@ -65,7 +65,7 @@ pub(in crate::trace) fn outcome_with_families(
         })
         .collect();
     let mut result = TraceResult {
-        verdict: verdict.to_string(),
+        verdict: verdict.gated(after_result.goodness.verdict),
         changed_parameters: changed_parameters(&before_result.parameters, &after_result.parameters),
         before: before_result,
         effects,
@@ -73,7 +73,7 @@ pub(in crate::trace) fn outcome_with_families(
         residual_before: "independent poses: structure is looked for effect by effect".to_string(),
         candidates: ended.families + ended.candidates,
         candidates_detectable: ended.families + ended.detectable,
-        ..unsearched_of(&after, &after_fit, after_result)
+        ..unsearched_of(&after, &after_fit, after_result)?
     };
     result.warnings.extend(ended.warnings);
     if ended.interrupted {

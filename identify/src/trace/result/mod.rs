@@ -12,19 +12,17 @@ use abbe_model::effect::Effect;
 
 use super::alias::{self, Alias, CompetingEffect};
 use super::remainder::Structure;
-use super::start::Start;
 use super::state::SearchState;
 use crate::candidates::library;
 use crate::error::IdentifyError;
-use crate::fit::{self, Fit};
+use crate::fit::outcome::{self, Determined};
+use crate::fit::{self, Fit, aliases, assume, prepare_with};
 use crate::heldout::figures::cross_validation;
 use crate::heldout::{mislabelled_runs, rms_mm};
 use crate::noise;
 use crate::plausibility::Plausibility;
 use crate::problem::Problem;
-use crate::results::{
-    ChangedParameter, EffectResult, ModelResult, ParameterResult, TraceResult, phases_follow_amplitudes,
-};
+use crate::results::{ChangedParameter, EffectResult, ModelResult, ParameterResult, TraceResult};
 pub(crate) use effect::effect_name;
 pub(super) use families::{FamiliesEnded, outcome_with_families};
 pub(super) use unsearched::unsearched;
@@ -37,7 +35,10 @@ pub(super) struct TraceFindings<'f> {
     pub after: &'f Problem,
     pub after_fit: &'f Fit,
     pub search: &'f SearchState<'f>,
-    pub start: &'f Start,
+    /// Explanations that the user accepts.
+    pub assume: &'f [String],
+    /// Seed of the folds.
+    pub seed: u64,
     pub structure_before: Option<&'f Structure>,
     pub structure_after: Option<&'f Structure>,
     pub last_p_value: f64,
@@ -51,6 +52,8 @@ pub(super) struct TraceFindings<'f> {
 
 /// The result, with the data that reports need.
 pub(super) struct ReportedEffect {
+    pub after: Problem,
+    pub after_fit: Fit,
     pub result: TraceResult,
     pub alias_effects: Vec<Vec<Effect>>,
     pub competing_effects: Vec<Vec<CompetingEffect>>,
@@ -58,61 +61,73 @@ pub(super) struct ReportedEffect {
 
 /// The result, and for each effect its aliases and the best competing effects.
 pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, IdentifyError> {
-    let TraceFindings { before, before_fit, after, after_fit, search, .. } = findings;
+    let TraceFindings { before, before_fit, search, .. } = findings;
     let before_result = before_result(findings)?;
     let held_out = HeldOut::of(search, before_result.heldout_rms_um);
-    let mut after_result = model_result(after, after_fit, held_out.last_um() * 1e-3)?;
-
     let mut alias_effects: Vec<Vec<Effect>> = Vec::new();
     let mut competing_effects = Vec::new();
     let mut gains = Vec::new();
-    let mut moves = Vec::new();
+    let mut chosen_candidates = Vec::new();
     let mut predicted = Vec::new();
-    let mut delta_chi2 = Vec::new();
+    let mut costs = Vec::new();
     let variance = residual_variance(findings);
     for (k, taken) in search.selected().iter().enumerate() {
         let model = search.model_without(Some(k))?;
         let (mut aliases, of_effect) = alias::aliases(search, k, &model, variance)?;
-        predicted.push(prediction::predictions(findings, k, &mut aliases)?);
+        let mut of_tests = prediction::predictions(findings, k, &mut aliases)?;
         competing_effects.push(of_effect);
-        let named = model.with_candidate(taken.candidate)?.0;
+        let chosen = assumed(findings, taken.candidate, &mut aliases);
+        if chosen.is_some_and(|candidate| candidate != taken.candidate) {
+            // The left-out tests were predicted with the other effect in the model.
+            of_tests = prediction::Predictions::none(&aliases);
+        }
+        predicted.push(of_tests);
+        chosen_candidates.push((chosen.unwrap_or(taken.candidate), chosen.is_some()));
         let effect_of = |alias: &Alias| search.effect(alias.candidate).clone();
         alias_effects.push(aliases.iter().map(effect_of).collect());
-        delta_chi2.push(aliases.iter().map(|alias| alias.delta_chi2).collect::<Vec<_>>());
-        let in_its_place = |alias: &Alias| moves_by(findings, k, &alias.model_coefficients, &named);
-        moves.push(aliases.iter().map(in_its_place).collect::<Vec<_>>());
+        costs.push(aliases.iter().map(|alias| [alias.delta_chi2, alias.prior_cost]).collect::<Vec<_>>());
         gains.push(model.gain(taken.candidate)?.gain);
     }
-    cover(&mut after_result.parameters, after, after_fit, &moves);
-    after_result.covariance = fit::covariance_of_parameters(after, after_fit, &after_result.parameters);
+    let (after, after_fit) = with_aliases(findings, &chosen_candidates, &alias_effects)?;
+    let (after, after_fit) = (&after, &after_fit);
+    let mut after_result = model_result(after, after_fit, held_out.last_um() * 1e-3)?;
+    let (verdict, remainder) = verdict(findings, !search.selected().is_empty());
+    let determined = Determined::of(after, &after_fit.rank)?;
+    let goodness = after_result.goodness.with_structure(remainder.structured);
+    after_result.goodness = goodness;
+    determined.mark(after, &mut after_result.parameters, goodness);
     let families = library::families()?;
-    let effects: Vec<EffectResult> = (0..moves.len())
+    let effects: Vec<EffectResult> = (0..alias_effects.len())
         .map(|k| {
             let reported = effect::Found {
                 number: k,
+                candidate: chosen_candidates[k].0,
+                after,
+                after_fit,
                 parameters: &after_result.parameters,
-                moves: &moves,
                 rms_gain_um: (gains[k] / held_out.rows).sqrt() * before.noise.sigma_mm * 1e3,
                 alias_effects: &alias_effects[k],
-                delta_chi2: &delta_chi2[k],
+                costs: &costs[k],
                 predicted: &predicted[k],
             };
             effect::result(findings, &families, &held_out, &reported)
         })
         .collect();
-    let (verdict, remainder) = verdict(findings, &effects);
     let mut warnings = before.session.warnings.clone();
     warnings.extend(noise::stated_against_repeats(before, &before_fit.residuals));
     warnings.extend(mislabelled_runs(&before.tests));
+    warnings.extend(assume::statements(after));
+    warnings.extend(not_assumed(findings, after));
     let changed_parameters = changed_parameters(&before_result.parameters, &after_result.parameters);
     let unique = effects.iter().all(|effect| effect.unique);
     let mut result = TraceResult {
-        verdict,
+        verdict: verdict.gated(goodness.verdict),
+        outcome: outcome::outcome(after, after_fit, goodness, &determined),
         interrupted: false,
         time_limit_s: None,
         unique,
         noise_um: after.noise.sigma_mm * 1e3,
-        noise_source: after.noise.source.word().to_string(),
+        noise_source: after.noise.source,
         noise_ar_coefficients: after.noise.ar_coefficients.clone(),
         readings: after.readings(),
         heldout_by: before.folds.kind.words().to_string(),
@@ -144,7 +159,8 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
     if findings.interrupted {
         result.mark_interrupted();
     }
-    Ok(ReportedEffect { result, alias_effects, competing_effects })
+    let (after, after_fit) = (after.clone(), after_fit.clone());
+    Ok(ReportedEffect { after, after_fit, result, alias_effects, competing_effects })
 }
 
 /// Held-out errors in µm. The held-out error of the declared model converts whitened sums of squares to µm.
@@ -216,7 +232,9 @@ pub(super) fn model_result(problem: &Problem, fit: &Fit, held_out_mm: f64) -> Re
     let rms = rms_mm(problem, &fit.residuals) * 1e3;
     let held = held_out_mm * 1e3;
     let in_3d = |rms: f64| three.then(|| rms * 3.0_f64.sqrt());
-    let parameters = fit::parameters(problem, fit);
+    let goodness = outcome::goodness(problem, fit);
+    let mut parameters = fit::parameters(problem, fit);
+    Determined::of(problem, &fit.rank)?.mark(problem, &mut parameters, goodness);
     Ok(ModelResult {
         cross_validation: cross_validation(problem, fit, held_out_mm, problem)?,
         rms_um: rms,
@@ -228,72 +246,71 @@ pub(super) fn model_result(problem: &Problem, fit: &Fit, held_out_mm: f64) -> Re
         parameter_count: fit.beta.len(),
         chi_square: fit.chi_square,
         degrees_of_freedom: fit.degrees_of_freedom,
+        goodness,
         identifiable: fit::ids(&parameters),
         covariance: fit::covariance_of_parameters(problem, fit, &parameters),
         parameters,
     })
 }
 
-/// Changes of the parameters after the search, internal units: by found effect, by alias that replaces it, by
-/// parameter.
-type Moves = [Vec<Vec<f64>>];
-
-/// Changes of functions of the parameters: the root sum of squares over the effects of the largest change by one of
-/// their aliases.
-fn alias_shifts(moves: &Moves, present: &[f64], values: impl Fn(&[f64]) -> Vec<f64>, beta: &[f64]) -> Vec<f64> {
-    let mut squares = vec![0.0; present.len()];
-    for of_effect in moves {
-        let mut largest = vec![0.0_f64; present.len()];
-        for moves in of_effect {
-            let moved: Vec<f64> = beta.iter().zip(moves).map(|(value, by)| value + by).collect();
-            for (most, (moved, present)) in largest.iter_mut().zip(values(&moved).iter().zip(present)) {
-                *most = most.max((moved - present).abs());
-            }
-        }
-        squares.iter_mut().zip(largest).for_each(|(sum, most)| *sum += most * most);
-    }
-    squares.into_iter().map(f64::sqrt).collect()
+/// Warnings about explanations that the user accepts and that explain no effect.
+fn not_assumed(findings: &TraceFindings<'_>, after: &Problem) -> Vec<String> {
+    let assumed: Vec<String> = after.parameters.effects.iter().filter(|one| one.assumed).map(Effect::id).collect();
+    let open = findings.assume.iter().filter(|id| !assumed.contains(id));
+    open.map(|id| format!("\"{id}\" is not assumed: no effect that was found is explained by it")).collect()
 }
 
-/// Enlarges the uncertainties to cover the changes by aliases.
-fn cover(parameters: &mut [ParameterResult], problem: &Problem, fit: &Fit, moves: &Moves) {
-    let quantities = fit::quantities(problem, &fit.rank);
-    let values = |beta: &[f64]| {
-        let mut values = Vec::with_capacity(parameters.len());
-        fit::values_at(problem, fit, &quantities, beta, |value| values.push(value));
-        values
-    };
-    let moved = alias_shifts(moves, &values(&fit.beta), values, &fit.beta);
-    for (parameter, moved) in parameters.iter_mut().zip(moved) {
-        let mut u = parameter.u.hypot(moved);
-        if parameter.id.ends_with(".phase") {
-            u = u.min(fit::u_of_undetermined_phase_deg());
-        }
-        parameter.set_u(u);
+/// The candidate that the user accepts as the explanation of an effect; `None` if it is none of these. If it is an alias,
+/// the found effect takes its place among the aliases.
+fn assumed(findings: &TraceFindings<'_>, found: usize, aliases: &mut Vec<Alias>) -> Option<usize> {
+    let id = |candidate: usize| findings.search.effect(candidate).id();
+    if findings.assume.contains(&id(found)) {
+        return Some(found);
     }
-    phases_follow_amplitudes(parameters);
+    let place = aliases.iter().position(|alias| findings.assume.contains(&id(alias.candidate)))?;
+    let chosen = aliases.remove(place);
+    for alias in aliases.iter_mut() {
+        alias.delta_chi2 -= chosen.delta_chi2;
+        alias.prior_cost -= chosen.prior_cost;
+    }
+    let replaced =
+        Alias { candidate: found, delta_chi2: -chosen.delta_chi2, prior_cost: -chosen.prior_cost, ..chosen.clone() };
+    aliases.insert(0, replaced);
+    Some(chosen.candidate)
 }
 
-/// Changes of the parameters if an alias replaces the `k`-th effect, internal units. `in_place` and `named` are the
-/// coefficients of the model without that effect, fitted together with the alias and with the effect. The coefficients
-/// of the effect itself do not change: the alias has none of them.
-fn moves_by(findings: &TraceFindings<'_>, k: usize, in_place: &[f64], named: &[f64]) -> Vec<f64> {
-    let (search, to_unknowns) = (findings.search, &findings.start.to_parameters);
-    let by: Vec<f64> = in_place.iter().zip(named).map(|(a, b)| a - b).collect();
-    let (of_declared, of_found) = by.split_at(search.moments.rank());
-    // The parameters of the declared model come first, then the found effects in their order.
-    let mut moves: Vec<f64> = (0..to_unknowns.nrows())
-        .map(|j| of_declared.iter().enumerate().map(|(k, by)| to_unknowns[(j, k)] * by).sum())
+/// The model with the found effects, which now have their aliases: uncertainties cover these, unless the effect is
+/// assumed. `chosen` is the candidate of each effect, and whether the user accepts it.
+///
+/// # Errors
+/// If an alias cannot be evaluated, or the model with an accepted alias cannot be fitted.
+fn with_aliases(
+    findings: &TraceFindings<'_>,
+    chosen: &[(usize, bool)],
+    alias_effects: &[Vec<Effect>],
+) -> Result<(Problem, Fit), IdentifyError> {
+    let search = findings.search;
+    let effects: Vec<Effect> = (chosen.iter().zip(alias_effects))
+        .map(|((candidate, assumed), aliases)| Effect {
+            aliases: aliases.clone(),
+            assumed: *assumed,
+            ..search.effect(*candidate).clone()
+        })
         .collect();
-    let mut of_found = of_found.iter();
-    for (l, taken) in search.selected().iter().enumerate() {
-        for _ in 0..search.moments.count(taken.candidate) {
-            let by = if l == k { None } else { of_found.next() };
-            moves.push(by.copied().unwrap_or(0.0));
+    let as_found = search.selected().iter().zip(chosen).all(|(found, chosen)| found.candidate == chosen.0);
+    if !as_found {
+        let (mut after, mut fitted) = prepare_with(&findings.before.session, &effects, findings.seed)?;
+        if after.noise != findings.after.noise {
+            after.noise = findings.after.noise.clone();
+            fitted = fit::fit(&after, Some(&fitted.beta))?;
         }
+        return Ok((after, fitted));
     }
-    debug_assert_eq!(moves.len(), findings.after_fit.beta.len());
-    moves
+    let (mut after, mut fitted) = (findings.after.clone(), findings.after_fit.clone());
+    let declared = findings.before.parameters.effects.len();
+    after.parameters.effects[declared..].clone_from_slice(&effects);
+    fitted.aliases = aliases::at_solution(&after, &fitted.beta)?;
+    Ok((after, fitted))
 }
 
 /// Parameters that changed by more than their standard uncertainty.

@@ -22,6 +22,13 @@ pub(super) struct Predictions {
     pub aliases_um: Vec<Option<f64>>,
 }
 
+impl Predictions {
+    /// Of no test.
+    pub fn none(aliases: &[Alias]) -> Predictions {
+        Predictions { found_um: None, aliases_um: vec![None; aliases.len()] }
+    }
+}
+
 /// Predicts the left-out tests with the `k`-th found effect and with each of its aliases. Sorts the aliases: those that
 /// predict better come first, otherwise the order remains.
 pub(super) fn predictions(
@@ -29,7 +36,7 @@ pub(super) fn predictions(
     k: usize,
     aliases: &mut Vec<Alias>,
 ) -> Result<Predictions, IdentifyError> {
-    let none = Predictions { found_um: None, aliases_um: vec![None; aliases.len()] };
+    let none = Predictions::none(aliases);
     if aliases.is_empty() || findings.after.models.len() < 2 {
         return Ok(none);
     }

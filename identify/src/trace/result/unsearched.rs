@@ -2,29 +2,35 @@
 
 use super::{model_result, not_examined};
 use crate::error::IdentifyError;
+use crate::fit::outcome::{self, Determined};
 use crate::fit::{self, Fit};
 use crate::noise;
 use crate::plausibility::Plausibility;
 use crate::problem::Problem;
-use crate::results::{ModelResult, TraceResult};
+use crate::results::{ModelResult, TraceResult, TraceVerdict};
 
 /// The declared model alone, without a verdict.
 pub(in crate::trace) fn unsearched(problem: &Problem, fit: &Fit) -> Result<TraceResult, IdentifyError> {
-    Ok(unsearched_of(problem, fit, model_result(problem, fit, fit.held_out.rms_mm)?))
+    unsearched_of(problem, fit, model_result(problem, fit, fit.held_out.rms_mm)?)
 }
 
 /// As [`unsearched`], with the known figures of the model.
-pub(super) fn unsearched_of(problem: &Problem, fit: &Fit, declared: ModelResult) -> TraceResult {
+///
+/// # Errors
+/// If the model cannot be evaluated.
+pub(super) fn unsearched_of(problem: &Problem, fit: &Fit, declared: ModelResult) -> Result<TraceResult, IdentifyError> {
     let remainder = not_examined();
     let mut warnings = problem.session.warnings.clone();
     warnings.extend(noise::stated_against_repeats(problem, &fit.residuals));
-    TraceResult {
-        verdict: String::new(),
+    let determined = Determined::of(problem, &fit.rank)?;
+    Ok(TraceResult {
+        outcome: outcome::outcome(problem, fit, declared.goodness, &determined),
+        verdict: TraceVerdict::Incomplete,
         interrupted: false,
         time_limit_s: None,
         unique: true,
         noise_um: problem.noise.sigma_mm * 1e3,
-        noise_source: problem.noise.source.word().to_string(),
+        noise_source: problem.noise.source,
         noise_ar_coefficients: problem.noise.ar_coefficients.clone(),
         readings: problem.readings(),
         heldout_by: problem.folds.kind.words().to_string(),
@@ -44,5 +50,5 @@ pub(super) fn unsearched_of(problem: &Problem, fit: &Fit, declared: ModelResult)
         conformity: None,
         plausibility: Plausibility::default(),
         warnings,
-    }
+    })
 }

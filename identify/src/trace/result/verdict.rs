@@ -1,30 +1,30 @@
 //! Verdict of a trace and the residual of its model.
 
 use super::TraceFindings;
-use crate::results::{EffectResult, Remainder};
+use crate::results::{Remainder, TraceVerdict};
 use crate::trace::constants::EXPLAINED_SHARE;
 
-/// The verdict, and the residual of the model with the found effects.
-pub(super) fn verdict(findings: &TraceFindings<'_>, effects: &[EffectResult]) -> (String, Remainder) {
+/// The verdict of the search, and the residual of the model with the found effects, if it has found any.
+pub(super) fn verdict(findings: &TraceFindings<'_>, found: bool) -> (TraceVerdict, Remainder) {
     if findings.interrupted {
-        return (String::new(), not_examined());
+        return (TraceVerdict::Incomplete, not_examined());
     }
     let Some(after) = findings.structure_after else {
-        let word = match (effects.is_empty(), findings.stopped_early) {
-            (true, _) => "clean",
-            (false, false) => "explained",
-            (false, true) => "partly-explained",
+        let word = match (found, findings.stopped_early) {
+            (false, _) => TraceVerdict::Clean,
+            (true, false) => TraceVerdict::Explained,
+            (true, true) => TraceVerdict::PartlyExplained,
         };
         let remainder = Remainder { structured: false, p_value: findings.last_p_value, place: None };
-        return (word.to_string(), remainder);
+        return (word, remainder);
     };
     let structured = after.is_significant();
     let remainder =
         Remainder { structured, p_value: after.p_value, place: structured.then(|| after.description.clone()) };
     let before = findings.structure_before.map_or(0.0, |structure| structure.excess);
     let share = if before > 0.0 { after.excess / before } else { 0.0 };
-    let word = word(!effects.is_empty(), structured, share);
-    (word.to_string(), remainder)
+    let word = word(found, structured, share);
+    (word, remainder)
 }
 
 /// Description of the residual of an interrupted trace.
@@ -34,13 +34,13 @@ pub(super) fn not_examined() -> Remainder {
 
 /// What is said of a search along runs: whether it found anything, whether structure remains, and what share of its
 /// excess over noise.
-fn word(found: bool, structured: bool, share: f64) -> &'static str {
+fn word(found: bool, structured: bool, share: f64) -> TraceVerdict {
     match (found, structured) {
-        (false, false) => "clean",
-        (false, true) => "unexplained",
-        (true, false) => "explained",
-        (true, true) if share < EXPLAINED_SHARE => "partly-explained",
-        (true, true) => "unexplained",
+        (false, false) => TraceVerdict::Clean,
+        (false, true) => TraceVerdict::Unexplained,
+        (true, false) => TraceVerdict::Explained,
+        (true, true) if share < EXPLAINED_SHARE => TraceVerdict::PartlyExplained,
+        (true, true) => TraceVerdict::Unexplained,
     }
 }
 
@@ -51,11 +51,11 @@ mod tests {
     #[test]
     fn a_verdict_says_whether_most_of_the_structure_is_explained() {
         for (found, structured, share, verdict) in [
-            (false, false, 0.0, "clean"),
-            (false, true, 1.0, "unexplained"),
-            (true, false, 0.9, "explained"),
-            (true, true, 0.2, "partly-explained"),
-            (true, true, 0.8, "unexplained"),
+            (false, false, 0.0, TraceVerdict::Clean),
+            (false, true, 1.0, TraceVerdict::Unexplained),
+            (true, false, 0.9, TraceVerdict::Explained),
+            (true, true, 0.2, TraceVerdict::PartlyExplained),
+            (true, true, 0.8, TraceVerdict::Unexplained),
         ] {
             assert_eq!(word(found, structured, share), verdict);
         }

@@ -1,4 +1,4 @@
-//! Reader of `[[effect]]`: component × driver × shape.
+//! Reader of `[[effect]]`: component × driver × shape, and of its aliases `[[effect.alias]]`.
 
 use std::collections::BTreeSet;
 
@@ -22,6 +22,26 @@ pub(super) fn effect(
     item: Value<'_>,
 ) -> Result<Effect, ModelError> {
     let mut table = item.table("[[effect]]".into())?;
+    let aliases = match table.take("alias") {
+        Some(value) => value.list("tables [[effect.alias]]")?,
+        None => Vec::new(),
+    };
+    let alias = |item: Value<'_>| one(context, declared, columns, item.table("[[effect.alias]]".into())?);
+    let aliases = aliases.into_iter().map(alias).collect::<Result<_, _>>()?;
+    let assumed = match table.take("assumed") {
+        Some(value) => value.boolean()?,
+        None => false,
+    };
+    Ok(Effect { aliases, assumed, ..one(context, declared, columns, table)? })
+}
+
+/// Reads an effect without aliases.
+fn one(
+    context: &Context<'_>,
+    declared: &[Declared],
+    columns: &BTreeSet<String>,
+    mut table: Table<'_>,
+) -> Result<Effect, ModelError> {
     let component = component(context, &mut table)?;
     let word_value = table.require("shape", "the dependence of the component on the driver, such as \"harmonic\"")?;
     let word = word_value.text()?;
@@ -44,7 +64,7 @@ pub(super) fn effect(
     let prior = prior::read(&mut table, &component, &shape, context.instrument.unknowns())?;
     shape.check().map_err(|fault| word_value.error(fault.to_string(), None))?;
     table.finish()?;
-    Ok(Effect { component, driver, shape, tests, prior })
+    Ok(Effect { tests, prior, ..Effect::new(component, driver, shape) })
 }
 
 fn component(context: &Context<'_>, table: &mut Table<'_>) -> Result<Component, ModelError> {

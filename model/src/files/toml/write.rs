@@ -47,9 +47,19 @@ pub fn with_blocks(original: &str, blocks: impl IntoIterator<Item = String>) -> 
     text
 }
 
-/// One `[[effect]]`.
+/// One `[[effect]]` with its aliases `[[effect.alias]]`.
 fn effect_table(effect: &Effect, machine: &Machine) -> String {
-    let mut keys = KeyWriter::new("[[effect]]", effect.driver_unit(machine));
+    let mut text = table(effect, "[[effect]]", machine);
+    for alias in &effect.aliases {
+        text.push('\n');
+        text.push_str(&table(alias, "[[effect.alias]]", machine));
+    }
+    text
+}
+
+/// The keys of an effect under a heading.
+fn table(effect: &Effect, heading: &str, machine: &Machine) -> String {
+    let mut keys = KeyWriter::new(heading, effect.driver_unit(machine));
     keys.line("component", quoted(&effect.component.to_string()));
     keys.line("driver", quoted(&effect.driver.to_string()));
     keys.line("shape", quoted(effect.shape.entry().word));
@@ -58,6 +68,9 @@ fn effect_table(effect: &Effect, machine: &Machine) -> String {
     if !effect.tests.is_empty() {
         let names: Vec<String> = effect.tests.iter().map(|name| quoted(name)).collect();
         keys.line("tests", format!("[{}]", names.join(", ")));
+    }
+    if effect.assumed {
+        keys.line("assumed", true);
     }
     keys.finish()
 }

@@ -1,0 +1,206 @@
+//! What a fit is worth: its residual against the noise, what determines its estimates, what it assumes.
+
+use abbe_model::axis::AxisKind;
+use abbe_model::session::Prior;
+use abbe_model::words::counted;
+
+use super::{Fit, assume};
+use crate::error::IdentifyError;
+use crate::noise::{NoiseSource, stated_against_repeats};
+use crate::numerics::rank::Rank;
+use crate::parameters::Role;
+use crate::plan::identifiability::determined_by_prior;
+use crate::plan::linear::{Linearisation, is_of_interest};
+use crate::plausibility::Pulls;
+use crate::problem::Problem;
+use crate::results::{
+    Assumption, AssumptionKind, AssumptionVerdict, DataRange, DeterminedBy, DeterminedByPrior, Goodness,
+    GoodnessVerdict, NotEstimated, Outcome, ParameterResult,
+};
+
+/// χ²/ν below which the noise is said to be overstated.
+const MIN_RATIO: f64 = 0.5;
+
+/// The residual of a fit against the noise.
+pub(crate) fn goodness(problem: &Problem, fit: &Fit) -> Goodness {
+    let chi_square_ratio = fit.chi_square / fit.degrees_of_freedom as f64;
+    let judged = problem.noise.source.judges();
+    let verdict = if !judged {
+        GoodnessVerdict::NotJudged
+    } else if fit.u_enlargement > 1.0 {
+        GoodnessVerdict::Exceeds
+    } else if chi_square_ratio < MIN_RATIO {
+        GoodnessVerdict::NoiseOverstated
+    } else {
+        GoodnessVerdict::Agrees
+    };
+    let p_value = judged.then_some(fit.p_value);
+    Goodness { chi_square_ratio, p_value, ..Goodness::default() }.with_verdict(verdict)
+}
+
+/// What determines each parameter of a problem, by index, and the errors that set-up priors determine, in words.
+pub(crate) struct Determined {
+    by: Vec<DeterminedBy>,
+    by_prior: Vec<DeterminedByPrior>,
+}
+
+impl Determined {
+    /// At the nominal machine, as a plan decides it.
+    ///
+    /// # Errors
+    /// If the model cannot be evaluated.
+    pub fn of(problem: &Problem, rank: &Rank) -> Result<Determined, IdentifyError> {
+        let list = &problem.parameters.list;
+        let of_null_space = |j: usize| {
+            let own: Vec<&Vec<f64>> = rank.null_combinations.iter().filter(|row| row[j] != 0.0).collect();
+            match own.iter().any(|row| row.iter().filter(|share| **share != 0.0).count() > 1) {
+                _ if own.is_empty() => DeterminedBy::Readings,
+                true => DeterminedBy::BaseCombination,
+                false => DeterminedBy::Nothing,
+            }
+        };
+        let mut determined = Determined { by: (0..list.len()).map(of_null_space).collect(), by_prior: Vec::new() };
+        let has_prior = |role: Role, prior: Prior| role == Role::Setup && matches!(prior, Prior::Gaussian(_));
+        if !list.iter().any(|parameter| has_prior(parameter.role, parameter.prior)) {
+            return Ok(determined);
+        }
+        // Priors of families determine their coefficients. They are no statement about the set-up.
+        let (problem, kept) = problem.without_families();
+        let linear = Linearisation::of(&problem, &vec![0.0; kept.len()])?;
+        let alone = Rank::decide(&linear.readings, &linear.size, &linear.preference)?;
+        for (k, j) in kept.iter().enumerate() {
+            let by_prior = is_of_interest(&list[*j]) && linear.rank.is_identifiable(k) && !alone.is_identifiable(k);
+            if by_prior && determined.by[*j] == DeterminedBy::Readings {
+                determined.by[*j] = DeterminedBy::Prior;
+            }
+        }
+        determined.by_prior = determined_by_prior(&problem, &linear)?;
+        Ok(determined)
+    }
+
+    /// States what determines the estimates of a model, and whether they may be quoted.
+    pub fn mark(&self, problem: &Problem, parameters: &mut [ParameterResult], goodness: Goodness) {
+        let list = problem.parameters.list.iter();
+        let by_prior: Vec<&str> = (list.zip(&self.by))
+            .filter(|(_, by)| **by == DeterminedBy::Prior)
+            .map(|(parameter, _)| parameter.id.trim_end_matches(".cos").trim_end_matches(".sin"))
+            .collect();
+        for parameter in parameters {
+            parameter.quotable = goodness.quotable;
+            let own = parameter.id.trim_end_matches(".amplitude").trim_end_matches(".phase");
+            if by_prior.contains(&own) {
+                parameter.set_determined_by(DeterminedBy::Prior);
+            }
+        }
+    }
+
+    /// The parameters without an estimate of their own.
+    fn not_estimated(&self, problem: &Problem) -> Vec<NotEstimated> {
+        let list = problem.parameters.list.iter().zip(&self.by);
+        let open = |by: DeterminedBy| matches!(by, DeterminedBy::BaseCombination | DeterminedBy::Nothing);
+        list.filter(|(_, by)| open(**by))
+            .map(|(parameter, by)| NotEstimated { id: parameter.id.clone(), determined_by: *by })
+            .collect()
+    }
+}
+
+/// What a fit is worth.
+pub(crate) fn outcome(problem: &Problem, fit: &Fit, goodness: Goodness, determined: &Determined) -> Outcome {
+    Outcome {
+        goodness,
+        determined_by_prior: determined.by_prior.clone(),
+        not_estimated: determined.not_estimated(problem),
+        assumptions: assumptions(problem, fit),
+        ranges: ranges(problem),
+    }
+}
+
+/// What a fit assumes, each with its test by the readings.
+fn assumptions(problem: &Problem, fit: &Fit) -> Vec<Assumption> {
+    let mut list = vec![noise(problem, fit)];
+    list.extend(priors(problem, fit));
+    let excluded = problem.rejected.iter().flatten().filter(|rejected| **rejected).count();
+    if excluded > 0 {
+        let share = excluded as f64 / (problem.readings() + excluded) as f64;
+        list.push(Assumption {
+            kind: AssumptionKind::ExcludedReadings,
+            statement: format!("{} as outliers do not count", counted(excluded, "reading")),
+            verdict: AssumptionVerdict::Agrees,
+            test: format!("each is too far from the model for the noise; {:.2} % of the readings", 100.0 * share),
+        });
+    }
+    list.extend(assume::statements(problem).into_iter().map(|statement| Assumption {
+        kind: AssumptionKind::Explanation,
+        statement,
+        verdict: AssumptionVerdict::NotTested,
+        test: "the readings explain both equally well".to_string(),
+    }));
+    list
+}
+
+fn noise(problem: &Problem, fit: &Fit) -> Assumption {
+    let figure = format!("noise of {:.3} µm", problem.noise.sigma_mm * 1e3);
+    let contradicted = stated_against_repeats(problem, &fit.residuals);
+    let (statement, verdict, test) = match (problem.noise.source, contradicted) {
+        (_, Some(why)) => (format!("{figure}, as stated"), AssumptionVerdict::Contradicted, why),
+        (NoiseSource::Stated, None) => (
+            format!("{figure}, as stated"),
+            AssumptionVerdict::Agrees,
+            "repeats, if there are any, do not contradict it".to_string(),
+        ),
+        (NoiseSource::Repeats, None) => {
+            (format!("{figure}, from repeats"), AssumptionVerdict::Agrees, "pure error of the repeats".to_string())
+        }
+        (_, None) => (
+            format!("{figure}, from the residual of the model"),
+            AssumptionVerdict::NotTested,
+            "no noise is stated and no reading repeats".to_string(),
+        ),
+    };
+    Assumption { kind: AssumptionKind::Noise, statement, verdict, test }
+}
+
+/// The stated values of the set-up against their estimates.
+fn priors(problem: &Problem, fit: &Fit) -> Option<Assumption> {
+    let list = &problem.parameters.list;
+    let stated = |prior: Prior| matches!(prior, Prior::Gaussian(_));
+    let count = list.iter().filter(|parameter| parameter.role == Role::Setup && stated(parameter.prior)).count();
+    if count == 0 {
+        return None;
+    }
+    let pulls = Pulls::of(problem, fit);
+    let largest = pulls.each.iter().max_by(|a, b| a.pull.abs().total_cmp(&b.pull.abs()));
+    let (verdict, test) = match largest {
+        None => (AssumptionVerdict::NotTested, "the readings contain no information about them".to_string()),
+        Some(pull) => {
+            let contradicted = !pulls.contradicted().is_empty();
+            let verdict = if contradicted { AssumptionVerdict::Contradicted } else { AssumptionVerdict::Agrees };
+            let id = &list[pull.parameter].id;
+            (verdict, format!("largest pull {:.1} ({id}), limit {:.1}", pull.pull.abs(), pulls.limit))
+        }
+    };
+    let statement = format!("{} with their stated uncertainties", counted(count, "set-up parameter"));
+    Some(Assumption { kind: AssumptionKind::Priors, statement, verdict, test })
+}
+
+/// The range of the readings along each axis that moves.
+fn ranges(problem: &Problem) -> Vec<DataRange> {
+    let machine = &problem.session.machine;
+    let mut ranges = Vec::new();
+    for (index, axis) in machine.axes.iter().enumerate() {
+        let positions = (problem.tests.iter()).filter_map(|test| test.readings.as_ref()?.positions.get(index));
+        let (mut least, mut greatest) = (f64::INFINITY, f64::NEG_INFINITY);
+        for position in positions.flatten() {
+            (least, greatest) = (least.min(*position), greatest.max(*position));
+        }
+        if least < greatest {
+            let unit = match axis.kind {
+                AxisKind::Linear => "mm",
+                AxisKind::Rotary => "deg",
+            };
+            let range = [least, greatest].map(|position| axis.kind.to_display(position));
+            ranges.push(DataRange { axis: axis.name.clone(), range, unit: unit.to_string() });
+        }
+    }
+    ranges
+}

@@ -1,0 +1,127 @@
+//! The three statements with which every output opens: is the result good, what to correct, what to measure next.
+
+use std::fmt;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::outcome::{Goodness, TraceVerdict};
+use super::parameter::DeterminedBy;
+use crate::tolerance::rule::Decision;
+
+/// A component of an axis line or a direction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum LineQuantity {
+    /// A coordinate of a point on a rotary axis, mm.
+    Point,
+    /// A component of the unit vector of an axis.
+    Direction,
+}
+
+impl fmt::Display for LineQuantity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            LineQuantity::Point => "point",
+            LineQuantity::Direction => "direction",
+        })
+    }
+}
+
+/// A component of the line of an axis in R with all axes at zero: nominal, identified, and the change.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct AxisCorrection {
+    /// The axis.
+    pub axis: String,
+    /// Whether it is of a point on the axis or of its direction.
+    pub quantity: LineQuantity,
+    /// The coordinate in R: `X`, `Y`, `Z`.
+    pub coordinate: char,
+    /// Nominal value: mm of a point, 1 of a direction.
+    pub nominal: f64,
+    /// Identified value, in the unit of `nominal`.
+    pub identified: f64,
+    /// Identified less nominal, in `unit`.
+    pub change: f64,
+    /// Standard uncertainty of the change, in `unit`.
+    pub u: f64,
+    /// `um` of a point, `um/m` of a direction.
+    pub unit: String,
+    /// What determines the change.
+    pub determined_by: DeterminedBy,
+    /// Whether the change may be quoted.
+    pub quotable: bool,
+}
+
+impl AxisCorrection {
+    /// Whether the change exceeds its expanded uncertainty `2 u`.
+    pub fn exceeds_u(&self) -> bool {
+        self.u > 0.0 && self.change.abs() > 2.0 * self.u
+    }
+}
+
+/// What to do next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum NextStep {
+    /// Correct the session: the readings contradict it.
+    CorrectSession,
+    /// Search for the effect that the model lacks.
+    Trace,
+    /// Measure the test that separates an effect from its aliases.
+    SeparatingTest,
+    /// Measure the test that makes confounded parameters identifiable.
+    Identify,
+    /// Measure the test that most lowers the largest uncertainty.
+    Improve,
+    /// State the noise, or repeat a run.
+    StateNoise,
+    /// Nothing: no candidate test is known for the instrument.
+    Nothing,
+}
+
+/// Whether the result is good.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct GoodStatement {
+    /// The verdict of a trace; absent for a fit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub verdict: Option<TraceVerdict>,
+    /// The residual against the noise.
+    pub goodness: Goodness,
+    /// The decision by the limits of the session; absent without limits.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub decision: Option<Decision>,
+    /// The limits that fail, by identifier.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub failed: Vec<String>,
+    /// The limits that are undecided, by identifier.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub undecided: Vec<String>,
+}
+
+/// What to measure next.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct MeasureStatement {
+    /// The step.
+    pub step: NextStep,
+    /// Name of the test in the session that the command writes; absent if no test is proposed yet.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub test: Option<String>,
+    /// The test in words.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub description: Option<String>,
+    /// The effect that it separates from its aliases.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub effect: Option<String>,
+}
+
+/// The three statements.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Statements {
+    /// Is the result good.
+    pub good: GoodStatement,
+    /// What to correct: the line of each axis whose location errors are identified.
+    pub correct: Vec<AxisCorrection>,
+    /// What to measure next.
+    pub measure: MeasureStatement,
+}
