@@ -3,13 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use abbe::identify::compare::results::{Comparison, ExcludedReading};
-use abbe::identify::compare::{CompareOptions, Named, SIGNIFICANCE, compare, one_machine};
-use abbe::identify::fit;
-use abbe::identify::model_file::{self, IdentifiedModel, Provenance};
+use abbe::identify::compare::{CompareOptions, Input, Named, SIGNIFICANCE, compare, models, one_machine};
+use abbe::identify::model_file::{self, IdentifiedModel};
 use abbe::identify::results::Outlier;
-use abbe::model::chain::Machine;
 use abbe::model::files::{self, ReadOptions};
-use abbe::model::session::Session;
 use clap::Args;
 
 use super::failure::Failure;
@@ -20,11 +17,11 @@ use crate::report::compare as present;
 
 /// Examples of `abbe compare`.
 pub const HELP: &str = "Each input is a session, which is fitted as declared, or a model of `abbe fit --save` or `abbe trace --save`. Sessions are fitted \
-with the errors and effects that any of them declares, so that their parameters are the same. The others are compared with the first.
+with the errors and effects that any input has, models included, so that their parameters are the same. The others are compared with the first.
 
 A difference is significant if Holm's procedure rejects that it is zero: the probability of any false claim between two inputs is at \
-most the level of --significance. Bars of the same name with the same prior are one bar, whose deviation cancels; --shared names \
-other set-up quantities that were not mounted again.
+most the level of --significance. Bars of the same name with the same prior are taken for one bar, whose deviation cancels, \
+unless the readings show that they are two; --shared names other set-up quantities that were not mounted again.
 
 Examples:
   abbe compare run1/session.toml run2/session.toml
@@ -73,21 +70,6 @@ pub struct CompareArguments {
     csv: Option<PathBuf>,
     #[command(flatten)]
     common: CommonArguments,
-}
-
-/// What an input is.
-enum Input {
-    Model(Box<IdentifiedModel>),
-    Session(Box<Session>),
-}
-
-impl Input {
-    fn machine(&self) -> &Machine {
-        match self {
-            Input::Model(model) => &model.machine,
-            Input::Session(session) => &session.machine,
-        }
-    }
 }
 
 /// Runs `abbe compare`.
@@ -167,35 +149,4 @@ fn read(file: &Path, arguments: &CompareArguments, outputs: &Outputs, origin: &m
     outputs.refuse_overwrite_of_sources(&sources)?;
     origin.add(Origin::of_session(&sources));
     Ok(Input::Session(Box::new(session)))
-}
-
-/// The models of all inputs, and the readings that their fits exclude as outliers. Sessions are fitted with the errors
-/// and effects that any of them declares.
-fn models(inputs: Vec<Input>, seed: u64) -> Result<Vec<(IdentifiedModel, Vec<Outlier>)>, Failure> {
-    let (mut errors, mut effects) = (Vec::new(), Vec::new());
-    for input in &inputs {
-        let Input::Session(session) = input else { continue };
-        for error in &session.unknowns {
-            if !errors.contains(error) {
-                errors.push(error.clone());
-            }
-        }
-        for effect in session.effects.iter().filter(|effect| effect.tests.is_empty()) {
-            if !effects.contains(effect) {
-                effects.push(effect.clone());
-            }
-        }
-    }
-    let model = |input: Input| match input {
-        Input::Model(model) => Ok((*model, Vec::new())),
-        Input::Session(session) => {
-            let own = session.effects.iter().filter(|effect| !effect.tests.is_empty()).cloned();
-            let effects = effects.iter().cloned().chain(own).collect();
-            let session = Session { unknowns: errors.clone(), effects, ..*session };
-            let (problem, fit) = fit::prepare(&session, seed)?;
-            let outliers = fit::outliers(&problem, &fit);
-            Ok((IdentifiedModel::of_fit(&problem, &fit, Provenance::default())?, outliers))
-        }
-    };
-    inputs.into_iter().map(model).collect()
 }

@@ -4,7 +4,7 @@ use abbe::identify::compare::results::{Comparison, Difference, Pair};
 use abbe::identify::results::Outlier;
 use abbe::model::words::counted;
 
-use super::number::{p_equals, probability, unit};
+use super::number::{p_equals, probability, quantity, unit, value_and_u};
 use super::table::{Cell, Table, cells, numbers};
 
 /// Rows of the first screen that are not significant.
@@ -47,6 +47,20 @@ pub fn headline(comparison: &Comparison, pair: &Pair) -> Vec<String> {
     }
     if !pair.shared_setup.is_empty() {
         lines.push(format!("one object in both: {}", pair.shared_setup.join(", ")));
+    }
+    let others: Vec<&str> =
+        pair.not_shared.iter().filter(|other| !other.refuted).map(|other| other.id.as_str()).collect();
+    if !others.is_empty() {
+        lines.push(format!("not taken for one object, like the others of their kind: {}", others.join(", ")));
+    }
+    for refuted in pair.not_shared.iter().filter(|other| other.refuted) {
+        let (value, u) = value_and_u(refuted.value, refuted.u);
+        lines.push(format!(
+            "not one object in both, although of one name: {} differs by {} ({})",
+            refuted.id,
+            quantity(&format!("{value} ± {u}"), &refuted.unit),
+            p_equals(refuted.p_value)
+        ));
     }
     if !pair.not_comparable.is_empty() {
         let ids: Vec<&str> = pair.not_comparable.iter().map(|held| held.id.as_str()).collect();

@@ -12,11 +12,13 @@
 //! rejective multiple test procedure, Scand. J. Statist. 6 (1979) 65), so that the probability of any false claim is at
 //! most the level.
 //!
-//! - `shared`: the covariance of two models with a common set-up; `gauge`: one gauge for both;
+//! - `inputs`: sessions and models with the same parameters; `shared`: the covariance of two models with a common
+//!   set-up, which the readings test; `gauge`: one gauge for both;
 //! - [`workspace`]: the volumetric error of each model over the common range;
 //! - [`results`]: the reported comparison.
 
 mod gauge;
+mod inputs;
 pub mod results;
 mod shared;
 pub mod workspace;
@@ -32,7 +34,9 @@ use crate::numerics::symmetric::Symmetric;
 use crate::numerics::tails::{chi_square_tail, normal_tail};
 use crate::parameters::Role;
 use crate::validate::machine::differences;
+pub use inputs::{Input, models};
 use results::{Comparison, Difference, NotComparable, OnlyIn, Pair};
+use shared::SharedDifference;
 
 /// Probability of any false claim of a difference between two models, if the caller states none.
 pub const SIGNIFICANCE: f64 = 0.05;
@@ -45,7 +49,7 @@ pub struct CompareOptions {
     /// Probability of any false claim of a difference between two models.
     pub significance: f64,
     /// Set-up quantities that are the same objects in both sessions: `bar`, `workpiece_ball`, `spindle_ball`. `None`:
-    /// bars of the same name with the same prior.
+    /// bars of the same name with the same prior. Those that the readings show to be different objects are not shared.
     pub shared: Option<Vec<String>>,
     /// Places along each axis at which the volumetric error is evaluated; 0 for none.
     pub places: usize,
@@ -120,7 +124,8 @@ fn pair(a: &Named<'_>, b: &Named<'_>, options: &CompareOptions) -> Result<Compar
             a.name, b.name
         )));
     }
-    let (mut delta, mut covariance, shared) = shared::difference(a.model, b.model, &common, options.shared.as_deref())?;
+    let SharedDifference { mut delta, mut covariance, shared, refuted } =
+        shared::difference(a.model, b.model, &common, options.shared.as_deref())?;
     let held = gauge::one_gauge(a.model, b.model, &common, &mut delta, &mut covariance)?;
     let id = |k: usize| a.model.parameters[common[k].0].id.clone();
     let mut differences = Vec::new();
@@ -176,6 +181,7 @@ fn pair(a: &Named<'_>, b: &Named<'_>, options: &CompareOptions) -> Result<Compar
         degrees_of_freedom,
         p_value: chi_square_tail(chi_square, degrees_of_freedom as f64),
         shared_setup: shared,
+        not_shared: refuted,
         not_comparable: held.iter().map(|k| NotComparable { id: id(*k) }).collect(),
         only_in,
     };
@@ -190,7 +196,7 @@ fn common(a: &IdentifiedModel, b: &IdentifiedModel) -> Vec<(usize, usize)> {
         p.id == q.id
             && match (p.role, q.role) {
                 (Role::Coefficient { effect: e, .. }, Role::Coefficient { effect: f, .. }) => {
-                    a.effects[e] == b.effects[f]
+                    a.effects[e].is_same(&b.effects[f])
                 }
                 (p, q) => p == q,
             }

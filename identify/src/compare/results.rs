@@ -75,11 +75,32 @@ pub struct Pair {
     pub p_value: f64,
     /// Set-up quantities that are the same object in both sessions.
     pub shared_setup: Vec<String>,
+    /// Set-up quantities of one name that are not shared, because the readings show that they, or others of their kind, are
+    /// not one object.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub not_shared: Vec<NotShared>,
     /// Parameters without a difference of their own: one of the sessions does not separate them from others, and they
     /// are held at nominal in both.
     pub not_comparable: Vec<NotComparable>,
     /// Effects and errors that only one of the inputs has.
     pub only_in: Vec<OnlyIn>,
+}
+
+/// A set-up quantity of one name that is not one object in both sessions.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct NotShared {
+    /// Identifier: `bar[C100]`.
+    pub id: String,
+    /// Deviation in the other input less that in the first, by the readings alone, in `unit`.
+    pub value: f64,
+    /// Standard uncertainty of the difference, in `unit`.
+    pub u: f64,
+    /// Unit of `value` and `u`.
+    pub unit: String,
+    /// Probability of a larger difference if it were one object.
+    pub p_value: f64,
+    /// Whether the readings show that it is not. Otherwise they show it of another object of its kind.
+    pub refuted: bool,
 }
 
 /// A parameter without a difference of its own.

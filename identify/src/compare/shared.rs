@@ -10,19 +10,43 @@
 //! A fit whose residual exceeds its noise enlarges all its uncertainties by a factor, those of its priors included. `f`
 //! is the larger factor of the two: each model contains at least that prior, so that `Λ` stays positive semidefinite,
 //! and the prior that remains is the narrower one.
+//!
+//! That both used the same object is an assumption, which the readings test. With the variance `C` of a deviation after
+//! a fit and its prior `f·u_s`, the readings alone have the information `i = 1/C − 1/(f·u_s)²` and the estimate
+//! `l = s/(C·i)`. For one object `(l_B − l_A)²·i_A·i_B/(i_A + i_B)` is a χ² of one degree of freedom.
 
 use abbe_model::session::Prior;
 use faer::Mat;
 
+use super::results::NotShared;
 use crate::error::IdentifyError;
 use crate::model_file::{IdentifiedModel, ModelParameter};
 use crate::numerics::symmetric::pseudo_inverse;
+use crate::numerics::tails::normal_tail;
 use crate::parameters::Role;
 
+/// Least share of a prior variance by which readings have to lower it to contain information about the object.
+const LEAST_SHARE: f64 = 1e-3;
 /// The word that states that nothing is shared.
 const NOTHING: &str = "none";
 
-/// The difference B − A over the common parameters, its covariance, and the identifiers of the shared set-up.
+/// Probability with which objects of one kind, such as bars, are taken for others although they are the same.
+const REFUTED: f64 = 0.001;
+
+/// The difference of two models with what they share.
+pub(super) struct SharedDifference {
+    /// The difference B − A over the common parameters, internal units.
+    pub delta: Vec<f64>,
+    /// Its covariance.
+    pub covariance: Mat<f64>,
+    /// Identifiers of the shared set-up.
+    pub shared: Vec<String>,
+    /// Set-up quantities that would be shared, if the readings did not show that they are not one object.
+    pub refuted: Vec<NotShared>,
+}
+
+/// The difference B − A over the common parameters. Objects of a kind of which the readings show one to be two are not
+/// shared.
 ///
 /// # Errors
 /// If a covariance has no inverse, or a stated quantity is not estimated in both.
@@ -31,14 +55,15 @@ pub(super) fn difference(
     b: &IdentifiedModel,
     common: &[(usize, usize)],
     things: Option<&[String]>,
-) -> Result<(Vec<f64>, Mat<f64>, Vec<String>), IdentifyError> {
-    let shared = shared(a, b, things)?;
+) -> Result<SharedDifference, IdentifyError> {
+    let mut shared = shared(a, b, things)?;
+    let refuted = refuted(a, b, &mut shared);
     if shared.is_empty() {
         let delta = common.iter().map(|(i, j)| b.parameters[*j].value - a.parameters[*i].value).collect();
         let covariance = Mat::from_fn(common.len(), common.len(), |k, l| {
             a.covariance[(common[k].0, common[l].0)] + b.covariance[(common[k].1, common[l].1)]
         });
-        return Ok((delta, covariance, Vec::new()));
+        return Ok(SharedDifference { delta, covariance, shared: Vec::new(), refuted });
     }
     // The parameters of both: those of A, then those of B that are not shared.
     let own_b: Vec<usize> = (0..b.parameters.len()).filter(|j| !shared.iter().any(|(_, of_b)| of_b == j)).collect();
@@ -80,7 +105,65 @@ pub(super) fn difference(
         let ((i, j), (p, q)) = (ends[k], ends[l]);
         joint[(j, q)] - joint[(j, p)] - joint[(i, q)] + joint[(i, p)]
     });
-    Ok((delta, covariance, shared.iter().map(|(i, _)| a.parameters[*i].id.clone()).collect()))
+    let shared = shared.iter().map(|(i, _)| a.parameters[*i].id.clone()).collect();
+    Ok(SharedDifference { delta, covariance, shared, refuted })
+}
+
+/// Takes the kinds of objects out of `shared` of which the readings show one to be two (Bonferroni over the kind). The
+/// others of the kind may differ by less than the readings show; a kit of bars that was assembled again is another one.
+fn refuted(a: &IdentifiedModel, b: &IdentifiedModel, shared: &mut Vec<(usize, usize)>) -> Vec<NotShared> {
+    let tested: Vec<Option<NotShared>> = shared.iter().map(|pair| test(a, b, *pair)).collect();
+    let kind = |i: usize| thing(a, i);
+    let of_kind = |name: &str| shared.iter().filter(|(i, _)| kind(*i) == name).count() as f64;
+    let mut kinds: Vec<&str> = Vec::new();
+    let mut refuted: Vec<NotShared> = Vec::new();
+    for ((i, _), found) in shared.iter().zip(&tested) {
+        if found.as_ref().is_some_and(|found| found.p_value * of_kind(kind(*i)) < REFUTED) && !kinds.contains(&kind(*i))
+        {
+            kinds.push(kind(*i));
+        }
+    }
+    for ((i, _), found) in shared.iter().zip(tested) {
+        if let Some(found) = found.filter(|_| kinds.contains(&kind(*i))) {
+            let refuted_itself = found.p_value * of_kind(kind(*i)) < REFUTED;
+            refuted.push(NotShared { refuted: refuted_itself, ..found });
+        }
+    }
+    let kinds: Vec<String> = kinds.into_iter().map(str::to_string).collect();
+    shared.retain(|(i, _)| !kinds.iter().any(|kind| kind == thing(a, *i)));
+    refuted
+}
+
+/// The kind of a set-up quantity: `bar` of `bar[C100]`, `workpiece_ball` of `workpiece_ball.x[P1]`.
+fn thing(model: &IdentifiedModel, parameter: usize) -> &str {
+    model.parameters[parameter].id.split(['[', '.']).next().unwrap_or_default()
+}
+
+/// The test of one object by the readings of both sessions; `None` if one of them contains no information about it.
+fn test(a: &IdentifiedModel, b: &IdentifiedModel, (i, j): (usize, usize)) -> Option<NotShared> {
+    let alone = |model: &IdentifiedModel, k: usize| {
+        let variance = model.covariance[(k, k)];
+        let of_prior = match model.parameters[k].prior {
+            Prior::Gaussian(u) => (model.quality.u_enlargement * u).powi(-2),
+            Prior::Free | Prior::Known => 0.0,
+        };
+        let information = 1.0 / variance - of_prior;
+        // Below this share of the variance the difference is rounding.
+        (information * variance > LEAST_SHARE)
+            .then(|| (model.parameters[k].value / (variance * information), 1.0 / information))
+    };
+    let ((of_a, variance_a), (of_b, variance_b)) = (alone(a, i)?, alone(b, j)?);
+    let parameter = &a.parameters[i];
+    let display = parameter.unit.display_per_internal;
+    let (value, u) = (of_b - of_a, (variance_a + variance_b).sqrt());
+    Some(NotShared {
+        id: parameter.id.clone(),
+        value: value * display,
+        u: u * display,
+        unit: parameter.unit.name.clone(),
+        p_value: (2.0 * normal_tail((value / u).abs())).min(1.0),
+        refuted: false,
+    })
 }
 
 /// The information of a model: the inverse of its covariance over the parameters that are not held.
@@ -107,7 +190,7 @@ fn shared(
         b.parameters.iter().position(same).map(|j| (i, j))
     });
     let mut of_both: Vec<(usize, usize)> = of_both.collect();
-    let thing = |i: usize| a.parameters[i].id.split(['[', '.']).next().unwrap_or_default();
+    let thing = |i: usize| thing(a, i);
     let things_stated = things.unwrap_or_default();
     if things_stated.len() > 1 && things_stated.iter().any(|stated| stated == NOTHING) {
         return Err(IdentifyError::Request(format!(
