@@ -173,7 +173,7 @@ fn correction(
     parameters: &[ParameterResult],
     covariance: &Covariance,
 ) -> Option<AxisCorrection> {
-    // Index and change of the component in mm or 1 for a unit of the parameter.
+    // Index and change of the component in mm or 1 per unit of the parameter.
     let own: Vec<(usize, f64)> = (terms.iter())
         .filter_map(|(name, by)| {
             let id = name.to_string();
