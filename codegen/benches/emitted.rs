@@ -20,7 +20,7 @@
 //!   errors[7]    theta_y0c    rad  orientation of C about Y (EB0C)
 //! Value: the length read, mm. Gradient: by errors[0], errors[1] and so on, mm/mm and mm/rad.
 //! Value and gradient: 66 operations per reading (28 + and −, 36 ·, 1 /, 1 √).
-//! Checked against the chain with dual numbers at 40 points, errors to ±10 mm and ±0.1 rad: largest relative difference 0e0 (value), 7e-16 (gradient).
+//! Checked against the chain with dual numbers at 40 points, errors to ±10 mm and ±0.1 rad: largest relative difference 0 (value), 7e-16 (gradient).
 //! Largest deviation from the exact chain over C −180° to 180°, A −20° to 70°: 0.0054 µm at errors of ±10 µm and ±0.01°, 0.54 µm at errors of ±100 µm and ±0.1°.
 
 /// Lengths of the set-up.
