@@ -45,9 +45,14 @@ pub fn watch_termination() {
 #[cfg(not(unix))]
 pub fn watch_termination() {}
 
+/// Whether SIGTERM came. What fails from then on fails because the temporary files are being removed.
+pub fn is_terminated() -> bool {
+    IS_TERMINATED.load(Ordering::Relaxed)
+}
+
 /// The exit status of an interrupted command.
 pub fn status() -> u8 {
-    if IS_TERMINATED.load(Ordering::Relaxed) { TERMINATED } else { INTERRUPTED }
+    if is_terminated() { TERMINATED } else { INTERRUPTED }
 }
 
 /// Ends the program without its temporary files.

@@ -250,6 +250,7 @@ pub fn run() -> ExitCode {
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
+        Err(_) if interrupt::is_terminated() => ExitCode::from(interrupt::status()),
         Err(failure) => {
             failure.show();
             ExitCode::from(failure.status())

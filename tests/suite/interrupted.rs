@@ -288,8 +288,9 @@ fn a_terminated_program_leaves_no_temporary_file() {
     // At any time.
     for number in 0..12 {
         let delay = 0.005 * f64::from(number);
-        let line =
-            format!("abbe fit session.toml --json new.json --plots plots -q & sleep {delay}; kill -TERM $!; wait $!");
+        let line = format!(
+            "abbe fit session.toml --json new.json --plots plots{number} -q & sleep {delay}; kill -TERM $!; wait $!"
+        );
         let output = place.shell(&line);
         assert!(matches!(output.status.code(), Some(0 | TERMINATED)), "{:?}", output.status);
         for name in place.names() {
