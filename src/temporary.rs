@@ -4,6 +4,7 @@
 //! A temporary file is locked while its process writes it. The lock ends with the process, however it ends: what is not
 //! locked is stale, and [`remove_stale`] removes it.
 
+use std::cell::Cell;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -39,15 +40,18 @@ impl TemporaryFile {
     /// # Errors
     /// If it cannot be made. The message does not name it: the caller knows the file that was asked for.
     pub fn in_folder(folder: &Path) -> io::Result<TemporaryFile> {
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(PREFIX).suffix(SUFFIX);
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            builder.permissions(std::fs::Permissions::from_mode(0o666));
-        }
+        // `tempfile` adds the path of the temporary file to an error, and drops its code.
+        let code = Cell::new(None);
+        let open = |path: &Path| {
+            let file = OpenOptions::new().read(true).write(true).create_new(true).open(path);
+            file.inspect_err(|error| code.set(error.raw_os_error()))
+        };
+        let make = || {
+            let made = tempfile::Builder::new().prefix(PREFIX).suffix(SUFFIX).make_in(folder, open);
+            made.map_err(|error| code.get().map_or(error, io::Error::from_raw_os_error))
+        };
         for _ in 0..ATTEMPTS {
-            let (file, noted) = noted(|| builder.tempfile_in(folder), |file| file.path())?;
+            let (file, noted) = noted(make, |file| file.path())?;
             if is_own(file.as_file(), file.path())? {
                 return Ok(TemporaryFile { file, _noted: noted });
             }
@@ -65,7 +69,7 @@ impl TemporaryFile {
     /// # Errors
     /// If it cannot be moved; it is removed then.
     pub fn persist(self, place: &Path) -> io::Result<()> {
-        self.file.persist(place).map(drop).map_err(|error| plain(error.error))
+        self.file.persist(place).map(drop).map_err(|error| error.error)
     }
 }
 
@@ -93,7 +97,11 @@ impl TemporaryFolder {
     /// If it cannot be made.
     pub fn in_folder(folder: &Path) -> io::Result<TemporaryFolder> {
         for _ in 0..ATTEMPTS {
-            let builder = || tempfile::Builder::new().prefix(PREFIX).tempdir_in(folder);
+            // Without the path of the temporary folder, which `tempfile` adds to an error.
+            let builder = || {
+                let made = tempfile::Builder::new().prefix(PREFIX).tempdir_in(folder);
+                made.map_err(|error| error.kind().into())
+            };
             let (made, noted) = noted(builder, TempDir::path)?;
             let place = made.path().join(LOCK);
             let lock = match File::create_new(&place) {
@@ -128,7 +136,7 @@ impl Drop for Noted {
 /// Makes a file or a folder and notes its path, without a moment between in which a signal could end the process.
 fn noted<T>(make: impl FnOnce() -> io::Result<T>, path: impl Fn(&T) -> &Path) -> io::Result<(T, Noted)> {
     let mut own = OWN.lock().unwrap_or_else(PoisonError::into_inner);
-    let made = make().map_err(plain)?;
+    let made = make()?;
     let path = path(&made).to_path_buf();
     own.push(path.clone());
     Ok((made, Noted(path)))
@@ -188,16 +196,6 @@ fn remove_unlocked(lock: &Path, path: &Path) {
     let Ok(file) = OpenOptions::new().read(true).write(true).open(lock) else { return };
     if file.try_lock().is_ok() {
         let _ = if path.is_dir() { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) };
-    }
-}
-
-/// The error of the operating system, without the path of the temporary file that `tempfile` adds.
-fn plain(error: io::Error) -> io::Error {
-    let inner =
-        error.get_ref().and_then(std::error::Error::source).and_then(|source| source.downcast_ref::<io::Error>());
-    match inner.and_then(io::Error::raw_os_error) {
-        Some(code) => io::Error::from_raw_os_error(code),
-        None => error,
     }
 }
 
