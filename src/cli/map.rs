@@ -22,7 +22,7 @@ pub struct MapArguments {
         long,
         value_name = "FILE.csv",
         requires = "functions",
-        conflicts_with_all = ["language", "order", "rotation", "errors", "symbols", "gradient", "out"]
+        conflicts_with_all = ["language", "order", "rotation", "errors", "notation", "gradient", "out"]
     )]
     map: Option<PathBuf>,
     /// The errors as functions of the axes: a TOML file of constants, tables, polynomials and harmonics.
