@@ -1,11 +1,11 @@
 //! Aliases of a found effect: other effects that explain the residual equally well.
 //!
-//! Two candidates are aliases if the readings do not separate them. The alias replaces the found effect in the same
-//! model. Either its evidence is then at most 2 lower, or χ² is at most 4 higher: 2 in the log-likelihood. Every tuned
-//! number of the alias that the found effect does not have has to lower χ² by 4. Selected positions count with their
-//! penalty if the found effect has positions too. The alias also reproduces at least half of the found effect's signature in the readings. The search reports the
-//! candidate with the shortest description. The others are listed, the most probable first: by likelihood and by mechanical
-//! plausibility ([`super::plausible`]).
+//! Two candidates are aliases if the readings do not separate them. The alias replaces the found effect in the same model.
+//! Either its evidence is then at most 2 lower, or χ² is at most 4 higher: 2 in the log-likelihood. Every tuned number of
+//! the alias that the found effect does not have has to lower χ² by 4. Selected positions count with their penalty if the
+//! found effect has positions too. The alias also reproduces at least half of the found effect's signature in the readings.
+//! The search reports the candidate with the shortest description. The others are listed, the most probable first: by
+//! likelihood and by mechanical plausibility (`plausible.rs`).
 
 use std::cmp::Ordering;
 use std::collections::HashSet;

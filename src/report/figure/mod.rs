@@ -4,7 +4,7 @@
 //! [`set_up`]) holds the data of the kind, its
 //! table and its drawing. Printers: [`svg`] draws a figure inside the report or as a file; `png` (feature `png`) draws
 //! that file as pixels; [`pdf`] draws it for LaTeX; [`Figure::table`] gives the data as one tidy table, which
-//! [`super::csv`] writes. A further kind is one file and one variant of [`Chart`].
+//! [`crate::printers::csv`] writes. A further kind is one file and one variant of [`Chart`].
 
 pub mod bars;
 pub mod chain;

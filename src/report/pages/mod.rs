@@ -1,7 +1,7 @@
 //! HTML reports and plots. Each report is one file without external resources. The calculations are in
 //! `abbe::identify`.
 //!
-//! - [`document`], [`page`]: contents of a report, and the page around them. [`provenance`]: inputs, version and
+//! - [`document`]: contents of a report. [`crate::report::provenance`]: inputs, version and
 //!   command line. [`embed`]: data in the page.
 //! - [`fit`], [`trace`], [`validate`](mod@validate), [`plan`], [`method`], [`next_test`], [`history`]: the report of each command.
 //! - [`summary`], [`values`], [`residuals`], [`effects`], [`readings`], [`sections`]: sections.
