@@ -36,8 +36,8 @@ pub mod readings;
 pub mod repeated;
 pub mod self_calibration;
 pub mod simulation;
-#[cfg(feature = "fleet")]
 pub mod statements;
+#[cfg(feature = "fleet")]
 pub mod study;
 pub mod table;
 pub mod trace;
