@@ -8,7 +8,7 @@ use std::io::Write;
 use std::path::Path;
 
 use abbe_model::ModelError;
-use abbe_model::files::toml::{rewrite, write};
+use abbe_model::document::edit::SessionText;
 use abbe_model::files::{self, ReadOptions};
 use abbe_model::session::{Session, planned};
 
@@ -102,10 +102,12 @@ pub fn session(input: &[u8]) {
         let text = std::str::from_utf8(input).expect("an accepted session is UTF-8");
         let file = Path::new("session.toml");
         // The rewritten form of a valid session is a valid session.
-        let again = rewrite::with_machine_file(text, file, "machine.toml").expect("it was read");
-        let again = rewrite::with_noise(&again, file, 0.5).expect("it was read");
-        let again = write::with_effects(&again, &session.effects, &session.machine);
-        assert!(!rewrite::without_tables(&again, &["effect"]).contains("[[effect]]\ncomponent"));
+        let mut again = SessionText::new(text, file).expect("it was read");
+        again.set_machine_file("machine.toml");
+        again.set_noise(0.5);
+        again.add_effects(&session.effects, &session.machine).expect("it was read");
+        again.remove(&["effect"]);
+        assert!(!again.to_string().contains("[[effect]]\ncomponent"));
         let short = text.matches("runs").count() == 0 && text.len() < 4000;
         let steps = session.tests.iter().filter(|test| test.motion.is_some()).count();
         if short && steps == 1 {

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use abbe_model::document::node::{Named, Node};
 use abbe_model::files;
 use abbe_model::session::limits::{LARGEST, MAX_LENGTH_MM};
 use abbe_model::words::number as number_in_words;
@@ -150,19 +151,14 @@ fn factor(from: &str, to: &str) -> Option<f64> {
 pub fn read(path: &Path) -> Result<Vec<Given>, IdentifyError> {
     let fault = |message: String| IdentifyError::Request(format!("{}: {message}", path.display()));
     let source = files::text(path, "the file of values")?;
-    let table = toml::de::DeTable::parse(&source.text).map_err(|cause| fault(cause.to_string()))?;
-    let mut entries: Vec<_> = table.into_inner().into_iter().collect();
-    entries.sort_by_key(|(key, _)| key.span().start);
-    entries
-        .into_iter()
-        .map(|(key, value)| match value.get_ref().as_str() {
-            Some(quantity) => Given::of(key.get_ref(), quantity).map_err(|error| fault(error.to_string())),
-            None => Err(fault(format!(
-                "`{key}` is not text; write number and unit in quotes, as in `{key} = \"35.3 um\"`",
-                key = key.get_ref()
-            ))),
-        })
-        .collect()
+    let values: Named<Node> = files::read::document_of(&source)?;
+    let given = values.0.iter().map(|(key, value)| match value.as_text() {
+        Some(quantity) => Given::of(key, quantity).map_err(|error| fault(error.to_string())),
+        None => {
+            Err(fault(format!("`{key}` is not text; write number and unit in quotes, as in `{key} = \"35.3 um\"`")))
+        }
+    });
+    given.collect()
 }
 
 #[cfg(test)]

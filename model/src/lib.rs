@@ -70,6 +70,7 @@ pub mod body;
 pub mod chain;
 pub mod code;
 pub mod component;
+pub mod document;
 pub mod driver;
 pub mod effect;
 pub mod error;

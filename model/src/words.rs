@@ -1,4 +1,4 @@
-//! Words of messages: counts with correct number agreement, and excerpts of the input that a message quotes.
+//! Words of messages: counts and lists, and excerpts of the input that a message quotes.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -29,6 +29,15 @@ pub fn counted(count: impl TryInto<u64> + std::fmt::Display + Copy, thing: &str)
         _ => format!("{noun}s"),
     };
     format!("{count} {plural}{rest}")
+}
+
+/// `a, b and c`.
+pub(crate) fn listed(words: &[impl AsRef<str>], joint: &str) -> String {
+    let words: Vec<&str> = words.iter().map(AsRef::as_ref).collect();
+    match words.split_last() {
+        Some((last, [_, ..])) => format!("{} {joint} {last}", words[..words.len() - 1].join(", ")),
+        _ => words.concat(),
+    }
 }
 
 /// A number in a message: seven digits at most, and an exponent where a number without one would be long.

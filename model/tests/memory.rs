@@ -1,9 +1,12 @@
 //! Sessions built in memory against the same sessions read from files, and the errors of unusable ones.
 
 use std::fs;
+use std::path::Path;
 
 use abbe_model::ModelError;
 use abbe_model::chain::Machine;
+use abbe_model::document::node::Node;
+use abbe_model::files::read::{add_node, document_of_text, plan_of_node};
 use abbe_model::files::{self, ReadOptions};
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::instrument::tracker::Tracker;
@@ -143,10 +146,11 @@ fn test_at(axis: &str, position: f64) -> NewTest {
 #[test]
 fn missing_readings_are_left_out_and_told() {
     use abbe_model::files::table::memory::{MemoryColumn, Values};
-    use abbe_model::files::toml::memory;
 
-    let (head, tests) = SESSION.split_once("[[test]]").unwrap();
-    let test = format!("[[test]]{tests}");
+    let document: Node = document_of_text(Path::new("session.toml"), SESSION).unwrap();
+    let test = &document.get("test").unwrap().items()[0];
+    let mut head = document.clone();
+    head.set("test", Node::from_iter::<[Node; 0]>([]));
     let c = [0.0, f64::NAN, 60.0, 90.0, 120.0, 180.0];
     let time = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
     let length = [125.0, 125.0, 1e99, 125.001, 125.002, 125.003];
@@ -158,8 +162,8 @@ fn missing_readings_are_left_out_and_told() {
             MemoryColumn { name: "time_s", values: Values::Numbers(time), missing: &[] },
             MemoryColumn { name: "length_mm", values: Values::Numbers(length), missing: of_length },
         ];
-        let mut session = memory::session(head).unwrap();
-        memory::add(&mut session, &test, &columns).map(|()| session).map_err(|fault| fault.to_string())
+        let mut session = plan_of_node(head.clone()).unwrap();
+        add_node(&mut session, "test", test.clone(), &columns).map(|()| session).map_err(|fault| fault.to_string())
     };
     let session = added(&length, &time, &of_length).unwrap();
     let told = "test \"C100\": 3 of 6 readings are missing: `c_deg` item 1; `length_mm` items 2, 3";

@@ -4,11 +4,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use abbe_model::chain::BodyErrors;
+use abbe_model::document::edit::SessionText;
 use abbe_model::driver::{Driver, DriverInput, Reference};
 use abbe_model::effect::shape::{Curve, Harmonic, Local, Periodic, Polynomial, Power, ReversalSpike, Steps, Warmup};
 use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::files::table::csv;
-use abbe_model::files::toml::write;
 use abbe_model::files::{self, ReadOptions};
 use abbe_model::sensitivity::TestModel;
 use abbe_model::session::planned;
@@ -202,7 +202,9 @@ fn written_effects_read_back_equal() {
     let path = ready("hermle-c600u/chapter5.toml");
     let original = fs::read_to_string(&path).unwrap();
     let session = plan("hermle-c600u/chapter5.toml");
-    let text = write::with_effects(&original, &effects, &session.machine);
+    let mut text = SessionText::new(&original, &path).unwrap();
+    text.add_effects(&effects, &session.machine).unwrap();
+    let text = text.to_string();
     assert!(text.starts_with(&original));
     let folder = tempfile::tempdir().unwrap();
     fs::copy(ready("hermle-c600u/machine.toml"), folder.path().join("machine.toml")).unwrap();
@@ -231,10 +233,15 @@ fn a_plan_becomes_a_measured_session() {
         measured.push(readings);
     }
     let written = folder.path().join("session.toml");
-    let text = write::with_data(&original, &written, &data).unwrap();
+    let with_data = |text: &str| {
+        let mut text = SessionText::new(text, &written).unwrap();
+        text.set_data(&data);
+        text.to_string()
+    };
+    let text = with_data(&original);
     assert_eq!(text.lines().count(), original.lines().count() + 4);
     // Applied again to the result, the names of the files are replaced, not added.
-    assert_eq!(write::with_data(&text, &written, &data).unwrap(), text);
+    assert_eq!(with_data(&text), text);
     fs::write(&written, text).unwrap();
     fs::copy(ready("hermle-c600u/machine.toml"), folder.path().join("machine.toml")).unwrap();
     let read = files::session(&written, &ReadOptions::default()).unwrap();

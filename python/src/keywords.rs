@@ -4,22 +4,24 @@
 //! number for the position of an axis is where the test holds the axis. Everything else is a key of `[[test]]`. `None`
 //! states nothing.
 
+use abbe::model::document::node::{Entry, Node, Value};
+use abbe::model::document::schema;
+use abbe::model::document::test::Test;
 use abbe::model::files::table::memory::{MemoryColumn, Values};
 use abbe::model::session::Session;
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
-use toml::{Table, Value};
 
 use crate::failed::Failed;
 
-/// Keys of `[[test]]` that no instrument states.
-const TEST_KEYS: [&str; 6] = ["setup", "spindle_setup", "at", "sweep", "path", "name"];
+/// Keys of `[[test]]` about files, which a test in memory does not have.
+const OF_FILES: [&str; 3] = ["data", "format", "columns"];
 
 /// The keywords of a test.
 pub struct Keywords<'py> {
     /// The keys of `[[test]]`.
-    pub table: Table,
+    pub table: Vec<(String, Node)>,
     columns: Vec<Column<'py>>,
 }
 
@@ -43,34 +45,35 @@ enum Held<'py> {
 impl<'py> Keywords<'py> {
     /// Sorts the keywords of a test.
     pub fn of_test(session: &Session, keywords: &Bound<'py, PyDict>) -> PyResult<Keywords<'py>> {
-        let set_up: Vec<&str> = session.instrument.entry().keys.iter().map(|key| key.name).collect();
-        let is_key = |name: &str| TEST_KEYS.contains(&name) || set_up.contains(&name);
-        let mut sorted = Keywords { table: Table::new(), columns: Vec::new() };
-        let mut at = Table::new();
+        let mut keys = schema::fields::<Test>();
+        keys.retain(|key| !OF_FILES.contains(&key.as_str()));
+        keys.extend(session.instrument.entry().keys.iter().map(|key| key.name.to_string()));
+        let is_key = |name: &String| keys.contains(name);
+        let mut sorted = Keywords { table: Vec::new(), columns: Vec::new() };
+        let mut at: Vec<(String, Node)> = Vec::new();
         for (name, value) in keywords.iter() {
             let name: String = name.extract()?;
             if value.is_none() {
                 continue;
             } else if is_key(&name) {
-                sorted.table.insert(name.clone(), toml_value(&name, &value)?);
+                sorted.table.push((name.clone(), node_of(&name, &value)?));
             } else if is_sequence(&value) {
                 sorted.columns.push(column(name, &value)?);
             } else if is_position(session, &name) {
-                at.insert(name.clone(), toml_value(&name, &value)?);
+                at.push((name.clone(), node_of(&name, &value)?));
             } else {
-                let known: Vec<&str> = TEST_KEYS.iter().chain(&set_up).copied().collect();
                 return Err(Failed::argument(
                     format!("`{name}` is neither the position of an axis nor a key of a test"),
-                    format!("columns are arrays; keys of a test are {}", known.join(", ")),
+                    format!("columns are arrays; keys of a test are {}", keys.join(", ")),
                 )
                 .into());
             }
         }
         if !at.is_empty() {
-            if let Some(Value::Table(stated)) = sorted.table.remove("at") {
-                at.extend(stated);
+            match sorted.table.iter_mut().find(|(name, _)| name == "at") {
+                Some((_, stated)) => at.into_iter().for_each(|(name, position)| stated.set(&name, position)),
+                None => sorted.table.push(("at".to_string(), Node::table(at))),
             }
-            sorted.table.insert("at".to_string(), Value::Table(at));
         }
         Ok(sorted)
     }
@@ -145,38 +148,38 @@ fn held<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Held<'py>> {
     }
 }
 
-/// A value of Python as a value of TOML.
-pub fn toml_value(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
+/// A value of Python as a value of a document.
+pub fn node_of(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Node> {
     if let Ok(table) = value.cast::<PyDict>() {
-        let mut converted = Table::new();
-        // `None` is what a caller has who states nothing.
-        for (key, value) in table.iter().filter(|(_, value)| !value.is_none()) {
+        let entry = |(key, value): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
             let key: String = key.extract()?;
-            let value = toml_value(&key, &value)?;
-            converted.insert(key, value);
-        }
-        return Ok(Value::Table(converted));
+            let node = node_of(&key, &value)?;
+            Ok::<_, PyErr>(Entry { key, key_span: 0..0, node })
+        };
+        // `None` is what a caller has who states nothing.
+        let stated = table.iter().filter(|(_, value)| !value.is_none());
+        return Ok(Value::Table(stated.map(entry).collect::<PyResult<_>>()?).into());
     }
     if value.is_instance_of::<PyBool>() {
-        return Ok(Value::Boolean(value.extract()?));
+        return Ok(value.extract::<bool>()?.into());
     }
     if value.is_instance_of::<PyInt>() {
-        let message = || Failed::argument(format!("`{name}`: {value} is too large"), "state a number of moderate size");
-        return Ok(Value::Integer(value.extract().map_err(|_| message())?));
+        let number: f64 = value.extract().unwrap_or(f64::INFINITY);
+        return Ok(Value::Number(number, value.str()?.extract()?).into());
     }
     if let Ok(number) = value.cast::<PyFloat>() {
-        return Ok(Value::Float(number.extract()?));
+        return Ok(number.extract::<f64>()?.into());
     }
     if let Ok(text) = value.cast::<PyString>() {
-        return Ok(Value::String(text.extract()?));
+        return Ok(Value::Text(text.extract()?).into());
     }
     // Numbers and arrays of NumPy become those of Python.
     if let Ok(plain) = value.call_method0("tolist") {
-        return toml_value(name, &plain);
+        return node_of(name, &plain);
     }
     if value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>() {
-        let items = value.try_iter()?.map(|item| toml_value(name, &item?));
-        return Ok(Value::Array(items.collect::<PyResult<_>>()?));
+        let items = value.try_iter()?.map(|item| node_of(name, &item?));
+        return Ok(Value::List(items.collect::<PyResult<_>>()?).into());
     }
     let found: String = value.get_type().name()?.extract()?;
     let message = format!("`{name}` is a {found}; a number, a text, a list or a dict is expected");

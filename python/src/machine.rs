@@ -4,13 +4,13 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use abbe::model;
+use abbe::model::document::{of_domain, print};
 use abbe::model::files;
-use abbe::model::files::toml::parts;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::failed::Failed;
-use crate::keywords::toml_value;
+use crate::keywords::node_of;
 
 /// A kinematic chain.
 #[pyclass(frozen, module = "abbe._abbe")]
@@ -33,20 +33,18 @@ impl Machine {
 
     #[staticmethod]
     fn from_toml(text: &str) -> Result<Machine, Failed> {
-        Ok(Machine { machine: Arc::new(parts::machine_of_text("machine.toml".as_ref(), text)?) })
+        Ok(Machine { machine: Arc::new(files::read::machine_of_text("machine.toml".as_ref(), text)?) })
     }
 
     /// The machine of the tables of a machine file.
     #[staticmethod]
     fn from_tables(tables: &Bound<'_, PyDict>) -> PyResult<Machine> {
-        let tables = toml_value("machine", tables)?;
-        let text = toml::to_string(&tables)
-            .map_err(|cause| Failed::new(format!("the machine cannot be written as TOML: {cause}")))?;
-        Ok(Machine::from_toml(&text)?)
+        let machine = files::read::machine_of_node(node_of("machine", tables.as_any())?).map_err(Failed::from)?;
+        Ok(Machine { machine: Arc::new(machine) })
     }
 
-    fn to_toml(&self) -> String {
-        parts::machine_text(&self.machine)
+    fn to_toml(&self) -> Result<String, Failed> {
+        Ok(print::text_of(&of_domain::machine(&self.machine))?)
     }
 
     #[getter]

@@ -5,14 +5,15 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use abbe::document::Origin;
+use abbe::model::document::node::Node;
+use abbe::model::document::print;
 use abbe::model::files::SourceMap;
-use abbe::model::files::toml::memory;
+use abbe::model::files::read::{document_of_text, plan_of_node};
 use abbe::model::session::Test;
 use abbe::model::session::readings::{Origin as Lines, Readings};
 use numpy::{Element, IntoPyArray, PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use toml::{Table, Value};
 
 use crate::failed::Failed;
 use crate::session::{Session, State};
@@ -40,7 +41,8 @@ pub fn unpickled(pickled: &Bound<'_, PyDict>) -> PyResult<Session> {
         Ok::<_, PyErr>(pickled.get_item(name)?.ok_or_else(missing)?)
     };
     let text: String = item("text")?.extract()?;
-    let mut session = memory::plan(&text).map_err(Failed::from)?;
+    let document: Node = document_of_text("session.toml".as_ref(), &text).map_err(Failed::from)?;
+    let mut session = plan_of_node(document).map_err(Failed::from)?;
     let declared = std::mem::take(&mut session.tests);
     for test in item("tests")?.try_iter()? {
         session.tests.push(unpickled_test(&declared, test?.cast::<PyDict>()?, session.machine.axes.len())?);
@@ -58,10 +60,9 @@ fn whole_text(sources: &SourceMap) -> Result<String, Failed> {
     let Some(machine) = &sources.machine_text else {
         return Ok(sources.text.clone());
     };
-    let unreadable = |cause: toml::de::Error| Failed::new(cause.to_string());
-    let mut text: Table = sources.text.parse().map_err(unreadable)?;
-    text.insert("machine".to_string(), Value::Table(machine.parse().map_err(unreadable)?));
-    toml::to_string(&text).map_err(|cause| Failed::new(cause.to_string()))
+    let mut document: Node = document_of_text(&sources.file, &sources.text)?;
+    document.set("machine", document_of_text::<Node>(&sources.file, machine)?);
+    Ok(print::text_of(&document)?)
 }
 
 fn pickled_test<'py>(py: Python<'py>, test: &Test) -> PyResult<Bound<'py, PyDict>> {

@@ -12,19 +12,22 @@ use abbe::identify::quantity::Given;
 use abbe::identify::simulate::{Simulation, simulate};
 use abbe::identify::unit::Unit;
 use abbe::model::component::ErrorName;
+use abbe::model::document::edit::SessionText;
+use abbe::model::document::node::Node;
+use abbe::model::document::{of_domain, print};
 use abbe::model::driver::name_in_files;
 use abbe::model::effect::Component;
-use abbe::model::files::toml::{memory, parts, rewrite};
+use abbe::model::files::read::{add_node, plan_of_node};
+use abbe::model::files::table::memory::MemoryColumn;
 use abbe::model::files::{self, Changes, ReadOptions, SourceMap};
 use abbe::model::session::{self as domain, Prior};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
-use toml::{Table, Value};
 
 use crate::failed::Failed;
-use crate::keywords::{Keywords, toml_value};
+use crate::keywords::{Keywords, node_of};
 use crate::machine::Machine;
 use crate::work;
 
@@ -82,21 +85,18 @@ impl Session {
         Arc::clone(&self.0.read().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// The next state, with tables added to the text.
-    fn extend(&self, session: domain::Session, table: &str, entry: Table) -> PyResult<()> {
+    /// The next state, with an entry of a list added.
+    fn extend(&self, list: &str, entry: Node, columns: &[MemoryColumn<'_>]) -> PyResult<()> {
         let state = self.state();
-        let added = Table::from_iter([(table.to_string(), Value::Array(vec![Value::Table(entry)]))]);
-        let text = format!("{}\n{}", state.sources.text.trim_end(), printed(&added)?);
-        let sources = SourceMap { text, ..state.sources.clone() };
+        let mut session = state.session.clone();
+        add_node(&mut session, list, entry.clone(), columns).map_err(Failed::from)?;
+        let mut text = SessionText::new(&state.sources.text, &state.sources.file).map_err(Failed::from)?;
+        text.add(list, &entry).map_err(Failed::from)?;
+        let sources = SourceMap { text: text.to_string(), ..state.sources.clone() };
         let next = State::new(session, sources, state.origin.clone());
         *self.0.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(next);
         Ok(())
     }
-}
-
-/// A table as TOML.
-fn printed(table: &Table) -> Result<String, Failed> {
-    toml::to_string(table).map_err(|cause| Failed::new(format!("the session cannot be written as TOML: {cause}")))
 }
 
 #[pymethods]
@@ -116,41 +116,27 @@ impl Session {
     /// A session without tests: `head` has the tables of a session file without its machine.
     #[staticmethod]
     fn new(machine: &Machine, head: &Bound<'_, PyDict>) -> PyResult<Session> {
-        let machine: Table = parts::machine_text(&machine.machine)
-            .parse()
-            .map_err(|cause| Failed::new(format!("the machine cannot be written as TOML: {cause}")))?;
-        let mut text = Table::from_iter([("machine".to_string(), Value::Table(machine))]);
-        for (name, table) in head.iter() {
-            let name: String = name.extract()?;
-            text.insert(name.clone(), toml_value(&name, &table)?);
-        }
-        let text = printed(&text)?;
-        let session = memory::session(&text).map_err(Failed::from)?;
+        let mut document = node_of("session", head.as_any())?;
+        let tables = print::json_of(&of_domain::machine(&machine.machine)).map_err(Failed::from)?;
+        document.set("machine", tables);
+        let text = print::text_of(&document).map_err(Failed::from)?;
+        let session = plan_of_node(document).map_err(Failed::from)?;
         Ok(Session::of(State::in_memory(session, text)))
     }
 
     fn add_test(&self, name: &str, keywords: &Bound<'_, PyDict>) -> PyResult<()> {
-        let mut session = self.state().session.clone();
-        let mut sorted = Keywords::of_test(&session, keywords)?;
-        let mut entry = Table::from_iter([("name".to_string(), Value::String(name.to_string()))]);
+        let mut sorted = Keywords::of_test(&self.state().session, keywords)?;
+        let mut entry = vec![("name".to_string(), Node::from(name))];
         if sorted.has_columns() {
-            entry.insert("data".to_string(), Value::String(format!("{name}.csv")));
+            entry.push(("data".to_string(), Node::from(format!("{name}.csv").as_str())));
         }
         entry.extend(std::mem::take(&mut sorted.table));
-        let text = Table::from_iter([("test".to_string(), Value::Array(vec![Value::Table(entry.clone())]))]);
-        memory::add(&mut session, &printed(&text)?, &sorted.columns()?).map_err(Failed::from)?;
-        self.extend(session, "test", entry)
+        self.extend("test", Node::table(entry), &sorted.columns()?)
     }
 
     /// Adds an entry of `[[effect]]` or `[[socket_distance]]`.
-    fn add(&self, table: &str, keywords: &Bound<'_, PyDict>) -> PyResult<()> {
-        let mut session = self.state().session.clone();
-        let Value::Table(entry) = toml_value(table, keywords)? else {
-            return Ok(());
-        };
-        let text = Table::from_iter([(table.to_string(), Value::Array(vec![Value::Table(entry.clone())]))]);
-        memory::add(&mut session, &printed(&text)?, &[]).map_err(Failed::from)?;
-        self.extend(session, table, entry)
+    fn add(&self, list: &str, keywords: &Bound<'_, PyDict>) -> PyResult<()> {
+        self.extend(list, node_of(list, keywords.as_any())?, &[])
     }
 
     #[getter]
@@ -305,7 +291,9 @@ impl Session {
             let mut sources = SourceMap { files: Vec::new(), ..state.sources.clone() };
             if let Some(noise_um) = noise_um {
                 session.noise_mm = simulation.noise_mm;
-                sources.text = rewrite::with_noise(&sources.text, &sources.file, noise_um)?;
+                let mut text = SessionText::new(&sources.text, &sources.file)?;
+                text.set_noise(noise_um);
+                sources.text = text.to_string();
             }
             Ok((State::new(session, sources, Origin::default()), simulated.truth, simulated.warnings))
         })?;

@@ -7,6 +7,7 @@ use abbe::document::{Call, Document};
 use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::separating_tests::separate_aliases;
 use abbe::identify::trace::{self, Progress, TraceOptions, TraceOutcome};
+use abbe::model::document::edit::SessionText;
 use abbe::model::words::counted;
 use abbe::report::{self, pages, readings};
 use numpy::PyArray1;
@@ -145,15 +146,16 @@ impl Trace {
     }
 
     /// The session with the found effects declared.
-    fn session(&self) -> Session {
+    fn session(&self) -> Result<Session, Failed> {
         let state = &self.state;
         let mut session = state.session.clone();
         session.effects.extend(self.trace.effects.iter().cloned());
         let mut sources = state.sources.clone();
-        sources.text =
-            abbe::model::files::toml::write::with_effects(&sources.text, &self.trace.effects, &session.machine);
+        let mut text = SessionText::new(&sources.text, &sources.file)?;
+        text.add_effects(&self.trace.effects, &session.machine)?;
+        sources.text = text.to_string();
         sources.files.clear();
-        Session::of(State::new(session, sources, Default::default()))
+        Ok(Session::of(State::new(session, sources, Default::default())))
     }
 }
 

@@ -1,5 +1,6 @@
 //! Errors on standard error: what was found and where, what to do, and an excerpt of the file.
 
+use abbe::fleet::FleetError;
 use abbe::identify::IdentifyError;
 use abbe::model::ModelError;
 
@@ -21,7 +22,7 @@ pub enum Failure {
     Codegen(#[from] abbe::codegen::CodegenError),
     /// The results of a fleet cannot be read or written.
     #[error(transparent)]
-    Fleet(#[from] abbe::fleet::FleetError),
+    Fleet(abbe::fleet::FleetError),
     /// A file that cannot be written.
     #[error("{path}: cannot be written: {source}")]
     Write {
@@ -49,6 +50,15 @@ impl From<IdentifyError> for Failure {
                 Failure::Other(format!("{error}; `abbe trace --list` lists all candidates"))
             }
             other => Failure::Identify(other),
+        }
+    }
+}
+
+impl From<FleetError> for Failure {
+    fn from(error: FleetError) -> Self {
+        match error {
+            FleetError::Model(error) => Failure::Model(error),
+            other => Failure::Fleet(other),
         }
     }
 }

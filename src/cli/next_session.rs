@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
+use abbe::model::ModelError;
+use abbe::model::document::edit::SessionText;
 use abbe::model::files::SourceMap;
-use abbe::model::files::toml::rewrite;
 
 use super::failure::Failure;
 use super::message::{Kind, tell};
@@ -15,11 +16,13 @@ pub fn write(
     path: &Path,
     sources: &SourceMap,
     arguments: &SessionArguments,
-    edit: impl FnOnce(&str) -> String,
+    edit: impl FnOnce(&mut SessionText) -> Result<(), ModelError>,
 ) -> Result<(), Failure> {
     let data = arguments.data.as_deref();
-    let text = rewrite::relocated(&sources.text, &sources.file, output::folder_of(path), data)?;
-    output::write_whole(path, edit(&text).as_bytes())?;
+    let mut text = SessionText::new(&sources.text, &sources.file)?;
+    text.relocate(output::folder_of(path), data)?;
+    edit(&mut text)?;
+    output::write_whole(path, text.to_string().as_bytes())?;
     let [own, there] = [&sources.file, path].map(|file| output::folder_of(file).canonicalize().ok());
     if own != there {
         let note = format!(

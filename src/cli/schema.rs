@@ -11,7 +11,7 @@ use abbe::identify::results::{FitResult, TraceResult};
 use abbe::identify::self_calibration::SelfCalibration;
 use abbe::identify::validate::ValidationResult;
 use abbe::identify::volumetric::Summary;
-use abbe::model::files::schema;
+use abbe::model::document::schema;
 use clap::{Args, ValueEnum};
 use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
@@ -93,8 +93,8 @@ pub struct SchemaArguments {
 /// Runs `abbe schema`.
 pub fn run(arguments: &SchemaArguments) -> Result<(), Failure> {
     let schema = match arguments.subject {
-        Subject::Session => session()?,
-        Subject::Machine => parsed(schema::MACHINE)?,
+        Subject::Session => schema::session(),
+        Subject::Machine => schema::machine(),
         Subject::Fit => of::<FitResult>(),
         Subject::Repeat => of::<Repeated>(),
         Subject::Geometric => of::<Comparison>(),
@@ -124,32 +124,12 @@ pub fn run(arguments: &SchemaArguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The session's schema with that of the machine and the keys of all shapes and instruments in it.
-fn session() -> Result<Value, Failure> {
-    let mut session = parsed(schema::SESSION)?;
-    let mut machine = parsed(schema::MACHINE)?;
-    // A schema within a schema is a resource of its own: its references start from it.
-    machine["$id"] = json!("machine");
-    session["$defs"]["machine"] = machine;
-    for (definition, registered) in schema::registered_properties() {
-        let properties = session["$defs"][definition]["properties"].as_object_mut();
-        if let (Some(properties), Value::Object(registered)) = (properties, parsed(&registered)?) {
-            properties.extend(registered);
-        }
-    }
-    Ok(session)
-}
-
 /// The schema of a file that has no head of a command.
 fn plain<T: JsonSchema>() -> Value {
     let generator = SchemaSettings::draft2020_12().for_serialize().into_generator();
     let mut schema = generator.into_root_schema_for::<T>().to_value();
     close(&mut schema);
     schema
-}
-
-fn parsed(text: &str) -> Result<Value, Failure> {
-    serde_json::from_str(text).map_err(|error| Failure::Other(format!("a schema of this program is no JSON: {error}")))
 }
 
 /// The schema of a command's document.

@@ -12,7 +12,6 @@ use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::results::TraceResult;
 use abbe::identify::separating_tests::separate_aliases;
 use abbe::identify::trace::{Progress, TraceOptions};
-use abbe::model::files::toml::write;
 use abbe::model::words::counted;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -166,17 +165,15 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     arguments.common.write_json(&sources, &trace.result)?;
     if let Some(path) = &arguments.write {
         next_session::write(path, &sources, &arguments.session, |text| {
-            let mut next = write::with_effects(text, &trace.effects, &session.machine);
+            text.add_effects(&trace.effects, &session.machine)?;
             if arguments.with_tests {
-                next = write::with_blocks(&next, proposals(&trace.result));
+                proposals(&trace.result).iter().try_for_each(|block| text.add_block(block))?;
             }
-            match trace.result.interrupted {
-                true => {
-                    let interruption = trace.result.interruption();
-                    format!("# The trace was {interruption}: effects may be missing.\n{next}")
-                }
-                false => next,
+            if trace.result.interrupted {
+                let interruption = trace.result.interruption();
+                text.add_remark(&format!("The trace was {interruption}: effects may be missing."));
             }
+            Ok(())
         })?;
     }
     if let Some(path) = &arguments.csv {

@@ -48,6 +48,9 @@ pub enum FleetError {
     /// The caller ended the work before the session was done.
     #[error("interrupted before the session was done")]
     Interrupted,
+    /// A document that cannot be used.
+    #[error(transparent)]
+    Model(#[from] abbe_model::ModelError),
     /// A request that cannot be met.
     #[error("{0}")]
     Request(String),

@@ -12,8 +12,8 @@ use abbe_identify::results::{FitResult, TraceResult};
 use abbe_identify::trace::{Progress, TraceOptions, trace};
 use abbe_identify::validate::validate;
 use abbe_identify::{fit, model_file};
+use abbe_model::document::{of_domain, print};
 use abbe_model::files::stamp::FileStamp;
-use abbe_model::files::toml::parts::machine_text;
 use abbe_model::files::{self, ReadOptions, Source, SourceMap};
 use abbe_model::session::Session;
 use sha2::{Digest, Sha256};
@@ -164,7 +164,7 @@ fn describe(record: &mut Record, session: &Session) {
     record.date = note("date");
     record.session_id = note("session_id");
     // Other names and travels of the same axes are the same machine.
-    let geometry = machine_text(machine);
+    let geometry = print::text_of(&of_domain::machine(machine)).unwrap_or_default();
     let is_geometry = |line: &&str| !line.starts_with("name") && !line.starts_with("travel_");
     let geometry: Vec<&str> = geometry.lines().filter(is_geometry).collect();
     record.machine = Some(MachineRecord {

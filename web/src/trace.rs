@@ -3,7 +3,7 @@
 use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::separating_tests::separate_aliases;
 use abbe::identify::trace::{self, Progress, TraceOptions, TraceOutcome};
-use abbe::model::files::toml::write;
+use abbe::model::document::edit::SessionText;
 use abbe::model::words::counted;
 use abbe::report::{pages, readings, trace as present};
 use wasm_bindgen::prelude::*;
@@ -62,8 +62,13 @@ impl Trace {
     }
 
     /// The session of `--write`: the same with the found effects declared.
-    pub fn session(&self) -> String {
-        write::with_effects(&self.read.sources.text, &self.trace.effects, &self.read.session.machine)
+    ///
+    /// # Errors
+    /// If the session states its effects as something else than tables.
+    pub fn session(&self) -> Result<String, Failed> {
+        let mut text = SessionText::new(&self.read.sources.text, &self.read.sources.file)?;
+        text.add_effects(&self.trace.effects, &self.read.session.machine)?;
+        Ok(text.to_string())
     }
 }
 

@@ -9,7 +9,7 @@ use abbe_model::driver::{Driver, Reference, TEMPERATURE};
 use abbe_model::effect::Effect;
 use abbe_model::error::Location;
 use abbe_model::files;
-use abbe_model::files::toml::parts;
+use abbe_model::files::read::{effects_of_nodes, machine_of_node};
 use abbe_model::instrument::InstrumentKind;
 use abbe_model::session::Prior;
 use faer::Mat;
@@ -181,21 +181,11 @@ impl File<'_> {
     /// The error of a part with the keys of TOML, as one of this file.
     fn part(&self, key: &str, error: ModelError) -> IdentifyError {
         let help = error.help().unwrap_or(SAVE_AGAIN).to_string();
-        let message = match error {
-            ModelError::Input { message, .. } => message,
-            other => other.to_string(),
-        };
-        self.error(format!("`{key}`: {message}"), &help)
-    }
-
-    /// The value of a key as TOML text.
-    fn toml(&self, key: &str, value: &impl serde::Serialize) -> Result<String, IdentifyError> {
-        toml::to_string(value).map_err(|cause| self.error(format!("`{key}`: {cause}"), SAVE_AGAIN))
+        self.error(format!("`{key}`: {error}"), &help)
     }
 
     fn machine(&self, value: &Value) -> Result<Machine, IdentifyError> {
-        let text = self.toml("machine", value)?;
-        parts::machine_of_text(self.path, &text).map_err(|error| self.part("machine", error))
+        machine_of_node(value.clone().into()).map_err(|error| self.part("machine", error))
     }
 
     fn effects(
@@ -211,8 +201,7 @@ impl File<'_> {
         let mut effects = Vec::with_capacity(values.len());
         for (k, value) in values.iter().enumerate() {
             let key = format!("effects[{k}]");
-            let text = self.toml(&key, &serde_json::json!({ "effect": [value] }))?;
-            let read = parts::effects_of_text(self.path, &text, machine, instrument, &tests);
+            let read = effects_of_nodes(vec![value.clone().into()], machine, instrument, &tests);
             effects.extend(read.map_err(|error| self.part(&key, error))?);
         }
         Ok(effects)

@@ -1,5 +1,6 @@
 use std::path::{Path, PathBuf};
 
+use abbe_model::document::node::Node;
 use abbe_model::driver::Driver;
 use abbe_model::effect::shape::Shape;
 use abbe_model::effect::{Component, Effect};
@@ -20,7 +21,9 @@ fn fitted() -> (Session, Problem, Fit) {
     let mut session = files::session(&file, &ReadOptions::default()).unwrap();
     let text = "[[effect]]\ncomponent = \"EZC\"\nshape = \"harmonic\"\norder = 2\n[[effect]]\ncomponent = \"EXA\"\n\
                 shape = \"periodic\"\nperiod_deg = 33.3\n";
-    let read = files::toml::parts::effects_of_text(&file, text, &session.machine, session.instrument, &[]);
+    let document: Node = files::read::document_of_text(&file, text).unwrap();
+    let nodes = document.get("effect").unwrap().items().to_vec();
+    let read = files::read::effects_of_nodes(nodes, &session.machine, session.instrument, &[]);
     session.effects = read.unwrap();
     let (problem, fit) = prepare(&session, 1).unwrap();
     (session, problem, fit)

@@ -1,7 +1,8 @@
 //! A model as a JSON text.
 
+use abbe_model::ModelError;
+use abbe_model::document::{of_domain, print};
 use abbe_model::driver::TEMPERATURE;
-use abbe_model::files::toml::parts;
 use abbe_model::session::Prior;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
@@ -38,9 +39,15 @@ impl IdentifiedModel {
     }
 
     fn document(&self) -> Result<Document, String> {
-        let machine = toml_value(&parts::machine_text(&self.machine))?;
-        let effects = toml_value(&parts::effects_text(&self.effects, &self.machine))?;
-        let effects = effects.get("effect").and_then(Value::as_array).cloned().unwrap_or_default();
+        let sorted = |printed: Result<Value, ModelError>| {
+            let mut value = printed.map_err(|cause| cause.to_string())?;
+            value.sort_all_objects();
+            Ok::<Value, String>(value)
+        };
+        let machine = sorted(print::json_of(&of_domain::machine(&self.machine)))?;
+        let effects = self.effects.iter();
+        let effects = effects.map(|effect| sorted(print::json_of(&of_domain::effect(effect, &self.machine))));
+        let effects = effects.collect::<Result<_, _>>()?;
         let size = self.parameters.len();
         Ok(Document {
             schema: SCHEMA.to_string(),
@@ -134,12 +141,6 @@ fn location((name, value): &(abbe_model::component::ErrorName, f64)) -> document
         unit: unit.name,
         internal: *value,
     }
-}
-
-/// The values of a TOML text as JSON.
-fn toml_value(text: &str) -> Result<Value, String> {
-    let table: toml::Table = text.parse().map_err(|cause: toml::de::Error| cause.to_string())?;
-    serde_json::to_value(table).map_err(|cause| cause.to_string())
 }
 
 /// SHA-256 of a document without its checksum, as compact JSON.

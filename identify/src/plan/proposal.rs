@@ -1,6 +1,6 @@
 //! Proposed tests as blocks of a session file.
 
-use abbe_model::files::toml::write_test;
+use abbe_model::document::{of_domain, print};
 use abbe_model::instrument::Station;
 use abbe_model::instrument::ballbar::BAR;
 use abbe_model::session::motion::Motion;
@@ -64,7 +64,7 @@ pub fn proposal(
         }
     }
     test.name.clone_from(&name);
-    let block = write_test::block(&test, &session.machine, description)?;
+    let block = print::block_of("test", &of_domain::test(&test, &session.machine)?, description).ok()?;
     taken.push(name.clone());
     Some(Proposal { name, block })
 }

@@ -166,12 +166,11 @@ pub fn read(path: &Path, machine: &Machine) -> Result<Vec<ErrorFunction>, Identi
 /// As [`read`].
 pub fn of_source(source: &Source, machine: &Machine) -> Result<Vec<ErrorFunction>, IdentifyError> {
     let fault = |message: String| IdentifyError::Request(format!("{}: {message}", source.file.display()));
-    parse(&source.text, machine).map_err(fault)
+    functions(&files::read::document_of(source)?, machine).map_err(fault)
 }
 
-/// As [`read`], from text; the error is a message.
-fn parse(text: &str, machine: &Machine) -> Result<Vec<ErrorFunction>, String> {
-    let file: File = toml::from_str(text).map_err(|cause| cause.to_string())?;
+/// The functions of a file; the error is a message.
+fn functions(file: &File, machine: &Machine) -> Result<Vec<ErrorFunction>, String> {
     let mut functions = Vec::new();
     for (id, quantity) in &file.constant {
         let (slot, over, angle) = error_slot_of(machine, id)?;

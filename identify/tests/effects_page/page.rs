@@ -3,10 +3,11 @@
 use std::collections::VecDeque;
 
 use abbe_model::chain::Machine;
+use abbe_model::document::node::{Entries, Node};
 use abbe_model::driver::{Driver, DriverUnit};
-use abbe_model::effect::keys::{Key, KeyReader};
+use abbe_model::effect::keys::{KeyForm, KeyReader};
+use abbe_model::effect::shape::Entry;
 use abbe_model::effect::{Component, Effect, Shape};
-use abbe_model::error::ModelError;
 
 /// A Markdown table: header and rows, with trimmed cells.
 pub struct Table {
@@ -78,66 +79,33 @@ pub fn effect(machine: &Machine, cell: &str) -> Effect {
     let own = name[word.len()..].split_whitespace();
     let numbers = own.chain(more.split(' ').filter(|number| !number.is_empty())).map(|number| number.parse().unwrap());
     let (unit, default_scale) = (driver.kind().unit(axis), driver.kind().default_scale(axis));
-    let mut keys = Numbers { numbers: numbers.collect(), unit, default_scale };
     let entry = Shape::entry_of(if word == "h" { "harmonic" } else { word }).unwrap_or_else(|| panic!("{text}"));
-    let shape = (entry.read)(&mut keys).unwrap();
-    assert!(keys.numbers.is_empty(), "{text}");
+    let entries = entries(entry, unit, numbers.collect());
+    let shape = (entry.read)(&KeyReader::new(&entries, entry.word, unit, default_scale)).unwrap();
     Effect::new(component, driver, shape)
 }
 
-/// The numbers of a shape as the page states them: without keys, in the order in which the shape reads them. Optional
-/// keys are absent, but a count is stated.
-struct Numbers {
-    numbers: VecDeque<f64>,
-    unit: DriverUnit,
-    default_scale: f64,
-}
-
-impl Numbers {
-    fn next(&mut self) -> f64 {
-        self.numbers.pop_front().expect("a number")
-    }
-
-    fn internal(&self, number: f64) -> f64 {
-        self.unit.to_internal(self.unit.file, number).unwrap()
-    }
-}
-
-impl KeyReader for Numbers {
-    fn unit(&self) -> DriverUnit {
-        self.unit
-    }
-    fn default_scale(&self) -> f64 {
-        self.default_scale
-    }
-    fn quantity(&mut self, _: &Key) -> Result<Option<f64>, ModelError> {
-        Ok(None)
-    }
-    /// A curve over a linear axis covers the travel of 200 mm.
-    fn required_quantity(&mut self, key: &Key) -> Result<f64, ModelError> {
-        Ok(match key.name {
-            "from" => -100.0,
-            "to" => 100.0,
-            _ => {
-                let number = self.next();
-                self.internal(number)
+/// The keys of a shape with the numbers of the page, which states them without keys, in the order of the shape. Optional
+/// keys are absent, but a count is stated. A curve over a linear axis covers the travel of 200 mm.
+fn entries(entry: &Entry, unit: DriverUnit, mut numbers: VecDeque<f64>) -> Entries {
+    let mut entries = Entries::default();
+    for key in entry.keys {
+        let name = match key.form {
+            KeyForm::Flag => continue,
+            KeyForm::Positive | KeyForm::Count(..) => key.name.to_string(),
+            KeyForm::Quantity | KeyForm::Quantities => format!("{}_{}", key.name, unit.file),
+        };
+        match key.name {
+            "scale" => {}
+            "from" | "to" | "period" if unit.is_angle() && numbers.is_empty() => {}
+            "from" => entries.push(name, -100.0),
+            "to" => entries.push(name, 100.0),
+            _ if matches!(key.form, KeyForm::Quantities) => {
+                entries.push(name, std::mem::take(&mut numbers).into_iter().collect::<Node>());
             }
-        })
+            _ => entries.push(name, numbers.pop_front().expect("a number")),
+        }
     }
-    fn required_quantities(&mut self, _: &Key) -> Result<Vec<f64>, ModelError> {
-        let numbers = std::mem::take(&mut self.numbers);
-        Ok(numbers.into_iter().map(|number| self.internal(number)).collect())
-    }
-    fn required_positive(&mut self, _: &'static str, _: &str) -> Result<f64, ModelError> {
-        Ok(self.next())
-    }
-    fn count(&mut self, _: &'static str, _: usize, _: usize) -> Result<Option<usize>, ModelError> {
-        Ok(Some(self.next() as usize))
-    }
-    fn required_count(&mut self, _: &'static str, _: &str, _: usize, _: usize) -> Result<usize, ModelError> {
-        Ok(self.next() as usize)
-    }
-    fn flag(&mut self, _: &'static str) -> Result<Option<bool>, ModelError> {
-        Ok(None)
-    }
+    assert!(numbers.is_empty(), "{}", entry.word);
+    entries
 }

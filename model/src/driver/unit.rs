@@ -46,17 +46,17 @@ impl DriverUnit {
     }
 
     /// A number in the unit of files that reads back to the same bits, or else in the internal unit; with its suffix.
-    pub fn exact(self, value: f64) -> (&'static str, String) {
+    pub fn exact(self, value: f64) -> (&'static str, f64) {
         if !self.is_angle() {
-            return (self.file, value.to_string());
+            return (self.file, value);
         }
         let degrees = value.to_degrees();
         let round = (degrees * 1e9).round() / 1e9;
         for candidate in [round, degrees, degrees.next_up(), degrees.next_down()] {
             if candidate.to_radians() == value {
-                return (self.file, candidate.to_string());
+                return (self.file, candidate);
             }
         }
-        (self.internal, value.to_string())
+        (self.internal, value)
     }
 }

@@ -1,9 +1,12 @@
 //! The keys of an effect's shape in files: their declaration, and how a shape reads and writes them.
 
-use std::fmt::Write as _;
+use serde::Deserialize;
 
-use crate::driver::DriverUnit;
-use crate::error::ModelError;
+use crate::document::fault::{Fault, Within};
+use crate::document::from_node;
+use crate::document::node::{Entries, Node};
+use crate::driver::{DriverUnit, unit_suffixes};
+use crate::session::limits;
 
 /// What a key holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,61 +34,21 @@ pub struct Key {
     pub meaning: &'static str,
 }
 
-/// Reads the keys of a shape. Errors point at the place in the file.
-pub trait KeyReader {
-    /// The unit of the driver.
-    fn unit(&self) -> DriverUnit;
-    /// The divisor of the driver in a polynomial that states none.
-    fn default_scale(&self) -> f64;
-    /// A number in the unit of the driver, converted to the internal unit; `None` if it is absent.
-    ///
-    /// # Errors
-    /// If it is no number, is in the unit of another driver, or is given in two units.
-    fn quantity(&mut self, key: &Key) -> Result<Option<f64>, ModelError>;
-    /// As [`KeyReader::quantity`], for a key that is required.
-    ///
-    /// # Errors
-    /// As before, or if it is absent.
-    fn required_quantity(&mut self, key: &Key) -> Result<f64, ModelError>;
-    /// Several numbers in the unit of the driver, converted; required.
-    ///
-    /// # Errors
-    /// As [`KeyReader::required_quantity`].
-    fn required_quantities(&mut self, key: &Key) -> Result<Vec<f64>, ModelError>;
-    /// A positive number; `help` says what to add if it is absent.
-    ///
-    /// # Errors
-    /// If it is absent or not positive.
-    fn required_positive(&mut self, key: &'static str, help: &str) -> Result<f64, ModelError>;
-    /// A whole number between two limits; `None` if it is absent.
-    ///
-    /// # Errors
-    /// If it is not a whole number between the limits.
-    fn count(&mut self, key: &'static str, least: usize, most: usize) -> Result<Option<usize>, ModelError>;
-    /// As [`KeyReader::count`], for a key that is required; `help` says what to add.
-    ///
-    /// # Errors
-    /// As before, or if it is absent.
-    fn required_count(&mut self, key: &'static str, help: &str, least: usize, most: usize)
-    -> Result<usize, ModelError>;
-    /// True or false; `None` if it is absent.
-    ///
-    /// # Errors
-    /// If it is neither.
-    fn flag(&mut self, key: &'static str) -> Result<Option<bool>, ModelError>;
-}
-
-/// Writes the keys of an effect, a line each.
+/// Reads the keys of a shape. Numbers in the unit of the driver have a suffix: `_mm` for a linear axis, `_deg` (or `_rad`)
+/// for a rotary one; each driver states its own. A fault has the path of its key.
 #[derive(Debug)]
-pub struct KeyWriter {
-    text: String,
+pub struct KeyReader<'e> {
+    entries: &'e Entries,
+    word: &'static str,
     unit: DriverUnit,
+    default_scale: f64,
 }
 
-impl KeyWriter {
-    /// A table that starts with `heading`, of an effect whose driver has this unit.
-    pub fn new(heading: &str, unit: DriverUnit) -> KeyWriter {
-        KeyWriter { text: format!("{heading}\n"), unit }
+impl<'e> KeyReader<'e> {
+    /// The keys of the shape `word` of an effect whose driver has this unit; `default_scale` is the divisor of the driver in
+    /// a polynomial that states none.
+    pub fn new(entries: &'e Entries, word: &'static str, unit: DriverUnit, default_scale: f64) -> KeyReader<'e> {
+        KeyReader { entries, word, unit, default_scale }
     }
 
     /// The unit of the driver.
@@ -93,33 +56,157 @@ impl KeyWriter {
         self.unit
     }
 
-    /// A key and its value as TOML.
-    pub fn line(&mut self, key: &str, value: impl std::fmt::Display) {
-        // Writing to a String does not fail.
-        let _ = writeln!(self.text, "{key} = {value}");
+    /// The divisor of the driver in a polynomial that states none.
+    pub fn default_scale(&self) -> f64 {
+        self.default_scale
+    }
+
+    /// A key that is present, as typed.
+    fn get<T: Deserialize<'e>>(&self, key: &str) -> Result<Option<T>, Fault> {
+        self.entries.get(key).map(|node| from_node(node).within(key)).transpose()
+    }
+
+    /// The form of a quantity that is present, with its suffix.
+    fn suffixed<T: Deserialize<'e>>(&self, key: &Key) -> Result<Option<(T, &'static str)>, Fault> {
+        let mut found = None;
+        for suffix in unit_suffixes() {
+            let name = format!("{}_{suffix}", key.name);
+            if self.entries.get(&name).is_none() {
+                continue;
+            }
+            if self.unit.to_internal(suffix, 0.0).is_none() {
+                let message = format!("`{name}` for a driver in {}", self.unit.file);
+                let help = format!("use `{}_{}`", key.name, self.unit.file);
+                return Err(Fault::new(message, Some(help)).on_key().at(&name));
+            }
+            if found.is_some() {
+                return Err(Fault::new(format!("`{name}` is given twice, in two units"), None).at(&name));
+            }
+            found = self.get(&name)?.map(|value| (value, suffix));
+        }
+        Ok(found)
+    }
+
+    fn converted(&self, number: f64, suffix: &str) -> f64 {
+        self.unit.to_internal(suffix, number).unwrap_or(number)
+    }
+
+    /// The fault that a key is absent.
+    fn missing(&self, key: &str, help: impl Into<String>) -> Fault {
+        let message = format!("the shape \"{}\" needs `{key}`", self.word);
+        Fault::new(message, Some(help.into())).at("shape")
+    }
+
+    fn missing_quantity(&self, key: &Key, example: &str) -> Fault {
+        let name = format!("{}_{}", key.name, self.unit.file);
+        self.missing(&name, format!("add `{name} = {example}`"))
+    }
+
+    /// A number in the unit of the driver, converted to the internal unit; `None` if it is absent.
+    ///
+    /// # Errors
+    /// If it is no number, is in the unit of another driver, or is given in two units.
+    pub fn quantity(&self, key: &Key) -> Result<Option<f64>, Fault> {
+        Ok(self.suffixed(key)?.map(|(number, suffix)| self.converted(number, suffix)))
+    }
+
+    /// As [`KeyReader::quantity`], for a key that is required.
+    ///
+    /// # Errors
+    /// As before, or if it is absent.
+    pub fn required_quantity(&self, key: &Key) -> Result<f64, Fault> {
+        self.quantity(key)?.ok_or_else(|| self.missing_quantity(key, "…"))
+    }
+
+    /// Several numbers in the unit of the driver, converted; required.
+    ///
+    /// # Errors
+    /// As [`KeyReader::required_quantity`].
+    pub fn required_quantities(&self, key: &Key) -> Result<Vec<f64>, Fault> {
+        let Some((list, suffix)) = self.suffixed::<Vec<f64>>(key)? else {
+            return Err(self.missing_quantity(key, "[ … ]"));
+        };
+        Ok(list.into_iter().map(|number| self.converted(number, suffix)).collect())
+    }
+
+    /// A positive number; `help` says what to add if it is absent.
+    ///
+    /// # Errors
+    /// If it is absent or not positive.
+    pub fn required_positive(&self, key: &'static str, help: &str) -> Result<f64, Fault> {
+        let number: Option<f64> = self.get(key)?;
+        limits::positive(number.ok_or_else(|| self.missing(key, help))?).map_err(Fault::is).within(key)
+    }
+
+    /// A whole number between two limits; `None` if it is absent.
+    ///
+    /// # Errors
+    /// If it is not a whole number between the limits.
+    pub fn count(&self, key: &'static str, least: usize, most: usize) -> Result<Option<usize>, Fault> {
+        let number: Option<f64> = self.get(key)?;
+        number.map(|number| limits::count(number, least, most).map_err(Fault::is).within(key)).transpose()
+    }
+
+    /// As [`KeyReader::count`], for a key that is required; `help` says what to add.
+    ///
+    /// # Errors
+    /// As before, or if it is absent.
+    pub fn required_count(&self, key: &'static str, help: &str, least: usize, most: usize) -> Result<usize, Fault> {
+        self.count(key, least, most)?.ok_or_else(|| self.missing(key, help))
+    }
+
+    /// True or false; `None` if it is absent.
+    ///
+    /// # Errors
+    /// If it is neither.
+    pub fn flag(&self, key: &'static str) -> Result<Option<bool>, Fault> {
+        self.get(key)
+    }
+}
+
+/// Writes the keys of a shape.
+#[derive(Debug)]
+pub struct KeyWriter {
+    entries: Entries,
+    unit: DriverUnit,
+}
+
+impl KeyWriter {
+    /// The keys of an effect whose driver has this unit.
+    pub fn new(unit: DriverUnit) -> KeyWriter {
+        KeyWriter { entries: Entries::default(), unit }
+    }
+
+    /// The unit of the driver.
+    pub fn unit(&self) -> DriverUnit {
+        self.unit
+    }
+
+    /// A key and its value.
+    pub fn set(&mut self, key: &str, value: impl Into<Node>) {
+        self.entries.push(key, value);
     }
 
     /// A number in the unit of the driver that reads back to the same bits.
     pub fn quantity(&mut self, key: &Key, value: f64) {
         let (suffix, number) = self.unit.exact(value);
-        self.line(&format!("{}_{suffix}", key.name), number);
+        self.set(&format!("{}_{suffix}", key.name), number);
     }
 
     /// Several numbers in one unit: that of files if every one of them reads back to the same bits, else the internal
     /// unit.
     pub fn quantities(&mut self, key: &Key, values: &[f64]) {
         let unit = self.unit;
-        let all: Vec<(&str, String)> = values.iter().map(|value| unit.exact(*value)).collect();
+        let all: Vec<(&str, f64)> = values.iter().map(|value| unit.exact(*value)).collect();
         let exact = all.iter().all(|(suffix, _)| *suffix == unit.file);
         let suffix = if exact { unit.file } else { unit.internal };
-        let numbers: Vec<String> = (values.iter().zip(all))
-            .map(|(value, (_, number))| if exact { number } else { value.to_string() })
-            .collect();
-        self.line(&format!("{}_{suffix}", key.name), format!("[{}]", numbers.join(", ")));
+        let numbers: Node =
+            values.iter().zip(all).map(|(value, (_, number))| if exact { number } else { *value }).collect();
+        self.set(&format!("{}_{suffix}", key.name), numbers);
     }
 
-    /// The text written.
-    pub fn finish(self) -> String {
-        self.text
+    /// The keys written.
+    pub fn finish(self) -> Entries {
+        self.entries
     }
 }

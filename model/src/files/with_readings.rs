@@ -4,7 +4,7 @@ use std::path::{Component, Path};
 
 use super::source_map::{BodyFile, SourceMap};
 use super::table::csv;
-use super::toml::{rewrite, write};
+use crate::document::edit::SessionText;
 use crate::error::ModelError;
 use crate::session::Session;
 use crate::session::readings::Readings;
@@ -49,17 +49,18 @@ pub fn with_readings(
         }
         files.push((name.clone(), contents.to_vec()));
     }
-    let mut text = write::with_data(&sources.text, file, &data)?;
-    text = rewrite::with_machine_file(&text, file, "machine.toml")?;
+    let mut text = SessionText::new(&sources.text, file)?;
+    text.set_data(&data);
+    text.set_machine_file("machine.toml");
     if let Some(noise_um) = changes.noise_um {
-        text = rewrite::with_noise(&text, file, noise_um)?;
+        text.set_noise(noise_um);
     }
     // The data files have the standard columns, whatever the columns of the original.
-    text = rewrite::without_tables(&text, &["format", "columns"]);
+    text.remove(&["format", "columns"]);
     if changes.hide_effects {
-        text = rewrite::without_tables(&text, &["effect"]);
+        text.remove(&["effect"]);
     }
-    files.push(("session.toml".into(), text.into_bytes()));
+    files.push(("session.toml".into(), text.to_string().into_bytes()));
     Ok(files)
 }
 

@@ -11,7 +11,7 @@ use super::{
     SharedBy, Station, default_errors, displaced, point,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
-use crate::error::ModelError;
+use crate::document::Fault as KeyFault;
 use crate::frames::Point;
 use crate::scalar::{Nominal, Scalar};
 use crate::session::{Prior, limits};
@@ -63,7 +63,7 @@ const COLUMNS: [Column; 2] =
 /// Balls that are closer to each other than this coincide, mm.
 const MIN_MM: f64 = 1e-6;
 
-fn read(keys: &mut dyn SetUpReader) -> Result<SetUp, ModelError> {
+fn read(keys: &SetUpReader<'_>) -> Result<SetUp, KeyFault> {
     let bar = keys.positive_length("bar_mm", "the calibrated length of the bar")?;
     let Balls { workpiece_ball, spindle_ball, mut priors } = Balls::read(keys)?;
     priors.extend(keys.priors("bar_u_um", 1)?);

@@ -7,7 +7,7 @@ use super::set_up::{SetUp, SetUpKey, SetUpReader};
 use super::{InstrumentKind, InstrumentParameter, Reading, SharedBy, Station};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::component::ErrorName;
-use crate::error::ModelError;
+use crate::document::Fault as KeyFault;
 use crate::scalar::{Nominal, Scalar};
 use crate::session::readings::Readings;
 
@@ -38,7 +38,7 @@ pub struct Entry {
     /// The keys of a test that only some instruments have.
     pub keys: &'static [SetUpKey],
     /// Reads the set-up of a test.
-    pub read: fn(&mut dyn SetUpReader) -> Result<SetUp, ModelError>,
+    pub read: fn(&SetUpReader<'_>) -> Result<SetUp, KeyFault>,
 }
 
 /// The nominal geometry of an instrument over an open number.

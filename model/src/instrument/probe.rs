@@ -20,7 +20,7 @@ use super::{
     default_errors, displaced, point, pose_error,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
-use crate::error::ModelError;
+use crate::document::Fault as KeyFault;
 use crate::frames::Point;
 use crate::scalar::{Nominal, Scalar};
 use crate::session::{Prior, limits};
@@ -88,7 +88,7 @@ pub(super) const ENTRY: Entry = Entry {
 const COLUMNS: [Column; 2] =
     [Column::new("distance", "mm", Quantity::Length), Column::new("deviation", "um", Quantity::Outward)];
 
-fn read(keys: &mut dyn SetUpReader) -> Result<SetUp, ModelError> {
+fn read(keys: &SetUpReader<'_>) -> Result<SetUp, KeyFault> {
     let artefact = keys.point("artefact_mm", "a point of the cylinder's axis in the table frame")?;
     let radius = keys.positive_length("radius_mm", "the radius of the cylinder plus that of the stylus")?;
     let stylus = keys.point("stylus_mm", "the stylus' centre in the tool frame")?;

@@ -22,7 +22,7 @@ use super::{
     Station, default_errors, displaced, point,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
-use crate::error::ModelError;
+use crate::document::Fault as KeyFault;
 use crate::frames::{Coordinate, Point, Rotation, SinCos, cross, turn_about};
 use crate::scalar::{Nominal, Scalar};
 
@@ -89,7 +89,7 @@ const SENSORS: [Column; 3] = Column::vector(["du", "dv", "dw"], "um");
 /// Least triple product of three measuring directions. Below it, one coordinate has twenty times the noise.
 const MIN_VOLUME: f64 = 0.05;
 
-fn read(keys: &mut dyn SetUpReader) -> Result<SetUp, ModelError> {
+fn read(keys: &SetUpReader<'_>) -> Result<SetUp, KeyFault> {
     let settings = "\"E\" (sensors on the table) or \"Es\" (sensors in the spindle)";
     let setting = [Setting::Table, Setting::Spindle][keys.choice("setting", settings, &["E", "Es"])?];
     let Balls { workpiece_ball, spindle_ball, mut priors } = Balls::read(keys)?;
@@ -100,7 +100,7 @@ fn read(keys: &mut dyn SetUpReader) -> Result<SetUp, ModelError> {
 }
 
 /// The measuring directions of three sensors: from ω, φ, θ, or stated; `None` if readings are in X, Y, Z.
-fn read_sensors(keys: &mut dyn SetUpReader) -> Result<Option<[[f64; 3]; 3]>, ModelError> {
+fn read_sensors(keys: &SetUpReader<'_>) -> Result<Option<[[f64; 3]; 3]>, KeyFault> {
     let help = "keep one of them: either states the measuring directions of the sensors";
     keys.not_both("sensor_angles_deg", "sensor_directions", help)?;
     if let Some(angles) = keys.three_angles("sensor_angles_deg", "the three angles ω, φ, θ")? {
@@ -119,7 +119,7 @@ fn read_sensors(keys: &mut dyn SetUpReader) -> Result<Option<[[f64; 3]; 3]>, Mod
              angles)"
         );
         let help = "three coordinates need three independent measuring directions; check the directions";
-        return Err(keys.fault("sensor_directions", message, help));
+        return Err(KeyFault::new(message, Some(help.into())).at("sensor_directions"));
     }
     Ok(Some([a, b, c]))
 }

@@ -11,7 +11,7 @@ use super::{
     default_errors, displaced, point,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
-use crate::error::ModelError;
+use crate::document::Fault as KeyFault;
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
 
@@ -53,7 +53,7 @@ pub(super) const ENTRY: Entry = Entry {
 /// The column of a socket: a pose consists of axis positions only.
 const COLUMNS: [Column; 1] = [Column::new("socket", "", Quantity::Socket)];
 
-fn read(keys: &mut dyn SetUpReader) -> Result<SetUp, ModelError> {
+fn read(keys: &SetUpReader<'_>) -> Result<SetUp, KeyFault> {
     let ball = keys.point("ball_mm", "the ball in the tool frame")?;
     let mut priors = vec![Prior::Free; 3];
     priors.extend(keys.priors("ball_u_um", 3)?);
@@ -61,7 +61,7 @@ fn read(keys: &mut dyn SetUpReader) -> Result<SetUp, ModelError> {
     let stated = keys.stated_point("socket_mm")?;
     if stated.is_some() && name.is_none() {
         let help = "add `socket = \"…\"`, the name of the socket of all poses of the test";
-        return Err(keys.fault("socket_mm", "`socket_mm` without the name of the socket".into(), help));
+        return Err(KeyFault::new("`socket_mm` without the name of the socket", Some(help.into())).at("socket_mm"));
     }
     let is_located = stated.is_some();
     let socket = stated.unwrap_or_else(|| [0.0; 3].map(Written::number));

@@ -12,7 +12,7 @@ use super::{
     default_errors, displaced, point, pose_error,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
-use crate::error::ModelError;
+use crate::document::Fault as KeyFault;
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
 
@@ -50,7 +50,7 @@ pub(super) const ENTRY: Entry = Entry {
 /// The columns of a tracker.
 const COLUMNS: [Column; 3] = Column::vector(["px", "py", "pz"], "mm");
 
-fn read(keys: &mut dyn SetUpReader) -> Result<SetUp, ModelError> {
+fn read(keys: &SetUpReader<'_>) -> Result<SetUp, KeyFault> {
     let target = keys.point("target_mm", "the target in the tool frame")?;
     let mut priors = vec![Prior::Free; 6];
     priors.extend(keys.priors("target_u_um", 3)?);

@@ -40,3 +40,22 @@ pub(crate) fn too_small_um(number: f64) -> Option<String> {
 pub(crate) fn not_positive(name: &str, number: f64) -> Option<String> {
     (number <= 0.0).then(|| format!("`{name}` is {}; it must be greater than 0", words::number(number)))
 }
+
+/// A number above zero, or what is wrong with it.
+pub(crate) fn positive(number: f64) -> Result<f64, String> {
+    if number > 0.0 { Ok(number) } else { Err(format!("{}; it must be greater than 0", words::number(number))) }
+}
+
+/// A number that is not below zero, or what is wrong with it.
+pub(crate) fn not_negative(number: f64) -> Result<f64, String> {
+    if number < 0.0 { Err(format!("{}; it cannot be negative", words::number(number))) } else { Ok(number) }
+}
+
+/// A whole number from `least` to `most`, or what is wrong with it.
+pub(crate) fn count(number: f64, least: usize, most: usize) -> Result<usize, String> {
+    if number.fract() == 0.0 && number >= least as f64 && number <= most as f64 {
+        Ok(number as usize)
+    } else {
+        Err(format!("{}; a whole number from {least} to {most} is expected", words::number(number)))
+    }
+}

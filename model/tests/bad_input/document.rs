@@ -34,7 +34,14 @@ fn unknown_keys() {
         &with_session("noise_um", "nois_um"),
         &["session.toml:6", "[instrument] has the unknown key `nois_um`", "did you mean `noise_um`?"],
     );
-    assert_contains(&with_session("[instrument]", "[instruments]"), &["has no `instrument`"]);
+    assert_contains(
+        &with_session("[instrument]", "[instruments]"),
+        &["session.toml:4", "the file has the unknown key `instruments`", "did you mean `instrument`?"],
+    );
+    assert_contains(
+        &with_session("[instrument]\nkind = \"ballbar\"\nnoise_um = 0.3\n", ""),
+        &["the file has no `instrument`", "add `instrument`: the instrument: [instrument] with `kind"],
+    );
     assert_contains(
         &with_session("[machine]", "extra = 1\n[machine]"),
         &["session.toml:1", "the file has the unknown key `extra`"],

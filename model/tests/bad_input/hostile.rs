@@ -277,7 +277,7 @@ fn a_spreadsheet_that_unpacks_without_end() {
 #[test]
 fn nesting_up_to_the_limit_is_read() {
     let deep = |levels: usize| error_text(session(MACHINE, &format!("x = {}", nested("[", "]", levels)), None));
-    assert_contains(&deep(79), &["has no `machine`"]);
+    assert_contains(&deep(79), &["the file has the unknown key `x`"]);
     assert_contains(&deep(81), &["nested 80 levels deep"]);
 }
 

@@ -8,10 +8,11 @@ use abbe_model::ModelError;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
+use abbe_model::document::edit::SessionText;
 use abbe_model::driver::Driver;
 use abbe_model::effect::{Component, Effect, Shape};
+use abbe_model::files::table::csv;
 use abbe_model::files::{self, ReadOptions};
-use abbe_model::files::{table::csv, toml::write};
 use abbe_model::frames::Rotation;
 use abbe_model::instrument::Station;
 use abbe_model::instrument::tracker::Tracker;
@@ -118,7 +119,9 @@ proptest! {
         let folder = tempfile::tempdir().unwrap();
         let effects = declared(&machine, effects);
         let readings = readings(&machine, &rows);
-        let session = write::with_effects(&text(&machine), &effects, &machine);
+        let mut session = SessionText::new(&text(&machine), folder.path()).unwrap();
+        session.add_effects(&effects, &machine).unwrap();
+        let session = session.to_string();
         fs::write(folder.path().join("session.toml"), &session).unwrap();
         let station = Station::Tracker(Tracker {
             target: [1.0, 2.0, 3.0],

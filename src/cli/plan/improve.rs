@@ -10,7 +10,6 @@ use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::problem::Problem;
 use abbe::model::effect::Effect;
 use abbe::model::files::SourceMap;
-use abbe::model::files::toml::write;
 use abbe::model::words::counted;
 use clap::{Args, ValueEnum};
 
@@ -125,7 +124,10 @@ impl ImproveArguments {
             return Ok(());
         };
         let blocks = found.steps.iter().map(|step| step.session_toml.clone()).filter(|block| !block.is_empty());
-        next_session::write(path, sources, session, |text| write::with_blocks(text, blocks))
+        next_session::write(path, sources, session, |text| {
+            let mut blocks = blocks;
+            blocks.try_for_each(|block| text.add_block(&block))
+        })
     }
 
     /// Travel of the sensor in the bar, in each direction, mm.

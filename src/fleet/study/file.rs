@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 use abbe_identify::simulate::{Simulation, simulate};
 use abbe_identify::trace::TraceOptions;
 use abbe_identify::trace::screening::screened_effects;
+use abbe_model::document::node::Node;
 use abbe_model::effect::Effect;
+use abbe_model::files::read::{document_of, effects_of_nodes};
 use abbe_model::files::stamp::FileStamp;
-use abbe_model::files::toml::parts;
 use abbe_model::files::{self, ReadOptions};
 use abbe_model::session::Session;
 use schemars::JsonSchema;
@@ -104,7 +105,7 @@ pub struct TrueEffect {
     /// The effect otherwise, with the keys of `[[effect]]` of a session file.
     #[serde(default)]
     #[schemars(with = "Option<serde_json::Value>")]
-    pub effect: Option<toml::Table>,
+    pub effect: Option<Node>,
 }
 
 /// The noise of simulated readings.
@@ -153,7 +154,7 @@ pub fn read(path: &Path) -> Result<Study, FleetError> {
     let source = files::text(path, "the study file").map_err(|fault| FleetError::Request(fault.to_string()))?;
     let text = &source.text;
     let fault = |what: String| FleetError::Request(format!("{}: {what}", path.display()));
-    let file: StudyFile = toml::from_str(text).map_err(|error| fault(error.to_string()))?;
+    let file: StudyFile = document_of(&source)?;
     check(&file).map_err(fault)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut digest = Sha256::new();
@@ -191,9 +192,8 @@ pub fn read(path: &Path) -> Result<Study, FleetError> {
 /// The declared effect of an entry in a plan.
 fn declared(path: &Path, effect: &TrueEffect, session: &Session) -> Result<Option<Effect>, FleetError> {
     let Some(keys) = &effect.effect else { return Ok(None) };
-    let table = toml::Table::from_iter([("effect".to_string(), toml::Value::Array(vec![keys.clone().into()]))]);
     let tests: Vec<String> = session.tests.iter().map(|test| test.name.clone()).collect();
-    let read = parts::effects_of_text(path, &table.to_string(), &session.machine, session.instrument, &tests);
+    let read = effects_of_nodes(vec![keys.clone()], &session.machine, session.instrument, &tests);
     let wrong = |what: String| FleetError::Request(format!("{}: effect `{}`: {what}", path.display(), effect.name));
     let mut effects = read.map_err(|error| wrong(error.to_string()))?;
     Ok(effects.pop())

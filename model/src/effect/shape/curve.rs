@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use super::kind::{Basis, Entry, Follows, ShapeFault, ShapeKind, positive};
 use super::words::EffectWords;
 use super::{DriverSample, Key, KeyForm, KeyReader, KeyWriter, Shape};
+use crate::document::Fault;
 use crate::effect::sampled::Sampled;
-use crate::error::ModelError;
 use crate::scalar::Nominal;
 
 /// A nonparametric curve (spline): cubic B-splines on equal knots from `from` to `to`.
@@ -40,7 +40,7 @@ pub(super) const ENTRY: Entry =
 
 /// Reads a curve. By default it covers the full revolution of a rotary axis and is closed; for other drivers its ends
 /// are required.
-fn read(keys: &mut dyn KeyReader) -> Result<Shape, ModelError> {
+fn read(keys: &KeyReader<'_>) -> Result<Shape, Fault> {
     let rotary = keys.unit().is_angle();
     let stated = keys.flag("closed")?;
     let mut closed = stated.unwrap_or(rotary);
@@ -80,8 +80,8 @@ impl ShapeKind for Curve {
     fn write(&self, keys: &mut KeyWriter) {
         keys.quantity(&FROM, self.from);
         keys.quantity(&TO, self.to);
-        keys.line("intervals", self.intervals);
-        keys.line("closed", self.closed);
+        keys.set("intervals", self.intervals);
+        keys.set("closed", self.closed);
     }
     fn check(&self) -> Result<(), ShapeFault> {
         positive(self.to - self.from, "the length of a curve")?;

@@ -39,7 +39,7 @@ impl ShapeKind for FirstOrderLag {
         &ENTRY
     }
     fn write(&self, keys: &mut KeyWriter) {
-        keys.line("tau_s", self.tau_s);
+        keys.set("tau_s", self.tau_s);
         keys.quantity(&polynomial::SCALE, self.scale);
     }
     fn check(&self) -> Result<(), ShapeFault> {

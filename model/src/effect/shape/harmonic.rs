@@ -66,7 +66,7 @@ impl ShapeKind for Harmonic {
         &ENTRY
     }
     fn write(&self, keys: &mut KeyWriter) {
-        keys.line("order", self.order);
+        keys.set("order", self.order);
     }
     fn check(&self) -> Result<(), ShapeFault> {
         positive(self.order, "the order of a harmonic")

@@ -1,12 +1,12 @@
 //! What a shape consists of: each file of this folder holds one shape and implements these traits.
 
 use crate::axis::AxisKind;
+use crate::document::Fault;
 use crate::driver::{Driver, DriverPart, DriverSample};
 use crate::effect::keys::{Key, KeyReader, KeyWriter};
 use crate::effect::sampled::Sampled;
 use crate::effect::shape::Shape;
 use crate::effect::shape::words::EffectWords;
-use crate::error::ModelError;
 use crate::scalar::Nominal;
 
 /// Invalid shape parameters.
@@ -23,7 +23,7 @@ pub struct Entry {
     /// The drivers that it can have.
     pub follows: Follows,
     /// Reads it from its keys.
-    pub read: fn(&mut dyn KeyReader) -> Result<Shape, ModelError>,
+    pub read: fn(&KeyReader<'_>) -> Result<Shape, Fault>,
     /// Its members in the library of the search for a driver as a session samples it, each with a cost in addition to
     /// that of its family, in natural-logarithm units. A shape without members is one that only users declare.
     pub members: fn(&Sampled) -> Vec<(Shape, f64)>,

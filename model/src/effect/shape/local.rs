@@ -69,7 +69,7 @@ impl ShapeKind for Local {
         keys.quantity(&CENTRE, self.centre);
         keys.quantity(&WIDTH, self.width);
         if self.recurs.is_none() && keys.unit().is_angle() {
-            keys.line("recurs", false);
+            keys.set("recurs", false);
         }
     }
     fn check(&self) -> Result<(), ShapeFault> {

@@ -3,7 +3,7 @@
 use super::kind::{Basis, Entry, Follows, Per, ShapeFault, ShapeKind, positive};
 use super::words::EffectWords;
 use super::{DriverSample, Key, KeyForm, KeyReader, KeyWriter, Shape};
-use crate::error::ModelError;
+use crate::document::Fault;
 use crate::scalar::Nominal;
 
 /// Powers 1 … `degree` of the driver over `scale`.
@@ -35,7 +35,7 @@ pub(super) const ENTRY: Entry = Entry {
 };
 
 /// Reads degree and scale.
-pub(super) fn read(keys: &mut dyn KeyReader) -> Result<(usize, f64), ModelError> {
+pub(super) fn read(keys: &KeyReader<'_>) -> Result<(usize, f64), Fault> {
     let degree = keys.required_count("order", "add `order = 1`", 1, HIGHEST_DEGREE)?;
     let scale = keys.quantity(&SCALE)?.unwrap_or(keys.default_scale());
     Ok((degree, scale))
@@ -44,7 +44,7 @@ pub(super) fn read(keys: &mut dyn KeyReader) -> Result<(usize, f64), ModelError>
 /// Writes degree and scale.
 pub(super) fn write(degree: usize, scale: f64, keys: &mut KeyWriter) {
     keys.quantity(&SCALE, scale);
-    keys.line("order", degree);
+    keys.set("order", degree);
 }
 
 /// Checks degree and scale.

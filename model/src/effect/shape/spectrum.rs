@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use super::kind::{Basis, Entry, Follows, Per, ShapeFault, ShapeKind, positive};
 use super::words::EffectWords;
 use super::{DriverSample, Key, KeyForm, KeyReader, KeyWriter, Shape};
-use crate::error::ModelError;
+use crate::document::Fault;
 use crate::scalar::Nominal;
 
 /// Cosines and sines of the orders 1 … `orders` of a period.
@@ -37,7 +37,7 @@ pub(super) const ENTRY: Entry = Entry {
 
 /// Reads a spectrum. By default the period is one turn of a rotary axis. That of a linear axis is required: twice the
 /// travelled range represents any curve over the range.
-fn read(keys: &mut dyn KeyReader) -> Result<Shape, ModelError> {
+fn read(keys: &KeyReader<'_>) -> Result<Shape, Fault> {
     let orders = keys.required_count("orders", "add `orders = 40`", 1, HIGHEST_ORDER)?;
     let period = if keys.unit().is_angle() {
         keys.quantity(&super::periodic::PERIOD)?.unwrap_or(TAU)
@@ -59,7 +59,7 @@ impl ShapeKind for Spectrum {
         &ENTRY
     }
     fn write(&self, keys: &mut KeyWriter) {
-        keys.line("orders", self.orders);
+        keys.set("orders", self.orders);
         if self.period != TAU || !keys.unit().is_angle() {
             keys.quantity(&super::periodic::PERIOD, self.period);
         }

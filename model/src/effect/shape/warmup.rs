@@ -37,7 +37,7 @@ impl ShapeKind for Warmup {
         &ENTRY
     }
     fn write(&self, keys: &mut KeyWriter) {
-        keys.line("tau_s", self.tau_s);
+        keys.set("tau_s", self.tau_s);
     }
     fn check(&self) -> Result<(), ShapeFault> {
         positive(self.tau_s, "the time constant of a warm-up")

@@ -5,20 +5,44 @@
 
 use std::path::{Path, PathBuf};
 
-use super::ReadOptions;
-use crate::error::ModelError;
-use crate::files::toml::document::Value;
+use super::store::Store;
+use crate::document::Fault;
+
+/// Options for reading a session.
+#[derive(Clone, Debug)]
+pub struct ReadOptions {
+    /// The folder of the data files, if they are not beside the session file.
+    pub data_directory: Option<PathBuf>,
+    /// Whether the data files are read; otherwise the session is only a plan.
+    pub read_data: bool,
+    /// Whether the session may read files outside its own folder, the folders below and the data directory.
+    pub allow_outside: bool,
+    /// Where the session, its machine and its data lie.
+    pub store: Store,
+}
+
+impl Default for ReadOptions {
+    /// Data are read, from the session's folder and below.
+    fn default() -> Self {
+        ReadOptions { data_directory: None, read_data: true, allow_outside: false, store: Store::Disk }
+    }
+}
 
 /// The folder to which the names in a session are relative.
-pub(super) fn folder(session: &Path) -> &Path {
+pub(crate) fn folder(session: &Path) -> &Path {
     match session.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
     }
 }
 
-/// Returns an error unless the session may read the file.
-pub(super) fn check(session: &Path, options: &ReadOptions, named: &Value<'_>, found: &Path) -> Result<(), ModelError> {
+/// Returns a fault unless the session may read the file; `(key, named)` says how the session names it.
+pub(crate) fn check(
+    session: &Path,
+    options: &ReadOptions,
+    (key, named): (&str, &str),
+    found: &Path,
+) -> Result<(), Fault> {
     if options.allow_outside {
         return Ok(());
     }
@@ -31,12 +55,10 @@ pub(super) fn check(session: &Path, options: &ReadOptions, named: &Value<'_>, fo
         return Ok(());
     }
     let message = format!(
-        "`{} = \"{}\"` is outside the session's folder: {}",
-        named.key,
-        named.as_text().unwrap_or(""),
+        "`{key} = \"{named}\"` is outside the session's folder: {}",
         real.as_deref().unwrap_or(found).display()
     );
     let help = "a session may read files in its own folder, below it, and in the data folder; copy the file there, or allow files outside \
                 if you trust the session";
-    Err(named.file_error(message, help))
+    Err(Fault::file(message, help))
 }

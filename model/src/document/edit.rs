@@ -1,0 +1,341 @@
+//! Edits of the text of a session. Comments, the order of the keys and everything else stay.
+
+use std::path::{Path, PathBuf};
+
+use toml_edit::{DocumentMut, InlineTable, Item, Table, TableLike, Value};
+
+use super::of_domain;
+use super::print::{number_of, table_of};
+use crate::chain::Machine;
+use crate::effect::Effect;
+use crate::error::{Location, ModelError};
+
+/// The text of a session during edits.
+///
+/// ```
+/// use std::path::Path;
+///
+/// use abbe_model::chain::Machine;
+/// use abbe_model::document::edit::SessionText;
+/// use abbe_model::driver::Driver;
+/// use abbe_model::effect::shape::Harmonic;
+/// use abbe_model::effect::{Component, Effect, Shape};
+///
+/// let machine = Machine::from_code("wCAbYXZt")?;
+/// let component = Component::parse("EZC").unwrap();
+/// let effect = Effect::new(component, Driver::parse("C"), Shape::Harmonic(Harmonic { order: 2.0 }));
+/// let mut text = SessionText::new("# a session\n[columns]\nJ1_rad = \"j1\"\n# end\n", Path::new("session.toml"))?;
+/// text.remove(&["columns"]);
+/// text.add_effects(&[effect], &machine)?;
+/// assert_eq!(
+///     text.to_string(),
+///     "# end\n\n[[effect]]\ncomponent = \"EZC\"\ndriver = \"C\"\nshape = \"harmonic\"\norder = 2\n"
+/// );
+/// # Ok::<(), abbe_model::ModelError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct SessionText {
+    file: PathBuf,
+    /// A remark above everything.
+    remark: Option<String>,
+    document: DocumentMut,
+}
+
+impl std::fmt::Display for SessionText {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if let Some(remark) = &self.remark {
+            writeln!(formatter, "# {remark}")?;
+        }
+        self.document.fmt(formatter)
+    }
+}
+
+impl SessionText {
+    /// The text of a file.
+    ///
+    /// # Errors
+    /// If it is not TOML.
+    pub fn new(text: &str, file: &Path) -> Result<SessionText, ModelError> {
+        let document = text.parse().map_err(|fault: toml_edit::TomlError| ModelError::Input {
+            location: Location::file(file),
+            message: format!("not valid TOML: {}", fault.message()),
+            help: None,
+        })?;
+        Ok(SessionText { file: file.to_path_buf(), remark: None, document })
+    }
+
+    /// Reads the machine from another file; a session with the machine's own tables is unchanged.
+    pub fn set_machine_file(&mut self, name: &str) {
+        if let Some(file) = value_in(&mut self.document, &["machine", "file"]) {
+            replace(file, name);
+        }
+    }
+
+    /// States the noise of the instrument.
+    pub fn set_noise(&mut self, noise_um: f64) {
+        match value_in(&mut self.document, &["instrument", "noise_um"]) {
+            Some(noise) => replace(noise, number_of(noise_um)),
+            None => {
+                if let Some(instrument) = self.document.get_mut("instrument").and_then(Place::of) {
+                    instrument.insert_after("kind", "noise_um", number_of(noise_um));
+                }
+            }
+        }
+    }
+
+    /// States the data file of each named test.
+    pub fn set_data(&mut self, data: &[(String, String)]) {
+        for mut test in tables(&mut self.document, "test") {
+            let name = test.table().get("name").and_then(Item::as_str);
+            let Some((_, file)) = data.iter().find(|(test, _)| Some(test.as_str()) == name) else { continue };
+            match test.table().get_mut("data").and_then(Item::as_value_mut) {
+                Some(old) => replace(old, file.as_str()),
+                None => test.insert_after("name", "data", file.as_str().into()),
+            }
+        }
+    }
+
+    /// Removes tables of these names, of the session and of its tests.
+    pub fn remove(&mut self, names: &[&str]) {
+        for name in names {
+            self.document.remove(name);
+            for mut test in tables(&mut self.document, "test") {
+                test.table().remove(name);
+            }
+        }
+    }
+
+    /// Adapts the relative names of the machine file and of data files to another folder. Absolute names are unchanged,
+    /// and so are names found in `data_directory`, which the reader searches first.
+    ///
+    /// # Errors
+    /// If one of the two folders does not exist.
+    pub fn relocate(&mut self, folder: &Path, data_directory: Option<&Path>) -> Result<(), ModelError> {
+        let own = parent(&self.file).to_path_buf();
+        let adapt = |value: &mut Value| {
+            let named = PathBuf::from(value.as_str().unwrap_or_default());
+            if named.is_relative() {
+                replace(value, relative_path(folder, &own.join(named))?);
+            }
+            Ok::<(), ModelError>(())
+        };
+        if let Some(file) = value_in(&mut self.document, &["machine", "file"]) {
+            adapt(file)?;
+        }
+        for mut test in tables(&mut self.document, "test") {
+            let Some(data) = test.table().get_mut("data").and_then(Item::as_value_mut) else { continue };
+            let named = data.as_str().unwrap_or_default();
+            if !data_directory.is_some_and(|folder| folder.join(named).exists()) {
+                adapt(data)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds a remark above everything.
+    pub fn add_remark(&mut self, remark: &str) {
+        self.remark = Some(remark.to_string());
+    }
+
+    /// Adds effects at the end.
+    ///
+    /// # Errors
+    /// If the session states its effects as something else than a list of tables.
+    pub fn add_effects(&mut self, effects: &[Effect], machine: &Machine) -> Result<(), ModelError> {
+        effects.iter().try_for_each(|effect| self.add("effect", &of_domain::effect(effect, machine)))
+    }
+
+    /// Adds an entry of a list of tables at the end.
+    ///
+    /// # Errors
+    /// As [`SessionText::add_effects`].
+    pub fn add(&mut self, list: &str, entry: &impl serde::Serialize) -> Result<(), ModelError> {
+        self.push(list, table_of(entry)?)
+    }
+
+    /// Adds the tables of a text, as [`print::block_of`](super::print::block_of) writes one, at the end.
+    ///
+    /// # Errors
+    /// As [`SessionText::add_effects`], or if it is not TOML.
+    pub fn add_block(&mut self, block: &str) -> Result<(), ModelError> {
+        for (list, item) in SessionText::new(block, &self.file)?.document.into_table() {
+            if let Item::ArrayOfTables(tables) = item {
+                tables.into_iter().try_for_each(|table| self.push(&list, table))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn push(&mut self, list: &str, mut table: Table) -> Result<(), ModelError> {
+        // What follows the last table, such as a comment, stays before the new one.
+        let mut prefix = self.document.trailing().as_str().unwrap_or_default().to_string();
+        self.document.set_trailing("");
+        if !self.document.as_table().is_empty() || !prefix.is_empty() {
+            prefix.push('\n');
+        }
+        prefix.push_str(table.decor().prefix().and_then(|prefix| prefix.as_str()).unwrap_or_default());
+        table.decor_mut().set_prefix(prefix);
+        table.set_position(Some(isize::MAX));
+        let place = self.document.entry(list).or_insert_with(|| Item::ArrayOfTables(toml_edit::ArrayOfTables::new()));
+        match place {
+            Item::ArrayOfTables(tables) => tables.push(table),
+            Item::Value(Value::Array(items)) => items.push(table.into_inline_table()),
+            _ => {
+                return Err(ModelError::Input {
+                    location: Location::file(&self.file),
+                    message: format!("`{list}` is not a list of tables"),
+                    help: Some(format!("write each entry as its own [[{list}]]")),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A value by its keys.
+fn value_in<'d>(document: &'d mut DocumentMut, keys: &[&str]) -> Option<&'d mut Value> {
+    let mut item = document.as_item_mut();
+    for key in keys {
+        item = item.as_table_like_mut()?.get_mut(key)?;
+    }
+    item.as_value_mut()
+}
+
+/// A table under a header or in a line.
+enum Place<'d> {
+    Header(&'d mut Table),
+    Line(&'d mut InlineTable),
+}
+
+impl<'d> Place<'d> {
+    fn of(item: &'d mut Item) -> Option<Place<'d>> {
+        match item {
+            Item::Table(table) => Some(Place::Header(table)),
+            Item::Value(Value::InlineTable(table)) => Some(Place::Line(table)),
+            _ => None,
+        }
+    }
+
+    fn table(&mut self) -> &mut dyn TableLike {
+        match self {
+            Place::Header(table) => *table,
+            Place::Line(table) => *table,
+        }
+    }
+
+    /// Inserts a key after another one.
+    fn insert_after(mut self, after: &str, key: &str, value: Value) {
+        let mut order: Vec<String> = self.table().iter().map(|(key, _)| key.to_string()).collect();
+        let place = order.iter().position(|own| own == after).map_or(order.len(), |place| place + 1);
+        order.insert(place, key.to_string());
+        self.table().insert(key, Item::Value(value));
+        let rank = |key: &str| order.iter().position(|own| own == key);
+        match self {
+            Place::Header(table) => table.sort_values_by(|a, _, b, _| rank(a.get()).cmp(&rank(b.get()))),
+            Place::Line(table) => {
+                table.sort_values_by(|a, _, b, _| rank(a.get()).cmp(&rank(b.get())));
+                table.fmt();
+            }
+        }
+    }
+}
+
+/// The tables of a list.
+fn tables<'d>(document: &'d mut DocumentMut, list: &str) -> Vec<Place<'d>> {
+    match document.get_mut(list) {
+        Some(Item::ArrayOfTables(tables)) => tables.iter_mut().map(Place::Header).collect(),
+        Some(Item::Value(Value::Array(items))) => {
+            items.iter_mut().filter_map(Value::as_inline_table_mut).map(Place::Line).collect()
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// Replaces a value; the space and the comment around it stay.
+fn replace(value: &mut Value, new: impl Into<Value>) {
+    let decor = value.decor().clone();
+    *value = new.into();
+    *value.decor_mut() = decor;
+}
+
+/// The folder of a file.
+fn parent(file: &Path) -> &Path {
+    match file.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
+/// The name of a file relative to a folder; the absolute name if they share only the root.
+fn relative_path(folder: &Path, file: &Path) -> Result<String, ModelError> {
+    let whole = |path: &Path| {
+        path.canonicalize().map_err(|cause| ModelError::Output { file: path.to_path_buf(), cause: cause.to_string() })
+    };
+    let (from, to) = (whole(folder)?, whole(parent(file))?);
+    let shared = from.components().zip(to.components()).take_while(|(a, b)| a == b).count();
+    let name = file.file_name().unwrap_or_default();
+    if shared <= 1 {
+        return Ok(to.join(name).display().to_string());
+    }
+    let up = from.components().skip(shared).map(|_| "..".into());
+    let down = to.components().skip(shared).map(|part| part.as_os_str().to_string_lossy());
+    let parts: Vec<_> = up.chain(down).chain([name.to_string_lossy()]).collect();
+    Ok(parts.join("/"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SESSION: &str =
+        "[machine]\nfile = \"../machine.toml\" # ours\n\n[instrument]\nkind = \"ballbar\"   # Renishaw\n";
+
+    fn edited(text: &str, edit: impl FnOnce(&mut SessionText)) -> String {
+        let mut text = SessionText::new(text, Path::new("session.toml")).unwrap();
+        edit(&mut text);
+        text.to_string()
+    }
+
+    #[test]
+    fn other_text_is_unchanged() {
+        let text = edited(SESSION, |text| text.set_machine_file("machine.toml"));
+        assert_eq!(text, SESSION.replace("../machine.toml", "machine.toml"));
+        let text = edited(SESSION, |text| text.set_noise(0.25));
+        assert_eq!(text, SESSION.replace("# Renishaw\n", "# Renishaw\nnoise_um = 0.25\n"));
+        let text = edited(&text, |text| text.set_noise(0.0));
+        assert!(text.ends_with("\nnoise_um = 0\n"), "{text}");
+        let inline = edited("instrument = { kind = \"ballbar\" }\n", |text| text.set_noise(1.5));
+        assert_eq!(inline, "instrument = { kind = \"ballbar\", noise_um = 1.5 }\n");
+    }
+
+    #[test]
+    fn file_names_are_adapted_to_another_folder() {
+        let root = tempfile::tempdir().unwrap();
+        let at = |name: &str| root.path().join(name);
+        for folder in ["ours/data", "ours/elsewhere", "theirs/next"] {
+            std::fs::create_dir_all(at(folder)).unwrap();
+        }
+        std::fs::write(at("ours/elsewhere/b.csv"), "").unwrap();
+        let session = "[machine]\nfile = \"../machine.toml\" # ours\n\n[[test]]\nname = \"A\"\ndata = \"data/a.csv\"\n\n\
+                       [[test]]\nname = \"B\"\ndata = \"b.csv\"\n\n[[test]]\nname = \"C\"\ndata = \"/c.csv\"\n";
+        let elsewhere = at("ours/elsewhere");
+        let relocated_to = |folder: &str| {
+            let mut text = SessionText::new(session, &at("ours/session.toml")).unwrap();
+            text.relocate(&at(folder), Some(&elsewhere)).unwrap();
+            text.to_string()
+        };
+        let there =
+            session.replace("../machine.toml", "../../machine.toml").replace("data/a.csv", "../../ours/data/a.csv");
+        assert_eq!(relocated_to("theirs/next"), there);
+        assert_eq!(relocated_to("ours"), session);
+        assert_eq!(relocated_to("ours/data"), session.replace("../", "../../").replace("data/a", "a"));
+    }
+
+    #[test]
+    fn layouts_go_from_the_session_and_from_its_tests() {
+        let text = "# head\n[format]\nheader = false\n\n[[test]] # first\nname = \"A\"\ncolumns = { x_mm = 1 }\n\
+                    [test.format]\nheader = true\n# end\n";
+        let kept = edited(text, |text| text.remove(&["format", "columns"]));
+        assert_eq!(kept, "\n[[test]] # first\nname = \"A\"\n# end\n");
+    }
+}

@@ -1,0 +1,198 @@
+//! A fault of a document before its place in a file is known: what is wrong, and the path of keys that leads there.
+
+use std::fmt;
+
+use serde::de;
+
+use crate::error::ModelError;
+
+/// A step from a table or a list to what it contains.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// The value of a key.
+    Key(String),
+    /// An item of a list, from 0.
+    Item(usize),
+}
+
+/// What is wrong.
+#[derive(Debug)]
+pub(super) enum Finding {
+    /// A message, and what to do.
+    Said { message: String, help: Option<String> },
+    /// What is said of the value: the message starts with its key.
+    OfKey { what: String, help: Option<String> },
+    /// What is said of a table: the message starts with its name.
+    OfTable { what: String, help: Option<String> },
+    /// A value of another type or word than this one.
+    Unexpected(String),
+    /// A key that the table does not have.
+    UnknownKey { key: String, known: Vec<String> },
+    /// A required key that is absent, in a table of this type; `what` says what to add.
+    MissingKey { table: &'static str, key: String, what: Option<String> },
+    /// A file that is named and does not exist, or must not be read.
+    File { message: String, help: String },
+    /// An error that has its place already.
+    Other(Box<ModelError>),
+}
+
+/// A fault of a document. `Parsed::error_of` finds its place in a file.
+#[derive(Debug)]
+pub struct Fault {
+    pub(super) finding: Finding,
+    /// From the value outwards.
+    pub(super) path: Vec<Step>,
+    /// Whether it points at the key rather than at the value.
+    pub(super) on_key: bool,
+}
+
+impl Fault {
+    fn of(finding: Finding) -> Fault {
+        Fault { finding, path: Vec::new(), on_key: false }
+    }
+
+    /// A fault in words, with what to do.
+    pub fn new(message: impl Into<String>, help: Option<String>) -> Fault {
+        Fault::of(Finding::Said { message: message.into(), help })
+    }
+
+    /// The value is this, and must be something else: the message starts with its key.
+    pub fn is(what: impl Into<String>) -> Fault {
+        Fault::of_key(format!("is {}", what.into()), None)
+    }
+
+    /// What is wrong with the value, said of its key.
+    pub fn of_key(what: impl Into<String>, help: Option<String>) -> Fault {
+        Fault::of(Finding::OfKey { what: what.into(), help })
+    }
+
+    /// What is wrong with the table, said of its name.
+    pub fn of_table(what: impl Into<String>, help: Option<String>) -> Fault {
+        Fault::of(Finding::OfTable { what: what.into(), help })
+    }
+
+    /// Something else is expected.
+    pub fn unexpected(expected: impl Into<String>) -> Fault {
+        Fault::of(Finding::Unexpected(expected.into()))
+    }
+
+    /// A required key is absent; `what` says what to add.
+    pub fn missing(key: &str, what: &str) -> Fault {
+        Fault::of(Finding::MissingKey { table: "", key: key.to_string(), what: Some(what.to_string()) })
+    }
+
+    /// A key that is not among the known ones.
+    pub fn unknown_key(key: &str, known: Vec<String>) -> Fault {
+        Fault::of(Finding::UnknownKey { key: key.to_string(), known })
+    }
+
+    /// A file that is named and does not exist, or must not be read.
+    pub fn file(message: String, help: &str) -> Fault {
+        Fault::of(Finding::File { message, help: help.to_string() })
+    }
+
+    /// The same, about the key rather than its value.
+    pub fn on_key(self) -> Fault {
+        Fault { on_key: true, ..self }
+    }
+
+    /// The same, in the value of a key.
+    pub fn at(mut self, key: &str) -> Fault {
+        self.path.push(Step::Key(key.to_string()));
+        self
+    }
+
+    /// The same, in an item of a list.
+    pub fn at_item(mut self, item: usize) -> Fault {
+        self.path.push(Step::Item(item));
+        self
+    }
+
+    /// The same, if a key is unknown, with one more that is known.
+    pub(super) fn also_known(mut self, key: Option<&'static str>) -> Fault {
+        if let Finding::UnknownKey { known, .. } = &mut self.finding {
+            known.extend(key.map(str::to_string));
+        }
+        self
+    }
+
+    /// The same, of a table of the type `name`, if a key of it is absent.
+    pub(super) fn in_table(mut self, name: &'static str) -> Fault {
+        if let Finding::MissingKey { table, .. } = &mut self.finding
+            && table.is_empty()
+        {
+            *table = name;
+        }
+        self
+    }
+}
+
+impl From<ModelError> for Fault {
+    fn from(error: ModelError) -> Fault {
+        Fault::of(Finding::Other(Box::new(error)))
+    }
+}
+
+impl From<(String, String)> for Fault {
+    fn from((message, help): (String, String)) -> Fault {
+        Fault::new(message, Some(help))
+    }
+}
+
+/// Where a result belongs in a document.
+pub trait Within<T> {
+    /// In the value of a key.
+    ///
+    /// # Errors
+    /// As the result.
+    fn within(self, key: &str) -> Result<T, Fault>;
+    /// In an item of a list.
+    ///
+    /// # Errors
+    /// As the result.
+    fn within_item(self, item: usize) -> Result<T, Fault>;
+}
+
+impl<T, E: Into<Fault>> Within<T> for Result<T, E> {
+    fn within(self, key: &str) -> Result<T, Fault> {
+        self.map_err(|fault| fault.into().at(key))
+    }
+
+    fn within_item(self, item: usize) -> Result<T, Fault> {
+        self.map_err(|fault| fault.into().at_item(item))
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{:?}", self.finding)
+    }
+}
+
+impl std::error::Error for Fault {}
+
+impl de::Error for Fault {
+    fn custom<T: fmt::Display>(message: T) -> Fault {
+        Fault::new(message.to_string(), None)
+    }
+
+    fn invalid_type(_: de::Unexpected<'_>, expected: &dyn de::Expected) -> Fault {
+        Fault::unexpected(expected.to_string())
+    }
+
+    fn invalid_value(_: de::Unexpected<'_>, expected: &dyn de::Expected) -> Fault {
+        Fault::unexpected(expected.to_string())
+    }
+
+    fn invalid_length(_: usize, expected: &dyn de::Expected) -> Fault {
+        Fault::unexpected(expected.to_string())
+    }
+
+    fn unknown_field(field: &str, known: &'static [&'static str]) -> Fault {
+        Fault::unknown_key(field, known.iter().map(|name| (*name).to_string()).collect())
+    }
+
+    fn missing_field(field: &'static str) -> Fault {
+        Fault::of(Finding::MissingKey { table: "", key: field.to_string(), what: None })
+    }
+}

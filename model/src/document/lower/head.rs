@@ -1,0 +1,170 @@
+//! What a session states before its tests: notes, constants, instrument, the errors to estimate; and the distances of
+//! sockets.
+
+use crate::chain::Machine;
+use crate::component::ErrorName;
+use crate::document::fault::{Fault, Within};
+use crate::document::from_node;
+use crate::document::node::{Entries, Named, Value};
+use crate::document::session as document;
+use crate::document::value::Note;
+use crate::files::quantity::{self, MICROMETRE};
+use crate::instrument::{InstrumentKind, SharedBy};
+use crate::pattern;
+use crate::session::expression::Constant;
+use crate::session::{SocketDistance, Test, limits};
+use crate::words::listed;
+
+/// Notes that reports repeat.
+pub(super) fn about(notes: &Named<Note>) -> Result<Vec<(String, String)>, Fault> {
+    let note = |(key, Note(text)): &(String, Note)| {
+        if key.chars().any(char::is_control) || key.trim().is_empty() {
+            let help = "use names such as `serial_number`, `operator`, `date`, `comment`";
+            let message = "a note of [about] has a name that cannot be displayed";
+            return Err(Fault::new(message, Some(help.into())).on_key().at(key));
+        }
+        Ok((key.clone(), text.clone()))
+    };
+    notes.0.iter().map(note).collect()
+}
+
+/// The constants, in the order of the file. Without `means`, the comment behind the value is its meaning.
+pub(super) fn constants(entries: &Entries, comment: impl Fn(&str) -> Option<String>) -> Result<Vec<Constant>, Fault> {
+    let constant = |(name, node): &(String, _)| {
+        let node: &crate::document::node::Node = node;
+        let mut letters = name.chars();
+        let valid = letters.next().is_some_and(|c| c.is_alphabetic() || c == '_')
+            && letters.all(|c| c.is_alphanumeric() || c == '_')
+            && name != "sqrt";
+        if !valid {
+            let help = "a name is a letter followed by letters, digits and `_`; `sqrt` is reserved";
+            let message = format!("a constant cannot have the name `{name}`");
+            return Err(Fault::new(message, Some(help.into())).on_key().at(name));
+        }
+        if !matches!(node.value, Value::Table(_)) {
+            return Ok(Constant { name: name.clone(), mm: from_node(node).within(name)?, means: comment(name) });
+        }
+        let document::Constant { mm, means } = from_node(node).within(name)?;
+        let means = match means {
+            Some(text) => Some(text.trim().to_string()).filter(|text| !text.is_empty()),
+            None => comment(name),
+        };
+        Ok(Constant { name: name.clone(), mm, means })
+    };
+    entries.0.iter().map(constant).collect()
+}
+
+/// The kind of the instrument, and noise and resolution of a reading, mm.
+pub(super) fn instrument(document: &document::Instrument) -> Result<(InstrumentKind, Option<f64>, Option<f64>), Fault> {
+    let kind = InstrumentKind::of_word(&document.kind).ok_or_else(|| {
+        let words: Vec<String> = InstrumentKind::ALL.iter().map(|kind| format!("\"{}\"", kind.word())).collect();
+        Fault::unexpected(listed(&words, "or")).at("kind")
+    })?;
+    let in_mm = |um: Option<f64>, key: &str| {
+        let mm = um.map(|um| match limits::too_small_um(limits::not_negative(um)?) {
+            Some(fault) => Err(fault),
+            None => Ok(um * MICROMETRE),
+        });
+        mm.transpose().map_err(Fault::is).within(key)
+    };
+    let resolution_mm = in_mm(document.resolution_um, "resolution_um")?.filter(|step| *step > 0.0);
+    Ok((kind, in_mm(document.noise_um, "noise_um")?, resolution_mm))
+}
+
+/// The errors to be estimated: those stated, or the defaults of the instrument.
+pub(super) fn unknowns(
+    machine: &Machine,
+    kind: InstrumentKind,
+    document: &document::Unknowns,
+) -> Result<Vec<ErrorName>, Fault> {
+    let Some(errors) = &document.errors else {
+        return Ok(kind.default_errors(machine));
+    };
+    let mut unknowns: Vec<ErrorName> = Vec::new();
+    // A pattern may include errors that are named already; each error is estimated once.
+    let mut by_pattern: Vec<ErrorName> = Vec::new();
+    for (item, text) in errors.iter().enumerate() {
+        if pattern::is_pattern(text) {
+            by_pattern.extend(matching(machine, text).within_item(item)?);
+            for name in &by_pattern {
+                if !unknowns.contains(name) {
+                    unknowns.push(name.clone());
+                }
+            }
+            continue;
+        }
+        let name = error_name(machine, text).within_item(item)?;
+        if by_pattern.contains(&name) {
+            continue;
+        }
+        if unknowns.contains(&name) {
+            return Err(Fault::new(format!("`{name}` occurs twice in `errors`"), None).at_item(item));
+        }
+        unknowns.push(name);
+    }
+    Ok(unknowns)
+}
+
+/// The errors that a pattern matches.
+fn matching(machine: &Machine, text: &str) -> Result<Vec<ErrorName>, Fault> {
+    let found = pattern::matching(machine, text);
+    if found.is_empty() {
+        let axes: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
+        let help = format!(
+            "`?` matches one character and `*` any number of them: \"E?0C\" for the location errors of C, \"E?0J*\" for those of all joints; the axes are {}",
+            axes.join(", ")
+        );
+        return Err(Fault::new(format!("\"{text}\" matches no error of the machine"), Some(help)));
+    }
+    Ok(found)
+}
+
+/// An error of the machine by its name.
+fn error_name(machine: &Machine, text: &str) -> Result<ErrorName, Fault> {
+    let Some(mut name) = ErrorName::parse(text) else {
+        let help = "ISO 230-1 names such as \"EY0A\" (location) and \"EYA\" (motion), or `e_y0a`, `θ_z0c`";
+        return Err(Fault::new(format!("\"{text}\" is not the name of an error"), Some(help.into())));
+    };
+    match quantity::axis_index(machine, &name.axis) {
+        Some(index) => name.axis.clone_from(&machine.axes[index].name),
+        None => {
+            let (message, help) = quantity::no_axis(machine, &name.axis);
+            return Err(Fault::new(format!("\"{text}\": {message}"), Some(help)));
+        }
+    }
+    Ok(name)
+}
+
+/// Sockets at known distances; `read` says whether all sockets are known.
+pub(super) fn socket_distances(
+    kind: InstrumentKind,
+    tests: &[Test],
+    documents: &[document::SocketDistance],
+    read: bool,
+) -> Result<Vec<SocketDistance>, Fault> {
+    if !documents.is_empty() && !kind.shares(SharedBy::Socket) {
+        let message = format!("[[socket_distance]] in a session whose instrument is a {}", kind.word());
+        return Err(Fault::new(message, None).on_key());
+    }
+    let distance = |document: &document::SocketDistance| {
+        for (item, socket) in document.between.iter().enumerate() {
+            // Sockets named by a column are known after the data are read.
+            if read && !tests.iter().any(|test| test.socket.as_ref() == Some(socket)) {
+                let mut known: Vec<&str> = tests.iter().filter_map(|test| test.socket.as_deref()).collect();
+                known.dedup();
+                let help = format!("sockets here: {}", known.join(", "));
+                let message = format!("no test has the socket \"{socket}\"");
+                return Err(Fault::new(message, Some(help)).at_item(item).at("between"));
+            }
+        }
+        let between = <[String; 2]>::try_from(document.between.clone())
+            .map_err(|_| Fault::of_key("needs two sockets", None).at("between"))?;
+        if between[0] == between[1] {
+            return Err(Fault::of_key("needs two different sockets", None).at("between"));
+        }
+        let distance_mm = limits::positive(document.mm).map_err(Fault::is).within("mm")?;
+        let u_um = limits::not_negative(document.u_um.unwrap_or(0.0)).map_err(Fault::is).within("u_um")?;
+        Ok(SocketDistance { between, distance_mm, u_mm: u_um * MICROMETRE })
+    };
+    documents.iter().enumerate().map(|(item, document)| distance(document).within_item(item)).collect()
+}

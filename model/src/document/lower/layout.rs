@@ -1,0 +1,90 @@
+//! The layout of the data files of other programs.
+
+use crate::document::fault::{Fault, Within};
+use crate::document::from_node;
+use crate::document::layout as document;
+use crate::document::node::Value;
+use crate::driver::column;
+use crate::error::Location;
+use crate::files::table::encoding;
+use crate::files::table::request::{ColumnMapping, ForeignColumn, Format};
+use crate::session::limits;
+
+/// Largest number of a column, and of lines above the header.
+const MANY: usize = 1_000_000;
+
+/// Separator, decimal, header, encoding, lines above the header; sheet of a spreadsheet; direction in a ball-bar file.
+pub(super) fn format(document: &document::Format) -> Result<Format, Fault> {
+    let mut format = Format::default();
+    if let Some(text) = &document.separator {
+        format.separator = one_of(text, b",;\t|:").within("separator")?;
+    }
+    if let Some(text) = &document.decimal {
+        format.decimal = one_of(text, b".,").within("decimal")?;
+    }
+    if let Some(header) = document.header {
+        format.header = header;
+    }
+    format.sheet.clone_from(&document.sheet);
+    if let Some(node) = &document.anticlockwise {
+        // Files number directions, or name one of them.
+        format.anticlockwise = Some(match &node.value {
+            Value::Truth(truth) => truth.to_string(),
+            Value::Text(text) => text.trim().to_string(),
+            _ => {
+                let number =
+                    from_node::<f64>(node).and_then(|number| limits::count(number, 0, MANY).map_err(Fault::is));
+                number.within("anticlockwise")?.to_string()
+            }
+        });
+    }
+    if let Some(name) = &document.encoding {
+        format.encoding = Some(encoding::of_name(name).ok_or_else(|| {
+            let help = "common are \"utf-8\", \"latin1\", \"utf-16le\", \"utf-16be\"; others have their name in the WHATWG Encoding Standard, such as \"shift_jis\"";
+            let what = format!("is \"{name}\", which is not a known encoding");
+            Fault::of_key(what, Some(help.into())).at("encoding")
+        })?);
+    }
+    if let Some(lines) = document.skip_lines {
+        format.skip_lines = limits::count(lines as f64, 0, MANY).map_err(Fault::is).within("skip_lines")?;
+    }
+    if format.decimal == format.separator && document.decimal.is_some() {
+        let message = "the decimal comma is also the separator (\",\" unless declared)";
+        let help = "declare the separator of the columns, such as `separator = \";\"`";
+        return Err(Fault::new(message, Some(help.into())).at("decimal"));
+    }
+    Ok(format)
+}
+
+fn one_of(text: &str, known: &[u8]) -> Result<u8, Fault> {
+    match text.as_bytes() {
+        [one] if known.contains(one) => Ok(*one),
+        _ => {
+            let names: Vec<String> = known.iter().map(|byte| format!("{:?}", char::from(*byte).to_string())).collect();
+            Err(Fault::unexpected(format!("one of {}", names.join(" "))))
+        }
+    }
+}
+
+/// Own name = foreign name or number; `place` finds the lines of the file.
+pub(super) fn columns(
+    document: &document::Columns,
+    place: impl Fn(&[&str]) -> Location,
+) -> Result<Vec<ColumnMapping>, Fault> {
+    let own = document.own.0.iter().map(|(key, node)| (vec![key.as_str()], key.clone(), node));
+    // An unquoted `driver.NAME_unit` is a table in TOML.
+    let drivers = document.driver.0.iter();
+    let drivers = drivers.map(|(key, node)| (vec!["driver", key], format!("{}{key}", column::PREFIX), node));
+    own.chain(drivers)
+        .map(|(path, own, node)| {
+            let foreign = match node.as_text() {
+                Some(text) => Ok(ForeignColumn::Name(text.trim().to_string())),
+                None => from_node(node)
+                    .and_then(|number| limits::count(number, 1, MANY).map_err(Fault::is))
+                    .map(ForeignColumn::Number),
+            };
+            let foreign = foreign.map_err(|fault| path.iter().rev().fold(fault, |fault, key| fault.at(key)))?;
+            Ok(ColumnMapping { own, foreign, location: place(&path) })
+        })
+        .collect()
+}

@@ -1,0 +1,193 @@
+//! A test with its data: one, or one for each socket in its data.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::{Context, Found, layout, movement};
+use crate::axis::AxisKind;
+use crate::document::fault::{Fault, Within};
+use crate::document::node::{Entries, Named};
+use crate::document::test as document;
+use crate::document::value;
+use crate::document::{lower::Data, schema};
+use crate::files::access;
+use crate::files::quantity;
+use crate::files::table::{self, memory, request::Request};
+use crate::instrument::set_up::{SetUp, SetUpReader};
+use crate::instrument::{InstrumentKind, SharedBy};
+use crate::session::expression::Length;
+use crate::session::motion::Motion;
+use crate::session::{Test, check, planned};
+
+/// The tests of one `[[test]]`, the `item`th of its document.
+pub(super) fn tests(
+    context: &Context<'_>,
+    item: usize,
+    document: &document::Test,
+    found: &mut Found,
+) -> Result<Vec<Test>, Fault> {
+    let name = &document.name;
+    let SetUp { station: written, priors, socket } = set_up(context, &document.set_up)?;
+    let (station, geometry) = (written.map(|length| length.mm), written.map(|length| length.length.clone()));
+    let has_bar = context.instrument.shares(SharedBy::BarSetup);
+    let bar_setup = document.set_up.get("bar_setup").filter(|_| has_bar).map(|node| {
+        node.as_text().map(str::to_string).ok_or_else(|| Fault::unexpected("a text in quotes").at("bar_setup"))
+    });
+    let HeldPositions { mut at, written: at_written, listed } = at(context, &document.at).within("at")?;
+    let format = document.format.as_ref().map(|format| layout::format(format).within("format")).transpose()?;
+    let columns = document.columns.as_ref().map(|columns| {
+        layout::columns(columns, |path| (context.place)(&["test"], Some(item), &[&["columns"], path].concat()))
+            .within("columns")
+    });
+    let columns = columns.transpose()?;
+    let motion = match (&document.sweep, &document.path) {
+        (Some(_), Some(_)) => {
+            let help = "a test moves one axis (`sweep`) or several together (`path`)";
+            return Err(Fault::of_table("has both `sweep` and `path`", Some(help.into())));
+        }
+        (Some(sweep), None) => Some(movement::sweep(context, sweep, &station).within("sweep")?),
+        (None, Some(path)) => Some(movement::path(context, path, &station).within("path")?),
+        (None, None) => None,
+    };
+    if document.data.is_none() && matches!(motion, None | Some(Motion::List)) {
+        let help = "add `data = \"….csv\"`, or the motion of the axes: `sweep = { … }` or `path = { … }`";
+        return Err(Fault::of_table("has neither data nor a motion", Some(help.into())));
+    }
+
+    planned::centre_circle(context.machine, &station, motion.as_ref(), &listed, &mut at);
+    let mut test = Test {
+        name: name.clone(),
+        station,
+        geometry,
+        priors,
+        setup: document.setup.clone().unwrap_or_else(|| name.clone()),
+        spindle_setup: document
+            .spindle_setup
+            .clone()
+            .unwrap_or_else(|| context.instrument.spindle_setup(name).to_string()),
+        bar_setup: bar_setup.transpose()?.unwrap_or_else(|| name.clone()),
+        socket,
+        motion,
+        at,
+        at_written,
+        readings: None,
+    };
+    let Some(data) = &document.data else {
+        check::plan(context.machine, &test)?;
+        return Ok(vec![test]);
+    };
+    if matches!(context.data, Data::None) {
+        return Ok(vec![test]);
+    }
+
+    let columns = columns.as_ref().or(context.columns.as_ref());
+    let request = Request {
+        machine: context.machine,
+        test: &test,
+        store: &context.options.store,
+        at_listed: &listed,
+        format: format.unwrap_or_else(|| context.format.clone()),
+        // An empty table maps no column: the file has the default names.
+        columns: columns.map(Vec::as_slice).filter(|columns| !columns.is_empty()),
+    };
+    let (by_socket, warnings) = match context.data {
+        Data::Columns(columns) => memory::read(columns, &request)?,
+        _ => {
+            let data = table::read(&data_file(context, data).within("data")?, &request)?;
+            found.stamps.push(data.stamp);
+            (data.by_socket, data.warnings)
+        }
+    };
+    found.warnings.extend(warnings);
+    let mut tests = Vec::new();
+    for (socket, readings) in by_socket {
+        let doubts = check::readings(context.machine, &test, &readings)?;
+        found.warnings.extend(doubts);
+        let Some(socket) = socket else {
+            test.readings = Some(Arc::new(readings));
+            return Ok(vec![test]);
+        };
+        if test.socket.is_some() {
+            let what = "names a socket, and a column of its data names sockets too";
+            return Err(Fault::of_table(what, Some("keep one of them".into())));
+        }
+        tests.push(Test {
+            name: format!("{name}/{socket}"),
+            socket: Some(socket),
+            readings: Some(Arc::new(readings)),
+            ..test.clone()
+        });
+    }
+    Ok(tests)
+}
+
+/// The instrument's keys of a test.
+fn set_up(context: &Context<'_>, entries: &Entries) -> Result<SetUp, Fault> {
+    let own = context.instrument.entry();
+    let is_own = |name: &str| own.keys.iter().any(|known| known.name == name);
+    for (name, _) in entries.0.iter().filter(|(name, _)| !is_own(name)) {
+        let of_other = InstrumentKind::ALL.iter().find(|kind| kind.entry().keys.iter().any(|key| key.name == *name));
+        return Err(match of_other {
+            Some(kind) => {
+                let what = format!("belongs to a {}; this session's instrument is a {}", kind.word(), own.word);
+                Fault::of_key(what, None).on_key().at(name)
+            }
+            None => {
+                let own = own.keys.iter().map(|key| key.name.to_string());
+                Fault::unknown_key(name, own.chain(schema::fields::<document::Test>()).collect())
+            }
+        });
+    }
+    (own.read)(&SetUpReader::new(entries, context.constants))
+}
+
+/// Positions at which a test holds its axes, by axis.
+struct HeldPositions {
+    at: Vec<f64>,
+    /// As written, for linear axes stated in mm.
+    written: Vec<Option<Length>>,
+    /// Whether the test states the position.
+    listed: Vec<bool>,
+}
+
+/// `at = { x_mm = 0, … }`.
+fn at(context: &Context<'_>, entries: &Named<value::Length>) -> Result<HeldPositions, Fault> {
+    let machine = context.machine;
+    let axes = machine.axes.len();
+    let mut held = HeldPositions { at: vec![0.0; axes], written: vec![None; axes], listed: vec![false; axes] };
+    for (key, length) in &entries.0 {
+        let Some((axis, unit)) = quantity::axis_position(machine, key) else {
+            let known: Vec<String> = machine.axes.iter().map(|axis| axis.column("")).collect();
+            let help = format!("known: {}", known.join(", "));
+            return Err(Fault::new(format!("`at` has the unknown position `{key}`"), Some(help)).on_key().at(key));
+        };
+        if held.listed[axis] {
+            let message = format!("`at` gives the position of axis `{}` twice", machine.axes[axis].name);
+            return Err(Fault::new(message, None).on_key().at(key));
+        }
+        let (written, number) = length.in_mm(context.constants).within(key)?;
+        held.at[axis] = unit.to_internal(number);
+        let in_mm = machine.axes[axis].kind == AxisKind::Linear && unit == quantity::Unit::Times(1.0);
+        held.written[axis] = in_mm.then_some(written);
+        held.listed[axis] = true;
+    }
+    Ok(held)
+}
+
+/// The data file: in the data directory if one is given, else beside the session file.
+fn data_file(context: &Context<'_>, named: &str) -> Result<PathBuf, Fault> {
+    let beside = context.file.parent().unwrap_or(Path::new("")).join(named);
+    let elsewhere = context.options.data_directory.as_ref().map(|folder| folder.join(named));
+    if let Some(found) = elsewhere.iter().chain([&beside]).find(|file| context.options.store.exists(file)) {
+        access::check(context.file, context.options, ("data", named), found)?;
+        return Ok(found.clone());
+    }
+    let (looked, help) = match &elsewhere {
+        Some(elsewhere) => (
+            format!("{} and {}", elsewhere.display(), beside.display()),
+            "check that the data folder is the one to which `data` is relative",
+        ),
+        None => (beside.display().to_string(), "state the data folder if the data are not beside the session file"),
+    };
+    Err(Fault::file(format!("the data file `{named}` does not exist; looked for {looked}"), help))
+}

@@ -1,0 +1,28 @@
+//! The documents of users: every key of every file, once.
+//!
+//! A document is a value of serde types. Their fields are the keys, and their doc comments are the documentation and the
+//! schema. It comes from a TOML file, from JSON or from a Python dict, by way of one tree of values ([`node`]), and
+//! [`lower`] turns it into the domain of [`session`](crate::session). A fault has the path of keys that leads to it
+//! ([`fault`]); `source` finds its place in the file. [`of_domain`] goes the other way, [`print`] writes a document, and
+//! [`edit`] edits the text of a user.
+
+mod de;
+pub mod edit;
+pub mod effect;
+pub mod fault;
+pub mod layout;
+pub(crate) mod lower;
+pub mod machine;
+pub mod movement;
+pub mod node;
+pub mod of_domain;
+pub mod print;
+pub mod schema;
+pub mod session;
+pub(crate) mod source;
+pub mod test;
+pub mod tolerance;
+pub mod value;
+
+pub use de::from_node;
+pub use fault::Fault;

@@ -1,0 +1,227 @@
+//! From the domain to documents, which read back to the same bits.
+
+use std::ops::Range;
+
+use super::lower::effect::{SCALES, internal};
+use super::machine::{Axis, KindWord, Machine, RotationWord};
+use super::movement::{Circle, Follow, Offset, Path, Sweep};
+use super::node::{Entries, Named, Node};
+use super::test::Test;
+use super::value::{Length, Three};
+use super::{effect, node};
+use crate::axis::AxisKind;
+use crate::driver::DriverUnit;
+use crate::effect::keys::KeyWriter;
+use crate::effect::{CoefficientPrior, Effect};
+use crate::frames::Rotation;
+use crate::instrument::Station;
+use crate::instrument::ballbar::BAR;
+use crate::session::motion::{FollowOffset, Motion};
+use crate::session::{Prior, Test as DomainTest};
+use crate::{axis, chain};
+
+/// A machine without its bodies. Numbers read back to the same bits, except a direction, which the reader scales to
+/// length 1.
+pub fn machine(machine: &chain::Machine) -> Machine {
+    Machine {
+        name: Some(machine.name.clone()),
+        chain: machine.code(),
+        rotation: (machine.rotation == Rotation::SmallAngle).then_some(RotationWord::SmallAngle),
+        gravity: Some(Three(machine.gravity)),
+        axis: Named(machine.axes.iter().map(|axis| (axis.name.clone(), self::axis(axis))).collect()),
+        body: Vec::new(),
+    }
+}
+
+fn axis(axis: &axis::Axis) -> Axis {
+    const DEGREES: DriverUnit = DriverUnit::new("deg", "rad", "deg", "°");
+    let travel = |kind: AxisKind| axis.travel.filter(|_| axis.kind == kind).map(|ends| ends.to_vec());
+    // Degrees that read back to the same radians, where there are such.
+    let degrees = |end: f64| match DEGREES.exact(end) {
+        ("deg", number) => number,
+        _ => end.to_degrees(),
+    };
+    Axis {
+        kind: Some(match axis.kind {
+            AxisKind::Rotary => KindWord::Rotary,
+            AxisKind::Linear => KindWord::Linear,
+        }),
+        direction: Some(Three(axis.direction)),
+        origin_mm: Some(Three(axis.origin_mm)),
+        travel_mm: travel(AxisKind::Linear),
+        travel_deg: travel(AxisKind::Rotary).map(|ends| ends.into_iter().map(degrees).collect()),
+    }
+}
+
+/// An effect with its aliases.
+pub fn effect(effect: &Effect, machine: &chain::Machine) -> effect::Effect {
+    let mut keys = KeyWriter::new(effect.driver_unit(machine));
+    effect.shape.write(&mut keys);
+    let mut document = effect::Effect {
+        component: effect.component.to_string(),
+        driver: Some(effect.driver.to_string()),
+        shape: effect.shape.entry().word.to_string(),
+        keys: keys.finish(),
+        tests: (!effect.tests.is_empty()).then(|| effect.tests.clone()),
+        assumed: effect.assumed.then_some(true),
+        alias: effect.aliases.iter().map(|alias| self::effect(alias, machine)).collect(),
+        ..effect::Effect::default()
+    };
+    match &effect.prior {
+        prior if *prior == CoefficientPrior::default_of(&effect.shape) => {}
+        CoefficientPrior::Flat => {}
+        CoefficientPrior::Family(name) => document.family = Some(name.clone()),
+        CoefficientPrior::Scale(scale) => {
+            let is_angle = effect.component.is_angle();
+            let (_, unit) = SCALES[usize::from(is_angle)];
+            let to = if is_angle { &mut document.scale_arcsec } else { &mut document.scale_um };
+            *to = Some(scale / internal(unit));
+        }
+    }
+    document
+}
+
+/// A planned ball-bar test, with the positions of the axes that it does not move. `None` for another instrument, or for
+/// a test without a motion of its own.
+///
+/// ```
+/// use abbe_model::chain::Machine;
+/// use abbe_model::document::{of_domain, print};
+/// use abbe_model::instrument::Station;
+/// use abbe_model::instrument::ballbar::BallBar;
+/// use abbe_model::instrument::InstrumentKind;
+/// use abbe_model::session::build::NewTest;
+/// use abbe_model::session::motion::Motion;
+/// use abbe_model::session::Session;
+///
+/// let mut session = Session::new(Machine::from_code("wCAbYXZt")?, InstrumentKind::BallBar);
+/// let bar = BallBar { workpiece_ball: [0.0, 100.0, 0.0], spindle_ball: [0.0; 3], bar: 125.0 };
+/// let turn = Motion::sweep(&session.machine, "C", [0.0, std::f64::consts::TAU], 1.0_f64.to_radians())?;
+/// session.add_test(NewTest::new("C100", Station::BallBar(bar)).at("Z", 75.0).motion(turn))?;
+/// let text = print::text_of(&of_domain::test(&session.tests[0], &session.machine))?;
+/// assert!(text.starts_with("name = \"C100\"\nbar_mm = 125\n"), "{text}");
+/// # Ok::<(), abbe_model::ModelError>(())
+/// ```
+pub fn test(test: &DomainTest, machine: &chain::Machine) -> Option<Test> {
+    let Station::BallBar(bar) = &test.station else {
+        return None;
+    };
+    let (moved, sweep, path) = motion(test.motion.as_ref()?, machine)?;
+    let point = |mm: [f64; 3]| mm.map(number).into_iter().collect::<Node>();
+    let mut set_up = Entries::default();
+    set_up.push("bar_mm", number(bar.bar));
+    set_up.push("workpiece_ball_mm", point(bar.workpiece_ball));
+    set_up.push("spindle_ball_mm", point(bar.spindle_ball));
+    let u = |range: Range<usize>| -> Vec<f64> {
+        test.priors.get(range).unwrap_or_default().iter().map(|prior| uncertainty_um(*prior)).collect()
+    };
+    for (key, range) in [("workpiece_ball_u_um", 0..3), ("spindle_ball_u_um", 3..6)] {
+        let u = u(range);
+        if u.iter().any(|u| *u != 0.0) {
+            set_up.push(key, node::Node::from_iter(u));
+        }
+    }
+    if let [u] = u(BAR..BAR + 1)[..]
+        && u != 0.0
+    {
+        set_up.push("bar_u_um", u);
+    }
+    let stated = |set_up: &String| (*set_up != test.name).then(|| set_up.clone());
+    if let Some(name) = stated(&test.bar_setup) {
+        set_up.push("bar_setup", name.as_str());
+    }
+    let held = (0..machine.axes.len())
+        .filter(|axis| !moved.contains(axis))
+        .map(|axis| (axis, number(machine.axes[axis].kind.to_display(test.at[axis]))))
+        .filter(|(_, position)| *position != 0.0)
+        .map(|(axis, position)| (machine.axes[axis].column(""), Length::Number(position)));
+    Some(Test {
+        name: test.name.clone(),
+        set_up,
+        setup: stated(&test.setup),
+        spindle_setup: stated(&test.spindle_setup),
+        at: Named(held.collect()),
+        sweep,
+        path,
+        ..Test::default()
+    })
+}
+
+/// The axes whose positions follow from a motion, and its document.
+fn motion(motion: &Motion, machine: &chain::Machine) -> Option<(Vec<usize>, Option<Sweep>, Option<Path>)> {
+    let name = |axis: usize| machine.axes[axis].name.clone();
+    let degrees = |angle: f64| number(angle.to_degrees());
+    let often = |runs: usize| Some(runs as u64);
+    Some(match *motion {
+        Motion::Sweep { axis, from, to, step, speed, runs, both_directions } => {
+            let kind = machine.axes[axis].kind;
+            let in_unit = |of: AxisKind, value: f64| (kind == of).then(|| number(kind.to_display(value)));
+            let sweep = Sweep {
+                axis: name(axis),
+                from_mm: in_unit(AxisKind::Linear, from),
+                from_deg: in_unit(AxisKind::Rotary, from),
+                to_mm: in_unit(AxisKind::Linear, to),
+                to_deg: in_unit(AxisKind::Rotary, to),
+                step_mm: in_unit(AxisKind::Linear, step),
+                step_deg: in_unit(AxisKind::Rotary, step),
+                feed_mm_min: in_unit(AxisKind::Linear, speed * 60.0),
+                feed_deg_min: in_unit(AxisKind::Rotary, speed * 60.0),
+                runs: often(runs),
+                both_directions: Some(both_directions),
+            };
+            (vec![axis], Some(sweep), None)
+        }
+        Motion::Circle { first, second, radius, centre, from, to, step, speed, runs, both_directions } => {
+            let circle = Circle {
+                plane: format!("{}{}", machine.axes[first].name, machine.axes[second].name),
+                radius_mm: Length::Number(number(radius)),
+                centre_mm: Some(Three(centre.map(|mm| Length::Number(number(mm))))),
+                from_deg: Some(degrees(from)),
+                to_deg: Some(degrees(to)),
+                step_deg: degrees(step),
+                feed_mm_min: Some(number(60.0 * speed)),
+                runs: often(runs),
+                both_directions: Some(both_directions),
+            };
+            (vec![first, second], None, Some(Path::Circle(circle)))
+        }
+        Motion::Follow { axis, from, to, step, speed, runs, both_directions, offset } => {
+            let offset = match offset {
+                FollowOffset::Radial => Offset::Radial,
+                FollowOffset::Tangential => Offset::Tangential,
+                FollowOffset::Axial => Offset::Axial,
+                FollowOffset::None | FollowOffset::Touching => return None,
+            };
+            let follow = Follow {
+                axis: name(axis),
+                offset: Some(offset),
+                from_deg: Some(degrees(from)),
+                to_deg: Some(degrees(to)),
+                step_deg: degrees(step),
+                feed_mm_min: None,
+                feed_deg_min: Some(degrees(60.0 * speed)),
+                programmed_feed_mm_min: None,
+                runs: often(runs),
+                both_directions: Some(both_directions),
+            };
+            let linear = (0..machine.axes.len()).filter(|axis| machine.axes[*axis].kind == AxisKind::Linear);
+            (std::iter::once(axis).chain(linear).collect(), None, Some(Path::Follow(follow)))
+        }
+        Motion::List => return None,
+    })
+}
+
+/// A standard uncertainty of a set-up length, µm.
+fn uncertainty_um(prior: Prior) -> f64 {
+    match prior {
+        Prior::Known => 0.0,
+        Prior::Gaussian(u) => number(u * 1e3),
+        Prior::Free => f64::INFINITY,
+    }
+}
+
+/// A number with nine decimals at most: far below what a control resolves.
+fn number(value: f64) -> f64 {
+    // Zero has no sign.
+    format!("{value:.9}").parse().unwrap_or(value) + 0.0
+}

@@ -1,0 +1,114 @@
+//! A document as TOML: the one printer of files.
+
+use serde::Serialize;
+use toml_edit::ser::ValueSerializer;
+use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value};
+
+use super::de::REST;
+use crate::error::ModelError;
+
+/// The text of a file that holds a document.
+///
+/// # Errors
+/// [`ModelError::Session`] if a value has no form in TOML.
+pub fn text_of(document: &impl Serialize) -> Result<String, ModelError> {
+    Ok(DocumentMut::from(table_of(document)?).to_string())
+}
+
+/// An entry of a list of tables, such as `[[test]]`, with a remark above it.
+///
+/// # Errors
+/// As [`text_of`].
+pub fn block_of(list: &str, entry: &impl Serialize, remark: &str) -> Result<String, ModelError> {
+    let mut table = table_of(entry)?;
+    table.decor_mut().set_prefix(remark.lines().map(|line| format!("# {line}\n")).collect::<String>());
+    let mut document = DocumentMut::new();
+    document.insert(list, Item::ArrayOfTables(std::iter::once(table).collect()));
+    Ok(document.to_string())
+}
+
+/// A document as JSON: whole numbers are integers.
+///
+/// # Errors
+/// As [`text_of`].
+pub fn json_of(document: &impl Serialize) -> Result<serde_json::Value, ModelError> {
+    Ok(json(value_of(document)?))
+}
+
+fn json(value: Value) -> serde_json::Value {
+    match value {
+        Value::String(text) => text.into_value().into(),
+        Value::Integer(number) => number.into_value().into(),
+        Value::Float(number) => number.into_value().into(),
+        Value::Boolean(truth) => truth.into_value().into(),
+        Value::Datetime(date) => date.to_string().into(),
+        Value::Array(items) => items.into_iter().map(json).collect(),
+        Value::InlineTable(table) => {
+            serde_json::Value::Object(table.into_iter().map(|(key, value)| (key.to_string(), json(value))).collect())
+        }
+    }
+}
+
+/// A document as a table: what has a header in a file is a table, everything else stands in a line.
+pub(super) fn table_of(document: &impl Serialize) -> Result<Table, ModelError> {
+    match value_of(document)? {
+        Value::InlineTable(inline) => Ok(with_headers(inline, "")),
+        _ => Ok(Table::new()),
+    }
+}
+
+/// A value whose tables stand in lines.
+fn value_of(document: &impl Serialize) -> Result<Value, ModelError> {
+    let value = document.serialize(ValueSerializer::new()).map_err(|cause| ModelError::Session {
+        message: format!("it cannot be written as TOML: {cause}"),
+        help: "every value is a text, a number, a list or a table".into(),
+    })?;
+    Ok(tidy(value))
+}
+
+/// Whole numbers without a point, and the keys that a registry determines among those of their table.
+fn tidy(value: Value) -> Value {
+    match value {
+        Value::Float(number) => number_of(number.into_value()),
+        Value::Array(items) => items.into_iter().map(tidy).collect(),
+        Value::InlineTable(table) => {
+            let mut tidied = InlineTable::new();
+            for (key, value) in table {
+                match tidy(value) {
+                    Value::InlineTable(rest) if key == REST => tidied.extend(rest),
+                    value => _ = tidied.insert(key, value),
+                }
+            }
+            Value::InlineTable(tidied)
+        }
+        other => other,
+    }
+}
+
+/// A number as it is written by hand: `125` and `0.0000001`.
+pub(super) fn number_of(number: f64) -> Value {
+    number.to_string().parse().unwrap_or_else(|_| Value::from(number))
+}
+
+/// The table with its tables under headers; `key` is its own key.
+fn with_headers(inline: InlineTable, key: &str) -> Table {
+    let mut table = Table::new();
+    for (own, value) in inline {
+        let has_header = key.is_empty() || key == "axis" || matches!(own.as_str(), "axis" | "body" | "alias");
+        let item = match value {
+            Value::InlineTable(inner) if has_header => Item::Table(with_headers(inner, &own)),
+            Value::Array(items) if has_header && !items.is_empty() && items.iter().all(Value::is_inline_table) => {
+                let tables = items.into_iter().filter_map(|item| match item {
+                    Value::InlineTable(inner) => Some(with_headers(inner, &format!("[{own}]"))),
+                    _ => None,
+                });
+                Item::ArrayOfTables(tables.collect::<ArrayOfTables>())
+            }
+            value => Item::Value(value),
+        };
+        table.insert(&own, item);
+    }
+    // `[axis]` alone says nothing.
+    table.set_implicit(key == "axis");
+    table
+}

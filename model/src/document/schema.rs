@@ -1,0 +1,219 @@
+//! JSON Schema of the documents (draft 2020-12), from the types and their doc comments. The keys of shapes and of
+//! instruments come from their registries.
+
+use schemars::JsonSchema;
+use schemars::generate::SchemaSettings;
+use serde_json::{Map, Value, json};
+
+use super::machine::Machine;
+use super::session::Session;
+use crate::driver::{Driver, unit_suffixes};
+use crate::effect::keys::{Key, KeyForm};
+use crate::effect::shape::{Entry, SHAPES};
+use crate::instrument::InstrumentKind;
+use crate::instrument::set_up::{SetUpForm, SetUpKey};
+
+/// Schema of `machine.toml`.
+pub fn machine() -> Value {
+    schema_of::<Machine>("Abbe machine file")
+}
+
+/// Schema of `session.toml`.
+pub fn session() -> Value {
+    let mut schema = schema_of::<Session>("Abbe session file");
+    // A document may lack it, while a program adds its tests one by one; a file may not.
+    if let Some(required) = schema["required"].as_array_mut() {
+        required.push(json!("test"));
+    }
+    for (definition, registered) in
+        [("effect", effect_properties()), ("instrument", instrument_properties()), ("test", test_properties())]
+    {
+        if let Some(properties) = schema["$defs"][definition]["properties"].as_object_mut() {
+            properties.extend(registered);
+        }
+    }
+    schema
+}
+
+/// The keys of a type's own fields.
+pub fn fields<T: JsonSchema>() -> Vec<String> {
+    let properties = schema_of::<T>("")["properties"].as_object().cloned();
+    properties.unwrap_or_default().into_iter().map(|(key, _)| key).collect()
+}
+
+/// The keys of a shape, with the suffix of every unit.
+pub(crate) fn shape_keys(entry: &Entry) -> Vec<String> {
+    entry.keys.iter().flat_map(names).collect()
+}
+
+/// What a key of a table is, as the end of a sentence; the table by the name of its type.
+pub(crate) fn meaning(table: &str, key: &str) -> Option<String> {
+    let session = session();
+    let of = match table {
+        "session" => &session,
+        table => &session["$defs"][table],
+    };
+    let variants = || session["$defs"]["path"]["oneOf"].as_array().into_iter().flatten();
+    let own = of["properties"].get(key);
+    let property = own.or_else(|| variants().find_map(|variant| variant["properties"].get(key)))?;
+    let text = property["description"].as_str()?.trim_end_matches('.').to_string();
+    let mut letters = text.chars();
+    let first = letters.next()?;
+    let rest = letters.as_str();
+    // An abbreviation keeps its capitals.
+    let is_word = !rest.starts_with(char::is_uppercase);
+    Some(if is_word { first.to_lowercase().chain(rest.chars()).collect() } else { text })
+}
+
+/// The schema of a document that a file holds.
+fn schema_of<T: JsonSchema>(title: &str) -> Value {
+    let generator = SchemaSettings::draft2020_12().for_deserialize().into_generator();
+    let mut schema = generator.into_root_schema_for::<T>().to_value();
+    tidy(&mut schema);
+    schema["title"] = json!(title);
+    schema
+}
+
+/// A key that is absent has no value: neither `null`, nor a default. The widths of numbers are those of Rust.
+fn tidy(schema: &mut Value) {
+    match schema {
+        Value::Object(entries) => {
+            entries.values_mut().for_each(tidy);
+            if entries.get("format").is_some_and(Value::is_string) {
+                entries.shift_remove("format");
+            }
+            entries.shift_remove("default");
+            if let Some(Value::String(text)) = entries.get_mut("description") {
+                *text = text.replace('\n', " ");
+            }
+            let is_null = |of: &Value| *of == json!("null") || of["type"] == json!("null");
+            for list in ["type", "anyOf", "enum"] {
+                let Some(items) = entries.get_mut(list).and_then(Value::as_array_mut) else { continue };
+                items.retain(|item| !is_null(item) && !item.is_null());
+                if items.len() == 1 && list == "type" {
+                    let only = items.remove(0);
+                    entries.insert(list.to_string(), only);
+                } else if items.len() == 1
+                    && list == "anyOf"
+                    && let Value::Object(only) = items.remove(0)
+                {
+                    entries.shift_remove("anyOf");
+                    for (key, value) in only {
+                        entries.entry(key).or_insert(value);
+                    }
+                }
+            }
+        }
+        Value::Array(items) => items.iter_mut().for_each(tidy),
+        _ => {}
+    }
+}
+
+fn instrument_properties() -> Map<String, Value> {
+    let words: Vec<&str> = InstrumentKind::ALL.iter().map(|kind| kind.word()).collect();
+    let kind = json!({"enum": words, "description": "The kind of the instrument."});
+    Map::from_iter([("kind".to_string(), kind)])
+}
+
+/// The keys of a test that only some instruments have. A key of several instruments has the meanings of each.
+fn test_properties() -> Map<String, Value> {
+    let all = || InstrumentKind::ALL.iter().flat_map(|kind| kind.entry().keys);
+    let mut properties = Map::new();
+    for key in all() {
+        let meanings: Vec<&str> = all().filter(|other| other.name == key.name).map(|other| other.meaning).collect();
+        let mut schema = set_up_schema(key);
+        let meanings = meanings.join("; ");
+        if meanings.starts_with(char::is_alphabetic) {
+            schema["description"] = json!(format!("{meanings}."));
+        }
+        properties.entry(key.name).or_insert(schema);
+    }
+    properties
+}
+
+fn set_up_schema(key: &SetUpKey) -> Value {
+    let three = |items: Value| json!({"type": "array", "items": items, "minItems": 3, "maxItems": 3});
+    let length = || json!({"$ref": "#/$defs/length"});
+    let u = || json!({"type": "number", "minimum": 0});
+    match key.form {
+        SetUpForm::Length => length(),
+        SetUpForm::Point => three(length()),
+        SetUpForm::Vector => three(json!({"type": "number"})),
+        SetUpForm::Vectors => three(three(json!({"type": "number"}))),
+        SetUpForm::Uncertainty => json!({
+            "type": "number", "minimum": 0,
+            "description": "Standard uncertainty, µm; 0 or absent: exactly known; inf: no prior."
+        }),
+        SetUpForm::Uncertainties => json!({
+            "anyOf": [u(), three(u())],
+            "description": "Standard uncertainty of each coordinate, µm: a number for all or three; 0 or absent: \
+                            exactly known; inf: no prior."
+        }),
+        SetUpForm::Text => json!({"type": "string"}),
+        SetUpForm::Words(words) => json!({"enum": words}),
+    }
+}
+
+/// The properties of an effect that drivers and shapes determine: their words, and the keys of shapes.
+fn effect_properties() -> Map<String, Value> {
+    let words: Vec<&str> = SHAPES.iter().map(|entry| entry.word).collect();
+    let drivers = Driver::words().join(", ");
+    let mut properties = Map::from_iter([
+        (
+            "shape".to_string(),
+            json!({"enum": words, "description": "The dependence of the component on the driver, such as \"harmonic\"."}),
+        ),
+        (
+            "driver".to_string(),
+            json!({
+                "type": "string",
+                "description": format!("The driver: an axis, {drivers}, or a column of the data as NAME_unit.")
+            }),
+        ),
+    ]);
+    for key in SHAPES.iter().flat_map(|entry| entry.keys) {
+        for name in names(key) {
+            let mut schema = schema(key.form);
+            schema["description"] = json!(shape_meaning(key));
+            properties.entry(name).or_insert(schema);
+        }
+    }
+    properties
+}
+
+/// The keys with the suffix of every unit, if the key has one.
+fn names(key: &Key) -> Vec<String> {
+    match key.form {
+        KeyForm::Quantity | KeyForm::Quantities => {
+            let suffixes = unit_suffixes().into_iter();
+            suffixes.map(|suffix| format!("{}_{suffix}", key.name)).collect()
+        }
+        KeyForm::Positive | KeyForm::Count(..) | KeyForm::Flag => vec![key.name.to_string()],
+    }
+}
+
+fn schema(form: KeyForm) -> Value {
+    match form {
+        KeyForm::Quantity => json!({"type": "number"}),
+        KeyForm::Quantities => json!({"type": "array", "items": {"type": "number"}}),
+        KeyForm::Positive => json!({"type": "number", "exclusiveMinimum": 0}),
+        KeyForm::Count(least, most) => json!({"type": "integer", "minimum": least, "maximum": most}),
+        KeyForm::Flag => json!({"type": "boolean"}),
+    }
+}
+
+/// What the key means to the shapes that have it, each meaning once.
+fn shape_meaning(key: &Key) -> String {
+    let mut meanings: Vec<&str> = Vec::new();
+    for other in SHAPES.iter().flat_map(|entry| entry.keys).filter(|other| other.name == key.name) {
+        if !meanings.contains(&other.meaning) {
+            meanings.push(other.meaning);
+        }
+    }
+    let phrase = meanings.join(", ");
+    let capital: String = phrase.chars().take(1).flat_map(char::to_uppercase).chain(phrase.chars().skip(1)).collect();
+    match key.form {
+        KeyForm::Quantity | KeyForm::Quantities => format!("{capital}. In the unit of the driver."),
+        KeyForm::Positive | KeyForm::Count(..) | KeyForm::Flag => format!("{capital}."),
+    }
+}

@@ -1,0 +1,194 @@
+//! The tables of a session: `session.toml`.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize, Serializer};
+
+use super::effect::Effect;
+use super::layout::{Columns, Format};
+use super::machine::Machine;
+use super::node::{Entries, Named};
+use super::test::Test;
+use super::tolerance::Tolerance;
+use super::value::Note;
+
+/// session.toml: a machine, a plan of tests, and the readings of the tests that were run. The name of a number contains
+/// its unit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename = "session", deny_unknown_fields)]
+pub struct Session {
+    /// The machine file, or the tables of the machine: [machine] with `file = "machine.toml"`, or the machine's tables in
+    /// it.
+    pub machine: SessionMachine,
+    /// Notes on the measurement: serial_number, operator, date, comment. Reports and results repeat them; no calculation
+    /// uses them.
+    #[serde(default, skip_serializing_if = "Named::is_empty")]
+    #[schemars(extend("properties" = {
+        "serial_number": {"type": ["string", "number"], "description": "Serial number of the machine."},
+        "operator": {"type": "string", "description": "Name of the operator."},
+        "date": {"type": "string", "description": "Date of the measurement; a TOML date or a text."},
+        "comment": {"type": "string", "description": "Further remarks for the report."}
+    }))]
+    pub about: Named<Note>,
+    /// Named lengths, mm, that tests may use and equations keep as symbols: R = 100.0, or R = { mm = 100.0, means =
+    /// "radius" }.
+    #[serde(default, skip_serializing_if = "Named::is_empty")]
+    #[schemars(with = "Named<ConstantForms>")]
+    pub constants: Entries,
+    /// The instrument: [instrument] with `kind = "ballbar"`.
+    pub instrument: Instrument,
+    /// The errors to estimate.
+    #[serde(default, skip_serializing_if = "Unknowns::is_default")]
+    pub unknowns: Unknowns,
+    /// Layout of the data files.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub format: Option<Format>,
+    /// Own name = foreign name or number; the own name contains the unit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub columns: Option<Columns>,
+    /// The effects that the user declares.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub effect: Vec<Effect>,
+    /// The tests.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(min = 1))]
+    pub test: Vec<Test>,
+    /// Sockets at known distances.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub socket_distance: Vec<SocketDistance>,
+    /// Limits for decisions of conformity by the rule of ISO 14253-1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tolerance: Option<Tolerance>,
+    /// Sizes of the ball bar for checks of clearance against the bodies of the machine.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clearance: Option<Clearance>,
+}
+
+/// The machine of a session.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(inline, untagged)]
+pub enum SessionMachine {
+    /// A file of its own.
+    File(MachineFile),
+    /// The tables of the machine.
+    Other(Machine),
+}
+
+impl Serialize for SessionMachine {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            SessionMachine::File(file) => file.serialize(serializer),
+            SessionMachine::Other(machine) => machine.serialize(serializer),
+        }
+    }
+}
+
+/// A machine file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename = "machine_file", deny_unknown_fields)]
+#[schemars(inline)]
+pub struct MachineFile {
+    /// machine.toml, relative to the session file.
+    pub file: String,
+}
+
+/// A constant.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename = "constant", deny_unknown_fields)]
+pub struct Constant {
+    /// Its value, for example `mm = 100.0`.
+    pub mm: f64,
+    /// The meaning in words, for tables of symbols. Default: the comment behind the value.
+    pub means: Option<String>,
+}
+
+/// The forms of a constant in the schema.
+#[derive(JsonSchema)]
+#[schemars(inline, untagged)]
+#[allow(dead_code, reason = "the schema alone uses it")]
+enum ConstantForms {
+    Number(f64),
+    Table(Constant),
+}
+
+/// The instrument of a session.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename = "instrument", deny_unknown_fields)]
+pub struct Instrument {
+    /// "ballbar", "r-test", "probe", "tracker" or "socket".
+    pub kind: String,
+    /// Noise standard deviation of one scalar reading, µm; estimated if absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0))]
+    pub noise_um: Option<f64>,
+    /// Resolution of a reading, µm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0))]
+    pub resolution_um: Option<f64>,
+}
+
+/// The errors to estimate.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename = "unknowns", deny_unknown_fields)]
+#[schemars(inline)]
+pub struct Unknowns {
+    /// Errors to estimate: EY0A (location), EYA (motion), e_y0a, θ_z0c; patterns such as E?0C and E?0J*, where ? is one
+    /// character and * any number. Default: the position and orientation errors of the rotary axes; for a tracker and for
+    /// sockets all location errors of all axes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub errors: Option<Vec<String>>,
+}
+
+impl Unknowns {
+    fn is_default(&self) -> bool {
+        self.errors.is_none()
+    }
+}
+
+/// The distance of two sockets.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename = "socket_distance", deny_unknown_fields)]
+pub struct SocketDistance {
+    /// The two sockets, such as ["0", "1"].
+    #[schemars(length(equal = 2))]
+    pub between: Vec<String>,
+    /// The distance in mm.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub mm: f64,
+    /// Its standard uncertainty; absent: exact.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0))]
+    pub u_um: Option<f64>,
+}
+
+/// Sizes of the ball bar for checks of clearance.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename = "clearance", deny_unknown_fields)]
+pub struct Clearance {
+    /// Radius of the bar; default 10.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub bar_radius_mm: Option<f64>,
+    /// The stem below the workpiece ball, along -Z of the table frame.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub workpiece_holder: Option<Holder>,
+    /// The stem above the spindle ball, along Z of the tool frame.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spindle_holder: Option<Holder>,
+    /// Least clearance of a proposed test; less causes a warning. Default 5.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0))]
+    pub least_mm: Option<f64>,
+}
+
+/// A stem that holds a ball.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename = "holder", deny_unknown_fields)]
+pub struct Holder {
+    /// Radius of the stem.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub radius_mm: f64,
+    /// Its length from the centre of the ball.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub length_mm: f64,
+}

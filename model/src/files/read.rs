@@ -1,0 +1,287 @@
+//! Sessions and machines from files, and from documents in memory.
+
+use std::path::Path;
+
+use super::access::{self, ReadOptions};
+use super::source_map::{BodyFile, SourceMap};
+use super::stamp::FileStamp;
+use super::store::Store;
+use super::table::memory::MemoryColumn;
+use serde::de::DeserializeOwned;
+
+use crate::chain::Machine;
+use crate::document::fault::{Fault, Step, Within};
+use crate::document::lower::body::BodyFiles;
+use crate::document::lower::{self, Data, Parts, Surroundings};
+use crate::document::machine as machine_document;
+use crate::document::node::Node;
+use crate::document::session::{MachineFile, Session as Document, SessionMachine};
+use crate::document::source::{Parsed, Source};
+use crate::document::{effect, from_node};
+use crate::effect::Effect;
+use crate::error::{Location, ModelError};
+use crate::instrument::InstrumentKind;
+use crate::session::Session;
+
+/// Reads the text of another file in the same way: UTF-8 with or without byte order mark, of a limited size, unchanged
+/// while it is read. `what` names its content in messages.
+///
+/// # Errors
+/// If the file cannot be read or is not such a text, with its name and what to do.
+pub fn text(path: &Path, what: &str) -> Result<Source, ModelError> {
+    Source::read(&Store::Disk, path, what)
+}
+
+/// Reads a machine file.
+///
+/// # Errors
+/// If the file cannot be read or does not describe a machine, with its line and what to do.
+pub fn machine(path: &Path) -> Result<Machine, ModelError> {
+    machine_of(&machine_source(&Store::Disk, path)?)
+}
+
+/// As [`machine()`], from a machine file that has been read.
+///
+/// # Errors
+/// As [`machine()`].
+pub fn machine_of(source: &Source) -> Result<Machine, ModelError> {
+    let options = ReadOptions::default();
+    let path = source.file.as_path();
+    let mut files = BodyFiles { from: Some((path, path, &options)), ..BodyFiles::default() };
+    machine_in(&source.parse()?, &mut files)
+}
+
+/// The machine of the text of a machine file; `file` names it in messages.
+///
+/// # Errors
+/// As [`machine()`].
+pub fn machine_of_text(file: &Path, text: &str) -> Result<Machine, ModelError> {
+    machine_in(&Source::new(file, text).parse()?, &mut BodyFiles::default())
+}
+
+/// The machine of a document in memory.
+///
+/// # Errors
+/// If it does not describe a machine: [`ModelError::Session`], which has no place.
+pub fn machine_of_node(node: Node) -> Result<Machine, ModelError> {
+    machine_in(&Parsed::of_node(node), &mut BodyFiles::default())
+}
+
+fn machine_in(parsed: &Parsed<'_>, files: &mut BodyFiles<'_>) -> Result<Machine, ModelError> {
+    let document: machine_document::Machine = parsed.document()?;
+    lower::machine(&document, files).map_err(|fault| parsed.error_of(fault))
+}
+
+fn machine_source(store: &Store, path: &Path) -> Result<Source, ModelError> {
+    Source::read(store, path, "the machine file")
+}
+
+/// Effects of a session with this machine, instrument and names of tests, from documents in memory.
+///
+/// # Errors
+/// [`ModelError::Session`] as for a session file, without its line.
+pub fn effects_of_nodes(
+    nodes: Vec<Node>,
+    machine: &Machine,
+    instrument: InstrumentKind,
+    tests: &[String],
+) -> Result<Vec<Effect>, ModelError> {
+    let source = Parsed::of_node(Node::table([("effect".to_string(), nodes.into_iter().collect::<Node>())]));
+    let read = || {
+        let documents: Vec<effect::Effect> = from_node(source.root.get("effect").unwrap_or(&source.root))?;
+        lower::effects_of(machine, instrument, tests, &documents)
+    };
+    read().within("effect").map_err(|fault| source.error_of(fault))
+}
+
+/// A document of another kind, from the text of its TOML file; `file` names it in messages.
+///
+/// # Errors
+/// As [`machine()`].
+pub fn document_of_text<T: DeserializeOwned>(file: &Path, text: &str) -> Result<T, ModelError> {
+    document_of(&Source::new(file, text))
+}
+
+/// As [`document_of_text`], from a file that has been read.
+///
+/// # Errors
+/// As [`machine()`].
+pub fn document_of<T: DeserializeOwned>(source: &Source) -> Result<T, ModelError> {
+    source.parse()?.document()
+}
+
+/// Reads a session file, its machine and, if requested, its data.
+///
+/// # Errors
+/// Every fault that prevents the use of the session: file, line, what was found and expected, and what to do.
+pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError> {
+    session_with_sources(path, options).map(|(session, _)| session)
+}
+
+/// As [`session`], with the files and texts from which the session was read.
+///
+/// # Errors
+/// As [`session`].
+pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Session, SourceMap), ModelError> {
+    session_of(&Source::read(&options.store, path, "the session file")?, options)
+}
+
+/// As [`session_with_sources`], from a session file that has been read.
+///
+/// # Errors
+/// As [`session`].
+pub fn session_of(source: &Source, options: &ReadOptions) -> Result<(Session, SourceMap), ModelError> {
+    let path = source.file.as_path();
+    let parsed = source.parse()?;
+    let document: Document = parsed.document()?;
+    let here = |fault: Fault| parsed.error_of(fault);
+    let SessionMachineRead { machine, source: machine_source, bodies, warnings } =
+        session_machine(path, options, &document.machine).within("machine").map_err(here)?;
+    let comment = |path: &[&str]| parsed.comment(path);
+    let mut session = lower::head(machine, &document, &comment).map_err(here)?;
+    session.warnings = warnings;
+    let surroundings = Surroundings {
+        file: path,
+        options,
+        data: if options.read_data { Data::Files } else { Data::None },
+        place: &|table, item, keys| {
+            let key = |key: &&str| Step::Key((*key).to_string());
+            let path = table.iter().map(key).chain(item.map(Step::Item)).chain(keys.iter().map(key));
+            parsed.location_of(&path.collect::<Vec<_>>())
+        },
+    };
+    let found = lower::add(&mut session, (&document).into(), &surroundings).map_err(here)?;
+    if session.tests.is_empty() {
+        return Err(ModelError::Input {
+            location: Location::file(path),
+            message: "a session without tests".into(),
+            help: Some("add at least one [[test]]".into()),
+        });
+    }
+    let mut files: Vec<FileStamp> = Vec::new();
+    let own = source.stamp.iter().chain(machine_source.iter().filter_map(|source| source.stamp.as_ref()));
+    for stamp in own.chain(bodies.iter().map(|body| &body.stamp)).chain(&found.stamps) {
+        if !files.contains(stamp) {
+            files.push(stamp.clone());
+        }
+    }
+    let sources = SourceMap {
+        file: path.to_path_buf(),
+        text: source.text.clone(),
+        machine_text: machine_source.map(|source| source.text),
+        bodies,
+        files,
+    };
+    Ok((session, sources))
+}
+
+/// The machine of a session, and its file if it has one of its own.
+struct SessionMachineRead {
+    machine: Machine,
+    source: Option<Source>,
+    /// The files of bodies.
+    bodies: Vec<BodyFile>,
+    /// Warnings about usable files of bodies.
+    warnings: Vec<String>,
+}
+
+/// The machine: a file beside the session, or tables in the session.
+fn session_machine(path: &Path, options: &ReadOptions, document: &SessionMachine) -> Result<SessionMachineRead, Fault> {
+    let named = match document {
+        SessionMachine::File(MachineFile { file }) => file,
+        SessionMachine::Other(tables) => {
+            let mut files = BodyFiles { from: Some((path, path, options)), ..BodyFiles::default() };
+            let machine = lower::machine(tables, &mut files)?;
+            let BodyFiles { read: bodies, warnings, .. } = files;
+            return Ok(SessionMachineRead { machine, source: None, bodies, warnings });
+        }
+    };
+    let found = path.parent().unwrap_or(Path::new("")).join(named);
+    if !options.store.exists(&found) {
+        let message = format!("the machine file `{named}` does not exist; looked for {}", found.display());
+        return Err(Fault::new(message, Some("its name is relative to the session file".into())).at("file"));
+    }
+    access::check(path, options, ("file", named), &found).within("file")?;
+    let source = machine_source(&options.store, &found)?;
+    let mut files = BodyFiles { from: Some((path, &found, options)), ..BodyFiles::default() };
+    let machine = machine_in(&source.parse()?, &mut files)?;
+    let BodyFiles { read: bodies, warnings, .. } = files;
+    Ok(SessionMachineRead { machine, source: Some(source), bodies, warnings })
+}
+
+/// A session of a document in memory, with its machine in it: a plan, whose tests have no readings, or a session without
+/// tests.
+///
+/// # Errors
+/// [`ModelError::Session`] as for a session file, without its line.
+pub fn plan_of_node(node: Node) -> Result<Session, ModelError> {
+    let source = Parsed::of_node(node);
+    let document: Document = source.document()?;
+    let read = || {
+        let SessionMachine::Other(tables) = &document.machine else {
+            let help = "state the machine's tables in [machine]";
+            return Err(Fault::new("a session in memory has no machine file", Some(help.into())).at("machine"));
+        };
+        let machine = lower::machine(tables, &mut BodyFiles::default()).within("machine")?;
+        let mut session = lower::head(machine, &document, &|_| None)?;
+        lower::add(&mut session, (&document).into(), &in_memory(Data::None, &ReadOptions::default()))?;
+        Ok(session)
+    };
+    read().map_err(|fault| source.error_of(fault))
+}
+
+/// Adds an entry of a list of a session, such as `test`, `effect` or `socket_distance`. A test with `data` has the readings
+/// of the columns, whatever the name of the file. After an error the session is unchanged.
+///
+/// A program that has its readings in memory states its tests with the keys of a session file, and gets the same checks,
+/// defaults and messages:
+///
+/// ```
+/// use abbe_model::files::read::{add_node, plan_of_node};
+/// use abbe_model::files::table::memory::{MemoryColumn, Values};
+/// use serde_json::json;
+///
+/// let machine = json!({"chain": "w C b Z t", "axis": {"C": {}, "Z": {}}});
+/// let head = json!({"machine": machine, "instrument": {"kind": "ballbar"}});
+/// let mut session = plan_of_node(head.into())?;
+/// let test = json!({"name": "C125", "bar_mm": 125, "workpiece_ball_mm": [0, 100, 0], "spindle_ball_mm": [0, 0, 0],
+///                   "at": {"z_mm": 75}, "data": "C125.csv"});
+/// let columns = [("c_deg", [0.0, 90.0]), ("length_mm", [125.0, 125.0])];
+/// let columns = columns.each_ref().map(|(name, values)| MemoryColumn { name, values: Values::Numbers(values), missing: &[] });
+/// add_node(&mut session, "test", test.into(), &columns)?;
+/// assert_eq!(session.tests[0].readings.as_ref().map(|readings| readings.rows()), Some(2));
+/// # Ok::<(), abbe_model::ModelError>(())
+/// ```
+///
+/// # Errors
+/// [`ModelError::Session`] as for a session file, without its line.
+pub fn add_node(
+    session: &mut Session,
+    list: &str,
+    entry: Node,
+    columns: &[MemoryColumn<'_>],
+) -> Result<(), ModelError> {
+    let source = Parsed::of_node(Node::table([(list.to_string(), Node::from_iter([entry]))]));
+    let read = |session: &mut Session| {
+        let (mut tests, mut effects, mut distances) = (Vec::new(), Vec::new(), Vec::new());
+        for entry in source.root.entries() {
+            let within = |fault: Fault| fault.at(&entry.key);
+            match entry.key.as_str() {
+                "test" => tests = from_node(&entry.node).map_err(within)?,
+                "effect" => effects = from_node(&entry.node).map_err(within)?,
+                "socket_distance" => distances = from_node(&entry.node).map_err(within)?,
+                other => {
+                    let known = ["test", "effect", "socket_distance"].map(str::to_string);
+                    return Err(Fault::unknown_key(other, known.to_vec()));
+                }
+            }
+        }
+        let parts = Parts { test: &tests, effect: &effects, socket_distance: &distances, ..Parts::default() };
+        lower::add(session, parts, &in_memory(Data::Columns(columns), &ReadOptions::default())).map(|_| ())
+    };
+    read(session).map_err(|fault| source.error_of(fault))
+}
+
+fn in_memory<'a>(data: Data<'a>, options: &'a ReadOptions) -> Surroundings<'a> {
+    Surroundings { file: Path::new(""), options, data, place: &|_, _, _| Location::default() }
+}
