@@ -1,6 +1,7 @@
 //! Fits readings that are in memory: a table whose axis lies 12 µm beside its nominal place.
 
 use abbe::prelude::*;
+use serde_json::json;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut session = Session::new(Machine::from_code("w C A b Y X Z t")?, InstrumentKind::BallBar);
@@ -10,11 +11,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // In place of readings: the length of a bar from (0.012 − 100 sin C, 100 cos C, 0) to (0, 0, 75).
     let c: Vec<f64> = (0..360).map(|degree| f64::from(degree).to_radians()).collect();
     let length = |c: &f64| ((0.012 - 100.0 * c.sin()).powi(2) + (100.0 * c.cos()).powi(2) + 75.0_f64.powi(2)).sqrt();
-    let observed = c.iter().map(length).collect();
+    let length: Vec<f64> = c.iter().map(length).collect();
 
-    let bar = BallBar { workpiece_ball: [0.0, 100.0, 0.0], spindle_ball: [0.0; 3], bar: 125.0 };
-    let readings = Columns { axes: vec![("C".into(), c)], observed, ..Columns::default() };
-    session.add_test(NewTest::new("C125", Station::BallBar(bar)).at("Z", 75.0).readings(readings))?;
+    // The keys of a test are those of `[[test]]` in a session file.
+    let test = json!({
+        "name": "C125", "bar_mm": 125, "workpiece_ball_mm": [0, 100, 0], "spindle_ball_mm": [0, 0, 0], "at": {"z_mm": 75}
+    });
+    let columns = [MemoryColumn::numbers("c_rad", &c), MemoryColumn::numbers("length_mm", &length)];
+    add_node(&mut session, "test", test.into(), &columns)?;
 
     let fit = SessionFit::of(&session, 1)?;
     println!("rank {} of {}", fit.result.rank, fit.result.parameter_count);

@@ -74,12 +74,10 @@ pub mod prelude {
     pub use abbe_model::chain::Machine;
     pub use abbe_model::component::ErrorName;
     pub use abbe_model::error::ModelError;
-    pub use abbe_model::instrument::ballbar::BallBar;
-    pub use abbe_model::instrument::{InstrumentKind, Station};
+    pub use abbe_model::files::read::add_node;
+    pub use abbe_model::files::table::memory::MemoryColumn;
+    pub use abbe_model::instrument::InstrumentKind;
     pub use abbe_model::session::Session;
-    pub use abbe_model::session::build::NewTest;
-    pub use abbe_model::session::columns::Columns;
-    pub use abbe_model::session::motion::Motion;
 
     /// Reads a session file and the machine and data that it names.
     ///

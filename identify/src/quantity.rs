@@ -2,8 +2,10 @@
 
 use std::path::Path;
 
+use abbe_model::document::fault::Fault;
 use abbe_model::document::node::{Named, Node};
 use abbe_model::files;
+use abbe_model::files::read::lowered;
 use abbe_model::session::limits::{LARGEST, MAX_LENGTH_MM};
 use abbe_model::words::number as number_in_words;
 
@@ -149,16 +151,15 @@ fn factor(from: &str, to: &str) -> Option<f64> {
 /// If the file cannot be read, is not TOML, or a value is not text with a number and a unit. The message names the file
 /// and the entry.
 pub fn read(path: &Path) -> Result<Vec<Given>, IdentifyError> {
-    let fault = |message: String| IdentifyError::Request(format!("{}: {message}", path.display()));
-    let source = files::text(path, "the file of values")?;
-    let values: Named<Node> = files::read::document_of(&source)?;
-    let given = values.0.iter().map(|(key, value)| match value.as_text() {
-        Some(quantity) => Given::of(key, quantity).map_err(|error| fault(error.to_string())),
+    let given = |(key, value): &(String, Node)| match value.as_text() {
+        Some(quantity) => Given::of(key, quantity).map_err(|error| Fault::new(error.to_string(), None).at(key)),
         None => {
-            Err(fault(format!("`{key}` is not text; write number and unit in quotes, as in `{key} = \"35.3 um\"`")))
+            let help = format!("write number and unit in quotes, as in `{key} = \"35.3 um\"`");
+            Err(Fault::new(format!("`{key}` is not text"), help).at(key))
         }
-    });
-    given.collect()
+    };
+    let source = files::text(path, "the file of values")?;
+    Ok(lowered(&source, |values: &Named<Node>| values.0.iter().map(given).collect())?)
 }
 
 #[cfg(test)]

@@ -5,11 +5,11 @@ use std::f64::consts::TAU;
 use abbe_identify::fit;
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
-use abbe_model::instrument::ballbar::BallBar;
-use abbe_model::instrument::{InstrumentKind, Station};
+use abbe_model::files::read::add_node;
+use abbe_model::files::table::memory::MemoryColumn;
+use abbe_model::instrument::InstrumentKind;
 use abbe_model::session::Session;
-use abbe_model::session::build::NewTest;
-use abbe_model::session::columns::Columns;
+use serde_json::json;
 
 /// Offset of the axis of C, mm.
 const OFFSET: [f64; 2] = [0.012, -0.007];
@@ -30,15 +30,13 @@ fn the_offset_of_an_axis_is_found_in_readings_in_memory() {
     let c: Vec<f64> = forward.iter().chain(forward.iter().rev()).copied().collect();
     // Noise without a pattern over C: the fractional part of a multiple of the golden ratio.
     let noise = |row: usize| 0.35e-3 * ((row as f64 * 0.618_033_988_749_895).fract() - 0.5);
-    let columns = Columns {
-        observed: c.iter().enumerate().map(|(row, c)| length(*c) + noise(row)).collect(),
-        run: (0..c.len()).map(|row| if row < 180 { 1 } else { 2 }).collect(),
-        axes: vec![("C".into(), c)],
-        ..Columns::default()
-    };
-    let bar = BallBar { workpiece_ball: [0.0, 100.0, 0.0], spindle_ball: [0.0; 3], bar: 125.0 };
-    let test = NewTest::new("C100", Station::BallBar(bar));
-    session.add_test(test.at("Z", 75.0).readings(columns)).unwrap();
+    let length_mm: Vec<f64> = c.iter().enumerate().map(|(row, c)| length(*c) + noise(row)).collect();
+    let run: Vec<f64> = (0..c.len()).map(|row| if row < 180 { 1.0 } else { 2.0 }).collect();
+    let columns = [("c_rad", &c), ("length_mm", &length_mm), ("run", &run)];
+    let columns = columns.map(|(name, values)| MemoryColumn::numbers(name, values));
+    let test = json!({"name": "C100", "bar_mm": 125, "workpiece_ball_mm": [0, 100, 0], "spindle_ball_mm": [0, 0, 0],
+                      "at": {"z_mm": 75}});
+    add_node(&mut session, "test", test.into(), &columns).unwrap();
     let (problem, found) = fit::prepare(&session, 1).unwrap();
     let report = fit::report(&problem, &found).unwrap();
     assert_eq!(report.readings, 360);

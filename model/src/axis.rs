@@ -1,15 +1,29 @@
 //! One axis of a machine: kind, direction, origin and travel.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use crate::frames::{Coordinate, Point, SinCos, cross_nominal, turn_about_nominal};
 use crate::scalar::{Nominal, Scalar};
 
 /// Whether an axis is linear or rotary.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(inline)]
 pub enum AxisKind {
     /// Moves along its direction; positions in mm.
     Linear,
     /// Rotates about its direction; positions in radians.
     Rotary,
+}
+
+impl std::fmt::Display for AxisKind {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.write_str(match self {
+            AxisKind::Linear => "linear",
+            AxisKind::Rotary => "rotary",
+        })
+    }
 }
 
 impl AxisKind {

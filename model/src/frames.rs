@@ -3,6 +3,9 @@
 //! Motions transform points; motions are never multiplied. The transformation of a point takes 4 products per rotation
 //! and preserves the sparsity that a product of 4 × 4 matrices of dual numbers would lose.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use crate::scalar::{Nominal, Scalar};
 
 /// Three coordinates in mm, or three components of a direction.
@@ -90,7 +93,9 @@ impl<N: Nominal> SinCos<N> {
 }
 
 /// Rotation convention of the error angles.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+#[schemars(inline)]
 pub enum Rotation {
     /// `Rx(a)·Ry(b)·Rz(c)`, exact.
     #[default]

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use abbe_model::document::machine::Machine;
 use abbe_model::document::print;
 use abbe_model::document::session::Session;
-use abbe_model::files::read::document_of_text;
+use abbe_model::files::Source;
+use abbe_model::files::read::document_of;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -24,9 +25,9 @@ fn files_in(folder: &Path, files: &mut Vec<PathBuf>) {
 
 #[track_caller]
 fn reads_back<T: Serialize + DeserializeOwned + PartialEq + Debug>(file: &Path, text: &str) {
-    let document: T = document_of_text(file, text).unwrap();
+    let document: T = document_of(&Source::new(file, text)).unwrap();
     let printed = print::text_of(&document).unwrap();
-    let again: T = document_of_text(file, &printed).unwrap_or_else(|fault| panic!("{fault}\n{printed}"));
+    let again: T = document_of(&Source::new(file, &printed)).unwrap_or_else(|fault| panic!("{fault}\n{printed}"));
     assert_eq!(again, document, "{printed}");
 }
 

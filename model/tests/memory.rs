@@ -6,15 +6,12 @@ use std::path::Path;
 use abbe_model::ModelError;
 use abbe_model::chain::Machine;
 use abbe_model::document::node::Node;
-use abbe_model::files::read::{add_node, document_of_text, plan_of_node};
-use abbe_model::files::{self, ReadOptions};
-use abbe_model::instrument::ballbar::BallBar;
-use abbe_model::instrument::tracker::Tracker;
-use abbe_model::instrument::{InstrumentKind, Station};
-use abbe_model::session::build::NewTest;
-use abbe_model::session::columns::Columns;
-use abbe_model::session::motion::Motion;
-use abbe_model::session::{Prior, Session};
+use abbe_model::files::read::{add_node, document_of, plan_of_node};
+use abbe_model::files::table::memory::{MemoryColumn, Values};
+use abbe_model::files::{self, ReadOptions, Source};
+use abbe_model::instrument::InstrumentKind;
+use abbe_model::session::Session;
+use serde_json::json;
 
 const SESSION: &str = r#"
 [machine]
@@ -39,31 +36,30 @@ at = { z_mm = 75 }
 sweep = { axis = "C", from_deg = 0, to_deg = 180, step_deg = 90, feed_deg_min = 120 }
 "#;
 
-fn ball_bar() -> Station<f64> {
-    Station::BallBar(BallBar { workpiece_ball: [0.0, 100.0, 0.0], spindle_ball: [0.0; 3], bar: 125.0 })
-}
+const C_DEG: [f64; 3] = [0.0, 90.0, 180.0];
+const TIME: [f64; 3] = [0.0, 1.0, 2.0];
+const RUN: [f64; 3] = [1.0; 3];
+const LENGTH: [f64; 3] = [125.001, 125.0, 124.999];
 
 fn empty() -> Session {
     Session::new(Machine::from_code("w C A b Y X Z t").unwrap(), InstrumentKind::BallBar)
 }
 
-fn columns() -> Columns {
-    Columns {
-        axes: vec![("C".into(), [0.0_f64, 90.0, 180.0].map(f64::to_radians).to_vec())],
-        run: vec![1; 3],
-        time_s: vec![0.0, 1.0, 2.0],
-        observed: vec![125.001, 125.0, 124.999],
-        ..Columns::default()
-    }
+/// The test of the session file, without the name of its data.
+fn test() -> Node {
+    let document: Node = document_of(&Source::new(Path::new("session.toml"), SESSION)).unwrap();
+    let mut test = document.get("test").unwrap().items()[0].clone();
+    test.set("data", Node::default());
+    test
 }
 
-fn test() -> NewTest {
-    NewTest::new("C100", ball_bar())
-        .prior("bar", Prior::Gaussian(0.5e-3))
-        .prior("workpiece_ball", Prior::Gaussian(2e-3))
-        .setup("P1")
-        .at("Z", 75.0)
-        .readings(columns())
+fn columns<'a>(c_deg: &'a [f64], time: &'a [f64], run: &'a [f64], length: &'a [f64]) -> [MemoryColumn<'a>; 4] {
+    [
+        MemoryColumn::numbers("c_deg", c_deg),
+        MemoryColumn::numbers("time_s", time),
+        MemoryColumn::numbers("run", run),
+        MemoryColumn::numbers("length_mm", length),
+    ]
 }
 
 #[test]
@@ -74,15 +70,14 @@ fn a_session_in_memory_is_that_of_its_file() {
     fs::write(folder.path().join("session.toml"), SESSION).unwrap();
     let read = files::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
     let mut built = empty();
-    let sweep = read.tests[0].motion.clone().unwrap();
-    assert!(matches!(sweep, Motion::Sweep { .. }));
-    built.add_test(test().motion(sweep)).unwrap();
+    add_node(&mut built, "test", test(), &columns(&C_DEG, &TIME, &RUN, &LENGTH)).unwrap();
     assert_eq!(built.unknowns, read.unknowns);
     assert_eq!(built.warnings, read.warnings);
     let (own, other) = (&built.tests[0], &read.tests[0]);
     assert_eq!(own.name, other.name);
     assert_eq!(own.station, other.station);
     assert_eq!(own.priors, other.priors);
+    assert_eq!(own.motion, other.motion);
     assert_eq!(
         [&own.setup, &own.spindle_setup, &own.bar_setup],
         [&other.setup, &other.spindle_setup, &other.bar_setup]
@@ -98,38 +93,52 @@ fn a_session_in_memory_is_that_of_its_file() {
 #[test]
 fn an_unusable_test_is_refused_and_the_session_unchanged() {
     let mut session = empty();
-    session.add_test(test()).unwrap();
-    let with = |change: &dyn Fn(&mut Columns)| {
-        let mut columns = columns();
-        change(&mut columns);
-        NewTest::new("other", ball_bar()).at("Z", 75.0).readings(columns)
+    let good = columns(&C_DEG, &TIME, &RUN, &LENGTH);
+    add_node(&mut session, "test", test(), &good).unwrap();
+    let named = |key: &str, value: serde_json::Value| {
+        let mut test = test();
+        test.set("name", "other");
+        test.set(key, value);
+        test
     };
-    let tracker = Station::Tracker(Tracker {
-        target: [0.0; 3],
-        rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-        origin: [0.0; 3],
-    });
-    let no_bar = Station::BallBar(BallBar { workpiece_ball: [0.0, 100.0, 0.0], spindle_ball: [0.0; 3], bar: 0.0 });
-    for (bad, expected) in [
-        (test(), "two tests have the name \"C100\""),
-        (NewTest::new(" ", ball_bar()), "a test without a name"),
-        (NewTest::new("T", tracker), "its instrument is a tracker, that of the session a ballbar"),
-        (NewTest::new("T", no_bar), "`bar` is 0; it must be greater than 0"),
-        (NewTest::new("T", ball_bar()), "neither readings nor a motion"),
-        (NewTest::new("T", ball_bar()).prior("mirror", Prior::Free), "a ballbar has no `mirror`"),
-        (NewTest::new("T", ball_bar()).prior("bar", Prior::Gaussian(-1.0)), "the standard uncertainty of `bar` is -1"),
-        (with(&|columns| columns.axes[0].0 = "Q".into()), "has no axis `Q`"),
-        (with(&|columns| columns.axes.clear()), "no positions of an axis"),
-        (with(&|columns| columns.axes[0].1.truncate(2)), "positions of C: 2 where 3 are expected"),
-        (with(&|columns| columns.observed[1] = f64::NAN), "observed values is NaN (item 2)"),
-        (with(&|columns| columns.observed[1] = 1e13), "too large"),
-        (with(&|columns| columns.observed.truncate(1)), "not enough for a fit"),
-        (with(&|columns| columns.run.truncate(1)), "run numbers: 1 where 3 are expected"),
-        (with(&|columns| columns.time_s[2] = 0.5), "time decreases: 0.5 s after 1 s"),
-        (with(&|columns| columns.observed = vec![0.001; 3]), "a bar of 125.0000 mm read 0.001 mm"),
-        (test_at("C", 0.0), "cannot reach between its balls"),
+    let other = named("name", "other".into());
+    let lengths = |of: [f64; 3]| of;
+    let (nan, large, short) = (lengths([125.0, f64::NAN, 125.0]), lengths([125.0, 1e13, 125.0]), lengths([0.001; 3]));
+    let with = |length| columns(&C_DEG, &TIME, &RUN, length);
+    let mut unknown = good;
+    unknown[0].name = "q_deg";
+    for (test, columns, expected) in [
+        (test(), &good[..], "two tests have the name \"C100\""),
+        (named("name", " ".into()), &good, "a test without a name"),
+        (named("mirror_u_um", 1.into()), &good, "test \"other\" has the unknown key `mirror_u_um`"),
+        (
+            named("target_mm", 1.into()),
+            &good,
+            "`target_mm` belongs to a tracker; this session's instrument is a ballbar",
+        ),
+        (named("bar_mm", 0.into()), &good, "`bar_mm` is 0; it must be greater than 0"),
+        (named("bar_u_um", (-1).into()), &good, "`bar_u_um` is -1; an uncertainty cannot be negative"),
+        (named("sweep", json!(null)), &[], "has neither data nor a motion"),
+        (named("at", json!({})), &good, "cannot reach between its balls"),
+        (other.clone(), &unknown, "unknown column `q_deg`"),
+        (other.clone(), &good[3..], "no column `c_deg`, though axis `C` moves in this test; found: length_mm"),
+        (other.clone(), &columns(&C_DEG[..2], &TIME, &RUN, &LENGTH), "`time_s` has 3 values, `c_deg` has 2"),
+        (other.clone(), &with(&nan), "`length_mm`, item 1: it is NaN"),
+        (other.clone(), &with(&large), "`length_mm`, item 1: it is 1e13, which is too large"),
+        (other.clone(), &with(&short), "a bar of 125.0000 mm read 0.001 mm"),
+        (
+            other.clone(),
+            &columns(&C_DEG[..1], &TIME[..1], &RUN[..1], &LENGTH[..1]),
+            "1 readings, which is not enough for a fit",
+        ),
+        (
+            other.clone(),
+            &columns(&C_DEG, &[0.0, 1.0, 0.5], &RUN, &LENGTH),
+            "`time_s`, item 2: time decreases: 0.5 s after 1 s",
+        ),
+        (other, &columns(&C_DEG, &TIME, &[1.0, 1.5, 2.0], &LENGTH), "`run`, item 1: `1.5` is not a run number"),
     ] {
-        let fault = session.add_test(bad).unwrap_err();
+        let fault = add_node(&mut session, "test", test, columns).unwrap_err();
         assert!(fault.to_string().contains(expected), "`{expected}` is not in\n{fault}");
         assert!(matches!(fault, ModelError::Session { .. }) && fault.help().is_some());
         assert!(fault.location().is_none());
@@ -137,17 +146,11 @@ fn an_unusable_test_is_refused_and_the_session_unchanged() {
     }
 }
 
-fn test_at(axis: &str, position: f64) -> NewTest {
-    NewTest::new("low", ball_bar()).at(axis, position).readings(columns())
-}
-
 /// A reading of which a value is missing is left out; the session tells how many and where, and faults of the others keep
 /// their places among all items.
 #[test]
 fn missing_readings_are_left_out_and_told() {
-    use abbe_model::files::table::memory::{MemoryColumn, Values};
-
-    let document: Node = document_of_text(Path::new("session.toml"), SESSION).unwrap();
+    let document: Node = document_of(&Source::new(Path::new("session.toml"), SESSION)).unwrap();
     let test = &document.get("test").unwrap().items()[0];
     let mut head = document.clone();
     head.set("test", Node::from_iter::<[Node; 0]>([]));

@@ -33,7 +33,7 @@ impl Machine {
 
     #[staticmethod]
     fn from_toml(text: &str) -> Result<Machine, Failed> {
-        Ok(Machine { machine: Arc::new(files::read::machine_of_text("machine.toml".as_ref(), text)?) })
+        Ok(Machine { machine: Arc::new(files::read::machine_of(&files::Source::new("machine.toml".as_ref(), text))?) })
     }
 
     /// The machine of the tables of a machine file.

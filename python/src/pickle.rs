@@ -7,8 +7,8 @@ use std::sync::Arc;
 use abbe::document::Origin;
 use abbe::model::document::node::Node;
 use abbe::model::document::print;
-use abbe::model::files::SourceMap;
-use abbe::model::files::read::{document_of_text, plan_of_node};
+use abbe::model::files::read::{document_of, plan_of_node};
+use abbe::model::files::{Source, SourceMap};
 use abbe::model::session::Test;
 use abbe::model::session::readings::{Origin as Lines, Readings};
 use numpy::{Element, IntoPyArray, PyArray1, PyArrayMethods};
@@ -41,7 +41,7 @@ pub fn unpickled(pickled: &Bound<'_, PyDict>) -> PyResult<Session> {
         Ok::<_, PyErr>(pickled.get_item(name)?.ok_or_else(missing)?)
     };
     let text: String = item("text")?.extract()?;
-    let document: Node = document_of_text("session.toml".as_ref(), &text).map_err(Failed::from)?;
+    let document: Node = document_of(&Source::new("session.toml".as_ref(), &text)).map_err(Failed::from)?;
     let mut session = plan_of_node(document).map_err(Failed::from)?;
     let declared = std::mem::take(&mut session.tests);
     for test in item("tests")?.try_iter()? {
@@ -60,8 +60,8 @@ fn whole_text(sources: &SourceMap) -> Result<String, Failed> {
     let Some(machine) = &sources.machine_text else {
         return Ok(sources.text.clone());
     };
-    let mut document: Node = document_of_text(&sources.file, &sources.text)?;
-    document.set("machine", document_of_text::<Node>(&sources.file, machine)?);
+    let mut document: Node = document_of(&Source::new(&sources.file, &sources.text))?;
+    document.set("machine", document_of::<Node>(&Source::new(&sources.file, machine))?);
     Ok(print::text_of(&document)?)
 }
 

@@ -15,9 +15,7 @@ use super::date;
 /// # Errors
 /// If the file cannot be read; with the line of what cannot be used.
 pub fn read(file: &Path) -> Result<Vec<Compensation>, FleetError> {
-    let source =
-        files::text(file, "the file of compensations").map_err(|fault| FleetError::Request(fault.to_string()))?;
-    of_source(&source)
+    of_source(&files::text(file, "the file of compensations")?)
 }
 
 /// As [`read`], from a file that has been read.

@@ -8,15 +8,16 @@ use abbe::identify::circular::{CircularTest, of_session};
 use abbe::identify::tolerance::rule::Decision;
 use abbe::identify::tolerance::{ConformityItem, conformity};
 use abbe::model::chain::Machine;
-use abbe::model::instrument::ballbar::{BAR, BallBar};
-use abbe::model::instrument::{InstrumentKind, Station};
-use abbe::model::session::build::NewTest;
-use abbe::model::session::columns::Columns;
+use abbe::model::files::read::add_node;
+use abbe::model::files::table::memory::MemoryColumn;
+use abbe::model::instrument::InstrumentKind;
+use abbe::model::instrument::ballbar::BAR;
 use abbe::model::session::tolerance::{Limit, TestFigure, Tolerance, Toleranced};
 use abbe::model::session::{Prior, Session};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
+use serde_json::json;
 
 const ROWS: usize = 72;
 const RADIUS: f64 = 100.0;
@@ -43,13 +44,15 @@ fn session(height: f64, runs: i64, mut reading: impl FnMut(f64, i64) -> f64) -> 
         for k in 0..=ROWS {
             let there = TAU * k as f64 / ROWS as f64;
             c.push(if number % 2 == 0 { there } else { TAU - there });
-            run.push(number + 1);
+            run.push((number + 1) as f64);
             observed.push(reading(c[c.len() - 1], number));
         }
     }
-    let columns = Columns { observed, run, axes: vec![("C".into(), c)], ..Columns::default() };
-    let bar = BallBar { workpiece_ball: [0.0, RADIUS, 0.0], spindle_ball: [0.0; 3], bar: RADIUS.hypot(height) };
-    session.add_test(NewTest::new("C", Station::BallBar(bar)).at("Z", height).readings(columns)).unwrap();
+    let columns = [("c_rad", &c), ("length_mm", &observed), ("run", &run)];
+    let columns = columns.map(|(name, values)| MemoryColumn::numbers(name, values));
+    let test = json!({"name": "C", "bar_mm": RADIUS.hypot(height), "workpiece_ball_mm": [0, RADIUS, 0],
+                      "spindle_ball_mm": [0, 0, 0], "at": {"z_mm": height}});
+    add_node(&mut session, "test", test.into(), &columns).unwrap();
     session
 }
 

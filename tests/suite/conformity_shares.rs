@@ -7,14 +7,14 @@ use abbe::identify::fit::SessionFit;
 use abbe::identify::tolerance::rule::Decision;
 use abbe::model::chain::Machine;
 use abbe::model::component::ErrorName;
-use abbe::model::instrument::ballbar::BallBar;
-use abbe::model::instrument::{InstrumentKind, Station};
+use abbe::model::files::read::add_node;
+use abbe::model::files::table::memory::MemoryColumn;
+use abbe::model::instrument::InstrumentKind;
 use abbe::model::session::Session;
-use abbe::model::session::build::NewTest;
-use abbe::model::session::columns::Columns;
 use abbe::model::session::tolerance::{Limit, Tolerance, Toleranced};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
+use serde_json::json;
 
 const MACHINES: usize = 10_000;
 const THREADS: usize = 2;
@@ -38,14 +38,12 @@ fn decision(ex_um: f64, lower: f64, upper: f64, random: &mut Pcg64) -> Decision 
     });
     let c: Vec<f64> = (0..ROWS).map(|k| TAU * k as f64 / ROWS as f64).collect();
     let mut noise = || -> f64 { StandardNormal.sample(random) };
-    let columns = Columns {
-        observed: c.iter().map(|c| length(*c, ex_um * 1e-3) + NOISE_MM * noise()).collect(),
-        run: vec![1; ROWS],
-        axes: vec![("C".into(), c)],
-        ..Columns::default()
-    };
-    let bar = BallBar { workpiece_ball: [0.0, 100.0, 0.0], spindle_ball: [0.0; 3], bar: 125.0 };
-    session.add_test(NewTest::new("C100", Station::BallBar(bar)).at("Z", 75.0).readings(columns)).unwrap();
+    let length_mm: Vec<f64> = c.iter().map(|c| length(*c, ex_um * 1e-3) + NOISE_MM * noise()).collect();
+    let columns = [("c_rad", &c[..]), ("length_mm", &length_mm), ("run", &[1.0; ROWS])];
+    let columns = columns.map(|(name, values)| MemoryColumn::numbers(name, values));
+    let test = json!({"name": "C100", "bar_mm": 125, "workpiece_ball_mm": [0, 100, 0], "spindle_ball_mm": [0, 0, 0],
+                      "at": {"z_mm": 75}});
+    add_node(&mut session, "test", test.into(), &columns).unwrap();
     let result = SessionFit::of(&session, 1).unwrap().result;
     result.conformity.unwrap().verdict
 }

@@ -267,7 +267,7 @@ fn invalid_requests_are_refused_with_the_reason() {
     refused_with(&["--errors", "tracker.a"], &["another instrument", "workpiece_ball.x"]);
     refused(&["equation", "none.toml", "--test", "A150"], &["none.toml", "cannot be read"]);
     refused(&["volumetric", "none.toml"], &["none.toml", "cannot be read"]);
-    refused(&["volumetric", text(&plan)], &["chapter5.toml:1", "no `chain`"]);
+    refused(&["volumetric", text(&plan)], &["chapter5.toml:7", "the file has the unknown key `machine`", "chain"]);
     refused(&["volumetric", text(&machine), "--errors", "bar"], &["`bar`", "an error vector has no parameters"]);
     let folder = tempfile::tempdir().unwrap();
     let broken = folder.path().join("machine.toml");

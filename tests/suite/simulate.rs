@@ -141,9 +141,11 @@ fn errors_come_from_a_file_and_the_command_line_overrides_it() {
     assert!(row("EY0C").unwrap().contains("10.0000"), "{printed}");
     assert!(row("bar[C 150]").unwrap().contains("0.4000"), "{printed}");
     assert!(row("EB0C").unwrap().contains("-2.0000"), "{printed}");
-    for (bad, message) in
-        [("EY0C = 10", "`EY0C` is not text"), ("EY0C = \"10\"", "has no unit"), ("EY0C = ", "errors.toml: ")]
-    {
+    for (bad, message) in [
+        ("EY0C = 10", "`EY0C` is not text"),
+        ("EY0C = \"10\"", "has no unit"),
+        ("EY0C = ", "errors.toml:1: not valid TOML"),
+    ] {
         fs::write(&errors, bad).unwrap();
         let stderr = refused(&plan, &folder.path().join("bad"), &["--errors", text(&errors)]);
         assert!(stderr.contains(message) && stderr.contains("errors.toml"), "{stderr}");

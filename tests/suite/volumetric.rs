@@ -162,15 +162,15 @@ fn the_command_writes_map_and_summary_and_names_what_is_wrong() {
         ("[constant]\nEX0W = \"1 um\"\n", "no axis `W`"),
         ("[constant]\nEX0X = \"1 um\"\n", "a linear axis has squareness errors"),
         ("[constant]\nEX0C = \"1 arcsec\"\n", "arcsec"),
-        ("[[function]]\nerror = \"EXX\"\n", "[[function]] 1 (`EXX`): give exactly one of"),
+        ("[[function]]\nerror = \"EXX\"\n", "errors.toml:1: `EXX`: give exactly one of"),
         (
             "[[function]]\nerror = \"EXX\"\ntable = { at_deg = [0, 1], um = [0, 1] }\n",
-            "`at_mm` is expected for this axis",
+            "errors.toml:3: `at_mm` is expected for this axis",
         ),
         ("[[function]]\nerror = \"EXX\"\ntable = { at_mm = [1, 0], um = [0, 1] }\n", "ascend"),
         ("[[function]]\nerror = \"EAX\"\npolynomial = { um = [0, 1] }\n", "in `arcsec`"),
         ("[[function]]\nerror = \"EXX\"\nharmonic = { order = 2, amplitude_um = 1 }\n", "`period_"),
-        ("[[function]]\nerror = \"EXX\"\nspline = 1\n", "line 3"),
+        ("[[function]]\nerror = \"EXX\"\nspline = 1\n", "errors.toml:3: [[function]] has the unknown key `spline`"),
     ] {
         std::fs::write(&file, written).unwrap();
         let (status, printed) = run(text(&file), &[]);

@@ -21,7 +21,7 @@ fn fitted() -> (Session, Problem, Fit) {
     let mut session = files::session(&file, &ReadOptions::default()).unwrap();
     let text = "[[effect]]\ncomponent = \"EZC\"\nshape = \"harmonic\"\norder = 2\n[[effect]]\ncomponent = \"EXA\"\n\
                 shape = \"periodic\"\nperiod_deg = 33.3\n";
-    let document: Node = files::read::document_of_text(&file, text).unwrap();
+    let document: Node = files::read::document_of(&files::Source::new(&file, text)).unwrap();
     let nodes = document.get("effect").unwrap().items().to_vec();
     let read = files::read::effects_of_nodes(nodes, &session.machine, session.instrument, &[]);
     session.effects = read.unwrap();

@@ -5,8 +5,11 @@ use std::path::Path;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{ERRORS_PER_AXIS, Machine};
 use abbe_model::component::{ErrorKind, ErrorName};
+use abbe_model::document::fault::{Fault, Within};
+use abbe_model::document::value::Positive;
+use abbe_model::files::read::lowered;
 use abbe_model::files::{self, Source};
-use abbe_model::session::limits;
+use abbe_model::instrument::InternalUnit;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
@@ -82,28 +85,29 @@ pub struct ErrorFunction {
     pub form: Form,
 }
 
+/// The keys of a file of error functions.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
     #[serde(default)]
     constant: BTreeMap<String, String>,
     #[serde(default)]
-    function: Vec<FunctionEntry>,
+    function: Vec<Function>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct FunctionEntry {
+struct Function {
     error: String,
     over: Option<String>,
-    table: Option<TableEntry>,
-    polynomial: Option<PolynomialEntry>,
-    harmonic: Option<HarmonicEntry>,
+    table: Option<Table>,
+    polynomial: Option<Polynomial>,
+    harmonic: Option<Harmonic>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct TableEntry {
+struct Table {
     at_mm: Option<Vec<f64>>,
     at_deg: Option<Vec<f64>>,
     um: Option<Vec<f64>>,
@@ -112,19 +116,19 @@ struct TableEntry {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct PolynomialEntry {
-    scale_mm: Option<f64>,
-    scale_deg: Option<f64>,
+struct Polynomial {
+    scale_mm: Option<Positive>,
+    scale_deg: Option<Positive>,
     um: Option<Vec<f64>>,
     arcsec: Option<Vec<f64>>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct HarmonicEntry {
-    order: Option<f64>,
-    period_mm: Option<f64>,
-    period_deg: Option<f64>,
+struct Harmonic {
+    order: Option<Positive>,
+    period_mm: Option<Positive>,
+    period_deg: Option<Positive>,
     amplitude_um: Option<f64>,
     amplitude_arcsec: Option<f64>,
     #[serde(default)]
@@ -154,8 +158,8 @@ struct HarmonicEntry {
 /// Several functions of one error are summed.
 ///
 /// # Errors
-/// If the file cannot be read, is not of this form, holds a number beyond [`limits::LARGEST`], or names something that
-/// the machine lacks. The message names the file and the entry.
+/// If the file cannot be read, is not of this form, holds a number beyond the limits of input, or names something that
+/// the machine lacks. The message names the file and the line.
 pub fn read(path: &Path, machine: &Machine) -> Result<Vec<ErrorFunction>, IdentifyError> {
     of_source(&files::text(path, "the file of error functions")?, machine)
 }
@@ -165,159 +169,126 @@ pub fn read(path: &Path, machine: &Machine) -> Result<Vec<ErrorFunction>, Identi
 /// # Errors
 /// As [`read`].
 pub fn of_source(source: &Source, machine: &Machine) -> Result<Vec<ErrorFunction>, IdentifyError> {
-    let fault = |message: String| IdentifyError::Request(format!("{}: {message}", source.file.display()));
-    functions(&files::read::document_of(source)?, machine).map_err(fault)
+    Ok(lowered(source, |file: &File| {
+        let mut functions = Vec::new();
+        for (id, quantity) in &file.constant {
+            let constant = constant(machine, id, quantity).map_err(|fault| fault.on_key().at(id));
+            functions.push(constant.within("constant")?);
+        }
+        for (item, entry) in file.function.iter().enumerate() {
+            functions.push(function(machine, entry).within_item(item).within("function")?);
+        }
+        Ok(functions)
+    })?)
 }
 
-/// The functions of a file; the error is a message.
-fn functions(file: &File, machine: &Machine) -> Result<Vec<ErrorFunction>, String> {
-    let mut functions = Vec::new();
-    for (id, quantity) in &file.constant {
-        let (slot, over, angle) = error_slot_of(machine, id)?;
-        let unit = Unit::of(if angle {
-            abbe_model::instrument::InternalUnit::Radian
-        } else {
-            abbe_model::instrument::InternalUnit::Millimetre
-        });
-        let given = Given::of(id, quantity).map_err(|fault| fault.to_string())?;
-        functions.push(ErrorFunction {
-            slot,
-            over,
-            form: Form::Constant(given.inside(&unit).map_err(|fault| fault.to_string())?),
-        });
-    }
-    for (number, entry) in file.function.iter().enumerate() {
-        let label = format!("[[function]] {} (`{}`)", number + 1, entry.error);
-        functions.push(function(machine, entry).map_err(|message| format!("{label}: {message}"))?);
-    }
-    Ok(functions)
+fn constant(machine: &Machine, id: &str, quantity: &str) -> Result<ErrorFunction, Fault> {
+    let (slot, over, angle) = error_slot_of(machine, id)?;
+    let unit = Unit::of(if angle { InternalUnit::Radian } else { InternalUnit::Millimetre });
+    let inside = Given::of(id, quantity).and_then(|given| given.inside(&unit));
+    let form = Form::Constant(inside.map_err(|fault| Fault::new(fault.to_string(), None))?);
+    Ok(ErrorFunction { slot, over, form })
 }
 
-fn function(machine: &Machine, entry: &FunctionEntry) -> Result<ErrorFunction, String> {
-    let (slot, own, angle) = error_slot_of(machine, &entry.error)?;
+fn function(machine: &Machine, entry: &Function) -> Result<ErrorFunction, Fault> {
+    let (slot, own, angle) = error_slot_of(machine, &entry.error).within("error")?;
     let over = match &entry.over {
         None => own,
-        Some(name) => machine.axis_index(name).ok_or_else(|| no_axis(machine, name))?,
+        Some(name) => machine.axis_index(name).ok_or_else(|| no_axis(machine, name)).within("over")?,
     };
     let kind = machine.axes[over].kind;
     let form = match (&entry.table, &entry.polynomial, &entry.harmonic) {
-        (Some(table), None, None) => {
-            let at = position(kind, table.at_mm.clone(), table.at_deg.clone(), "at")?
-                .ok_or_else(|| format!("a table needs positions: `at_{}`", unit_suffix(kind)))?;
-            let values = values(angle, table.um.clone(), table.arcsec.clone())?;
-            if at.len() != values.len() || at.len() < 2 {
-                return Err(format!(
-                    "{} positions and {} values; a table needs the same number of both, at least two",
-                    at.len(),
-                    values.len()
-                ));
-            }
-            if at.windows(2).any(|pair| pair[1] <= pair[0]) {
-                return Err("the positions of a table must ascend".into());
-            }
-            Form::Table { at, values }
+        (Some(table), None, None) => self::table(kind, angle, table).within("table")?,
+        (None, Some(Polynomial { scale_mm, scale_deg, um, arcsec }), None) => {
+            let scale = of_axis(kind, "scale", scale_mm, scale_deg).within("polynomial")?;
+            let scale = scale.map_or(1.0, |scale| kind.to_internal(scale.0));
+            Form::Polynomial { scale, coefficients: values(angle, um, arcsec).within("polynomial")? }
         }
-        (None, Some(polynomial), None) => {
-            let single = |value: Option<f64>| value.map(|value| vec![value]);
-            let scale = position(kind, single(polynomial.scale_mm), single(polynomial.scale_deg), "scale")?
-                .map_or(1.0, |scale| scale[0]);
-            if scale <= 0.0 {
-                return Err("the scale of a polynomial must be above 0".into());
-            }
-            let coefficients = values(angle, polynomial.um.clone(), polynomial.arcsec.clone())?;
-            Form::Polynomial { scale, coefficients }
+        (None, None, Some(harmonic)) => self::harmonic(kind, angle, harmonic).within("harmonic")?,
+        _ => {
+            let error = &entry.error;
+            let help = "such as `harmonic = { order = 2, amplitude_um = 1.5 }`";
+            return Err(Fault::new(
+                format!("`{error}`: give exactly one of `table`, `polynomial` and `harmonic`"),
+                help,
+            ));
         }
-        (None, None, Some(harmonic)) => {
-            let single = |value: Option<f64>| value.map(|value| vec![value]);
-            let period = position(kind, single(harmonic.period_mm), single(harmonic.period_deg), "period")?;
-            check_finite(harmonic.order.as_slice())?;
-            let period = match (period, harmonic.order, kind) {
-                (Some(period), None, _) => period[0],
-                (None, Some(order), AxisKind::Rotary) => std::f64::consts::TAU / order,
-                _ => {
-                    return Err(
-                        "a harmonic needs either a `period_…` or, over a rotary axis, an `order` (cycles per turn)"
-                            .into(),
-                    );
-                }
-            };
-            if period.is_nan() || period <= 0.0 || period.is_infinite() {
-                return Err("the period of a harmonic must be a length or an angle above 0".into());
-            }
-            let amplitude = values(angle, single(harmonic.amplitude_um), single(harmonic.amplitude_arcsec))?;
-            check_finite(&[harmonic.phase_deg])?;
-            Form::Harmonic { period, amplitude: amplitude[0], phase: harmonic.phase_deg.to_radians() }
-        }
-        _ => return Err("give exactly one of `table`, `polynomial` and `harmonic`".into()),
     };
     Ok(ErrorFunction { slot, over, form })
 }
 
+fn table(kind: AxisKind, angle: bool, table: &Table) -> Result<Form, Fault> {
+    let values = values(angle, &table.um, &table.arcsec)?;
+    let at = of_axis(kind, "at", &table.at_mm, &table.at_deg)?.ok_or_else(|| {
+        let key = format!("at_{}", kind.unit());
+        Fault::missing(&key, "the positions of the values")
+    })?;
+    if at.len() != values.len() || at.len() < 2 {
+        let what = format!("{} positions and {} values", at.len(), values.len());
+        return Err(Fault::new(what, "a table needs the same number of both, at least two"));
+    }
+    if at.windows(2).any(|pair| pair[1] <= pair[0]) {
+        return Err(Fault::new("the positions of a table must ascend", None));
+    }
+    Ok(Form::Table { at: at.iter().map(|place| kind.to_internal(*place)).collect(), values })
+}
+
+fn harmonic(kind: AxisKind, angle: bool, harmonic: &Harmonic) -> Result<Form, Fault> {
+    let period = of_axis(kind, "period", &harmonic.period_mm, &harmonic.period_deg)?;
+    let period = match (period, harmonic.order, kind) {
+        (Some(period), None, _) => kind.to_internal(period.0),
+        (None, Some(order), AxisKind::Rotary) => std::f64::consts::TAU / order.0,
+        _ => {
+            let message = "a harmonic needs either a `period_…` or, over a rotary axis, an `order` (cycles per turn)";
+            return Err(Fault::new(message, None));
+        }
+    };
+    let single = |value: Option<f64>| value.map(|value| vec![value]);
+    let amplitude = values(angle, &single(harmonic.amplitude_um), &single(harmonic.amplitude_arcsec))?[0];
+    Ok(Form::Harmonic { period, amplitude, phase: harmonic.phase_deg.to_radians() })
+}
+
 /// Slot and axis of an error, and whether it is an angle.
-fn error_slot_of(machine: &Machine, id: &str) -> Result<(usize, usize, bool), String> {
+fn error_slot_of(machine: &Machine, id: &str) -> Result<(usize, usize, bool), Fault> {
     let Some(name) = ErrorName::parse(id) else {
-        return Err(format!("`{id}` is not the name of an error; use ISO 230-1 names such as EXX, EB0A"));
+        return Err(Fault::new(format!("`{id}` is not the name of an error"), "use ISO 230-1 names such as EXX, EB0A"));
     };
-    let Some(slot) = machine.error_slot(&name) else {
-        return Err(no_axis(machine, &name.axis));
-    };
+    let slot = machine.error_slot(&name).ok_or_else(|| no_axis(machine, &name.axis))?;
     let axis = slot / ERRORS_PER_AXIS;
     let angle = name.freedom.is_angle();
     if machine.axes[axis].kind == AxisKind::Linear && name.kind == ErrorKind::Location && !angle {
-        return Err(format!("`{id}`: a linear axis has squareness errors (angles) but no position errors"));
+        let message = format!("`{id}`: a linear axis has squareness errors (angles) but no position errors");
+        return Err(Fault::new(message, None));
     }
     Ok((slot, axis, angle))
 }
 
-fn no_axis(machine: &Machine, name: &str) -> String {
+fn no_axis(machine: &Machine, name: &str) -> Fault {
     let axes: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
-    format!("the machine has no axis `{name}`; its axes are {}", axes.join(", "))
+    Fault::new(format!("the machine has no axis `{name}`"), format!("its axes are {}", axes.join(", ")))
 }
 
-fn unit_suffix(kind: AxisKind) -> &'static str {
-    match kind {
-        AxisKind::Linear => "mm",
-        AxisKind::Rotary => "deg",
-    }
-}
-
-fn position(
-    kind: AxisKind,
-    mm: Option<Vec<f64>>,
-    deg: Option<Vec<f64>>,
-    id_stem: &str,
-) -> Result<Option<Vec<f64>>, String> {
-    let (right, wrong) = match kind {
-        AxisKind::Linear => (mm, deg),
-        AxisKind::Rotary => (deg.map(|list| list.into_iter().map(f64::to_radians).collect()), mm),
+/// What is stated in the unit of an axis, in mm or degrees.
+fn of_axis<'v, T>(kind: AxisKind, stem: &str, mm: &'v Option<T>, deg: &'v Option<T>) -> Result<Option<&'v T>, Fault> {
+    let ((right, unit), (wrong, other)) = match kind {
+        AxisKind::Linear => ((mm, "mm"), (deg, "deg")),
+        AxisKind::Rotary => ((deg, "deg"), (mm, "mm")),
     };
-    if wrong.is_some() {
-        return Err(format!("`{id_stem}_{}` is expected for this axis", unit_suffix(kind)));
+    match wrong {
+        None => Ok(right.as_ref()),
+        Some(_) => {
+            let message = format!("`{stem}_{unit}` is expected for this axis");
+            Err(Fault::new(message, None).on_key().at(&format!("{stem}_{other}")))
+        }
     }
-    check_finite(right.as_deref().unwrap_or_default())?;
-    Ok(right)
 }
 
-fn values(angle: bool, um: Option<Vec<f64>>, arcsec: Option<Vec<f64>>) -> Result<Vec<f64>, String> {
-    let (right, wrong, display_per_internal, word) =
+/// Values of an error, mm or rad.
+fn values(angle: bool, um: &Option<Vec<f64>>, arcsec: &Option<Vec<f64>>) -> Result<Vec<f64>, Fault> {
+    let (right, wrong, per_internal, word) =
         if angle { (arcsec, um, ARCSEC, "arcsec") } else { (um, arcsec, 1e3, "um") };
-    let values = match (right, wrong) {
-        (Some(values), None) if !values.is_empty() => values,
-        _ => return Err(format!("the values of this error must be in `{word}`")),
-    };
-    check_finite(&values)?;
-    Ok(values.into_iter().map(|value| value / display_per_internal).collect())
-}
-
-/// Checks that numbers are finite and within the limits of all files.
-fn check_finite(values: &[f64]) -> Result<(), String> {
-    for value in values {
-        if !value.is_finite() {
-            return Err(format!("`{value}` is not a finite number"));
-        }
-        if let Some(fault) = limits::too_large(*value) {
-            return Err(fault);
-        }
+    match (right, wrong) {
+        (Some(values), None) if !values.is_empty() => Ok(values.iter().map(|value| value / per_internal).collect()),
+        _ => Err(Fault::new(format!("the values of this error must be in `{word}`"), None)),
     }
-    Ok(())
 }

@@ -3,7 +3,7 @@
 //!
 //! The deserialisers of `toml` and `serde_json` speak of types of Rust and lose the key; this one does not.
 
-use serde::de::value::{F64Deserializer, StrDeserializer, StringDeserializer};
+use serde::de::value::{F64Deserializer, MapAccessDeserializer, StrDeserializer, StringDeserializer};
 use serde::de::{self, DeserializeSeed, Deserializer, Expected, IntoDeserializer, MapAccess, SeqAccess, Visitor};
 
 use serde::{Deserialize, forward_to_deserialize_any};
@@ -92,7 +92,7 @@ fn plain(text: &str, refused: impl Fn(char) -> bool) -> Result<&str, Fault> {
         None => Ok(text),
         Some(control) => {
             let what = format!("contains the control character U+{:04X}", control as u32);
-            Err(Fault::of_key(what, Some("remove it".into())))
+            Err(Fault::of_key(what, "remove it"))
         }
     }
 }
@@ -193,7 +193,7 @@ impl<'de> Deserializer<'de> for De<'de> {
 
     fn deserialize_struct<V: Visitor<'de>>(
         self,
-        name: &'static str,
+        _: &'static str,
         fields: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, Fault> {
@@ -203,14 +203,14 @@ impl<'de> Deserializer<'de> for De<'de> {
             map.rest = Some(map.entries.iter().copied().filter(|entry| !is_own(entry)).collect());
             map.entries.retain(is_own);
         }
-        visitor.visit_map(map).map_err(|fault| fault.in_table(name))
+        visitor.visit_map(map)
     }
 
     /// A word, or a table whose key `kind` is the word. A table that has a variant's name as a key is that variant; the
     /// variant `other` takes any table.
     fn deserialize_enum<V: Visitor<'de>>(
         self,
-        name: &'static str,
+        _: &'static str,
         variants: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, Fault> {
@@ -231,7 +231,7 @@ impl<'de> Deserializer<'de> for De<'de> {
             return visitor.visit_enum(Variant { variant, map: Map::all(entries) });
         }
         let Some(kind) = self.0.get("kind") else {
-            return Err(Fault::missing("kind", &expected()).in_table(name));
+            return Err(Fault::missing("kind", &expected()));
         };
         let word = De(kind).text().ok().and_then(known);
         let variant = word.ok_or_else(|| Fault::unexpected(expected()).at("kind"))?;
@@ -327,34 +327,9 @@ impl<'de> MapAccess<'de> for Map<'de> {
             None => {
                 let entries = self.rest.take().unwrap_or_default().into();
                 let rest = Map { entries, value: None, rest: None, also: None };
-                seed.deserialize(Whole(rest))
+                seed.deserialize(MapAccessDeserializer::new(rest))
             }
         }
-    }
-}
-
-/// A table of which some keys were read before.
-struct Whole<'de>(Map<'de>);
-
-impl<'de> Deserializer<'de> for Whole<'de> {
-    type Error = Fault;
-
-    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
-        visitor.visit_map(self.0)
-    }
-
-    fn deserialize_struct<V: Visitor<'de>>(
-        self,
-        name: &'static str,
-        _: &'static [&'static str],
-        visitor: V,
-    ) -> Result<V::Value, Fault> {
-        visitor.visit_map(self.0).map_err(|fault| fault.in_table(name))
-    }
-
-    forward_to_deserialize_any! {
-        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf option unit unit_struct
-        newtype_struct seq tuple tuple_struct map enum identifier ignored_any
     }
 }
 
@@ -384,7 +359,7 @@ impl<'de> de::VariantAccess<'de> for Map<'de> {
     }
 
     fn newtype_variant_seed<T: DeserializeSeed<'de>>(self, seed: T) -> Result<T::Value, Fault> {
-        seed.deserialize(Whole(self))
+        seed.deserialize(MapAccessDeserializer::new(self))
     }
 
     fn tuple_variant<V: Visitor<'de>>(self, _: usize, _: V) -> Result<V::Value, Fault> {

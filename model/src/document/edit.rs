@@ -175,7 +175,7 @@ impl SessionText {
         }
         prefix.push_str(table.decor().prefix().and_then(|prefix| prefix.as_str()).unwrap_or_default());
         table.decor_mut().set_prefix(prefix);
-        table.set_position(Some(isize::MAX));
+        at_the_end(&mut table);
         let place = self.document.entry(list).or_insert_with(|| Item::ArrayOfTables(toml_edit::ArrayOfTables::new()));
         match place {
             Item::ArrayOfTables(tables) => tables.push(table),
@@ -189,6 +189,18 @@ impl SessionText {
             }
         }
         Ok(())
+    }
+}
+
+/// Moves a table with those below its own keys behind all others.
+fn at_the_end(table: &mut Table) {
+    table.set_position(Some(isize::MAX));
+    for (_, item) in table.iter_mut() {
+        match item {
+            Item::Table(inner) => at_the_end(inner),
+            Item::ArrayOfTables(tables) => tables.iter_mut().for_each(at_the_end),
+            _ => {}
+        }
     }
 }
 

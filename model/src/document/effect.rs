@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::node::Entries;
+use super::value::Positive;
 
 /// An effect that the user declares.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -13,7 +14,6 @@ pub struct Effect {
     /// The component: EZC, EX0C, workpiece_ball.x, bar, trigger.
     pub component: String,
     /// The driver.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub driver: Option<String>,
     /// The dependence of the component on the driver, such as "harmonic".
     pub shape: String,
@@ -22,23 +22,16 @@ pub struct Effect {
     #[schemars(skip)]
     pub keys: Entries,
     /// Prior standard deviation of the coefficients of an error of length, µm: the component where a basis function is 1.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub scale_um: Option<f64>,
+    pub scale_um: Option<Positive>,
     /// Prior standard deviation of the coefficients of an angular error, arcseconds: the component where a basis function
     /// is 1.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub scale_arcsec: Option<f64>,
+    pub scale_arcsec: Option<Positive>,
     /// Effects of one family share a prior standard deviation, estimated from the readings.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub family: Option<String>,
     /// The tests in which it acts; default: all.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub tests: Option<Vec<String>>,
     /// Whether the effect is taken for the explanation on the user's word, so that uncertainties do not cover its
     /// aliases; default: false.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub assumed: Option<bool>,
     /// Effects that explain the readings equally well in its place. Uncertainties cover what each would change.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

@@ -28,12 +28,33 @@ pub(super) enum Finding {
     Unexpected(String),
     /// A key that the table does not have.
     UnknownKey { key: String, known: Vec<String> },
-    /// A required key that is absent, in a table of this type; `what` says what to add.
-    MissingKey { table: &'static str, key: String, what: Option<String> },
+    /// A required key that is absent; `what` says what to add, if its schema does not.
+    MissingKey { key: String, what: Option<String> },
     /// A file that is named and does not exist, or must not be read.
     File { message: String, help: String },
     /// An error that has its place already.
     Other(Box<ModelError>),
+}
+
+/// What to do about a fault, if there is anything to say.
+pub struct Help(Option<String>);
+
+impl From<&str> for Help {
+    fn from(help: &str) -> Help {
+        Help(Some(help.to_string()))
+    }
+}
+
+impl From<String> for Help {
+    fn from(help: String) -> Help {
+        Help(Some(help))
+    }
+}
+
+impl From<Option<String>> for Help {
+    fn from(help: Option<String>) -> Help {
+        Help(help)
+    }
 }
 
 /// A fault of a document. `Parsed::error_of` finds its place in a file.
@@ -52,8 +73,8 @@ impl Fault {
     }
 
     /// A fault in words, with what to do.
-    pub fn new(message: impl Into<String>, help: Option<String>) -> Fault {
-        Fault::of(Finding::Said { message: message.into(), help })
+    pub fn new(message: impl Into<String>, help: impl Into<Help>) -> Fault {
+        Fault::of(Finding::Said { message: message.into(), help: help.into().0 })
     }
 
     /// The value is this, and must be something else: the message starts with its key.
@@ -62,13 +83,13 @@ impl Fault {
     }
 
     /// What is wrong with the value, said of its key.
-    pub fn of_key(what: impl Into<String>, help: Option<String>) -> Fault {
-        Fault::of(Finding::OfKey { what: what.into(), help })
+    pub fn of_key(what: impl Into<String>, help: impl Into<Help>) -> Fault {
+        Fault::of(Finding::OfKey { what: what.into(), help: help.into().0 })
     }
 
     /// What is wrong with the table, said of its name.
-    pub fn of_table(what: impl Into<String>, help: Option<String>) -> Fault {
-        Fault::of(Finding::OfTable { what: what.into(), help })
+    pub fn of_table(what: impl Into<String>, help: impl Into<Help>) -> Fault {
+        Fault::of(Finding::OfTable { what: what.into(), help: help.into().0 })
     }
 
     /// Something else is expected.
@@ -78,7 +99,7 @@ impl Fault {
 
     /// A required key is absent; `what` says what to add.
     pub fn missing(key: &str, what: &str) -> Fault {
-        Fault::of(Finding::MissingKey { table: "", key: key.to_string(), what: Some(what.to_string()) })
+        Fault::of(Finding::MissingKey { key: key.to_string(), what: Some(what.to_string()) })
     }
 
     /// A key that is not among the known ones.
@@ -115,16 +136,6 @@ impl Fault {
         }
         self
     }
-
-    /// The same, of a table of the type `name`, if a key of it is absent.
-    pub(super) fn in_table(mut self, name: &'static str) -> Fault {
-        if let Finding::MissingKey { table, .. } = &mut self.finding
-            && table.is_empty()
-        {
-            *table = name;
-        }
-        self
-    }
 }
 
 impl From<ModelError> for Fault {
@@ -133,9 +144,16 @@ impl From<ModelError> for Fault {
     }
 }
 
+/// What a value is, and must not be: the faults of [`limits`](crate::session::limits).
+impl From<String> for Fault {
+    fn from(what: String) -> Fault {
+        Fault::is(what)
+    }
+}
+
 impl From<(String, String)> for Fault {
     fn from((message, help): (String, String)) -> Fault {
-        Fault::new(message, Some(help))
+        Fault::new(message, help)
     }
 }
 
@@ -172,8 +190,8 @@ impl fmt::Display for Fault {
 impl std::error::Error for Fault {}
 
 impl de::Error for Fault {
-    fn custom<T: fmt::Display>(message: T) -> Fault {
-        Fault::new(message.to_string(), None)
+    fn custom<T: fmt::Display>(what: T) -> Fault {
+        Fault::is(what.to_string())
     }
 
     fn invalid_type(_: de::Unexpected<'_>, expected: &dyn de::Expected) -> Fault {
@@ -193,6 +211,6 @@ impl de::Error for Fault {
     }
 
     fn missing_field(field: &'static str) -> Fault {
-        Fault::of(Finding::MissingKey { table: "", key: field.to_string(), what: None })
+        Fault::of(Finding::MissingKey { key: field.to_string(), what: None })
     }
 }

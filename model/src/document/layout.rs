@@ -11,30 +11,23 @@ use super::node::{Entries, Named};
 #[serde(rename = "format", deny_unknown_fields)]
 pub struct Format {
     /// The separator between cells; default ",".
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("enum" = [",", ";", "\t", "|", ":"]))]
     pub separator: Option<String>,
     /// The decimal sign; default ".".
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("enum" = [".", ","]))]
     pub decimal: Option<String>,
     /// false: columns are numbered from 1.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub header: Option<bool>,
     /// The sheet of a spreadsheet; required if several contain cells.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub sheet: Option<String>,
     /// The value of RUN_DIRECTION in a ball-bar file for the direction from the first axis of the plane towards the
     /// second, if its words are ambiguous.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("type" = ["string", "boolean", "integer"]))]
     pub anticlockwise: Option<Node>,
     /// Character encoding of the data files: "latin1", "utf-16le", … (names of the WHATWG Encoding Standard); recognised
     /// where absent.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub encoding: Option<String>,
     /// Lines (of a spreadsheet: rows) above the header.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0, max = 1_000_000))]
     pub skip_lines: Option<u64>,
 }

@@ -2,9 +2,11 @@
 //!
 //! A document is a value of serde types. Their fields are the keys, and their doc comments are the documentation and the
 //! schema. It comes from a TOML file, from JSON or from a Python dict, by way of one tree of values ([`node`]), and
-//! [`lower`] turns it into the domain of [`session`](crate::session). A fault has the path of keys that leads to it
-//! ([`fault`]); `source` finds its place in the file. [`of_domain`] goes the other way, [`print`] writes a document, and
+//! `lower` turns it into the domain of [`session`](crate::session). A fault has the path of keys that leads to it
+//! ([`fault`]); `source` finds its place in the file. [`of_domain`] goes the other way, [`mod@print`] writes a document, and
 //! [`edit`] edits the text of a user.
+
+#![allow(rustdoc::broken_intra_doc_links, reason = "the schema has the same texts, with `[machine]` for a table")]
 
 mod de;
 pub mod edit;

@@ -3,11 +3,11 @@
 use std::ops::Range;
 
 use super::lower::effect::{SCALES, internal};
-use super::machine::{Axis, KindWord, Machine, RotationWord};
-use super::movement::{Circle, Follow, Offset, Path, Sweep};
+use super::machine::{Axis, Machine};
+use super::movement::{Circle, Follow, Path, Sweep};
 use super::node::{Entries, Named, Node};
 use super::test::Test;
-use super::value::{Length, Three};
+use super::value::{Length, Positive, Three};
 use super::{effect, node};
 use crate::axis::AxisKind;
 use crate::driver::DriverUnit;
@@ -26,7 +26,7 @@ pub fn machine(machine: &chain::Machine) -> Machine {
     Machine {
         name: Some(machine.name.clone()),
         chain: machine.code(),
-        rotation: (machine.rotation == Rotation::SmallAngle).then_some(RotationWord::SmallAngle),
+        rotation: (machine.rotation == Rotation::SmallAngle).then_some(Rotation::SmallAngle),
         gravity: Some(Three(machine.gravity)),
         axis: Named(machine.axes.iter().map(|axis| (axis.name.clone(), self::axis(axis))).collect()),
         body: Vec::new(),
@@ -42,10 +42,7 @@ fn axis(axis: &axis::Axis) -> Axis {
         _ => end.to_degrees(),
     };
     Axis {
-        kind: Some(match axis.kind {
-            AxisKind::Rotary => KindWord::Rotary,
-            AxisKind::Linear => KindWord::Linear,
-        }),
+        kind: Some(axis.kind),
         direction: Some(Three(axis.direction)),
         origin_mm: Some(Three(axis.origin_mm)),
         travel_mm: travel(AxisKind::Linear),
@@ -75,7 +72,7 @@ pub fn effect(effect: &Effect, machine: &chain::Machine) -> effect::Effect {
             let is_angle = effect.component.is_angle();
             let (_, unit) = SCALES[usize::from(is_angle)];
             let to = if is_angle { &mut document.scale_arcsec } else { &mut document.scale_um };
-            *to = Some(scale / internal(unit));
+            *to = Some(Positive(scale / internal(unit)));
         }
     }
     document
@@ -87,17 +84,16 @@ pub fn effect(effect: &Effect, machine: &chain::Machine) -> effect::Effect {
 /// ```
 /// use abbe_model::chain::Machine;
 /// use abbe_model::document::{of_domain, print};
-/// use abbe_model::instrument::Station;
-/// use abbe_model::instrument::ballbar::BallBar;
+/// use abbe_model::files::read::add_node;
 /// use abbe_model::instrument::InstrumentKind;
-/// use abbe_model::session::build::NewTest;
-/// use abbe_model::session::motion::Motion;
 /// use abbe_model::session::Session;
+/// use serde_json::json;
 ///
 /// let mut session = Session::new(Machine::from_code("wCAbYXZt")?, InstrumentKind::BallBar);
-/// let bar = BallBar { workpiece_ball: [0.0, 100.0, 0.0], spindle_ball: [0.0; 3], bar: 125.0 };
-/// let turn = Motion::sweep(&session.machine, "C", [0.0, std::f64::consts::TAU], 1.0_f64.to_radians())?;
-/// session.add_test(NewTest::new("C100", Station::BallBar(bar)).at("Z", 75.0).motion(turn))?;
+/// let turn = json!({"axis": "C", "from_deg": 0, "to_deg": 360, "step_deg": 1});
+/// let test = json!({"name": "C100", "bar_mm": 125, "workpiece_ball_mm": [0, 100, 0], "spindle_ball_mm": [0, 0, 0],
+///                   "at": {"z_mm": 75}, "sweep": turn});
+/// add_node(&mut session, "test", test.into(), &[])?;
 /// let text = print::text_of(&of_domain::test(&session.tests[0], &session.machine))?;
 /// assert!(text.starts_with("name = \"C100\"\nbar_mm = 125\n"), "{text}");
 /// # Ok::<(), abbe_model::ModelError>(())
@@ -164,8 +160,8 @@ fn motion(motion: &Motion, machine: &chain::Machine) -> Option<(Vec<usize>, Opti
                 to_deg: in_unit(AxisKind::Rotary, to),
                 step_mm: in_unit(AxisKind::Linear, step),
                 step_deg: in_unit(AxisKind::Rotary, step),
-                feed_mm_min: in_unit(AxisKind::Linear, speed * 60.0),
-                feed_deg_min: in_unit(AxisKind::Rotary, speed * 60.0),
+                feed_mm_min: in_unit(AxisKind::Linear, speed * 60.0).map(Positive),
+                feed_deg_min: in_unit(AxisKind::Rotary, speed * 60.0).map(Positive),
                 runs: often(runs),
                 both_directions: Some(both_directions),
             };
@@ -179,19 +175,16 @@ fn motion(motion: &Motion, machine: &chain::Machine) -> Option<(Vec<usize>, Opti
                 from_deg: Some(degrees(from)),
                 to_deg: Some(degrees(to)),
                 step_deg: degrees(step),
-                feed_mm_min: Some(number(60.0 * speed)),
+                feed_mm_min: Some(Positive(number(60.0 * speed))),
                 runs: often(runs),
                 both_directions: Some(both_directions),
             };
             (vec![first, second], None, Some(Path::Circle(circle)))
         }
         Motion::Follow { axis, from, to, step, speed, runs, both_directions, offset } => {
-            let offset = match offset {
-                FollowOffset::Radial => Offset::Radial,
-                FollowOffset::Tangential => Offset::Tangential,
-                FollowOffset::Axial => Offset::Axial,
-                FollowOffset::None | FollowOffset::Touching => return None,
-            };
+            if matches!(offset, FollowOffset::None | FollowOffset::Touching) {
+                return None;
+            }
             let follow = Follow {
                 axis: name(axis),
                 offset: Some(offset),
@@ -199,7 +192,7 @@ fn motion(motion: &Motion, machine: &chain::Machine) -> Option<(Vec<usize>, Opti
                 to_deg: Some(degrees(to)),
                 step_deg: degrees(step),
                 feed_mm_min: None,
-                feed_deg_min: Some(degrees(60.0 * speed)),
+                feed_deg_min: Some(Positive(degrees(60.0 * speed))),
                 programmed_feed_mm_min: None,
                 runs: often(runs),
                 both_directions: Some(both_directions),

@@ -12,7 +12,10 @@ use crate::error::ModelError;
 /// # Errors
 /// [`ModelError::Session`] if a value has no form in TOML.
 pub fn text_of(document: &impl Serialize) -> Result<String, ModelError> {
-    Ok(DocumentMut::from(table_of(document)?).to_string())
+    match value_of(document)? {
+        Value::InlineTable(inline) => Ok(DocumentMut::from(with_headers(inline, "")).to_string()),
+        _ => Ok(String::new()),
+    }
 }
 
 /// An entry of a list of tables, such as `[[test]]`, with a remark above it.
@@ -49,10 +52,11 @@ fn json(value: Value) -> serde_json::Value {
     }
 }
 
-/// A document as a table: what has a header in a file is a table, everything else stands in a line.
-pub(super) fn table_of(document: &impl Serialize) -> Result<Table, ModelError> {
-    match value_of(document)? {
-        Value::InlineTable(inline) => Ok(with_headers(inline, "")),
+/// An entry of a list of tables as a table: its tables stand in a line, lists of tables such as `[[effect.alias]]` have
+/// headers.
+pub(super) fn table_of(entry: &impl Serialize) -> Result<Table, ModelError> {
+    match value_of(entry)? {
+        Value::InlineTable(inline) => Ok(with_headers(inline, "[]")),
         _ => Ok(Table::new()),
     }
 }

@@ -5,6 +5,7 @@ use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde_json::{Map, Value, json};
 
+use super::fault::Step;
 use super::machine::Machine;
 use super::session::Session;
 use crate::driver::{Driver, unit_suffixes};
@@ -46,16 +47,19 @@ pub(crate) fn shape_keys(entry: &Entry) -> Vec<String> {
     entry.keys.iter().flat_map(names).collect()
 }
 
-/// What a key of a table is, as the end of a sentence; the table by the name of its type.
-pub(crate) fn meaning(table: &str, key: &str) -> Option<String> {
+/// What a key of the table at a path is, as the end of a sentence; of a session or a machine file.
+pub(crate) fn meaning(path: &[Step], key: &str) -> Option<String> {
     let session = session();
-    let of = match table {
-        "session" => &session,
-        table => &session["$defs"][table],
-    };
-    let variants = || session["$defs"]["path"]["oneOf"].as_array().into_iter().flatten();
-    let own = of["properties"].get(key);
-    let property = own.or_else(|| variants().find_map(|variant| variant["properties"].get(key)))?;
+    let property = [&session, &session["$defs"]["machine"]].into_iter().find_map(|root| {
+        let tables = path.iter().fold(alternatives(&session, root), |tables, step| {
+            let inner = tables.into_iter().filter_map(|table| match step {
+                Step::Key(key) => table["properties"].get(key).or_else(|| table.get("additionalProperties")),
+                Step::Item(_) => table.get("items"),
+            });
+            inner.flat_map(|schema| alternatives(&session, schema)).collect()
+        });
+        tables.into_iter().find_map(|table| table["properties"].get(key))
+    })?;
     let text = property["description"].as_str()?.trim_end_matches('.').to_string();
     let mut letters = text.chars();
     let first = letters.next()?;
@@ -63,6 +67,14 @@ pub(crate) fn meaning(table: &str, key: &str) -> Option<String> {
     // An abbreviation keeps its capitals.
     let is_word = !rest.starts_with(char::is_uppercase);
     Some(if is_word { first.to_lowercase().chain(rest.chars()).collect() } else { text })
+}
+
+/// A schema with those that it refers to or chooses between.
+fn alternatives<'s>(root: &'s Value, schema: &'s Value) -> Vec<&'s Value> {
+    let reference = schema["$ref"].as_str().and_then(|name| name.strip_prefix("#/$defs/"));
+    let others = ["anyOf", "oneOf"].into_iter().filter_map(|list| schema[list].as_array()).flatten();
+    let others = others.chain(reference.map(|name| &root["$defs"][name]));
+    std::iter::once(schema).chain(others.flat_map(|other| alternatives(root, other))).collect()
 }
 
 /// The schema of a document that a file holds.

@@ -9,7 +9,7 @@ use super::machine::Machine;
 use super::node::{Entries, Named};
 use super::test::Test;
 use super::tolerance::Tolerance;
-use super::value::Note;
+use super::value::{NotNegative, Note, Positive};
 
 /// session.toml: a machine, a plan of tests, and the readings of the tests that were run. The name of a number contains
 /// its unit.
@@ -40,10 +40,8 @@ pub struct Session {
     #[serde(default, skip_serializing_if = "Unknowns::is_default")]
     pub unknowns: Unknowns,
     /// Layout of the data files.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub format: Option<Format>,
     /// Own name = foreign name or number; the own name contains the unit.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub columns: Option<Columns>,
     /// The effects that the user declares.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -56,10 +54,8 @@ pub struct Session {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub socket_distance: Vec<SocketDistance>,
     /// Limits for decisions of conformity by the rule of ISO 14253-1.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<Tolerance>,
     /// Sizes of the ball bar for checks of clearance against the bodies of the machine.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub clearance: Option<Clearance>,
 }
 
@@ -118,13 +114,9 @@ pub struct Instrument {
     /// "ballbar", "r-test", "probe", "tracker" or "socket".
     pub kind: String,
     /// Noise standard deviation of one scalar reading, µm; estimated if absent.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(range(min = 0))]
-    pub noise_um: Option<f64>,
+    pub noise_um: Option<NotNegative>,
     /// Resolution of a reading, µm.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(range(min = 0))]
-    pub resolution_um: Option<f64>,
+    pub resolution_um: Option<NotNegative>,
 }
 
 /// The errors to estimate.
@@ -135,7 +127,6 @@ pub struct Unknowns {
     /// Errors to estimate: EY0A (location), EYA (motion), e_y0a, θ_z0c; patterns such as E?0C and E?0J*, where ? is one
     /// character and * any number. Default: the position and orientation errors of the rotary axes; for a tracker and for
     /// sockets all location errors of all axes.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub errors: Option<Vec<String>>,
 }
 
@@ -153,12 +144,9 @@ pub struct SocketDistance {
     #[schemars(length(equal = 2))]
     pub between: Vec<String>,
     /// The distance in mm.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub mm: f64,
+    pub mm: Positive,
     /// Its standard uncertainty; absent: exact.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(range(min = 0))]
-    pub u_um: Option<f64>,
+    pub u_um: Option<NotNegative>,
 }
 
 /// Sizes of the ball bar for checks of clearance.
@@ -166,19 +154,13 @@ pub struct SocketDistance {
 #[serde(rename = "clearance", deny_unknown_fields)]
 pub struct Clearance {
     /// Radius of the bar; default 10.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub bar_radius_mm: Option<f64>,
+    pub bar_radius_mm: Option<Positive>,
     /// The stem below the workpiece ball, along -Z of the table frame.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub workpiece_holder: Option<Holder>,
     /// The stem above the spindle ball, along Z of the tool frame.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub spindle_holder: Option<Holder>,
     /// Least clearance of a proposed test; less causes a warning. Default 5.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(range(min = 0))]
-    pub least_mm: Option<f64>,
+    pub least_mm: Option<NotNegative>,
 }
 
 /// A stem that holds a ball.
@@ -186,9 +168,7 @@ pub struct Clearance {
 #[serde(rename = "holder", deny_unknown_fields)]
 pub struct Holder {
     /// Radius of the stem.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub radius_mm: f64,
+    pub radius_mm: Positive,
     /// Its length from the centre of the ball.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub length_mm: f64,
+    pub length_mm: Positive,
 }

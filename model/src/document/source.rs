@@ -140,9 +140,9 @@ impl Parsed<'_> {
                 let known: Vec<&str> = known.iter().map(String::as_str).collect();
                 (format!("{} has the unknown key `{key}`", self.name(&path)), Some(known_names(&key, &known)))
             }
-            Finding::MissingKey { table, key, what } => {
+            Finding::MissingKey { key, what } => {
                 let what =
-                    what.or_else(|| schema::meaning(table, &key)).map_or(String::new(), |what| format!(": {what}"));
+                    what.or_else(|| schema::meaning(&path, &key)).map_or(String::new(), |what| format!(": {what}"));
                 (format!("{} has no `{key}`", self.name(&path)), Some(format!("add `{key}`{what}")))
             }
         };

@@ -16,31 +16,24 @@ pub struct Test {
     /// A name that no other test has.
     pub name: String,
     /// The data file, relative to the session file or to the data folder.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub data: Option<String>,
     /// The keys of the set-up, which depend on the instrument.
     #[serde(rename = "$rest", default)]
     #[schemars(skip)]
     pub set_up: Entries,
     /// Tests with the same name share the workpiece ball (nest, tracker, artefact).
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub setup: Option<String>,
     /// Tests with the same name share the spindle ball (target, stylus).
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub spindle_setup: Option<String>,
     /// Positions of axes that the data do not contain: x_mm, a_deg.
     #[serde(default, skip_serializing_if = "Named::is_empty")]
     pub at: Named<Length>,
     /// Layout of the data file.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub format: Option<Format>,
     /// Own name = foreign name or number; the own name contains the unit.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub columns: Option<Columns>,
     /// One axis moves.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub sweep: Option<Sweep>,
     /// Several axes move together.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub path: Option<Path>,
 }

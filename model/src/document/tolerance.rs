@@ -4,13 +4,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::node::{Entries, Named, Node};
+use super::value::{NotNegative, Positive};
 
 /// Limits for decisions of conformity by the rule of ISO 14253-1.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename = "tolerance", deny_unknown_fields)]
 pub struct Tolerance {
     /// Least probability with which a pass or a fail is true; default 0.95.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.5, "exclusiveMaximum" = 1))]
     pub probability: Option<f64>,
     /// Limits of estimated errors and of parameters of effects: EX0C_um, EB0A_arcsec, EC0Y_um_m.
@@ -27,7 +27,7 @@ pub struct Tolerance {
 #[schemars(rename = "limit", untagged)]
 #[allow(dead_code, reason = "the schema alone uses it")]
 enum Limit {
-    Both(#[schemars(extend("exclusiveMinimum" = 0))] f64),
+    Both(Positive),
     Each(#[schemars(length(equal = 2))] Vec<f64>),
 }
 
@@ -36,35 +36,21 @@ enum Limit {
 #[serde(rename = "test_limits", deny_unknown_fields)]
 pub struct TestLimits {
     /// Standard uncertainty of the instrument besides the noise of its readings, µm.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(range(min = 0))]
-    pub instrument_u_um: Option<f64>,
+    pub instrument_u_um: Option<NotNegative>,
     /// Largest circular deviation G, in either direction.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub circular_deviation_um: Option<f64>,
+    pub circular_deviation_um: Option<Positive>,
     /// Largest bidirectional circular deviation G(b).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub bidirectional_circular_deviation_um: Option<f64>,
+    pub bidirectional_circular_deviation_um: Option<Positive>,
     /// Limits of the radial deviation F.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Limit")]
     pub radial_deviation_um: Option<Node>,
     /// Limits of the mean bidirectional radial deviation D.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Limit")]
     pub mean_bidirectional_radial_deviation_um: Option<Node>,
     /// Largest circular hysteresis H.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub hysteresis_um: Option<f64>,
+    pub hysteresis_um: Option<Positive>,
     /// Largest synchronous error motion of a rotary axis, in either direction.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub synchronous_error_motion_um: Option<f64>,
+    pub synchronous_error_motion_um: Option<Positive>,
     /// Largest asynchronous error motion of a rotary axis, in either direction.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub asynchronous_error_motion_um: Option<f64>,
+    pub asynchronous_error_motion_um: Option<Positive>,
 }

@@ -43,7 +43,7 @@ impl Length {
         let names: Vec<&str> = constants.iter().map(|constant| constant.name.as_str()).collect();
         let length = expression::Length::parse(text, &names).map_err(|fault| {
             let help = "a length is a number or an expression in [constants] with + - * / ^2 sqrt( )";
-            Fault::of_key(format!("= \"{text}\": {fault}"), Some(help.into()))
+            Fault::of_key(format!("= \"{text}\": {fault}"), help)
         })?;
         let number = length.evaluate(&|name: &str| {
             let found = constants.iter().find(|known| known.name == name);
@@ -54,7 +54,7 @@ impl Length {
         }
         if !number.is_finite() {
             let what = format!("= \"{text}\" evaluates to {number} with these constants");
-            return Err(Fault::of_key(what, Some("a root of a negative number, or a division by zero?".into())));
+            return Err(Fault::of_key(what, "a root of a negative number, or a division by zero?"));
         }
         Ok((length, number))
     }
@@ -158,6 +158,34 @@ impl<T: JsonSchema> JsonSchema for Three<T> {
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
         let items = generator.subschema_for::<T>();
         json_schema!({"type": "array", "items": items, "minItems": 3, "maxItems": 3})
+    }
+}
+
+/// A number above 0.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "f64")]
+#[schemars(inline, extend("exclusiveMinimum" = 0))]
+pub struct Positive(pub f64);
+
+impl TryFrom<f64> for Positive {
+    type Error = String;
+
+    fn try_from(number: f64) -> Result<Positive, String> {
+        limits::positive(number).map(Positive)
+    }
+}
+
+/// A number that is not below 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "f64")]
+#[schemars(inline, extend("minimum" = 0))]
+pub struct NotNegative(pub f64);
+
+impl TryFrom<f64> for NotNegative {
+    type Error = String;
+
+    fn try_from(number: f64) -> Result<NotNegative, String> {
+        limits::not_negative(number).map(NotNegative)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use crate::document::fault::{Fault, Within};
+use crate::document::fault::{Fault, Help, Within};
 use crate::document::from_node;
 use crate::document::node::{Entries, Node};
 use crate::driver::{DriverUnit, unit_suffixes};
@@ -77,7 +77,7 @@ impl<'e> KeyReader<'e> {
             if self.unit.to_internal(suffix, 0.0).is_none() {
                 let message = format!("`{name}` for a driver in {}", self.unit.file);
                 let help = format!("use `{}_{}`", key.name, self.unit.file);
-                return Err(Fault::new(message, Some(help)).on_key().at(&name));
+                return Err(Fault::new(message, help).on_key().at(&name));
             }
             if found.is_some() {
                 return Err(Fault::new(format!("`{name}` is given twice, in two units"), None).at(&name));
@@ -92,9 +92,9 @@ impl<'e> KeyReader<'e> {
     }
 
     /// The fault that a key is absent.
-    fn missing(&self, key: &str, help: impl Into<String>) -> Fault {
+    fn missing(&self, key: &str, help: impl Into<Help>) -> Fault {
         let message = format!("the shape \"{}\" needs `{key}`", self.word);
-        Fault::new(message, Some(help.into())).at("shape")
+        Fault::new(message, help).at("shape")
     }
 
     fn missing_quantity(&self, key: &Key, example: &str) -> Fault {
@@ -135,7 +135,7 @@ impl<'e> KeyReader<'e> {
     /// If it is absent or not positive.
     pub fn required_positive(&self, key: &'static str, help: &str) -> Result<f64, Fault> {
         let number: Option<f64> = self.get(key)?;
-        limits::positive(number.ok_or_else(|| self.missing(key, help))?).map_err(Fault::is).within(key)
+        limits::positive(number.ok_or_else(|| self.missing(key, help))?).within(key)
     }
 
     /// A whole number between two limits; `None` if it is absent.
@@ -144,7 +144,7 @@ impl<'e> KeyReader<'e> {
     /// If it is not a whole number between the limits.
     pub fn count(&self, key: &'static str, least: usize, most: usize) -> Result<Option<usize>, Fault> {
         let number: Option<f64> = self.get(key)?;
-        number.map(|number| limits::count(number, least, most).map_err(Fault::is).within(key)).transpose()
+        number.map(|number| limits::count(number, least, most).within(key)).transpose()
     }
 
     /// As [`KeyReader::count`], for a key that is required; `help` says what to add.

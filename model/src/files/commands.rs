@@ -10,25 +10,22 @@ use std::path::{Path, PathBuf};
 
 use csv::StringRecord;
 
-use super::quantity::{self, Unit};
+use super::quantity::Unit;
 use super::stamp::FileStamp;
 use super::store::{OpenFile, Store};
+use super::table::columns::Role;
 use super::table::number;
 use super::table::request::Format;
 use crate::axis::AxisKind;
 use crate::chain::Machine;
-use crate::driver::column;
 use crate::error::{Location, ModelError};
 use crate::session::readings::{AxisTravel, Readings};
 
 /// The content of a column.
 #[derive(Clone, Debug, PartialEq)]
 enum Meaning {
-    Axis(usize, Unit),
-    Time,
-    Run,
-    /// A driver column, `NAME_unit`.
-    Driver(String),
+    /// A time, a run, a driver, the position of an axis.
+    Of(Role),
     Pose(usize, Unit),
     Other,
 }
@@ -147,10 +144,9 @@ impl CommandFile {
             header.iter().enumerate().map(|(place, name)| meaning(machine, name, place == 0)).collect();
         for (place, meaning) in meanings.iter().enumerate() {
             let same = |other: &Meaning| match (meaning, other) {
-                (Meaning::Axis(a, _), Meaning::Axis(b, _)) => a == b,
+                (Meaning::Of(a), Meaning::Of(b)) => a.same_as(b),
                 (Meaning::Pose(a, _), Meaning::Pose(b, _)) => a == b,
-                (Meaning::Other, _) => false,
-                _ => meaning == other,
+                _ => false,
             };
             if let Some(other) = meanings[..place].iter().position(same) {
                 return Err(fault(
@@ -171,7 +167,7 @@ impl CommandFile {
             () if whole(point) && none(axis) && whole(quaternion) => PoseColumns::PointAndQuaternion,
             () => return Err(fault("the columns of the pose are incomplete, or state it twice".into(), expected())),
         };
-        let axes = meanings.iter().any(|meaning| matches!(meaning, Meaning::Axis(..)));
+        let axes = meanings.iter().any(|meaning| matches!(meaning, Meaning::Of(Role::Axis(..))));
         if axes == (poses != PoseColumns::None) {
             let message = if axes {
                 "the file states both axis positions and poses of the tool"
@@ -208,7 +204,7 @@ impl CommandFile {
     /// The axis of each column; `None` for other columns.
     pub fn axis_columns(&self) -> Vec<Option<usize>> {
         let axis = |meaning: &Meaning| match meaning {
-            Meaning::Axis(axis, _) => Some(*axis),
+            Meaning::Of(Role::Axis(axis, _)) => Some(*axis),
             _ => None,
         };
         self.meanings.iter().map(axis).collect()
@@ -227,7 +223,7 @@ impl CommandFile {
     /// A position in the unit of a column, mm and rad inside.
     pub fn in_unit_of(&self, column: usize, position: f64) -> f64 {
         match self.meanings.get(column) {
-            Some(Meaning::Axis(_, unit)) => unit.in_unit(position),
+            Some(Meaning::Of(Role::Axis(_, unit))) => unit.in_unit(position),
             _ => position,
         }
     }
@@ -242,8 +238,8 @@ impl CommandFile {
     /// # Errors
     /// If the file cannot be read on, or is not text.
     pub fn next_block(&mut self, machine: &Machine, most: usize) -> Result<Option<Block>, ModelError> {
-        let has = |wanted: Meaning| self.meanings.contains(&wanted);
-        let (time, run) = (has(Meaning::Time), has(Meaning::Run));
+        let has = |wanted: Role| self.meanings.contains(&Meaning::Of(wanted));
+        let (time, run) = (has(Role::Time), has(Role::Run));
         let mut block = Block {
             rows: Readings { positions: vec![Vec::new(); machine.axes.len()], coordinates: 1, ..Readings::default() },
             poses: Vec::new(),
@@ -274,7 +270,7 @@ impl CommandFile {
             block.rows.positions.iter_mut().zip(&row.positions).for_each(|(column, position)| column.push(*position));
             time.then(|| block.rows.time_s.push(row.time_s));
             for (place, meaning) in self.meanings.iter().enumerate() {
-                if let Meaning::Driver(name) = meaning {
+                if let Meaning::Of(Role::Driver(name)) = meaning {
                     let value = row.drivers.get(place).copied().unwrap_or(f64::NAN);
                     block.rows.drivers.entry(name.clone()).or_default().push(value);
                 }
@@ -320,16 +316,18 @@ impl CommandFile {
             }
             let value = number::number(cell, &Format::default()).map_err(|(fault, _)| format!("`{name}`: {fault}"))?;
             match meaning {
-                Meaning::Axis(axis, unit) => row.positions[*axis] = unit.to_internal(value),
-                Meaning::Time => row.time_s = value,
-                Meaning::Run if value.fract() != 0.0 => return Err(format!("`{name}`: {cell} is no integer")),
-                Meaning::Run => row.run = value as i64,
-                Meaning::Driver(_) => {
+                Meaning::Of(Role::Axis(axis, unit)) => row.positions[*axis] = unit.to_internal(value),
+                Meaning::Of(Role::Time) => row.time_s = value,
+                Meaning::Of(Role::Run) if value.fract() != 0.0 => {
+                    return Err(format!("`{name}`: {cell} is no integer"));
+                }
+                Meaning::Of(Role::Run) => row.run = value as i64,
+                Meaning::Of(Role::Driver(_)) => {
                     row.drivers.resize(place + 1, f64::NAN);
                     row.drivers[place] = value;
                 }
                 Meaning::Pose(part, unit) => row.pose[*part] = unit.to_internal(value),
-                Meaning::Other => {}
+                Meaning::Of(Role::Reading(..) | Role::Socket) | Meaning::Other => {}
             }
         }
         Ok(row)
@@ -355,16 +353,8 @@ impl Row {
 
 fn meaning(machine: &Machine, name: &str, first: bool) -> Meaning {
     let name = if first { name.trim_start_matches('\u{feff}') } else { name };
-    match name {
-        "time_s" => return Meaning::Time,
-        "run" => return Meaning::Run,
-        _ => {}
-    }
-    if let Some(own) = column::of_files(name) {
-        return Meaning::Driver(own.to_string());
-    }
-    if let Some((axis, unit)) = quantity::axis_position(machine, name) {
-        return Meaning::Axis(axis, unit);
+    if let Some(role) = Role::of_machine(name, machine) {
+        return Meaning::Of(role);
     }
     let (stem, unit) = match name.rsplit_once('_') {
         Some((stem, unit)) if POSE[..3].contains(&stem) => (stem, Unit::of_length(unit)),

@@ -9,14 +9,6 @@ pub(crate) const MICROMETRE: f64 = 1e-3;
 /// An inch in mm (exact since 1959).
 const INCH: f64 = 25.4;
 
-/// `linear` or `rotary`.
-pub(crate) fn kind_word(kind: AxisKind) -> &'static str {
-    match kind {
-        AxisKind::Linear => "linear",
-        AxisKind::Rotary => "rotary",
-    }
-}
-
 /// The axis of this name; the case of letters is ignored if that is unambiguous.
 pub(crate) fn axis_index(machine: &Machine, name: &str) -> Option<usize> {
     if let Some(index) = machine.axis_index(name) {
@@ -25,6 +17,11 @@ pub(crate) fn axis_index(machine: &Machine, name: &str) -> Option<usize> {
     let lower = name.to_lowercase();
     let mut alike = (0..machine.axes.len()).filter(|&index| machine.axes[index].name.to_lowercase() == lower);
     alike.next().filter(|_| alike.next().is_none())
+}
+
+/// As [`axis_index`]; the fault names the most similar axis.
+pub(crate) fn axis(machine: &Machine, name: &str) -> Result<usize, (String, String)> {
+    axis_index(machine, name).ok_or_else(|| no_axis(machine, name))
 }
 
 /// Message and help for an unknown axis, with the most similar name.

@@ -40,23 +40,16 @@ pub fn machine(path: &Path) -> Result<Machine, ModelError> {
     machine_of(&machine_source(&Store::Disk, path)?)
 }
 
-/// As [`machine()`], from a machine file that has been read.
+/// As [`machine()`], from a text that has been read.
 ///
 /// # Errors
 /// As [`machine()`].
 pub fn machine_of(source: &Source) -> Result<Machine, ModelError> {
     let options = ReadOptions::default();
     let path = source.file.as_path();
-    let mut files = BodyFiles { from: Some((path, path, &options)), ..BodyFiles::default() };
-    machine_in(&source.parse()?, &mut files)
-}
-
-/// The machine of the text of a machine file; `file` names it in messages.
-///
-/// # Errors
-/// As [`machine()`].
-pub fn machine_of_text(file: &Path, text: &str) -> Result<Machine, ModelError> {
-    machine_in(&Source::new(file, text).parse()?, &mut BodyFiles::default())
+    // A text from no file has no files beside it.
+    let from = source.stamp.is_some().then_some((path, path, &options));
+    machine_in(&source.parse()?, &mut BodyFiles { from, ..BodyFiles::default() })
 }
 
 /// The machine of a document in memory.
@@ -94,20 +87,24 @@ pub fn effects_of_nodes(
     read().within("effect").map_err(|fault| source.error_of(fault))
 }
 
-/// A document of another kind, from the text of its TOML file; `file` names it in messages.
-///
-/// # Errors
-/// As [`machine()`].
-pub fn document_of_text<T: DeserializeOwned>(file: &Path, text: &str) -> Result<T, ModelError> {
-    document_of(&Source::new(file, text))
-}
-
-/// As [`document_of_text`], from a file that has been read.
+/// A document of another kind, from its TOML text.
 ///
 /// # Errors
 /// As [`machine()`].
 pub fn document_of<T: DeserializeOwned>(source: &Source) -> Result<T, ModelError> {
     source.parse()?.document()
+}
+
+/// What follows from a document of another kind. A fault of it has its place in the text.
+///
+/// # Errors
+/// As [`machine()`], and the fault of `lower`.
+pub fn lowered<T: DeserializeOwned, V>(
+    source: &Source,
+    lower: impl FnOnce(&T) -> Result<V, Fault>,
+) -> Result<V, ModelError> {
+    let parsed = source.parse()?;
+    lower(&parsed.document()?).map_err(|fault| parsed.error_of(fault))
 }
 
 /// Reads a session file, its machine and, if requested, its data.
@@ -199,7 +196,7 @@ fn session_machine(path: &Path, options: &ReadOptions, document: &SessionMachine
     let found = path.parent().unwrap_or(Path::new("")).join(named);
     if !options.store.exists(&found) {
         let message = format!("the machine file `{named}` does not exist; looked for {}", found.display());
-        return Err(Fault::new(message, Some("its name is relative to the session file".into())).at("file"));
+        return Err(Fault::new(message, "its name is relative to the session file").at("file"));
     }
     access::check(path, options, ("file", named), &found).within("file")?;
     let source = machine_source(&options.store, &found)?;
@@ -220,7 +217,7 @@ pub fn plan_of_node(node: Node) -> Result<Session, ModelError> {
     let read = || {
         let SessionMachine::Other(tables) = &document.machine else {
             let help = "state the machine's tables in [machine]";
-            return Err(Fault::new("a session in memory has no machine file", Some(help.into())).at("machine"));
+            return Err(Fault::new("a session in memory has no machine file", help).at("machine"));
         };
         let machine = lower::machine(tables, &mut BodyFiles::default()).within("machine")?;
         let mut session = lower::head(machine, &document, &|_| None)?;
@@ -230,26 +227,34 @@ pub fn plan_of_node(node: Node) -> Result<Session, ModelError> {
     read().map_err(|fault| source.error_of(fault))
 }
 
-/// Adds an entry of a list of a session, such as `test`, `effect` or `socket_distance`. A test with `data` has the readings
-/// of the columns, whatever the name of the file. After an error the session is unchanged.
+/// Adds an entry of a list of a session, such as `test`, `effect` or `socket_distance`. A test has the readings of the
+/// columns, if there are any. After an error the session is unchanged.
 ///
 /// A program that has its readings in memory states its tests with the keys of a session file, and gets the same checks,
-/// defaults and messages:
+/// defaults and messages. A ball bar on a five-axis machine; the axis of C is 10 µm away from its nominal position along X:
 ///
 /// ```
-/// use abbe_model::files::read::{add_node, plan_of_node};
-/// use abbe_model::files::table::memory::{MemoryColumn, Values};
+/// use abbe_model::chain::Machine;
+/// use abbe_model::files::read::add_node;
+/// use abbe_model::files::table::memory::MemoryColumn;
+/// use abbe_model::instrument::InstrumentKind;
+/// use abbe_model::session::Session;
 /// use serde_json::json;
 ///
-/// let machine = json!({"chain": "w C b Z t", "axis": {"C": {}, "Z": {}}});
-/// let head = json!({"machine": machine, "instrument": {"kind": "ballbar"}});
-/// let mut session = plan_of_node(head.into())?;
+/// let mut session = Session::new(Machine::from_code("[wCAbYXZt]")?, InstrumentKind::BallBar);
 /// let test = json!({"name": "C125", "bar_mm": 125, "workpiece_ball_mm": [0, 100, 0], "spindle_ball_mm": [0, 0, 0],
-///                   "at": {"z_mm": 75}, "data": "C125.csv"});
-/// let columns = [("c_deg", [0.0, 90.0]), ("length_mm", [125.0, 125.0])];
-/// let columns = columns.each_ref().map(|(name, values)| MemoryColumn { name, values: Values::Numbers(values), missing: &[] });
+///                   "at": {"z_mm": 75}});
+/// let c_rad: Vec<f64> = (0..360).map(|degree| f64::from(degree).to_radians()).collect();
+/// let read = |c: &f64| ((0.01 - 100.0 * c.sin()).powi(2) + (100.0 * c.cos()).powi(2) + 75.0_f64.powi(2)).sqrt();
+/// let length_mm: Vec<f64> = c_rad.iter().map(read).collect();
+/// let columns = [MemoryColumn::numbers("c_rad", &c_rad), MemoryColumn::numbers("length_mm", &length_mm)];
 /// add_node(&mut session, "test", test.into(), &columns)?;
-/// assert_eq!(session.tests[0].readings.as_ref().map(|readings| readings.rows()), Some(2));
+/// assert_eq!(session.tests[0].readings.as_ref().map(|readings| readings.rows()), Some(360));
+///
+/// // Without the position of Z, the bar does not reach from ball to ball.
+/// let test = json!({"name": "again", "bar_mm": 125, "workpiece_ball_mm": [0, 100, 0], "spindle_ball_mm": [0, 0, 0]});
+/// let fault = add_node(&mut session, "test", test.into(), &columns).unwrap_err();
+/// assert!(fault.to_string().contains("a bar of 125.0000 mm cannot reach between its balls"));
 /// # Ok::<(), abbe_model::ModelError>(())
 /// ```
 ///

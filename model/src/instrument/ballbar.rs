@@ -14,7 +14,7 @@ use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::Fault as KeyFault;
 use crate::frames::Point;
 use crate::scalar::{Nominal, Scalar};
-use crate::session::{Prior, limits};
+use crate::session::Prior;
 
 /// Both balls, the length of the bar, the gain of the sensor.
 pub const PARAMETERS: [InstrumentParameter; 8] = [
@@ -172,9 +172,6 @@ impl Instrument for BallBar<f64> {
     }
     fn following(&self) -> Following {
         Following::AtBar
-    }
-    fn invalid_length(&self) -> Option<String> {
-        limits::not_positive("bar", self.bar)
     }
     /// The distance between the balls is the length of the bar.
     fn check_set_up(&self, checked: &Checked<'_>) -> Result<(), Fault> {

@@ -138,10 +138,6 @@ pub trait Instrument {
     fn balls_mut(&mut self) -> Option<[&mut [f64; 3]; 2]> {
         None
     }
-    /// What is wrong with the lengths of the set-up.
-    fn invalid_length(&self) -> Option<String> {
-        None
-    }
     /// Checks that the instrument nominally fits at the positions of the readings.
     ///
     /// # Errors

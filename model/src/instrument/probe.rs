@@ -23,7 +23,7 @@ use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::Fault as KeyFault;
 use crate::frames::Point;
 use crate::scalar::{Nominal, Scalar};
-use crate::session::{Prior, limits};
+use crate::session::Prior;
 
 /// The pose of the artefact on the table, its radius, its form deviation; the stylus in the tool frame.
 pub const PARAMETERS: [InstrumentParameter; 11] = [
@@ -252,9 +252,6 @@ impl Instrument for Probe<f64> {
         let missing = !has(Quantity::Length) && !has(Quantity::Outward);
         let help = "a probe needs `distance_mm` to the surface, or `deviation_um`, the deviation outwards";
         missing.then(|| ("with the probe readings".into(), help.into()))
-    }
-    fn invalid_length(&self) -> Option<String> {
-        limits::not_positive("radius", self.radius)
     }
     /// The stylus is in front of the artefact and near it at every reading.
     fn check_set_up(&self, checked: &Checked<'_>) -> Result<(), Fault> {

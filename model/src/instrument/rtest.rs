@@ -119,7 +119,7 @@ fn read_sensors(keys: &SetUpReader<'_>) -> Result<Option<[[f64; 3]; 3]>, KeyFaul
              angles)"
         );
         let help = "three coordinates need three independent measuring directions; check the directions";
-        return Err(KeyFault::new(message, Some(help.into())).at("sensor_directions"));
+        return Err(KeyFault::new(message, help).at("sensor_directions"));
     }
     Ok(Some([a, b, c]))
 }

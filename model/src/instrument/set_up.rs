@@ -119,7 +119,7 @@ impl<'e> SetUpReader<'e> {
     /// If it is absent, no length or not above zero.
     pub fn positive_length(&self, key: &str, what: &str) -> Result<Written, Fault> {
         let length = self.written(&self.require(key, what)?).within(key)?;
-        limits::positive(length.mm).map_err(Fault::is).within(key)?;
+        limits::positive(length.mm).within(key)?;
         Ok(length)
     }
 
@@ -233,7 +233,7 @@ impl<'e> SetUpReader<'e> {
         match (self.entries.get(first), self.entries.get(second)) {
             (Some(_), Some(_)) => {
                 let message = format!("both `{first}` and `{second}`");
-                Err(Fault::new(message, Some(help.into())).on_key().at(second))
+                Err(Fault::new(message, help).on_key().at(second))
             }
             _ => Ok(()),
         }
@@ -249,13 +249,10 @@ fn unit(vector: &Vector) -> Result<[f64; 3], Fault> {
 fn prior(Uncertainty(u): Uncertainty) -> Result<Prior, Fault> {
     if u < 0.0 {
         let help = "0 means exactly known, `inf` means unknown";
-        return Err(Fault::of_key(
-            format!("is {}; an uncertainty cannot be negative", words::number(u)),
-            Some(help.into()),
-        ));
+        return Err(Fault::of_key(format!("is {}; an uncertainty cannot be negative", words::number(u)), help));
     }
     if let Some(fault) = limits::too_small_um(u) {
-        return Err(Fault::of_key(format!("is {fault}"), Some("0 means exactly known".into())));
+        return Err(Fault::of_key(format!("is {fault}"), "0 means exactly known"));
     }
     Ok(if u == 0.0 {
         Prior::Known

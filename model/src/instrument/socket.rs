@@ -61,7 +61,7 @@ fn read(keys: &SetUpReader<'_>) -> Result<SetUp, KeyFault> {
     let stated = keys.stated_point("socket_mm")?;
     if stated.is_some() && name.is_none() {
         let help = "add `socket = \"…\"`, the name of the socket of all poses of the test";
-        return Err(KeyFault::new("`socket_mm` without the name of the socket", Some(help.into())).at("socket_mm"));
+        return Err(KeyFault::new("`socket_mm` without the name of the socket", help).at("socket_mm"));
     }
     let is_located = stated.is_some();
     let socket = stated.unwrap_or_else(|| [0.0; 3].map(Written::number));

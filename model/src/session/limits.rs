@@ -36,11 +36,6 @@ pub(crate) fn too_small_um(number: f64) -> Option<String> {
         .then(|| format!("{} µm; the least value other than 0 is {MIN_UM:e} µm", words::number(number)))
 }
 
-/// The fault of a length with this name that is not above zero.
-pub(crate) fn not_positive(name: &str, number: f64) -> Option<String> {
-    (number <= 0.0).then(|| format!("`{name}` is {}; it must be greater than 0", words::number(number)))
-}
-
 /// A number above zero, or what is wrong with it.
 pub(crate) fn positive(number: f64) -> Result<f64, String> {
     if number > 0.0 { Ok(number) } else { Err(format!("{}; it must be greater than 0", words::number(number))) }

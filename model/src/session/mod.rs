@@ -1,11 +1,8 @@
 //! Sessions: a machine, a plan of tests, and the readings of the tests that were run.
 //!
-//! A session is validated and in mm, rad and s. [`build`] makes it in memory; [`files`](crate::files) reads and writes
-//! it.
+//! A session is validated and in mm, rad and s. [`files`](crate::files) reads it, from files or memory, and writes it.
 
-pub mod build;
 pub(crate) mod check;
-pub mod columns;
 pub mod expression;
 pub mod limits;
 pub mod motion;
@@ -64,6 +61,25 @@ pub struct Session {
 }
 
 impl Session {
+    /// A session without tests. The errors to be estimated are the defaults of the instrument; the noise is estimated.
+    pub fn new(machine: Machine, instrument: InstrumentKind) -> Session {
+        Session {
+            unknowns: instrument.default_errors(&machine),
+            machine: Arc::new(machine),
+            constants: Vec::new(),
+            instrument,
+            noise_mm: None,
+            resolution_mm: None,
+            effects: Vec::new(),
+            tests: Vec::new(),
+            socket_distances: Vec::new(),
+            tolerance: None,
+            clearance: None,
+            warnings: Vec::new(),
+            about: Vec::new(),
+        }
+    }
+
     /// Reference time and temperature, from which the drivers of effects count.
     pub fn reference(&self) -> Reference {
         Reference::of(self.tests.iter().filter_map(|test| test.readings.as_deref()))

@@ -1,5 +1,8 @@
 //! Motion of the axes in a planned test.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use crate::axis::AxisKind;
 use crate::chain::Machine;
 use crate::error::ModelError;
@@ -100,7 +103,9 @@ impl Motion {
 }
 
 /// Direction of the bar while linear axes follow a rotary axis (ISO 10791-6, BK1 and BK2).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(inline)]
 pub enum FollowOffset {
     /// Away from the axis.
     Radial,
@@ -109,8 +114,10 @@ pub enum FollowOffset {
     /// Along the axis.
     Axial,
     /// No bar: the tool point follows the point of the table below it at the start.
+    #[serde(skip)]
     None,
     /// No bar: the tool point follows the instrument's point of the table.
+    #[serde(skip)]
     Touching,
 }
 

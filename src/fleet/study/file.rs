@@ -151,7 +151,7 @@ pub struct Study {
 /// # Errors
 /// With file and line or key of what cannot be used.
 pub fn read(path: &Path) -> Result<Study, FleetError> {
-    let source = files::text(path, "the study file").map_err(|fault| FleetError::Request(fault.to_string()))?;
+    let source = files::text(path, "the study file")?;
     let text = &source.text;
     let fault = |what: String| FleetError::Request(format!("{}: {what}", path.display()));
     let file: StudyFile = document_of(&source)?;
@@ -164,8 +164,7 @@ pub fn read(path: &Path) -> Result<Study, FleetError> {
     for plan in &file.plan {
         let place = folder.join(&plan.session);
         let options = ReadOptions { allow_outside: true, ..ReadOptions::default() };
-        let (session, sources) =
-            files::session_with_sources(&place, &options).map_err(|error| FleetError::Request(error.to_string()))?;
+        let (session, sources) = files::session_with_sources(&place, &options)?;
         for read in sources.files.iter().filter_map(FileStamp::read) {
             digest.update(read.sha256);
         }

@@ -33,9 +33,13 @@ fn error_functions_beyond_the_largest_value() {
     let file = folder.path().join("errors.toml");
     for (error, form, message) in [
         ("EXX", "polynomial = { um = [1e300] }", "1e300, which is too large; the limit is 1e12"),
-        ("EXX", "table = { at_mm = [-1e308, 1e308], um = [0, 1] }", "-1e308, which is too large; the limit is 1e12"),
+        (
+            "EXX",
+            "table = { at_mm = [-1e308, 1e308], um = [0, 1] }",
+            "errors.toml:3: `at_mm` is -1e308, which is too large; the limit is 1 km",
+        ),
         ("EXC", "harmonic = { order = 1e300, amplitude_um = 1 }", "1e300, which is too large; the limit is 1e12"),
-        ("EXX", "polynomial = { um = [nan] }", "`NaN` is not a finite number"),
+        ("EXX", "polynomial = { um = [nan] }", "errors.toml:3: `um` is NaN; a number is expected"),
         (
             "EXX",
             "polynomial = { scale_mm = 1e-300, um = [0, 1, 1] }",

@@ -10,7 +10,6 @@ use crate::document::{machine as document, session};
 use crate::files::access::{self, ReadOptions};
 use crate::files::source_map::BodyFile;
 use crate::files::{quantity, stl};
-use crate::session::limits;
 
 /// The files of bodies: where they may lie, and which were read.
 #[derive(Default)]
@@ -29,7 +28,7 @@ impl BodyFiles<'_> {
     fn surface(&mut self, body: &str, named: &str) -> Result<BodyShape, Fault> {
         let Some((reader, beside, options)) = self.from else {
             let help = "write the machine to a file beside the STL file";
-            return Err(Fault::new("`stl` names a file, but this text is in none", Some(help.into())));
+            return Err(Fault::new("`stl` names a file, but this text is in none", help));
         };
         let found = access::folder(beside).join(named);
         if !options.store.exists(&found) {
@@ -38,7 +37,7 @@ impl BodyFiles<'_> {
         }
         access::check(reader, options, ("stl", named), &found)?;
         let surface = stl::surface(&options.store, &found)
-            .map_err(|(message, help)| Fault::new(format!("{} {message}", found.display()), Some(help)))?;
+            .map_err(|(message, help)| Fault::new(format!("{} {message}", found.display()), help))?;
         if surface.open_edges > 0 {
             self.warnings.push(format!(
                 "body `{body}`: the surface of {named} is not closed: {} of its edges belong to one triangle only; \
@@ -73,34 +72,30 @@ fn body(
     let name = document.name.clone();
     if others.iter().any(|other| other.name == name) {
         let help = "give each its own name";
-        return Err(Fault::new(format!("two bodies are called `{name}`"), Some(help.into())).at("name"));
+        return Err(Fault::new(format!("two bodies are called `{name}`"), help).at("name"));
     }
     let axis = document.axis.as_ref().map(|text| {
-        quantity::axis_index(machine, text).ok_or_else(|| {
-            let (message, help) = quantity::no_axis(machine, text);
-            Fault::new(message, Some(format!("{help}; a body of the bed has no `axis`"))).at("axis")
+        quantity::axis(machine, text).map_err(|(message, help)| {
+            Fault::new(message, format!("{help}; a body of the bed has no `axis`")).at("axis")
         })
     });
     let axis = axis.transpose()?;
     let shape = match (&document.box_mm, &document.capsule, &document.stl) {
         (Some(corners), None, None) => cuboid(corners).within("box_mm")?,
         (None, Some(capsule), None) => {
-            let radius_mm = limits::positive(capsule.radius_mm).map_err(Fault::is);
-            let radius_mm = radius_mm.within("radius_mm").within("capsule")?;
-            BodyShape::Capsule { ends_mm: [capsule.from_mm.0, capsule.to_mm.0], radius_mm }
+            BodyShape::Capsule { ends_mm: [capsule.from_mm.0, capsule.to_mm.0], radius_mm: capsule.radius_mm.0 }
         }
         (None, None, Some(file)) => files.surface(&name, file).within("stl")?,
         _ => {
             let help = "box_mm = [[-160, -160, -60], [160, 160, -10]], or capsule = { from_mm = [0, 0, 60], to_mm = [0, 0, 300], radius_mm = 40 }, or stl = \"table.stl\"; in R with all axes at zero";
-            return Err(Fault::new(format!("body `{name}` has no shape, or two"), Some(help.into())));
+            return Err(Fault::new(format!("body `{name}` has no shape, or two"), help));
         }
     };
     Ok(Body { name, axis, shape })
 }
 
 fn cuboid(corners: &[Vector]) -> Result<BodyShape, Fault> {
-    let fault =
-        |message: &str| Fault::new(message, Some("the least corner, then the greatest: [[x, y, z], [x, y, z]]".into()));
+    let fault = |message: &str| Fault::new(message, "the least corner, then the greatest: [[x, y, z], [x, y, z]]");
     match corners {
         [low, high] if (0..3).all(|i| low.0[i] < high.0[i]) => Ok(BodyShape::Box { low_mm: low.0, high_mm: high.0 }),
         [_, _] => Err(fault("`box_mm`: a coordinate of the second corner is not greater than that of the first")),
@@ -109,24 +104,13 @@ fn cuboid(corners: &[Vector]) -> Result<BodyShape, Fault> {
 }
 
 /// The sizes of a ball bar.
-pub(super) fn clearance(document: &session::Clearance) -> Result<ClearanceSizes, Fault> {
+pub(super) fn clearance(document: &session::Clearance) -> ClearanceSizes {
     let usual = ClearanceSizes::default();
-    let holder = |document: Option<session::Holder>, key: &str| {
-        let positive = |number: f64, of: &str| limits::positive(number).map_err(Fault::is).within(of).within(key);
-        let holder = document.map(|holder| {
-            Ok::<_, Fault>(Holder {
-                radius_mm: positive(holder.radius_mm, "radius_mm")?,
-                length_mm: positive(holder.length_mm, "length_mm")?,
-            })
-        });
-        holder.transpose()
-    };
-    let bar_radius_mm = limits::positive(document.bar_radius_mm.unwrap_or(usual.bar_radius_mm)).map_err(Fault::is);
-    let least_mm = limits::not_negative(document.least_mm.unwrap_or(usual.least_mm)).map_err(Fault::is);
-    Ok(ClearanceSizes {
-        bar_radius_mm: bar_radius_mm.within("bar_radius_mm")?,
-        workpiece_holder: holder(document.workpiece_holder, "workpiece_holder")?,
-        spindle_holder: holder(document.spindle_holder, "spindle_holder")?,
-        least_mm: least_mm.within("least_mm")?,
-    })
+    let holder = |holder: session::Holder| Holder { radius_mm: holder.radius_mm.0, length_mm: holder.length_mm.0 };
+    ClearanceSizes {
+        bar_radius_mm: document.bar_radius_mm.map_or(usual.bar_radius_mm, |radius| radius.0),
+        workpiece_holder: document.workpiece_holder.map(holder),
+        spindle_holder: document.spindle_holder.map(holder),
+        least_mm: document.least_mm.map_or(usual.least_mm, |least| least.0),
+    }
 }

@@ -7,6 +7,7 @@ use crate::component::ErrorKind;
 use crate::document::effect as document;
 use crate::document::fault::{Fault, Within};
 use crate::document::schema;
+use crate::document::value::Positive;
 use crate::driver::{Driver, column};
 use crate::effect::keys::KeyReader;
 use crate::effect::shape::{Entry, SHAPES};
@@ -14,7 +15,7 @@ use crate::effect::{CoefficientPrior, Component, Effect, Shape};
 use crate::files::quantity;
 use crate::files::spelling::known_names;
 use crate::instrument::{InstrumentParameter, InternalUnit};
-use crate::session::limits::{self, MIN_UM};
+use crate::session::limits::MIN_UM;
 use crate::words::{self, listed};
 
 /// The effect with its aliases; `columns` are the driver columns of the data, `NAME_unit`.
@@ -55,7 +56,7 @@ fn one(
     let Some(entry) = entry else {
         let words: Vec<&str> = SHAPES.iter().map(|entry| entry.word).collect();
         let message = format!("\"{word}\" is not a shape");
-        return Err(Fault::new(message, Some(known_names(word, &words))).at("shape"));
+        return Err(Fault::new(message, known_names(word, &words)).at("shape"));
     };
     let axis = driver.kind_of_axis(context.machine, component.axis(context.machine));
     let kind = driver.kind();
@@ -64,7 +65,7 @@ fn one(
     drop(kind);
     entry.follows.check(&driver, driver.axis_kind(context.machine)).map_err(|help| {
         let message = format!("the shape \"{}\" cannot have the driver \"{driver}\"", shape.word());
-        Fault::new(message, Some(help.to_string())).at("shape")
+        Fault::new(message, help).at("shape")
     })?;
     let tests = tests(document.tests.as_deref().unwrap_or_default(), declared).within("tests")?;
     let prior = prior(document, &component, &shape, context.instrument.unknowns())?;
@@ -90,10 +91,8 @@ fn component(context: &Context<'_>, text: &str) -> Result<Component, Fault> {
     };
     match Component::parse(text) {
         Some(Component::Axis(mut name)) => {
-            let Some(index) = quantity::axis_index(context.machine, &name.axis) else {
-                let (message, help) = quantity::no_axis(context.machine, &name.axis);
-                return Err(Fault::new(format!("effect on \"{text}\": {message}"), Some(help)));
-            };
+            let index = quantity::axis(context.machine, &name.axis)
+                .map_err(|(message, help)| Fault::new(format!("effect on \"{text}\": {message}"), help))?;
             name.axis.clone_from(&context.machine.axes[index].name);
             Ok(Component::Axis(name))
         }
@@ -105,7 +104,7 @@ fn component(context: &Context<'_>, text: &str) -> Result<Component, Fault> {
                 .any(|unknown| unknown.thing == thing && unknown.coordinate == coordinate);
             if !own {
                 let message = format!("effect on \"{text}\", which a {} does not have", context.instrument.word());
-                return Err(Fault::new(message, Some(format!("it has {}", instrument()))));
+                return Err(Fault::new(message, format!("it has {}", instrument())));
             }
             Ok(Component::Instrument { thing, coordinate })
         }
@@ -115,7 +114,7 @@ fn component(context: &Context<'_>, text: &str) -> Result<Component, Fault> {
                 "errors of axes according to ISO 230-1, such as EZC or EX0C; parameters of the instrument: {}; or trigger",
                 instrument()
             );
-            Err(Fault::new(format!("\"{text}\" is not a component"), Some(help)))
+            Err(Fault::new(format!("\"{text}\" is not a component"), help))
         }
     }
 }
@@ -135,7 +134,7 @@ fn driver(
             _ => {
                 let words: Vec<String> = Driver::words().iter().map(|word| format!("\"{word}\"")).collect();
                 let help = format!("add `driver`: an axis, {}", listed(&words, "or"));
-                Err(Fault::of_table("has no `driver`", Some(help)))
+                Err(Fault::of_table("has no `driver`", help))
             }
         };
     };
@@ -150,13 +149,13 @@ fn driver(
             let columns = columns.iter().map(String::as_str);
             let others: Vec<&str> = Driver::words().into_iter().chain(columns).collect();
             let help = format!("{help}; other drivers are {}, and columns as NAME_unit", listed(&others, "and"));
-            return Err(Fault::new(format!("effect driven by \"{text}\": {message}"), Some(help)).at("driver"));
+            return Err(Fault::new(format!("effect driven by \"{text}\": {message}"), help).at("driver"));
         }
         (other, ..) => other,
     };
     let own = component.axis(context.machine).map(|axis| context.machine.axes[axis].kind);
     let checked = driver.kind().check_component(&component.to_string(), own);
-    checked.map_err(|fault| Fault::new(fault.message, Some(fault.help.into())).at("driver"))?;
+    checked.map_err(|fault| Fault::new(fault.message, fault.help).at("driver"))?;
     Ok(driver)
 }
 
@@ -170,7 +169,7 @@ fn tests(names: &[String], declared: &[Declared]) -> Result<Vec<String>, Fault> 
             None => {
                 let names: Vec<&str> = declared.iter().map(|test| test.name.as_str()).collect();
                 let message = format!("no test has the name \"{name}\"");
-                return Err(Fault::new(message, Some(known_names(name, &names))).at_item(item));
+                return Err(Fault::new(message, known_names(name, &names)).at_item(item));
             }
         }
     }
@@ -200,7 +199,7 @@ fn prior(
     let mut prior = CoefficientPrior::default_of(shape);
     let mut stated = false;
     for ((key, unit), scale) in SCALES.into_iter().zip([document.scale_um, document.scale_arcsec]) {
-        let Some(scale) = scale else { continue };
+        let Some(Positive(scale)) = scale else { continue };
         if component.unit(parameters) != Some(unit) {
             let other = SCALES.iter().find(|(_, other)| component.unit(parameters) == Some(*other));
             let help = match other {
@@ -208,9 +207,8 @@ fn prior(
                 None => "remove it: this component has no unit of length or angle".to_string(),
             };
             let message = format!("`{key}` for the component \"{component}\"");
-            return Err(Fault::new(message, Some(help)).on_key().at(key));
+            return Err(Fault::new(message, help).on_key().at(key));
         }
-        limits::positive(scale).map_err(Fault::is).within(key)?;
         if !(MIN_UM..=MAX_SCALE).contains(&scale) {
             return Err(
                 Fault::is(format!("{}; it must be between {MIN_UM} and {MAX_SCALE}", words::number(scale))).at(key)
@@ -222,11 +220,11 @@ fn prior(
     if let Some(name) = &document.family {
         if stated {
             let help = "omit `family` to use the stated scale, or omit the scale to estimate it for the family";
-            return Err(Fault::new("`family` beside a stated scale", Some(help.into())).at("family"));
+            return Err(Fault::new("`family` beside a stated scale", help).at("family"));
         }
         if name.is_empty() {
             let help = "such as \"compliance\"";
-            return Err(Fault::new("the name of a family is empty", Some(help.into())).at("family"));
+            return Err(Fault::new("the name of a family is empty", help).at("family"));
         }
         prior = CoefficientPrior::Family(name.clone());
     }

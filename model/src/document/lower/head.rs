@@ -7,7 +7,7 @@ use crate::document::fault::{Fault, Within};
 use crate::document::from_node;
 use crate::document::node::{Entries, Named, Value};
 use crate::document::session as document;
-use crate::document::value::Note;
+use crate::document::value::{NotNegative, Note};
 use crate::files::quantity::{self, MICROMETRE};
 use crate::instrument::{InstrumentKind, SharedBy};
 use crate::pattern;
@@ -21,7 +21,7 @@ pub(super) fn about(notes: &Named<Note>) -> Result<Vec<(String, String)>, Fault>
         if key.chars().any(char::is_control) || key.trim().is_empty() {
             let help = "use names such as `serial_number`, `operator`, `date`, `comment`";
             let message = "a note of [about] has a name that cannot be displayed";
-            return Err(Fault::new(message, Some(help.into())).on_key().at(key));
+            return Err(Fault::new(message, help).on_key().at(key));
         }
         Ok((key.clone(), text.clone()))
     };
@@ -39,7 +39,7 @@ pub(super) fn constants(entries: &Entries, comment: impl Fn(&str) -> Option<Stri
         if !valid {
             let help = "a name is a letter followed by letters, digits and `_`; `sqrt` is reserved";
             let message = format!("a constant cannot have the name `{name}`");
-            return Err(Fault::new(message, Some(help.into())).on_key().at(name));
+            return Err(Fault::new(message, help).on_key().at(name));
         }
         if !matches!(node.value, Value::Table(_)) {
             return Ok(Constant { name: name.clone(), mm: from_node(node).within(name)?, means: comment(name) });
@@ -60,12 +60,9 @@ pub(super) fn instrument(document: &document::Instrument) -> Result<(InstrumentK
         let words: Vec<String> = InstrumentKind::ALL.iter().map(|kind| format!("\"{}\"", kind.word())).collect();
         Fault::unexpected(listed(&words, "or")).at("kind")
     })?;
-    let in_mm = |um: Option<f64>, key: &str| {
-        let mm = um.map(|um| match limits::too_small_um(limits::not_negative(um)?) {
-            Some(fault) => Err(fault),
-            None => Ok(um * MICROMETRE),
-        });
-        mm.transpose().map_err(Fault::is).within(key)
+    let in_mm = |um: Option<NotNegative>, key: &str| {
+        let mm = um.map(|NotNegative(um)| limits::too_small_um(um).map_or(Ok(um * MICROMETRE), Err));
+        mm.transpose().within(key)
     };
     let resolution_mm = in_mm(document.resolution_um, "resolution_um")?.filter(|step| *step > 0.0);
     Ok((kind, in_mm(document.noise_um, "noise_um")?, resolution_mm))
@@ -114,7 +111,7 @@ fn matching(machine: &Machine, text: &str) -> Result<Vec<ErrorName>, Fault> {
             "`?` matches one character and `*` any number of them: \"E?0C\" for the location errors of C, \"E?0J*\" for those of all joints; the axes are {}",
             axes.join(", ")
         );
-        return Err(Fault::new(format!("\"{text}\" matches no error of the machine"), Some(help)));
+        return Err(Fault::new(format!("\"{text}\" matches no error of the machine"), help));
     }
     Ok(found)
 }
@@ -123,15 +120,11 @@ fn matching(machine: &Machine, text: &str) -> Result<Vec<ErrorName>, Fault> {
 fn error_name(machine: &Machine, text: &str) -> Result<ErrorName, Fault> {
     let Some(mut name) = ErrorName::parse(text) else {
         let help = "ISO 230-1 names such as \"EY0A\" (location) and \"EYA\" (motion), or `e_y0a`, `θ_z0c`";
-        return Err(Fault::new(format!("\"{text}\" is not the name of an error"), Some(help.into())));
+        return Err(Fault::new(format!("\"{text}\" is not the name of an error"), help));
     };
-    match quantity::axis_index(machine, &name.axis) {
-        Some(index) => name.axis.clone_from(&machine.axes[index].name),
-        None => {
-            let (message, help) = quantity::no_axis(machine, &name.axis);
-            return Err(Fault::new(format!("\"{text}\": {message}"), Some(help)));
-        }
-    }
+    let index = quantity::axis(machine, &name.axis)
+        .map_err(|(message, help)| Fault::new(format!("\"{text}\": {message}"), help))?;
+    name.axis.clone_from(&machine.axes[index].name);
     Ok(name)
 }
 
@@ -154,7 +147,7 @@ pub(super) fn socket_distances(
                 known.dedup();
                 let help = format!("sockets here: {}", known.join(", "));
                 let message = format!("no test has the socket \"{socket}\"");
-                return Err(Fault::new(message, Some(help)).at_item(item).at("between"));
+                return Err(Fault::new(message, help).at_item(item).at("between"));
             }
         }
         let between = <[String; 2]>::try_from(document.between.clone())
@@ -162,9 +155,8 @@ pub(super) fn socket_distances(
         if between[0] == between[1] {
             return Err(Fault::of_key("needs two different sockets", None).at("between"));
         }
-        let distance_mm = limits::positive(document.mm).map_err(Fault::is).within("mm")?;
-        let u_um = limits::not_negative(document.u_um.unwrap_or(0.0)).map_err(Fault::is).within("u_um")?;
-        Ok(SocketDistance { between, distance_mm, u_mm: u_um * MICROMETRE })
+        let u_um = document.u_um.unwrap_or_default().0;
+        Ok(SocketDistance { between, distance_mm: document.mm.0, u_mm: u_um * MICROMETRE })
     };
     documents.iter().enumerate().map(|(item, document)| distance(document).within_item(item)).collect()
 }

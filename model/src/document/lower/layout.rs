@@ -42,16 +42,16 @@ pub(super) fn format(document: &document::Format) -> Result<Format, Fault> {
         format.encoding = Some(encoding::of_name(name).ok_or_else(|| {
             let help = "common are \"utf-8\", \"latin1\", \"utf-16le\", \"utf-16be\"; others have their name in the WHATWG Encoding Standard, such as \"shift_jis\"";
             let what = format!("is \"{name}\", which is not a known encoding");
-            Fault::of_key(what, Some(help.into())).at("encoding")
+            Fault::of_key(what, help).at("encoding")
         })?);
     }
     if let Some(lines) = document.skip_lines {
-        format.skip_lines = limits::count(lines as f64, 0, MANY).map_err(Fault::is).within("skip_lines")?;
+        format.skip_lines = limits::count(lines as f64, 0, MANY).within("skip_lines")?;
     }
     if format.decimal == format.separator && document.decimal.is_some() {
         let message = "the decimal comma is also the separator (\",\" unless declared)";
         let help = "declare the separator of the columns, such as `separator = \";\"`";
-        return Err(Fault::new(message, Some(help.into())).at("decimal"));
+        return Err(Fault::new(message, help).at("decimal"));
     }
     Ok(format)
 }

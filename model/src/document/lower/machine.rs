@@ -6,11 +6,8 @@ use crate::chain::Machine;
 use crate::code::StructuralCode;
 use crate::document::fault::{Fault, Within};
 use crate::document::machine as document;
-use crate::document::machine::{KindWord, RotationWord};
 use crate::document::value::Vector;
-use crate::files::quantity;
 use crate::files::spelling::known_names;
-use crate::frames::Rotation;
 
 /// The machine; `files` knows where the surfaces of its bodies lie.
 pub(crate) fn machine(document: &document::Machine, files: &mut BodyFiles<'_>) -> Result<Machine, Fault> {
@@ -26,7 +23,7 @@ pub(crate) fn machine(document: &document::Machine, files: &mut BodyFiles<'_>) -
             let known: Vec<&str> = code.axes().map(String::as_str).collect();
             let message = format!("axis `{name}` is not in the chain `{text}`");
             let help = format!("add it to `chain` or remove its table; {}", known_names(name, &known));
-            return Err(Fault::new(message, Some(help)).on_key().at(name).at("axis"));
+            return Err(Fault::new(message, help).on_key().at(name).at("axis"));
         }
     }
     let axes = code.axes().map(|name| {
@@ -40,10 +37,7 @@ pub(crate) fn machine(document: &document::Machine, files: &mut BodyFiles<'_>) -
         name: document.name.clone().unwrap_or_else(|| text.clone()),
         workpiece_side: code.workpiece_side.len(),
         axes: axes.collect::<Result<_, Fault>>()?,
-        rotation: document.rotation.map_or(Rotation::Exact, |word| match word {
-            RotationWord::Exact => Rotation::Exact,
-            RotationWord::SmallAngle => Rotation::SmallAngle,
-        }),
+        rotation: document.rotation.unwrap_or_default(),
         gravity,
         bodies: Vec::new(),
     };
@@ -53,27 +47,24 @@ pub(crate) fn machine(document: &document::Machine, files: &mut BodyFiles<'_>) -
 
 fn axis(name: &str, document: &document::Axis) -> Result<Axis, Fault> {
     let of_letter = AxisKind::of_letter(name);
-    let stated = document.kind.map(|word| match word {
-        KindWord::Rotary => AxisKind::Rotary,
-        KindWord::Linear => AxisKind::Linear,
-    });
-    if let (Some(letter), Some(stated)) = (of_letter, stated)
+    if let (Some(letter), Some(stated)) = (of_letter, document.kind)
         && letter != stated
     {
-        let (by_letter, by_key) = (quantity::kind_word(letter), quantity::kind_word(stated));
         let help = "A B C are rotary and X Y Z U V W linear; give another axis another name, such as `J1`";
-        let message = format!("axis `{name}` is {by_letter} by ISO 841, not {by_key}");
-        return Err(Fault::new(message, Some(help.into())).at("kind"));
+        let message = format!("axis `{name}` is {letter} by ISO 841, not {stated}");
+        return Err(Fault::new(message, help).at("kind"));
     }
     let no_letter = |what: &str, help: &str| {
-        Fault::new(format!("axis `{name}` is not an ISO 841 letter and has no `{what}`"), Some(help.into()))
+        Fault::new(format!("axis `{name}` is not an ISO 841 letter and has no `{what}`"), help)
     };
-    let kind =
-        stated.or(of_letter).ok_or_else(|| no_letter("kind", "add `kind = \"rotary\"` or `kind = \"linear\"`"))?;
+    let kind = document
+        .kind
+        .or(of_letter)
+        .ok_or_else(|| no_letter("kind", "add `kind = \"rotary\"` or `kind = \"linear\"`"))?;
     let direction = match &document.direction {
         Some(vector) => unit(vector).ok_or_else(|| {
             let help = "a direction of any length above 0, such as [0, 0, 1]";
-            Fault::new(format!("`direction` of axis `{name}` is zero"), Some(help.into())).at("direction")
+            Fault::new(format!("`direction` of axis `{name}` is zero"), help).at("direction")
         })?,
         None => Axis::direction_of_letter(name).ok_or_else(|| {
             let help = "add `direction`: the direction in R along or about which it moves, such as [0, 0, 1]";
@@ -88,8 +79,8 @@ fn travel(name: &str, kind: AxisKind, document: &document::Axis) -> Result<Optio
     let (mm, deg) = (("travel_mm", &document.travel_mm), ("travel_deg", &document.travel_deg));
     let ((right, ends), (wrong, other)) = if kind == AxisKind::Linear { (mm, deg) } else { (deg, mm) };
     if other.is_some() {
-        let message = format!("`{wrong}` for the {} axis `{name}`", quantity::kind_word(kind));
-        return Err(Fault::new(message, Some(format!("use `{right}`"))).on_key().at(wrong));
+        let message = format!("`{wrong}` for the {kind} axis `{name}`");
+        return Err(Fault::new(message, format!("use `{right}`")).on_key().at(wrong));
     }
     let Some(ends) = ends else { return Ok(None) };
     match ends[..] {

@@ -162,11 +162,10 @@ pub(crate) fn add(session: &mut Session, document: Parts<'_>, surroundings: &Sur
         .tolerance
         .map(|limits| tolerance::tolerance(&session.machine, &session.unknowns, &names, limits).within("tolerance"));
     let tolerance = tolerance.transpose()?;
-    let clearance = document.clearance.map(|sizes| body::clearance(sizes).within("clearance")).transpose()?;
     session.tests = tests;
     session.effects.extend(effects);
     session.socket_distances.extend(distances);
-    session.clearance = clearance.or(session.clearance);
+    session.clearance = document.clearance.map(body::clearance).or(session.clearance);
     session.tolerance = tolerance.or(session.tolerance.take());
     session.warnings.extend(found.warnings.iter().cloned());
     Ok(found)

@@ -4,7 +4,7 @@ use super::Context;
 use crate::axis::{Axis, AxisKind};
 use crate::document::fault::{Fault, Within};
 use crate::document::movement as document;
-use crate::document::movement::Offset;
+use crate::document::value::Positive;
 use crate::files::quantity;
 use crate::instrument::{Following, Station};
 use crate::session::limits;
@@ -30,7 +30,7 @@ pub(super) fn sweep(
         }
         right.map(|number| kind.to_internal(number)).ok_or_else(|| {
             let key = format!("{name}_{}", kind.unit());
-            Fault::of_table(format!("has no `{key}`"), Some(format!("add `{key}`")))
+            Fault::of_table(format!("has no `{key}`"), format!("add `{key}`"))
         })
     };
     let from = end("from", document.from_mm, document.from_deg)?;
@@ -69,17 +69,14 @@ fn circle(context: &Context<'_>, document: &document::Circle) -> Result<Motion, 
         return Err(Fault::of_key(format!("= \"{plane}\" names one axis twice"), None).at("plane"));
     }
     let (_, radius) = document.radius_mm.in_mm(context.constants).within("radius_mm")?;
-    limits::positive(radius).map_err(Fault::is).within("radius_mm")?;
+    limits::positive(radius).within("radius_mm")?;
     let mut centre = [0.0; 3];
     for (item, (to, length)) in centre.iter_mut().zip(document.centre_mm.iter().flat_map(|point| &point.0)).enumerate()
     {
         (_, *to) = length.in_mm(context.constants).within_item(item).within("centre_mm")?;
     }
     let range = StepRange::turn(document.from_deg, document.to_deg, document.step_deg)?;
-    let speed = match document.feed_mm_min {
-        Some(feed) => limits::positive(feed).map_err(Fault::is).within("feed_mm_min")? / 60.0,
-        None => DEFAULT_FEED_MM_S,
-    };
+    let speed = document.feed_mm_min.map_or(DEFAULT_FEED_MM_S, |feed| feed.0 / 60.0);
     let (runs, both_directions) = runs_and_directions(document.runs, document.both_directions, range.steps())?;
     let StepRange { from, to, step } = range;
     Ok(Motion::Circle { first, second, radius, centre, from, to, step, speed, runs, both_directions })
@@ -98,12 +95,10 @@ fn follow(context: &Context<'_>, document: &document::Follow, station: &Station<
         return Err(Fault::new(message, None));
     }
     let offset = match (station.following(), document.offset) {
-        (Following::AtBar, Some(Offset::Radial)) => FollowOffset::Radial,
-        (Following::AtBar, Some(Offset::Tangential)) => FollowOffset::Tangential,
-        (Following::AtBar, Some(Offset::Axial)) => FollowOffset::Axial,
+        (Following::AtBar, Some(offset)) => offset,
         (Following::AtBar, None) => return Err(Fault::missing("offset", "\"radial\", \"tangential\" or \"axial\"")),
         (Following::Touching(message, help), Some(_)) => {
-            return Err(Fault::new(message, Some(help.into())).on_key().at("offset"));
+            return Err(Fault::new(message, help).on_key().at("offset"));
         }
         (Following::Apart, Some(_)) => {
             let known = ["axis", "from_deg", "to_deg", "step_deg", "feed_mm_min", "feed_deg_min"];
@@ -124,7 +119,7 @@ fn follow(context: &Context<'_>, document: &document::Follow, station: &Station<
 }
 
 fn named_axis(context: &Context<'_>, name: &str) -> Result<usize, Fault> {
-    Ok(quantity::axis_index(context.machine, name).ok_or_else(|| quantity::no_axis(context.machine, name))?)
+    Ok(quantity::axis(context.machine, name)?)
 }
 
 fn moved_axis(context: &Context<'_>, name: &str) -> Result<(usize, AxisKind), Fault> {
@@ -159,7 +154,7 @@ impl StepRange {
         let range = StepRange { from, to, step };
         if range.steps() > MAX_READINGS as f64 {
             let message = format!("{:.2e} steps; the limit is {MAX_READINGS} readings", range.steps());
-            return Err(Fault::new(message, Some("use a larger step".into())).at(key));
+            return Err(Fault::new(message, "use a larger step").at(key));
         }
         if range.steps() < 1.0 {
             return Err(Fault::is("larger than the whole motion").at(key));
@@ -178,21 +173,19 @@ fn speed(
     context: &Context<'_>,
     axis: usize,
     station: &Station<f64>,
-    mm: Option<f64>,
-    deg: Option<f64>,
+    mm: Option<Positive>,
+    deg: Option<Positive>,
 ) -> Result<f64, Fault> {
-    let positive = |number: f64, key: &str| limits::positive(number).map_err(Fault::is).within(key);
     match (context.machine.axes[axis].kind, mm, deg) {
         (_, Some(_), Some(_)) => Err(Fault::new("both `feed_mm_min` and `feed_deg_min`", None).at("feed_deg_min")),
         (kind, None, None) => Ok(default_speed(kind)),
-        (AxisKind::Linear, Some(feed), None) => Ok(positive(feed, "feed_mm_min")? / 60.0),
+        (AxisKind::Linear, Some(feed), None) => Ok(feed.0 / 60.0),
         (AxisKind::Linear, None, Some(_)) => {
             Err(Fault::new("`feed_deg_min` for a linear axis", None).at("feed_deg_min"))
         }
-        (AxisKind::Rotary, None, Some(deg)) => Ok(positive(deg, "feed_deg_min")?.to_radians() / 60.0),
+        (AxisKind::Rotary, None, Some(deg)) => Ok(deg.0.to_radians() / 60.0),
         (AxisKind::Rotary, Some(feed), None) => {
-            let feed_mm_s = positive(feed, "feed_mm_min")? / 60.0;
-            Ok(feed_mm_s / radius_on_axis(context, axis, station).within("feed_mm_min")?)
+            Ok(feed.0 / 60.0 / radius_on_axis(context, axis, station).within("feed_mm_min")?)
         }
     }
 }
@@ -202,19 +195,18 @@ fn programmed_speed(
     context: &Context<'_>,
     axis: usize,
     station: &Station<f64>,
-    feed: f64,
+    feed: Positive,
     document: &document::Follow,
 ) -> Result<f64, Fault> {
     const KEY: &str = "programmed_feed_mm_min";
-    let feed_mm_s = limits::positive(feed).map_err(Fault::is).within(KEY)? / 60.0;
     for (key, other) in [("feed_mm_min", document.feed_mm_min), ("feed_deg_min", document.feed_deg_min)] {
         if other.is_some() {
             let help = "the programmed feed determines the speed of the ball: keep one of them";
-            return Err(Fault::new(format!("both `{KEY}` and `{key}`"), Some(help.into())).at(key));
+            return Err(Fault::new(format!("both `{KEY}` and `{key}`"), help).at(key));
         }
     }
     let radius = radius_on_axis(context, axis, station).within(KEY)?;
-    Ok(feed_mm_s / programmed_over_path_feed(radius) / radius)
+    Ok(feed.0 / 60.0 / programmed_over_path_feed(radius) / radius)
 }
 
 /// Distance of the carried ball from a rotary axis, mm.
@@ -225,7 +217,7 @@ fn radius_on_axis(context: &Context<'_>, axis: usize, station: &Station<f64>) ->
     };
     let radius = radius_about(&context.machine.axes[axis], carried);
     if radius < 1e-3 {
-        return Err(Fault::of_key("of a ball that lies on its axis of rotation", Some("use `feed_deg_min`".into())));
+        return Err(Fault::of_key("of a ball that lies on its axis of rotation", "use `feed_deg_min`"));
     }
     Ok(radius)
 }
@@ -241,7 +233,7 @@ fn radius_about(axis: &Axis, point: [f64; 3]) -> f64 {
 /// The number of runs, and whether each has both directions; the default is one run in both directions.
 fn runs_and_directions(runs: Option<u64>, both: Option<bool>, steps: f64) -> Result<(usize, bool), Fault> {
     let stated = runs.is_some();
-    let runs = limits::count(runs.unwrap_or(1) as f64, 1, MAX_READINGS).map_err(Fault::is).within("runs")?;
+    let runs = limits::count(runs.unwrap_or(1) as f64, 1, MAX_READINGS).within("runs")?;
     if stated && runs as f64 * (steps + 1.0) * 2.0 > MAX_READINGS as f64 {
         let message = format!("{runs} runs of {steps:.0} steps; the limit is {MAX_READINGS} readings");
         return Err(Fault::new(message, None).at("runs"));

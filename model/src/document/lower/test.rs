@@ -43,15 +43,16 @@ pub(super) fn tests(
     let motion = match (&document.sweep, &document.path) {
         (Some(_), Some(_)) => {
             let help = "a test moves one axis (`sweep`) or several together (`path`)";
-            return Err(Fault::of_table("has both `sweep` and `path`", Some(help.into())));
+            return Err(Fault::of_table("has both `sweep` and `path`", help));
         }
         (Some(sweep), None) => Some(movement::sweep(context, sweep, &station).within("sweep")?),
         (None, Some(path)) => Some(movement::path(context, path, &station).within("path")?),
         (None, None) => None,
     };
-    if document.data.is_none() && matches!(motion, None | Some(Motion::List)) {
+    let is_measured = document.data.is_some() || matches!(context.data, Data::Columns([_, ..]));
+    if !is_measured && matches!(motion, None | Some(Motion::List)) {
         let help = "add `data = \"….csv\"`, or the motion of the axes: `sweep = { … }` or `path = { … }`";
-        return Err(Fault::of_table("has neither data nor a motion", Some(help.into())));
+        return Err(Fault::of_table("has neither data nor a motion", help));
     }
 
     planned::centre_circle(context.machine, &station, motion.as_ref(), &listed, &mut at);
@@ -72,11 +73,10 @@ pub(super) fn tests(
         at_written,
         readings: None,
     };
-    let Some(data) = &document.data else {
+    if !is_measured {
         check::plan(context.machine, &test)?;
-        return Ok(vec![test]);
-    };
-    if matches!(context.data, Data::None) {
+    }
+    if !is_measured || matches!(context.data, Data::None) {
         return Ok(vec![test]);
     }
 
@@ -93,7 +93,8 @@ pub(super) fn tests(
     let (by_socket, warnings) = match context.data {
         Data::Columns(columns) => memory::read(columns, &request)?,
         _ => {
-            let data = table::read(&data_file(context, data).within("data")?, &request)?;
+            let named = document.data.as_deref().unwrap_or_default();
+            let data = table::read(&data_file(context, named).within("data")?, &request)?;
             found.stamps.push(data.stamp);
             (data.by_socket, data.warnings)
         }
@@ -109,7 +110,7 @@ pub(super) fn tests(
         };
         if test.socket.is_some() {
             let what = "names a socket, and a column of its data names sockets too";
-            return Err(Fault::of_table(what, Some("keep one of them".into())));
+            return Err(Fault::of_table(what, "keep one of them"));
         }
         tests.push(Test {
             name: format!("{name}/{socket}"),
@@ -125,7 +126,7 @@ pub(super) fn tests(
 fn set_up(context: &Context<'_>, entries: &Entries) -> Result<SetUp, Fault> {
     let own = context.instrument.entry();
     let is_own = |name: &str| own.keys.iter().any(|known| known.name == name);
-    for (name, _) in entries.0.iter().filter(|(name, _)| !is_own(name)) {
+    if let Some((name, _)) = entries.0.iter().find(|(name, _)| !is_own(name)) {
         let of_other = InstrumentKind::ALL.iter().find(|kind| kind.entry().keys.iter().any(|key| key.name == *name));
         return Err(match of_other {
             Some(kind) => {
@@ -159,7 +160,7 @@ fn at(context: &Context<'_>, entries: &Named<value::Length>) -> Result<HeldPosit
         let Some((axis, unit)) = quantity::axis_position(machine, key) else {
             let known: Vec<String> = machine.axes.iter().map(|axis| axis.column("")).collect();
             let help = format!("known: {}", known.join(", "));
-            return Err(Fault::new(format!("`at` has the unknown position `{key}`"), Some(help)).on_key().at(key));
+            return Err(Fault::new(format!("`at` has the unknown position `{key}`"), help).on_key().at(key));
         };
         if held.listed[axis] {
             let message = format!("`at` gives the position of axis `{}` twice", machine.axes[axis].name);

@@ -6,6 +6,7 @@ use crate::document::fault::{Fault, Within};
 use crate::document::from_node;
 use crate::document::node::{Node, Value};
 use crate::document::tolerance as document;
+use crate::document::value::Positive;
 use crate::files::quantity;
 use crate::files::spelling::known_names;
 use crate::session::limits;
@@ -25,7 +26,7 @@ pub(super) fn tolerance(
     let probability = document.probability.unwrap_or(Tolerance::PROBABILITY);
     if !(probability > 0.5 && probability < 1.0) {
         let help = "the probability with which a pass or a fail is true: above 0.5 and below 1, usually 0.95";
-        return Err(Fault::of_key(format!("is {probability}"), Some(help.into())).at("probability"));
+        return Err(Fault::of_key(format!("is {probability}"), help).at("probability"));
     }
     let mut limits: Vec<Limit> = Vec::new();
     for (key, node) in &document.errors.0 {
@@ -39,20 +40,20 @@ pub(super) fn tolerance(
     for (test, figures) in &document.tests.0 {
         if !tests.contains(&test.as_str()) {
             let message = format!("[tolerance.tests] names the test `{test}`, which the session does not have");
-            return Err(Fault::new(message, Some(known_names(test, tests))).on_key().at(test).at("tests"));
+            return Err(Fault::new(message, known_names(test, tests)).on_key().at(test).at("tests"));
         }
         limits.extend(of_test(test, figures).within(test).within("tests")?);
     }
     if limits.is_empty() {
         let help = "add a limit, such as `EC0Y_um_m = 20` to [tolerance.errors] or `circular_deviation_um = 10` to the \
                     table of a test in [tolerance.tests], or remove [tolerance]";
-        return Err(Fault::new("[tolerance] states no limit", Some(help.into())).on_key());
+        return Err(Fault::new("[tolerance] states no limit", help).on_key());
     }
     Ok(Tolerance { probability, limits })
 }
 
 fn of_parameter(machine: &Machine, unknowns: &[ErrorName], key: &str, node: &Node) -> Result<Limit, Fault> {
-    let fault = |message: String, help: &str| Fault::new(message, Some(help.to_string())).on_key().at(key);
+    let fault = |message: String, help: &str| Fault::new(message, help).on_key().at(key);
     let split = |(suffix, unit): &(&str, &'static str)| Some((key.strip_suffix(suffix)?, *unit));
     let Some((id, unit)) = UNITS.iter().find_map(split) else {
         return Err(fault(
@@ -92,9 +93,8 @@ fn of_parameter(machine: &Machine, unknowns: &[ErrorName], key: &str, node: &Nod
 }
 
 fn of_test(test: &str, document: &document::TestLimits) -> Result<Vec<Limit>, Fault> {
-    let instrument_u_um =
-        limits::not_negative(document.instrument_u_um.unwrap_or(0.0)).map_err(Fault::is).within("instrument_u_um")?;
-    let number = |number: Option<f64>| number.map(Node::from);
+    let instrument_u_um = document.instrument_u_um.unwrap_or_default().0;
+    let number = |number: Option<Positive>| number.map(|number| Node::from(number.0));
     let mut limits = Vec::new();
     for (figure, node) in [
         (TestFigure::CircularDeviation, number(document.circular_deviation_um)),
@@ -123,7 +123,7 @@ fn interval(node: &Node) -> Result<[f64; 2], Fault> {
         [lower, upper] if lower < upper => Ok([lower, upper]),
         _ => Err(Fault::of_key(
             "is not a number above 0 or a list of the least and the largest permitted value",
-            Some("write 20 for -20 to 20, or [-5, 20]".into()),
+            "write 20 for -20 to 20, or [-5, 20]",
         )),
     }
 }

@@ -6,6 +6,7 @@ use super::encoding::name_of;
 use super::number::number;
 use super::request::{ColumnMapping, ForeignColumn, Request};
 use super::row::Row;
+use crate::chain::Machine;
 use crate::driver::column;
 use crate::error::{Location, ModelError};
 use crate::files::quantity::{self, Unit};
@@ -14,7 +15,7 @@ use crate::instrument::column::Quantity;
 
 /// The content of a column.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Role {
+pub(in crate::files) enum Role {
     Time,
     Run,
     /// A driver column, `NAME_unit`.
@@ -36,22 +37,27 @@ pub(super) struct Column {
 }
 
 impl Role {
-    /// Parses one of our names.
-    pub fn of(name: &str, request: &Request<'_>) -> Option<Role> {
+    /// Parses one of our names that no instrument has: a time, a run, a driver, the position of an axis.
+    pub fn of_machine(name: &str, machine: &Machine) -> Option<Role> {
         match name {
             "time_s" => return Some(Role::Time),
             "run" => return Some(Role::Run),
             _ => {}
         }
-        if let Some(own) = column::of_files(name) {
-            return Some(Role::Driver(own.to_string()));
+        match column::of_files(name) {
+            Some(own) => Some(Role::Driver(own.to_string())),
+            None => quantity::axis_position(machine, name).map(|(axis, unit)| Role::Axis(axis, unit)),
         }
+    }
+
+    /// Parses one of our names.
+    pub fn of(name: &str, request: &Request<'_>) -> Option<Role> {
         let own = request.test.station.columns();
         if own.iter().any(|column| column.unit.is_empty() && column.stem == name) {
             return Some(Role::Socket);
         }
-        if let Some((axis, unit)) = quantity::axis_position(request.machine, name) {
-            return Some(Role::Axis(axis, unit));
+        if let Some(role) = Role::of_machine(name, request.machine) {
+            return Some(role);
         }
         let (what, unit) = name.rsplit_once('_')?;
         let unit = Unit::of_length(unit)?;

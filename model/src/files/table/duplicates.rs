@@ -6,7 +6,7 @@
 //! with neither column is taken as it is.
 
 use std::collections::HashMap;
-use std::hash::{DefaultHasher, Hash, Hasher};
+use std::hash::{DefaultHasher, Hasher};
 use std::ops::Range;
 use std::path::Path;
 
@@ -15,10 +15,10 @@ use crate::session::readings::Readings;
 /// Largest number of lines listed in a message.
 const MAX_LISTED: usize = 8;
 
-/// A hash of all cells of a row.
-pub(super) fn hash_of(cells: &[String]) -> u64 {
+/// A hash of all cells of a row, which `add` adds.
+pub(super) fn hash_of(add: impl FnOnce(&mut DefaultHasher)) -> u64 {
     let mut hasher = DefaultHasher::new();
-    cells.hash(&mut hasher);
+    add(&mut hasher);
     hasher.finish()
 }
 

@@ -1,5 +1,6 @@
-//! Readings from rows of cells, by the roles of their columns.
+//! Readings from the rows of a file or of columns in memory, by the roles of their columns.
 
+use std::hash::DefaultHasher;
 use std::path::{Path, PathBuf};
 
 use super::columns::{self, Column, Role};
@@ -19,6 +20,47 @@ const MAX_SOCKETS: usize = 1000;
 
 /// Readings of one data file: one set per socket in the file, else one.
 pub(crate) type BySocket = Vec<(Option<String>, Readings)>;
+
+/// The cells of one row.
+pub(super) trait Cells {
+    /// The number in a column, or what is wrong with it.
+    fn number(&self, column: &Column) -> Result<f64, Fault>;
+    /// The text in a column.
+    fn text(&self, column: &Column) -> &str;
+    /// The error of a fault in a column, with its place.
+    fn error(&self, column: &Column, fault: Fault) -> ModelError;
+    /// Adds all cells of the row to a hash.
+    fn hash(&self, hasher: &mut DefaultHasher);
+}
+
+/// A row of a file.
+struct FileRow<'r> {
+    file: &'r Path,
+    row: &'r Row,
+    format: &'r Format,
+}
+
+impl Cells for FileRow<'_> {
+    fn number(&self, column: &Column) -> Result<f64, Fault> {
+        number(self.text(column), self.format).map_err(|(message, help)| (message, help.to_string()))
+    }
+
+    fn text(&self, column: &Column) -> &str {
+        &self.row.cells[column.index]
+    }
+
+    fn error(&self, column: &Column, (message, help): Fault) -> ModelError {
+        ModelError::Input {
+            location: Location { span: self.row.span(column.index), ..Location::line(self.file, self.row.line) },
+            message: format!("{}: {message}", self.row.place(column.index, &column.name)),
+            help: Some(help),
+        }
+    }
+
+    fn hash(&self, hasher: &mut DefaultHasher) {
+        std::hash::Hash::hash(&self.row.cells, hasher);
+    }
+}
 
 /// Reads the rows of a data file. Returns the readings, and warnings about the file.
 ///
@@ -42,28 +84,45 @@ pub(super) fn read(
     let width = first.cells.len();
     let header = has_header.then_some(&first);
     let columns = columns::columns(request, file, &first, header)?;
-    required::required(request, file, first.line, &columns, header.map(|row| row.cells.as_slice()))?;
-    let mut filled = ReadingColumns::new(request, file, columns);
+    let names = header.map(|row| row.cells.as_slice());
+    required::required(request, &columns, names).map_err(|(message, help)| ModelError::Input {
+        location: Location::line(file, first.line),
+        message,
+        help: Some(help),
+    })?;
+    let mut filled = Filled::new(request, columns, 0);
+    let push = |filled: &mut Filled<'_>, row: &Row| {
+        let cells = FileRow { file, row, format: &request.format };
+        filled.push(&cells)?;
+        filled.line.push(row.line);
+        if filled.can_have_copies() {
+            filled.cells.push(duplicates::hash_of(|hasher| cells.hash(hasher)));
+        }
+        Ok::<(), ModelError>(())
+    };
     if header.is_none() {
-        filled.push(&first)?;
+        push(&mut filled, &first)?;
     }
     while let Some(row) = rows.next_row()? {
         if row.cells.len() != width {
             return Err(wrong_width(file, &row, width, &request.format));
         }
-        filled.push(&row)?;
+        push(&mut filled, &row)?;
     }
-    let (readings, warning) = filled.without_duplicates();
-    match readings.line.len() {
-        0 => Err(empty("a header without readings")),
-        1 => Err(ModelError::Input {
-            location: Location::line(file, readings.line[0]),
+    let warning = filled.remove_duplicates(file);
+    match filled.line[..] {
+        [] => Err(empty("a header without readings")),
+        [line] => Err(ModelError::Input {
+            location: Location::line(file, line),
             message: "one reading, which is not enough for a fit".into(),
-            help: Some("a test needs at least two readings, and as many as it has parameters".into()),
+            help: Some(NOT_ENOUGH.into()),
         }),
-        _ => Ok((readings.by_socket(), warning.into_iter().collect())),
+        _ => Ok((filled.by_socket(Some(file)), warning.into_iter().collect())),
     }
 }
+
+/// What to do about a test with fewer than two readings.
+pub(super) const NOT_ENOUGH: &str = "a test needs at least two readings, and as many as it has parameters";
 
 fn wrong_width(file: &Path, row: &Row, width: usize, format: &Format) -> ModelError {
     let found = row.cells.len();
@@ -81,157 +140,138 @@ fn wrong_width(file: &Path, row: &Row, width: usize, format: &Format) -> ModelEr
     }
 }
 
-/// The columns while they are filled.
-struct ReadingColumns<'a> {
+/// The readings while they are filled.
+pub(super) struct Filled<'a> {
     request: &'a Request<'a>,
-    file: PathBuf,
     columns: Vec<Column>,
-    readings: Readings,
-    /// The line of each row.
-    line: Vec<usize>,
+    pub readings: Readings,
+    /// The line or item of each row, from 1.
+    pub line: Vec<usize>,
     /// The socket of each row, as an index into `sockets`.
     socket: Vec<usize>,
     sockets: Vec<String>,
-    /// A hash of the cells of each row, over all columns of the file.
-    cells: Vec<u64>,
+    /// A hash of the cells of each row, over all columns; empty if there can be no copies.
+    pub cells: Vec<u64>,
 }
 
-impl<'a> ReadingColumns<'a> {
-    fn new(request: &'a Request<'a>, file: &Path, columns: Vec<Column>) -> Self {
-        ReadingColumns {
-            request,
-            file: file.to_path_buf(),
-            columns,
-            readings: Readings {
-                positions: vec![Vec::new(); request.machine.axes.len()],
-                coordinates: request.instrument().coordinates(),
-                ..Readings::default()
-            },
-            line: Vec::new(),
-            socket: Vec::new(),
-            sockets: Vec::new(),
-            cells: Vec::new(),
-        }
-    }
-
-    /// Removes rows that are copies of earlier ones, with a message that lists them.
-    fn without_duplicates(mut self) -> (Self, Option<String>) {
-        let Some(kept) = duplicates::kept(&self.readings, &self.cells) else {
-            return (self, None);
+impl<'a> Filled<'a> {
+    /// Nothing yet, with room for some rows.
+    pub fn new(request: &'a Request<'a>, columns: Vec<Column>, rows: usize) -> Self {
+        let coordinates = request.instrument().coordinates();
+        let mut readings = Readings {
+            positions: vec![Vec::with_capacity(rows); request.machine.axes.len()],
+            coordinates,
+            observed: Vec::with_capacity(rows * coordinates),
+            ..Readings::default()
         };
-        let message = duplicates::message(&self.file, &self.line, &kept);
-        self.readings = self.readings.of_rows(&kept);
-        self.line = kept.iter().map(|row| self.line[*row]).collect();
-        if !self.socket.is_empty() {
-            self.socket = kept.iter().map(|row| self.socket[*row]).collect();
+        for column in &columns {
+            match &column.role {
+                Role::Time => readings.time_s.reserve_exact(rows),
+                Role::Run => readings.run.reserve_exact(rows),
+                Role::Driver(name) => _ = readings.drivers.insert(name.clone(), Vec::with_capacity(rows)),
+                Role::Axis(..) | Role::Reading(..) | Role::Socket => {}
+            }
         }
-        (self, Some(message))
+        let (line, socket, sockets, cells) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Filled { request, columns, readings, line, socket, sockets, cells }
     }
 
-    fn push(&mut self, row: &Row) -> Result<(), ModelError> {
+    /// Adds a row.
+    ///
+    /// # Errors
+    /// A cell that is not what its column expects, with its place.
+    pub fn push(&mut self, row: &impl Cells) -> Result<(), ModelError> {
         let readings = &mut self.readings;
         let mut observed = [0.0; 3];
         for (positions, &at) in readings.positions.iter_mut().zip(&self.request.test.at) {
             positions.push(at);
         }
         for column in &self.columns {
-            let cell = row.cells[column.index].as_str();
+            let fault = |message: String, help: &str| row.error(column, (message, help.to_string()));
             if column.role == Role::Socket {
-                let index = socket_index(&mut self.sockets, cell).map_err(|(message, help)| ModelError::Input {
-                    location: Location::line(&self.file, row.line),
-                    message,
-                    help: Some(help),
-                })?;
-                self.socket.push(index);
+                let index = socket_index(&mut self.sockets, row.text(column));
+                self.socket.push(index.map_err(|fault| row.error(column, fault))?);
                 continue;
             }
-            let fault = |message: String, help: &str| ModelError::Input {
-                location: Location { span: row.span(column.index), ..Location::line(&self.file, row.line) },
-                message: format!("{}: {message}", row.place(column.index, &column.name)),
-                help: Some(help.to_string()),
-            };
-            let value = number(cell, &self.request.format).map_err(|(message, help)| fault(message, help))?;
+            let value = row.number(column).map_err(|fault| row.error(column, fault))?;
             match &column.role {
                 Role::Time => {
                     if let Some(&before) = readings.time_s.last()
                         && let Some(message) = check::decreasing_time(before, value)
                     {
-                        return Err(fault(
-                            message,
-                            "sort the rows by time, or omit the time column from [columns] if it has no meaning",
-                        ));
+                        return Err(fault(message, "sort the rows by time, or omit the times if they have no meaning"));
                     }
                     readings.time_s.push(value);
                 }
                 Role::Run => {
-                    readings.run.push(run_number(value).ok_or_else(|| {
-                        fault(
-                            format!("`{cell}` is not a run number"),
+                    if value.fract() != 0.0 || value.abs() > 1e9 {
+                        return Err(fault(
+                            format!("`{}` is not a run number", crate::words::number(value)),
                             "run numbers are integers, one for each traversal in one direction",
-                        )
-                    })?);
+                        ));
+                    }
+                    readings.run.push(value as i64);
                 }
-                Role::Driver(name) => match readings.drivers.get_mut(name) {
-                    Some(values) => values.push(value),
-                    None => _ = readings.drivers.insert(name.clone(), vec![value]),
-                },
+                Role::Driver(name) => {
+                    if let Some(values) = readings.drivers.get_mut(name) {
+                        values.push(value);
+                    }
+                }
                 Role::Axis(axis, unit) => {
                     if let Some(last) = readings.positions[*axis].last_mut() {
                         *last = unit.to_internal(value);
                     }
                 }
                 Role::Reading(quantity, unit) => {
-                    let coordinate = if let Quantity::Coordinate(i) = quantity { *i } else { 0 };
-                    observed[coordinate] = self::observed(*quantity, unit.to_internal(value), self.request);
+                    let value = unit.to_internal(value);
+                    let (coordinate, value) = match quantity {
+                        Quantity::Coordinate(i) => (*i, value),
+                        Quantity::Length => (0, value),
+                        Quantity::Deviation => (0, self.request.bar_mm() + value),
+                        Quantity::Outward => (0, -value),
+                        Quantity::Socket => (0, 0.0),
+                    };
+                    observed[coordinate] = value;
                 }
                 Role::Socket => {}
             }
         }
-        self.cells.push(duplicates::hash_of(&row.cells));
-        self.line.push(row.line);
         readings.observed.extend(&observed[..readings.coordinates]);
         Ok(())
     }
 
-    /// The readings, split by socket if a column names it.
-    fn by_socket(self) -> BySocket {
-        let all = Readings { origin: Some(Origin { file: self.file, line: self.line }), ..self.readings };
-        by_socket(all, self.sockets, &self.socket)
+    /// Whether a column tells copies of rows from repeats.
+    pub fn can_have_copies(&self) -> bool {
+        self.columns.iter().any(|column| matches!(column.role, Role::Time | Role::Run))
     }
-}
 
-/// Readings by socket; `socket` has the index of the socket of each row, and nothing if no column names sockets.
-pub(super) fn by_socket(all: Readings, sockets: Vec<String>, socket: &[usize]) -> BySocket {
-    if sockets.is_empty() {
-        return vec![(None, all)];
+    /// Removes rows that are copies of earlier ones, with a message that lists them; `file` names where they are.
+    pub fn remove_duplicates(&mut self, file: &Path) -> Option<String> {
+        let kept = duplicates::kept(&self.readings, &self.cells)?;
+        let message = duplicates::message(file, &self.line, &kept);
+        self.readings = self.readings.of_rows(&kept);
+        self.line = kept.iter().map(|row| self.line[*row]).collect();
+        if !self.socket.is_empty() {
+            self.socket = kept.iter().map(|row| self.socket[*row]).collect();
+        }
+        Some(message)
     }
-    sockets
-        .into_iter()
-        .enumerate()
-        .map(|(index, name)| {
-            let rows: Vec<usize> = (0..socket.len()).filter(|&row| socket[row] == index).collect();
-            (Some(name), all.of_rows(&rows))
-        })
-        .collect()
-}
 
-/// A run number, if the number is one.
-pub(super) fn run_number(value: f64) -> Option<i64> {
-    (value.fract() == 0.0 && value.abs() <= 1e9).then_some(value as i64)
-}
-
-/// The observed value of a cell in the internal unit.
-pub(super) fn observed(quantity: Quantity, value: f64, request: &Request<'_>) -> f64 {
-    match quantity {
-        Quantity::Length | Quantity::Coordinate(_) => value,
-        Quantity::Deviation => request.bar_mm() + value,
-        Quantity::Outward => -value,
-        Quantity::Socket => 0.0,
+    /// The readings, split by socket if a column names it, with their lines if they are of a file.
+    pub fn by_socket(self, file: Option<&Path>) -> BySocket {
+        let Filled { readings, line, sockets, socket, .. } = self;
+        let origin = file.map(|file| Origin { file: PathBuf::from(file), line });
+        let all = Readings { origin, ..readings };
+        if sockets.is_empty() {
+            return vec![(None, all)];
+        }
+        let rows_of = |index: usize| (0..socket.len()).filter(|row| socket[*row] == index).collect::<Vec<_>>();
+        sockets.into_iter().enumerate().map(|(index, name)| (Some(name), all.of_rows(&rows_of(index)))).collect()
     }
 }
 
 /// The index of a socket among those found so far in the file.
-pub(super) fn socket_index(sockets: &mut Vec<String>, name: &str) -> Result<usize, Fault> {
+fn socket_index(sockets: &mut Vec<String>, name: &str) -> Result<usize, Fault> {
     if let Some(known) = sockets.iter().position(|socket| socket == name) {
         return Ok(known);
     }

@@ -1,21 +1,17 @@
 //! Readings from columns in memory: the same names, units and checks as the columns of a file.
 
-use std::hash::{DefaultHasher, Hash, Hasher};
+use std::hash::{DefaultHasher, Hash};
 use std::path::Path;
 
 use super::columns::{Column, Role, known, listed};
-use super::fill::{self, BySocket};
+use super::fill::{BySocket, Cells, Filled, NOT_ENOUGH};
 use super::missing::{self, Marks};
 use super::request::Request;
 use super::{duplicates, required};
 use crate::error::ModelError;
 use crate::files::spelling::suggestion;
 use crate::instrument::Fault;
-use crate::instrument::column::Quantity;
-use crate::session::readings::Readings;
-use crate::session::{check, columns};
-
-const NOT_ENOUGH: &str = "a test needs at least two readings, and as many as it has parameters";
+use crate::session::{check, limits};
 
 /// A column of readings in memory.
 #[derive(Clone, Copy, Debug)]
@@ -27,6 +23,13 @@ pub struct MemoryColumn<'a> {
     /// Which of the values are missing, one for each reading; empty if none is. A reading of which a value is missing is
     /// left out, and a warning tells how many they are and where.
     pub missing: &'a [bool],
+}
+
+impl<'a> MemoryColumn<'a> {
+    /// Numbers of which none is missing.
+    pub const fn numbers(name: &'a str, numbers: &'a [f64]) -> MemoryColumn<'a> {
+        MemoryColumn { name, values: Values::Numbers(numbers), missing: &[] }
+    }
 }
 
 /// The values of a column.
@@ -45,34 +48,39 @@ impl Values<'_> {
             Values::Words(words) => words.len(),
         }
     }
+}
 
-    /// The values of some rows.
-    fn of_rows(self, rows: &[usize]) -> OwnValues {
-        match self {
-            Values::Numbers(numbers) => OwnValues::Numbers(rows.iter().map(|row| numbers[*row]).collect()),
-            Values::Words(words) => OwnValues::Words(rows.iter().map(|row| words[*row].clone()).collect()),
+/// The values of one reading.
+struct Item<'a> {
+    given: &'a [MemoryColumn<'a>],
+    item: usize,
+}
+
+impl Cells for Item<'_> {
+    fn number(&self, column: &Column) -> Result<f64, Fault> {
+        let Values::Numbers(numbers) = self.given[column.index].values else { return Ok(f64::NAN) };
+        let number = numbers[self.item];
+        let fault = if number.is_finite() { limits::too_large(number) } else { Some(number.to_string()) };
+        fault.map_or(Ok(number), |fault| Err((format!("it is {fault}"), "a finite number is expected".into())))
+    }
+
+    fn text(&self, column: &Column) -> &str {
+        match self.given[column.index].values {
+            Values::Words(words) => &words[self.item],
+            Values::Numbers(_) => "",
         }
     }
 
-    fn hash(self, row: usize, hasher: &mut DefaultHasher) {
-        match self {
-            Values::Numbers(numbers) => numbers[row].to_bits().hash(hasher),
-            Values::Words(words) => words[row].hash(hasher),
-        }
+    fn error(&self, column: &Column, (message, help): Fault) -> ModelError {
+        fault((format!("`{}`, item {}: {message}", column.name, self.item), help))
     }
-}
 
-/// The values of the readings that are not missing.
-enum OwnValues {
-    Numbers(Vec<f64>),
-    Words(Vec<String>),
-}
-
-impl OwnValues {
-    fn borrowed(&self) -> Values<'_> {
-        match self {
-            OwnValues::Numbers(numbers) => Values::Numbers(numbers),
-            OwnValues::Words(words) => Values::Words(words),
+    fn hash(&self, hasher: &mut DefaultHasher) {
+        for column in self.given {
+            match column.values {
+                Values::Numbers(numbers) => numbers[self.item].to_bits().hash(hasher),
+                Values::Words(words) => words[self.item].hash(hasher),
+            }
         }
     }
 }
@@ -85,25 +93,35 @@ impl OwnValues {
 pub(crate) fn read(given: &[MemoryColumn<'_>], request: &Request<'_>) -> Result<(BySocket, Vec<String>), ModelError> {
     let columns = roles(given, request).map_err(fault)?;
     let names: Vec<String> = given.iter().map(|column| column.name.to_string()).collect();
-    required::required(request, Path::new(""), 0, &columns, Some(&names))?;
+    required::required(request, &columns, Some(&names)).map_err(fault)?;
     let rows = given.first().map_or(0, |column| column.values.len());
     let marks: Vec<Marks<'_>> =
         given.iter().map(|column| Marks { name: column.name, missing: column.missing }).collect();
-    let Some(present) = missing::present(&marks, rows).map_err(fault)? else {
-        return filled(given, None, &columns, request).map_err(fault);
-    };
-    if present.len() < check::MIN_READINGS {
-        let message =
-            format!("{} of {rows} readings are missing, the rest is not enough for a fit", rows - present.len());
+    let present = missing::present(&marks, rows).map_err(fault)?;
+    let found = present.as_ref().map_or(rows, Vec::len);
+    if found < check::MIN_READINGS {
+        let message = match present {
+            Some(_) => format!("{} of {rows} readings are missing, the rest is not enough for a fit", rows - found),
+            None => format!("{rows} readings, which is not enough for a fit"),
+        };
         return Err(fault((message, NOT_ENOUGH.into())));
     }
-    let values: Vec<OwnValues> = given.iter().map(|column| column.values.of_rows(&present)).collect();
-    let kept = given.iter().zip(&values);
-    let kept: Vec<MemoryColumn<'_>> =
-        kept.map(|(column, own)| MemoryColumn { values: own.borrowed(), missing: &[], ..*column }).collect();
-    let (readings, mut warnings) = filled(&kept, Some(&present), &columns, request).map_err(fault)?;
-    warnings.insert(0, missing::warning(&request.test.name, &marks, rows, present.len()));
-    Ok((readings, warnings))
+    let item = |row: usize| Item { given, item: present.as_ref().map_or(row, |present| present[row]) };
+    let mut filled = Filled::new(request, columns, found);
+    for row in 0..found {
+        filled.push(&item(row))?;
+    }
+    let mut warnings = Vec::new();
+    if found < rows {
+        warnings.push(missing::warning(&marks, rows, found));
+    }
+    // Hashes of all rows take as much memory as the rows themselves.
+    if filled.can_have_copies() && !duplicates::cannot_occur(&filled.readings) {
+        filled.cells = (0..found).map(|row| duplicates::hash_of(|hasher| item(row).hash(hasher))).collect();
+        filled.line = (0..found).map(|row| item(row).item + 1).collect();
+        warnings.extend(filled.remove_duplicates(Path::new("the arrays")));
+    }
+    Ok((filled.by_socket(None), request.named(warnings)))
 }
 
 fn fault((message, help): Fault) -> ModelError {
@@ -116,134 +134,23 @@ fn roles(given: &[MemoryColumn<'_>], request: &Request<'_>) -> Result<Vec<Column
     for (index, MemoryColumn { name, values, .. }) in given.iter().enumerate() {
         let Some(role) = Role::of(name, request).or_else(|| Role::of(&name.to_lowercase(), request)) else {
             let known = known(request);
-            let like: Vec<&str> = known.iter().map(String::as_str).collect();
-            let help = format!("{}known columns are {}", suggestion(name, &like), listed(&known));
+            let help = format!("{}known columns are {}", suggestion(name, &known), listed(&known));
             return Err((format!("unknown column `{name}`"), help));
         };
         if let Some(other) = columns.iter().find(|other| other.role.same_as(&role)) {
-            return Err((
-                format!("columns `{}` and `{name}` have the same meaning", other.name),
-                "keep one of them".into(),
-            ));
+            let message = format!("columns `{}` and `{name}` have the same meaning", other.name);
+            return Err((message, "keep one of them".into()));
         }
         if (role == Role::Socket) != matches!(values, Values::Words(_)) {
             let what = if role == Role::Socket { "the names of sockets" } else { "numbers" };
             return Err((format!("`{name}`: {what} are expected"), "one for each reading".into()));
         }
         if values.len() != given[0].values.len() {
-            return Err((
-                format!("`{name}` has {} values, `{}` has {}", values.len(), given[0].name, given[0].values.len()),
-                "all columns have one value for each reading".into(),
-            ));
+            let (first, count) = (given[0].name, given[0].values.len());
+            let message = format!("`{name}` has {} values, `{first}` has {count}", values.len());
+            return Err((message, "all columns have one value for each reading".into()));
         }
         columns.push(Column { role, index, name: (*name).to_string() });
     }
     Ok(columns)
-}
-
-/// Readings of columns without gaps. `items` are the places of their rows among all that were given, if some are missing.
-fn filled(
-    given: &[MemoryColumn<'_>],
-    items: Option<&[usize]>,
-    columns: &[Column],
-    request: &Request<'_>,
-) -> Result<(BySocket, Vec<String>), Fault> {
-    let rows = given.first().map_or(0, |column| column.values.len());
-    let item = |row: usize| items.map_or(row, |items| items[row]);
-    if rows < check::MIN_READINGS {
-        return Err((format!("{rows} readings, which is not enough for a fit"), NOT_ENOUGH.into()));
-    }
-    let coordinates = request.instrument().coordinates();
-    let mut readings = Readings {
-        positions: vec![Vec::new(); request.machine.axes.len()],
-        coordinates,
-        observed: vec![0.0; rows * coordinates],
-        ..Readings::default()
-    };
-    let (mut sockets, mut socket): (Vec<String>, Vec<usize>) = (Vec::new(), Vec::new());
-    for (column, MemoryColumn { name, values, .. }) in columns.iter().zip(given) {
-        let numbers = match values {
-            Values::Numbers(numbers) => *numbers,
-            Values::Words(words) => {
-                for word in *words {
-                    socket.push(fill::socket_index(&mut sockets, word)?);
-                }
-                continue;
-            }
-        };
-        for (row, number) in numbers.iter().enumerate() {
-            columns::number(name, *number)
-                .map_err(|(message, help)| (format!("{message} (item {})", item(row)), help))?;
-        }
-        match &column.role {
-            Role::Time => readings.time_s = times(name, numbers, &item)?,
-            Role::Run => {
-                readings.run =
-                    numbers.iter().map(|number| fill::run_number(*number)).collect::<Option<_>>().ok_or((
-                        format!("`{name}` has a value that is not a run number"),
-                        "run numbers are integers, one for each traversal in one direction".to_string(),
-                    ))?;
-            }
-            Role::Driver(name) => _ = readings.drivers.insert(name.clone(), numbers.to_vec()),
-            Role::Axis(axis, unit) => {
-                readings.positions[*axis] = numbers.iter().map(|number| unit.to_internal(*number)).collect();
-            }
-            Role::Reading(quantity, unit) => {
-                let first = match quantity {
-                    Quantity::Coordinate(coordinate) => *coordinate,
-                    _ => 0,
-                };
-                let observed = readings.observed[first..].iter_mut().step_by(coordinates);
-                for (observed, number) in observed.zip(numbers) {
-                    *observed = fill::observed(*quantity, unit.to_internal(*number), request);
-                }
-            }
-            Role::Socket => {}
-        }
-    }
-    for (positions, at) in readings.positions.iter_mut().zip(&request.test.at) {
-        if positions.is_empty() {
-            *positions = vec![*at; rows];
-        }
-    }
-    let warning = without_copies(&mut readings, &mut socket, given, &item);
-    let warnings = warning.map(|warning| format!("test \"{}\": {warning}", request.test.name));
-    Ok((fill::by_socket(readings, sockets, &socket), warnings.into_iter().collect()))
-}
-
-fn times(name: &str, numbers: &[f64], item: &dyn Fn(usize) -> usize) -> Result<Vec<f64>, Fault> {
-    for (row, pair) in numbers.windows(2).enumerate() {
-        if let Some(fault) = check::decreasing_time(pair[0], pair[1]) {
-            return Err((format!("`{name}`, item {}: {fault}", item(row + 1)), "sort the readings by time".into()));
-        }
-    }
-    Ok(numbers.to_vec())
-}
-
-/// Removes rows that are copies of earlier ones, as in a file, with a message.
-fn without_copies(
-    readings: &mut Readings,
-    socket: &mut Vec<usize>,
-    given: &[MemoryColumn<'_>],
-    item: &dyn Fn(usize) -> usize,
-) -> Option<String> {
-    // Hashes of all rows take as much memory as the rows themselves.
-    if readings.time_s.is_empty() && readings.run.is_empty() || duplicates::cannot_occur(readings) {
-        return None;
-    }
-    let rows = readings.rows();
-    let hash_of = |row: usize| {
-        let mut hasher = DefaultHasher::new();
-        given.iter().for_each(|column| column.values.hash(row, &mut hasher));
-        hasher.finish()
-    };
-    let cells: Vec<u64> = (0..rows).map(hash_of).collect();
-    let kept = duplicates::kept(readings, &cells)?;
-    let lines: Vec<usize> = (0..rows).map(|row| item(row) + 1).collect();
-    let message = duplicates::message(Path::new("the arrays"), &lines, &kept);
-    *readings = readings.of_rows(&kept);
-    if !socket.is_empty() {
-        *socket = kept.iter().map(|row| socket[*row]).collect();
-    }
-    Some(message)
 }

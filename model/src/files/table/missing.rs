@@ -27,13 +27,13 @@ pub(super) fn present(given: &[Marks<'_>], rows: usize) -> Result<Option<Vec<usi
     Ok((present.len() < rows).then_some(present))
 }
 
-/// How many readings of a test are missing, and where.
-pub(super) fn warning(test: &str, given: &[Marks<'_>], rows: usize, present: usize) -> String {
+/// How many readings are missing, and where.
+pub(super) fn warning(given: &[Marks<'_>], rows: usize, present: usize) -> String {
     let named = given.iter().filter(|column| column.missing.contains(&true));
     let places: Vec<String> = named.map(|column| format!("`{}` {}", column.name, items(column.missing))).collect();
     let missing = rows - present;
     let are = if missing == 1 { "is" } else { "are" };
-    format!("test \"{test}\": {missing} of {rows} readings {are} missing: {}", places.join("; "))
+    format!("{missing} of {rows} readings {are} missing: {}", places.join("; "))
 }
 
 /// The marked items, counted from 0: `item 3`, `items 7 to 9, 20`.

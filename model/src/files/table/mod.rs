@@ -9,7 +9,7 @@
 //! - `lines`, `encoding`, `row`, `number`: lines of a text, rows and cells.
 
 mod ballbar_xml;
-mod columns;
+pub(in crate::files) mod columns;
 pub mod csv;
 mod duplicates;
 pub(crate) mod encoding;
@@ -53,9 +53,7 @@ pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<Data, ModelErro
     match formats::of(file).open(file, request)? {
         Content::Table(mut table) => {
             let (by_socket, warnings) = fill::read(file, table.rows.as_mut(), table.has_header, request)?;
-            let name = &request.test.name;
-            let warnings = warnings.into_iter().map(|warning| format!("test \"{name}\": {warning}"));
-            Ok(Data { stamp: table.stamp, by_socket, warnings: warnings.collect() })
+            Ok(Data { stamp: table.stamp, by_socket, warnings: request.named(warnings) })
         }
         Content::Readings(whole) => {
             Ok(Data { stamp: whole.stamp, by_socket: vec![(None, whole.readings)], warnings: whole.warnings })

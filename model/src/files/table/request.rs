@@ -88,6 +88,12 @@ impl Request<'_> {
         self.test.station.reference_mm()
     }
 
+    /// Warnings with the name of the test.
+    pub fn named(&self, warnings: Vec<String>) -> Vec<String> {
+        let name = &self.test.name;
+        warnings.into_iter().map(|warning| format!("test \"{name}\": {warning}")).collect()
+    }
+
     /// Axes that move in the planned test.
     pub fn moved(&self) -> Vec<usize> {
         motion::named_axes(self.test.motion.as_ref())

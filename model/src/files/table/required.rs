@@ -1,33 +1,19 @@
 //! Columns that an instrument requires.
 
-use std::path::Path;
-
 use super::columns::{Column, Role, known, listed};
 use super::request::Request;
-use crate::error::{Location, ModelError};
+use crate::instrument::Fault;
 use crate::instrument::column::Quantity;
 use crate::session::check::{self, MissingPosition};
 
-/// Returns an error if one of them is missing.
-pub(super) fn required(
-    request: &Request<'_>,
-    file: &Path,
-    line: usize,
-    columns: &[Column],
-    header: Option<&[String]>,
-) -> Result<(), ModelError> {
+/// Returns a fault if one of them is missing.
+pub(super) fn required(request: &Request<'_>, columns: &[Column], header: Option<&[String]>) -> Result<(), Fault> {
     let has = |accepted: &dyn Fn(&Role) -> bool| columns.iter().any(|column| accepted(&column.role));
     let found = || match header {
         Some(header) => format!("; found: {}", listed(header)),
         None => String::new(),
     };
-    let missing = |what: String, help: String| {
-        Err(ModelError::Input {
-            location: Location::line(file, line),
-            message: format!("no column {what}{}", found()),
-            help: Some(help),
-        })
-    };
+    let missing = |what: String, help: String| Err((format!("no column {what}{}", found()), help));
     let reads = |quantity: Quantity| match quantity {
         Quantity::Socket => request.test.socket.is_some() || has(&|role| *role == Role::Socket),
         quantity => has(&|role| matches!(role, Role::Reading(own, _) if *own == quantity)),
