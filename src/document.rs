@@ -1,7 +1,13 @@
 //! Results as JSON documents: the result of a command with its inputs and options, so that a program can repeat the
 //! command and check what it reads.
 
+use abbe_identify::compare::results::{Comparison, Difference};
 use abbe_identify::model_file::{InputFile, Provenance};
+use abbe_identify::plan::results::{Contribution, PlanAnalysis};
+use abbe_identify::results::{
+    ComparisonStatement, FitResult, PlanStatement, Statements, TraceResult, ValidationStatement,
+};
+use abbe_identify::validate::results::{MovedParameter, ValidationResult};
 use abbe_model::files::SourceMap;
 use abbe_model::files::stamp::FileStamp;
 use schemars::JsonSchema;
@@ -78,6 +84,37 @@ impl Origin {
             inputs: self.session.iter().flat_map(|session| session.inputs.clone()).collect(),
             session: self.session.as_ref().map_or(String::new(), |session| session.file.clone()),
         }
+    }
+}
+
+/// A result with its three statements: is it good, what to correct, what to measure next.
+#[derive(Serialize, JsonSchema)]
+pub struct Stated<'r, T, S> {
+    /// The statements.
+    statements: S,
+    /// The result.
+    #[serde(flatten)]
+    result: &'r T,
+}
+
+/// A fit with its statements.
+pub type StatedFit<'r> = Stated<'r, FitResult, Statements>;
+/// A trace with its statements.
+pub type StatedTrace<'r> = Stated<'r, TraceResult, Statements>;
+/// A plan with its statements.
+pub type StatedPlan<'r> = Stated<'r, PlanAnalysis, Statements<PlanStatement, Contribution>>;
+/// A validation with its statements.
+pub type StatedValidation<'r> = Stated<'r, ValidationResult, Statements<ValidationStatement, MovedParameter>>;
+/// A comparison with its statements.
+pub type StatedComparison<'r> = Stated<'r, Comparison, Statements<ComparisonStatement, Difference>>;
+/// A history with its statements.
+#[cfg(feature = "fleet")]
+pub type StatedHistory<'r> = Stated<'r, crate::fleet::history::FleetHistory, crate::fleet::history::HistoryStatements>;
+
+impl<'r, T, S> Stated<'r, T, S> {
+    /// A result with its statements.
+    pub fn new(result: &'r T, statements: S) -> Self {
+        Stated { statements, result }
     }
 }
 

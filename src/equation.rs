@@ -4,9 +4,57 @@ use abbe_codegen::Variable;
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::effect::{Component, Effect};
+use abbe_model::error::ModelError;
+use abbe_model::files::{self, ReadOptions, Source, SourceMap};
 use abbe_model::instrument::InstrumentParameter;
 use abbe_model::pattern;
 use abbe_model::session::{Session, Test};
+
+/// What an equation of a session without readings is made of.
+pub const WITHOUT_READINGS: &str = "the equation is made without readings: in a test without a planned movement every axis moves that the test does not hold";
+
+/// The session with its readings, or without them if they cannot be read, and why not.
+///
+/// # Errors
+/// If the session cannot be read without its readings either.
+pub fn session(source: &Source, options: &ReadOptions) -> Result<(Session, SourceMap, Option<ModelError>), ModelError> {
+    let fault = match files::session_of(source, options) {
+        Ok((session, sources)) => return Ok((session, sources, None)),
+        Err(fault) => fault,
+    };
+    match files::session_of(source, &ReadOptions { read_data: false, ..options.clone() }) {
+        Ok((session, sources)) => Ok((session, sources, Some(fault))),
+        Err(_) => Err(fault),
+    }
+}
+
+/// The test of a session by its name.
+///
+/// # Errors
+/// If it has none of this name, in words.
+pub fn test<'s>(session: &'s Session, name: &str) -> Result<&'s Test, String> {
+    session.tests.iter().find(|test| test.name == name).ok_or_else(|| {
+        let names: Vec<&str> = session.tests.iter().map(|test| test.name.as_str()).collect();
+        format!("no test `{name}`; the session has {}", names.join(", "))
+    })
+}
+
+/// Refuses two tests of a session whose files, each with its name and text, have one name; many file systems ignore
+/// case.
+///
+/// # Errors
+/// In words, with both.
+pub fn refuse_equal_names(session: &Session, files: &[(String, String)]) -> Result<(), String> {
+    for (place, (test, (name, _))) in session.tests.iter().zip(files).enumerate() {
+        if let Some((other, _)) = files[..place].iter().find(|(other, _)| other.eq_ignore_ascii_case(name)) {
+            return Err(format!(
+                "test \"{}\" would be written to {name}, and another test is written to {other}; rename one of them",
+                test.name
+            ));
+        }
+    }
+    Ok(())
+}
 
 /// The parameters of an equation; all others are zero.
 #[derive(Clone, Debug, Default)]

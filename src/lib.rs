@@ -9,6 +9,7 @@
 //! | estimates, uncertainty, plans, the trace of unmodelled effects | [`identify`] |
 //! | closed forms and their languages | [`codegen`] |
 //! | results as JSON documents, parameters of equations by name | [`document`], [`equation`] |
+//! | exports of a model | [`exports`] |
 //! | many sessions of many machines | [`fleet`] |
 //!
 //! The change that a simulated error of 10 µm makes is what the equation of the same test says, −R·sin C/L₀:
@@ -50,12 +51,15 @@ pub use abbe_model as model;
 
 pub mod document;
 pub mod equation;
+pub mod exports;
 #[cfg(feature = "fleet")]
 pub mod fleet;
 #[doc(hidden)]
 pub mod printers;
 #[doc(hidden)]
 pub mod report;
+#[cfg(feature = "fleet")]
+pub mod schemas;
 #[cfg(feature = "fleet")]
 pub mod temporary;
 

@@ -64,6 +64,18 @@ pub struct Options {
     pub effects: Vec<Effect>,
 }
 
+impl Options {
+    /// The same in first order, without derivatives: its coefficients are the sensitivities.
+    #[must_use]
+    pub fn in_first_order(self) -> Options {
+        let arrangement = match self.arrangement {
+            Arrangement::Groups => Arrangement::Single,
+            other => other,
+        };
+        Options { order: Order::First, gradient: false, arrangement, ..self }
+    }
+}
+
 /// The quantity that an equation describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {

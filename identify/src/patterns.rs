@@ -43,9 +43,10 @@ pub struct Pattern {
 }
 
 /// The patterns of a session.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Patterns {
     /// Names and states of the tests.
+    #[serde(skip)]
     pub tests: Vec<(String, Readings)>,
     /// Test by test, error by error.
     pub patterns: Vec<Pattern>,

@@ -28,7 +28,10 @@ pub(crate) use parameter::phases_follow_amplitudes;
 pub use parameter::{
     Combination, Covariance, DeterminedBy, EnlargedBy, Interval, NullSpace, ParameterResult, Unobservable,
 };
-pub use statements::{AxisCorrection, GoodStatement, LineQuantity, MeasureStatement, NextStep, Statements};
+pub use statements::{
+    AxisCorrection, ComparisonStatement, GoodStatement, LineQuantity, MeasureStatement, NextStep, PlanStatement,
+    Statements, ValidationStatement,
+};
 pub use trace::{
     AliasResult, AlternativeResult, ChangedParameter, CurvePoint, EffectName, EffectResult, LargestOrder, ModelResult,
     PriorResult, RejectedCandidate, Remainder, SeparatingTestResult, SeparationResult, ShapeParameter, TraceResult,

@@ -5,6 +5,7 @@
 //! and `L` the chain in `f64`. The identifiers are those of the results, so that the estimates of a fit can be
 //! simulated again.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use abbe_model::component::ErrorName;
@@ -13,6 +14,8 @@ use abbe_model::session::readings::Readings;
 use abbe_model::session::{Prior, Session, planned};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use crate::error::IdentifyError;
 use crate::parameters::{Parameters, Role};
@@ -42,6 +45,50 @@ pub struct Simulated {
     pub noise_mm: f64,
     /// Warnings for the user.
     pub warnings: Vec<String>,
+}
+
+/// The simulated session and the true values of its parameters.
+#[derive(Serialize, JsonSchema)]
+pub struct SimulationResult {
+    /// The session file that was written.
+    pub written_session: String,
+    /// Number of simulated readings.
+    pub readings: usize,
+    /// Standard deviation of the simulated noise, µm.
+    pub noise_um: f64,
+    /// Resolution of the readings, µm; `null` for none.
+    pub resolution_um: Option<f64>,
+    /// The parameters that are not zero.
+    pub truth: Vec<TrueValue>,
+    /// Warnings in words.
+    pub warnings: Vec<String>,
+}
+
+/// The true value of a parameter.
+#[derive(Serialize, JsonSchema)]
+pub struct TrueValue {
+    /// Identifier: `EY0A`, `bar[A100]`, `EZC~C:h2.cos`.
+    pub id: String,
+    /// The value, in `unit`.
+    pub value: f64,
+    /// `um`, `arcsec`, …
+    pub unit: String,
+}
+
+impl SimulationResult {
+    /// Of a simulation that was written to this session file.
+    pub fn of(session: &Session, simulated: &Simulated, file: &Path) -> SimulationResult {
+        let truth = simulated.truth.iter();
+        let truth = truth.map(|(id, value, unit)| TrueValue { id: id.clone(), value: *value, unit: unit.clone() });
+        SimulationResult {
+            written_session: file.display().to_string(),
+            readings: simulated.readings.iter().map(|readings| readings.rows()).sum(),
+            noise_um: simulated.noise_mm * 1e3,
+            resolution_um: session.resolution_mm.map(|step| step * 1e3),
+            truth: truth.collect(),
+            warnings: simulated.warnings.clone(),
+        }
+    }
 }
 
 /// Stream of the generator for the set-ups; test `k` has stream `k + 1`.

@@ -1,4 +1,4 @@
-//! The three statements of a fit or a trace: is it good, what to correct, what to measure next.
+//! The three statements of a result: is it good, what to correct, what to measure next.
 //!
 //! The line of a rotary axis `k` in R with all axes at zero follows from the location errors of the axis and of the
 //! rotary axes `p` between it and the bed on its side. To first order, with their translations `t`, rotations `ω` and
@@ -15,16 +15,20 @@ use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
 
+use crate::compare::results::{Comparison, Difference};
 use crate::plan::candidate_tests::has_candidates;
+use crate::plan::results::{Contribution, ErrorAnalysis, PlanAnalysis};
 use crate::plausibility::Plausibility;
 use crate::problem::Problem;
 use crate::results::{
-    AxisCorrection, Covariance, DeterminedBy, FitResult, GoodStatement, Goodness, GoodnessVerdict, LineQuantity,
-    MeasureStatement, NextStep, ParameterResult, Statements, TraceResult,
+    AxisCorrection, ComparisonStatement, Covariance, DeterminedBy, FitResult, GoodStatement, Goodness, GoodnessVerdict,
+    LineQuantity, MeasureStatement, NextStep, ParameterResult, PlanStatement, Statements, TraceResult,
+    ValidationStatement,
 };
 use crate::tolerance::Conformity;
 use crate::tolerance::rule::Decision;
 use crate::unit::ARCSEC;
+use crate::validate::results::{MovedParameter, ValidationResult, ValidationVerdict};
 
 /// A component of a unit vector above which it is taken as along the axis.
 const ALONG: f64 = 0.9;
@@ -44,7 +48,7 @@ impl Statements {
         Statements {
             good: good(goodness, result.conformity.as_ref()),
             correct: corrections(&problem.session.machine, &result.parameters, &result.covariance),
-            measure: MeasureStatement { step: measure, test: None, description: None, effect: None },
+            measure: measure.into(),
         }
     }
 
@@ -67,13 +71,82 @@ impl Statements {
                     Some(NextStep::Trace) | None => NextStep::Identify,
                     Some(step) => step,
                 };
-                MeasureStatement { step, test: None, description: None, effect: None }
+                step.into()
             }
         };
         Statements {
             good: GoodStatement { verdict: Some(result.verdict), ..good(goodness, result.conformity.as_ref()) },
             correct: corrections(&problem.session.machine, &result.after.parameters, &result.after.covariance),
             measure,
+        }
+    }
+}
+
+/// Share of a variance from which a contribution of the set-up limits an error.
+const MIN_LIMITING_SHARE: f64 = 0.1;
+/// Contributions that limit an error, at most.
+const MAX_LIMITING: usize = 2;
+
+impl Statements<PlanStatement, Contribution> {
+    /// Of a plan.
+    pub fn of_plan(problem: &Problem, analysis: &PlanAnalysis) -> Self {
+        let worst = analysis.worst();
+        let step = match analysis.errors.iter().all(|error| error.u.is_some()) {
+            _ if !has_candidates(problem) => NextStep::Nothing,
+            true => NextStep::Improve,
+            false => NextStep::Identify,
+        };
+        let ids = analysis.errors.iter().filter(|error| error.u.is_none()).map(|error| error.id.clone());
+        Statements {
+            good: PlanStatement {
+                errors: analysis.errors.len(),
+                not_identifiable: ids.collect(),
+                determined_by_prior: analysis.determined_by_prior.iter().map(|item| item.error.clone()).collect(),
+                worst: worst.map(|error| error.id.clone()),
+            },
+            correct: worst.map_or(Vec::new(), limiting),
+            measure: step.into(),
+        }
+    }
+}
+
+/// The contributions of the set-up that limit an error: none if the noise has half of the variance.
+fn limiting(error: &ErrorAnalysis) -> Vec<Contribution> {
+    if error.noise_share() >= 0.5 {
+        return Vec::new();
+    }
+    let setup = error.budget.iter().filter(|part| !part.is_noise()).enumerate();
+    let named = setup.take_while(|(k, part)| *k == 0 || (*k < MAX_LIMITING && part.share >= MIN_LIMITING_SHARE));
+    named.map(|(_, part)| part.clone()).collect()
+}
+
+impl Statements<ValidationStatement, MovedParameter> {
+    /// Of a validation.
+    pub fn of_validation(result: &ValidationResult) -> Self {
+        let step = match result.verdict {
+            ValidationVerdict::Holds => NextStep::Nothing,
+            ValidationVerdict::HoldsInRange => NextStep::WidenRange,
+            ValidationVerdict::Degraded | ValidationVerdict::DoesNotHold => NextStep::Refit,
+        };
+        let ValidationResult { verdict, readings, readings_in_range, .. } = *result;
+        Statements {
+            good: ValidationStatement { verdict, readings, readings_in_range },
+            correct: result.moved.clone(),
+            measure: step.into(),
+        }
+    }
+}
+
+impl Statements<ComparisonStatement, Difference> {
+    /// Of a comparison.
+    pub fn of_comparison(comparison: &Comparison) -> Self {
+        let significant = comparison.differences.iter().filter(|difference| difference.significant);
+        let correct: Vec<Difference> = significant.cloned().collect();
+        let step = if correct.is_empty() { NextStep::Nothing } else { NextStep::Repeat };
+        Statements {
+            good: ComparisonStatement { significant: correct.len(), compared: comparison.differences.len() },
+            correct,
+            measure: step.into(),
         }
     }
 }

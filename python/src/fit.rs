@@ -2,12 +2,15 @@
 
 use std::sync::Arc;
 
-use abbe::document::{Call, Document};
+use abbe::document::{Call, Document, Stated};
 use abbe::identify::fit::{Fit as Estimated, SessionFit};
 use abbe::identify::model_file::IdentifiedModel;
 use abbe::identify::problem::Problem;
+use abbe::identify::results::Statements;
+use abbe::report::block::Report;
+use abbe::report::commands::Commands;
 use abbe::report::parameters::{self, Estimates};
-use abbe::report::{pages, readings};
+use abbe::report::{self, readings};
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 
@@ -37,7 +40,8 @@ impl Fit {
 
     fn json(&self) -> Result<String, Failed> {
         let origin = self.state.origin.clone();
-        Ok(Document::new(call("fit"), origin, Some(self.seed), &self.fit.result).text()?)
+        let stated = Stated::new(&self.fit.result, Statements::of_fit(&self.fit.problem, &self.fit.result));
+        Ok(Document::new(call("fit"), origin, Some(self.seed), &stated).text()?)
     }
 
     /// Estimates of all parameters of the session in their order, in display units.
@@ -61,13 +65,18 @@ impl Fit {
         work::at_once(py, || Ok(Table(readings::residuals(&self.fit.problem, &self.fit.fit))))
     }
 
+    /// What `print` and a notebook show.
+    fn shown(&self, py: Python<'_>) -> PyResult<(String, String)> {
+        work::at_once(py, || Ok(show::shown(&self.report(false)?)))
+    }
+
     fn figures(&self, py: Python<'_>) -> PyResult<Vec<Figure>> {
-        work::at_once(py, || Ok(show::figures(self.document()?)))
+        work::at_once(py, || Ok(show::figures(&self.report(true)?)))
     }
 
     fn page(&self, py: Python<'_>) -> PyResult<String> {
         let read = (&self.state.session, &self.state.sources);
-        work::at_once(py, || show::page(&self.document()?, read, "abbe.Session.fit", self.seed))
+        work::at_once(py, || show::page(&self.report(true)?, read, "abbe.Session.fit", self.seed))
     }
 
     fn model(&self, py: Python<'_>) -> PyResult<Model> {
@@ -76,8 +85,9 @@ impl Fit {
 }
 
 impl Fit {
-    fn document(&self) -> Result<pages::document::Document, Failed> {
-        Ok(pages::fit::document(&self.fit.problem, &self.fit.fit, &self.fit.result)?)
+    fn report(&self, figures: bool) -> Result<Report, Failed> {
+        let SessionFit { problem, fit, result, .. } = &*self.fit;
+        Ok(report::fit::report(problem, fit, result, &Commands::default(), figures)?)
     }
 }
 

@@ -12,6 +12,7 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::todo)
 )]
 
+mod compare;
 mod equation;
 mod failed;
 mod fit;
@@ -39,6 +40,7 @@ fn _abbe(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<plan::Plan>()?;
     module.add_class::<model::Model>()?;
     module.add_class::<model::Validation>()?;
+    module.add_class::<compare::Comparison>()?;
     module.add_class::<show::Table>()?;
     module.add_class::<show::Figure>()?;
     module.add_function(wrap_pyfunction!(equation::equation, module)?)?;

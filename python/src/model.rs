@@ -3,14 +3,16 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use abbe::document::{Document, Origin};
+use abbe::document::{Document, Origin, Stated};
+use abbe::exports::{self, ExportOptions};
 use abbe::identify::correction::{Aim, Correction, EstimatedErrors};
 use abbe::identify::model_file::{self, IdentifiedModel};
+use abbe::identify::results::Statements;
 use abbe::identify::unit::ARCSEC;
 use abbe::identify::validate::{self, validate};
 use abbe::model::files;
 use abbe::model::session::readings::Readings;
-use abbe::report::pages;
+use abbe::report::commands::Commands;
 use abbe::report::validate as present;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -25,10 +27,10 @@ use crate::work;
 /// An identified model.
 #[pyclass(frozen, module = "abbe._abbe")]
 pub struct Model {
-    model: Arc<IdentifiedModel>,
+    pub model: Arc<IdentifiedModel>,
     /// Its file. Numbers of a model that is read are rounded by their units.
     text: String,
-    origin: Origin,
+    pub origin: Origin,
 }
 
 impl Model {
@@ -80,6 +82,13 @@ impl Model {
             (parameter.id.clone(), parameter.value * scale, self.model.u(j) * scale, name, parameter.held)
         };
         parameters.map(row).collect()
+    }
+
+    /// The file of `abbe export`.
+    fn export(&self, format: &str, tool_mm: Option<[f64; 3]>) -> Result<Vec<u8>, Failed> {
+        let mut options = ExportOptions::of(&self.model);
+        options.tool_mm = tool_mm.unwrap_or(options.tool_mm);
+        Ok(exports::format(format)?.export(&self.model, &options)?.text)
     }
 
     fn validate(&self, py: Python<'_>, session: &Session) -> PyResult<Validation> {
@@ -192,7 +201,9 @@ pub struct Validation {
 #[pymethods]
 impl Validation {
     fn json(&self, seed: u64) -> Result<String, Failed> {
-        Ok(Document::new(call("validate"), self.origin.clone(), Some(seed), &self.validation.result).text()?)
+        let result = &self.validation.result;
+        let stated = Stated::new(result, Statements::of_validation(result));
+        Ok(Document::new(call("validate"), self.origin.clone(), Some(seed), &stated).text()?)
     }
 
     fn residuals_um<'py>(&self, py: Python<'py>, test: &str) -> PyResult<Bound<'py, PyArray1<f64>>> {
@@ -214,13 +225,18 @@ impl Validation {
         tables.into_iter().map(Table).collect()
     }
 
+    /// What `print` and a notebook show.
+    fn shown(&self) -> (String, String) {
+        show::shown(&present::report(&self.state.session, &self.validation, &Commands::default()))
+    }
+
     fn figures(&self) -> Vec<Figure> {
-        show::figures(pages::validate::document(&self.state.session, &self.validation))
+        show::figures(&present::report(&self.state.session, &self.validation, &Commands::default()))
     }
 
     fn page(&self, py: Python<'_>, seed: u64) -> PyResult<String> {
         let read = (&self.state.session, &self.state.sources);
-        let document = pages::validate::document(&self.state.session, &self.validation);
-        work::at_once(py, || show::page(&document, read, "abbe.Model.validate", seed))
+        let report = present::report(&self.state.session, &self.validation, &Commands::default());
+        work::at_once(py, || show::page(&report, read, "abbe.Model.validate", seed))
     }
 }

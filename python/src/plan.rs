@@ -2,12 +2,14 @@
 
 use std::sync::Arc;
 
-use abbe::document::{Call, Document};
+use abbe::document::{Call, Document, Stated};
 use abbe::identify::plan::results::PlanAnalysis;
 use abbe::identify::plan::{self, PlanOptions};
 use abbe::identify::problem::Problem;
+use abbe::identify::results::Statements;
 use abbe::model::session::limits::{LARGEST, MIN_UM};
-use abbe::report::pages;
+use abbe::report::block::Report;
+use abbe::report::commands::Commands;
 use abbe::report::plan as present;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
@@ -55,7 +57,8 @@ impl Plan {
 
     fn json(&self, seed: u64) -> Result<String, Failed> {
         let call = Call { command: "plan".to_string(), options: self.options.clone() };
-        Ok(Document::new(call, self.state.origin.clone(), Some(seed), &*self.analysis).text()?)
+        let stated = Stated::new(&*self.analysis, Statements::of_plan(&self.problem, &self.analysis));
+        Ok(Document::new(call, self.state.origin.clone(), Some(seed), &stated).text()?)
     }
 
     /// The change of each reading of a test by each error of the analysis, in µm per unit of the error.
@@ -89,14 +92,23 @@ impl Plan {
         [present::uncertainties(errors), present::sensitivity(errors), present::budgets(errors)].map(Table).into()
     }
 
+    /// What `print` and a notebook show.
+    fn shown(&self, py: Python<'_>) -> PyResult<(String, String)> {
+        work::at_once(py, || Ok(show::shown(&self.report(false)?)))
+    }
+
     fn figures(&self, py: Python<'_>) -> PyResult<Vec<Figure>> {
-        work::at_once(py, || Ok(show::figures(pages::plan::document(&self.problem, &self.analysis)?)))
+        work::at_once(py, || Ok(show::figures(&self.report(true)?)))
     }
 
     fn page(&self, py: Python<'_>, seed: u64) -> PyResult<String> {
         let read = (&self.state.session, &self.state.sources);
-        work::at_once(py, || {
-            show::page(&pages::plan::document(&self.problem, &self.analysis)?, read, "abbe.Session.plan", seed)
-        })
+        work::at_once(py, || show::page(&self.report(true)?, read, "abbe.Session.plan", seed))
+    }
+}
+
+impl Plan {
+    fn report(&self, figures: bool) -> Result<Report, Failed> {
+        Ok(present::analysis::report(&self.problem, &self.analysis, &Commands::default(), figures)?)
     }
 }

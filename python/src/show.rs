@@ -2,11 +2,10 @@
 
 use abbe::model::files::SourceMap;
 use abbe::model::session::Session;
-use abbe::printers::page;
-use abbe::printers::{csv, html, terminal};
+use abbe::printers::{csv, html, notebook, page, terminal};
+use abbe::report::block::Report;
 use abbe::report::figure;
 use abbe::report::figure::svg;
-use abbe::report::pages::document::Document;
 use abbe::report::provenance::Provenance;
 use abbe::report::table::{self, Cell};
 use pyo3::IntoPyObjectExt;
@@ -103,15 +102,29 @@ impl Figure {
 }
 
 /// The figures of a report.
-pub fn figures(document: Document) -> Vec<Figure> {
-    document.figures.into_iter().map(Figure).collect()
+pub fn figures(report: &Report) -> Vec<Figure> {
+    report.drawn().cloned().map(Figure).collect()
+}
+
+/// A report as `print` and a notebook show it: text and HTML.
+pub fn shown(report: &Report) -> (String, String) {
+    (terminal::report(report, Some("`report` writes them")), notebook::html(report))
 }
 
 /// The page of a report; `call` is what was called in Python.
 ///
 /// # Errors
 /// If a file of the session has changed since it was read.
-pub fn page(document: &Document, read: (&Session, &SourceMap), call: &str, seed: u64) -> Result<String, Failed> {
+pub fn page(report: &Report, read: (&Session, &SourceMap), call: &str, seed: u64) -> Result<String, Failed> {
     let provenance = Provenance { command: call.to_string(), ..Provenance::of(read, seed) };
-    Ok(page::html(document, &provenance)?)
+    Ok(page::html(report, &provenance)?)
+}
+
+/// The page of a report that is of no single session.
+///
+/// # Errors
+/// If a table of the report cannot be written.
+pub fn page_without_session(report: &Report, call: &str) -> Result<String, Failed> {
+    let provenance = Provenance { command: call.to_string(), ..Provenance::of_command(None) };
+    Ok(page::html(report, &provenance)?)
 }

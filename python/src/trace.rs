@@ -3,13 +3,16 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use abbe::document::{Call, Document};
+use abbe::document::{Call, Document, Stated};
 use abbe::identify::plan::test_variations::TestVariations;
+use abbe::identify::results::Statements;
 use abbe::identify::separating_tests::separate_aliases;
 use abbe::identify::trace::{self, Progress, TraceOptions, TraceOutcome};
 use abbe::model::document::edit::SessionText;
 use abbe::model::words::counted;
-use abbe::report::{self, pages, readings};
+use abbe::report::block::Report;
+use abbe::report::commands::Commands;
+use abbe::report::{self, readings};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use serde_json::{Map, Value};
@@ -99,7 +102,8 @@ impl Trace {
 
     fn json(&self) -> Result<String, Failed> {
         let origin = self.state.origin.clone();
-        Ok(Document::new(self.call(), origin, Some(self.seed), &self.trace.result).text()?)
+        let stated = Stated::new(&self.trace.result, Statements::of_trace(&self.trace.after, &self.trace.result));
+        Ok(Document::new(self.call(), origin, Some(self.seed), &stated).text()?)
     }
 
     fn residuals_um<'py>(&self, py: Python<'py>, test: &str, before: bool) -> PyResult<Bound<'py, PyArray1<f64>>> {
@@ -124,13 +128,18 @@ impl Trace {
         work::at_once(py, || Ok(Table(readings::residuals(&self.trace.after, &self.trace.after_fit))))
     }
 
+    /// What `print` and a notebook show.
+    fn shown(&self, py: Python<'_>) -> PyResult<(String, String)> {
+        work::at_once(py, || Ok(show::shown(&self.report(false)?)))
+    }
+
     fn figures(&self, py: Python<'_>) -> PyResult<Vec<Figure>> {
-        work::at_once(py, || Ok(show::figures(pages::trace::document(&self.trace)?)))
+        work::at_once(py, || Ok(show::figures(&self.report(true)?)))
     }
 
     fn page(&self, py: Python<'_>) -> PyResult<String> {
         let read = (&self.state.session, &self.state.sources);
-        work::at_once(py, || show::page(&pages::trace::document(&self.trace)?, read, "abbe.Session.trace", self.seed))
+        work::at_once(py, || show::page(&self.report(true)?, read, "abbe.Session.trace", self.seed))
     }
 
     fn model(&self, py: Python<'_>) -> PyResult<Model> {
@@ -160,6 +169,10 @@ impl Trace {
 }
 
 impl Trace {
+    fn report(&self, figures: bool) -> Result<Report, Failed> {
+        Ok(report::trace::report(&self.trace, &Commands::default(), figures)?)
+    }
+
     fn call(&self) -> Call {
         Call { command: "trace".to_string(), options: self.options.clone() }
     }

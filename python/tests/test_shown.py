@@ -31,6 +31,19 @@ def test_tables(results):
     assert len(rows) == sum(results[0].residuals[test].shape[0] for test in results[0].residuals)
 
 
+def test_print_and_notebook_show_the_report(results):
+    fit, trace, plan, validation = results
+    # What the command prints: goodness of fit, verdict, what is identifiable.
+    assert "Goodness of fit: " in str(fit) and "χ²/ν" in str(fit) and "numerical rank" in str(fit)
+    assert f"Verdict: {trace.verdict}" in str(trace) and "EZC" in str(trace)
+    assert "worst determined" in str(plan) and f"Verdict: {validation.verdict}" in str(validation)
+    for result in results:
+        text, page = str(result), result._repr_html_()
+        assert "<script" not in page and "<svg" not in page
+        for words in ("worst determined", "Goodness of fit", "indistinguishable", "inside the range"):
+            assert (words in text) == (words in page), words
+
+
 def test_estimates_agree_with_the_refusals():
     c_deg = np.arange(0.0, 360.0, 10.0)
     c = np.radians(c_deg)
@@ -67,6 +80,20 @@ def test_guesses_lead_on(results, guess, ours):
     with pytest.raises(AttributeError, match=ours):
         getattr(results[0], guess)
     assert not hasattr(results[0], guess)
+
+
+def test_compare_and_export(results, tmp_path):
+    fit = results[0]
+    found = abbe.compare(fit, fit.model(), names=["first", "again"], places=3)
+    assert found.inputs == ("first", "again") and not any(pair.significant for pair in found.pairs)
+    assert "no significant difference" in str(found) and found.figures
+    found.report(tmp_path / "compare.html")
+    with pytest.raises(TypeError, match="at least two"):
+        abbe.compare(fit)
+    text = fit.model().export("urdf", tmp_path / "machine.urdf")
+    assert text.startswith("<?xml") and (tmp_path / "machine.urdf").read_text() == text
+    with pytest.raises(abbe.Error, match="the formats are urdf"):
+        fit.model().export("nothing")
 
 
 def test_figures(results):

@@ -12,7 +12,13 @@ import sys
 import textwrap
 from pathlib import Path
 
-ROOT = {"fit": "FitResult", "trace": "TraceResult", "plan": "PlanAnalysis", "validate": "ValidationResult"}
+ROOT = {
+    "fit": "FitResult",
+    "trace": "TraceResult",
+    "plan": "PlanAnalysis",
+    "validate": "ValidationResult",
+    "compare": "ComparisonResult",
+}
 """The class of each command's result."""
 
 DOCUMENT = {"schema_version", "tool_version", "command", "session", "inputs", "seed", "options"}

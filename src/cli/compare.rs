@@ -2,33 +2,22 @@
 
 use std::path::{Path, PathBuf};
 
-use abbe::identify::compare::results::{Comparison, ExcludedReading};
-use abbe::identify::compare::{CompareOptions, Input, Named, SIGNIFICANCE, compare, models, one_machine};
-use abbe::identify::model_file::{self, IdentifiedModel};
-use abbe::identify::results::Outlier;
-use abbe::model::files::{self, ReadOptions};
+use abbe::document::Stated;
+use abbe::identify::compare::{CompareOptions, Input, SIGNIFICANCE, compare_inputs};
+use abbe::identify::model_file;
+use abbe::identify::results::Statements;
+use abbe::model::files::stamp::FileStamp;
+use abbe::model::files::{self, ReadOptions, SourceMap};
 use clap::Args;
 
+use super::CommonArguments;
 use super::failure::Failure;
-use super::json::{self, Origin};
-use super::output;
-use super::{CommonArguments, output::Outputs};
-use crate::report::compare as present;
+use super::output::Outputs;
+use super::results::Read;
+use crate::report;
 
 /// Examples of `abbe compare`.
-pub const HELP: &str = "Each input is a session, which is fitted as declared, or a model of `abbe fit --save` or `abbe trace --save`. Sessions are fitted \
-with the errors and effects that any input has, models included, so that their parameters are the same. The others are compared with the first.
-
-A difference is significant if Holm's procedure rejects that it is zero: the probability of any false claim between two inputs is at \
-most the level of --significance. Bars of the same name with the same prior are taken for one bar, whose deviation cancels, \
-unless the readings show that they are two; --shared names other set-up quantities that were not mounted again.
-
-Examples:
-  abbe compare run1/session.toml run2/session.toml
-  abbe compare run1/session.toml run2/session.toml --shared bar --shared workpiece_ball
-  abbe fit run1/session.toml --save model.json
-  abbe compare model.json run2/session.toml --json differences.json
-  abbe compare model.json run2/session.toml --significance 0.01 --places 7 --csv differences.csv";
+pub const HELP: &str = include_str!("help/compare.txt");
 
 /// `abbe compare A B …`
 #[derive(Args)]
@@ -60,14 +49,6 @@ pub struct CompareArguments {
     /// Example: --places 7
     #[arg(long, value_name = "N", default_value_t = 5)]
     places: usize,
-    /// List every difference.
-    #[arg(long)]
-    all: bool,
-    /// Write the differences as CSV.
-    ///
-    /// Example: --csv differences.csv
-    #[arg(long, value_name = "FILE")]
-    csv: Option<PathBuf>,
     #[command(flatten)]
     common: CommonArguments,
 }
@@ -83,70 +64,53 @@ pub fn run(arguments: &CompareArguments) -> Result<(), Failure> {
     if arguments.places > 100 {
         return Err(Failure::CommandLine(format!("`--places {}`: 100 is the most", arguments.places)));
     }
-    let outputs = arguments.common.outputs(&[arguments.csv.as_ref()])?;
-    let mut origin = Origin::default();
-    let inputs: Vec<Input> =
-        arguments.inputs.iter().map(|file| read(file, arguments, &outputs, &mut origin)).collect::<Result<_, _>>()?;
+    let common = &arguments.common;
+    let outputs = common.output.prepared(&[])?;
+    let reading = ReadOptions {
+        data_directory: arguments.data.clone(),
+        allow_outside: arguments.allow_outside,
+        ..ReadOptions::default()
+    };
+    let inputs: Vec<File> =
+        arguments.inputs.iter().map(|file| read(file, &reading, &outputs)).collect::<Result<_, _>>()?;
     let names: Vec<String> = arguments.inputs.iter().map(|file| file.display().to_string()).collect();
-    for (name, input) in names.iter().zip(&inputs).skip(1) {
-        one_machine((&names[0], inputs[0].machine()), (name, input.machine()))?;
-    }
-    let (models, outliers): (Vec<IdentifiedModel>, Vec<Vec<Outlier>>) =
-        models(inputs, arguments.common.seed)?.into_iter().unzip();
-    let excluded = names.iter().zip(outliers).flat_map(|(input, outliers)| {
-        outliers.into_iter().map(|outlier| ExcludedReading { input: input.clone(), outlier })
-    });
-    let excluded: Vec<ExcludedReading> = excluded.collect();
-    let named: Vec<Named<'_>> = names.into_iter().zip(&models).map(|(name, model)| Named { name, model }).collect();
+    let given: Vec<Input> = inputs.iter().map(|(input, _)| input.clone()).collect();
     let options = CompareOptions {
         significance: arguments.significance,
         shared: (!arguments.shared.is_empty()).then(|| arguments.shared.clone()),
         places: arguments.places,
     };
-    let comparison = Comparison { outliers: excluded, ..compare(&named, &options)? };
-    if outputs.tables(arguments.common.quiet) {
-        for (number, pair) in comparison.pairs.iter().enumerate() {
-            if number > 0 {
-                say!("");
-            }
-            for line in present::headline(&comparison, pair) {
-                say!("{line}");
-            }
-            output::print(&present::differences(&comparison, pair, arguments.all));
-        }
-        match comparison.workspace.is_empty() {
-            false => output::print(&present::workspace(&comparison)),
-            true if arguments.places > 0 => {
-                say!("");
-                say!("Volumetric error: not evaluated, because the ranges of the axes have nothing in common");
-            }
-            true => {}
+    let found = compare_inputs(names, given, &options, common.seed)?;
+    let mut from = Read { seed: Some(common.seed), ..Read::default() };
+    for (input, from_files) in &inputs {
+        match (input, from_files) {
+            (Input::Session(session), InputFiles::Session(sources)) => from.sessions.push((session, sources)),
+            (_, InputFiles::Model(stamp)) => from.files.extend(stamp),
+            _ => {}
         }
     }
-    if let Some(path) = &arguments.csv {
-        output::write_figures(path, &present::figures(&comparison))?;
-    }
-    match &arguments.common.json {
-        Some(path) => json::write(path, origin, Some(arguments.common.seed), &comparison),
-        None => Ok(()),
-    }
+    let report = report::compare::report(&inputs[0].0.machine().name, &found, arguments.places > 0);
+    common.output.put(&outputs, &report, &Stated::new(&found, Statements::of_comparison(&found)), &from)
 }
 
-fn read(file: &Path, arguments: &CompareArguments, outputs: &Outputs, origin: &mut Origin) -> Result<Input, Failure> {
+/// What an input was read from.
+enum InputFiles {
+    Session(Box<SourceMap>),
+    Model(Option<FileStamp>),
+}
+
+/// An input with its files.
+type File = (Input, InputFiles);
+
+fn read(file: &Path, options: &ReadOptions, outputs: &Outputs) -> Result<File, Failure> {
     let source = files::text(file, "the session or model")?;
     // A model is JSON; no session begins with a brace.
     if source.text.trim_start().starts_with('{') {
         outputs.refuse_overwrite([file])?;
-        origin.add(Origin::of_files(&source.stamp));
-        return Ok(Input::Model(Box::new(model_file::read_text(file, &source.text)?)));
+        let model = model_file::read_text(file, &source.text)?;
+        return Ok((Input::Model(Box::new(model)), InputFiles::Model(source.stamp)));
     }
-    let options = ReadOptions {
-        data_directory: arguments.data.clone(),
-        allow_outside: arguments.allow_outside,
-        ..ReadOptions::default()
-    };
-    let (session, sources) = files::session_of(&source, &options)?;
+    let (session, sources) = files::session_of(&source, options)?;
     outputs.refuse_overwrite_of_sources(&sources)?;
-    origin.add(Origin::of_session(&sources));
-    Ok(Input::Session(Box::new(session)))
+    Ok((Input::Session(Box::new(session)), InputFiles::Session(Box::new(sources))))
 }

@@ -1,73 +1,26 @@
 //! `abbe export`: the calibrated machine for other programs and for controls.
 
+mod travel;
+
 use std::path::PathBuf;
 
-use abbe::identify::compensation::{self, Compensation, Control};
-use abbe::identify::export::control::{self, EntryChoice, KinematicTable, NOT_DOCUMENTED};
-use abbe::identify::export::dh::{self, DhTable};
-use abbe::identify::export::travel::Travel;
-use abbe::identify::export::{left_out, urdf};
-use abbe::identify::model_file::{self, IdentifiedModel};
-use abbe::identify::parameters::Role;
-use abbe::model::component::{ErrorKind, ErrorName};
+use abbe::exports::{self, ExportOptions, FORMATS};
+use abbe::identify::export::control::EntryChoice;
+use abbe::identify::model_file;
 use abbe::model::files;
-use abbe::model::words::cut;
+use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::{Args, ValueEnum};
-use schemars::JsonSchema;
-use serde::Serialize;
 
 use super::failure::Failure;
-use super::json::{self, Origin};
-use super::output::{self, Outputs};
-use super::values;
+use super::results::{OutputArguments, Read};
+use super::{output, values};
 use crate::report::export as present;
 
 /// Examples of `abbe export`.
-pub const HELP: &str = "urdf writes the calibrated chain (ROS, lengths in m); dh writes Denavit-Hartenberg parameters of a robot in the modified form of Craig, \
-with Hayati's angle for parallel axes. linuxcnc and fanuc write the change of each kinematic parameter of the control: what is added to the \
-present entry, with its standard uncertainty. The entries make the rms of the volumetric error over the travel least: the measured range of \
-each axis, or that of --travel. --entries plain writes the displacements of the axis lines themselves. The file states what remains. beckhoff writes location errors in the ISG CSV format. The source of each control's model \
-stands in the table. For siemens and heidenhain the public manuals leave the signs open: nothing is written.
+pub const HELP: &str = include_str!("help/export.txt");
 
-A fixed geometry holds location errors only. Effects are listed as left out.
-
-Examples:
-  abbe fit run1/session.toml --save model.json
-  abbe export model.json --as urdf --out machine.urdf --tool-mm 0,0,-120
-  abbe export model.json --as linuxcnc --out kinematics.csv --json kinematics.json
-  abbe export model.json --as fanuc --out kinematics.csv --travel A=-30..110 --travel C=-180..180";
-
-/// What is written.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Format {
-    /// URDF of the calibrated chain
-    Urdf,
-    /// Denavit-Hartenberg parameters, calibrated and nominal
-    Dh,
-    /// LinuxCNC, xyzac-trt-kins and xyzbc-trt-kins
-    Linuxcnc,
-    /// Fanuc 30i, table rotation type
-    Fanuc,
-    /// Beckhoff TF5280, location errors
-    Beckhoff,
-    /// SINUMERIK 840D
-    Siemens,
-    /// Heidenhain TNC
-    Heidenhain,
-}
-
-impl Format {
-    /// The word of a control.
-    fn control(self) -> &'static str {
-        match self {
-            Format::Linuxcnc => "linuxcnc",
-            Format::Fanuc => "fanuc",
-            Format::Siemens => NOT_DOCUMENTED[0].0,
-            Format::Heidenhain => NOT_DOCUMENTED[1].0,
-            Format::Beckhoff => "beckhoff",
-            Format::Urdf | Format::Dh => "",
-        }
-    }
+fn formats() -> PossibleValuesParser {
+    PossibleValuesParser::new(FORMATS.iter().map(|format| PossibleValue::new(format.word).help(format.about)))
 }
 
 /// Entries of a control.
@@ -96,8 +49,8 @@ pub struct ExportArguments {
     /// What is written.
     ///
     /// Example: --as urdf
-    #[arg(long = "as", value_enum, value_name = "FORMAT")]
-    format: Format,
+    #[arg(long = "as", value_parser = formats(), value_name = "FORMAT")]
+    format: String,
     /// Where it is written; `-` is standard output.
     ///
     /// Example: --out robot.urdf
@@ -116,124 +69,31 @@ pub struct ExportArguments {
     /// Example: --travel A=-30..110 --travel C=-180..180
     #[arg(long, value_name = "AXIS=FROM..TO", allow_hyphen_values = true)]
     travel: Vec<String>,
-    /// Write the same as JSON (dh and controls).
-    ///
-    /// Example: --json kinematics.json
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
-}
-
-/// The result of `abbe export` in JSON.
-#[derive(Serialize, JsonSchema)]
-pub struct ExportResult {
-    /// Denavit-Hartenberg parameters with the identified location errors.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    calibrated: Option<DhTable>,
-    /// Those of the machine without errors.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    nominal: Option<DhTable>,
-    /// Changes of a control's kinematic parameters.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    kinematics: Option<KinematicTable>,
-    /// Effects and errors that a fixed geometry does not hold.
-    left_out: Vec<String>,
+    #[command(flatten)]
+    output: OutputArguments,
 }
 
 /// Runs `abbe export`.
-pub fn run(arguments: &ExportArguments, quiet: bool) -> Result<(), Failure> {
-    let outputs = Outputs::new(std::iter::once(&arguments.out).chain(&arguments.json))?;
+pub fn run(arguments: &ExportArguments) -> Result<(), Failure> {
+    let outputs = arguments.output.prepared(&[Some(&arguments.out)])?;
     outputs.refuse_overwrite([arguments.model.as_path()])?;
     let source = files::text(&arguments.model, "the model file")?;
     let model = model_file::read_text(&source.file, &source.text)?;
-    let tool_mm = values::point_mm("--tool-mm", &arguments.tool_mm, model.tool_mm)?;
-    if !matches!(arguments.format, Format::Linuxcnc | Format::Fanuc) {
+    let format = exports::format(&arguments.format)?;
+    if !format.takes_entries {
         let other = [(arguments.entries == Entries::Plain, "--entries"), (!arguments.travel.is_empty(), "--travel")];
         if let Some((_, option)) = other.iter().find(|(is_given, _)| *is_given) {
             return Err(Failure::CommandLine(format!("`{option}` belongs to `--as linuxcnc` and `--as fanuc`")));
         }
     }
-    let mut result = ExportResult { calibrated: None, nominal: None, kinematics: None, left_out: left_out(&model) };
-    let (text, tables) = match arguments.format {
-        Format::Urdf => (urdf::urdf(&model, tool_mm)?.into_bytes(), Vec::new()),
-        Format::Dh => {
-            let [calibrated, nominal] = dh::tables(&model, tool_mm)?;
-            let table = present::dh(&calibrated, &nominal);
-            (result.calibrated, result.nominal) = (Some(calibrated), Some(nominal));
-            ([present::dh_header(&table).into_bytes(), output::csv(&table)?].concat(), vec![table])
-        }
-        Format::Beckhoff => {
-            let (text, missing) = beckhoff(&model)?;
-            result.left_out = missing;
-            (text, Vec::new())
-        }
-        control => {
-            let travel = travel(&arguments.travel, &model)?;
-            let table = control::table(&model, control.control(), arguments.entries.choice(), &travel, tool_mm)?;
-            result.left_out.clone_from(&table.left_out);
-            let printed = present::kinematics(&table);
-            let text = [present::kinematics_header(&table).into_bytes(), output::csv(&printed)?].concat();
-            result.kinematics = Some(table);
-            (text, vec![printed])
-        }
+    let options = ExportOptions {
+        tool_mm: values::point_mm("--tool-mm", &arguments.tool_mm, model.tool_mm)?,
+        entries: arguments.entries.choice(),
+        travel: travel::stated(&arguments.travel, &model)?,
     };
-    output::write_whole(&arguments.out, &text)?;
-    if outputs.tables(quiet) {
-        say!("{}: written", arguments.out.display());
-        tables.iter().for_each(output::print);
-        for missing in &result.left_out {
-            say!("left out: {missing}");
-        }
-    }
-    match &arguments.json {
-        Some(path) => json::write(path, Origin::of_files(&source.stamp), None, &result),
-        None => Ok(()),
-    }
-}
-
-/// The travel of each axis: the measured range, or that of an option `AXIS=FROM..TO`.
-fn travel(options: &[String], model: &IdentifiedModel) -> Result<Travel, Failure> {
-    let mut travel = Travel::measured(model);
-    for option in options {
-        let refused = |why: &str| {
-            let axes: Vec<&str> = model.machine.axes.iter().map(|axis| axis.name.as_str()).collect();
-            Failure::CommandLine(format!(
-                "`--travel {}`: {why}; AXIS=FROM..TO is expected, as A=-30..110, in mm or degrees, with an axis of {}",
-                cut(option, 80),
-                axes.join(", ")
-            ))
-        };
-        let (name, range) = option.split_once('=').ok_or_else(|| refused("no `=`"))?;
-        let (from, to) = range.split_once("..").ok_or_else(|| refused("no `..`"))?;
-        let axis = model.machine.axis_index(name.trim()).ok_or_else(|| refused("no such axis"))?;
-        let number = |text: &str| text.trim().parse::<f64>().ok();
-        let (from, to) = number(from).zip(number(to)).ok_or_else(|| refused("no two numbers"))?;
-        values::POSITION.all(&format!("--travel {}=", model.machine.axes[axis].name), &[from, to])?;
-        if from >= to {
-            return Err(refused("the first number is not below the second"));
-        }
-        let kind = model.machine.axes[axis].kind;
-        travel.ranges[axis] = [from, to].map(|value| kind.to_internal(value));
-        travel.is_measured = false;
-    }
-    Ok(travel)
-}
-
-/// The location errors in the format of the control, and what it does not hold.
-fn beckhoff(model: &IdentifiedModel) -> Result<(Vec<u8>, Vec<String>), Failure> {
-    let errors = model.parameters.iter().enumerate().filter(|(_, parameter)| parameter.role == Role::Error);
-    let named = errors
-        .filter(|(index, _)| model.is_estimated(*index))
-        .filter_map(|(_, parameter)| Some((ErrorName::parse(&parameter.id)?, parameter.value)));
-    let locations = named.filter(|(name, _)| name.kind == ErrorKind::Location).collect();
-    let compensation = Compensation { locations, left_out: left_out(model), ..Compensation::default() };
-    let control: Option<&Control> =
-        compensation::CONTROLS.iter().find(|control| control.word == Format::Beckhoff.control());
-    let Some(control) = control else {
-        return Err(Failure::Other("the format of Beckhoff is not in the registry".into()));
-    };
-    let tables = compensation::tables(&model.machine, &compensation, control, compensation::MAX_POINTS);
-    match tables.files.into_iter().next() {
-        Some((_, text)) => Ok((text.into_bytes(), tables.left_out)),
-        None => Err(Failure::Other("the model has no location error that the format holds".into())),
-    }
+    let exported = format.export(&model, &options)?;
+    output::write_whole(&arguments.out, &exported.text)?;
+    let left_out = &exported.result.left_out;
+    let report = present::report(&model.machine.name, &arguments.out, exported.table, left_out);
+    arguments.output.put(&outputs, &report, &exported.result, &Read::files(&source.stamp))
 }

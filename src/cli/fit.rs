@@ -1,54 +1,21 @@
 //! `abbe fit`: estimate errors from readings.
 
-mod screen;
-
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use abbe::document::Stated;
+use abbe::identify::results::Statements;
+use abbe::identify::{fit, propagation};
+use clap::Args;
 
 use super::failure::Failure;
-use super::message::print_warnings;
-use super::report::ReportArguments;
+use super::method::{self, Method};
+use super::results::Read;
 use super::save::SaveArguments;
-use super::{
-    CommonArguments, SessionArguments, compensation, geometric, output, read_session, repeated, self_calibration,
-};
-use crate::report::fit::Figures;
-use crate::report::readings;
+use super::{CommonArguments, SessionArguments, compensation, monte_carlo, output, read_session, repeated};
+use crate::report::{self, readings};
 
 /// Examples of `abbe fit`.
-pub const HELP: &str = "Examples:
-  abbe fit sessions/hermle-c600u/measured/session.toml
-  abbe fit sessions/hermle-c600u/measured/session.toml --all
-  abbe fit sessions/hermle-c600u/measured/session.toml --json fit.json --csv fit.csv
-  abbe fit sessions/hermle-c600u/measured/session.toml --report fit.html --plots plots
-  abbe fit run1/session.toml --base --save model.json
-  abbe fit run2/session.toml --repeat run3/session.toml
-  abbe fit run1/session.toml --method cone
-  abbe fit run1/session.toml --monte-carlo 10000 --coverage 0.99
-  abbe fit sessions/r-test/measured/session.toml --views views.csv --residuals residuals.csv
-  abbe fit sessions/self-calibration/measured/session.toml --method self-calibration \\
-      --monte-carlo 100000
-
-The first screen answers in this order: goodness of fit and rank; estimates with standard uncertainty u, expanded uncertainty \
-U = 2u and significance; what is confounded; what to do next. It folds set-up parameters, ball-bar figures, null-space \
-directions and outliers. --all lists them.";
-
-/// The method of identification.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Method {
-    /// All parameters of the session together, by least squares on the kinematic chain.
-    Full,
-    /// Position errors from the centre of one circle per axis (Jiang 2014, Section 4.2), beside the full fit.
-    Circle,
-    /// Orientation errors from the cone of the bar with its extension (Jiang 2014, Sections 4.2.1, 5.2), beside the
-    /// full fit.
-    Cone,
-    /// Orientation errors from circles in two planes along each axis (Jiang 2014, Section 6.1.2), beside the full fit.
-    TwoPlane,
-    /// Rotary axis, linear axes and artefact separately, from a probed cylinder (Zimmermann & Ibaraki 2020).
-    SelfCalibration,
-}
+pub const HELP: &str = include_str!("help/fit.txt");
 
 /// `abbe fit SESSION`
 #[derive(Args)]
@@ -57,8 +24,6 @@ pub struct FitArguments {
     session: SessionArguments,
     #[command(flatten)]
     common: CommonArguments,
-    #[command(flatten)]
-    report: ReportArguments,
     #[command(flatten)]
     save: SaveArguments,
     /// Print the base parameters: a minimal set of numbers with u that predicts the same readings, and the parameters
@@ -69,12 +34,8 @@ pub struct FitArguments {
     /// takes its place. Uncertainties do not cover the others; every output says so. May be repeated.
     ///
     /// Example: --assume EZC~C:h2
-    #[arg(long, value_name = "EFFECT")]
+    #[arg(long, value_name = "EFFECT", allow_hyphen_values = true)]
     assume: Vec<String>,
-    /// List everything that the first screen folds: set-up parameters, directions and diagnosis of ball-bar figures,
-    /// null-space directions, outliers.
-    #[arg(long)]
-    all: bool,
     /// Method of identification.
     ///
     /// Example: --method two-plane
@@ -93,7 +54,7 @@ pub struct FitArguments {
     #[arg(long, value_name = "FILE.csv")]
     residuals: Option<PathBuf>,
     #[command(flatten)]
-    draws: self_calibration::DrawArguments,
+    draws: monte_carlo::DrawArguments,
     /// Compare with further sessions of the same plan: standard uncertainty from the scatter of the fits (Type A)
     /// beside that of each fit (Type B).
     ///
@@ -102,99 +63,58 @@ pub struct FitArguments {
         long,
         value_name = "SESSION",
         num_args = 1..,
-        conflicts_with_all = ["monte_carlo", "csv", "views", "residuals", "report", "plots", "compensation", "save", "base"]
+        conflicts_with_all = ["monte_carlo", "views", "residuals", "compensation", "save", "base"]
     )]
     repeat: Vec<PathBuf>,
-    /// Write the result as CSV, one row per value (full fit only).
-    ///
-    /// Example: --csv fit.csv
-    #[arg(long, value_name = "FILE")]
-    csv: Option<PathBuf>,
     #[command(flatten)]
     compensation: compensation::CompensationArguments,
 }
 
 /// Runs `abbe fit`.
 pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
-    arguments.report.check()?;
     arguments.compensation.check()?;
-    let others =
-        [arguments.csv.as_ref(), arguments.views.as_ref(), arguments.residuals.as_ref(), arguments.report.file()];
-    let others = [others.as_slice(), &[arguments.save.file()]].concat();
-    let outputs = arguments.common.outputs(&others)?;
-    let tables = outputs.tables(arguments.common.quiet);
+    let common = &arguments.common;
+    let others = [arguments.views.as_ref(), arguments.residuals.as_ref(), arguments.save.file()];
+    let outputs = common.output.prepared(&others)?;
     if !arguments.repeat.is_empty() {
         if arguments.method != Method::Full {
-            return Err(Failure::CommandLine(
-                "`--repeat` compares full fits: leave out `--method` or `--repeat`".into(),
-            ));
+            let message = "`--repeat` compares full fits: leave out `--method` or `--repeat`";
+            return Err(Failure::CommandLine(message.into()));
         }
-        return repeated::run(&arguments.session, &arguments.repeat, &arguments.common, &outputs);
+        return repeated::run(&arguments.session, &arguments.repeat, common, &outputs);
     }
     let (session, sources) = read_session(&arguments.session, &outputs)?;
-    let session = abbe::identify::fit::assume(&session, &arguments.assume)?;
-    if arguments.views.is_some() && arguments.method != Method::Full {
-        let message = "`--views` writes residuals of the full fit: leave out `--method`";
-        return Err(Failure::CommandLine(message.into()));
+    let session = fit::assume(&session, &arguments.assume)?;
+    let read = Read::session(&session, &sources, common.seed);
+    if arguments.method != Method::Full {
+        method::refuse([
+            ("--views", arguments.views.is_some()),
+            ("--residuals", arguments.residuals.is_some()),
+            ("--compensation", arguments.compensation.wanted()),
+            ("--base", arguments.base),
+            ("--save", arguments.save.file().is_some()),
+        ])?;
+        return arguments.method.run(&session, &arguments.draws, (common, &outputs), &read);
     }
-    if arguments.residuals.is_some() && arguments.method != Method::Full {
-        let message = "`--residuals` writes residuals of the full fit: leave out `--method`";
-        return Err(Failure::CommandLine(message.into()));
-    }
-    if arguments.method != Method::Full && (arguments.csv.is_some() || arguments.compensation.wanted()) {
-        return Err(Failure::CommandLine(
-            "`--csv` and `--compensation` write results of the full fit: leave out `--method`, or use `--json`".into(),
-        ));
-    }
-    if arguments.method != Method::Full && (arguments.base || arguments.save.file().is_some()) {
-        let message = "`--base` and `--save` take the result of the full fit: leave out `--method`";
-        return Err(Failure::CommandLine(message.into()));
-    }
-    if arguments.method == Method::SelfCalibration && arguments.report.asked() {
-        return Err(Failure::CommandLine(
-            "`--report` and `--plots` show the full fit and the geometric methods: leave out `--method`".to_string(),
-        ));
-    }
-    if arguments.method == Method::SelfCalibration {
-        return self_calibration::run((&session, &sources), &arguments.draws, &arguments.common, tables);
-    }
-    let geometric = match arguments.method {
-        Method::Full | Method::SelfCalibration => None,
-        Method::Circle => Some(abbe::identify::geometric::Method::Circle),
-        Method::Cone => Some(abbe::identify::geometric::Method::Cone),
-        Method::TwoPlane => Some(abbe::identify::geometric::Method::TwoPlane),
-    };
-    if let Some(method) = geometric {
-        arguments.draws.refuse()?;
-        return geometric::run((&session, &sources), method, &arguments.common, &arguments.report, tables);
-    }
-    let draws = arguments.draws.draws(arguments.common.seed)?;
-    let (problem, fit) = abbe::identify::fit::prepare(&session, arguments.common.seed)?;
+    let draws = arguments.draws.draws(common.seed)?;
+    let (problem, found) = fit::prepare(&session, common.seed)?;
     if let Some(path) = &arguments.views {
-        output::write_whole(path, &output::csv(&readings::by_direction(&problem, &fit)?)?)?;
+        output::write_whole(path, &output::csv(&readings::by_direction(&problem, &found)?)?)?;
     }
     if let Some(path) = &arguments.residuals {
-        output::write_whole(path, &output::csv(&readings::residuals(&problem, &fit))?)?;
+        output::write_whole(path, &output::csv(&readings::residuals(&problem, &found))?)?;
     }
-    let mut result = abbe::identify::fit::report(&problem, &fit)?;
+    let mut result = fit::report(&problem, &found)?;
     if let Some(draws) = &draws {
-        abbe::identify::propagation::add_monte_carlo(&problem, &fit, draws, &mut result)?;
+        propagation::add_monte_carlo(&problem, &found, draws, &mut result)?;
     }
     if arguments.base {
-        result.base = Some(abbe::identify::fit::base::report(&problem, &fit)?);
+        result.base = Some(fit::base::report(&problem, &found)?);
     }
-    if tables {
-        screen::print(&problem, &fit, &result, &arguments.session, arguments.all);
-    }
-    print_warnings(&result.warnings);
-    arguments.common.write_json(&sources, &result)?;
-    if let Some(path) = &arguments.csv {
-        output::write_figures(path, &Figures::of_fit(&result))?;
-    }
-    if arguments.report.asked() {
-        let document = crate::report::pages::fit::document(&problem, &fit, &result)?;
-        arguments.report.write(&document, (&session, &sources), arguments.common.seed)?;
-    }
-    arguments.save.run(&problem, &fit, &sources, arguments.common.seed)?;
-    arguments.compensation.run(&problem, &fit, tables)
+    let commands = arguments.session.commands();
+    let report = report::fit::report(&problem, &found, &result, &commands, common.output.figures())?;
+    let stated = Stated::new(&result, Statements::of_fit(&problem, &result));
+    common.output.put(&outputs, &report, &stated, &read)?;
+    arguments.save.run(&problem, &found, &sources, common.seed)?;
+    arguments.compensation.run(&problem, &found, outputs.tables())
 }

@@ -1,17 +1,18 @@
 //! `abbe volumetric --map`: the volumetric error over a grid, and its compensation.
 
+mod grid;
+
 use std::path::PathBuf;
 
-use abbe::identify::volumetric::{self, MachineWithErrors, Summary, functions};
-use abbe::model::axis::AxisKind;
+use abbe::identify::volumetric::{self, MachineWithErrors, functions};
 use abbe::model::chain::Machine;
 use abbe::model::files::{self, Source};
-use abbe::model::words::counted;
 use clap::Args;
 
 use super::failure::Failure;
-use super::json::{self, Origin};
-use super::{output, values};
+use super::output::{self, Outputs};
+use super::results::{OutputArguments, Read};
+use super::values;
 use crate::report::volumetric as present;
 
 /// A map of the volumetric error.
@@ -40,15 +41,14 @@ pub struct MapArguments {
     /// Add the commands of the linear axes that cancel the error, and what they leave.
     #[arg(long, requires = "map")]
     compensate: bool,
-    /// Write the summary of the map as JSON.
-    #[arg(long, value_name = "FILE", requires = "map")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    pub output: OutputArguments,
 }
 
 impl MapArguments {
-    /// The files that are written.
-    pub fn outputs(&self) -> impl Iterator<Item = &PathBuf> {
-        self.map.iter().chain(&self.json)
+    /// The file of the map.
+    pub fn file(&self) -> Option<&PathBuf> {
+        self.map.as_ref()
     }
 
     /// The file of the errors.
@@ -63,97 +63,22 @@ impl MapArguments {
 }
 
 /// Runs `abbe volumetric --map`.
-pub fn run(machine_file: &Source, machine: &Machine, arguments: &MapArguments, tables: bool) -> Result<(), Failure> {
+pub fn run(
+    machine_file: &Source,
+    machine: &Machine,
+    arguments: &MapArguments,
+    outputs: &Outputs,
+) -> Result<(), Failure> {
     let (Some(path), Some(file)) = (&arguments.map, &arguments.functions) else {
         return Err(Failure::Other("--map and --functions go together".into()));
     };
     let source = files::text(file, "the file of error functions")?;
     let functions = functions::of_source(&source, machine)?;
     let tool_mm = values::point_mm("--tool-mm", &arguments.tool_mm, [0.0; 3])?;
-    let grid = grid(machine, arguments)?;
+    let grid = grid::grid(machine, arguments.places, &arguments.axes)?;
     let erring = MachineWithErrors { machine, functions: &functions, tool_mm };
     let (places, summary) = volumetric::map(&erring, &grid, arguments.compensate)?;
     output::write_whole(path, &output::csv(&present::places(machine, &places))?)?;
-    if tables {
-        print(&summary, functions.len(), &path.display().to_string());
-    }
-    if let Some(path) = &arguments.json {
-        let read = machine_file.stamp.iter().chain(&source.stamp);
-        json::write(path, Origin::of_files(read), None, &summary)?;
-    }
-    Ok(())
-}
-
-/// Positions of each axis, mm or rad.
-fn grid(machine: &Machine, arguments: &MapArguments) -> Result<Vec<Vec<f64>>, Failure> {
-    if arguments.places > volumetric::MAX_POINTS {
-        return Err(Failure::Other(format!(
-            "--places {}: a map has at most {} places",
-            arguments.places,
-            volumetric::MAX_POINTS
-        )));
-    }
-    let mut wanted: Vec<Option<(char, f64)>> = vec![None; machine.axes.len()];
-    for text in &arguments.axes {
-        let fault = || {
-            Failure::Other(format!(
-                "--axis {text}: write where the axis stands, `A=30`, or its number of places, `X:11`"
-            ))
-        };
-        let sign = if text.contains('=') { '=' } else { ':' };
-        let (name, number) = text.split_once(sign).ok_or_else(fault)?;
-        let number: f64 = number.trim().parse().map_err(|_| fault())?;
-        if number.is_nan() || (sign == ':' && (number < 1.0 || number.fract() != 0.0)) {
-            return Err(fault());
-        }
-        if sign == '=' {
-            values::POSITION.check(&format!("--axis {}=", name.trim()), number)?;
-        } else if number > volumetric::MAX_POINTS as f64 {
-            return Err(Failure::Other(format!("--axis {text}: {} places are the most", volumetric::MAX_POINTS)));
-        }
-        let Some(axis) = machine.axis_index(name.trim()) else {
-            let names: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
-            return Err(Failure::Other(format!(
-                "--axis {text}: the machine has no axis `{}`; its axes are {}",
-                name.trim(),
-                names.join(", ")
-            )));
-        };
-        wanted[axis] = Some((sign, number));
-    }
-    let along = |axis: usize| -> Result<Vec<f64>, Failure> {
-        let body = &machine.axes[axis];
-        let inside = |q: f64| match body.kind {
-            AxisKind::Linear => q,
-            AxisKind::Rotary => q.to_radians(),
-        };
-        let count = match wanted[axis] {
-            Some(('=', at)) => return Ok(vec![inside(at)]),
-            Some((_, count)) => count as usize,
-            None => arguments.places,
-        };
-        let [least, greatest] = match (body.travel, body.kind) {
-            (Some(travel), _) => travel,
-            (None, AxisKind::Rotary) => [-std::f64::consts::PI, std::f64::consts::PI],
-            (None, AxisKind::Linear) => {
-                return Err(Failure::Other(format!(
-                    "axis `{}` states no travel: add `travel_mm` to the machine, or `--axis {}=0`",
-                    body.name, body.name
-                )));
-            }
-        };
-        Ok(match count {
-            0 => return Err(Failure::Other("--places 0: a map has at least one place".into())),
-            1 => vec![0.5 * (least + greatest)],
-            _ => (0..count).map(|k| least + (greatest - least) * k as f64 / (count - 1) as f64).collect(),
-        })
-    };
-    (0..machine.axes.len()).map(along).collect()
-}
-
-fn print(summary: &Summary, functions: usize, path: &str) {
-    say!("{path}: {}, {}", counted(summary.points, "place"), counted(functions, "error function"));
-    let at: Vec<String> = summary.largest_at.iter().map(|at| format!("{} {:.1}", at.axis, at.position)).collect();
-    say!("largest at {}\n", at.join(", "));
-    output::print(&present::sizes(summary));
+    let report = present::report(machine, path, &summary, functions.len());
+    arguments.output.put(outputs, &report, &summary, &Read::files(machine_file.stamp.iter().chain(&source.stamp)))
 }

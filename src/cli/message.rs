@@ -7,6 +7,7 @@ use std::io::Write;
 use abbe::model::words::{MAX_QUOTED, cut, shortened};
 use clap::builder::styling::{AnsiColor, Style};
 use clap::error::ContextValue;
+use indicatif::{ProgressBar, ProgressStyle};
 
 /// The kind of a message.
 #[derive(Clone, Copy)]
@@ -90,4 +91,13 @@ pub fn print_usage(mut error: clap::Error) {
         error.insert(kind, value);
     }
     let _ = write!(anstream::stderr(), "{}", shortened(&error.render().ansi().to_string()));
+}
+
+/// A bar of the progress of many units, `sessions`; none if `quiet`.
+pub fn progress_bar(count: usize, units: &str, quiet: bool) -> ProgressBar {
+    let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(count as u64) };
+    if let Ok(style) = ProgressStyle::with_template(&format!("{{bar:40}} {{pos}} of {{len}} {units}, {{eta}} left")) {
+        bar.set_style(style);
+    }
+    bar
 }

@@ -14,12 +14,13 @@ mod export;
 mod failure;
 mod fit;
 mod folder;
-mod geometric;
 mod history;
 mod interrupt;
 mod json;
 mod map;
 mod message;
+mod method;
+mod monte_carlo;
 mod nc;
 mod new;
 mod next_session;
@@ -27,19 +28,18 @@ mod output;
 mod paper;
 mod plan;
 mod repeated;
-mod report;
+mod results;
 mod run;
 mod save;
 mod schema;
-mod screen;
 mod search;
-mod self_calibration;
 mod sheet;
 mod simulate;
 mod study;
 mod trace;
 mod validate;
 mod values;
+mod volumetric;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -48,8 +48,10 @@ use abbe::model::files::{self, ReadOptions, SourceMap};
 use abbe::model::session::Session;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
+use crate::report::commands::Commands;
 use failure::Failure;
 use output::Outputs;
+use results::OutputArguments;
 
 /// Identify geometric errors of machine tools, robots and other serial chains: identifiability, estimates with
 /// uncertainties, unmodelled effects.
@@ -97,8 +99,8 @@ enum Command {
     #[command(after_help = equation::HELP)]
     Equation(equation::EquationArguments),
     /// Print the equation of the volumetric error, or map and compensate it over the workspace.
-    #[command(after_help = equation::VOLUMETRIC_HELP)]
-    Volumetric(equation::VolumetricArguments),
+    #[command(after_help = volumetric::HELP)]
+    Volumetric(volumetric::VolumetricArguments),
     /// State the differences between sessions or models of one machine, with their significance.
     #[command(after_help = compare::HELP)]
     Compare(compare::CompareArguments),
@@ -175,39 +177,23 @@ impl SessionArguments {
     fn options(&self) -> ReadOptions {
         ReadOptions { data_directory: self.data.clone(), allow_outside: self.allow_outside, ..ReadOptions::default() }
     }
+
+    /// How command lines name the session.
+    fn commands(&self) -> Commands {
+        Commands::of(&self.session, self.data.as_deref(), self.allow_outside)
+    }
 }
 
-/// Arguments of every command with a result.
+/// Arguments of every command with a result that depends on a seed.
 #[derive(Args, Clone)]
 pub struct CommonArguments {
-    /// Write the result as JSON; `-` writes it, and nothing else, to standard output.
-    ///
-    /// Example: --json result.json
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
-    /// Suppress tables and progress output; warnings and errors stay.
-    #[arg(short, long, global = true)]
-    quiet: bool,
+    #[command(flatten)]
+    output: OutputArguments,
     /// Seed of the random numbers: folds, null distribution, simulated noise, Monte Carlo.
     ///
     /// Example: --seed 7
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-}
-
-impl CommonArguments {
-    /// The requested output files. A file that cannot be written is refused before the work.
-    fn outputs(&self, others: &[Option<&PathBuf>]) -> Result<Outputs, Failure> {
-        Outputs::new(others.iter().copied().flatten().chain(&self.json))
-    }
-
-    /// Writes the result as JSON if it is requested.
-    fn write_json<T: serde::Serialize>(&self, sources: &SourceMap, result: &T) -> Result<(), Failure> {
-        match &self.json {
-            Some(path) => json::write(path, json::Origin::of_session(sources), Some(self.seed), result),
-            None => Ok(()),
-        }
-    }
 }
 
 /// Runs the command line and returns the exit status.
@@ -224,10 +210,10 @@ pub fn run() -> ExitCode {
     };
     let outcome = match command {
         Command::Equation(arguments) => equation::run(&arguments),
-        Command::Volumetric(arguments) => equation::run_volumetric(&arguments, quiet),
+        Command::Volumetric(arguments) => volumetric::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
-        Command::Compensate(arguments) => compensate::run(&arguments, quiet),
-        Command::Export(arguments) => export::run(&arguments, quiet),
+        Command::Compensate(arguments) => compensate::run(&arguments),
+        Command::Export(arguments) => export::run(&arguments),
         Command::Nc(arguments) => nc::run(&arguments, quiet),
         Command::Fit(arguments) => fit::run(&arguments),
         Command::Paper(arguments) => paper::run(&arguments, quiet),
@@ -239,12 +225,12 @@ pub fn run() -> ExitCode {
             output::whole(String::from_utf8_lossy(&script).trim_end());
             Ok(())
         }
-        Command::History(arguments) => history::run(&arguments, quiet),
-        Command::Run(arguments) => run::run(&arguments, quiet),
+        Command::History(arguments) => history::run(&arguments),
+        Command::Run(arguments) => run::run(&arguments),
         Command::Schema(arguments) => schema::run(&arguments),
         Command::Sheet(arguments) => sheet::run(&arguments, quiet),
         Command::Simulate(arguments) => simulate::run(&arguments),
-        Command::Study(arguments) => study::run(&arguments, quiet),
+        Command::Study(arguments) => study::run(&arguments),
         Command::Trace(arguments) => trace::run(&arguments),
         Command::Validate(arguments) => validate::run(&arguments),
     };

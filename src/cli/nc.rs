@@ -3,36 +3,18 @@
 use std::path::PathBuf;
 
 use abbe::codegen::nc::{self, NcFiles, NcOptions};
-use abbe::identify::plan::{collision, states};
+use abbe::identify::plan::collision;
 use abbe::model::files::{self, ReadOptions};
-use abbe::model::session::Session;
-use abbe::model::session::moves::Moves;
 use clap::Args;
 
 use super::failure::Failure;
 use super::message::print_warnings;
 use super::{SessionArguments, folder, output};
-use crate::report::table::{Table, cells};
+use crate::printers::terminal;
+use crate::report::nc as present;
 
 /// Examples of `abbe nc`.
-pub const HELP: &str = "A program for each test and `main`, which calls them in the order of the session: approach along the tool, centring of the workpiece \
-ball, a stop to mount the bar, feed-in, the path with overshoot before and after, every run in both directions, feed-out, retreat. The \
-positions are those of the session's `sweep` or `path`: the recorded readings belong to them as they are. Positions count from R with \
-the tool length of the session; no work offset and no tool length is changed. Travel limits of the machine are checked before a file \
-is written. Bodies of the machine and sizes of [clearance] are compared along the paths, and along centring, approach, feed-in, overshoot and \
-retreat: what comes too close is a warning.
-
-Rotary and linear axes together move in segments at inverse time (G93; heidenhain: the feed of each segment). --tool-point writes these \
-paths for the tool point over the table: TRAORI, G43.4, TCPM.
-
-The programs for linuxcnc run in its interpreter in the project's tests. Those for fanuc, siemens and heidenhain have not been run on a \
-control; each says so. Try every program in single block, without the bar, before it is trusted.
-
-Examples:
-  abbe nc sessions/hermle-c600u/chapter5.toml --control linuxcnc --out programs
-  abbe nc sessions/hermle-c600u/chapter5.toml --control heidenhain --out klartext --overshoot-deg 10
-  abbe nc sessions/hermle-c600u/chapter5.toml --control fanuc --out fanuc --number 7000
-  abbe nc sessions/r-test/plan.toml --control siemens --out r-test --tool-point";
+pub const HELP: &str = include_str!("help/nc.txt");
 
 /// `abbe nc SESSION --control C --out DIR`
 #[derive(Args)]
@@ -104,14 +86,6 @@ pub struct NcArguments {
     force: bool,
 }
 
-/// Tests, and moves of their programs, with less clearance than the session asks for.
-fn collisions(session: &Session, moves: &[Moves]) -> Result<Vec<String>, Failure> {
-    let complete = states::complete(session, true)?;
-    let mut found = collision::warnings(&complete, &collision::clearances(&complete));
-    found.extend(collision::warnings_of_moves(session, moves));
-    Ok(found)
-}
-
 /// Runs `abbe nc`.
 pub fn run(arguments: &NcArguments, quiet: bool) -> Result<(), Failure> {
     let control = nc::control(&arguments.control)?;
@@ -134,21 +108,10 @@ pub fn run(arguments: &NcArguments, quiet: bool) -> Result<(), Failure> {
         .refuse_overwrite_of_sources(&sources)?;
     folder::write(&arguments.out, &written, arguments.force, |_| Ok(()))?;
     print_warnings(&warnings);
-    print_warnings(&collisions(&session, &moves)?);
+    print_warnings(&collision::warnings_of_programs(&session, &moves)?);
     if !quiet {
-        let mut rows = vec![cells![&written[0].0, "all tests", written[0].1.lines().count().to_string()]];
-        rows.extend(
-            written
-                .iter()
-                .skip(1)
-                .zip(&session.tests)
-                .map(|((name, text), test)| cells![name, &test.name, text.lines().count().to_string()]),
-        );
-        output::print(&Table::new(["program", "test", ">lines"], rows));
-        if !control.is_run() {
-            say!("\nThe form for {} has not been run on a control.", control.word());
-        }
-        say!("\nTry each program in single block and without the bar before it is trusted.");
+        let report = present::report(&session, &written, control);
+        output::whole(&terminal::report(&report, None));
     }
     Ok(())
 }

@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
+use abbe::identify::results::TraceResult;
+use abbe::identify::trace::TraceOutcome;
 use abbe::model::ModelError;
+use abbe::model::chain::Machine;
 use abbe::model::document::edit::SessionText;
 use abbe::model::files::SourceMap;
 
@@ -32,4 +35,34 @@ pub fn write(
         tell(Kind::Note, &note);
     }
     Ok(())
+}
+
+/// Declares the found effects, and adds the tests that separate them from their aliases if they are asked for.
+pub fn add_trace(
+    text: &mut SessionText,
+    trace: &TraceOutcome,
+    machine: &Machine,
+    with_tests: bool,
+) -> Result<(), ModelError> {
+    text.add_effects(&trace.effects, machine)?;
+    if with_tests {
+        proposals(&trace.result).iter().try_for_each(|block| text.add_block(block))?;
+    }
+    if trace.result.interrupted {
+        text.add_remark(&format!("The trace was {}: effects may be missing.", trace.result.interruption()));
+    }
+    Ok(())
+}
+
+/// The proposed tests as blocks of a session, each once.
+fn proposals(result: &TraceResult) -> Vec<String> {
+    let mut seen: Vec<&str> = Vec::new();
+    let mut blocks = Vec::new();
+    for test in result.effects.iter().flat_map(|effect| &effect.separating_tests) {
+        if !test.session_toml.is_empty() && !seen.contains(&test.test.as_str()) {
+            seen.push(&test.test);
+            blocks.push(test.session_toml.clone());
+        }
+    }
+    blocks
 }

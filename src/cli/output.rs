@@ -5,7 +5,6 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use abbe::model::files::SourceMap;
-use abbe::model::words::shortened;
 use abbe::temporary::{self, TemporaryFile};
 
 use super::failure::Failure;
@@ -96,7 +95,10 @@ pub fn check(path: &Path) -> Result<(), Failure> {
 }
 
 /// The files that a command is to write, looked at before the work, so that nothing is lost by it.
-pub struct Outputs(Vec<PathBuf>);
+pub struct Outputs {
+    files: Vec<PathBuf>,
+    quiet: bool,
+}
 
 impl Outputs {
     /// # Errors
@@ -121,17 +123,22 @@ impl Outputs {
             }
             outputs.push(file.clone());
         }
-        Ok(Outputs(outputs))
+        Ok(Outputs { files: outputs, quiet: false })
+    }
+
+    /// The same, without tables on standard output if `--quiet` was given.
+    pub fn quieted(self, quiet: bool) -> Outputs {
+        Outputs { quiet, ..self }
     }
 
     /// Whether tables go to standard output: neither `--quiet` was given nor does one of the outputs go there.
-    pub fn tables(&self, quiet: bool) -> bool {
-        !quiet && !self.0.iter().any(|output| is_standard_output(output))
+    pub fn tables(&self) -> bool {
+        !self.quiet && !self.files.iter().any(|output| is_standard_output(output))
     }
 
     /// The files that are to lie in a folder.
     pub fn in_folder<'n>(folder: &Path, names: impl Iterator<Item = &'n String>) -> Outputs {
-        Outputs(names.map(|name| folder.join(name)).collect())
+        Outputs { files: names.map(|name| folder.join(name)).collect(), quiet: false }
     }
 
     /// # Errors
@@ -144,7 +151,7 @@ impl Outputs {
     /// If one of them would replace a file that is read.
     pub fn refuse_overwrite<'r>(&self, read: impl IntoIterator<Item = &'r Path>) -> Result<(), Failure> {
         for file in read {
-            if let Some(output) = self.0.iter().find(|output| !is_stream(output) && is_same(output, file)) {
+            if let Some(output) = self.files.iter().find(|output| !is_stream(output) && is_same(output, file)) {
                 return Err(Failure::Other(format!(
                     "{}: cannot be written: it is one of the files that are read; name another",
                     output.display()
@@ -166,15 +173,10 @@ pub fn is_same(a: &Path, b: &Path) -> bool {
     a == b || place(a).is_some_and(|a| place(b) == Some(a))
 }
 
-/// Length of a line that no result has but by a name that it quotes, bytes.
-const MAX_LINE: usize = 1000;
-
 /// Writes lines to standard output. What a long line quotes is cut to a readable length.
 pub fn line(text: std::fmt::Arguments<'_>) {
     let text = text.to_string();
-    let short = |line: &str| if line.len() > MAX_LINE { shortened(line).into_owned() } else { line.to_string() };
-    let lines: Vec<String> = text.split('\n').map(short).collect();
-    whole(&lines.join("\n"));
+    whole(&text.split('\n').map(terminal::line).collect::<Vec<_>>().join("\n"));
 }
 
 /// Writes a text to standard output as it is, and a line end.
@@ -209,20 +211,7 @@ impl Write for StandardOutput {
     }
 }
 
-/// Prints a table under its title.
-pub fn print(table: &Table) {
-    if !table.title.is_empty() {
-        say!("\n{}:", table.title);
-    }
-    whole(&terminal::text(table));
-}
-
 /// The table as CSV.
 pub fn csv(table: &Table) -> Result<Vec<u8>, Failure> {
     csv::text(table).map_err(|error| Failure::Other(format!("the table cannot be written as CSV: {error}")))
-}
-
-/// Writes the figures of a result as CSV, under a comment that states the convention of their signs.
-pub fn write_figures(path: &Path, table: &Table) -> Result<(), Failure> {
-    write_whole(path, &[csv::CONVENTION.as_bytes(), &csv(table)?].concat())
 }

@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use abbe::identify::repeated::{self, Repeated};
-use abbe::model::words::counted;
+use abbe::identify::{fit, repeated};
 
 use super::failure::Failure;
-use super::json::{self, Origin};
 use super::output::{self, Outputs};
-use super::{CommonArguments, SessionArguments, message, read_session};
+use super::results::Read;
+use super::{CommonArguments, SessionArguments, read_session};
+use crate::report::block::Report;
 use crate::report::repeated as present;
 
 /// Fits each session separately and compares the fits.
@@ -19,45 +19,23 @@ pub fn run(
     outputs: &Outputs,
 ) -> Result<(), Failure> {
     let all: Vec<&Path> = std::iter::once(&first.session).chain(repeat).map(PathBuf::as_path).collect();
-    let mut sessions = Vec::with_capacity(all.len());
-    let mut origin = Origin::default();
+    let mut read = Vec::with_capacity(all.len());
     for (place, path) in all.iter().enumerate() {
-        let twice = all[..place].iter().any(|earlier| output::is_same(earlier, path));
-        if twice {
+        if all[..place].iter().any(|earlier| output::is_same(earlier, path)) {
             return Err(Failure::Other(format!("{} is named twice; name each repeated session once", path.display())));
         }
         let arguments = SessionArguments { session: path.to_path_buf(), ..first.clone() };
-        let (session, sources) = read_session(&arguments, outputs)?;
-        if common.json.is_some() {
-            origin.add(Origin::of_session(&sources));
-        }
-        let (problem, fit) = abbe::identify::fit::prepare(&session, common.seed)?;
-        let report = abbe::identify::fit::report(&problem, &fit)?;
-        let named: Vec<String> =
-            report.warnings.iter().map(|warning| format!("{}: {warning}", path.display())).collect();
-        message::print_warnings(&named);
-        sessions.push(repeated::Session::new(&path.display().to_string(), &problem, &fit));
+        read.push(read_session(&arguments, outputs)?);
+    }
+    let (mut sessions, mut warnings) = (Vec::with_capacity(all.len()), Vec::new());
+    for (path, (session, _)) in all.iter().zip(&read) {
+        let (problem, found) = fit::prepare(session, common.seed)?;
+        let own = fit::report(&problem, &found)?.warnings;
+        warnings.extend(own.iter().map(|warning| format!("{}: {warning}", path.display())));
+        sessions.push(repeated::Session::new(&path.display().to_string(), &problem, &found));
     }
     let result = repeated::compare(&sessions)?;
-    if outputs.tables(common.quiet) {
-        print(&result);
-    }
-    if let Some(path) = &common.json {
-        json::write(path, origin, Some(common.seed), &result)?;
-    }
-    Ok(())
-}
-
-fn print(result: &Repeated) {
-    say!("{} of one plan, each fitted separately\n", counted(result.sessions.len(), "session"));
-    output::print(&present::parameters(result));
-    say!(
-        "\nType A: from the scatter of the sessions, s/√n of their mean, s of one session. Type B: standard uncertainty u of one fit.\n\
-         p: probability of such a ratio s/u by chance."
-    );
-    if !result.deviating.is_empty() {
-        output::print(&present::deviating(result));
-    } else if result.sessions.len() > 2 {
-        say!("No session deviates significantly from the others.");
-    }
+    let report = Report { warnings, ..present::report(&read[0].0.machine.name, &result) };
+    let sessions = read.iter().map(|(session, sources)| (session, sources)).collect();
+    common.output.put(outputs, &report, &result, &Read { sessions, files: Vec::new(), seed: Some(common.seed) })
 }

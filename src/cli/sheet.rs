@@ -17,13 +17,7 @@ use super::{SessionArguments, output, values};
 use crate::printers::sheet as present;
 
 /// Examples of `abbe sheet`.
-pub const HELP: &str = "One page of HTML for each test, to be printed from the browser: drawing of balls, bar and rotary axes, what to mount and what stays \
-mounted, coordinates, bar length and extension, positions of all axes with their distance from the ends of travel, duration, room for notes. \
-The first page has the order of the tests.
-
-Examples:
-  abbe sheet sessions/hermle-c600u/chapter5.toml --out sheets.html
-  abbe sheet sessions/hermle-c600u/chapter5.toml --out sheets.html --bar-mm 100 --setup-min 10";
+pub const HELP: &str = include_str!("help/sheet.txt");
 
 /// `abbe sheet SESSION --out FILE.html`
 #[derive(Args)]
@@ -65,7 +59,7 @@ pub fn run(arguments: &SheetArguments, quiet: bool) -> Result<(), Failure> {
         values::MINUTES.check(flag, value)?;
     }
     arguments.bar_mm.map(|mm| values::BAR_MM.check("--bar-mm", mm)).transpose()?;
-    let outputs = output::Outputs::new([&arguments.out])?;
+    let outputs = output::Outputs::new([&arguments.out])?.quieted(quiet);
     let reading = ReadOptions { read_data: false, ..arguments.session.options() };
     let source = files::text(&arguments.session.session, "the session file")?;
     let (mut session, mut sources) = files::session_of(&source, &reading)?;
@@ -82,7 +76,7 @@ pub fn run(arguments: &SheetArguments, quiet: bool) -> Result<(), Failure> {
     let page = present::html(&session, &sheets, arguments.bar_mm.or(shortest), &name, &warnings);
     print_warnings(&warnings);
     output::write_whole(&arguments.out, page.as_bytes())?;
-    if outputs.tables(quiet) {
+    if outputs.tables() {
         say!("{}: {}, one page each, and an overview", arguments.out.display(), counted(sheets.len(), "test"));
     }
     Ok(())

@@ -3,34 +3,17 @@
 use std::path::PathBuf;
 
 use abbe::identify::quantity::{self, Given};
-use abbe::identify::simulate::{Simulated, Simulation, simulate};
-use abbe::model::files::{self, Changes, SourceMap, with_readings};
-use abbe::model::session::Session;
-use abbe::model::words::counted;
+use abbe::identify::simulate::{Simulation, SimulationResult, simulate};
+use abbe::model::files::{self, Changes, with_readings};
 use clap::Args;
-use schemars::JsonSchema;
-use serde::Serialize;
 
 use super::failure::Failure;
-use super::{CommonArguments, SessionArguments, folder, message, output, read_session, values};
-use crate::report::number::micrometres;
-use crate::report::simulation::truth;
-use crate::report::table::Table;
+use super::results::Read;
+use super::{CommonArguments, SessionArguments, folder, output, read_session, values};
+use crate::report::simulation as present;
 
 /// Examples of `abbe simulate`, and the names of values.
-pub const HELP: &str = "Names of values are those of results, with a unit: errors (EY0A of ISO 230-1, e_y0a of the literature), set-up \
-parameters (`bar[A100]`, `workpiece_ball.x[P1]`), coefficients of the [[effect]] tables of the session \
-(--effect \"EZC~C:h2.amplitude=1.5um\"). A harmonic is amplitude · cos(order · angle + phase). Values that are not \
-given are zero.
-
-Examples:
-  abbe simulate sessions/hermle-c600u/chapter5.toml --out run1 --error EY0A=35.3um \\
-      --error EB0A=-1.29arcsec
-  abbe simulate sessions/hermle-c600u/chapter5.toml --out run2 --draw-setups --seed 7
-  abbe simulate sessions/hermle-c600u/chapter5.toml --out run3 --draw-setups --seed 8 \\
-      --noise-um 0.5
-
-A file for --errors has one value per line, `EY0A = \"35.3 um\"`. Names with other characters than letters and digits are quoted.";
+pub const HELP: &str = include_str!("help/simulate.txt");
 
 /// `abbe simulate SESSION --out DIR`
 #[derive(Args)]
@@ -77,7 +60,7 @@ pub struct SimulateArguments {
 
 /// Runs `abbe simulate`.
 pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
-    let outputs = arguments.common.outputs(&[])?;
+    let outputs = arguments.common.output.prepared(&[])?;
     let (session, sources) = read_session(&arguments.session, &outputs)?;
     let mut given = match &arguments.file {
         Some(file) => {
@@ -116,75 +99,8 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
         files::session(&path, &files::ReadOptions::default())?;
         Ok(())
     })?;
-    report((&session, &sources), &simulated, arguments, outputs.tables(arguments.common.quiet))
-}
-
-/// The simulated session and the true values of its parameters.
-#[derive(Serialize, JsonSchema)]
-pub struct SimulationResult {
-    /// The session file that was written.
-    written_session: String,
-    /// Number of simulated readings.
-    readings: usize,
-    /// Standard deviation of the simulated noise, µm.
-    noise_um: f64,
-    /// Resolution of the readings, µm; `null` for none.
-    resolution_um: Option<f64>,
-    /// The parameters that are not zero.
-    truth: Vec<TrueValue>,
-    /// Warnings in words.
-    warnings: Vec<String>,
-}
-
-/// The true value of a parameter.
-#[derive(Serialize, JsonSchema)]
-struct TrueValue {
-    /// Identifier: `EY0A`, `bar[A100]`, `EZC~C:h2.cos`.
-    id: String,
-    /// The value, in `unit`.
-    value: f64,
-    /// `um`, `arcsec`, …
-    unit: String,
-}
-
-fn report(
-    (session, sources): (&Session, &SourceMap),
-    simulated: &Simulated,
-    arguments: &SimulateArguments,
-    tables: bool,
-) -> Result<(), Failure> {
-    let report = SimulationResult {
-        written_session: arguments.out.join("session.toml").display().to_string(),
-        readings: simulated.readings.iter().map(|readings| readings.rows()).sum(),
-        noise_um: simulated.noise_mm * 1e3,
-        resolution_um: session.resolution_mm.map(|step| step * 1e3),
-        truth: simulated
-            .truth
-            .iter()
-            .map(|(id, value, unit)| TrueValue { id: id.clone(), value: *value, unit: unit.clone() })
-            .collect(),
-        warnings: simulated.warnings.clone(),
-    };
-    if tables {
-        print(session, &report, &truth(simulated), arguments.common.seed);
-    }
-    message::print_warnings(&report.warnings);
-    arguments.common.write_json(sources, &report)
-}
-
-fn print(session: &Session, report: &SimulationResult, truth: &Table, seed: u64) {
-    say!(
-        "{}: {} of {}, noise {}, seed {}",
-        report.written_session,
-        counted(report.readings, "reading"),
-        counted(session.tests.len(), "test"),
-        micrometres(report.noise_um),
-        seed
-    );
-    if truth.rows.is_empty() {
-        say!("No error is given: the readings are those of the nominal machine.");
-    } else {
-        say!("");
-        output::print(truth);
-    }
+    let common = &arguments.common;
+    let result = SimulationResult::of(&session, &simulated, &arguments.out.join("session.toml"));
+    let report = present::report(&session, &result.written_session, &simulated, common.seed);
+    common.output.put(&outputs, &report, &result, &Read::session(&session, &sources, common.seed))
 }

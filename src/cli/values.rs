@@ -2,6 +2,7 @@
 
 use abbe::model::session::limits::{LARGEST, MAX_LENGTH_MM, MIN_UM};
 use abbe::model::words::number;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::failure::Failure;
 
@@ -81,6 +82,30 @@ impl Quantity {
             false => format!("{words} {limits} is expected"),
         })
     }
+}
+
+/// The words of an option, each with its value.
+pub type Words<T> = &'static [(&'static str, T)];
+
+/// The value of one of these words.
+pub fn words<T: Copy + Send + Sync>(words: Words<T>) -> impl TypedValueParser<Value = T> {
+    let value =
+        move |text: String| words.iter().find(|(word, _)| *word == text).map(|(_, value)| *value).ok_or("no such word");
+    PossibleValuesParser::new(words.iter().map(|(word, _)| *word)).try_map(value)
+}
+
+/// A number of things from 1 to the most.
+pub fn count(option: &str, things: &str, value: usize, most: usize) -> Result<usize, Failure> {
+    if (1..=most).contains(&value) {
+        return Ok(value);
+    }
+    let of = if things.is_empty() { String::new() } else { format!(" of {things}") };
+    Err(Failure::Other(format!("`{option} {value}`: a number{of} from 1 to {most} is expected")))
+}
+
+/// A number of threads.
+pub fn threads() -> clap::builder::RangedI64ValueParser<u32> {
+    clap::value_parser!(u32).range(1..=1024)
 }
 
 /// A point that an option states by three coordinates; `usual` if it is not stated.

@@ -2,10 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
-use abbe_identify::history::events::Compensation;
+use abbe_identify::history::events::{Compensation, Kind};
 use abbe_identify::history::faults::{Fault, FoundEffect, faults};
-use abbe_identify::history::results::History;
+use abbe_identify::history::results::{History, MachineHistory};
 use abbe_identify::history::{HistoryOptions, MachineSessions, SessionValues, analyse};
+use abbe_identify::results::{NextStep, Statements};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -27,6 +28,51 @@ pub struct FleetHistory {
     pub conformity: Vec<MachineConformity>,
     /// Sessions, notes and rows of known compensations that the history does not use.
     pub not_used: Vec<NotUsed>,
+}
+
+/// Whether the machines of a history are in control.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct HistoryStatement {
+    /// Number of machines.
+    pub machines: usize,
+    /// The machines with a parameter that is out of control in the latest session.
+    pub out_of_control: Vec<String>,
+}
+
+/// A parameter of a machine that drifts, or that has shifted other than by a compensation or towards zero.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ChangedInHistory {
+    /// Identifier of the machine.
+    pub machine_id: String,
+    /// The parameter.
+    pub id: String,
+}
+
+/// The statements of a history.
+pub type HistoryStatements = Statements<HistoryStatement, ChangedInHistory>;
+
+/// Are these machines in control, what to correct, what to measure next.
+pub fn statements(machines: &[MachineHistory]) -> HistoryStatements {
+    let out = machines.iter().filter(|machine| !machine.out_of_control.is_empty());
+    let changed = |machine: &MachineHistory| -> Vec<ChangedInHistory> {
+        let shifts = machine.changes.iter().filter(|change| match change.kind {
+            Kind::Shift | Kind::CompensationAndShift => true,
+            Kind::Compensation | Kind::Correction => false,
+        });
+        let shifted: BTreeSet<&String> = shifts.flat_map(|change| &change.parameters).collect();
+        let own = machine.parameters.iter();
+        let own = own.filter(|one| one.drift_per_year.is_some() || shifted.contains(&one.id));
+        own.map(|one| ChangedInHistory { machine_id: machine.machine_id.clone(), id: one.id.clone() }).collect()
+    };
+    let step = if machines.is_empty() { NextStep::Nothing } else { NextStep::NextCheck };
+    Statements {
+        good: HistoryStatement {
+            machines: machines.len(),
+            out_of_control: out.map(|machine| machine.machine_id.clone()).collect(),
+        },
+        correct: machines.iter().flat_map(changed).collect(),
+        measure: step.into(),
+    }
 }
 
 /// A session, a note or a row of known compensations that the history does not use.

@@ -41,6 +41,32 @@ pub fn sessions(paths: &[PathBuf]) -> Result<Vec<PathBuf>, FleetError> {
     Ok(found)
 }
 
+/// The paths that are typed and those of a list, and their session files, or of `n` parts of them the `k`th: every `n`th
+/// file from the `k`th on.
+///
+/// # Errors
+/// If a typed path is not there, the list cannot be read, or there is no session.
+pub fn chosen(
+    typed: &[PathBuf],
+    list: Option<&Path>,
+    part: Option<(usize, usize)>,
+) -> Result<(Vec<PathBuf>, Vec<PathBuf>), FleetError> {
+    // A file of a list may be gone since the list was made: it is a result with its error. A path that is typed is a
+    // mistake.
+    if let Some(path) = typed.iter().find(|path| matches!(path.try_exists(), Ok(false))) {
+        let message = format!("{}: neither a session file nor a folder is there; correct the path", path.display());
+        return Err(FleetError::Request(message));
+    }
+    let mut paths = typed.to_vec();
+    paths.extend(list.map_or(Ok(Vec::new()), listed)?);
+    let files = sessions(&paths)?;
+    if files.is_empty() && part.is_none() {
+        return Err(FleetError::Request("no session is named; name session files or folders".into()));
+    }
+    let (first, every) = part.map_or((0, 1), |(k, n)| (k - 1, n));
+    Ok((paths, files.into_iter().skip(first).step_by(every).collect()))
+}
+
 /// The paths of a file with one path in each line; `-` is standard input. Empty lines and lines that begin with `#` do
 /// not count.
 ///

@@ -4,6 +4,7 @@
 //!   inputs and options;
 //! - [`record`]: the result of one session, as JSON has it;
 //! - [`store`]: a folder of records, each written completely or not at all;
+//! - [`pool`]: units of work on several threads; [`run`]: what a run did;
 //! - [`study`]: simulated sessions and their analysis;
 //! - [`list`]: session files from files, folders and lists;
 //! - [`history`]: the machines of a folder over time; [`conformity`]: their decisions; [`compensations`]: the file of
@@ -17,7 +18,9 @@ pub mod date;
 pub mod history;
 pub mod list;
 pub mod options;
+pub mod pool;
 pub mod record;
+pub mod run;
 pub mod store;
 pub mod study;
 pub mod unit;

@@ -1,9 +1,10 @@
 //! Tables as CSV: one row per row, numbers with all their places, for spreadsheets.
 
+use crate::report::block::{Body, Report, Text};
 use crate::report::table::{Cell, Table};
 
 /// How the signs of a table of figures are meant, as comments in front of it.
-pub const CONVENTION: &str = "# Errors by their names of ISO 230-1: EX0C is a location error, EXC an error motion. Value = actual less nominal: the body that the axis\n\
+const CONVENTION: &str = "# Errors by their names of ISO 230-1: EX0C is a location error, EXC an error motion. Value = actual less nominal: the body that the axis\n\
 # carries is displaced along +X, +Y, +Z of R and turned about them by the right-hand rule, E = Trans(EX, EY, EZ) Rx(EA) Ry(EB) Rz(EC), whatever\n\
 # the axis' own direction. A correction has the opposite sign. u is one standard uncertainty.\n";
 
@@ -25,12 +26,38 @@ pub fn text(table: &Table) -> Result<Vec<u8>, String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(table.columns.iter().map(|column| cell(column.heading.clone()))).map_err(fault)?;
     for row in &table.rows {
+        let missing = table.columns.len().saturating_sub(row.len());
         let cells = row.iter().map(|value| match value {
             Cell::Text(text) => cell(text.clone()),
             Cell::Number(value, Some(places)) => format!("{value:.places$}"),
             Cell::Number(value, None) => value.to_string(),
         });
+        let cells = cells.chain(std::iter::repeat_n(String::new(), missing));
         writer.write_record(cells).map_err(fault)?;
     }
     writer.into_inner().map_err(|error| error.to_string())
+}
+
+/// The values of a report, under a comment that states the convention of their signs; of a report without them, its
+/// tables, each under a comment with its title.
+///
+/// # Errors
+/// If a row is not as long as the header.
+pub fn report(report: &Report) -> Result<Vec<u8>, String> {
+    if !report.values.rows.is_empty() {
+        return Ok([CONVENTION.as_bytes(), &text(&report.values)?].concat());
+    }
+    let (mut printed, mut heading) = (Vec::new(), "");
+    for block in &report.blocks {
+        match &block.body {
+            Body::Text(Text::Section(words) | Text::Heading(words) | Text::Fold(words)) => heading = words,
+            Body::Table(table) => {
+                let title = if table.title.is_empty() { heading } else { &table.title };
+                printed.extend(format!("# {}\n", title.replace('\n', " ")).into_bytes());
+                printed.extend(text(table)?);
+            }
+            _ => {}
+        }
+    }
+    Ok(printed)
 }

@@ -1,11 +1,19 @@
-//! Tables and sentences as HTML. All text passes through templates that escape markup.
+//! Reports as HTML. All text passes through templates that escape markup.
 
+use abbe::model::words::counted;
 use maud::{Markup, PreEscaped, html};
 
+use crate::report::block::{Body, Level, Report, Text, uncited};
+use crate::report::figure::{Figure, file_name, svg};
+use crate::report::number::{capitalised, with_minus_signs};
 use crate::report::table::{Align, Table};
 
 /// A word column with a longer cell than this wraps.
 const MAX_UNWRAPPED: usize = 26;
+/// Longer tables are folded.
+const MAX_UNFOLDED: usize = 40;
+/// Longer lists are folded.
+const MAX_LISTED: usize = 12;
 
 /// The head of a page that stands alone: its policy, title and style.
 pub fn head(policy: &str, title: &str, style: &str) -> Markup {
@@ -25,12 +33,15 @@ pub fn head(policy: &str, title: &str, style: &str) -> Markup {
 /// The table under its title. Columns of words are aligned to the left, columns of numbers to the right.
 pub fn table(table: &Table) -> Markup {
     let class: Vec<Option<&str>> = (0..table.columns.len()).map(|column| column_class(table, column)).collect();
+    let headed = table.columns.iter().any(|column| !column.heading.is_empty());
     html! {
         @if !table.title.is_empty() { p { (table.title) "." } }
         div class="scroll" {
-            table {
-                thead {
-                    tr { @for (column, class) in table.columns.iter().zip(&class) { th class=[*class] { (column.heading) } } }
+            table class=[(!headed).then_some("pairs")] {
+                @if headed {
+                    thead {
+                        tr { @for (column, class) in table.columns.iter().zip(&class) { th class=[*class] { (column.heading) } } }
+                    }
                 }
                 tbody {
                     @for row in &table.rows {
@@ -54,15 +65,6 @@ fn column_class(table: &Table, column: usize) -> Option<&'static str> {
     }
 }
 
-/// Text with a minus sign in place of a hyphen before numbers.
-pub fn with_minus_signs(text: &str) -> String {
-    let word = |word: &str| match word.strip_prefix('-') {
-        Some(number) if number.starts_with(|c: char| c.is_ascii_digit()) => format!("\u{2212}{number}"),
-        _ => word.to_string(),
-    };
-    text.split(' ').map(word).collect::<Vec<_>>().join(" ")
-}
-
 /// Text in which backquotes mark code.
 pub fn prose(text: &str) -> Markup {
     html! {
@@ -82,33 +84,154 @@ pub fn folded(summary: &str, contents: &Markup) -> Markup {
     html! { details { summary { (summary) } (contents) } }
 }
 
-/// Contents, folded if there are more than `max` of these things.
-pub fn folded_beyond(max: usize, count: usize, summary: &str, contents: Markup) -> Markup {
-    if count > max { folded(summary, &contents) } else { contents }
+/// The sections of a report with the blocks of some levels: anchor, heading, contents. What comes before the first
+/// section has neither anchor nor heading.
+pub fn sections(report: &Report, levels: &[Level]) -> Vec<(String, String, Markup)> {
+    let mut sections = Vec::new();
+    let (mut heading, mut contents) = (String::new(), Contents::default());
+    for block in report.blocks.iter().filter(|block| levels.contains(&block.level)) {
+        match &block.body {
+            Body::Text(Text::Section(next)) => {
+                sections.push((std::mem::replace(&mut heading, next.clone()), std::mem::take(&mut contents)));
+            }
+            Body::Text(Text::Heading(next)) => contents.head(next, false),
+            Body::Text(Text::Fold(next)) => contents.head(next, true),
+            Body::Figure(figure) => match contents.parts.last_mut() {
+                Some(Part::Figures(figures)) => figures.push(figure),
+                _ => contents.parts.push(Part::Figures(vec![figure])),
+            },
+            other => match (contents.parts.last_mut(), element(other)) {
+                (Some(Part::Words(words)), one) => words.push(one),
+                (_, one) => contents.parts.push(Part::Words(vec![one])),
+            },
+        }
+    }
+    sections.push((heading, contents));
+    let printed = sections.into_iter().map(|(heading, contents)| {
+        let anchor = file_name(&heading.to_lowercase());
+        (anchor, heading, contents.end())
+    });
+    printed.filter(|(_, heading, contents)| heading.is_empty() || !contents.0.is_empty()).collect()
 }
 
-/// Text with a capital first letter.
-pub fn capitalised(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+/// Words or figures that follow one another.
+enum Part<'r> {
+    Words(Vec<Markup>),
+    Figures(Vec<&'r Figure>),
 }
 
-/// An integer with a thin space between thousands.
-pub fn integer(value: usize) -> String {
-    let digits = value.to_string();
-    let groups: Vec<&str> =
-        digits.as_bytes().rchunks(3).rev().filter_map(|group| std::str::from_utf8(group).ok()).collect();
-    if digits.len() < 5 { digits } else { groups.join("\u{202f}") }
+/// The contents of a section while it is made.
+#[derive(Default)]
+struct Contents<'r> {
+    /// What lies before the last heading.
+    done: Vec<Markup>,
+    /// The last heading, and whether what is below it is folded.
+    heading: Option<(String, bool)>,
+    /// What lies below it.
+    parts: Vec<Part<'r>>,
 }
 
-#[cfg(test)]
-mod tests {
-    use super::integer;
+impl Contents<'_> {
+    /// Begins a part below a heading.
+    fn head(&mut self, heading: &str, folded: bool) {
+        self.close();
+        self.heading = Some((heading.to_string(), folded));
+    }
 
-    #[test]
-    fn integers_have_groups_of_three_digits_from_10_000_on() {
-        assert_eq!(integer(9_876), "9876");
-        assert_eq!(integer(12_345), "12\u{202f}345");
-        assert_eq!(integer(1_234_567), "1\u{202f}234\u{202f}567");
+    fn close(&mut self) {
+        let parts = std::mem::take(&mut self.parts);
+        let beside = parts.len() > 1 && parts.iter().any(|part| matches!(part, Part::Figures(_)));
+        let printed = html! {
+            @for part in &parts {
+                @match part {
+                    Part::Figures(drawn) => (figures(drawn)),
+                    Part::Words(words) if beside => div class="words" { @for one in words { (one) } },
+                    Part::Words(words) => @for one in words { (one) },
+                }
+            }
+        };
+        let printed = if beside {
+            html! { div class="halves" { (printed) } }
+        } else {
+            printed
+        };
+        self.done.push(match self.heading.take() {
+            Some((heading, true)) => folded(&heading, &printed),
+            Some((heading, false)) => html! { h3 { (heading) } (printed) },
+            None => printed,
+        });
+    }
+
+    fn end(mut self) -> Markup {
+        self.close();
+        html! { @for part in &self.done { (part) } }
+    }
+}
+
+/// Figures beside one another. Drawings of one width stand in columns; drawings of several widths share rows.
+fn figures(drawn: &[&Figure]) -> Markup {
+    let drawn: Vec<(f64, Markup)> = drawn.iter().map(|figure| svg::element(figure)).collect();
+    let width = drawn.first().map_or(0.0, |(width, _)| *width);
+    let layout = if drawn.iter().any(|(other, _)| *other != width) { "figures row" } else { "figures columns" };
+    html! {
+        div class=(layout) style=(format!("--width:{width}")) { @for (_, figure) in &drawn { (figure) } }
+    }
+}
+
+/// A block other than a heading and a figure.
+fn element(body: &Body) -> Markup {
+    match body {
+        Body::KeyFigures(figures) => html! {
+            dl class="key-figures" {
+                @for figure in figures {
+                    div { dt { (figure.label) } dd { (with_minus_signs(&figure.value)) } dd class="note" { (figure.note) } }
+                }
+            }
+        },
+        Body::Table(found) if found.rows.len() > MAX_UNFOLDED => {
+            let title = if found.title.is_empty() { counted(found.rows.len(), "row") } else { found.title.clone() };
+            folded(&title, &table(&Table { title: String::new(), ..found.clone() }))
+        }
+        Body::Table(found) => table(found),
+        Body::Formula(formula) => html! { p class="formula" { (formula.text) } },
+        Body::Figure(figure) => svg::element(figure).1,
+        Body::Text(text) => words(text),
+    }
+}
+
+/// The command of an indented sentence and what it is for.
+fn command(sentence: &str) -> Option<(&str, &str)> {
+    sentence.strip_prefix("  ")?.split_once("  ")
+}
+
+fn words(text: &Text) -> Markup {
+    match text {
+        Text::Opening { word, sentences } => html! {
+            @for (number, sentence) in sentences.iter().enumerate() {
+                p class="verdict" {
+                    @if number == 0 && !word.is_empty() { strong class=(format!("word {}", file_name(word))) { (word) } " " }
+                    @match command(sentence) {
+                        Some((command, purpose)) => { code { (command) } " " (purpose) }
+                        None => { (prose(&uncited(sentence))) }
+                    }
+                }
+            }
+        },
+        Text::Section(heading) => html! { h2 { (heading) } },
+        Text::Heading(heading) | Text::Fold(heading) => html! { h3 { (heading) } },
+        Text::Paragraph(paragraph) => html! { p { (prose(&uncited(paragraph))) } },
+        Text::List(lines) if lines.len() > MAX_LISTED => {
+            folded(&counted(lines.len(), "entry"), &list(lines.iter().map(|line| capitalised(&uncited(line)))))
+        }
+        Text::List(lines) => list(lines.iter().map(|line| capitalised(&uncited(line)))),
+        Text::Steps(steps) => html! {
+            ul class="steps" {
+                @for (step, purpose) in steps {
+                    li { @if step.starts_with("abbe ") { code { (step) } } @else { (prose(step)) } ": " (prose(purpose)) }
+                }
+            }
+        },
+        Text::Note(note) => html! { p class="note" { (prose(&uncited(note))) } },
+        Text::Controls => html! { div class="controls needs-script" id="controls" hidden {} },
     }
 }

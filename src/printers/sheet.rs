@@ -5,11 +5,11 @@ use abbe::model::session::Session;
 use abbe::model::words::counted;
 use maud::{DOCTYPE, Markup, html};
 
-use super::html::{head, table, with_minus_signs};
+use super::html::{head, table};
 use crate::report::figure::set_up::SetUps;
 use crate::report::figure::svg::{LIGHT, STYLE, element};
 use crate::report::figure::{Chart, Figure};
-use crate::report::number::unit;
+use crate::report::number::{unit, with_minus_signs};
 use crate::report::table::{Cell, Table, cells, numbers};
 
 const PAGE_STYLE: &str = include_str!("sheet.css");

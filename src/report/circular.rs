@@ -5,11 +5,35 @@
 
 use abbe::identify::circular::{CircularTest, Diagnosis};
 
+use super::block::{Report, Text};
 use super::number::{micrometres, unit};
 use super::table::{Cell, Table, cells};
 
+/// Tests that a terminal shows without `--all`.
+const MAX_TESTS: usize = 6;
+
+/// The section of the figures and the diagnosis of each test, if there is one.
+pub fn section(report: &mut Report, tests: &[CircularTest]) {
+    if tests.is_empty() {
+        return;
+    }
+    report.section("Ball-bar figures");
+    report.key(summary(tests).titled("Ball-bar figures (ISO 230-4)").folded(MAX_TESTS));
+    report.brief(Text::Note("directions, diagnosis and limitations".to_string()));
+    report.page(
+        "Terms of ISO 230-4:2022, symbols of the edition of 2005 in brackets. The figures describe the readings without \
+         any correction by the fit. Centre and radius are those of the least-squares circle.",
+    );
+    for test in tests {
+        report.detail(Text::Heading(heading(test)));
+        tables(test).into_iter().for_each(|table| report.detail(table));
+        let limitations = test.not_identifiable.iter().map(|line| format!("limitation: {line}"));
+        report.detail(Text::List(limitations.collect()));
+    }
+}
+
 /// The test and its path.
-pub fn heading(test: &CircularTest) -> String {
+fn heading(test: &CircularTest) -> String {
     let radius = test.radius_mm.map_or(String::new(), |radius| format!(", radius {radius:.1} mm"));
     let feed = test.feed_mm_min.map_or(String::new(), |feed| format!(", {feed:.0} mm/min"));
     let arc = if test.arc_deg < 359.0 { format!(", {:.0}°", test.arc_deg) } else { String::new() };
@@ -23,7 +47,7 @@ fn figure(um: Option<f64>) -> Cell {
 }
 
 /// The figures of both directions together and the largest fault, one row per test.
-pub fn summary(tests: &[CircularTest]) -> Table {
+fn summary(tests: &[CircularTest]) -> Table {
     let rows = tests.iter().map(|test| {
         let arc =
             if test.arc_deg < 359.0 { format!("{}, {:.0}°", test.axes, test.arc_deg) } else { test.axes.clone() };
@@ -46,7 +70,7 @@ pub fn summary(tests: &[CircularTest]) -> Table {
 }
 
 /// All tables of a test: each direction, both together, the diagnosis.
-pub fn tables(test: &CircularTest) -> Vec<Table> {
+fn tables(test: &CircularTest) -> Vec<Table> {
     let mut tables = vec![directions(test), both(test), faults(test)];
     tables.retain(|table| !table.rows.is_empty());
     tables

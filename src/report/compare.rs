@@ -1,49 +1,79 @@
 //! Differences between models of one machine.
 
 use abbe::identify::compare::results::{Comparison, Difference, Pair};
-use abbe::identify::results::Outlier;
+use abbe::identify::results::{Outlier, Statements};
 use abbe::model::words::counted;
 
-use super::number::{p_equals, probability, quantity, unit, value_and_u};
+use super::block::{Report, Text};
+use super::figure::bars::{Row, Value, Values};
+use super::figure::{Chart, Figure, Quantity};
+use super::number::{p_equals, probability, quantity, unit, units, value_and_u};
+use super::statements;
 use super::table::{Cell, Table, cells, numbers};
 
 /// Rows of the first screen that are not significant.
 const FOLDED: usize = 8;
 /// Outliers that are listed by line and residual.
 const MAX_OUTLIERS: usize = 5;
+/// Rows of a figure.
+const MAX_ROWS: usize = 30;
 
-/// What has changed, in a few lines.
-pub fn headline(comparison: &Comparison, pair: &Pair) -> Vec<String> {
+/// Method of a comparison.
+const METHOD: &str = "Sessions are fitted with the errors and effects that any input has, models included, so that their \
+     parameters are the same. A difference is significant if Holm's procedure rejects that it is zero.";
+
+/// The report of a comparison of models of this machine; `with_workspace`, whether the volumetric error is asked for.
+pub fn report(machine: &str, comparison: &Comparison, with_workspace: bool) -> Report {
+    let mut report = Report::new(format!("Comparison of models of {machine}"));
+    report.method = METHOD.to_string();
+    report.values = values(comparison);
+    let statements = statements::of_comparison(&Statements::of_comparison(comparison));
+    report.opening("", comparison.pairs.iter().map(|pair| sentence(comparison, pair)).chain(statements));
+    for pair in &comparison.pairs {
+        report.section(&format!("{} → {}", pair.from, pair.to));
+        report.key(Text::List(remarks(comparison, pair)));
+        report.key(differences(comparison, pair));
+        report.figures(figures(comparison, pair));
+    }
+    report.section("Volumetric error");
+    match comparison.workspace.is_empty() {
+        false => report.key(workspace(comparison)),
+        true if with_workspace => {
+            report.key("Volumetric error: not evaluated, because the ranges of the axes have nothing in common.");
+        }
+        true => {}
+    }
+    report
+}
+
+/// What has changed.
+fn sentence(comparison: &Comparison, pair: &Pair) -> String {
     let changed = match pair.significant {
         0 => format!("no significant difference in {}", counted(pair.compared, "parameter")),
         count => format!("{} of {}", counted(count, "significant difference"), counted(pair.compared, "parameter")),
     };
     let level = comparison.significance;
-    let mut lines = vec![
-        format!("{} → {}: {changed} (any false claim: probability ≤ {level})", pair.from, pair.to),
-        format!(
-            "all differences together: χ² = {:.1} with {}, {}",
-            pair.chi_square,
-            counted(pair.degrees_of_freedom, "degree of freedom"),
-            p_equals(pair.p_value)
-        ),
-    ];
+    format!("{} → {}: {changed} (any false claim: probability ≤ {level}).", pair.from, pair.to)
+}
+
+/// All differences together, and what is not compared.
+fn remarks(comparison: &Comparison, pair: &Pair) -> Vec<String> {
+    let mut lines = vec![format!(
+        "all differences together: χ² = {:.1} with {}, {}",
+        pair.chi_square,
+        counted(pair.degrees_of_freedom, "degree of freedom"),
+        p_equals(pair.p_value)
+    )];
     for input in [&pair.from, &pair.to] {
-        let own: Vec<&Outlier> = comparison
-            .outliers
-            .iter()
-            .filter(|excluded| excluded.input == *input)
-            .map(|found| &found.outlier)
-            .collect();
+        let own = comparison.outliers.iter().filter(|excluded| excluded.input == *input);
+        let own: Vec<&Outlier> = own.map(|found| &found.outlier).collect();
         let place = |outlier: &&Outlier| format!("{}:{} ({:.1} µm)", outlier.file, outlier.line, outlier.residual_um);
-        match own.as_slice() {
-            [] => {}
-            few if few.len() <= MAX_OUTLIERS => {
-                let places: Vec<String> = few.iter().map(place).collect();
-                lines.push(format!("excluded as outliers from {input}: {}", places.join(", ")));
-            }
-            many => lines.push(format!("excluded as outliers from {input}: {}", counted(many.len(), "reading"))),
-        }
+        let what = match own.as_slice() {
+            [] => continue,
+            few if few.len() <= MAX_OUTLIERS => few.iter().map(place).collect::<Vec<_>>().join(", "),
+            many => counted(many.len(), "reading"),
+        };
+        lines.push(format!("excluded as outliers from {input}: {what}"));
     }
     if !pair.shared_setup.is_empty() {
         lines.push(format!("one object in both: {}", pair.shared_setup.join(", ")));
@@ -73,25 +103,42 @@ pub fn headline(comparison: &Comparison, pair: &Pair) -> Vec<String> {
 }
 
 /// The differences of a pair, the most significant first.
-pub fn differences(comparison: &Comparison, pair: &Pair, all: bool) -> Table {
+fn own<'c>(comparison: &'c Comparison, pair: &'c Pair) -> impl Iterator<Item = &'c Difference> {
     // An input that is given twice has two pairs of the same names.
     let of_pair = comparison.differences.iter().filter(|d| d.from == pair.from && d.to == pair.to);
-    let own: Vec<&Difference> = of_pair.take(pair.compared).collect();
-    let shown = if all { own.len() } else { (pair.significant + FOLDED).min(own.len()) };
-    let rows = own[..shown].iter().map(|d| {
+    of_pair.take(pair.compared)
+}
+
+fn differences(comparison: &Comparison, pair: &Pair) -> Table {
+    let rows = own(comparison, pair).map(|d| {
         let verdict = if d.significant { "significant" } else { "" };
         let [value, u] = Cell::estimate(d.value, d.u);
         cells![d.id.clone(), value, u, unit(&d.unit), probability(d.p_value), verdict]
     });
-    let mut table = Table::new(["difference", ">value", ">u", "", ">p", ""], rows);
-    if shown < own.len() {
-        table.notes.push(format!("{} more with --all", own.len() - shown));
-    }
-    table
+    Table::new(["difference", ">value", ">u", "", ">p", ""], rows).folded(pair.significant + FOLDED)
+}
+
+/// The differences with error bars, one figure for each unit.
+fn figures(comparison: &Comparison, pair: &Pair) -> Vec<Figure> {
+    let names = units(own(comparison, pair).map(|d| d.unit.as_str())).into_iter();
+    let figure = |name: &str| {
+        let of_unit = own(comparison, pair).filter(|d| d.unit == name).take(MAX_ROWS);
+        let row =
+            |d: &Difference| Row { name: d.id.clone(), before: None, after: Some(Value { value: d.value, u: d.u }) };
+        let quantity = Quantity::new("difference", name);
+        let labels = ["", "difference"].map(str::to_string);
+        Figure::new(
+            format!("differences-{name}"),
+            format!("Differences in {}", unit(name)),
+            "Whiskers: ± 2 u.",
+            Chart::Values(Values { quantity, labels, rows: of_unit.map(row).collect() }),
+        )
+    };
+    names.map(figure).collect()
 }
 
 /// The volumetric error of each input over the common range.
-pub fn workspace(comparison: &Comparison) -> Table {
+fn workspace(comparison: &Comparison) -> Table {
     let rows = comparison.inputs.iter().zip(&comparison.workspace).map(|(name, volume)| {
         cells![
             name.clone(),
@@ -105,8 +152,8 @@ pub fn workspace(comparison: &Comparison) -> Table {
         .titled(format!("Volumetric error over the common range ({})", counted(points, "point")))
 }
 
-/// All differences as a table of figures.
-pub fn figures(comparison: &Comparison) -> Table {
+/// All differences as a table of values.
+fn values(comparison: &Comparison) -> Table {
     let columns = ["from", "to", "id"].map(super::table::Column::from).into_iter();
     let columns = columns.chain(["value", "u"].map(numbers)).chain(["unit".into()]).chain([numbers("p_value")]);
     let columns = columns.chain(["significant".into()]);

@@ -1,13 +1,29 @@
 //! Corrected commands: what became of the rows.
 
+use std::path::Path;
+
 use abbe::identify::correction::Aim;
 use abbe::identify::correction::stream::Summary;
 use abbe::model::words::{counted, with_exponent};
 
+use super::block::Report;
 use super::table::{Cell, Table, cells};
 
+/// The report of corrected commands in this file.
+pub fn report(file: &Path, summary: &Summary, aim: Aim) -> Report {
+    let mut report = Report::new("Corrected commands");
+    report.method =
+        "The machine with its errors puts the tool where the machine without errors would be at the commanded \
+                     positions."
+            .to_string();
+    report.opening("", [format!("{}: {}", file.display(), headline(summary, aim))]);
+    report.key(states(summary));
+    report.key(marked(summary));
+    report
+}
+
 /// What was done, in a line.
-pub fn headline(summary: &Summary, aim: Aim) -> String {
+fn headline(summary: &Summary, aim: Aim) -> String {
     let part = match aim {
         Aim::Position => "position",
         Aim::PositionAndAxis => "position and direction of the tool",
@@ -20,7 +36,7 @@ pub fn headline(summary: &Summary, aim: Aim) -> String {
 }
 
 /// Number of rows by state, and the largest errors.
-pub fn states(summary: &Summary) -> Table {
+fn states(summary: &Summary) -> Table {
     let mut rows: Vec<Vec<Cell>> = summary
         .states
         .iter()
@@ -38,7 +54,7 @@ pub fn states(summary: &Summary) -> Table {
 }
 
 /// The first rows that are not simply corrected.
-pub fn marked(summary: &Summary) -> Table {
+fn marked(summary: &Summary) -> Table {
     let rows = summary.marked.iter().map(|row| cells![row.line.to_string(), row.state, row.fault.clone()]);
     Table::new([">line", "state", ""], rows).titled("Rows that are marked")
 }

@@ -4,8 +4,43 @@ use abbe::identify::tolerance::rule::Decision;
 use abbe::identify::tolerance::{Conformity, ConformityItem};
 use abbe::model::words::counted;
 
-use super::number::{places, unit};
+use super::block::Report;
+use super::number::{places, quantity, unit, value_and_u};
 use super::table::{Cell, Table, cells};
+
+/// Items that the opening names.
+const MAX_NAMED: usize = 4;
+
+/// The section of the decisions, if the session states limits.
+pub fn section(report: &mut Report, found: Option<&Conformity>) {
+    if let Some(found) = found {
+        report.section("Conformity");
+        report.key(format!("Conformity: {}", sentence(found)));
+        report.key(table(found));
+    }
+}
+
+/// The items that fail, in a sentence of the opening; none without one.
+pub fn failed(found: Option<&Conformity>) -> Option<String> {
+    let items = &found?.items;
+    let failed: Vec<String> = items.iter().filter(|item| item.decision == Decision::Fail).map(beyond).collect();
+    let more = failed.len().saturating_sub(MAX_NAMED);
+    let named = failed[..failed.len() - more].join("; ");
+    let more = if more > 0 { format!("; {more} more") } else { String::new() };
+    (!failed.is_empty()).then(|| format!("Out of limits: {named}{more}."))
+}
+
+/// An item with its value and limits.
+fn beyond(item: &ConformityItem) -> String {
+    let value = match (item.value, item.u) {
+        (Some(value), Some(u)) => {
+            let (value, u) = value_and_u(value, u);
+            format!(" {}", quantity(&format!("{value} ± {u}"), &item.unit))
+        }
+        _ => String::new(),
+    };
+    format!("{}{value} (limits {})", item.id, limits(item.lower, item.upper))
+}
 
 /// The verdict and its rule in one sentence.
 pub fn sentence(conformity: &Conformity) -> String {

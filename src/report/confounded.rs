@@ -3,8 +3,12 @@
 use abbe::identify::results::{DeterminedByPrior, Outlier, Unobservable};
 use abbe::model::words::counted;
 
+use super::block::{Level, Report, Text};
 use super::number::{micrometres, with_symbols};
 use super::table::{Table, cells};
+
+/// Outliers that a terminal shows without `--all`.
+const MAX_OUTLIERS: usize = 3;
 
 /// One sentence for each combination that leaves every reading unchanged.
 pub fn sentences(directions: &[Unobservable]) -> Vec<String> {
@@ -19,10 +23,40 @@ pub fn by_prior(errors: &[DeterminedByPrior]) -> Vec<String> {
     errors.iter().map(|item| with_symbols(&item.why)).collect()
 }
 
-/// The readings that are excluded as outliers.
-pub fn outliers<'o>(outliers: impl ExactSizeIterator<Item = &'o Outlier>) -> Table {
+/// The section of null-space directions, of errors that set-up priors determine, and of outliers. One sentence where
+/// there is nothing.
+pub fn section(report: &mut Report, null_space: &[Unobservable], prior: &[DeterminedByPrior], outliers: &[Outlier]) {
+    report.section("Confounded parameters and outliers");
+    match (null_space.is_empty() && prior.is_empty(), outliers.is_empty()) {
+        (true, true) => report.key("No parameters are confounded. No reading is an outlier."),
+        (true, false) => report.key("No parameters are confounded."),
+        (false, _) => {}
+    }
+    if !prior.is_empty() {
+        let errors: Vec<&str> = prior.iter().map(|item| item.error.as_str()).collect();
+        report.key(Text::Heading(BY_PRIOR.to_string()));
+        report.brief(Text::Note(errors.join(", ")));
+        report.detail(Text::List(by_prior(prior)));
+    }
+    if !null_space.is_empty() {
+        let directions = counted(null_space.len(), "null-space direction");
+        let heading = format!("Confounded: {directions} (a combination that leaves every reading unchanged)");
+        report.headed(Level::Key, heading, Text::List(sentences(null_space)));
+    }
+    report.key(self::outliers(outliers));
+}
+
+/// The readings that are excluded as outliers; without `--all`, those with the largest residual.
+fn outliers(outliers: &[Outlier]) -> Table {
     let is_are = if outliers.len() == 1 { "is" } else { "are" };
     let title = format!("{} {is_are} excluded as outliers", counted(outliers.len(), "reading"));
-    let rows = outliers.map(|o| cells![&o.test, &o.file, o.line.to_string(), micrometres(o.residual_um)]);
-    Table::new(["test", "file", ">line", ">residual"], rows).titled(title)
+    let rows = outliers.iter().map(|o| cells![&o.test, &o.file, o.line.to_string(), micrometres(o.residual_um)]);
+    let mut table = Table::new(["test", "file", ">line", ">residual"], rows).titled(title);
+    if outliers.len() > MAX_OUTLIERS + 1 {
+        let mut order: Vec<usize> = (0..outliers.len()).collect();
+        order.sort_by(|a, b| outliers[*b].residual_um.abs().total_cmp(&outliers[*a].residual_um.abs()));
+        order.truncate(MAX_OUTLIERS);
+        table.key_rows = Some(order);
+    }
+    table
 }

@@ -1,10 +1,23 @@
 //! Exported descriptions as tables.
 
+use std::path::Path;
+
 use abbe::identify::compare::workspace::AxisRange;
 use abbe::identify::export::control::{EntryChoice, KinematicTable};
 use abbe::identify::export::dh::{DhTable, FixedPose};
 
+use super::block::Report;
 use super::table::{Cell, Column, Table, cells, numbers};
+
+/// The report of an exported machine, in this file.
+pub fn report(machine: &str, file: &Path, table: Option<Table>, left_out: &[String]) -> Report {
+    let mut report = Report::new(format!("Export of {machine}"));
+    report.method = "A fixed geometry holds location errors only.".to_string();
+    report.opening("", [format!("{}: written", file.display())]);
+    table.into_iter().for_each(|table| report.key(table));
+    left_out.iter().for_each(|missing| report.key(format!("left out: {missing}")));
+    report
+}
 
 /// The parameters of each joint, calibrated and nominal, between the poses of base and tool.
 pub fn dh(calibrated: &DhTable, nominal: &DhTable) -> Table {

@@ -1,43 +1,146 @@
 //! The result of a fit: goodness of fit, both propagations of uncertainty, all figures for a spreadsheet.
 
+use abbe::identify::IdentifyError;
 use abbe::identify::circular::CircularTest;
+use abbe::identify::fit::Fit;
 use abbe::identify::noise::NoiseSource;
+use abbe::identify::plan::candidate_tests;
+use abbe::identify::problem::Problem;
 use abbe::identify::results::{
-    CrossValidation, FitMonteCarlo, FitResult, Goodness, GoodnessVerdict, ParameterResult, Verdict,
+    CrossValidation, FitMonteCarlo, FitResult, GoodnessVerdict, ParameterResult, Statements, Verdict,
 };
+use abbe::identify::series::{spectrum, views};
 use abbe::identify::tolerance::Conformity;
 use abbe::model::words::counted;
 
-use super::cross_validation;
+use super::block::{Level, Report, Text};
+use super::commands::Commands;
 use super::number::{fixed, micrometres, places, unit};
+use super::parameters::Estimates;
+use super::quality::{self, Quality, noise_sentence};
+use super::session::plots::SessionPlots;
+use super::session::{self, residuals};
+use super::statements;
 use super::table::{Cell, Column, Table, cells, numbers, words};
+use super::{base, circular, conformity, confounded, cross_validation, plausibility};
 
-/// Whether the residual agrees with the noise.
-pub fn agreement(goodness: Goodness, degrees_of_freedom: usize) -> String {
-    let figures = format!("χ²/ν = {:.2}, ν = {degrees_of_freedom}", goodness.chi_square_ratio);
-    match goodness.verdict {
-        GoodnessVerdict::NotJudged => {
-            "cannot be judged: no noise is stated and no reading repeats, so the residual is taken for noise"
-                .to_string()
-        }
-        GoodnessVerdict::Exceeds => format!("the residual exceeds the noise ({figures}): the model lacks an effect"),
-        GoodnessVerdict::Structured => {
-            format!(
-                "the residual is no larger than the noise ({figures}), but it has structure: the model lacks an effect"
-            )
-        }
-        GoodnessVerdict::NoiseOverstated => {
-            format!("the residual is smaller than the noise ({figures}): the noise is overstated")
-        }
-        GoodnessVerdict::Agrees => format!("the residual agrees with the noise ({figures})"),
+/// The report of a fit; with `figures`, for a page.
+///
+/// # Errors
+/// If the model cannot be evaluated.
+pub fn report(
+    problem: &Problem,
+    fit: &Fit,
+    result: &FitResult,
+    commands: &Commands,
+    figures: bool,
+) -> Result<Report, IdentifyError> {
+    let mut report = Report::new(format!("Fit of {}", problem.session.machine.name));
+    report.warnings.clone_from(&result.warnings);
+    report.method = method(result);
+    let statements = Statements::of_fit(problem, result);
+    let opening = statements::opening(&statements, result.degrees_of_freedom, commands);
+    let rank = rank(result.identifiable.len(), result.parameter_count, result.rank);
+    let noise = noise(result.noise_um, result.noise_source);
+    let extent = format!("{}, {noise}; {rank}.", counted(result.readings, "reading"));
+    let failed = conformity::failed(result.conformity.as_ref());
+    let contradicted = plausibility::headline(&result.plausibility);
+    report.opening("", contradicted.into_iter().chain(failed).chain(opening).chain([extent]));
+    report.values = Figures::of_fit(result);
+    let quality = quality(result);
+    let mut figures_of_quality = quality.key_figures(None);
+    figures_of_quality.push(quality::readings(problem, result.readings, result.outliers.len()));
+    report.key(figures_of_quality);
+    plausibility::section(&mut report, &result.plausibility);
+    let estimates = Estimates::new(problem, fit, &result.parameters);
+    report.section("Values");
+    if let Some(drawn) = &result.monte_carlo {
+        report.key(propagations(drawn, |id| estimates.is_setup(id)));
+        report.key(agreement_of_propagations(drawn));
+    }
+    estimates.errors(&mut report, result.outcome.goodness, None);
+    if let Some(base) = &result.base {
+        report.headed(Level::Key, "Base parameters", base::base_parameters(base));
+        report.key(base::base_statement(base));
+    }
+    report.detail(statements::corrections(&statements));
+    estimates.set_up(&mut report, None);
+    conformity::section(&mut report, result.conformity.as_ref());
+    let by_prior = &result.outcome.determined_by_prior;
+    confounded::section(&mut report, &result.unobservable, by_prior, &result.outliers);
+    circular::section(&mut report, &result.circular);
+    report.section("Next");
+    report.key(Text::Steps(next(problem, result, commands)));
+    report.section("Residuals");
+    report.detail(Text::List(quality.held_out_sentences(None)));
+    if !figures {
+        return Ok(report);
+    }
+    let series = views(problem, fit, None)?;
+    let plots = SessionPlots::new(problem, &series);
+    let before = if plots.is_polar() { "nominal machine and set-up" } else { "nominal machine, fitted set-up" };
+    residuals::figures(&mut report, &plots, &spectrum::spectra(problem, &series), [before, "fit"]);
+    session::add_data(&mut report, &plots, &result.parameters);
+    session::traces(&mut report, &plots);
+    session::correlations(&mut report, problem, fit);
+    session::model(&mut report, problem, &fit.beta)?;
+    Ok(report)
+}
+
+fn quality(result: &FitResult) -> Quality<'_> {
+    Quality {
+        chi_square: result.chi_square,
+        degrees_of_freedom: result.degrees_of_freedom,
+        rms_um: result.rms_um,
+        rms_3d_um: result.rms_3d_um,
+        heldout_rms_um: result.heldout_rms_um,
+        heldout_rms_3d_um: result.heldout_rms_3d_um,
+        cross_validation: &result.cross_validation,
+        heldout_by: &result.heldout_by,
+        rank: result.rank,
+        parameters: result.parameter_count,
+        noise_um: result.noise_um,
+        noise_source: result.noise_source,
     }
 }
 
-/// What the estimates of a model are not good for; `None` if they may be quoted.
-pub fn reservation(goodness: Goodness) -> Option<&'static str> {
-    (!goodness.quotable).then_some(
-        "not to be quoted: the model lacks an effect, and u does not cover the bias that it causes in the estimates",
+fn method(result: &FitResult) -> String {
+    format!(
+        "Least squares on the kinematic chain. All parameters are estimated together in the identifiable subspace. The \
+         covariance follows from the law of propagation of uncertainty (JCGM 100, JCGM 102). {}. Held-out error: each \
+         fold leaves out {}.",
+        noise_sentence(result.noise_um, result.noise_source),
+        result.heldout_by
     )
+}
+
+/// What to do next.
+fn next(problem: &Problem, result: &FitResult, commands: &Commands) -> Vec<(String, String)> {
+    let mut steps: Vec<(String, String)> = Vec::new();
+    let mut step = |step: String, purpose: &str| steps.push((step, purpose.to_string()));
+    if !result.plausibility.conflicts.is_empty() {
+        step("correct the session".into(), "remove what the readings contradict");
+    }
+    let goodness = result.outcome.goodness.verdict;
+    if goodness.forbids_decisions().is_some() {
+        step(commands.command("trace", ""), "find the unmodelled effect behind the residual");
+    }
+    if goodness == GoodnessVerdict::NotJudged {
+        step("state `noise_um` or repeat a run".into(), "have χ² judge the model");
+    }
+    match (candidate_tests::has_candidates(problem), result.unobservable.is_empty()) {
+        (true, true) => {
+            step(commands.command("plan", "--improve"), "propose the test that most lowers the largest uncertainty")
+        }
+        (true, false) => step(
+            commands.command("plan", "--improve"),
+            "propose the test that makes the confounded parameters identifiable",
+        ),
+        (false, true) => {}
+        (false, false) => step("measure a further test".into(), "move axes that these tests leave at rest"),
+    }
+    step(commands.command("fit", "--report fit.html"), "write residuals, plots and sliders as a page");
+    steps
 }
 
 /// `identifiable` of `count` parameters, and the rank.
@@ -54,9 +157,10 @@ pub fn noise(noise_um: f64, source: NoiseSource) -> String {
     }
 }
 
-/// Both propagations side by side, with the quoted interval, of the parameters that are to be shown.
-pub fn propagations(drawn: &FitMonteCarlo, is_shown: impl Fn(&str) -> bool) -> Table {
-    let rows = drawn.parameters.iter().filter(|parameter| is_shown(&parameter.id)).map(|parameter| {
+/// Both propagations side by side, with the quoted interval; without `--all`, of the parameters that are no set-up.
+fn propagations(drawn: &FitMonteCarlo, is_setup: impl Fn(&str) -> bool) -> Table {
+    let key_rows = (0..drawn.parameters.len()).filter(|k| !is_setup(&drawn.parameters[*k].id)).collect();
+    let rows = drawn.parameters.iter().map(|parameter| {
         let [value, gum_u] = Cell::estimate(parameter.value, parameter.gum_u);
         let u = Cell::fixed(parameter.u, places(parameter.u));
         let (quoted, source) = match parameter.verdict {
@@ -70,12 +174,12 @@ pub fn propagations(drawn: &FitMonteCarlo, is_shown: impl Fn(&str) -> bool) -> T
     let interval = numbers(format!("{} %", drawn.coverage_probability * 100.0));
     let mut columns = ["parameter", ">value", ">u GUM", ">u MC", "unit", "quoted"].map(Column::from).to_vec();
     columns.insert(4, interval);
-    Table::new(columns, rows)
+    Table { key_rows: Some(key_rows), ..Table::new(columns, rows) }
         .titled("Estimates with standard uncertainty u by GUM and by Monte Carlo, and the quoted coverage interval")
 }
 
 /// The parameters whose propagations agree.
-pub fn agreement_of_propagations(drawn: &FitMonteCarlo) -> String {
+fn agreement_of_propagations(drawn: &FitMonteCarlo) -> String {
     let count = |verdict: Verdict| drawn.parameters.iter().filter(|p| p.verdict == verdict).count();
     format!(
         "Monte Carlo, {}, seed {}: {} of {} agree with the GUM within the tolerance of JCGM 101, 8.1; {} differ",
@@ -99,7 +203,7 @@ impl Default for Figures {
 
 impl Figures {
     /// The figures of a fit.
-    pub fn of_fit(result: &FitResult) -> Table {
+    fn of_fit(result: &FitResult) -> Table {
         let mut figures = Figures::default();
         figures.figure("residual", "rms", "", result.rms_um, "um");
         figures.held_out("residual", result.heldout_rms_um, &result.cross_validation);

@@ -3,20 +3,101 @@
 use abbe::fleet::conformity::{ItemHistory, MachineConformity};
 use abbe::fleet::date::date;
 use abbe::fleet::history::{FleetHistory, NotUsed};
+use abbe::identify::history::chart::{EWMA_LIMIT, SHEWHART_LIMIT};
 use abbe::identify::history::events::Kind;
 use abbe::identify::history::results::{Due, MachineHistory, ParameterHistory};
 use abbe::identify::tolerance::rule::Decision;
 use abbe::model::words::counted;
 
+use super::block::{KeyFigure, Report};
 use super::conformity::limits;
+use super::figure::lines::{Axis, Lines, Mark, Series};
+use super::figure::scale::{Scale, span};
+use super::figure::{Chart, Figure};
 use super::number::unit;
+use super::statements;
 use super::table::{Cell, Table, cells};
 
+/// Method of a history.
+const METHOD: &str = "A parameter over time has a level, perhaps a drift, and steps. A drift, a step and a pair of steps \
+     compete against the level alone by the p values of their F statistics. The variance is estimated under each of \
+     them, about the line or within the segments, beside the scatter of the other parameters of the machine and of \
+     the other machines (moderated as by Smyth 2004); p values count all positions (Bonferroni). The procedure of \
+     Benjamini and Hochberg (1995) bounds the rate of false claims over all parameters of all machines. The value of \
+     a parameter in a session has the standard uncertainty of the fit, enlarged by this scatter where it is above 1. \
+     Levels, drifts and steps of one machine are estimated together by generalised least squares with the \
+     covariances of its sessions. A change is a compensation if it agrees with the known tables (p at least 0.001, \
+     and a cosine of at least 0.9). Control charts: Shewhart with limits of 3 standard deviations, EWMA with weight \
+     0.2 and limits of 2.962 (Lucas and Saccucci 1990), about the mean of the first six sessions, and again after \
+     each step.";
+
+/// Days of a year in the figures.
+const DAYS_PER_YEAR: f64 = 365.25;
 /// Parameters that a cell names.
 const MOST_NAMES: usize = 4;
+/// Rows of a table that a terminal shows without `--all`.
+const MAX_ROWS: usize = 12;
+
+/// The report of the fleet.
+pub fn fleet(found: &FleetHistory) -> Report {
+    let all = &found.history.machines;
+    let mut report = Report::new("History of the fleet");
+    report.method = METHOD.to_string();
+    let (drifts, changes) = (drifts(all), changes(all));
+    report.opening("", std::iter::once(format!("{}.", headline(found))).chain(opening(all)));
+    report.key(vec![
+        KeyFigure::new("Machines", all.len().to_string(), ""),
+        KeyFigure::new("Drifts", drifts.rows.len().to_string(), ""),
+        KeyFigure::new("Changes", changes.rows.len().to_string(), ""),
+    ]);
+    section(&mut report, "Machines", machines(found), "No machine has a dated session.");
+    section(&mut report, "Drifts", drifts, "No parameter drifts significantly.");
+    section(&mut report, "Changes", changes, "No parameter has a significant step.");
+    report.section("Conformity (rule of ISO 14253-1, limits of each session)");
+    report.key(conformity(&found.conformity).folded(MAX_ROWS));
+    section(&mut report, "Faults", faults(found), "No session has an effect.");
+    report.section("Not used");
+    report.key(not_used(&found.not_used).folded(MAX_ROWS));
+    report
+}
+
+/// The report of a machine: a small figure for each parameter and its control chart, and its decisions of conformity.
+pub fn machine(machine: &MachineHistory, conformity: &[MachineConformity]) -> Report {
+    let own = std::slice::from_ref(machine);
+    let changed = machine.parameters.iter().filter(|parameter| has_changed(parameter)).count();
+    let mut report = Report::new(format!("History of {}", machine.machine_id));
+    report.method = METHOD.to_string();
+    let headline = format!("{changed} of {} parameters have changed.", machine.parameters.len());
+    report.opening("", std::iter::once(headline).chain(opening(own)));
+    report.key(vec![
+        KeyFigure::new("Sessions", machine.sessions.to_string(), format!("since {}", date(machine.first_days))),
+        KeyFigure::new("Last session", date(machine.last_days), ""),
+        KeyFigure::new("Out of control", machine.out_of_control.len().to_string(), named(&machine.out_of_control)),
+        KeyFigure::new("Next check", next_check(machine), machine.due_parameter.clone().unwrap_or_default()),
+    ]);
+    section(&mut report, "Drifts", drifts(own), "No parameter drifts significantly.");
+    section(&mut report, "Changes", changes(own), "No parameter has a significant step.");
+    if let Some(own) = conformity.iter().find(|own| own.machine_id == machine.machine_id) {
+        report.section("Conformity");
+        report.key(decisions(own).folded(MAX_ROWS));
+    }
+    report.section("Parameters over time");
+    report.figures(machine.parameters.iter().map(|parameter| over_time(machine, parameter)));
+    report.section("Control charts");
+    report.figures(machine.parameters.iter().map(|parameter| control_chart(machine, parameter)));
+    report
+}
+
+fn section(report: &mut Report, heading: &str, table: Table, none: &str) {
+    report.section(heading);
+    match table.rows.is_empty() {
+        true => report.key(none),
+        false => report.key(table.folded(MAX_ROWS)),
+    }
+}
 
 /// What was tested, in a sentence.
-pub fn headline(found: &FleetHistory) -> String {
+fn headline(found: &FleetHistory) -> String {
     let history = &found.history;
     let sessions: usize = history.machines.iter().map(|machine| machine.sessions).sum();
     let changed =
@@ -31,13 +112,21 @@ pub fn headline(found: &FleetHistory) -> String {
     )
 }
 
+/// Is it in control, what to correct, which machine to measure next.
+fn opening(machines: &[MachineHistory]) -> Vec<String> {
+    let dated = machines.iter().filter_map(|machine| Some((machine, machine.due_days?)));
+    let first = dated.min_by(|a, b| a.1.total_cmp(&b.1));
+    let check = first.map(|(machine, days)| (machine.machine_id.as_str(), date(days)));
+    statements::of_history(&abbe::fleet::history::statements(machines), check)
+}
+
 /// Whether a parameter has a drift or a step.
-pub fn has_changed(parameter: &ParameterHistory) -> bool {
+fn has_changed(parameter: &ParameterHistory) -> bool {
     parameter.drift_per_year.is_some() || !parameter.steps.is_empty()
 }
 
 /// The word of a kind of change.
-pub fn kind(kind: Kind) -> &'static str {
+fn kind(kind: Kind) -> &'static str {
     match kind {
         Kind::Compensation => "compensation",
         Kind::CompensationAndShift => "compensation and shift",
@@ -47,7 +136,7 @@ pub fn kind(kind: Kind) -> &'static str {
 }
 
 /// When the next check of a machine is due.
-pub fn next_check(machine: &MachineHistory) -> String {
+fn next_check(machine: &MachineHistory) -> String {
     match (machine.due, machine.due_days) {
         (Due::Date, Some(days)) => date(days),
         (Due::BeyondTenYears, _) => "beyond 10 years".to_string(),
@@ -63,7 +152,7 @@ pub fn named(names: &[String]) -> String {
 }
 
 /// The machines, those with the earliest due date first.
-pub fn machines(found: &FleetHistory) -> Table {
+fn machines(found: &FleetHistory) -> Table {
     let mut sorted: Vec<&MachineHistory> = found.history.machines.iter().collect();
     let due = |machine: &MachineHistory| machine.due_days.unwrap_or(f64::INFINITY);
     sorted.sort_by(|a, b| due(a).total_cmp(&due(b)).then_with(|| a.machine_id.cmp(&b.machine_id)));
@@ -86,7 +175,7 @@ pub fn machines(found: &FleetHistory) -> Table {
 }
 
 /// Drifts of all machines, the most significant first.
-pub fn drifts(machines: &[MachineHistory]) -> Table {
+fn drifts(machines: &[MachineHistory]) -> Table {
     let mut found: Vec<(&MachineHistory, &ParameterHistory, f64, f64)> = machines
         .iter()
         .flat_map(|machine| machine.parameters.iter().map(move |parameter| (machine, parameter)))
@@ -101,7 +190,7 @@ pub fn drifts(machines: &[MachineHistory]) -> Table {
 }
 
 /// Changes of all machines between sessions.
-pub fn changes(machines: &[MachineHistory]) -> Table {
+fn changes(machines: &[MachineHistory]) -> Table {
     let rows = machines.iter().flat_map(|machine| {
         machine.changes.iter().map(|change| {
             cells![
@@ -118,7 +207,7 @@ pub fn changes(machines: &[MachineHistory]) -> Table {
 }
 
 /// The decisions of conformity of all machines: the latest one of each quantity, those that fail first.
-pub fn conformity(machines: &[MachineConformity]) -> Table {
+fn conformity(machines: &[MachineConformity]) -> Table {
     let items = machines.iter().flat_map(|machine| machine.items.iter().map(move |item| (machine, item)));
     let mut latest: Vec<(&MachineConformity, &ItemHistory, Decision, f64)> = items
         .filter_map(|(machine, item)| item.latest().map(|(decision, since)| (machine, item, decision, since)))
@@ -153,7 +242,7 @@ pub fn conformity(machines: &[MachineConformity]) -> Table {
 }
 
 /// The decisions about one machine, session by session.
-pub fn decisions(machine: &MachineConformity) -> Table {
+fn decisions(machine: &MachineConformity) -> Table {
     let rows = machine.items.iter().flat_map(|item| item.points.iter().map(move |point| (item, point)));
     let rows = rows.map(|(item, point)| {
         let [value, u] = match point.value.zip(point.u) {
@@ -175,7 +264,7 @@ pub fn decisions(machine: &MachineConformity) -> Table {
 }
 
 /// The most frequent faults.
-pub fn faults(found: &FleetHistory) -> Table {
+fn faults(found: &FleetHistory) -> Table {
     let rows = found.faults.iter().map(|fault| {
         let names: Vec<&str> = fault.names.keys().map(String::as_str).filter(|name| *name != fault.id).collect();
         cells![
@@ -190,7 +279,86 @@ pub fn faults(found: &FleetHistory) -> Table {
 }
 
 /// The sessions and rows of compensations that the history does not use.
-pub fn not_used(not_used: &[NotUsed]) -> Table {
+fn not_used(not_used: &[NotUsed]) -> Table {
     let rows = not_used.iter().map(|session| cells![session.file.clone(), session.reason.clone()]);
     Table::new(["not used", "why"], rows.collect::<Vec<_>>())
+}
+
+/// Years since the first session of a machine.
+fn years(machine: &MachineHistory, days: f64) -> f64 {
+    (days - machine.first_days) / DAYS_PER_YEAR
+}
+
+fn time_axis(machine: &MachineHistory) -> Axis {
+    let last = machine.last_days.max(machine.first_days + 30.0);
+    Axis::new("date", "", Scale { words: Some(date), ..Scale::over([machine.first_days, last], 4) })
+}
+
+/// A parameter with its uncertainties, and its model.
+fn over_time(machine: &MachineHistory, parameter: &ParameterHistory) -> Figure {
+    let values = parameter.points.iter().map(|point| (point.days, point.value)).collect();
+    let ranges = parameter
+        .points
+        .iter()
+        .flat_map(|point| [-2.0, 2.0].map(|factor| (point.days, point.value + factor * point.u)))
+        .collect();
+    let mut series = vec![
+        Series::new("expanded uncertainty (k = 2)", "before", Mark::Bars, ranges),
+        Series::new("estimate", "before", Mark::Dots, values),
+    ];
+    series.extend(parameter.level.map(|_| Series::new("model", "after", Mark::Line, model(machine, parameter))));
+    let [low, high] = span(series.iter().flat_map(|series| series.points.iter().map(|point| point.1)));
+    let y = Axis::new(parameter.id.clone(), parameter.unit.clone(), Scale::rounded([low, high], 6));
+    Figure::new(
+        format!("history-{}", parameter.id),
+        parameter.id.clone(),
+        parameter.meaning.clone(),
+        Chart::Lines(Lines::new(time_axis(machine), y, series)),
+    )
+}
+
+/// The model of a parameter at its sessions, with two points at each step.
+fn model(machine: &MachineHistory, parameter: &ParameterHistory) -> Vec<(f64, f64)> {
+    let middle = parameter.points.iter().map(|point| years(machine, point.days)).sum::<f64>()
+        / parameter.points.len().max(1) as f64;
+    let level = parameter.level.map_or(0.0, |level| level.value);
+    let drift = parameter.drift_per_year.map_or(0.0, |drift| drift.value);
+    let value = |days: f64| {
+        let steps = parameter.steps.iter().filter(|step| step.before_days <= days).map(|step| step.value);
+        level + drift * (years(machine, days) - middle) + steps.sum::<f64>()
+    };
+    let mut points = Vec::with_capacity(parameter.points.len());
+    for (k, point) in parameter.points.iter().enumerate() {
+        let step = parameter.steps.iter().find(|step| step.before_days == point.days);
+        if let (Some(step), true) = (step, k > 0) {
+            points.push((point.days, value(point.days) - step.value));
+        }
+        points.push((point.days, value(point.days)));
+    }
+    points
+}
+
+/// Both control charts of a parameter, each with its limits.
+fn control_chart(machine: &MachineHistory, parameter: &ParameterHistory) -> Figure {
+    let points = |value: &dyn Fn(usize) -> f64| -> Vec<(f64, f64)> {
+        let rows = parameter.points.iter().enumerate();
+        rows.map(|(k, point)| (point.days, value(k))).collect()
+    };
+    let limit = |value: f64| vec![(machine.first_days, value), (machine.last_days, value)];
+    let series = vec![
+        Series::new("session (Shewhart)", "before", Mark::Dots, points(&|k| parameter.points[k].shewhart)),
+        Series::new("limit", "before", Mark::Line, limit(SHEWHART_LIMIT)),
+        Series::new("", "before", Mark::Line, limit(-SHEWHART_LIMIT)),
+        Series::new("moving average (EWMA)", "after", Mark::Line, points(&|k| parameter.points[k].ewma)),
+        Series::new("limit of the average", "after", Mark::Line, limit(EWMA_LIMIT)),
+        Series::new("", "after", Mark::Line, limit(-EWMA_LIMIT)),
+    ];
+    let [low, high] = span(series.iter().flat_map(|series| series.points.iter().map(|point| point.1)));
+    let y = Axis::new("deviation from the reference, standard deviations", "", Scale::rounded([low, high], 6));
+    Figure::new(
+        format!("control-{}", parameter.id),
+        format!("{}: control charts", parameter.id),
+        parameter.meaning.clone(),
+        Chart::Lines(Lines::new(time_axis(machine), y, series)),
+    )
 }

@@ -1,12 +1,73 @@
 //! The errors by a geometric method beside those of the full fit.
 
 use abbe::identify::geometric::{Comparison, ComparisonRow};
+use abbe::identify::problem::Problem;
+use abbe::model::words::counted;
 
-use super::number::unit;
+use super::block::Report;
+use super::figure::bars::{Row, Value, Values};
+use super::figure::{Chart, Figure, Quantity};
+use super::fit::noise;
+use super::number::{micrometres, unit, units};
+use super::quality::noise_sentence;
+use super::session;
 use super::table::{Cell, Column, Table, cells, numbers};
 
+/// The report of a method, compared with the full fit.
+pub fn report(problem: &Problem, result: &Comparison) -> Report {
+    let mut report = Report::new(format!("{}: {} method and full fit", problem.session.machine.name, result.method));
+    report.warnings.clone_from(&result.warnings);
+    report.method = format!(
+        "The {} method of the literature and the full least-squares fit, applied to the same readings. {}. Bias: both \
+         methods are applied to noise-free readings that are simulated with the errors of the full fit; these errors \
+         are subtracted.",
+        result.method,
+        noise_sentence(result.noise_um, result.noise_source)
+    );
+    report.opening("", [
+        format!(
+            "The {} method reduces the rms residual of its tests from {} to {}. The rms residual of the full fit in all tests is {}.",
+            result.method,
+            micrometres(result.nominal_rms_um),
+            micrometres(result.method_rms_um),
+            micrometres(result.rms_um)
+        ),
+        format!("{}, {}.", counted(result.readings, "reading"), noise(result.noise_um, result.noise_source)),
+    ]);
+    report.section("Errors by both methods");
+    report.key(errors(result));
+    report.figures(figures(result));
+    report.section("Axis positions");
+    report.key(centres(result));
+    session::machine(&mut report, problem);
+    report
+}
+
+fn figures(result: &Comparison) -> Vec<Figure> {
+    let value = |value: Option<f64>, u: Option<f64>| Some(Value { value: value?, u: u? });
+    let figure = |name: &str| {
+        let own = result.errors.iter().filter(|row| row.unit == name);
+        let rows = own.map(|row| Row {
+            name: row.id.clone(),
+            before: value(row.value, row.u),
+            after: value(row.full_value, row.full_u),
+        });
+        Figure::new(
+            format!("errors-{name}"),
+            format!("Errors by both methods, {}", unit(name)),
+            "Whiskers: ± 2 u. An error that a method does not identify has no mark.",
+            Chart::Values(Values {
+                quantity: Quantity::new("value", name),
+                labels: [result.method.clone(), "full fit".to_string()],
+                rows: rows.collect(),
+            }),
+        )
+    };
+    units(result.errors.iter().map(|row| row.unit.as_str())).into_iter().map(figure).collect()
+}
+
 /// The errors by the method and by the full fit, one row per error.
-pub fn errors(result: &Comparison) -> Table {
+fn errors(result: &Comparison) -> Table {
     let pair = |value: Option<f64>, u: Option<f64>| match (value, u) {
         (Some(value), Some(u)) => Cell::estimate(value, u),
         _ => ["–", "–"].map(Cell::from),
@@ -26,7 +87,7 @@ pub fn errors(result: &Comparison) -> Table {
 }
 
 /// The position of each axis relative to the ball at rest, and the errors that move it.
-pub fn centres(result: &Comparison) -> Table {
+fn centres(result: &Comparison) -> Table {
     let rows = result.centres.iter().flat_map(|centre| {
         centre.offsets.iter().map(move |found| {
             let [offset, u] = Cell::estimate(found.offset_um, found.u_um);

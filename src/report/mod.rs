@@ -1,14 +1,18 @@
 //! Results as tables, figures and text. Nothing here computes a result, prints one, or knows an option.
 //!
-//! - [`table`]: a table as data; [`number`]: digits and units; [`figure`]: plots;
+//! - [`block`]: a report as blocks; [`table`]: a table as data; [`number`]: digits and units; [`figure`]: plots;
 //! - one file per result: [`fit`], [`base`], [`trace`], [`validate`], [`plan`], [`next_test`], [`mod@poses`], [`method`],
-//!   [`repeated`], [`self_calibration`], [`simulation`], [`patterns`], [`volumetric`], [`compensation`], `history`, `study`;
-//! - parts of several results: [`parameters`], [`confounded`], [`cross_validation`], [`circular`], [`conformity`],
-//!   [`plausibility`], [`effect`], [`uniqueness`], [`readings`], [`provenance`];
-//! - [`pages`]: the pages of `--report`; [`paper`]: the sections of `abbe paper`.
+//!   [`repeated`], [`self_calibration`], [`simulation`], [`patterns`], [`volumetric`], [`compare`], [`compensate`],
+//!   [`compensation`], [`export`], [`nc`], `history`, `run`, `study`;
+//! - parts of several results: [`statements`], [`quality`], [`parameters`], [`effects`], [`confounded`],
+//!   [`cross_validation`], [`circular`], [`conformity`], [`plausibility`], [`effect`], [`uniqueness`], [`readings`],
+//!   [`session`], [`commands`], [`provenance`];
+//! - [`paper`]: the parts of `abbe paper`.
 
 pub mod base;
+pub mod block;
 pub mod circular;
+pub mod commands;
 pub mod compare;
 pub mod compensate;
 pub mod compensation;
@@ -16,15 +20,16 @@ pub mod conformity;
 pub mod confounded;
 pub mod cross_validation;
 pub mod effect;
+pub mod effects;
 pub mod export;
 pub mod figure;
 pub mod fit;
 #[cfg(feature = "fleet")]
 pub mod history;
 pub mod method;
+pub mod nc;
 pub mod next_test;
 pub mod number;
-pub mod pages;
 pub mod paper;
 pub mod parameters;
 pub mod patterns;
@@ -32,9 +37,13 @@ pub mod plan;
 pub mod plausibility;
 pub mod poses;
 pub mod provenance;
+pub mod quality;
 pub mod readings;
 pub mod repeated;
+#[cfg(feature = "fleet")]
+pub mod run;
 pub mod self_calibration;
+pub mod session;
 pub mod simulation;
 pub mod statements;
 #[cfg(feature = "fleet")]
@@ -43,4 +52,5 @@ pub mod table;
 pub mod trace;
 pub mod uniqueness;
 pub mod validate;
+mod validate_plots;
 pub mod volumetric;

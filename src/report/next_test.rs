@@ -1,47 +1,110 @@
 //! Proposed tests, and the smallest ranges of sweeps.
 
 use abbe::identify::plan::improve::Improvement;
+use abbe::identify::plan::next_test::NextTest;
 use abbe::identify::plan::range::Shrinkage;
+use abbe::identify::problem::Problem;
 use abbe::identify::results::Interval;
+use abbe::model::words::counted;
 
-use super::number::{quantity, three_digits, unit};
+use super::block::{Level, Report, Text};
+use super::figure::bars::{Bars, Fill};
+use super::figure::{Chart, Figure, Quantity};
+use super::fit::noise;
+use super::number::{capitalised, quantity, three_digits, unit};
+use super::session;
 use super::table::{Cell, Column, Table, cells, numbers};
 
-/// The figure of merit with the symbols of its units.
-pub fn criterion(found: &Improvement) -> String {
-    unit(&found.criterion)
+/// Method of the proposal.
+const METHOD: &str = "Each candidate test is rated by the information that it adds to the plan, linearised at the \
+    nominal machine. Tests are selected one by one, then improved by exchange: V. V. Fedorov, Theory of Optimal \
+    Experiments, Academic Press, 1972; A. C. Atkinson, A. N. Donev and R. D. Tobias, Optimum Experimental Designs, with \
+    SAS, Oxford University Press, 2007, ch. 12.";
+
+/// The report of proposed tests and of ranges.
+pub fn report(problem: &Problem, found: &NextTest) -> Report {
+    let NextTest { improvement, ranges, .. } = found;
+    let mut report = Report::new(format!("Next test for {}", problem.session.machine.name));
+    report.method = METHOD.to_string();
+    let verdict = match improvement {
+        Some(found) => verdict(found),
+        None => format!("Minimum sweep range of {}.", counted(ranges.len(), "test")),
+    };
+    let noise = noise(found.noise_um, found.noise_source);
+    report.opening("", [verdict, format!("{}.", capitalised(&noise))]);
+    if let Some(found) = improvement {
+        proposed(&mut report, found);
+    }
+    report.section("Minimum sweep ranges");
+    report.key(self::ranges(ranges));
+    session::machine(&mut report, problem);
+    report
 }
 
-/// The proposed tests, one after another.
-pub fn proposed(found: &Improvement) -> Table {
-    let point = |mm: [f64; 3]| mm.map(|x| format!("{x:.1}")).join(", ");
-    let rows = found.steps.iter().enumerate().map(|(number, step)| {
-        cells![
-            (number + 1).to_string(),
-            three_digits(step.after),
-            format!("{:.1}{}", step.duration_min, if step.new_setup { " with set-up" } else { "" }),
-            point(step.workpiece_ball_mm),
-            point(step.spindle_ball_mm),
-            step.bar_mm.to_string(),
-            step.makes_identifiable.join(", "),
-            &step.test
-        ]
-    });
-    let columns = [
-        ">number",
-        ">figure of merit",
-        ">duration, min",
-        ">workpiece ball, mm",
-        ">spindle ball, mm",
-        ">bar, mm",
-        "makes identifiable",
-        "test",
-    ];
-    Table::new(columns, rows)
+fn verdict(found: &Improvement) -> String {
+    let criterion = unit(&found.criterion);
+    match found.steps.as_slice() {
+        [] => format!(
+            "None of {} improves the {criterion} {}.",
+            counted(found.candidate_tests, "candidate test"),
+            three_digits(found.before)
+        ),
+        [.., last] => format!(
+            "With {} of {}: {criterion}: {} in place of {}.",
+            found.steps.len(),
+            counted(found.candidate_tests, "candidate test"),
+            three_digits(last.after),
+            three_digits(found.before)
+        ),
+    }
+}
+
+/// The proposed tests, one after another, and the plan with each.
+fn proposed(report: &mut Report, found: &Improvement) {
+    let criterion = unit(&found.criterion);
+    report.section("Proposed tests");
+    for (number, step) in found.steps.iter().enumerate() {
+        let point = |mm: [f64; 3]| format!("({}) mm", mm.map(|x| format!("{x:.1}")).join(", "));
+        let set_up = if step.new_setup { " including the set-up" } else { "" };
+        let mut rows = vec![
+            cells![&criterion, three_digits(step.after)],
+            cells!["duration", format!("{:.1} min{set_up}", step.duration_min)],
+            cells!["workpiece ball", point(step.workpiece_ball_mm)],
+            cells!["spindle ball", point(step.spindle_ball_mm)],
+            cells!["bar", format!("{} mm", step.bar_mm)],
+        ];
+        if !step.makes_identifiable.is_empty() {
+            rows.push(cells!["makes identifiable", step.makes_identifiable.join(", ")]);
+        }
+        report.headed(Level::Key, format!("{}. {}", number + 1, step.test), Table::new(["", ""], rows));
+    }
+    report.page(Text::Heading("Plan with each proposed test".to_string()));
+    report.figures([figure(found, &criterion)]);
+    report.section("Uncertainty of each error");
+    report.key(uncertainties(found));
+    let exchanged = found.exchanged.iter().map(|exchange| format!("replaced by a further search: {exchange}"));
+    report.key(Text::List(exchanged.collect()));
+    report.section("Alternatives");
+    report.key(alternatives(found));
+}
+
+/// The figure of merit of the plan, and with each proposed test.
+fn figure(found: &Improvement, criterion: &str) -> Figure {
+    let mut rows = vec![("as planned".to_string(), found.before, Fill::Other)];
+    rows.extend(found.steps.iter().enumerate().map(|(k, step)| (format!("with {}", k + 1), step.after, Fill::Named)));
+    // An error that is not identifiable has no uncertainty.
+    rows.retain(|row| row.1.is_finite());
+    let quantity = Quantity::new(criterion, "");
+    Figure::new(
+        "next-test",
+        "Plan with each proposed test",
+        format!("{}. The tests are added one after another.", capitalised(criterion)),
+        Chart::Bars(Bars { quantity, rows, labels: Vec::new() }),
+    )
 }
 
 /// The predicted standard uncertainty of each error with the plan and with each proposed test.
-pub fn uncertainties(found: &Improvement) -> Table {
+fn uncertainties(found: &Improvement) -> Table {
     let rows = found.uncertainties_before.iter().enumerate().map(|(k, before)| {
         let with = found.steps.iter().map(|step| Cell::from(three_digits(step.uncertainties[k].u)));
         cells![&before.id, three_digits(before.u)].into_iter().chain(with).collect()
@@ -52,7 +115,7 @@ pub fn uncertainties(found: &Improvement) -> Table {
 }
 
 /// The best single tests.
-pub fn alternatives(found: &Improvement) -> Table {
+fn alternatives(found: &Improvement) -> Table {
     let rows = found
         .alternatives
         .iter()
@@ -62,7 +125,7 @@ pub fn alternatives(found: &Improvement) -> Table {
 }
 
 /// The smallest range of each sweep.
-pub fn ranges(ranges: &[Shrinkage]) -> Table {
+fn ranges(ranges: &[Shrinkage]) -> Table {
     let rows = ranges.iter().map(|range| {
         let span = |Interval { low, high }: Interval| quantity(&format!("{low:.0} to {high:.0}"), &range.unit);
         cells![

@@ -114,6 +114,29 @@ pub fn shape_number(number: &ShapeParameter) -> String {
     format!("{} {}", number.name, quantity(&values.join(", "), &number.unit))
 }
 
+/// Text with a minus sign in place of a hyphen before numbers.
+pub fn with_minus_signs(text: &str) -> String {
+    let word = |word: &str| match word.strip_prefix('-') {
+        Some(number) if number.starts_with(|c: char| c.is_ascii_digit()) => format!("\u{2212}{number}"),
+        _ => word.to_string(),
+    };
+    text.split(' ').map(word).collect::<Vec<_>>().join(" ")
+}
+
+/// Text with a capital first letter.
+pub fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// An integer with a thin space between thousands.
+pub fn integer(value: usize) -> String {
+    let digits = value.to_string();
+    let groups: Vec<&str> =
+        digits.as_bytes().rchunks(3).rev().filter_map(|group| std::str::from_utf8(group).ok()).collect();
+    if digits.len() < 5 { digits } else { groups.join("\u{202f}") }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -169,5 +192,12 @@ mod tests {
         assert_eq!(unit("arcsec/um"), "″/µm");
         assert_eq!(unit("deg/mm^2"), "°/mm²");
         assert_eq!(unit("minimum, um or arcsec"), "minimum, µm or ″");
+    }
+
+    #[test]
+    fn integers_have_groups_of_three_digits_from_10_000_on() {
+        assert_eq!(integer(9_876), "9876");
+        assert_eq!(integer(12_345), "12\u{202f}345");
+        assert_eq!(integer(1_234_567), "1\u{202f}234\u{202f}567");
     }
 }

@@ -4,11 +4,20 @@ use abbe::identify::fit::Fit;
 use abbe::identify::parameters::{Parameter, Role};
 use abbe::identify::plausibility::{Pull, Pulls};
 use abbe::identify::problem::Problem;
-use abbe::identify::results::{DeterminedBy, ParameterResult};
+use abbe::identify::results::{DeterminedBy, Goodness, ParameterResult};
 use abbe::model::words::counted;
 
-use super::number::{places, unit, value_and_u};
-use super::table::{Cell, Table, cells};
+use super::block::{Report, Text};
+use super::figure::bars::{Row, Value, Values};
+use super::figure::{Chart, Figure, Quantity};
+use super::number::{places, unit, units, value_and_u};
+use super::quality::reservation;
+use super::table::{Cell, Table, cells, numbers};
+
+/// Errors that a terminal shows without `--all`.
+const MAX_ERRORS: usize = 20;
+/// Maximum number of rows of a figure.
+const MAX_ROWS: usize = 30;
 
 /// The mark of an estimate that exceeds `U` by the set-up priors.
 pub const PRIOR: &str = "†";
@@ -39,18 +48,44 @@ impl<'r> Estimates<'r> {
         self.setup.iter().any(|p| p.id == id)
     }
 
-    /// The `count` most significant errors in the order of the session.
-    pub fn most_significant(&self, count: usize) -> Vec<&'r ParameterResult> {
-        let ratio = |p: &ParameterResult| {
+    /// The table of the errors; without `--all`, the most significant ones.
+    pub fn table(&self, before: Option<&[ParameterResult]>) -> Table {
+        let ratio = |k: &usize| {
+            let p = self.errors[*k];
             if p.u > 0.0 { (p.value / p.u).abs() } else { f64::INFINITY }
         };
         let mut order: Vec<usize> = (0..self.errors.len()).collect();
-        if order.len() > count {
-            order.sort_by(|a, b| ratio(self.errors[*b]).total_cmp(&ratio(self.errors[*a])));
-            order.truncate(count);
+        let mut shown = table(&self.errors, before);
+        if order.len() > MAX_ERRORS {
+            order.sort_by(|a, b| ratio(b).total_cmp(&ratio(a)));
+            order.truncate(MAX_ERRORS);
             order.sort_unstable();
+            shown.key_rows = Some(order);
         }
-        order.into_iter().map(|k| self.errors[k]).collect()
+        shown
+    }
+
+    /// The table of the errors, and their figures.
+    pub fn errors(&self, report: &mut Report, goodness: Goodness, before: Option<&[ParameterResult]>) {
+        if self.errors.is_empty() {
+            report.key("No error is identifiable.");
+        }
+        report.key(self.table(before));
+        if let (Some(reservation), false) = (reservation(goodness), self.errors.is_empty()) {
+            report.key(Text::Note(reservation.to_string()));
+        }
+        report.figures(figures(&self.errors, before, "parameters", "Values"));
+    }
+
+    /// The set-up parameters, in one line or with their table and figures.
+    pub fn set_up(&self, report: &mut Report, before: Option<&[ParameterResult]>) {
+        if self.setup.is_empty() {
+            return;
+        }
+        report.brief(Text::Note(self.setup_in_short()));
+        report.detail(Text::Fold(format!("{} (balls, bar, poses)", counted(self.setup.len(), "set-up parameter"))));
+        report.detail(self.setup_table(before));
+        report.figures(figures(&self.setup, before, "setup", "Set-up parameters"));
     }
 
     /// The set-up parameters as deviations from their stated values; `before`, the estimates of another model.
@@ -111,15 +146,48 @@ pub fn table(parameters: &[&ParameterResult], before: Option<&[ParameterResult]>
     beside(table, parameters, before)
 }
 
-/// The table with a column of the same parameters in another model.
+/// The table with a column of the same parameters in another model, in front of their meaning.
 fn beside(mut table: Table, parameters: &[&ParameterResult], before: Option<&[ParameterResult]>) -> Table {
     let Some(before) = before else {
         return table;
     };
-    let cells = parameters.iter().map(|parameter| {
+    let meaning = table.columns.iter().position(|column| column.heading == "meaning");
+    let place = meaning.unwrap_or(table.columns.len());
+    table.columns.insert(place, numbers("before ± u"));
+    for (row, parameter) in table.rows.iter_mut().zip(parameters) {
         let earlier = before.iter().find(|value| value.id == parameter.id).map(|p| value_and_u(p.value, p.u));
-        Cell::from(earlier.map_or(String::new(), |(value, u)| format!("{value} ± {u}")))
-    });
-    table.push(">before ± u", cells);
+        row.insert(place, earlier.map_or(String::new(), |(value, u)| format!("{value} ± {u}")).into());
+    }
     table
+}
+
+/// Figures with error bars of ± 2 u, one for each unit.
+fn figures(values: &[&ParameterResult], before: Option<&[ParameterResult]>, name: &str, title: &str) -> Vec<Figure> {
+    let bar = |parameter: &ParameterResult| Value { value: parameter.value, u: parameter.u };
+    let same = |id: &str| before?.iter().find(|value| value.id == id).map(bar);
+    let mut figures: Vec<Figure> = Vec::new();
+    for unit_name in units(values.iter().map(|value| value.unit.as_str())) {
+        let own = values.iter().filter(|parameter| parameter.unit == unit_name);
+        let row = |parameter: &&ParameterResult| Row {
+            name: parameter.id.clone(),
+            before: same(&parameter.id),
+            after: Some(bar(parameter)),
+        };
+        let rows: Vec<Row> = own.map(row).collect();
+        let parts = rows.len().div_ceil(MAX_ROWS);
+        for (number, rows) in rows.chunks(MAX_ROWS).enumerate() {
+            let part = if parts > 1 { format!(" ({} of {parts})", number + 1) } else { String::new() };
+            figures.push(Figure::new(
+                format!("{name}-{}-{}", unit_name.replace('/', "-per-"), number + 1),
+                format!("{title} in {}{part}", unit(unit_name)),
+                "Whiskers: ± 2 u.",
+                Chart::Values(Values {
+                    quantity: Quantity::new("value", unit_name),
+                    labels: ["before", "after"].map(str::to_string),
+                    rows: rows.to_vec(),
+                }),
+            ));
+        }
+    }
+    figures
 }

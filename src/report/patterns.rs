@@ -1,14 +1,24 @@
 //! The change of the readings by each error alone.
 
-use abbe::identify::patterns::Patterns;
+use abbe::identify::patterns::{Pattern, Patterns};
 use abbe::model::session::Session;
 
+use super::block::Report;
 use super::number::unit;
 use super::table::{Cell, Column, Table, cells, numbers, words};
 
+/// The report of patterns.
+pub fn report(session: &Session, patterns: &[Pattern]) -> Report {
+    let mut report = Report::new(format!("Trace patterns of {}", session.machine.name));
+    report.method = "The change of each reading by each error alone, by the exact chain.".to_string();
+    report.section("Sizes");
+    report.key(sizes(patterns));
+    report
+}
+
 /// The size of each pattern.
-pub fn sizes(found: &Patterns) -> Table {
-    let rows = found.patterns.iter().map(|pattern| {
+fn sizes(patterns: &[Pattern]) -> Table {
+    let rows = patterns.iter().map(|pattern| {
         let size = format!("{} {}", pattern.size, unit(&pattern.unit));
         let [largest, mean, deviation] =
             [pattern.largest_um, pattern.mean_um, pattern.standard_deviation_um].map(|um| Cell::fixed(um, 3));

@@ -2,47 +2,39 @@
 
 use abbe::identify::plausibility::{ConflictKind, Plausibility, Suggestion};
 
+use super::block::{Report, Text};
 use super::number::{micrometres, unit};
 use super::table::{Cell, Table, cells};
 
-/// What contradicts the session and what may have caused it.
-pub struct Conflicts {
-    /// Conflicts other than those of the set-up, one sentence each.
-    pub sentences: Vec<String>,
-    /// Set-up parameters that the readings move too far.
-    pub setup: Table,
-    /// The possible cause, or an introduction to `causes`.
-    pub explanation: String,
-    /// Possible causes, if there are several.
-    pub causes: Vec<String>,
+/// What the readings contradict, in a sentence; `None` if nothing.
+pub fn headline(plausibility: &Plausibility) -> Option<String> {
+    let subjects: Vec<&str> = plausibility.conflicts.iter().map(|conflict| conflict.subject.as_str()).collect();
+    (!subjects.is_empty()).then(|| format!("The readings contradict the session: {}.", subjects.join(", ")))
 }
 
-/// The conflicts; `None` without one.
-pub fn conflicts(plausibility: &Plausibility) -> Option<Conflicts> {
+/// The section of conflicts, if the readings contradict the session.
+pub fn section(report: &mut Report, plausibility: &Plausibility) {
     if plausibility.conflicts.is_empty() {
-        return None;
+        return;
     }
+    report.section("Conflict between readings and session");
+    report.key("The readings contradict what the session states:");
     let other = plausibility.conflicts.iter().filter(|c| c.kind != ConflictKind::SetupParameter);
+    report.key(Text::List(other.map(|conflict| conflict.words.clone()).collect()));
     let rows = plausibility.conflicts.iter().filter_map(|conflict| {
         let pull = conflict.pull?;
         let value = Cell::fixed(conflict.value, 1);
         let stated = Cell::exact(conflict.stated);
         Some(cells![&conflict.subject, value, stated, unit(&conflict.unit), Cell::fixed(pull, 1)])
     });
-    let columns = ["set-up parameter", ">estimate", ">stated u", "unit", ">pull"];
+    report.key(Table::new(["set-up parameter", ">estimate", ">stated u", "unit", ">pull"], rows));
     let cause = |cause: &Suggestion| format!("{} (residual {})", cause.words, micrometres(cause.rms_um));
-    let (explanation, causes) = match plausibility.suggestions.as_slice() {
-        [] => ("No single mistake among those tried explains this.".to_string(), Vec::new()),
-        [one] => (format!("Explained if {}.", cause(one)), Vec::new()),
-        several => (
-            "Explained by one of these, which the readings do not separate:".to_string(),
-            several.iter().map(cause).collect(),
-        ),
-    };
-    Some(Conflicts {
-        sentences: other.map(|conflict| conflict.words.clone()).collect(),
-        setup: Table::new(columns, rows),
-        explanation,
-        causes,
-    })
+    match plausibility.suggestions.as_slice() {
+        [] => report.key("No single mistake among those tried explains this."),
+        [one] => report.key(format!("Explained if {}.", cause(one))),
+        several => {
+            report.key("Explained by one of these, which the readings do not separate:");
+            report.key(Text::List(several.iter().map(cause).collect()));
+        }
+    }
 }

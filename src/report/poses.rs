@@ -1,14 +1,30 @@
 //! Selected poses.
 
 use abbe::identify::plan::poses::PoseSelection;
+use abbe::model::session::Session;
 use abbe::model::words::counted;
 
+use super::block::Report;
 use super::fit::noise;
 use super::number::{three_digits, unit};
 use super::table::{Cell, Table, cells, numbers, words};
 
+/// The report of selected poses.
+pub fn report(session: &Session, found: &PoseSelection) -> Report {
+    let mut report = Report::new(format!("Poses for {}", session.machine.name));
+    report.warnings.clone_from(&found.warnings);
+    report.method =
+        "Poses are exchanged with candidates within the travel of the axes until none lowers the criterion.".into();
+    report.opening("", [format!("{}.", sentence(found))]);
+    report.section("Predicted uncertainty");
+    report.key(uncertainties(found));
+    report.section("Poses");
+    report.key(poses(found));
+    report
+}
+
 /// The criterion of the poses and of random sets.
-pub fn sentence(found: &PoseSelection) -> String {
+fn sentence(found: &PoseSelection) -> String {
     format!(
         "{} of {}: {} {}; median of 100 random sets {}; {}",
         counted(found.poses.len(), "pose"),
@@ -21,7 +37,7 @@ pub fn sentence(found: &PoseSelection) -> String {
 }
 
 /// The errors with their predicted uncertainties.
-pub fn uncertainties(found: &PoseSelection) -> Table {
+fn uncertainties(found: &PoseSelection) -> Table {
     let rows = found.uncertainties.iter().map(|error| cells![&error.id, three_digits(error.u), unit(&error.unit)]);
     let mut table = Table::new(["error", ">u", "unit"], rows).titled("Predicted standard uncertainty u");
     if !found.held.is_empty() {
@@ -34,7 +50,7 @@ pub fn uncertainties(found: &PoseSelection) -> Table {
 }
 
 /// The positions of all axes, and the sockets.
-pub fn poses(found: &PoseSelection) -> Table {
+fn poses(found: &PoseSelection) -> Table {
     table(found, |q| Cell::fixed(q, 3)).titled("Poses")
 }
 

@@ -18,8 +18,8 @@ pub struct Input {
 pub struct Provenance {
     /// Command line.
     pub command: String,
-    /// Seed.
-    pub seed: u64,
+    /// Seed, if there are random numbers.
+    pub seed: Option<u64>,
     /// Input files.
     pub inputs: Vec<Input>,
     /// Notes of the table `[about]` of the session file, with their names.
@@ -27,23 +27,32 @@ pub struct Provenance {
 }
 
 impl Provenance {
+    /// Provenance of the command line of this process, without files.
+    pub fn of_command(seed: Option<u64>) -> Provenance {
+        let arguments = std::env::args_os().map(|argument| quoted(argument.to_string_lossy().into_owned()));
+        let command = arguments.collect::<Vec<_>>().join(" ");
+        Provenance { command, seed, inputs: Vec::new(), about: Vec::new() }
+    }
+
     /// Provenance of a session with its sources.
-    pub fn of((session, sources): (&Session, &SourceMap), seed: u64) -> Provenance {
-        Provenance {
-            command: std::env::args_os()
-                .map(|argument| quoted(argument.to_string_lossy().into_owned()))
-                .collect::<Vec<_>>()
-                .join(" "),
-            seed,
-            inputs: sources.files.iter().map(Input::of).collect(),
-            about: session.about.clone(),
+    pub fn of(read: (&Session, &SourceMap), seed: u64) -> Provenance {
+        let mut found = Provenance::of_command(Some(seed));
+        found.add(read);
+        found
+    }
+
+    /// Adds a session: its files, and the notes of the first one.
+    pub fn add(&mut self, (session, sources): (&Session, &SourceMap)) {
+        if self.inputs.is_empty() {
+            self.about.clone_from(&session.about);
         }
+        self.inputs.extend(sources.files.iter().map(Input::of));
     }
 }
 
 impl Input {
     /// A file with the size and the checksum of the bytes that were read.
-    fn of(stamp: &FileStamp) -> Input {
+    pub fn of(stamp: &FileStamp) -> Input {
         Input {
             path: stamp.file.display().to_string(),
             bytes: stamp.read().map_or(0, |read| read.count),

@@ -1,12 +1,32 @@
 //! Type A evaluation over repeated sessions beside the Type B evaluation of each fit.
 
 use abbe::identify::repeated::{Repeated, Scatter};
+use abbe::model::words::counted;
 
+use super::block::Report;
 use super::number::{places, unit};
 use super::table::{Cell, Table, cells};
 
+/// The report of repeated sessions of a machine.
+pub fn report(machine: &str, result: &Repeated) -> Report {
+    let mut report = Report::new(format!("Repeated sessions of {machine}"));
+    report.method = "Type A: from the scatter of the sessions, s/√n of their mean, s of one session. Type B: standard \
+                     uncertainty u of one fit. p: probability of such a ratio s/u by chance."
+        .to_string();
+    report.opening("", [format!("{} of one plan, each fitted separately.", counted(result.sessions.len(), "session"))]);
+    report.section("Parameters");
+    report.key(parameters(result));
+    report.key(report.method.clone());
+    report.section("Deviations");
+    report.key(deviating(result));
+    if result.deviating.is_empty() && result.sessions.len() > 2 {
+        report.key("No session deviates significantly from the others.");
+    }
+    report
+}
+
 /// Mean and scatter of each parameter.
-pub fn parameters(result: &Repeated) -> Table {
+fn parameters(result: &Repeated) -> Table {
     let rows = result.parameters.iter().map(|parameter| {
         let [mean, u_type_a] = Cell::estimate(parameter.mean, parameter.u_type_a);
         let [s, u_type_b] = [parameter.s, parameter.u_type_b].map(|u| Cell::fixed(u, places(u)));
@@ -32,7 +52,7 @@ pub fn parameters(result: &Repeated) -> Table {
 }
 
 /// Sessions that deviate significantly from the mean of the others.
-pub fn deviating(result: &Repeated) -> Table {
+fn deviating(result: &Repeated) -> Table {
     let rows = result.deviating.iter().map(|deviation| {
         let [difference, u] = Cell::estimate(deviation.deviation, deviation.u);
         let ratio = Cell::fixed((deviation.deviation / deviation.u).abs(), 1);

@@ -1,13 +1,74 @@
-//! The functions of a self-calibration, and their coverage intervals.
+//! A self-calibration: its functions, the position of the axis, coverage intervals.
 
 use abbe::identify::results::Interval;
-use abbe::identify::self_calibration::{FunctionResult, MonteCarloResult};
+use abbe::identify::self_calibration::{FunctionResult, MonteCarloResult, SelfCalibration};
+use abbe::model::session::Session;
+use abbe::model::words::counted;
 
-use super::number::{fixed, places, value_and_u};
+use super::block::{Report, Text};
+use super::fit::noise;
+use super::number::{fixed, micrometres, places, value_and_u};
 use super::table::{Cell, Table, cells, numbers, words};
+use super::{confounded, parameters};
+
+/// The report of a self-calibration.
+pub fn report(session: &Session, result: &SelfCalibration) -> Report {
+    let mut report = Report::new(format!("Self-calibration of {}", session.machine.name));
+    report.warnings.clone_from(&result.warnings);
+    report.method = "Rotary axis, linear axes and artefact are estimated separately, under the conditions stated \
+                     (Zimmermann and Ibaraki 2020)."
+        .to_string();
+    report.opening(
+        "",
+        [
+            format!(
+                "{}, {}, residual {}.",
+                counted(result.readings, "reading"),
+                noise(result.noise_um, result.noise_source),
+                micrometres(result.rms_um)
+            ),
+            format!(
+                "{} of four functions, numerical rank {} without boundary conditions.",
+                counted(result.value_count, "value"),
+                result.rank_without_conditions
+            ),
+            format!(
+                "{} under {}, numerical rank {}.",
+                counted(result.parameter_count, "parameter"),
+                counted(result.conditions.len(), "condition"),
+                result.rank
+            ),
+        ],
+    );
+    report.section("Conditions");
+    result.conditions.iter().for_each(|condition| report.key(Text::Note(condition.clone())));
+    report.section("Functions");
+    report.key(functions(&result.functions).titled("Functions, µm, value ± standard uncertainty"));
+    report.key(parameters::table(&result.radius.iter().collect::<Vec<_>>(), None).titled(""));
+    let axis = &result.axis;
+    report.section("Rotary axis");
+    let of_axis = parameters::table(&result.parameters.iter().collect::<Vec<_>>(), None);
+    report.key(of_axis.titled(format!("Position of axis {axis}, by the least-squares circle of its displacements")));
+    let by_turn = parameters::table(&result.parameters_by_turn.iter().collect::<Vec<_>>(), None);
+    report.key(by_turn.titled("The same, from the angles of rotation"));
+    if !result.parameters.is_empty() {
+        report.key(functions(&result.error_motions).titled(format!("Error motions of axis {axis}, µm")));
+    }
+    confounded::section(&mut report, &result.unobservable, &[], &[]);
+    if let Some(drawn) = &result.monte_carlo {
+        report.section("Monte Carlo");
+        report.key(intervals(drawn).titled(format!(
+            "Monte Carlo, {}, seed {}; coverage intervals of {} %, µm",
+            counted(drawn.runs, "run"),
+            drawn.seed,
+            drawn.coverage_probability * 100.0
+        )));
+    }
+    report
+}
 
 /// Functions side by side, one row per angle.
-pub fn functions(functions: &[FunctionResult]) -> Table {
+fn functions(functions: &[FunctionResult]) -> Table {
     let mut angles: Vec<f64> = Vec::new();
     for point in functions.iter().flat_map(|function| &function.points) {
         if !angles.contains(&point.at_deg) {
@@ -35,7 +96,7 @@ pub fn functions(functions: &[FunctionResult]) -> Table {
 }
 
 /// Coverage intervals of the quantities, µm.
-pub fn intervals(drawn: &MonteCarloResult) -> Table {
+fn intervals(drawn: &MonteCarloResult) -> Table {
     let rows = drawn.quantities.iter().map(|quantity| {
         let [mean, u] = Cell::estimate(quantity.mean_um, quantity.u_um);
         let interval = |Interval { low, high }: Interval| {

@@ -1,12 +1,38 @@
-//! The true values of a simulated session.
+//! A simulated session and the true values of its parameters.
 
 use abbe::identify::simulate::Simulated;
+use abbe::model::session::Session;
+use abbe::model::words::counted;
 
-use super::number::unit;
+use super::block::Report;
+use super::number::{micrometres, unit};
 use super::table::{Cell, Table, cells};
 
+/// The report of a simulation that was written to this session file.
+pub fn report(session: &Session, file: &str, simulated: &Simulated, seed: u64) -> Report {
+    let mut report = Report::new(format!("Simulation of {}", session.machine.name));
+    report.warnings.clone_from(&simulated.warnings);
+    report.method = "Readings of the machine with the stated errors, with Gaussian noise.".to_string();
+    let readings: usize = simulated.readings.iter().map(|readings| readings.rows()).sum();
+    report.opening(
+        "",
+        [format!(
+            "{file}: {} of {}, noise {}, seed {seed}",
+            counted(readings, "reading"),
+            counted(session.tests.len(), "test"),
+            micrometres(simulated.noise_mm * 1e3),
+        )],
+    );
+    report.section("True values");
+    match simulated.truth.is_empty() {
+        true => report.key("No error is given: the readings are those of the nominal machine."),
+        false => report.key(truth(simulated)),
+    }
+    report
+}
+
 /// The parameters that are not zero.
-pub fn truth(simulated: &Simulated) -> Table {
+fn truth(simulated: &Simulated) -> Table {
     let rows = simulated.truth.iter().map(|(id, value, name)| cells![id, Cell::fixed(*value, 4), unit(name)]);
     Table::new(["parameter", ">value", "unit"], rows)
 }

@@ -1,21 +1,40 @@
-//! The three statements of a fit or a trace: is it good, what to correct, what to measure next.
+//! The three statements that open a report: is it good, what to correct, what to measure next.
 
-use abbe::identify::results::{AxisCorrection, DeterminedBy, GoodStatement, LineQuantity, NextStep, Statements};
+#[cfg(feature = "fleet")]
+use abbe::fleet::history::HistoryStatements;
+use abbe::identify::compare::results::Difference;
+use abbe::identify::plan::results::{Contribution, ErrorAnalysis, PlanAnalysis};
+use abbe::identify::results::{
+    AxisCorrection, ComparisonStatement, DeterminedBy, GoodStatement, LineQuantity, MeasureStatement, NextStep,
+    PlanStatement, Statements, ValidationStatement,
+};
 use abbe::identify::tolerance::rule::Decision;
+use abbe::identify::validate::ValidationVerdict;
+use abbe::identify::validate::results::MovedParameter;
 use abbe::model::words::counted;
 
-use super::fit::agreement;
-use super::number::{fixed, places, quantity, value_and_u};
+use super::commands::Commands;
+use super::number::{fixed, places, quantity, three_digits, value_and_u};
 use super::parameters::PRIOR;
+use super::quality::agreement;
 use super::table::{Cell, Table, cells};
 
 /// Changes that the sentence names.
 const NAMED: usize = 4;
+/// Share of the noise in a variance below which more readings do not help.
+const MIN_NOISE_SHARE: f64 = 0.1;
 /// Digits of a component of a unit vector.
 const DIRECTION_PLACES: usize = 6;
 
+/// The statements as sentences that open a report.
+pub fn opening(statements: &Statements, degrees_of_freedom: usize, commands: &Commands) -> Vec<String> {
+    let mut sentences = vec![good("Goodness of fit", &statements.good, degrees_of_freedom), correct(statements)];
+    sentences.extend(measure(&statements.measure, commands));
+    sentences
+}
+
 /// Is it good: residual against noise, and limits, after what is judged.
-pub fn good(of: &str, good: &GoodStatement, degrees_of_freedom: usize) -> String {
+fn good(of: &str, good: &GoodStatement, degrees_of_freedom: usize) -> String {
     let limits = match good.decision {
         None => "no limits are stated".to_string(),
         Some(Decision::Pass) => "all limits pass".to_string(),
@@ -26,7 +45,7 @@ pub fn good(of: &str, good: &GoodStatement, degrees_of_freedom: usize) -> String
 }
 
 /// What to correct: the changes that exceed their expanded uncertainty, the largest first.
-pub fn correct(statements: &Statements) -> String {
+fn correct(statements: &Statements) -> String {
     let mut large: Vec<&AxisCorrection> = statements.correct.iter().filter(|change| change.exceeds_u()).collect();
     let ratio = |change: &AxisCorrection| (change.change / change.u).abs();
     large.sort_by(|a, b| ratio(b).total_cmp(&ratio(a)));
@@ -62,9 +81,9 @@ fn in_short(change: &AxisCorrection) -> String {
     format!("{of} {}{mark}", quantity(&format!("{value} ± {u}"), &change.unit))
 }
 
-/// What to measure next, and the commands for it. `command` gives the command line of a verb with options; `next` is the
-/// session file that they write.
-pub fn measure(statements: &Statements, next: &str, command: impl Fn(&str, &str) -> String) -> Vec<String> {
+/// What to measure next, and the commands for it.
+fn measure(statement: &MeasureStatement, commands: &Commands) -> Vec<String> {
+    let (next, command) = (commands.next_session(), |verb: &str, options: &str| commands.command(verb, options));
     let with_program = |what: String, verb: &str, options: &str| {
         vec![
             what,
@@ -80,18 +99,170 @@ pub fn measure(statements: &Statements, next: &str, command: impl Fn(&str, &str)
         )
     };
     let one = |what: &str| vec![format!("What to measure next: {what}")];
-    match statements.measure.step {
+    match statement.step {
         NextStep::CorrectSession => one("nothing before the session is corrected: the readings contradict it"),
         NextStep::Trace => one(&format!("nothing before {}", command("trace", ""))),
         NextStep::StateNoise => one("a run once more, or state `noise_um`: only then can the model be judged"),
         NextStep::SeparatingTest => {
-            let test = statements.measure.description.as_deref().unwrap_or_default();
+            let test = statement.description.as_deref().unwrap_or_default();
             with_program(format!("What to measure next: {test}"), "trace", &format!("--write {next} --with-tests"))
         }
         NextStep::Identify => plan("makes the confounded parameters identifiable"),
         NextStep::Improve => plan("most lowers the largest uncertainty"),
         NextStep::Nothing => one("no candidate test is known for this instrument"),
+        NextStep::Refit => one(&format!("nothing before {}, which identifies the machine anew", command("trace", ""))),
+        NextStep::WidenRange => one("a session that covers the range of these readings"),
+        NextStep::Repeat => one("the session once more"),
+        NextStep::NextCheck => one("the next check"),
     }
+}
+
+/// Names of a list, the first ones and the number of the others.
+fn first(names: impl IntoIterator<Item = String>, what: &str) -> String {
+    let names: Vec<String> = names.into_iter().collect();
+    let shown = names.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
+    match names.len().saturating_sub(NAMED) {
+        0 => shown,
+        more => format!("{shown} and {}", counted(more, what)),
+    }
+}
+
+/// `12.1 ± 1.9 µm`.
+fn estimate(value: f64, u: f64, unit: &str) -> String {
+    let (value, u) = value_and_u(value, u);
+    quantity(&format!("{value} ± {u}"), unit)
+}
+
+/// The statements of a plan: what it identifies, what limits it.
+pub fn of_plan(
+    statements: &Statements<PlanStatement, Contribution>,
+    analysis: &PlanAnalysis,
+    commands: &Commands,
+) -> Vec<String> {
+    let PlanStatement { errors, not_identifiable, determined_by_prior, .. } = &statements.good;
+    let mut good = match not_identifiable.len() {
+        0 if *errors == 1 => "The plan identifies its 1 error".to_string(),
+        0 => format!("The plan identifies all of its {}", counted(*errors, "error")),
+        _ => format!(
+            "The plan does not identify {} of {}",
+            first(not_identifiable.iter().cloned(), "further error"),
+            counted(*errors, "error")
+        ),
+    };
+    if !determined_by_prior.is_empty() {
+        good += &format!(", {} by the set-up priors only", first(determined_by_prior.iter().cloned(), "further error"));
+    }
+    let worst = analysis.worst();
+    good += &worst.map_or(String::new(), |error| format!("; {}", worst_determined(error)));
+    let correct = match (statements.correct.as_slice(), worst) {
+        (_, None) => "nothing; no error is identifiable".to_string(),
+        ([], Some(error)) => format!(
+            "nothing of the set-up; the noise limits {}: it contributes {} of the variance, more readings reduce it",
+            error.id,
+            percent(error.noise_share())
+        ),
+        (parts, Some(error)) => format!(
+            "the set-up, which limits {}: {}, noise {} of the variance; {}",
+            error.id,
+            parts.iter().map(|part| format!("{} {}", part.source, percent(part.share))).collect::<Vec<_>>().join(", "),
+            percent(error.noise_share()),
+            if error.noise_share() < MIN_NOISE_SHARE {
+                "more readings do not reduce it"
+            } else {
+                "more readings reduce only the part of the noise"
+            }
+        ),
+    };
+    let mut sentences = vec![good, format!("What to correct: {correct}")];
+    sentences.extend(measure(&statements.measure, commands));
+    sentences
+}
+
+/// The worst determined error of a plan, with its uncertainty.
+fn worst_determined(error: &ErrorAnalysis) -> String {
+    let u = error.u.unwrap_or_default();
+    format!(
+        "{} is worst determined: u = {} (U = {})",
+        error.id,
+        quantity(&three_digits(u), &error.unit),
+        quantity(&three_digits(2.0 * u), &error.unit)
+    )
+}
+
+fn percent(share: f64) -> String {
+    let percent = share * 100.0;
+    if percent > 0.0 && percent < 1.0 { "< 1 %".to_string() } else { format!("{percent:.0} %") }
+}
+
+/// What to correct and to measure after a validation.
+pub fn of_validation(
+    statements: &Statements<ValidationStatement, MovedParameter>,
+    outside: &[String],
+    commands: &Commands,
+) -> Vec<String> {
+    let moved = statements
+        .correct
+        .iter()
+        .map(|moved| format!("{} has moved by {}", moved.id, estimate(moved.value, moved.u, &moved.unit)));
+    let correct = match (statements.correct.is_empty(), statements.good.verdict) {
+        (false, _) => first(moved, "further parameter"),
+        (true, ValidationVerdict::Holds | ValidationVerdict::HoldsInRange) => {
+            "nothing; no parameter has moved".to_string()
+        }
+        (true, ValidationVerdict::Degraded | ValidationVerdict::DoesNotHold) => {
+            "no single parameter; the model lacks what these readings show".to_string()
+        }
+    };
+    let mut sentences = vec![format!("What to correct: {correct}")];
+    match statements.measure.step {
+        NextStep::WidenRange => sentences.push(format!(
+            "What to measure next: a session to identify from that covers the range of these readings ({})",
+            outside.join(", ")
+        )),
+        NextStep::Nothing => sentences.push("What to measure next: nothing; the model holds".to_string()),
+        _ => sentences.extend(measure(&statements.measure, commands)),
+    }
+    sentences
+}
+
+/// What to correct and to measure after a comparison.
+pub fn of_comparison(statements: &Statements<ComparisonStatement, Difference>) -> Vec<String> {
+    let changed = statements.correct.iter().map(|d| format!("{} {}", d.id, estimate(d.value, d.u, &d.unit)));
+    let correct = match statements.correct.is_empty() {
+        true => "nothing; nothing differs significantly".to_string(),
+        false => first(changed, "further difference"),
+    };
+    let next = match statements.measure.step {
+        NextStep::Repeat => {
+            "the last session once more, mounted anew: it tells a change of the machine from one of the set-up"
+        }
+        _ => "nothing before the next check",
+    };
+    vec![format!("What to correct: {correct}"), format!("What to measure next: {next}")]
+}
+
+/// What to correct and to measure by a history; `check`, the machine whose next check is due first, and when.
+#[cfg(feature = "fleet")]
+pub fn of_history(statements: &HistoryStatements, check: Option<(&str, String)>) -> Vec<String> {
+    let out = &statements.good.out_of_control;
+    let control = match out.len() {
+        0 => "No machine is out of control".to_string(),
+        _ => format!("Out of control: {}", first(out.iter().cloned(), "further machine")),
+    };
+    let several = statements.good.machines > 1;
+    let changed = statements.correct.iter().map(|changed| match several {
+        true => format!("{} of {}", changed.id, changed.machine_id),
+        false => changed.id.clone(),
+    });
+    let correct = match statements.correct.is_empty() {
+        true => "nothing; no parameter drifts or has shifted".to_string(),
+        false => first(changed, "further parameter"),
+    };
+    let next = match check {
+        Some((machine, when)) => format!("{machine}, whose next check is due {when}"),
+        None => "two dated sessions of a machine; its next check follows from them".to_string(),
+    };
+    vec![control, format!("What to correct: {correct}"), format!("What to measure next: {next}")]
 }
 
 /// The line of each axis in R: nominal, identified, change.

@@ -1,7 +1,10 @@
 //! Studies: power, false claims, coverage.
 
-use abbe::fleet::study::summary::{Cell as Draws, Rate};
+use abbe::fleet::study::draw::Draw;
+use abbe::fleet::study::summary::{Cell as Draws, Rate, StudyResult};
+use abbe::model::words::counted;
 
+use super::block::Report;
 use super::number::fixed;
 use super::table::{Cell, Table, cells};
 
@@ -13,8 +16,32 @@ fn percent(rate: &Rate) -> String {
     }
 }
 
+/// The report of a study; `failed`, the first draw without a result.
+pub fn report(result: &StudyResult, failed: Option<&Draw>) -> Report {
+    let mut report = Report::new("Study");
+    report.method = "Every combination of plan, effect and noise is simulated and analysed. Each proportion has its \
+                     standard error."
+        .to_string();
+    report.values = cells(&result.cells);
+    report.opening("", [format!("{}.", counted(result.draws, "draw"))]);
+    for (heading, draws) in [
+        ("Combinations", &result.cells),
+        ("Effects over all plans and noise", &result.effects),
+        ("Plans, best first", &result.ranking),
+    ] {
+        report.section(heading);
+        report.key(cells(draws));
+    }
+    if let Some(draw) = failed {
+        let message = draw.error.as_deref().unwrap_or_default();
+        report.section("Draws without a result");
+        report.key(format!("The first draw without a result, {} in {}: {message}", draw.effect, draw.plan));
+    }
+    report
+}
+
 /// Cells of a study.
-pub fn cells(title: &str, draws: &[Draws]) -> Table {
+fn cells(draws: &[Draws]) -> Table {
     let rows = draws.iter().map(|cell| {
         cells![
             cell.plan.clone(),
@@ -47,7 +74,5 @@ pub fn cells(title: &str, draws: &[Draws]) -> Table {
         ">undetermined",
         ">mean u",
     ];
-    let mut table = Table::new(headings, rows.collect::<Vec<_>>());
-    title.clone_into(&mut table.title);
-    table
+    Table::new(headings, rows)
 }

@@ -116,6 +116,10 @@ pub struct Table {
     pub rows: Vec<Vec<Cell>>,
     /// Sentences below it.
     pub notes: Vec<String>,
+    /// The rows that a terminal shows without `--all`; `None` for all.
+    pub key_rows: Option<Vec<usize>>,
+    /// Name of its files in a paper.
+    pub name: String,
 }
 
 impl Table {
@@ -137,6 +141,18 @@ impl Table {
     /// The table with a title.
     pub fn titled(self, title: impl Into<String>) -> Table {
         Table { title: title.into(), ..self }
+    }
+
+    /// The table with a name of its files.
+    pub fn named(self, name: impl Into<String>) -> Table {
+        Table { name: name.into(), ..self }
+    }
+
+    /// The table, of which a terminal shows the first rows without `--all`. A row more than these costs no more room
+    /// than the number of the others.
+    pub fn folded(self, max: usize) -> Table {
+        let key_rows = (self.rows.len() > max + 1).then(|| (0..max).collect());
+        Table { key_rows, ..self }
     }
 
     /// Without the columns that have no text in any row.

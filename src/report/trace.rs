@@ -1,16 +1,233 @@
-//! The result of a trace: the residual before and after, rejected candidates, parameters that changed.
+//! The result of a trace: verdict, effects, the residual before and after, parameters that changed.
 
-use abbe::identify::results::{ModelResult, PriorResult, TraceResult};
+use abbe::identify::IdentifyError;
+use abbe::identify::plan::candidate_tests;
+use abbe::identify::results::{
+    EffectResult, GoodnessVerdict, ModelResult, PriorResult, Statements, TraceResult, TraceVerdict,
+};
+use abbe::identify::series::{spectrum, views};
+use abbe::identify::trace::TraceOutcome;
 use abbe::model::words::counted;
 
-use super::cross_validation;
+use super::block::{KeyFigure, Level, Report, Text};
+use super::commands::Commands;
 use super::effect::name;
 use super::fit::{Figures, noise as noise_in_words, rank};
-use super::number::{micrometres, p_value, quantity, value_and_u};
+use super::number::{capitalised, integer, micrometres, p_value, quantity, value_and_u};
+use super::parameters::Estimates;
+use super::quality::{self, Quality, noise_sentence};
+use super::session::plots::SessionPlots;
+use super::session::{self, residuals};
+use super::statements;
 use super::table::{Cell, Table, cells};
+use super::{conformity, confounded, cross_validation, effects, plausibility, uniqueness};
+
+/// Effects that the opening names.
+const MAX_NAMED: usize = 3;
+
+/// The report of a trace; with `figures`, for a page.
+///
+/// # Errors
+/// If the model cannot be evaluated.
+pub fn report(trace: &TraceOutcome, commands: &Commands, figures: bool) -> Result<Report, IdentifyError> {
+    let result = &trace.result;
+    let problem = &trace.after;
+    let mut report = Report::new(format!("Trace of {}", problem.session.machine.name));
+    report.warnings.clone_from(&result.warnings);
+    report.method = method(result);
+    report.values = values(result);
+    let statements = Statements::of_trace(&trace.after, result);
+    let mut sentences = vec![verdict(result)];
+    sentences.extend(uniqueness::headline(result).map(|headline| format!("{}.", capitalised(&headline))));
+    sentences.extend(plausibility::headline(&result.plausibility));
+    sentences.extend(conformity::failed(result.conformity.as_ref()));
+    sentences.extend(statements::opening(&statements, result.after.degrees_of_freedom, commands));
+    sentences.push(format!(
+        "{}, {}; {} of {} detectable.",
+        counted(result.readings, "reading"),
+        noise(result),
+        result.candidates_detectable,
+        counted(result.candidates, "candidate")
+    ));
+    report.opening(result.verdict.to_string(), sentences);
+    let [before, after] = [&result.before, &result.after].map(|model| quality(result, model));
+    report.key(key_figures(trace, &before, &after));
+    plausibility::section(&mut report, &result.plausibility);
+    let estimates = Estimates::new(problem, &trace.after_fit, &result.after.parameters);
+    let earlier = (!result.effects.is_empty()).then_some(result.before.parameters.as_slice());
+    report.section("Values");
+    estimates.errors(&mut report, result.outcome.goodness, earlier);
+    if result.after.parameters.iter().any(|parameter| !parameter.enlarged_by.is_empty()) {
+        let covers = "u covers the change of the parameter if an alias takes the place of an effect";
+        report.key(Text::Note(covers.to_string()));
+    }
+    let changed = Text::List(changes(result));
+    let heading =
+        "Changed by more than their standard uncertainty when the effects were added (bias of the declared model):";
+    report.headed(Level::Key, heading, changed);
+    report.detail(statements::corrections(&statements));
+    estimates.set_up(&mut report, earlier);
+    effects::section(&mut report, trace);
+    report.section("Before and after");
+    report.key(format!("Residual of the declared model: {}", result.residual_before));
+    report.key(before_and_after(result));
+    conformity::section(&mut report, result.conformity.as_ref());
+    let by_prior = &result.outcome.determined_by_prior;
+    confounded::section(&mut report, &result.unobservable, by_prior, &result.outliers);
+    report.section("Next");
+    report.headed(Level::Key, "Tests that separate an effect from its aliases:", Text::List(measure_next(result)));
+    report.key(Text::Steps(next(trace, commands)));
+    if !figures {
+        return Ok(report);
+    }
+    let series = views(problem, &trace.after_fit, Some(&trace.before_fit.residuals))?;
+    let plots = SessionPlots::new(problem, &series);
+    let models = if earlier.is_none() { ["declared model"; 2] } else { ["declared model", "with the found effects"] };
+    report.section("Residuals");
+    residuals::figures(&mut report, &plots, &spectrum::spectra(problem, &series), models);
+    session::add_data(&mut report, &plots, &result.after.parameters);
+    session::traces(&mut report, &plots);
+    session::correlations(&mut report, problem, &trace.after_fit);
+    session::model(&mut report, problem, &trace.after_fit.beta)?;
+    Ok(report)
+}
+
+fn method(result: &TraceResult) -> String {
+    format!(
+        "The search screens {} candidate effects of the library against the residual of the declared model. {} of them \
+         are detectable in these readings. An effect is added if the same search rarely finds an effect as good in \
+         readings without structure. All parameters are then refitted together. {}. Held-out error: each fold leaves \
+         out {}; the search is repeated in each fold.",
+        integer(result.candidates),
+        integer(result.candidates_detectable),
+        noise_sentence(result.noise_um, result.noise_source),
+        result.heldout_by
+    )
+}
+
+/// The verdict in a sentence that names the effects with their values.
+fn verdict(result: &TraceResult) -> String {
+    let subject = match result.effects.len() {
+        1 => "1 effect explains".to_string(),
+        n => format!("{n} effects explain"),
+    };
+    let found = named(&result.effects);
+    match result.verdict {
+        TraceVerdict::Clean => "The residual of the declared model agrees with noise.".to_string(),
+        TraceVerdict::Incomplete if result.effects.is_empty() => {
+            format!("The search was {}. Effects may be missing.", result.interruption())
+        }
+        TraceVerdict::Incomplete => {
+            format!("The search was {}. Effects may be missing. Found: {found}.", result.interruption())
+        }
+        TraceVerdict::Explained => format!("{subject} the residual of the declared model: {found}."),
+        TraceVerdict::PartlyExplained => {
+            format!("{subject} a part of the residual of the declared model: {found}. {}", remains(result))
+        }
+        TraceVerdict::NotJudged => format!(
+            "{} No noise is stated and no reading repeats, so that whether the remaining residual is noise cannot be judged.",
+            match result.effects.len() {
+                0 => "The search finds no effect.".to_string(),
+                _ => format!("{subject} a part of the residual of the declared model: {found}."),
+            }
+        ),
+        TraceVerdict::Unexplained => format!("No effect of the library explains the residual. {}", remains(result)),
+    }
+}
+
+/// What remains of the residual.
+fn remains(result: &TraceResult) -> &'static str {
+    match result.outcome.goodness.verdict {
+        GoodnessVerdict::Exceeds if !result.remainder.structured => {
+            "The residual exceeds the noise: the model lacks an effect, and its estimates are not to be quoted."
+        }
+        _ => "Structure remains: the model lacks an effect, and its estimates are not to be quoted.",
+    }
+}
+
+/// The first effects with their values, and the number of the others.
+fn named(found: &[EffectResult]) -> String {
+    let one = |effect: &EffectResult| format!("{}, {}", effect.name.meaning, effects::estimate(effect));
+    let mut named: Vec<String> = found.iter().take(MAX_NAMED).map(one).collect();
+    if found.len() > MAX_NAMED {
+        named.push(format!("{} more", found.len() - MAX_NAMED));
+    }
+    named.join("; ")
+}
+
+/// Quality of a model of a trace.
+fn quality<'r>(result: &'r TraceResult, model: &'r ModelResult) -> Quality<'r> {
+    Quality {
+        chi_square: model.chi_square,
+        degrees_of_freedom: model.degrees_of_freedom,
+        rms_um: model.rms_um,
+        rms_3d_um: model.rms_3d_um,
+        heldout_rms_um: model.heldout_rms_um,
+        heldout_rms_3d_um: model.heldout_rms_3d_um,
+        cross_validation: &model.cross_validation,
+        heldout_by: &result.heldout_by,
+        rank: model.rank,
+        parameters: model.parameter_count,
+        noise_um: model.noise_um,
+        noise_source: result.noise_source,
+    }
+}
+
+fn key_figures(trace: &TraceOutcome, before: &Quality<'_>, after: &Quality<'_>) -> Vec<KeyFigure> {
+    let result = &trace.result;
+    let mut figures = after.key_figures(Some(before));
+    let unique = result.effects.iter().filter(|effect| effect.unique).count();
+    match result.effects.as_slice() {
+        [] => {}
+        [one] if one.unique => {
+            let among = format!("among {} detectable candidates", integer(result.candidates_detectable));
+            figures.push(KeyFigure::new("Uniqueness", "unique", among));
+        }
+        [one] => {
+            let count = format!("1 of {}", one.explanation_count);
+            figures.push(KeyFigure::new("Uniqueness", count, "indistinguishable explanations"));
+        }
+        many => figures.push(KeyFigure::new("Uniqueness", format!("{unique} of {}", many.len()), "effects are unique")),
+    }
+    let structure = if result.remainder.structured { "significant" } else { "not significant" };
+    figures.push(KeyFigure::new("Remaining structure", structure, format!("p = {:.3}", result.remainder.p_value)));
+    figures.push(quality::readings(&trace.after, result.readings, result.outliers.len()));
+    figures
+}
+
+/// The tests that separate effects from their aliases.
+fn measure_next(result: &TraceResult) -> Vec<String> {
+    let sentences = result.effects.iter().enumerate().flat_map(|(k, effect)| {
+        let about = if result.effects.len() > 1 { format!("Effect {}: ", k + 1) } else { String::new() };
+        uniqueness::tests(effect, name).into_iter().map(move |sentence| format!("{about}{sentence}"))
+    });
+    sentences.collect()
+}
+
+/// What to do next.
+fn next(trace: &TraceOutcome, commands: &Commands) -> Vec<(String, String)> {
+    let result = &trace.result;
+    let mut steps: Vec<(String, String)> = Vec::new();
+    let mut step = |step: String, purpose: &str| steps.push((step, purpose.to_string()));
+    if !result.plausibility.conflicts.is_empty() {
+        step("correct the session".into(), "the readings contradict it");
+    }
+    if result.interrupted {
+        step(commands.command("trace", ""), "search to the end");
+    } else if !result.effects.is_empty() {
+        let purpose = "declare the effects in a session, which `abbe fit next.toml` fits";
+        step(commands.command("trace", "--write next.toml"), purpose);
+    }
+    if !result.unobservable.is_empty() && candidate_tests::has_candidates(&trace.after) {
+        let purpose = "propose the test that makes the confounded parameters identifiable";
+        step(commands.command("plan", "--improve"), purpose);
+    }
+    step(commands.command("trace", "--report trace.html"), "write residuals, plots and alternatives as a page");
+    steps
+}
 
 /// The noise and its source in words. A residual is not called noise.
-pub fn noise(result: &TraceResult) -> String {
+fn noise(result: &TraceResult) -> String {
     if result.noise_source.judges() || result.effects.is_empty() {
         return noise_in_words(result.noise_um, result.noise_source);
     }
@@ -73,12 +290,11 @@ pub fn remainder(result: &TraceResult) -> Option<String> {
     result.remainder.structured.then(|| format!("({}): {place}", p_value(result.remainder.p_value)))
 }
 
-/// Parameters that changed by more than their uncertainty when the effects were added, each with its identifier.
-pub fn changes(result: &TraceResult) -> Vec<(&str, String)> {
+/// Parameters that changed by more than their uncertainty when the effects were added.
+fn changes(result: &TraceResult) -> Vec<String> {
     let changes = result.changed_parameters.iter().map(|changed| {
         let (change, u) = value_and_u(changed.change, changed.u);
-        let sentence = format!("{}  {} (u {u})", changed.id, quantity(&change, &changed.unit));
-        (changed.id.as_str(), sentence)
+        format!("{}  {} (u {u})", changed.id, quantity(&change, &changed.unit))
     });
     changes.collect()
 }
@@ -104,7 +320,7 @@ pub fn prior(prior: &PriorResult) -> String {
 }
 
 /// Every figure with all its digits, one row per figure.
-pub fn figures(result: &TraceResult) -> Table {
+fn values(result: &TraceResult) -> Table {
     let mut figures = Figures::default();
     if result.interrupted {
         figures.statement("search", "interrupted", &format!("{}: the result is incomplete", result.interruption()));

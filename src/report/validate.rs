@@ -1,15 +1,83 @@
 //! A validated model: verdict, residuals of each machine, moved parameters, share of each effect.
 
+use abbe::identify::results::Statements;
 use abbe::identify::validate::results::RmsResult;
-use abbe::identify::validate::{ValidationResult, ValidationVerdict};
+use abbe::identify::validate::{Validation, ValidationResult, ValidationVerdict};
+use abbe::model::session::Session;
 use abbe::model::words::counted;
 
+use super::block::{KeyFigure, Report, Text};
+use super::commands::Commands;
 use super::fit::Figures;
-use super::number::{micrometres, probability, unit};
+use super::number::{capitalised, integer, micrometres, probability, unit};
+use super::statements;
 use super::table::{Cell, Table, cells};
+use super::validate_plots as plots;
+
+/// Rows of a list that a terminal shows without `--all`.
+const MAX_ROWS: usize = 10;
+
+/// Method of a validation.
+const METHOD: &str = "The errors of the machine are those of the saved model. Only the set-up of this session is \
+     estimated, with its priors, and again for each machine that is compared. The predicted variance of a residual is \
+     that of the noise plus that of the model's covariance, after projection on the set-up. Consistent: the residual is \
+     as large as predicted (ratio at most 1.05, or p at least 0.001), the 95 % intervals cover at least 90 % of the \
+     readings, and no parameter has moved (generalised least squares, 0.5 % over all parameters, Bonferroni).";
+
+/// The report of a validation.
+pub fn report(session: &Session, validation: &Validation, commands: &Commands) -> Report {
+    let result = &validation.result;
+    let mut report = Report::new(format!("Validation of a model of {}", session.machine.name));
+    report.warnings.clone_from(&result.warnings);
+    report.method = METHOD.to_string();
+    let sentence = format!("{}.", capitalised(&sentence(result)));
+    let statements = statements::of_validation(&Statements::of_validation(result), &result.outside, commands);
+    let sentences = std::iter::once(sentence).chain(statements).chain([format!("{}.", readings(result))]);
+    report.opening(result.verdict.to_string(), sentences);
+    report.key(key_figures(result));
+    report.section("Residuals");
+    report.key(residuals(result));
+    report.figures(plots::of_machines(result));
+    report.section("Moved parameters");
+    match result.moved.is_empty() {
+        true => report.key("No parameter of the machine has moved significantly."),
+        false => report.key(moved(result).folded(MAX_ROWS)),
+    }
+    report.section("Effects");
+    report.key(without(result).folded(MAX_ROWS));
+    report.figures((!result.without.is_empty()).then(|| plots::of_effects(result)).into_iter().flatten());
+    report.section("Set-up");
+    let estimated = counted(result.set_up.len(), "parameter");
+    if !result.set_up.is_empty() {
+        report.brief(Text::Note(format!("{estimated} of the set-up estimated")));
+    }
+    report.folded(estimated, set_up(result));
+    report.section("Tests");
+    report.figures(plots::of_tests(validation));
+    report.values = values(result);
+    report
+}
+
+fn key_figures(result: &ValidationResult) -> Vec<KeyFigure> {
+    let model = &result.model;
+    let predicted = format!("predicted {}", micrometres(model.predicted_rms_um));
+    let mut figures = vec![KeyFigure::new("Residual rms", micrometres(model.rms.rms_um), predicted)];
+    let length = model.rms.rms_3d_um.map(|length| KeyFigure::new("Residual vector", micrometres(length), "rms length"));
+    figures.extend(length);
+    figures.extend([
+        KeyFigure::new(
+            "Location errors alone",
+            micrometres(result.locations.rms_um),
+            format!("nominal machine {}", micrometres(result.nominal.rms_um)),
+        ),
+        KeyFigure::new("In 95 % intervals", format!("{:.1} %", 100.0 * model.coverage_95), "of scalar readings"),
+        KeyFigure::new("Readings", integer(result.readings), format!("{} inside the range", result.readings_in_range)),
+    ]);
+    figures
+}
 
 /// The verdict in a sentence.
-pub fn sentence(result: &ValidationResult) -> String {
+fn sentence(result: &ValidationResult) -> String {
     let cause = match result.moved.len() {
         0 => "the residual is larger than predicted".to_string(),
         1 => "1 parameter has moved".to_string(),
@@ -27,7 +95,7 @@ pub fn sentence(result: &ValidationResult) -> String {
 }
 
 /// The readings, those inside the range, and the noise.
-pub fn readings(result: &ValidationResult) -> String {
+fn readings(result: &ValidationResult) -> String {
     let outside = match result.outside.as_slice() {
         [] => String::new(),
         names => format!(" (outside: {})", names.join(", ")),
@@ -112,7 +180,7 @@ pub fn without(result: &ValidationResult) -> Table {
 }
 
 /// The estimated set-up.
-pub fn set_up(result: &ValidationResult) -> Table {
+fn set_up(result: &ValidationResult) -> Table {
     let rows = result.set_up.iter().map(|parameter| {
         let [value, u] = Cell::estimate(parameter.value, parameter.u);
         cells![&parameter.id, value, u, unit(&parameter.unit), &parameter.meaning]
@@ -122,7 +190,7 @@ pub fn set_up(result: &ValidationResult) -> Table {
 }
 
 /// Every figure with all its digits, one row per figure.
-pub fn figures(result: &ValidationResult) -> Table {
+fn values(result: &ValidationResult) -> Table {
     let mut figures = Figures::default();
     figures.statement("verdict", result.verdict.word(), &sentence(result));
     let mut rms = |id: &str, rms: &RmsResult| {

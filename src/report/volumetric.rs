@@ -1,13 +1,38 @@
 //! A map of the volumetric error over the workspace.
 
+use std::path::Path;
+
 use abbe::identify::volumetric::{Size, Summary, VolumetricPoint};
 use abbe::model::chain::Machine;
-use abbe::model::words::with_exponent;
+use abbe::model::words::{counted, with_exponent};
 
+use super::block::Report;
 use super::table::{Cell, Column, Table, cells, numbers};
 
+/// The report of a map in this file.
+pub fn report(machine: &Machine, file: &Path, summary: &Summary, functions: usize) -> Report {
+    let mut report = Report::new(format!("Volumetric error of {}", machine.name));
+    report.method = "The error vector of the tool point, by the exact chain.".to_string();
+    let at: Vec<String> = summary.largest_at.iter().map(|at| format!("{} {:.1}", at.axis, at.position)).collect();
+    report.opening(
+        "",
+        [
+            format!(
+                "{}: {}, {}",
+                file.display(),
+                counted(summary.points, "place"),
+                counted(functions, "error function")
+            ),
+            format!("largest at {}", at.join(", ")),
+        ],
+    );
+    report.section("Sizes");
+    report.key(sizes(summary));
+    report
+}
+
 /// The size of the error: in total, by coordinate, by axis, after compensation.
-pub fn sizes(summary: &Summary) -> Table {
+fn sizes(summary: &Summary) -> Table {
     let row = |name: String, size: &Size| cells![name, Cell::fixed(size.largest_um, 3), Cell::fixed(size.rms_um, 3)];
     let mut rows = vec![row("error vector".into(), &summary.error)];
     let coordinates = &summary.coordinates;

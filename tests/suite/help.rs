@@ -106,3 +106,25 @@ fn completions_are_written_for_every_shell() {
     std::io::Write::write_all(bash.stdin.as_mut().unwrap(), &abbe(&["completions", "bash"]).stdout).unwrap();
     assert!(bash.wait().unwrap().success());
 }
+
+/// A command is arguments, a call of the library, a report and its outputs. What all commands share is longer.
+#[test]
+fn the_file_of_a_command_has_at_most_120_lines() {
+    const SHARED: [&str; 5] = ["interrupt.rs", "mod.rs", "output.rs", "results.rs", "values.rs"];
+    let commands = workspace().join("src/cli");
+    let shared: Vec<_> = SHARED.iter().map(|name| commands.join(name)).collect();
+    let (mut folders, mut count) = (vec![commands], 0);
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|end| end == "rs") && !shared.contains(&path) {
+                let lines = std::fs::read_to_string(&path).unwrap().lines().count();
+                assert!(lines <= 120, "{}: {lines} lines", path.display());
+                count += 1;
+            }
+        }
+    }
+    assert!(count > 40, "{count} files");
+}

@@ -91,7 +91,7 @@ fn an_interrupted_trace_exits_with_130_and_every_output_says_so() {
         text(&report),
     ]);
     assert_eq!(status.code(), Some(INTERRUPTED), "{stderr}");
-    assert!(result.starts_with("Verdict: incomplete, 1 effect\n"), "{result}");
+    assert!(result.starts_with("Verdict: incomplete. The search was interrupted after 1 effect. "), "{result}");
     assert!(stderr.contains("interrupted after 1 effect\n"), "{stderr}");
     let read = |path: &Path| std::fs::read_to_string(path).unwrap();
     let result: serde_json::Value = serde_json::from_str(&read(&json)).unwrap();
@@ -121,7 +121,7 @@ fn a_second_interruption_ends_the_program_at_once() {
     let mut result = BufReader::new(child.stdout.take().unwrap());
     let mut verdict = String::new();
     result.read_line(&mut verdict).unwrap();
-    assert_eq!(verdict, "Verdict: incomplete, 1 effect\n");
+    assert!(verdict.starts_with("Verdict: incomplete. The search was interrupted after 1 effect. "), "{verdict}");
     interrupt(&child);
     let began = Instant::now();
     while child.try_wait().unwrap().is_none() {

@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 use super::{abbe, workspace};
 
 /// The commands, and the subject of `abbe schema` for each.
-const COMMANDS: [(&str, &str); 18] = [
+const COMMANDS: [(&str, &str); 21] = [
     ("abbe fit", "fit"),
     ("abbe fit --repeat", "repeat"),
     ("abbe fit --method circle, cone or two-plane", "geometric"),
@@ -16,6 +16,9 @@ const COMMANDS: [(&str, &str); 18] = [
     ("abbe trace", "trace"),
     ("abbe validate", "validate"),
     ("abbe fit and abbe trace --save", "model"),
+    ("abbe compare", "compare"),
+    ("abbe compensate", "compensate"),
+    ("abbe export", "export"),
     ("abbe plan", "plan"),
     ("abbe plan --improve, --separate or --range", "next-test"),
     ("abbe plan --global", "global"),

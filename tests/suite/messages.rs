@@ -125,5 +125,5 @@ fn one_test_and_two_tests() {
     let planned = run(&place, &["plan", "session.toml", "--no-effects"], &[]);
     let planned = String::from_utf8(planned.stdout).unwrap();
     assert!(planned.contains("\n90 readings in 1 test, 1 set-up,"), "{planned}");
-    assert!(planned.contains("of 1 error identifiable;"), "{planned}");
+    assert!(planned.contains("The plan identifies its 1 error;"), "{planned}");
 }

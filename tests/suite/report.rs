@@ -127,6 +127,33 @@ fn methods_and_next_tests_have_reports() {
     assert!(at("next/next-test.svg").exists());
 }
 
+/// The first screen of a page: sentences, and cards with a figure and at most eight words.
+#[test]
+fn a_page_opens_with_sentences_and_short_cards() {
+    let folder = tempfile::tempdir().unwrap();
+    let measured = ready("hermle-c600u/measured/session.toml");
+    let (fit, trace) = (["fit", text(&measured)], ["trace", text(&measured), "--only", "EZC"]);
+    let plan = ready("hermle-c600u/chapter5.toml");
+    let plan = ["plan", text(&plan), "--no-effects"];
+    for (name, command) in [("fit", &fit[..]), ("trace", &trace[..]), ("plan", &plan[..])] {
+        let page = folder.path().join(format!("{name}.html"));
+        assert!(abbe(&[command, &["-q", "--report", text(&page)]].concat()).status.success());
+        let page = std::fs::read_to_string(page).unwrap();
+        let (opening, _) = page.split_once("<dl class=\"key-figures\">").unwrap();
+        assert!(opening.matches("<p class=\"verdict\">").count() >= 2, "{name}");
+        let cards: Vec<&str> =
+            page.split("<div><dt>").skip(1).take_while(|card| card.contains("class=\"note\"")).collect();
+        assert!(cards.len() >= 4, "{name}: {} cards", cards.len());
+        for card in cards {
+            let (label, rest) = card.split_once("</dt>").unwrap();
+            let note = rest.split("<dd class=\"note\">").nth(1).unwrap().split("</dd>").next().unwrap();
+            let words = [label, note].join(" ");
+            let words = words.split([' ', ',', ';']).filter(|word| word.chars().any(char::is_alphabetic));
+            assert!(words.clone().count() <= 8, "{name}: {}", words.collect::<Vec<_>>().join(" "));
+        }
+    }
+}
+
 /// A share is the change of the modelled readings if the parameters of the share are set to zero: a difference, not a
 /// derivative.
 #[test]

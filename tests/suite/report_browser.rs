@@ -258,10 +258,11 @@ fn a_trace_shows_its_values_within_1500_px_and_folds_unaffected_tests() {
         const isFolded = (test) => Boolean(document.querySelector(`#residuals svg[aria-label^=\"${test}\"]`).closest('details:not([open])'));
         const tops = [...document.querySelectorAll('#residuals svg[aria-label^=\"C150\"]')].map((svg) => svg.getBoundingClientRect().top);
         const effect = document.querySelector('#effects-and-competing-explanations .halves');
-        const [values, alternatives] = [...effect.children].map((part) => part.getBoundingClientRect());
+        const [words, figures] = [...effect.children].map((part) => part.getBoundingClientRect());
         return { bottom: table.getBoundingClientRect().bottom + scrollY, rows: table.rows.length,
             folded: ['A100', 'A150', 'C100', 'C150'].map(isFolded), beside: tops[0] === tops[1],
-            alternatives: effect.querySelectorAll('tbody tr').length, right: alternatives.left >= values.right && alternatives.top === values.top };";
+            alternatives: effect.querySelectorAll('table')[1].querySelectorAll('tbody tr').length,
+            right: figures.left >= words.right && figures.top === words.top };";
     let (found, _) = run(&browser, &page, 1280, script);
     // 8 errors, amplitude and phase of the found effect, and the header.
     assert_eq!(found["rows"], 11, "{found}");
@@ -269,7 +270,7 @@ fn a_trace_shows_its_values_within_1500_px_and_folds_unaffected_tests() {
     // The simulator changed the axial motion of C only, which C150 alone measures.
     assert_eq!(found["folded"], serde_json::json!([true, true, true, false]), "{found}");
     assert_eq!(found["beside"], true, "{found}");
-    // The selected effect and its 8 alternatives, to the right of the values of the effect.
+    // The selected effect and its 8 alternatives, with their evidence beside them.
     assert_eq!(found["alternatives"], 9, "{found}");
     assert_eq!(found["right"], true, "{found}");
 }

@@ -216,8 +216,8 @@ fn written(arguments: &[&str]) -> Value {
     serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap()
 }
 
-/// The fields in front of every result of a session.
-const ENVELOPE: [&str; 6] = ["schema_version", "tool_version", "command", "session", "seed", "options"];
+/// The fields in front of every result of a fit or a trace.
+const ENVELOPE: [&str; 7] = ["schema_version", "tool_version", "command", "session", "seed", "options", "statements"];
 /// Held-out errors of a session of runs with several tests, one of which can be left out and one cannot.
 const LEFT_OUT: [&str; 4] = ["left_out_run_rms_um", "left_out_test_rms_um", "left_out_tests", "tests_not_left_out"];
 

@@ -99,7 +99,7 @@ fn a_model_holds_on_another_set_up_and_a_change_is_named() {
     ]);
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
     let screen = String::from_utf8(run.stdout).unwrap();
-    assert!(screen.starts_with("holds: "), "{screen}");
+    assert!(screen.starts_with("Verdict: holds. "), "{screen}");
     assert!(std::fs::read_to_string(&report).unwrap().contains("Residual of each machine"));
     assert!(std::fs::read_to_string(&csv).unwrap().contains("residual,model"));
     assert!(std::fs::read_dir(&plots).unwrap().count() >= 3);

@@ -1,8 +1,11 @@
 //! A fit.
 
+use abbe::document::Stated;
 use abbe::identify::fit::SessionFit;
-use abbe::report::fit::Figures;
-use abbe::report::{pages, readings};
+use abbe::identify::results::Statements;
+use abbe::report::block::Report;
+use abbe::report::commands::Commands;
+use abbe::report::{self, readings};
 use wasm_bindgen::prelude::*;
 
 use crate::failed::Failed;
@@ -32,18 +35,18 @@ impl Fit {
 
     /// The document of `--json`.
     pub fn json(&self) -> Result<String, Failed> {
-        output::json("fit", &self.read, self.seed, &self.fit.result)
+        let stated = Stated::new(&self.fit.result, Statements::of_fit(&self.fit.problem, &self.fit.result));
+        output::json("fit", &self.read, self.seed, &stated)
     }
 
     /// The page of `--report`.
     pub fn report(&self) -> Result<String, Failed> {
-        let document = pages::fit::document(&self.fit.problem, &self.fit.fit, &self.fit.result)?;
-        output::report("fit", &self.read, self.seed, &document)
+        output::report("fit", &self.read, self.seed, &self.found(true)?)
     }
 
     /// The table of `--csv`.
     pub fn csv(&self) -> Result<String, Failed> {
-        output::figures(&Figures::of_fit(&self.fit.result))
+        output::values(&self.found(false)?)
     }
 
     /// The table of `--residuals`.
@@ -54,5 +57,13 @@ impl Fit {
     /// The file of `--save`.
     pub fn model(&self) -> Result<String, Failed> {
         output::model("fit", &self.read, self.seed, &self.fit.problem, &self.fit.fit)
+    }
+}
+
+impl Fit {
+    fn found(&self, figures: bool) -> Result<Report, Failed> {
+        let commands = Commands::of(&self.read.sources.file, None, false);
+        let SessionFit { problem, fit, result, .. } = &self.fit;
+        Ok(report::fit::report(problem, fit, result, &commands, figures)?)
     }
 }

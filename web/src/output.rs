@@ -6,7 +6,7 @@ use abbe::identify::model_file::IdentifiedModel;
 use abbe::identify::problem::Problem;
 use abbe::printers::csv;
 use abbe::printers::page;
-use abbe::report::pages::document::Document as Report;
+use abbe::report::block::Report;
 use abbe::report::provenance::Provenance;
 use abbe::report::table::Table;
 use serde::Serialize;
@@ -26,10 +26,10 @@ pub fn json<T: Serialize>(command: &str, read: &Read, seed: u64, result: &T) -> 
 }
 
 /// The page of a report.
-pub fn report(command: &str, read: &Read, seed: u64, document: &Report) -> Result<String, Failed> {
+pub fn report(command: &str, read: &Read, seed: u64, found: &Report) -> Result<String, Failed> {
     let provenance = Provenance::of((&read.session, &read.sources), seed);
     let command = format!("abbe {command} {}", read.sources.file.display());
-    Ok(page::html(document, &Provenance { command, ..provenance })?)
+    Ok(page::html(found, &Provenance { command, ..provenance })?)
 }
 
 /// The file of an identified model.
@@ -38,9 +38,9 @@ pub fn model(command: &str, read: &Read, seed: u64, problem: &Problem, fit: &Fit
     Ok(IdentifiedModel::of_fit(problem, fit, provenance)?.to_text()?)
 }
 
-/// The figures of a result as CSV, under a comment that states the convention of their signs.
-pub fn figures(table: &Table) -> Result<String, Failed> {
-    Ok(csv::CONVENTION.to_string() + &self::table(table)?)
+/// The values of a report as CSV.
+pub fn values(report: &Report) -> Result<String, Failed> {
+    Ok(String::from_utf8_lossy(&csv::report(report)?).into_owned())
 }
 
 /// A table as CSV.

@@ -1,11 +1,15 @@
 //! A trace.
 
+use abbe::document::Stated;
 use abbe::identify::plan::test_variations::TestVariations;
+use abbe::identify::results::Statements;
 use abbe::identify::separating_tests::separate_aliases;
 use abbe::identify::trace::{self, Progress, TraceOptions, TraceOutcome};
 use abbe::model::document::edit::SessionText;
 use abbe::model::words::counted;
-use abbe::report::{pages, readings, trace as present};
+use abbe::report::block::Report;
+use abbe::report::commands::Commands;
+use abbe::report::{self, readings};
 use wasm_bindgen::prelude::*;
 
 use crate::failed::Failed;
@@ -38,17 +42,18 @@ impl Trace {
 
     /// The document of `--json`.
     pub fn json(&self) -> Result<String, Failed> {
-        output::json("trace", &self.read, self.seed, &self.trace.result)
+        let stated = Stated::new(&self.trace.result, Statements::of_trace(&self.trace.after, &self.trace.result));
+        output::json("trace", &self.read, self.seed, &stated)
     }
 
     /// The page of `--report`.
     pub fn report(&self) -> Result<String, Failed> {
-        output::report("trace", &self.read, self.seed, &pages::trace::document(&self.trace)?)
+        output::report("trace", &self.read, self.seed, &self.found(true)?)
     }
 
     /// The table of `--csv`.
     pub fn csv(&self) -> Result<String, Failed> {
-        output::figures(&present::figures(&self.trace.result))
+        output::values(&self.found(false)?)
     }
 
     /// The table of `--residuals`.
@@ -69,6 +74,13 @@ impl Trace {
         let mut text = SessionText::new(&self.read.sources.text, &self.read.sources.file)?;
         text.add_effects(&self.trace.effects, &self.read.session.machine)?;
         Ok(text.to_string())
+    }
+}
+
+impl Trace {
+    fn found(&self, figures: bool) -> Result<Report, Failed> {
+        let commands = Commands::of(&self.read.sources.file, None, false);
+        Ok(report::trace::report(&self.trace, &commands, figures)?)
     }
 }
 

@@ -6,6 +6,7 @@ pub(crate) mod columns;
 pub(crate) mod gain;
 pub mod library;
 pub(crate) mod moments;
+pub mod named;
 mod null_scores;
 pub(crate) mod sampling;
 pub(crate) mod step_table;

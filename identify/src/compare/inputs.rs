@@ -6,12 +6,15 @@ use abbe_model::component::ErrorName;
 use abbe_model::effect::Effect;
 use abbe_model::session::Session;
 
+use super::results::{Comparison, ExcludedReading};
+use super::{CompareOptions, Named, compare, one_machine};
 use crate::error::IdentifyError;
 use crate::fit;
 use crate::model_file::{IdentifiedModel, Provenance};
 use crate::results::Outlier;
 
 /// An input of a comparison.
+#[derive(Clone)]
 pub enum Input {
     /// A saved model.
     Model(Box<IdentifiedModel>),
@@ -79,4 +82,26 @@ pub fn models(inputs: Vec<Input>, seed: u64) -> Result<Vec<(IdentifiedModel, Vec
         }
     };
     inputs.into_iter().map(model).collect()
+}
+
+/// Compares inputs, each with its name in the result, with the first one.
+///
+/// # Errors
+/// If the inputs are of different machines, or a session cannot be fitted.
+pub fn compare_inputs(
+    names: Vec<String>,
+    inputs: Vec<Input>,
+    options: &CompareOptions,
+    seed: u64,
+) -> Result<Comparison, IdentifyError> {
+    for (name, input) in names.iter().zip(&inputs).skip(1) {
+        one_machine((&names[0], inputs[0].machine()), (name, input.machine()))?;
+    }
+    let (models, outliers): (Vec<IdentifiedModel>, Vec<Vec<Outlier>>) = models(inputs, seed)?.into_iter().unzip();
+    let excluded = names.iter().zip(outliers).flat_map(|(input, outliers)| {
+        outliers.into_iter().map(|outlier| ExcludedReading { input: input.clone(), outlier })
+    });
+    let outliers = excluded.collect();
+    let named: Vec<Named<'_>> = names.into_iter().zip(&models).map(|(name, model)| Named { name, model }).collect();
+    Ok(Comparison { outliers, ..compare(&named, options)? })
 }

@@ -13,6 +13,7 @@ use super::information::{Root, SharedParameters};
 use super::proposal::{Proposal, proposal};
 use super::ranking::smallest_first;
 use super::test_variations::TestVariations;
+use crate::candidates::named;
 use crate::error::IdentifyError;
 use crate::problem::Problem;
 
@@ -110,6 +111,25 @@ const MIN_GAIN: f64 = 1e-6;
 const MAX_ALTERNATIVES: usize = 5;
 /// Maximum number of exchange rounds.
 const MAX_ROUNDS: usize = 10;
+
+/// Proposes a test that separates two effects of the library, named by their identifiers.
+///
+/// # Errors
+/// As [`improve`], or if the library has no such effect for this plan.
+pub fn separating(
+    problem: &Problem,
+    pair: [&str; 2],
+    variations: &TestVariations,
+    by_minute: bool,
+) -> Result<Improvement, IdentifyError> {
+    let mut both = problem.clone();
+    for id in pair {
+        named::add(&mut both, id)?;
+    }
+    let variations = variations.clone().for_effects(&both.parameters.effects);
+    let goal = Goal::Separation { effect: pair[0].to_string(), coefficients: Vec::new() };
+    improve(&both, &variations, &ImproveOptions { goal, tests: 1, by_minute })
+}
 
 /// Proposes tests for a problem whose folds are its tests.
 ///

@@ -32,6 +32,7 @@ pub mod improve;
 pub mod indices;
 pub(crate) mod information;
 pub mod linear;
+pub mod next_test;
 pub mod poses;
 pub mod proposal;
 pub mod range;

@@ -50,6 +50,15 @@ pub struct PlanAnalysis {
     pub warnings: Vec<String>,
 }
 
+impl PlanAnalysis {
+    /// The error with the largest predicted standard uncertainty; 1 µm counts as 1″.
+    pub fn worst(&self) -> Option<&ErrorAnalysis> {
+        let identifiable = self.errors.iter().filter_map(|error| Some((error, error.u?)));
+        let worst = identifiable.max_by(|(a, u), (b, other)| u.total_cmp(other).then_with(|| b.id.cmp(&a.id)));
+        worst.map(|(error, _)| error)
+    }
+}
+
 /// A test in short.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct TestSummary {
@@ -101,6 +110,13 @@ pub struct Sensitivity {
     pub rms: f64,
     /// Unit: `um/um`, `um/arcsec`, …
     pub unit: String,
+}
+
+impl ErrorAnalysis {
+    /// Share of the noise in the variance.
+    pub fn noise_share(&self) -> f64 {
+        self.budget.iter().filter(|part| part.is_noise()).map(|part| part.share).sum()
+    }
 }
 
 /// A contribution to a standard uncertainty.

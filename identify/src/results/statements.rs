@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::outcome::{Goodness, TraceVerdict};
 use super::parameter::DeterminedBy;
 use crate::tolerance::rule::Decision;
+use crate::validate::results::ValidationVerdict;
 
 /// A component of an axis line or a direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
@@ -76,6 +77,14 @@ pub enum NextStep {
     Improve,
     /// State the noise, or repeat a run.
     StateNoise,
+    /// Identify the machine anew: a model does not hold.
+    Refit,
+    /// Measure and identify where the readings leave the range of a model.
+    WidenRange,
+    /// Measure the session once more, to tell a change of the machine from one of the set-up.
+    Repeat,
+    /// Measure at the date of the next check.
+    NextCheck,
     /// Nothing: no candidate test is known for the instrument.
     Nothing,
 }
@@ -99,6 +108,40 @@ pub struct GoodStatement {
     pub undecided: Vec<String>,
 }
 
+/// Whether a plan is good.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct PlanStatement {
+    /// Number of errors that the plan is to identify.
+    pub errors: usize,
+    /// The errors that it does not identify.
+    pub not_identifiable: Vec<String>,
+    /// The errors that set-up priors alone determine.
+    pub determined_by_prior: Vec<String>,
+    /// The error with the largest predicted standard uncertainty; 1 µm counts as 1″.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub worst: Option<String>,
+}
+
+/// Whether a model holds.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ValidationStatement {
+    /// The verdict.
+    pub verdict: ValidationVerdict,
+    /// Number of readings without outliers.
+    pub readings: usize,
+    /// Number of them inside the range of the model's data.
+    pub readings_in_range: usize,
+}
+
+/// Whether inputs agree.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct ComparisonStatement {
+    /// Number of significant differences.
+    pub significant: usize,
+    /// Number of differences.
+    pub compared: usize,
+}
+
 /// What to measure next.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct MeasureStatement {
@@ -115,13 +158,21 @@ pub struct MeasureStatement {
     pub effect: Option<String>,
 }
 
-/// The three statements.
+impl From<NextStep> for MeasureStatement {
+    fn from(step: NextStep) -> MeasureStatement {
+        MeasureStatement { step, test: None, description: None, effect: None }
+    }
+}
+
+/// The three statements of a result: of a fit and a trace, unless other types are named.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Statements {
+#[schemars(rename = "{G}s")]
+pub struct Statements<G = GoodStatement, C = AxisCorrection> {
     /// Is the result good.
-    pub good: GoodStatement,
-    /// What to correct: the line of each axis whose location errors are identified.
-    pub correct: Vec<AxisCorrection>,
+    pub good: G,
+    /// What to correct: of a fit and a trace the line of each axis whose location errors are identified, else what has
+    /// changed; of a plan what of the set-up limits its worst error.
+    pub correct: Vec<C>,
     /// What to measure next.
     pub measure: MeasureStatement,
 }

@@ -4,7 +4,7 @@ A session is a machine, its tests and their readings:
 
 - :class:`Machine`: a kinematic chain; :class:`Session`: tests and readings, from files or from arrays;
 - :class:`Fit`, :class:`Trace`, :class:`Plan`: results of a session; :class:`Model`: an identified machine, with
-  :class:`Validation` and :class:`Compensated`; :class:`Equation`: a closed form;
+  :class:`Validation` and :class:`Compensated`; :class:`Equation`: a closed form; :func:`compare`: differences;
 - :class:`Table`, :class:`Figure`: what results show;
 - :class:`Error` and its subclasses.
 
@@ -13,6 +13,7 @@ the command ``abbe``: ``to_dict()`` returns its JSON.
 """
 
 from ._abbe import __version__, set_threads, threads
+from ._compare import Comparison, compare
 from ._equation import Equation
 from ._errors import EquationError, Error, IdentificationError, SessionError
 from ._fit import ByTest, Fit
@@ -26,6 +27,7 @@ from ._trace import Trace
 
 __all__ = [
     "ByTest",
+    "Comparison",
     "Compensated",
     "Equation",
     "EquationError",
@@ -45,6 +47,7 @@ __all__ = [
     "Trace",
     "Validation",
     "__version__",
+    "compare",
     "set_threads",
     "threads",
 ]

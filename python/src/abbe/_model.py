@@ -120,6 +120,29 @@ class Model:
         """
         return Validation(self, session)
 
+    def export(
+        self,
+        format: str,
+        path: str | os.PathLike[str] | None = None,
+        *,
+        tool_mm: tuple[float, float, float] | None = None,
+    ) -> str:
+        """Return the calibrated machine for other programs and for controls, as ``abbe export``.
+
+        Parameters
+        ----------
+        format : str
+            ``"urdf"``, ``"dh"``, ``"linuxcnc"``, ``"fanuc"`` or ``"beckhoff"``.
+        path : path-like, optional
+            A file to write it to. It is replaced if it exists.
+        tool_mm : tuple of three floats, optional
+            The tool point in the tool frame, for ``"urdf"``, ``"dh"`` and controls; that of the instrument by default.
+        """
+        text = self._handle.export(format, tool_mm).decode()
+        if path is not None:
+            write_whole(path, text)
+        return text
+
     def compensate(
         self,
         positions: Mapping[str, ArrayLike] | ArrayLike,
@@ -238,6 +261,9 @@ class Validation(Shown, ValidationResult):
 
     def _figures(self) -> list[_abbe.Figure]:
         return self._handle.figures()
+
+    def _shown(self) -> tuple[str, str]:
+        return self._handle.shown()
 
     def _page(self) -> str:
         return self._handle.page(1)

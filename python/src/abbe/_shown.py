@@ -201,6 +201,9 @@ class Shown:
     def _page(self) -> str:
         raise NotImplementedError
 
+    def _shown(self) -> tuple[str, str]:
+        raise NotImplementedError
+
     @property
     def tables(self) -> tuple[Table, ...]:
         """The tables of the result."""
@@ -246,10 +249,10 @@ class Shown:
         write_whole(path, self._page())
 
     def __str__(self) -> str:
-        return "\n\n".join(str(table) for table in self.tables)
+        return self._shown()[0]
 
     def _repr_html_(self) -> str:
-        return "".join(table._repr_html_() for table in self.tables)
+        return self._shown()[1]
 
 
 def write_whole(path: str | os.PathLike[str], text: str) -> None:

@@ -85,6 +85,9 @@ class Trace(Shown, TraceResult):
     def _figures(self) -> list[_abbe.Figure]:
         return self._handle.figures()
 
+    def _shown(self) -> tuple[str, str]:
+        return self._handle.shown()
+
     def _page(self) -> str:
         return self._handle.page()
 

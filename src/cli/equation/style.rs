@@ -1,28 +1,14 @@
 //! How an equation is set or called: the options of `abbe equation` that do not change its content.
 
 use abbe::codegen::print::{AngleUnit, Audience, LANGUAGES, Layout, Numbering, OutputLanguage, Style};
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use crate::cli::failure::Failure;
+use crate::cli::values::{self, Words};
 
-#[derive(Clone, Copy, ValueEnum)]
-enum NumberArgument {
-    None,
-    Last,
-    All,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum LayoutArgument {
-    Named,
-    Flat,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum AnglesArgument {
-    Rad,
-    Deg,
-}
+const NUMBERINGS: Words<Numbering> = &[("none", Numbering::None), ("last", Numbering::Last), ("all", Numbering::All)];
+const LAYOUTS: Words<Layout> = &[("named", Layout::Named), ("flat", Layout::Flat)];
+const ANGLES: Words<AngleUnit> = &[("rad", AngleUnit::Radian), ("deg", AngleUnit::Degree)];
 
 /// How an equation is set.
 #[derive(Args)]
@@ -30,8 +16,8 @@ pub struct StyleArguments {
     /// LaTeX, Typst: equations with a number and a label, such as `eq:ldbb-C150` [default: none].
     ///
     /// Example: --number last
-    #[arg(long, value_enum)]
-    number: Option<NumberArgument>,
+    #[arg(long, value_parser = values::words(NUMBERINGS))]
+    number: Option<Numbering>,
     /// LaTeX, Typst: width of a line, as 84mm; longer equations are broken [default: a column of an article].
     ///
     /// Example: --width 84mm
@@ -47,13 +33,13 @@ pub struct StyleArguments {
     /// named].
     ///
     /// Example: --layout flat
-    #[arg(long, value_enum)]
-    layout: Option<LayoutArgument>,
+    #[arg(long, value_parser = values::words(LAYOUTS))]
+    layout: Option<Layout>,
     /// Code with named arguments: unit of the positions of rotary axes [default: rad].
     ///
     /// Example: --angles deg
-    #[arg(long, value_enum)]
-    angles: Option<AnglesArgument>,
+    #[arg(long, value_parser = values::words(ANGLES))]
+    angles: Option<AngleUnit>,
 }
 
 /// Width of a line for two columns, mm.
@@ -96,26 +82,16 @@ impl StyleArguments {
                 return Err(Failure::Other(message));
             }
         }
-        if matches!((self.layout, self.angles), (Some(LayoutArgument::Flat), Some(_))) {
+        if matches!((self.layout, self.angles), (Some(Layout::Flat), Some(_))) {
             let message = "`--angles` does not apply to `--layout flat`, whose arguments are sines and cosines";
             return Err(Failure::Other(message.to_string()));
         }
         Ok(Style {
-            numbering: match self.number {
-                None | Some(NumberArgument::None) => Numbering::None,
-                Some(NumberArgument::Last) => Numbering::Last,
-                Some(NumberArgument::All) => Numbering::All,
-            },
+            numbering: self.number.unwrap_or(Numbering::None),
             width_mm: self.two_column.then_some(TWO_COLUMN_MM).or(self.width),
             nomenclature: self.nomenclature,
-            layout: match self.layout {
-                None | Some(LayoutArgument::Named) => Layout::Named,
-                Some(LayoutArgument::Flat) => Layout::Flat,
-            },
-            angles: match self.angles {
-                None | Some(AnglesArgument::Rad) => AngleUnit::Radian,
-                Some(AnglesArgument::Deg) => AngleUnit::Degree,
-            },
+            layout: self.layout.unwrap_or(Layout::Named),
+            angles: self.angles.unwrap_or(AngleUnit::Radian),
             name_of_test: false,
         })
     }

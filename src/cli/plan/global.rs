@@ -6,16 +6,13 @@ use abbe::identify::quantity::Given;
 use clap::Args;
 
 use crate::cli::failure::Failure;
-use crate::cli::output;
-use crate::report::fit::noise;
-use crate::report::plan::global as present;
 
 /// Global sensitivity.
 #[derive(Args)]
 pub struct GlobalArguments {
     /// Sobol' indices of each identified error by set-up errors, noise and undeclared effects, with the full fit,
     /// beside the linear prediction.
-    #[arg(long, conflicts_with_all = ["improve", "separate", "range", "patterns", "report", "plots", "clearance_mm"])]
+    #[arg(long, conflicts_with_all = ["improve", "separate", "range", "patterns", "clearance_mm"])]
     global: bool,
     /// Size of an input of --global: half the range of an undeclared effect, or the standard deviation of a set-up
     /// parameter instead of its prior; may be repeated.
@@ -55,18 +52,4 @@ impl GlobalArguments {
         }
         Ok(global(problem, &GlobalOptions { samples: self.samples, seed, vary })?)
     }
-}
-
-/// Prints the indices.
-pub fn print(found: &GlobalAnalysis) {
-    say!(
-        "{} samples, {} fits, {} inputs, {}",
-        found.samples,
-        found.evaluations,
-        found.inputs.len(),
-        noise(found.noise_um, found.noise_source)
-    );
-    output::print(&present::errors(found));
-    output::print(&present::indices(found));
-    output::print(&present::convergence(found));
 }

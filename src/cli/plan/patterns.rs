@@ -2,14 +2,13 @@
 
 use std::path::PathBuf;
 
-use abbe::identify::patterns::{Pattern, patterns, usual_sizes};
+use abbe::identify::patterns::{Patterns, patterns, usual_sizes};
 use abbe::identify::quantity::Given;
-use abbe::model::files::SourceMap;
 use abbe::model::session::Session;
 use clap::Args;
 
 use crate::cli::failure::Failure;
-use crate::cli::{CommonArguments, output};
+use crate::cli::output;
 use crate::report::patterns as present;
 
 /// Trace patterns: the change of the readings by each error alone.
@@ -21,7 +20,7 @@ pub struct PatternArguments {
     #[arg(
         long,
         value_name = "FILE.csv",
-        conflicts_with_all = ["improve", "separate", "range", "report", "plots", "clearance_mm", "noise_um", "setup_um"]
+        conflicts_with_all = ["improve", "separate", "range", "clearance_mm", "noise_um", "setup_um"]
     )]
     patterns: Option<PathBuf>,
     /// Size of an error for --patterns; may be repeated
@@ -43,29 +42,14 @@ impl PatternArguments {
         self.patterns.is_some()
     }
 
-    /// Writes the patterns and prints their sizes.
-    pub fn run(
-        &self,
-        (session, sources): (&Session, &SourceMap),
-        common: &CommonArguments,
-        tables: bool,
-    ) -> Result<(), Failure> {
+    /// Writes the patterns.
+    pub fn run(&self, session: &Session) -> Result<Patterns, Failure> {
         let given: Vec<Given> = self.errors.iter().map(|text| Given::parse(text)).collect::<Result<_, _>>()?;
         let given = if given.is_empty() { usual_sizes(session) } else { given };
         let found = patterns(session, &given)?;
         if let Some(path) = &self.patterns {
             output::write_whole(path, &output::csv(&present::readings(&found, session))?)?;
         }
-        if tables {
-            output::print(&present::sizes(&found));
-        }
-        common.write_json(sources, &PatternSizes { patterns: found.patterns })
+        Ok(found)
     }
-}
-
-/// Change of the readings of each test by each error alone.
-#[derive(serde::Serialize, schemars::JsonSchema)]
-pub struct PatternSizes {
-    /// Test by test, error by error.
-    patterns: Vec<Pattern>,
 }

@@ -1,32 +1,24 @@
 //! `abbe plan --poses`: poses for an instrument that measures at rest.
 
+mod options;
+
 use std::path::PathBuf;
 
-use abbe::identify::plan::poses::candidates::{LineOfSight, PoseLimits};
-use abbe::identify::plan::poses::{PoseCriterion, PoseOptions, PoseSelection, measured_by, select};
-use abbe::model::instrument::InstrumentKind;
-use abbe::model::session::{Session, Test};
-use clap::{Args, ValueEnum};
+use abbe::identify::plan::poses::{PoseCriterion, without_place};
+use abbe::model::files::{self, ReadOptions};
+use clap::Args;
 
+use super::PlanArguments;
+use super::overrides::positive;
 use crate::cli::failure::Failure;
-use crate::cli::{output, values};
+use crate::cli::output::Outputs;
+use crate::cli::results::Read;
+use crate::cli::values::{self, Words};
 use crate::report::poses as present;
 
-/// Maximum number of poses.
-const MAX_POSES: usize = 1000;
-/// Maximum number of candidate poses.
-const MAX_CANDIDATES: usize = 20_000;
-
-/// What the poses are to make small.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Criterion {
-    /// Volume of the confidence ellipsoid.
-    D,
-    /// Mean variance.
-    A,
-    /// Largest standard uncertainty.
-    Worst,
-}
+/// Criteria of a selection.
+const CRITERIA: Words<PoseCriterion> =
+    &[("d", PoseCriterion::D), ("a", PoseCriterion::A), ("worst", PoseCriterion::WorstUncertainty)];
 
 /// The selection of poses.
 #[derive(Args)]
@@ -36,11 +28,12 @@ pub struct PoseArguments {
     /// Example: --poses 30
     #[arg(long, value_name = "N", conflicts_with_all = ["improve", "separate", "range", "patterns", "global"])]
     poses: Option<usize>,
-    /// What the poses are to make small.
+    /// What the poses are to make small: `d` the volume of the confidence ellipsoid, `a` the mean variance, `worst` the
+    /// largest standard uncertainty.
     ///
     /// Example: --poses 30 --criterion d
-    #[arg(long, value_enum, default_value = "worst", requires = "poses")]
-    criterion: Criterion,
+    #[arg(long, value_parser = values::words(CRITERIA), default_value = "worst", requires = "poses")]
+    criterion: PoseCriterion,
     /// The test whose instrument measures the poses [default: the last; of sockets all].
     ///
     /// Example: --poses 30 --pose-test A
@@ -79,99 +72,24 @@ pub struct PoseArguments {
     poses_csv: Option<PathBuf>,
 }
 
-impl PoseArguments {
-    /// Whether poses are requested.
-    pub fn asked(&self) -> bool {
-        self.poses.is_some()
+/// Runs `abbe plan --poses`, without the data of the session unless only they tell where a socket is.
+pub fn run(arguments: &PlanArguments, outputs: &Outputs) -> Result<(), Failure> {
+    let reading = ReadOptions { read_data: false, ..arguments.session.options() };
+    let source = files::text(&arguments.session.session, "the session file")?;
+    let (mut session, mut sources) = files::session_of(&source, &reading)?;
+    if let Some(test) = without_place(&session, &arguments.poses.tests(&session)?).first() {
+        let with_data = files::session_of(&source, &arguments.session.options());
+        (session, sources) = with_data.map_err(|error| {
+            Failure::Other(format!(
+                "test \"{}\" states no `socket_mm`, and its data do not tell where its socket is: {error}",
+                test.name
+            ))
+        })?;
     }
-
-    /// The file of the poses.
-    pub fn file(&self) -> Option<&PathBuf> {
-        self.poses_csv.as_ref()
-    }
-
-    /// Selects and shows the poses.
-    pub fn run(
-        &self,
-        session: &Session,
-        noise_mm: Option<f64>,
-        seed: u64,
-        tables: bool,
-    ) -> Result<PoseSelection, Failure> {
-        let within = |flag: &str, value: usize, most: usize| match value {
-            value if (1..=most).contains(&value) => Ok(value),
-            value => Err(Failure::Other(format!("`{flag} {value}`: a number from 1 to {most} is expected"))),
-        };
-        let options = PoseOptions {
-            poses: within("--poses", self.poses.unwrap_or(1), MAX_POSES)?,
-            criterion: match self.criterion {
-                Criterion::D => PoseCriterion::D,
-                Criterion::A => PoseCriterion::A,
-                Criterion::Worst => PoseCriterion::WorstUncertainty,
-            },
-            candidates: within("--candidates", self.candidates, MAX_CANDIDATES)?,
-            seed,
-            limits: self.limits()?,
-            noise_mm,
-        };
-        let tests = self.tests(session)?;
-        let found = select(session, &tests, &options)?;
-        if tables {
-            say!("{}", present::sentence(&found));
-            output::print(&present::uncertainties(&found));
-            output::print(&present::poses(&found));
-        }
-        if let Some(path) = &self.poses_csv {
-            output::write_whole(path, &output::csv(&present::exact_poses(&found))?)?;
-        }
-        Ok(found)
-    }
-
-    /// The tests whose instruments measure the poses.
-    pub fn tests<'s>(&self, session: &'s Session) -> Result<Vec<&'s Test>, Failure> {
-        let tests = measured_by(session, self.pose_test.as_deref());
-        if tests.is_empty() {
-            let names: Vec<&str> = session.tests.iter().map(|test| test.name.as_str()).collect();
-            return Err(Failure::Other(format!(
-                "`--pose-test {}`: the session has no such test; its tests are {}",
-                self.pose_test.as_deref().unwrap_or_default(),
-                names.join(", ")
-            )));
-        }
-        let probed = |test: &&Test| test.station.kind() == InstrumentKind::Probe;
-        if self.height_mm.is_some() && !tests.iter().all(probed) {
-            return Err(Failure::Other(format!(
-                "`--height-mm` is of the cylinder that a probe touches; this session's instrument is a {}",
-                session.instrument.word()
-            )));
-        }
-        Ok(tests)
-    }
-
-    fn limits(&self) -> Result<PoseLimits, Failure> {
-        let fault = |flag: &str, words: &str| Err(Failure::Other(format!("`{flag}`: {words}")));
-        let box_mm = match self.box_mm.as_deref() {
-            None => None,
-            Some(sides @ &[x, xx, y, yy, z, zz]) if x < xx && y < yy && z < zz => {
-                values::COORDINATE_MM.all("--box-mm", sides)?;
-                Some([[x, xx], [y, yy], [z, zz]])
-            }
-            Some(_) => return fault("--box-mm", "six numbers are expected: least and greatest X, Y, Z"),
-        };
-        let sight = match self.tracker_mm.as_deref() {
-            None => None,
-            Some(point) => Some(values::point_mm("--tracker-mm", point, [0.0; 3])?),
-        };
-        values::DISTANCE_MM.check("--sight-mm", self.sight_mm)?;
-        let sight = sight.map(|from_mm| LineOfSight { from_mm, clearance_mm: self.sight_mm });
-        let height_mm = match self.height_mm.as_deref() {
-            None => [0.0; 2],
-            Some(ends @ &[low, high]) if low <= high => {
-                values::COORDINATE_MM.all("--height-mm", ends)?;
-                [low, high]
-            }
-            Some(_) => return fault("--height-mm", "two numbers are expected: the least and the greatest height"),
-        };
-        Ok(PoseLimits { box_mm, sight, height_mm })
-    }
+    outputs.refuse_overwrite_of_sources(&sources)?;
+    let noise_mm = arguments.noise_um.map(|um| positive("--noise-um", um)).transpose()?;
+    let common = &arguments.common;
+    let found = arguments.poses.select(&session, noise_mm, common.seed)?;
+    let read = Read::session(&session, &sources, common.seed);
+    common.output.put(outputs, &present::report(&session, &found), &found, &read)
 }

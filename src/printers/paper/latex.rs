@@ -1,8 +1,10 @@
 //! Sections as LaTeX: booktabs tables, PDF figures, BibTeX citations.
 
+use super::Typesetter;
 use super::layout::{Class, Fitted, Layout};
-use super::{Typesetter, minus, pieces};
+use crate::report::block::{Formula, pieces};
 use crate::report::figure::Figure;
+use crate::report::number::with_minus_signs;
 use crate::report::table::{Align, Table};
 
 /// Prints LaTeX for pdfLaTeX with `graphicx`, `booktabs` and `array`.
@@ -83,8 +85,8 @@ impl Typesetter for Latex {
         pieces(text).into_iter().map(piece).collect()
     }
 
-    fn formula(&self, latex: &str, _: &str) -> String {
-        format!("\\begin{{equation*}}\n{latex}\n\\end{{equation*}}\n\n")
+    fn formula(&self, formula: &Formula) -> String {
+        format!("\\begin{{equation*}}\n{}\n\\end{{equation*}}\n\n", formula.latex)
     }
 
     fn heading(&self, text: &str) -> String {
@@ -102,7 +104,7 @@ impl Typesetter for Latex {
         let heading = part.columns.iter().map(|(column, _)| escaped(&table.columns[*column].heading)).collect();
         let rows = table.rows[part.rows.clone()].iter().map(|cells| {
             let cell = |(column, _): &(usize, Option<f64>)| {
-                cells.get(*column).map_or(String::new(), |cell| escaped(&minus(cell)))
+                cells.get(*column).map_or(String::new(), |cell| escaped(&with_minus_signs(&cell.to_string())))
             };
             row(part.columns.iter().map(cell).collect())
         });

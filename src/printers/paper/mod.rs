@@ -1,17 +1,17 @@
 //! The printers of `abbe paper`: sections of text, tables and figures as LaTeX and Typst, with their data.
 //!
 //! - [`layout`]: which widths a table gets in a column or on a page;
-//! - [`latex`], [`typst`]: printers of a section and of the main file; [`references`]: the bibliography.
+//! - [`latex`], [`typst`]: printers of a part and of the main file.
 
 pub mod latex;
 pub mod layout;
-pub mod references;
 pub mod typst;
 
 use super::csv;
+use crate::report::block::{Block, Body, Formula, Level, Text};
 use crate::report::figure::{self, Figure, file_name, svg};
-use crate::report::paper::{Item, Section};
-use crate::report::table::{Cell, Table};
+use crate::report::paper::Part;
+use crate::report::table::Table;
 use layout::{Fitted, Layout, fitted};
 
 /// A printer of sections.
@@ -20,8 +20,8 @@ pub trait Typesetter {
     fn extension(&self) -> &'static str;
     /// A text with citations.
     fn text(&self, text: &str) -> String;
-    /// A displayed formula of the two.
-    fn formula(&self, latex: &str, typst: &str) -> String;
+    /// A displayed formula.
+    fn formula(&self, formula: &Formula) -> String;
     /// A heading.
     fn heading(&self, text: &str) -> String;
     /// A part of a table with its caption.
@@ -38,80 +38,70 @@ pub trait Typesetter {
 ///
 /// # Errors
 /// If a table or a figure cannot be printed, which is a fault of the program.
-pub fn files(
-    title: &str,
-    summary: &str,
-    sections: &[Section],
-    layout: Layout,
-) -> Result<Vec<(String, Vec<u8>)>, String> {
+pub fn files(title: &str, summary: &str, parts: &[Part], layout: Layout) -> Result<Vec<(String, Vec<u8>)>, String> {
     let mut files: Vec<(String, Vec<u8>)> = Vec::new();
     let printers: [&dyn Typesetter; 2] = [&latex::Latex, &typst::Typst];
-    for item in sections.iter().flat_map(|section| &section.items) {
-        match item {
-            Item::Table(name, table) => files.push((format!("tables/{}.csv", file_name(name)), csv::text(table)?)),
-            Item::Figure(figure) => {
+    let printed = |block: &&Block| block.level != Level::Brief;
+    for block in parts.iter().flat_map(|part| part.report.blocks.iter().filter(printed)) {
+        match &block.body {
+            Body::Table(table) => files.push((format!("tables/{}.csv", file_name(&table.name)), csv::text(table)?)),
+            Body::Figure(figure) => {
                 files.push((format!("figures/{}.pdf", figure.name), figure::pdf::file(figure)?));
                 files.push((format!("figures/{}.svg", figure.name), svg::untitled(figure).into_bytes()));
                 files.push((format!("figures/{}.csv", figure.name), csv::text(&figure.table())?));
             }
-            Item::Text(_) | Item::Formula(..) => {}
+            _ => {}
         }
     }
     for printer in printers {
         let extension = printer.extension();
-        for section in sections {
-            let mut text = printer.heading(section.heading);
-            for item in &section.items {
-                match item {
-                    Item::Text(words) => text.push_str(&(printer.text(words) + "\n\n")),
-                    Item::Formula(latex, typst) => text.push_str(&printer.formula(latex, typst)),
-                    Item::Figure(figure) => text.push_str(&printer.figure(figure, layout)),
-                    Item::Table(name, table) => {
-                        let file = format!("tables/{}", file_name(name));
-                        let parts = fitted(table, layout);
-                        let printed: String =
-                            parts.iter().map(|part| printer.table(&file_name(name), table, part)).collect();
-                        files.push((format!("{file}.{extension}"), printed.into_bytes()));
-                        text.push_str(&printer.include(&file));
+        for part in parts {
+            let mut text = printer.heading(&part.report.title);
+            for block in part.report.blocks.iter().filter(printed) {
+                match &block.body {
+                    Body::Text(words) => text.extend(sentences(words).iter().map(|one| printer.text(one) + "\n\n")),
+                    Body::KeyFigures(_) => {}
+                    Body::Formula(formula) => text.push_str(&printer.formula(formula)),
+                    Body::Figure(figure) => text.push_str(&printer.figure(figure, layout)),
+                    Body::Table(table) => {
+                        let name = file_name(&table.name);
+                        let printed =
+                            fitted(table, layout).iter().map(|part| printer.table(&name, table, part)).collect();
+                        files.push((format!("tables/{name}.{extension}"), String::into_bytes(printed)));
+                        text.push_str(&printer.include(&format!("tables/{name}")));
                     }
                 }
             }
-            files.push((format!("sections/{}.{extension}", section.name), text.into_bytes()));
+            files.push((format!("sections/{}.{extension}", part.name), text.into_bytes()));
         }
-        let names: Vec<String> = sections.iter().map(|section| format!("sections/{}", section.name)).collect();
+        let names: Vec<String> = parts.iter().map(|part| format!("sections/{}", part.name)).collect();
         files.push((format!("main.{extension}"), printer.main(title, summary, &names, layout).into_bytes()));
     }
-    files.push(("refs.bib".into(), references::bibliography().into_bytes()));
+    files.push(("refs.bib".into(), include_bytes!("refs.bib").to_vec()));
     Ok(files)
 }
 
-/// A cell, its negative numbers with minus signs.
-fn minus(cell: &Cell) -> String {
-    let words = cell.to_string();
-    let signed = |word: &str| match word.strip_prefix('-') {
-        Some(digits) if digits.starts_with(|c: char| c.is_ascii_digit()) => format!("−{digits}"),
-        _ => word.to_string(),
-    };
-    words.split(' ').map(signed).collect::<Vec<_>>().join(" ")
-}
-
-/// A text as pieces: words, and the keys of the citations after them.
-pub(crate) fn pieces(text: &str) -> Vec<(&str, Vec<&str>)> {
-    let mut pieces = Vec::new();
-    let mut rest = text;
-    while let Some((words, (keys, after))) =
-        rest.split_once("[@").and_then(|(words, after)| Some((words, after.split_once(']')?)))
-    {
-        pieces.push((words, keys.split(';').map(|key| key.trim().trim_start_matches('@')).collect()));
-        rest = after;
+/// A text as paragraphs.
+fn sentences(text: &Text) -> Vec<String> {
+    match text {
+        Text::Opening { sentences, .. } => sentences.clone(),
+        Text::Section(words)
+        | Text::Heading(words)
+        | Text::Fold(words)
+        | Text::Paragraph(words)
+        | Text::Note(words) => {
+            vec![words.clone()]
+        }
+        Text::List(lines) => lines.clone(),
+        Text::Steps(steps) => steps.iter().map(|(step, purpose)| format!("{step}: {purpose}")).collect(),
+        Text::Controls => Vec::new(),
     }
-    pieces.push((rest, Vec::new()));
-    pieces
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::block::{Report, pieces};
     use crate::report::table::cells;
 
     fn sample() -> Table {
@@ -120,15 +110,8 @@ mod tests {
     }
 
     #[test]
-    fn citations_are_separated_from_words() {
-        let found = pieces("Rank [@a;@b] and x [@c].");
-        assert_eq!(found, [("Rank ", vec!["a", "b"]), (" and x ", vec!["c"]), (".", vec![])]);
-        assert_eq!(pieces("no [citation]"), [("no [citation]", vec![])]);
-    }
-
-    #[test]
     fn every_reference_that_a_section_cites_is_in_the_bibliography() {
-        let bibliography = references::bibliography();
+        let bibliography = include_str!("refs.bib");
         for source in [
             include_str!("../../report/paper/contents.rs"),
             include_str!("../../report/paper/methods.rs"),
@@ -145,9 +128,10 @@ mod tests {
     #[test]
     fn tables_of_both_languages_escape_what_the_languages_reserve() {
         let layout = Layout { class: layout::Class::Elsarticle, two_column: true };
-        let items = vec![Item::Text("50 % of A_B [@jcgm100]".into()), Item::Table("t 1".into(), sample())];
-        let section = Section { name: "bias", heading: "Bias", items };
-        let files = files("50 % & more", "none", &[section], layout).unwrap();
+        let mut report = Report::new("Bias");
+        report.key("50 % of A_B [@jcgm100]");
+        report.key(sample().named("t 1"));
+        let files = files("50 % & more", "none", &[Part { name: "bias", report }], layout).unwrap();
         let text = |name: &str| {
             let (_, bytes) = files.iter().find(|(file, _)| file == name).unwrap();
             String::from_utf8(bytes.clone()).unwrap()

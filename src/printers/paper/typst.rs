@@ -1,9 +1,11 @@
 //! Sections as Typst: the same tables, figures and citations as in LaTeX.
 
+use super::Typesetter;
 use super::latex::{caption, sentences};
 use super::layout::{Fitted, Layout};
-use super::{Typesetter, minus, pieces};
+use crate::report::block::{Formula, pieces};
 use crate::report::figure::Figure;
+use crate::report::number::with_minus_signs;
 use crate::report::table::{Align, Table};
 
 /// Prints Typst from version 0.13 on.
@@ -38,8 +40,8 @@ impl Typesetter for Typst {
         pieces(text).into_iter().map(piece).collect()
     }
 
-    fn formula(&self, _: &str, typst: &str) -> String {
-        format!("$ {typst} $\n\n")
+    fn formula(&self, formula: &Formula) -> String {
+        format!("$ {} $\n\n", formula.typst)
     }
 
     fn heading(&self, text: &str) -> String {
@@ -58,7 +60,7 @@ impl Typesetter for Typst {
             part.columns.iter().map(|(column, _)| string(&table.columns[*column].heading)).collect();
         let rows = table.rows[part.rows.clone()].iter().map(|cells| {
             let cell = |(column, _): &(usize, Option<f64>)| {
-                cells.get(*column).map_or("\"\"".into(), |cell| string(&minus(cell)))
+                cells.get(*column).map_or("\"\"".into(), |cell| string(&with_minus_signs(&cell.to_string())))
             };
             row(part.columns.iter().map(cell).collect())
         });

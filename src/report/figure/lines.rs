@@ -275,6 +275,16 @@ impl Kind for Lines {
     }
 
     fn table(&self) -> Table {
-        table(&self.series, &self.x.quantity, &self.y.quantity)
+        let mut table = table(&self.series, &self.x.quantity, &self.y.quantity);
+        let heading = self.x.quantity.heading();
+        let column = table.columns.iter().position(|column| column.heading == heading);
+        if let (Some(words), Some(column)) = (self.x.scale.words, column) {
+            for row in &mut table.rows {
+                if let Some(Cell::Number(value, _)) = row.get(column) {
+                    row[column] = words(*value).into();
+                }
+            }
+        }
+        table
     }
 }

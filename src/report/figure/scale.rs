@@ -32,6 +32,8 @@ pub struct Scale {
     pub values: [f64; 2],
     /// Step between ticks.
     pub step: f64,
+    /// The words of a value that is no number for people, such as a date in days.
+    pub words: Option<fn(f64) -> String>,
 }
 
 impl Scale {
@@ -44,13 +46,13 @@ impl Scale {
         } else {
             (0.0, 1.0)
         };
-        Scale { values: [low, high], step: round_up((high - low) / ticks.max(1) as f64) }
+        Scale { values: [low, high], step: round_up((high - low) / ticks.max(1) as f64), words: None }
     }
 
     /// A scale over this range, extended to whole steps.
     pub fn rounded(range: [f64; 2], ticks: usize) -> Scale {
-        let Scale { values: [low, high], step } = Scale::over(range, ticks);
-        Scale { values: [(low / step + 1e-9).floor() * step, (high / step - 1e-9).ceil() * step], step }
+        let Scale { values: [low, high], step, words } = Scale::over(range, ticks);
+        Scale { values: [(low / step + 1e-9).floor() * step, (high / step - 1e-9).ceil() * step], step, words }
     }
 
     /// A scale over this range and zero, extended to whole steps.
@@ -104,7 +106,8 @@ impl Placed {
 
     /// The ticks: coordinate and label.
     pub fn ticks(&self) -> Vec<(f64, String)> {
-        self.scale.ticks().into_iter().map(|value| (self.at(value), text(value, self.scale.step))).collect()
+        let label = |value: f64| self.scale.words.map_or_else(|| text(value, self.scale.step), |words| words(value));
+        self.scale.ticks().into_iter().map(|value| (self.at(value), label(value))).collect()
     }
 }
 

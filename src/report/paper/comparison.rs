@@ -1,21 +1,21 @@
 //! Several plans side by side: predicted uncertainties, ranks and observability indices.
 
+use super::Part;
 use super::contents::Study;
-use super::{Item, Section};
+use crate::report::block::Report;
 use crate::report::number::{three_digits, unit};
 use crate::report::table::{Align, Cell, Column, Table, cells};
 
-/// The section, for two plans or more.
-pub fn section(studies: &[Study]) -> Section {
+/// The part, for two plans or more.
+pub fn part(studies: &[Study]) -> Part {
     let text = "The predicted standard uncertainties of the plans, the ranks of their parameters and their observability \
                 indices are compared. A dash marks an error that a plan does not identify. The indices refer to the errors \
                 that each plan identifies, so that they compare only plans of the same errors.";
-    let items = vec![
-        Item::Text(text.into()),
-        Item::Table("comparison-uncertainty".into(), uncertainties(studies)),
-        Item::Table("comparison-indices".into(), indices(studies)),
-    ];
-    Section { name: "comparison", heading: "Comparison of plans", items }
+    let mut report = Report::new("Comparison of plans");
+    report.key(text);
+    report.key(uncertainties(studies).named("comparison-uncertainty"));
+    report.key(indices(studies).named("comparison-indices"));
+    Part { name: "comparison", report }
 }
 
 fn column(study: &Study) -> Column {

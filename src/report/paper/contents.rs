@@ -2,7 +2,6 @@
 
 use abbe::identify::IdentifyError;
 use abbe::identify::fit::SessionFit;
-use abbe::identify::parameters::Role;
 use abbe::identify::plan::bias::BiasTable;
 use abbe::identify::plan::results::PlanAnalysis;
 use abbe::identify::plan::structure::Structure;
@@ -10,21 +9,22 @@ use abbe::identify::problem::Problem;
 use abbe::identify::series::{paths, views};
 use abbe::model::words::counted;
 
-use super::{Item, Section};
+use super::Part;
+use crate::report::block::{Formula, Report};
 use crate::report::figure::bars::{Bars, Fill};
-use crate::report::figure::{Chart, Figure, Quantity, chain, set_up};
+use crate::report::figure::{Chart, Figure, Quantity, set_up};
 use crate::report::number::{three_digits, unit, with_symbols};
-use crate::report::pages::plots::SessionPlots;
-use crate::report::pages::{curves, plan, readings};
-use crate::report::plan as present;
+use crate::report::parameters;
+use crate::report::plan::{analysis as plan, indices};
+use crate::report::session::plots::SessionPlots;
+use crate::report::session::residuals::test_table;
+use crate::report::session::{self, curves};
 use crate::report::table::{Align, Column, Table, cells};
 
 /// Tests of a drawing of set-ups.
 const MAX_SET_UPS: usize = 8;
 /// Figures of sensitivities and of traces.
 const MAX_FIGURES: usize = 12;
-/// Errors of a correlation map.
-const MAX_CORRELATED: usize = 40;
 
 /// A plan or a measured session with its results.
 pub struct Study {
@@ -42,17 +42,10 @@ pub struct Study {
     pub fitted: Option<SessionFit>,
 }
 
-fn table(name: &str, table: Table) -> Item {
-    Item::Table(name.into(), table)
-}
-
 /// Chain, set-ups and tests.
-pub fn set_up(study: &Study) -> Section {
+pub fn set_up(study: &Study) -> Part {
     let problem = &study.problem;
-    let list = problem.parameters.list.iter();
-    let mut errors: Vec<String> =
-        list.filter(|parameter| parameter.role == Role::Error).map(|parameter| parameter.id.clone()).collect();
-    errors.extend(problem.parameters.effect_ids.iter().cloned());
+    let mut report = Report::new("Machine and set-up");
     let mut set_ups = paths::set_ups(problem);
     let all = set_ups.len();
     set_ups.truncate(MAX_SET_UPS);
@@ -61,91 +54,61 @@ pub fn set_up(study: &Study) -> Section {
         caption.push_str(&format!(" The first {MAX_SET_UPS} of {all} tests."));
     }
     let panels = set_up::SetUps { panels: set_ups, per_row: 2 };
-    let drawing = Figure::new("set-up", "Set-up of each test", caption, Chart::SetUps(panels));
+    report.figures([
+        session::chain(problem),
+        Figure::new("set-up", "Set-up of each test", caption, Chart::SetUps(panels)),
+    ]);
     let rows = study.analysis.tests.iter().map(|test| {
         let minutes = test.moving_min.map_or("–".to_string(), |min| format!("{min:.1}"));
         cells![&test.name, &test.setup, test.readings.to_string(), minutes]
     });
-    let tests = Table::new(["test", "set-up", ">readings", ">movement, min"], rows).titled("Tests");
-    let items = vec![
-        Item::Figure(chain::figure(&problem.session.machine, &errors)),
-        Item::Figure(drawing),
-        table("tests", tests),
-    ];
-    Section { name: "set-up", heading: "Machine and set-up", items }
+    let tests = Table::new(["test", "set-up", ">readings", ">movement, min"], rows);
+    report.key(tests.titled("Tests").named("tests"));
+    Part { name: "set-up", report }
 }
 
 /// Sensitivity curves, trace patterns, and the coefficients.
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn sensitivity(study: &Study) -> Result<Section, IdentifyError> {
+pub fn sensitivity(study: &Study) -> Result<Part, IdentifyError> {
     let nominal = vec![0.0; study.problem.parameters.list.len()];
     let figures = match &study.fitted {
         Some(fitted) => curves::sensitivities(&fitted.problem, &fitted.fit.beta)?,
         None => curves::sensitivities(&study.problem, &nominal)?,
     };
-    let mut items = vec![
-        Item::Text(
-            "The sensitivity of a reading to an error is the derivative of the kinematic chain. A trace pattern shows the \
-             deviation that one error alone causes about the nominal circle [@jiang2014]."
-                .into(),
-        ),
-        table("sensitivity", present::sensitivity(&study.analysis.errors)),
-    ];
-    items.extend(figures.into_iter().take(MAX_FIGURES).map(Item::Figure));
-    Ok(Section { name: "sensitivity", heading: "Sensitivity", items })
+    let mut report = Report::new("Sensitivity");
+    plan::sensitivity(&mut report, &study.analysis.errors);
+    report.figures(figures.into_iter().take(MAX_FIGURES));
+    Ok(Part { name: "sensitivity", report })
 }
 
 /// Predicted uncertainties and their budgets.
-pub fn uncertainty(study: &Study) -> Section {
-    let errors = &study.analysis.errors;
-    let mut items = vec![
-        Item::Text(
-            "The budget divides the variance of an error into the shares of the noise and of each set-up parameter \
-             [@jcgm100]. The conditional uncertainty is that with all other errors known. Its distance from u is the price \
-             of correlation."
-                .into(),
-        ),
-        table("uncertainty", present::uncertainties(errors)),
-        table("budget", present::budgets(errors)),
-    ];
-    items.extend(plan::uncertainties(errors).into_iter().map(Item::Figure));
-    Section { name: "uncertainty", heading: "Predicted uncertainty", items }
+pub fn uncertainty(study: &Study) -> Part {
+    let mut report = Report::new("Predicted uncertainty");
+    plan::uncertainty(&mut report, &study.analysis.errors);
+    Part { name: "uncertainty", report }
 }
 
 /// Correlation of the errors.
-pub fn correlation(study: &Study) -> Section {
-    let correlation = &study.analysis.correlation;
-    let count = correlation.ids.len().min(MAX_CORRELATED);
-    let ids = correlation.ids[..count].to_vec();
-    let rows = correlation.matrix[..count].iter().map(|row| row[..count].to_vec()).collect();
-    let mut items = vec![Item::Text(
-        "The square of a correlation coefficient is the share of the variance of one error that vanishes if the other \
-         error is known."
-            .into(),
-    )];
-    if count > 1 {
-        items.push(Item::Figure(readings::correlation_map(ids, rows)));
-    }
-    Section { name: "correlation", heading: "Correlation", items }
+pub fn correlation(study: &Study) -> Part {
+    let mut report = Report::new("Correlation");
+    plan::correlations(&mut report, &study.analysis);
+    Part { name: "correlation", report }
 }
 
 /// Ranks, singular values, null space, base parameters and observability indices.
-pub fn identifiability(study: &Study) -> Section {
+pub fn identifiability(study: &Study) -> Part {
     let (analysis, structure) = (&study.analysis, &study.structure);
-    let mut items = vec![
-        Item::Text(format!(
+    let mut report = Report::new("Identifiability");
+    report.key(format!(
             "The structural rank is that of noise-free readings at a generic geometry of the set-up [@bellman1970]. The \
              numerical rank counts the directions that the readings of this plan determine against their noise of {:.2} µm. \
              Singular values are those of the whitened Jacobian, in standard deviations per 1 mm or 0.01 rad.",
             analysis.noise_um
-        )),
-        table("ranks", ranks(structure)),
-    ];
-    if let Some(figure) = singular_values(structure) {
-        items.push(Item::Figure(figure));
-    }
+    ));
+    report.key(ranks(structure).named("ranks"));
+    report.figures(singular_values(structure));
     let null: Vec<_> = analysis.unidentifiable.iter().map(|item| ("unidentifiable", with_symbols(&item.why))).collect();
     let prior = analysis.determined_by_prior.iter().map(|item| ("determined by a prior only", with_symbols(&item.why)));
     let near = analysis.nearly_collinear.iter().map(|item| ("nearly collinear", with_symbols(&item.why)));
@@ -153,27 +116,28 @@ pub fn identifiability(study: &Study) -> Section {
     if !rows.is_empty() {
         let rows = rows.into_iter().map(|(kind, why)| cells![kind, why]);
         let caption = "Combinations that the readings do not separate, with their proportion in display units";
-        items.push(Item::Text("Near collinearity is judged by the condition index [@belsley1980].".into()));
-        items.push(table("null-space", Table::new(["kind", "combination"], rows).titled(caption)));
+        report.key("Near collinearity is judged by the condition index [@belsley1980].");
+        report.key(Table::new(["kind", "combination"], rows).titled(caption).named("null-space"));
     }
-    items.push(Item::Text(base_words(structure)));
-    items.push(table("base-parameters", base(structure)));
-    items.push(Item::Text(
+    report.key(base_words(structure));
+    report.key(base(structure).named("base-parameters"));
+    report.key(
         "The observability indices refer to the m singular values of the information on the errors, with the set-up \
          parameters estimated within their priors, and to n scalar readings: O1 [@borm1991], O2 [@driels1990], O3 \
-         [@nahvi1994], O4 [@nahvi1996] and O5 [@sun2008]."
-            .into(),
-    ));
-    items.push(Item::Formula(
-        r"O_1 = \frac{(\sigma_1 \cdots \sigma_m)^{1/m}}{\sqrt{n}}, \quad O_2 = \frac{\sigma_m}{\sigma_1}, \quad O_3 = \sigma_m",
-        r#"O_1 = (sigma_1 dots.c sigma_m)^(1 slash m) / sqrt(n), quad O_2 = sigma_m / sigma_1, quad O_3 = sigma_m"#,
-    ));
-    items.push(Item::Formula(
-        r"O_4 = \frac{\sigma_m^2}{\sigma_1}, \quad O_5 = \Bigl(\frac{1}{\sigma_1} + \cdots + \frac{1}{\sigma_m}\Bigr)^{-1}",
-        r#"O_4 = sigma_m^2 / sigma_1, quad O_5 = (1 / sigma_1 + dots.c + 1 / sigma_m)^(-1)"#,
-    ));
-    items.push(table("observability", present::indices(&analysis.indices)));
-    Section { name: "identifiability", heading: "Identifiability", items }
+         [@nahvi1994], O4 [@nahvi1996] and O5 [@sun2008].",
+    );
+    report.key(Formula {
+        latex: r"O_1 = \frac{(\sigma_1 \cdots \sigma_m)^{1/m}}{\sqrt{n}}, \quad O_2 = \frac{\sigma_m}{\sigma_1}, \quad O_3 = \sigma_m",
+        typst: r#"O_1 = (sigma_1 dots.c sigma_m)^(1 slash m) / sqrt(n), quad O_2 = sigma_m / sigma_1, quad O_3 = sigma_m"#,
+        text: "O1 = (σ1 ⋯ σm)^(1/m) / √n,  O2 = σm / σ1,  O3 = σm",
+    });
+    report.key(Formula {
+        latex: r"O_4 = \frac{\sigma_m^2}{\sigma_1}, \quad O_5 = \Bigl(\frac{1}{\sigma_1} + \cdots + \frac{1}{\sigma_m}\Bigr)^{-1}",
+        typst: r#"O_4 = sigma_m^2 / sigma_1, quad O_5 = (1 / sigma_1 + dots.c + 1 / sigma_m)^(-1)"#,
+        text: "O4 = σm² / σ1,  O5 = (1/σ1 + ⋯ + 1/σm)⁻¹",
+    });
+    report.key(indices(&analysis.indices).named("observability"));
+    Part { name: "identifiability", report }
 }
 
 fn ranks(structure: &Structure) -> Table {
@@ -238,7 +202,7 @@ fn base(structure: &Structure) -> Table {
 }
 
 /// Bias of each error by undeclared effects.
-pub fn bias(study: &Study) -> Section {
+pub fn bias(study: &Study) -> Part {
     let found = &study.bias;
     let number = |value: f64| if value.abs() < 5e-6 { "0".to_string() } else { three_digits(value) };
     let rows = found.rows.iter().map(|row| {
@@ -251,57 +215,41 @@ pub fn bias(study: &Study) -> Section {
     let errors = found.errors.iter().map(|error| right(format!("{}, {}", error.id, unit(&error.unit))));
     let last = ["signal, µm", "remains, µm"].map(|heading| right(heading.to_string()));
     let columns = [Column::from("effect, per unit")].into_iter().chain(errors).chain(last);
-    let items = vec![
-        Item::Text(
-            "An undeclared effect changes the readings by c per unit of its coefficient. With the Jacobian J of the \
-             estimated parameters, the weights W and the information P of the priors, it biases the estimates by b and \
-             leaves e in the residual [@jcgm102]:"
-                .into(),
-        ),
-        Item::Formula(
-            r"b = (J^\mathsf{T} W J + P)^{-1} J^\mathsf{T} W c, \quad e = c - J b",
-            r#"b = (J^sans(T) W J + P)^(-1) J^sans(T) W c, quad e = c - J b"#,
-        ),
-        table(
-            "bias",
-            Table::new(columns, rows).titled(
-                "Bias of each error per unit of an undeclared effect; root mean square of the signal in the readings and of \
-                 what remains of it in the residual",
-            ),
-        ),
-    ];
-    Section { name: "bias", heading: "Bias by undeclared effects", items }
+    let mut report = Report::new("Bias by undeclared effects");
+    report.key(
+        "An undeclared effect changes the readings by c per unit of its coefficient. With the Jacobian J of the \
+         estimated parameters, the weights W and the information P of the priors, it biases the estimates by b and \
+         leaves e in the residual [@jcgm102]:",
+    );
+    report.key(Formula {
+        latex: r"b = (J^\mathsf{T} W J + P)^{-1} J^\mathsf{T} W c, \quad e = c - J b",
+        typst: r#"b = (J^sans(T) W J + P)^(-1) J^sans(T) W c, quad e = c - J b"#,
+        text: "b = (JᵀWJ + P)⁻¹ JᵀW c,  e = c − J b",
+    });
+    let caption = "Bias of each error per unit of an undeclared effect; root mean square of the signal in the readings and of \
+                   what remains of it in the residual";
+    report.key(Table::new(columns, rows).titled(caption).named("bias"));
+    Part { name: "bias", report }
 }
 
 /// Estimates, and traces before and after. `None` without readings.
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn trace(study: &Study) -> Result<Option<Section>, IdentifyError> {
+pub fn trace(study: &Study) -> Result<Option<Part>, IdentifyError> {
     let Some(fitted) = &study.fitted else { return Ok(None) };
     let series = views(&fitted.problem, &fitted.fit, None)?;
     let plots = SessionPlots::new(&fitted.problem, &series);
-    let models = ["before", "after"];
-    let mut figures = Vec::new();
-    for (number, _) in plots.tests() {
-        match plots.polar_residuals(number, models) {
-            Some(polar) => figures.extend(polar),
-            None => figures.extend(plots.residuals(number)),
-        }
-    }
-    let rows = fitted.result.parameters.iter().map(|parameter| {
-        let (value, u) = crate::report::number::value_and_u(parameter.value, parameter.u);
-        cells![&parameter.id, value, u, unit(&parameter.unit), &parameter.meaning]
+    let models = ["nominal machine", "fit"];
+    let mut report = Report::new("Estimates and residuals");
+    let all: Vec<_> = fitted.result.parameters.iter().collect();
+    report.key(parameters::table(&all, None).named("estimates"));
+    let residuals = test_table(&plots, models).titled("Root mean square residual of each test");
+    report.key(residuals.named("residuals"));
+    let figures = plots.tests().flat_map(|(number, _)| match plots.polar_residuals(number, models) {
+        Some(polar) => polar,
+        None => plots.residuals(number),
     });
-    let estimates = Table::new(["error", ">value", ">u", "unit", "meaning"], rows)
-        .titled("Estimates with their standard uncertainty");
-    let rows = plots.tests().map(|(number, test)| {
-        let [before, after] = plots.rms_um(number).map(three_digits);
-        cells![&test.name, before, after]
-    });
-    let rms = Table::new(["test", ">before, µm", ">after, µm"], rows)
-        .titled("Root mean square residual of each test before (nominal machine) and after the fit");
-    let mut items = vec![table("estimates", estimates), table("residuals", rms)];
-    items.extend(figures.into_iter().take(MAX_FIGURES).map(Item::Figure));
-    Ok(Some(Section { name: "trace", heading: "Estimates and residuals", items }))
+    report.figures(figures.take(MAX_FIGURES));
+    Ok(Some(Part { name: "trace", report }))
 }

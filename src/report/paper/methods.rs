@@ -5,14 +5,16 @@ use abbe::identify::parameters::Role;
 use abbe::model::instrument::InstrumentKind;
 use abbe::model::words::counted;
 
+use super::Part;
 use super::contents::Study;
-use super::{Item, Section};
+use crate::report::block::Report;
 use crate::report::number::micrometres;
 
-/// The section.
-pub fn section(study: &Study) -> Section {
-    let mut items = vec![Item::Text(machine(study)), Item::Text(estimation(study)), Item::Text(uncertainty(study))];
-    items.extend(study.fitted.as_ref().map(|fitted| {
+/// The part.
+pub fn part(study: &Study) -> Part {
+    let mut report = Report::new("Methods");
+    [machine(study), estimation(study), uncertainty(study)].into_iter().for_each(|text| report.key(text));
+    if let Some(fitted) = &study.fitted {
         let result = &fitted.result;
         let enlarged = if result.u_enlargement > 1.0 {
             format!(
@@ -27,7 +29,7 @@ pub fn section(study: &Study) -> Section {
             NoiseSource::Repeats => "is estimated from repeated readings",
             _ => "is estimated from the residual",
         };
-        Item::Text(format!(
+        report.key(format!(
             "The fit of {} has a root mean square residual of {} and of {} for held-out readings ({} left out in turn). \
              The noise standard deviation of {} {source}. χ² is {:.0} for {} degrees of freedom (Birge ratio {:.2}).{enlarged}",
             counted(result.readings, "reading"),
@@ -38,9 +40,9 @@ pub fn section(study: &Study) -> Section {
             result.chi_square,
             result.degrees_of_freedom,
             result.birge_ratio,
-        ))
-    }));
-    Section { name: "methods", heading: "Methods", items }
+        ));
+    }
+    Part { name: "methods", report }
 }
 
 fn machine(study: &Study) -> String {

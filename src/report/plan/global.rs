@@ -1,15 +1,39 @@
 //! Sobol' indices of the estimates of a plan, beside the linear prediction.
 
 use abbe::identify::plan::global::GlobalAnalysis;
+use abbe::model::session::Session;
 
+use crate::report::block::Report;
+use crate::report::fit::noise;
 use crate::report::number::{three_digits, unit};
 use crate::report::table::{Cell, Table, cells};
 
 /// Total indices below this value are not listed, unless the linear share is above it; the JSON lists all.
 const MIN_LISTED: f64 = 0.01;
 
+/// The report of a global sensitivity analysis.
+pub fn report(session: &Session, found: &GlobalAnalysis) -> Report {
+    let mut report = Report::new(format!("Global sensitivity of the plan for {}", session.machine.name));
+    report.method =
+        "Sobol' indices by quasi-random samples of the inputs, with the full fit of each sample, beside the \
+                     shares by linear propagation."
+            .to_string();
+    let noise = noise(found.noise_um, found.noise_source);
+    report.opening(
+        "",
+        [format!("{} samples, {} fits, {} inputs, {noise}.", found.samples, found.evaluations, found.inputs.len(),)],
+    );
+    report.section("Errors");
+    report.key(errors(found));
+    report.section("Indices");
+    report.key(indices(found));
+    report.section("Convergence");
+    report.key(convergence(found));
+    report
+}
+
 /// Standard deviation of each estimate over the samples and by linear propagation.
-pub fn errors(found: &GlobalAnalysis) -> Table {
+fn errors(found: &GlobalAnalysis) -> Table {
     let rows = found.errors.iter().map(|error| {
         let interactions = 1.0 - error.indices.iter().map(|index| index.sobol.first).sum::<f64>();
         cells![
@@ -27,7 +51,7 @@ pub fn errors(found: &GlobalAnalysis) -> Table {
 }
 
 /// The indices of each error by each input.
-pub fn indices(found: &GlobalAnalysis) -> Table {
+fn indices(found: &GlobalAnalysis) -> Table {
     let rows = found.errors.iter().flat_map(|error| {
         let inputs = found.inputs.iter().zip(&error.indices);
         let listed = inputs.filter(|(_, index)| index.sobol.total.max(index.linear) >= MIN_LISTED);
@@ -51,7 +75,7 @@ pub fn indices(found: &GlobalAnalysis) -> Table {
 }
 
 /// Change of the total indices with the number of samples.
-pub fn convergence(found: &GlobalAnalysis) -> Table {
+fn convergence(found: &GlobalAnalysis) -> Table {
     let rows = found.convergence.iter().map(|one| cells![one.samples.to_string(), Cell::fixed(one.largest_change, 3)]);
     Table::new([">samples", ">largest change"], rows)
         .titled(format!("Convergence: largest change of a total index up to {} samples", found.samples))

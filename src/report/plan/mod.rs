@@ -1,8 +1,8 @@
 //! The analysis of a plan: predicted uncertainties, sensitivities, budgets, correlation, observability indices.
 
+pub mod analysis;
 pub mod effects;
 pub mod global;
-pub mod verdict;
 
 use abbe::identify::plan::collision::TestClearance;
 use abbe::identify::plan::results::{ErrorAnalysis, Indices, PlanAnalysis};

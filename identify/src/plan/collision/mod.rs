@@ -22,6 +22,8 @@ use abbe_model::session::{Session, Test};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::states;
+use crate::error::IdentifyError;
 pub use parts::{Bodies, Parts};
 pub(crate) use shape::segment_distance;
 
@@ -46,6 +48,17 @@ pub fn clearances(session: &Session) -> Vec<TestClearance> {
         Parts::of(session, &bodies, test)?.least(&test.name, readings)
     };
     session.tests.iter().filter_map(of).collect()
+}
+
+/// The sentences about tests, and moves of their programs, with less clearance than the session asks for.
+///
+/// # Errors
+/// If the states of a test cannot be planned.
+pub fn warnings_of_programs(session: &Session, moves: &[Moves]) -> Result<Vec<String>, IdentifyError> {
+    let complete = states::complete(session, true)?;
+    let mut found = warnings(&complete, &clearances(&complete));
+    found.extend(warnings_of_moves(session, moves));
+    Ok(found)
 }
 
 /// The sentences about tests with less clearance than the session asks for.

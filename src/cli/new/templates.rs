@@ -1,0 +1,101 @@
+//! The templates of `abbe new`: ready machines and sessions within the program.
+
+/// A session in the program.
+pub struct Template {
+    /// Its name.
+    pub name: &'static str,
+    /// What it is.
+    pub about: &'static str,
+    /// File name and contents.
+    pub files: &'static [(&'static str, &'static str)],
+}
+
+/// Files of a folder of `sessions/`.
+macro_rules! files {
+    ($folder:literal: $($file:literal),+ $(,)?) => {
+        &[$(($file, include_str!(concat!("../../../sessions/", $folder, "/", $file)))),+]
+    };
+}
+
+/// The templates.
+pub const TEMPLATES: &[Template] = &[
+    Template {
+        name: "hermle-c600u",
+        about: "five-axis machine with a tilting rotary table; three ball-bar methods as plans",
+        files: files!("hermle-c600u": "machine.toml", "chapter4.toml", "chapter5.toml", "chapter6.toml"),
+    },
+    Template {
+        name: "hermle-c600u-measured",
+        about: "the same machine with simulated readings and an effect to trace",
+        files: files!(
+            "hermle-c600u/measured": "machine.toml", "A100.csv", "A150.csv", "C100.csv", "C150.csv", "session.toml"
+        ),
+    },
+    Template {
+        name: "kuka-iiwa14",
+        about: "seven-axis robot with its ball in sockets (public data set, to be downloaded)",
+        files: files!("kuka-iiwa14": "machine.toml", "session.toml"),
+    },
+    Template {
+        name: "r-test",
+        about: "R-test on machines with B, C and with A, B tables: plans of BK1 and BK2, and readings with pitch-compensation steps to trace",
+        files: &[
+            ("machine.toml", include_str!("../../../sessions/r-test/machine.toml")),
+            ("plan.toml", include_str!("../../../sessions/r-test/plan.toml")),
+            ("machine-b.toml", include_str!("../../../sessions/r-test/machine-b.toml")),
+            ("session.toml", include_str!("../../../sessions/r-test/measured/session.toml")),
+            ("BK1.csv", include_str!("../../../sessions/r-test/measured/BK1.csv")),
+            ("BK2.csv", include_str!("../../../sessions/r-test/measured/BK2.csv")),
+            ("C-alone.csv", include_str!("../../../sessions/r-test/measured/C-alone.csv")),
+        ],
+    },
+    Template {
+        name: "self-calibration",
+        about: "rotary table probed on an uncalibrated cylinder; a plan, and readings simulated from it",
+        files: &[
+            ("machine.toml", include_str!("../../../sessions/self-calibration/machine.toml")),
+            ("plan.toml", include_str!("../../../sessions/self-calibration/session.toml")),
+            ("session.toml", include_str!("../../../sessions/self-calibration/measured/session.toml")),
+            ("1a.csv", include_str!("../../../sessions/self-calibration/measured/1a.csv")),
+            ("1b.csv", include_str!("../../../sessions/self-calibration/measured/1b.csv")),
+            ("2.csv", include_str!("../../../sessions/self-calibration/measured/2.csv")),
+            ("3.csv", include_str!("../../../sessions/self-calibration/measured/3.csv")),
+        ],
+    },
+    Template {
+        name: "volumetric",
+        about: "five-axis machine with 33 error functions, to map and to compensate (`abbe volumetric --map`)",
+        files: files!("volumetric": "machine.toml", "errors.toml"),
+    },
+    Template {
+        name: "table-and-head",
+        about: "five-axis machine with a rotary table and a tilting head; ball-bar plan of chapter 7, and simulated readings",
+        files: &[
+            ("machine.toml", include_str!("../../../sessions/table-and-head/machine.toml")),
+            ("plan.toml", include_str!("../../../sessions/table-and-head/session.toml")),
+            ("session.toml", include_str!("../../../sessions/table-and-head/measured/session.toml")),
+            ("A100.csv", include_str!("../../../sessions/table-and-head/measured/A100.csv")),
+            ("A150.csv", include_str!("../../../sessions/table-and-head/measured/A150.csv")),
+            ("C100.csv", include_str!("../../../sessions/table-and-head/measured/C100.csv")),
+            ("C150.csv", include_str!("../../../sessions/table-and-head/measured/C150.csv")),
+        ],
+    },
+    Template {
+        name: "tilting-head",
+        about: "five-axis machine with a tilting head; ball-bar plan of chapter 7, and simulated readings",
+        files: &[
+            ("machine.toml", include_str!("../../../sessions/tilting-head/machine.toml")),
+            ("plan.toml", include_str!("../../../sessions/tilting-head/session.toml")),
+            ("session.toml", include_str!("../../../sessions/tilting-head/measured/session.toml")),
+            ("B100.csv", include_str!("../../../sessions/tilting-head/measured/B100.csv")),
+            ("B150.csv", include_str!("../../../sessions/tilting-head/measured/B150.csv")),
+            ("C100.csv", include_str!("../../../sessions/tilting-head/measured/C100.csv")),
+            ("C150.csv", include_str!("../../../sessions/tilting-head/measured/C150.csv")),
+        ],
+    },
+    Template {
+        name: "ur10",
+        about: "six-axis robot measured by a laser tracker (public data set, to be downloaded)",
+        files: files!("ur10": "machine.toml", "session.toml"),
+    },
+];

@@ -1,0 +1,102 @@
+//! The parts of a paper of sessions.
+
+use std::path::{Path, PathBuf};
+
+use abbe::identify::candidates::named::effect;
+use abbe::identify::fit::SessionFit;
+use abbe::identify::plan::bias::{bias_table, usual_effects};
+use abbe::identify::plan::structure::structure;
+use abbe::identify::plan::{self, PlanOptions};
+use abbe::identify::problem::Problem;
+use abbe::model::effect::Effect;
+use abbe::model::session::Session;
+
+use super::PaperArguments;
+use crate::cli::failure::Failure;
+use crate::report::paper::contents::{self, Study};
+use crate::report::paper::{Part, comparison, methods};
+
+/// The parts of a paper, in their order.
+pub const PARTS: [&str; 9] = [
+    "methods",
+    "set-up",
+    "sensitivity",
+    "uncertainty",
+    "correlation",
+    "identifiability",
+    "bias",
+    "comparison",
+    "trace",
+];
+/// Effects of the bias table where none are named.
+const BIASING_EFFECTS: usize = 12;
+
+/// A session with its results.
+pub fn study(arguments: &PaperArguments, label: String, session: &Session) -> Result<Study, Failure> {
+    let options = PlanOptions { effects: false, ..PlanOptions::default() };
+    let analysis = plan::analyse(session, &options)?;
+    let (complete, noise) = plan::prepared(session, &options)?;
+    let problem = plan::states::problem_by_test(&complete, noise)?;
+    let bias = if arguments.effects.is_empty() {
+        bias_table(&problem, &usual_effects(&problem)?)?.largest(BIASING_EFFECTS)
+    } else {
+        bias_table(&problem, &named(&problem, &arguments.effects)?)?
+    };
+    let structure = structure(&problem)?;
+    let measured = session.tests.iter().all(|test| test.readings.is_some());
+    let fitted = if measured { Some(SessionFit::of(session, arguments.seed)?) } else { None };
+    Ok(Study { label, problem, analysis, structure, bias, fitted })
+}
+
+fn named(problem: &Problem, ids: &[String]) -> Result<Vec<Effect>, Failure> {
+    ids.iter().map(|id| Ok(effect(problem, id)?)).collect()
+}
+
+/// The requested parts that the sessions have.
+pub fn parts(arguments: &PaperArguments, studies: &[Study]) -> Result<Vec<Part>, Failure> {
+    let study = &studies[0];
+    let mut sections = Vec::new();
+    for part in PARTS {
+        let is_named = arguments.parts.iter().any(|named| named == part);
+        if !arguments.parts.is_empty() && !is_named {
+            continue;
+        }
+        let section = match part {
+            "methods" => Some(methods::part(study)),
+            "set-up" => Some(contents::set_up(study)),
+            "sensitivity" => Some(contents::sensitivity(study)?),
+            "uncertainty" => Some(contents::uncertainty(study)),
+            "correlation" => Some(contents::correlation(study)),
+            "identifiability" => Some(contents::identifiability(study)),
+            "bias" => Some(contents::bias(study)),
+            "comparison" => (studies.len() > 1).then(|| comparison::part(studies)),
+            _ => contents::trace(study)?,
+        };
+        match section {
+            Some(section) => sections.push(section),
+            None if is_named && part == "comparison" => {
+                return Err(Failure::CommandLine(
+                    "`--parts comparison` needs at least two sessions; name another".into(),
+                ));
+            }
+            None if is_named => {
+                return Err(Failure::Other(format!(
+                    "`--parts {part}`: {} has no readings; name a measured session, or leave the part out",
+                    arguments.sessions[0].display()
+                )));
+            }
+            None => {}
+        }
+    }
+    Ok(sections)
+}
+
+/// The name of a session in tables: that of its file, or of its folder if several have the same name.
+pub fn label(sessions: &[PathBuf], path: &Path) -> String {
+    let stem = |path: &Path| path.file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into_owned());
+    let own = stem(path);
+    if sessions.iter().filter(|other| stem(other) == own).count() == 1 {
+        return own;
+    }
+    path.with_extension("").display().to_string()
+}

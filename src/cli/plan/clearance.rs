@@ -1,0 +1,45 @@
+//! `abbe plan --clearance-mm`: collisions of spindle, table and device.
+
+use abbe::identify::plan::clearance::Clearance;
+use abbe::model::instrument::Station;
+use abbe::model::instrument::rtest::Setting;
+use abbe::model::session::Session;
+
+use crate::cli::failure::Failure;
+use crate::cli::values;
+
+/// Collisions, with the device where the R-tests of the session have it, else both on the table and in the spindle.
+pub fn faults(session: &Session, sizes: &str) -> Result<Vec<String>, Failure> {
+    let numbers: Vec<f64> = sizes.split(',').filter_map(|size| size.trim().parse().ok()).collect();
+    let &[spindle_mm, table_mm, device_height_mm, device_width_mm, shaft_mm, jig_mm] = numbers.as_slice() else {
+        return Err(Failure::Other(format!(
+            "`--clearance-mm {sizes}`: six lengths are expected: diameters of spindle and table, height and width of the device, shaft, jig"
+        )));
+    };
+    values::SIZE_MM.all("--clearance-mm", &numbers)?;
+    let settings: Vec<Setting> = session
+        .tests
+        .iter()
+        .filter_map(|test| match &test.station {
+            Station::RTest(rtest) => Some(rtest.setting),
+            _ => None,
+        })
+        .collect();
+    let faults = [(Setting::Table, "device on the table"), (Setting::Spindle, "device in the spindle")]
+        .into_iter()
+        .filter(|(setting, _)| settings.is_empty() || settings.contains(setting))
+        .flat_map(|(setting, words)| {
+            let device_on_table = setting == Setting::Table;
+            let clearance = Clearance {
+                spindle_mm,
+                table_mm,
+                device_height_mm,
+                device_width_mm,
+                shaft_mm,
+                jig_mm,
+                device_on_table,
+            };
+            clearance.faults().into_iter().map(move |fault| format!("{words}: {fault}"))
+        });
+    Ok(faults.collect())
+}

@@ -1,0 +1,92 @@
+//! A trace with its progress on standard error, and the list of its candidates.
+
+use std::sync::Mutex;
+use std::time::Duration;
+
+use abbe::identify::candidates::library;
+use abbe::identify::plan::test_variations::TestVariations;
+use abbe::identify::separating_tests::separate_aliases;
+use abbe::identify::trace::{self, Progress, TraceOptions, TraceOutcome};
+use abbe::model::session::Session;
+use abbe::model::words::counted;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::clock::Clock;
+use crate::cli::failure::Failure;
+use crate::cli::interrupt::Interrupts;
+
+/// Traces a session and compares tests that separate its effects from their aliases, until they are done, the time is up
+/// or the user interrupts.
+pub fn trace(
+    session: &Session,
+    options: &TraceOptions,
+    time_limit: Option<f64>,
+    quiet: bool,
+) -> Result<TraceOutcome, Failure> {
+    let clock = Clock::started(time_limit);
+    let bar = progress_bar(quiet);
+    let interrupts = Interrupts::handled(bar.clone());
+    let shown = Mutex::new(());
+    let report = |progress: Progress| {
+        if matches!(progress, Progress::Working) {
+            // Called often and from many threads; it shows nothing.
+            interrupts.keep_results();
+            return !interrupts.came() && !clock.has_run_out();
+        }
+        let _one_at_a_time = shown.lock();
+        match progress {
+            Progress::Fitting => bar.set_message("fitting the declared model"),
+            Progress::Screening(candidates) => {
+                bar.set_message(format!("screening {}", counted(candidates, "candidate")))
+            }
+            Progress::Folds(ended, folds) => bar.set_message(clock.remaining(ended, folds)),
+            Progress::SelectedEffect(number, id, rms_um) => {
+                let effects = counted(number, "effect");
+                bar.set_message(format!("{effects}, held out {rms_um:.2} µm: {id}"));
+                if !quiet {
+                    bar.suspend(|| eprintln!("  + {id:<28} held out {rms_um:.3} µm"));
+                }
+            }
+            Progress::Judging => bar.set_message("refitting and judging"),
+            Progress::Working => {}
+        }
+        !interrupts.came() && !clock.has_run_out()
+    };
+    let mut trace = trace::trace(session, options, &report)?;
+    bar.set_message("comparing candidate tests");
+    separate_aliases(&mut trace, &TestVariations::short(), &report)?;
+    interrupts.end_at_once();
+    bar.finish_and_clear();
+    if let Some(seconds) = time_limit.filter(|_| !interrupts.came()) {
+        trace.result.mark_time_limit(seconds);
+    }
+    Ok(trace)
+}
+
+fn progress_bar(quiet: bool) -> ProgressBar {
+    if quiet {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::new_spinner();
+    if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {msg}") {
+        bar.set_style(style);
+    }
+    bar.enable_steady_tick(Duration::from_millis(200));
+    bar
+}
+
+/// Lists the candidates of the library with their detectability.
+pub fn list(session: &Session, options: &TraceOptions) -> Result<(), Failure> {
+    let families = library::families()?;
+    let entries = trace::screening::screened_effects(session, options)?;
+    for (number, family) in families.iter().enumerate() {
+        let of_family: Vec<_> = entries.iter().filter(|entry| entry.family == number).collect();
+        let seen = of_family.iter().filter(|entry| entry.observable).count();
+        let candidates = counted(of_family.len(), "candidate");
+        say!("{}: {candidates}, {seen} detectable", family.name);
+        for entry in of_family {
+            say!("  {} {}", if entry.observable { "detectable    " } else { "not detectable" }, entry.id);
+        }
+    }
+    Ok(())
+}

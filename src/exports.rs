@@ -1,0 +1,170 @@
+//! The calibrated machine for other programs and for controls: one line of a registry for each format.
+
+use abbe_identify::IdentifyError;
+use abbe_identify::compensation::{self, Compensation};
+use abbe_identify::export::control::{self, EntryChoice, KinematicTable};
+use abbe_identify::export::dh::{self, DhTable};
+use abbe_identify::export::travel::Travel;
+use abbe_identify::export::{left_out, urdf};
+use abbe_identify::model_file::IdentifiedModel;
+use abbe_identify::parameters::Role;
+use abbe_model::component::{ErrorKind, ErrorName};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::printers::csv;
+use crate::report::export as present;
+use crate::report::table::Table;
+
+/// A format.
+pub struct ExportFormat {
+    /// The word by which it is requested.
+    pub word: &'static str,
+    /// What it is.
+    pub about: &'static str,
+    /// Whether it takes a choice of entries and the travel over which their error counts.
+    pub takes_entries: bool,
+    export: fn(&IdentifiedModel, &ExportOptions) -> Result<Exported, IdentifyError>,
+}
+
+impl ExportFormat {
+    const fn new(
+        word: &'static str,
+        about: &'static str,
+        export: fn(&IdentifiedModel, &ExportOptions) -> Result<Exported, IdentifyError>,
+    ) -> ExportFormat {
+        ExportFormat { word, about, takes_entries: false, export }
+    }
+
+    const fn with_entries(self) -> ExportFormat {
+        ExportFormat { takes_entries: true, ..self }
+    }
+}
+
+/// What a format takes beside the model.
+pub struct ExportOptions {
+    /// The tool point in the tool frame.
+    pub tool_mm: [f64; 3],
+    /// Which entries of a control are written.
+    pub entries: EntryChoice,
+    /// The travel over which the error of the entries counts.
+    pub travel: Travel,
+}
+
+impl ExportOptions {
+    /// The tool point of the model, and the entries that leave the least error over the measured range.
+    pub fn of(model: &IdentifiedModel) -> ExportOptions {
+        ExportOptions { tool_mm: model.tool_mm, entries: EntryChoice::Best, travel: Travel::measured(model) }
+    }
+}
+
+/// The formats.
+pub const FORMATS: [ExportFormat; 7] = [
+    ExportFormat::new("urdf", "URDF of the calibrated chain", of_urdf),
+    ExportFormat::new("dh", "Denavit-Hartenberg parameters, calibrated and nominal", of_dh),
+    ExportFormat::new("linuxcnc", "LinuxCNC, xyzac-trt-kins and xyzbc-trt-kins", |model, options| {
+        of_control(model, "linuxcnc", options)
+    })
+    .with_entries(),
+    ExportFormat::new("fanuc", "Fanuc 30i, table rotation type", |model, options| of_control(model, "fanuc", options))
+        .with_entries(),
+    ExportFormat::new("beckhoff", "Beckhoff TF5280, location errors", of_beckhoff),
+    ExportFormat::new("siemens", "SINUMERIK 840D", |model, options| of_control(model, "siemens", options)),
+    ExportFormat::new("heidenhain", "Heidenhain TNC", |model, options| of_control(model, "heidenhain", options)),
+];
+
+/// What is written.
+#[derive(Default)]
+pub struct Exported {
+    /// The file.
+    pub text: Vec<u8>,
+    /// The same as a table, if it is one.
+    pub table: Option<Table>,
+    /// The same as JSON.
+    pub result: ExportResult,
+}
+
+/// The result of `abbe export` in JSON.
+#[derive(Default, Serialize, JsonSchema)]
+pub struct ExportResult {
+    /// Denavit-Hartenberg parameters with the identified location errors.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calibrated: Option<DhTable>,
+    /// Those of the machine without errors.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nominal: Option<DhTable>,
+    /// Changes of a control's kinematic parameters.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kinematics: Option<KinematicTable>,
+    /// Effects and errors that a fixed geometry does not hold.
+    pub left_out: Vec<String>,
+}
+
+/// The format of this word.
+///
+/// # Errors
+/// If there is none.
+pub fn format(word: &str) -> Result<&'static ExportFormat, IdentifyError> {
+    FORMATS.iter().find(|format| format.word == word).ok_or_else(|| {
+        let words = FORMATS.iter().map(|format| format.word).collect::<Vec<_>>().join(", ");
+        IdentifyError::Request(format!("there is no format `{word}`; the formats are {words}"))
+    })
+}
+
+impl ExportFormat {
+    /// The model in this format.
+    ///
+    /// # Errors
+    /// If the format cannot hold the model.
+    pub fn export(&self, model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, IdentifyError> {
+        (self.export)(model, options)
+    }
+}
+
+/// A table under its header.
+fn tabled(header: String, table: Table, result: ExportResult) -> Result<Exported, IdentifyError> {
+    let rows = csv::text(&table).map_err(IdentifyError::Request)?;
+    Ok(Exported { text: [header.into_bytes(), rows].concat(), table: Some(table), result })
+}
+
+fn of_urdf(model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, IdentifyError> {
+    let result = ExportResult { left_out: left_out(model), ..ExportResult::default() };
+    Ok(Exported { text: urdf::urdf(model, options.tool_mm)?.into_bytes(), table: None, result })
+}
+
+fn of_dh(model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, IdentifyError> {
+    let [calibrated, nominal] = dh::tables(model, options.tool_mm)?;
+    let table = present::dh(&calibrated, &nominal);
+    let result = ExportResult {
+        calibrated: Some(calibrated),
+        nominal: Some(nominal),
+        left_out: left_out(model),
+        ..ExportResult::default()
+    };
+    tabled(present::dh_header(&table), table, result)
+}
+
+fn of_control(model: &IdentifiedModel, word: &str, options: &ExportOptions) -> Result<Exported, IdentifyError> {
+    let found = control::table(model, word, options.entries, &options.travel, options.tool_mm)?;
+    let left_out = found.left_out.clone();
+    let (header, table) = (present::kinematics_header(&found), present::kinematics(&found));
+    tabled(header, table, ExportResult { kinematics: Some(found), left_out, ..ExportResult::default() })
+}
+
+/// The location errors in the format of the control, and what it does not hold.
+fn of_beckhoff(model: &IdentifiedModel, _: &ExportOptions) -> Result<Exported, IdentifyError> {
+    let refused = |why: &str| IdentifyError::Request(why.to_string());
+    let errors = model.parameters.iter().enumerate().filter(|(_, parameter)| parameter.role == Role::Error);
+    let named = errors
+        .filter(|(index, _)| model.is_estimated(*index))
+        .filter_map(|(_, parameter)| Some((ErrorName::parse(&parameter.id)?, parameter.value)));
+    let locations = named.filter(|(name, _)| name.kind == ErrorKind::Location).collect();
+    let compensation = Compensation { locations, left_out: left_out(model), ..Compensation::default() };
+    let control = compensation::CONTROLS.iter().find(|control| control.word == "beckhoff");
+    let control = control.ok_or_else(|| refused("the format of Beckhoff is not in the registry"))?;
+    let tables = compensation::tables(&model.machine, &compensation, control, compensation::MAX_POINTS);
+    let file = tables.files.into_iter().next();
+    let (_, text) = file.ok_or_else(|| refused("the model has no location error that the format holds"))?;
+    let result = ExportResult { left_out: tables.left_out, ..ExportResult::default() };
+    Ok(Exported { text: text.into_bytes(), table: None, result })
+}

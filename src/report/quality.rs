@@ -1,0 +1,151 @@
+//! Key figures of a model: agreement of residual and noise, held-out error, rank and readings.
+
+use abbe::identify::noise::NoiseSource;
+use abbe::identify::problem::Problem;
+use abbe::identify::results::{CrossValidation, Goodness, GoodnessVerdict};
+use abbe::model::words::counted;
+
+use super::block::KeyFigure;
+use super::cross_validation;
+use super::number::{integer, micrometres};
+
+/// The quantities that describe the quality of one model.
+pub struct Quality<'r> {
+    /// χ², priors included.
+    pub chi_square: f64,
+    /// Degrees of freedom ν.
+    pub degrees_of_freedom: usize,
+    /// RMS residual over scalar readings, µm.
+    pub rms_um: f64,
+    /// RMS length of the residual vector, µm.
+    pub rms_3d_um: Option<f64>,
+    /// Held-out RMS residual over scalar readings, µm.
+    pub heldout_rms_um: f64,
+    /// Held-out RMS length of the residual vector, µm.
+    pub heldout_rms_3d_um: Option<f64>,
+    /// Held-out errors by what is held out.
+    pub cross_validation: &'r CrossValidation,
+    /// What each fold holds out.
+    pub heldout_by: &'r str,
+    /// Numerical rank.
+    pub rank: usize,
+    /// Number of parameters.
+    pub parameters: usize,
+    /// Noise standard deviation of one scalar reading, µm.
+    pub noise_um: f64,
+    /// Source of the noise.
+    pub noise_source: NoiseSource,
+}
+
+impl Quality<'_> {
+    /// Whether the noise is known independently of the residual, so that χ²/ν is a test of the model.
+    pub fn is_testable(&self) -> bool {
+        self.noise_source.judges()
+    }
+
+    /// χ²/ν; a dash without degrees of freedom.
+    fn ratio(&self) -> String {
+        match self.degrees_of_freedom {
+            0 => "–".to_string(),
+            freedom => format!("{:.2}", self.chi_square / freedom as f64),
+        }
+    }
+
+    fn chi_square(&self, before: Option<&Quality<'_>>) -> KeyFigure {
+        if !self.is_testable() {
+            return KeyFigure::new("χ²/ν", "not testable", "the residual is taken for noise");
+        }
+        let before = before.map_or(String::new(), |before| format!("before {}; ", before.ratio()));
+        KeyFigure::new("χ²/ν", self.ratio(), format!("{before}expected 1"))
+    }
+
+    fn residual(&self, before: Option<&Quality<'_>>) -> KeyFigure {
+        let noise = match self.is_testable() {
+            true => format!("noise {} ({})", micrometres(self.noise_um), self.noise_source),
+            false => "noise not stated".to_string(),
+        };
+        let before = before.map_or(String::new(), |before| format!("before {}; ", micrometres(before.rms_um)));
+        KeyFigure::new("Residual rms", micrometres(self.rms_um), format!("{before}{noise}"))
+    }
+
+    fn held_out(&self, before: Option<&Quality<'_>>) -> KeyFigure {
+        let note = match before {
+            Some(before) => format!("before {}", micrometres(before.heldout_rms_um)),
+            None => "cross-validation".to_string(),
+        };
+        KeyFigure::new("Held-out rms", micrometres(self.heldout_rms_um), note)
+    }
+
+    fn rank(&self) -> KeyFigure {
+        let note = match self.parameters.saturating_sub(self.rank) {
+            0 => "all parameters identifiable".to_string(),
+            deficit => format!("{} not identifiable", counted(deficit, "combination")),
+        };
+        KeyFigure::new("Rank", format!("{} of {}", self.rank, self.parameters), note)
+    }
+
+    /// The key figures, compared with those of a first model if there is one.
+    pub fn key_figures(&self, before: Option<&Quality<'_>>) -> Vec<KeyFigure> {
+        let mut figures = vec![self.chi_square(before), self.residual(before), self.held_out(before)];
+        if let (Some(rms), Some(held)) = (self.rms_3d_um, self.heldout_rms_3d_um) {
+            figures.push(KeyFigure::new("3-vector", micrometres(rms), format!("held out {}", micrometres(held))));
+        }
+        figures.push(self.rank());
+        figures
+    }
+
+    /// What is held out, and the held-out errors that do not decide.
+    pub fn held_out_sentences(&self, before: Option<&Quality<'_>>) -> Vec<String> {
+        let others = cross_validation::sentences(self.cross_validation, before.map(|before| before.cross_validation));
+        std::iter::once(format!("held out: leaving out {}", self.heldout_by)).chain(others).collect()
+    }
+}
+
+/// Number of readings, tests and outliers.
+pub fn readings(problem: &Problem, readings: usize, outliers: usize) -> KeyFigure {
+    let tests = counted(problem.tests.len(), "test");
+    let excluded = match outliers {
+        0 => "no outliers".to_string(),
+        some => format!("{} excluded", counted(some, "outlier")),
+    };
+    KeyFigure::new("Readings", integer(readings), format!("{tests}, {excluded}"))
+}
+
+/// The noise of a result and its source. The residual of a model is not called noise.
+pub fn noise_sentence(noise_um: f64, source: NoiseSource) -> String {
+    match source {
+        NoiseSource::Residual => format!(
+            "No noise is stated and there are no repeated readings. The uncertainties follow from the residual of the model, {}",
+            micrometres(noise_um)
+        ),
+        other => format!("Noise standard deviation {} ({other})", micrometres(noise_um)),
+    }
+}
+
+/// Whether the residual agrees with the noise.
+pub fn agreement(goodness: Goodness, degrees_of_freedom: usize) -> String {
+    let figures = format!("χ²/ν = {:.2}, ν = {degrees_of_freedom}", goodness.chi_square_ratio);
+    match goodness.verdict {
+        GoodnessVerdict::NotJudged => {
+            "cannot be judged: no noise is stated and no reading repeats, so the residual is taken for noise"
+                .to_string()
+        }
+        GoodnessVerdict::Exceeds => format!("the residual exceeds the noise ({figures}): the model lacks an effect"),
+        GoodnessVerdict::Structured => {
+            format!(
+                "the residual is no larger than the noise ({figures}), but it has structure: the model lacks an effect"
+            )
+        }
+        GoodnessVerdict::NoiseOverstated => {
+            format!("the residual is smaller than the noise ({figures}): the noise is overstated")
+        }
+        GoodnessVerdict::Agrees => format!("the residual agrees with the noise ({figures})"),
+    }
+}
+
+/// What the estimates of a model are not good for; `None` if they may be quoted.
+pub fn reservation(goodness: Goodness) -> Option<&'static str> {
+    (!goodness.quotable).then_some(
+        "not to be quoted: the model lacks an effect, and u does not cover the bias that it causes in the estimates",
+    )
+}

@@ -1,0 +1,105 @@
+//! What the files hold, as JSON Schema: one line of a registry for each.
+
+use abbe_identify::correction::stream;
+use abbe_identify::geometric::Comparison as GeometricComparison;
+use abbe_identify::model_file;
+use abbe_identify::patterns::Patterns;
+use abbe_identify::plan::global::GlobalAnalysis;
+use abbe_identify::plan::next_test::NextTest;
+use abbe_identify::plan::poses::PoseSelection;
+use abbe_identify::repeated::Repeated;
+use abbe_identify::self_calibration::SelfCalibration;
+use abbe_identify::simulate::SimulationResult;
+use abbe_identify::volumetric::Summary;
+use abbe_model::document::schema;
+use schemars::JsonSchema;
+use schemars::generate::SchemaSettings;
+use serde_json::{Value, json};
+
+use crate::document::{
+    Document, StatedComparison, StatedFit, StatedHistory, StatedPlan, StatedTrace, StatedValidation,
+};
+use crate::exports::ExportResult;
+use crate::fleet::record::Record;
+use crate::fleet::run::RunResult;
+use crate::fleet::study::file::StudyFile;
+use crate::fleet::study::summary::StudyResult;
+
+/// A file.
+pub struct FileSchema {
+    /// The word by which its schema is requested.
+    pub word: &'static str,
+    /// What the file is.
+    pub about: &'static str,
+    /// Its schema.
+    pub schema: fn() -> Value,
+}
+
+const fn file(word: &'static str, about: &'static str, schema: fn() -> Value) -> FileSchema {
+    FileSchema { word, about, schema }
+}
+
+/// The files.
+pub const SCHEMAS: &[FileSchema] = &[
+    file("session", "session.toml", schema::session),
+    file("machine", "machine.toml", schema::machine),
+    file("fit", "`abbe fit --json`", of::<StatedFit>),
+    file("repeat", "`abbe fit --repeat --json`", of::<Repeated>),
+    file("geometric", "`abbe fit --method circle|cone|two-plane --json`", of::<GeometricComparison>),
+    file("self-calibration", "`abbe fit --method self-calibration --json`", of::<SelfCalibration>),
+    file("trace", "`abbe trace --json`", of::<StatedTrace>),
+    file("validate", "`abbe validate --json`", of::<StatedValidation>),
+    file("model", "`abbe fit|trace --save`", plain::<model_file::document::Document>),
+    file("plan", "`abbe plan --json`", of::<StatedPlan>),
+    file("next-test", "`abbe plan --improve|--separate|--range --json`", of::<NextTest>),
+    file("global", "`abbe plan --global --json`", of::<GlobalAnalysis>),
+    file("poses", "`abbe plan --poses --json`", of::<PoseSelection>),
+    file("patterns", "`abbe plan --patterns --json`", of::<Patterns>),
+    file("simulate", "`abbe simulate --json`", of::<SimulationResult>),
+    file("map", "`abbe volumetric --map --json`", of::<Summary>),
+    file("compare", "`abbe compare --json`", of::<StatedComparison>),
+    file("export", "`abbe export --json`", of::<ExportResult>),
+    file("compensate", "`abbe compensate --json`", of::<stream::Summary>),
+    file("run", "`abbe run --json`", of::<RunResult>),
+    file("history", "`abbe history --json`", of::<StatedHistory>),
+    file("study", "`abbe study --json`", of::<StudyResult>),
+    file("study-file", "The study file of `abbe study`, as JSON", plain::<StudyFile>),
+    file("record", "The result of a session in the folder of `abbe run`", plain::<Record>),
+];
+
+/// The schema of a file that has no head of a command.
+fn plain<T: JsonSchema>() -> Value {
+    let mut schema = open::<T>();
+    close(&mut schema);
+    schema
+}
+
+fn open<T: JsonSchema>() -> Value {
+    let generator = SchemaSettings::draft2020_12().for_serialize().into_generator();
+    generator.into_root_schema_for::<T>().to_value()
+}
+
+/// The schema of a command's document.
+fn of<T: JsonSchema + 'static>() -> Value {
+    let (mut schema, result) = (open::<Document<'static, T>>(), open::<T>());
+    for key in ["title", "description"] {
+        schema[key] = result[key].clone();
+    }
+    close(&mut schema);
+    schema
+}
+
+/// A result has the fields that are described and no others, so that a program may rely on both.
+fn close(schema: &mut Value) {
+    match schema {
+        Value::Object(entries) => {
+            if entries.get("properties").is_some_and(Value::is_object) && entries.get("type") == Some(&json!("object"))
+            {
+                entries.entry("additionalProperties").or_insert(Value::Bool(false));
+            }
+            entries.values_mut().for_each(close);
+        }
+        Value::Array(items) => items.iter_mut().for_each(close),
+        _ => {}
+    }
+}
