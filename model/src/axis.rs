@@ -6,14 +6,14 @@ use serde::{Deserialize, Serialize};
 use crate::frames::{Coordinate, Point, SinCos, cross_nominal, turn_about_nominal};
 use crate::scalar::{Nominal, Scalar};
 
-/// Whether an axis is linear or rotary.
+/// Whether an axis is linear or rotary. Its positions are in mm or radians.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[schemars(inline)]
 pub enum AxisKind {
-    /// Moves along its direction; positions in mm.
+    /// Moves along its direction.
     Linear,
-    /// Rotates about its direction; positions in radians.
+    /// Rotates about its direction.
     Rotary,
 }
 

@@ -47,7 +47,7 @@ impl<'py> Keywords<'py> {
     pub fn of_test(session: &Session, keywords: &Bound<'py, PyDict>) -> PyResult<Keywords<'py>> {
         let mut keys = schema::fields::<Test>();
         keys.retain(|key| !OF_FILES.contains(&key.as_str()));
-        keys.extend(session.instrument.entry().keys.iter().map(|key| key.name.to_string()));
+        keys.extend((session.instrument.entry().keys)().into_iter().map(|(key, _)| key));
         let is_key = |name: &String| keys.contains(name);
         let mut sorted = Keywords { table: Vec::new(), columns: Vec::new() };
         let mut at: Vec<(String, Node)> = Vec::new();

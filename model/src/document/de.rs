@@ -17,6 +17,9 @@ use crate::words;
 /// comparison.
 const MAX_ITEMS: usize = 1000;
 
+/// What is expected in place of a value that is no list.
+pub(super) const LIST: &str = "a list in square brackets";
+
 /// The field that takes the keys that a struct does not name.
 pub(super) const REST: &str = "$rest";
 
@@ -24,7 +27,7 @@ pub(super) const REST: &str = "$rest";
 pub(super) const NOTE: &str = "Note";
 
 /// The type whose value is a number that may be infinite.
-pub(super) const UNCERTAINTY: &str = "Uncertainty";
+pub(super) const UNLIMITED: &str = "Unlimited";
 
 /// A document, or a part of one, from a tree of values.
 ///
@@ -43,7 +46,7 @@ impl<'de> De<'de> {
         let expected = match expected.to_string().as_str() {
             "a boolean" => "true or false".to_string(),
             "a string" => "a text in quotes".to_string(),
-            "a sequence" => "a list in square brackets".to_string(),
+            "a sequence" => LIST.to_string(),
             other => other.to_string(),
         };
         Fault::unexpected(expected)
@@ -150,7 +153,7 @@ impl<'de> Deserializer<'de> for De<'de> {
 
     fn deserialize_newtype_struct<V: Visitor<'de>>(self, name: &'static str, visitor: V) -> Result<V::Value, Fault> {
         match name {
-            UNCERTAINTY => {
+            UNLIMITED => {
                 let number = self.number_or_inf("a number or `inf`")?;
                 visitor.visit_newtype_struct(F64Deserializer::<Fault>::new(number))
             }
@@ -316,7 +319,7 @@ impl<'de> MapAccess<'de> for Map<'de> {
             None => return Ok(None),
         };
         let key: StrDeserializer<'_, Fault> = key.into_deserializer();
-        seed.deserialize(key).map(Some).map_err(|fault| fault.also_known(self.also))
+        seed.deserialize(key).map(Some).map_err(|fault| fault.also_known(self.also.map(str::to_string)))
     }
 
     fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, Fault> {
@@ -354,7 +357,7 @@ impl<'de> de::VariantAccess<'de> for Map<'de> {
     fn unit_variant(self) -> Result<(), Fault> {
         match self.entries.front() {
             None => Ok(()),
-            Some(entry) => Err(Fault::unknown_key(&entry.key, Vec::new()).also_known(self.also)),
+            Some(entry) => Err(Fault::unknown_key(&entry.key, Vec::new()).also_known(self.also.map(str::to_string))),
         }
     }
 

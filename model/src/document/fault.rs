@@ -129,10 +129,26 @@ impl Fault {
         self
     }
 
-    /// The same, if a key is unknown, with one more that is known.
-    pub(super) fn also_known(mut self, key: Option<&'static str>) -> Fault {
+    /// The key that is unknown, if that is the fault.
+    pub(super) fn unknown(&self) -> Option<&str> {
+        match &self.finding {
+            Finding::UnknownKey { key, .. } => Some(key),
+            _ => None,
+        }
+    }
+
+    /// The same, if a key is unknown, with more that are known.
+    pub(super) fn also_known(mut self, keys: impl IntoIterator<Item = String>) -> Fault {
         if let Finding::UnknownKey { known, .. } = &mut self.finding {
-            known.extend(key.map(str::to_string));
+            known.extend(keys);
+        }
+        self
+    }
+
+    /// The same, if a key is absent, with what it is.
+    pub(crate) fn explained(mut self, meaning: impl Fn(&str) -> Option<String>) -> Fault {
+        if let Finding::MissingKey { key, what } = &mut self.finding {
+            *what = what.take().or_else(|| meaning(key));
         }
         self
     }

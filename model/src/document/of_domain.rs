@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::lower::effect::{SCALES, internal};
 use super::machine::{Axis, Machine};
 use super::movement::{Circle, Follow, Path, Sweep};
-use super::node::{Entries, Named, Node};
+use super::node::{Named, Node};
 use super::test::Test;
 use super::value::{Length, Positive, Three};
 use super::{effect, node};
@@ -104,27 +104,27 @@ pub fn test(test: &DomainTest, machine: &chain::Machine) -> Option<Test> {
     };
     let (moved, sweep, path) = motion(test.motion.as_ref()?, machine)?;
     let point = |mm: [f64; 3]| mm.map(number).into_iter().collect::<Node>();
-    let mut set_up = Entries::default();
-    set_up.push("bar_mm", number(bar.bar));
-    set_up.push("workpiece_ball_mm", point(bar.workpiece_ball));
-    set_up.push("spindle_ball_mm", point(bar.spindle_ball));
+    let mut set_up = Node::table::<Node>([]);
+    set_up.set("bar_mm", number(bar.bar));
+    set_up.set("workpiece_ball_mm", point(bar.workpiece_ball));
+    set_up.set("spindle_ball_mm", point(bar.spindle_ball));
     let u = |range: Range<usize>| -> Vec<f64> {
         test.priors.get(range).unwrap_or_default().iter().map(|prior| uncertainty_um(*prior)).collect()
     };
     for (key, range) in [("workpiece_ball_u_um", 0..3), ("spindle_ball_u_um", 3..6)] {
         let u = u(range);
         if u.iter().any(|u| *u != 0.0) {
-            set_up.push(key, node::Node::from_iter(u));
+            set_up.set(key, node::Node::from_iter(u));
         }
     }
     if let [u] = u(BAR..BAR + 1)[..]
         && u != 0.0
     {
-        set_up.push("bar_u_um", u);
+        set_up.set("bar_u_um", u);
     }
     let stated = |set_up: &String| (*set_up != test.name).then(|| set_up.clone());
     if let Some(name) = stated(&test.bar_setup) {
-        set_up.push("bar_setup", name.as_str());
+        set_up.set("bar_setup", name.as_str());
     }
     let held = (0..machine.axes.len())
         .filter(|axis| !moved.contains(axis))

@@ -12,7 +12,6 @@ use crate::driver::{Driver, unit_suffixes};
 use crate::effect::keys::{Key, KeyForm};
 use crate::effect::shape::{Entry, SHAPES};
 use crate::instrument::InstrumentKind;
-use crate::instrument::set_up::{SetUpForm, SetUpKey};
 
 /// Schema of `machine.toml`.
 pub fn machine() -> Value {
@@ -38,8 +37,7 @@ pub fn session() -> Value {
 
 /// The keys of a type's own fields.
 pub fn fields<T: JsonSchema>() -> Vec<String> {
-    let properties = schema_of::<T>("")["properties"].as_object().cloned();
-    properties.unwrap_or_default().into_iter().map(|(key, _)| key).collect()
+    properties::<T>().into_iter().map(|(key, _)| key).collect()
 }
 
 /// The keys of a shape, with the suffix of every unit.
@@ -60,13 +58,20 @@ pub(crate) fn meaning(path: &[Step], key: &str) -> Option<String> {
         });
         tables.into_iter().find_map(|table| table["properties"].get(key))
     })?;
-    let text = property["description"].as_str()?.trim_end_matches('.').to_string();
+    property["description"].as_str().map(as_end)
+}
+
+/// A description as the end of a sentence.
+fn as_end(text: &str) -> String {
+    let text = text.trim_end_matches('.');
     let mut letters = text.chars();
-    let first = letters.next()?;
-    let rest = letters.as_str();
-    // An abbreviation keeps its capitals.
-    let is_word = !rest.starts_with(char::is_uppercase);
-    Some(if is_word { first.to_lowercase().chain(rest.chars()).collect() } else { text })
+    match letters.next() {
+        // An abbreviation keeps its capitals.
+        Some(first) if !letters.as_str().starts_with(char::is_uppercase) => {
+            first.to_lowercase().chain(letters).collect()
+        }
+        _ => text.to_string(),
+    }
 }
 
 /// A schema with those that it refers to or chooses between.
@@ -127,43 +132,32 @@ fn instrument_properties() -> Map<String, Value> {
     Map::from_iter([("kind".to_string(), kind)])
 }
 
-/// The keys of a test that only some instruments have. A key of several instruments has the meanings of each.
-fn test_properties() -> Map<String, Value> {
-    let all = || InstrumentKind::ALL.iter().flat_map(|kind| kind.entry().keys);
-    let mut properties = Map::new();
-    for key in all() {
-        let meanings: Vec<&str> = all().filter(|other| other.name == key.name).map(|other| other.meaning).collect();
-        let mut schema = set_up_schema(key);
-        let meanings = meanings.join("; ");
-        if meanings.starts_with(char::is_alphabetic) {
-            schema["description"] = json!(format!("{meanings}."));
-        }
-        properties.entry(key.name).or_insert(schema);
-    }
-    properties
+/// The properties of a type's own fields.
+pub(crate) fn properties<T: JsonSchema>() -> Map<String, Value> {
+    schema_of::<T>("")["properties"].as_object().cloned().unwrap_or_default()
 }
 
-fn set_up_schema(key: &SetUpKey) -> Value {
-    let three = |items: Value| json!({"type": "array", "items": items, "minItems": 3, "maxItems": 3});
-    let length = || json!({"$ref": "#/$defs/length"});
-    let u = || json!({"type": "number", "minimum": 0});
-    match key.form {
-        SetUpForm::Length => length(),
-        SetUpForm::Point => three(length()),
-        SetUpForm::Vector => three(json!({"type": "number"})),
-        SetUpForm::Vectors => three(three(json!({"type": "number"}))),
-        SetUpForm::Uncertainty => json!({
-            "type": "number", "minimum": 0,
-            "description": "Standard uncertainty, µm; 0 or absent: exactly known; inf: no prior."
-        }),
-        SetUpForm::Uncertainties => json!({
-            "anyOf": [u(), three(u())],
-            "description": "Standard uncertainty of each coordinate, µm: a number for all or three; 0 or absent: \
-                            exactly known; inf: no prior."
-        }),
-        SetUpForm::Text => json!({"type": "string"}),
-        SetUpForm::Words(words) => json!({"enum": words}),
+/// What a field of a type is, as the end of a sentence.
+pub(crate) fn description<T: JsonSchema>(key: &str) -> Option<String> {
+    properties::<T>().get(key)?["description"].as_str().map(as_end)
+}
+
+/// The keys of a test that only some instruments have. A key of several instruments has the meanings of each.
+fn test_properties() -> Map<String, Value> {
+    let mut properties: Map<String, Value> = Map::new();
+    for kind in InstrumentKind::ALL {
+        for (key, mut schema) in (kind.entry().keys)() {
+            let own = schema["description"].as_str().unwrap_or_default();
+            // An uncertainty means the same to every instrument.
+            if !key.contains("_u_") {
+                let others = properties.get(&key).and_then(|other| other["description"].as_str());
+                let others = others.map_or(String::new(), |others| format!("{}; ", others.trim_end_matches('.')));
+                schema["description"] = json!(format!("{others}{}: {}.", kind.word(), as_end(own)));
+            }
+            properties.insert(key, schema);
+        }
     }
+    properties
 }
 
 /// The properties of an effect that drivers and shapes determine: their words, and the keys of shapes.

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use serde::de::DeserializeOwned;
 use toml::de::DeTable;
 
-use super::de::from_node;
+use super::de::{LIST, from_node};
 use super::fault::{Fault, Finding, Step};
 use super::node::{Entry, Node, Value};
 use super::schema;
@@ -130,7 +130,11 @@ impl Parsed<'_> {
             Finding::OfKey { what, help } => (format!("{} {what}", quoted()), help),
             Finding::OfTable { what, help } => (format!("{} {what}", self.name(&path)), help),
             Finding::Unexpected(expected) => {
-                (format!("{} is {}; {expected} is expected", quoted(), node.found()), None)
+                let help = match (&node.value, entry) {
+                    (Value::Table(_), Some(entry)) if expected == LIST => Some(format!("write [[{}]]", entry.key)),
+                    _ => None,
+                };
+                (format!("{} is {}; {expected} is expected", quoted(), node.found()), help)
             }
             Finding::UnknownKey { key, mut known } => {
                 span = node.entry(&key).map_or(span, |entry| entry.key_span.clone());

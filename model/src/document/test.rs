@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::layout::{Columns, Format};
 use super::movement::{Path, Sweep};
-use super::node::{Entries, Named};
+use super::node::{Named, Node};
 use super::value::Length;
 
 /// A test.
@@ -20,7 +20,7 @@ pub struct Test {
     /// The keys of the set-up, which depend on the instrument.
     #[serde(rename = "$rest", default)]
     #[schemars(skip)]
-    pub set_up: Entries,
+    pub set_up: Node,
     /// Tests with the same name share the workpiece ball (nest, tracker, artefact).
     pub setup: Option<String>,
     /// Tests with the same name share the spindle ball (target, stylus).

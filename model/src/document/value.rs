@@ -7,11 +7,12 @@ use std::marker::PhantomData;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{SeqAccess, Visitor, value};
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::fault::Fault;
 use crate::session::expression::{self, Constant};
 use crate::session::limits;
+use crate::words;
 
 /// mm: a number, or an expression in `[constants]` in quotes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -109,24 +110,19 @@ impl Coordinate for Length {
     const THREE: &'static str = "a list of three lengths";
 }
 
-impl Coordinate for Three<f64> {
+impl Coordinate for Direction {
     const THREE: &'static str = "a list of three directions";
 }
 
 /// Three values, one for each of X, Y and Z.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[schemars(inline)]
 pub struct Three<T>(pub [T; 3]);
 
 /// Three numbers.
 pub type Vector = Three<f64>;
 /// Three lengths, mm.
 pub type Point = Three<Length>;
-
-impl<T: Serialize> Serialize for Three<T> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_seq(&self.0)
-    }
-}
 
 impl<'de, T: Deserialize<'de> + Coordinate> Deserialize<'de> for Three<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -143,21 +139,6 @@ impl<'de, T: Deserialize<'de> + Coordinate> Deserialize<'de> for Three<T> {
             }
         }
         deserializer.deserialize_tuple(3, Of(PhantomData))
-    }
-}
-
-impl<T: JsonSchema> JsonSchema for Three<T> {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> Cow<'static, str> {
-        format!("three_{}", T::schema_name()).into()
-    }
-
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let items = generator.subschema_for::<T>();
-        json_schema!({"type": "array", "items": items, "minItems": 3, "maxItems": 3})
     }
 }
 
@@ -189,24 +170,83 @@ impl TryFrom<f64> for NotNegative {
     }
 }
 
-/// A standard uncertainty; 0: exactly known, inf: no prior.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Uncertainty(pub f64);
+/// A direction of length 1.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(try_from = "Vector")]
+#[schemars(inline)]
+pub struct Direction(pub [f64; 3]);
 
-/// A note: a text, a number or a date, as it is written.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Note(pub String);
+impl TryFrom<Vector> for Direction {
+    type Error = String;
 
-impl JsonSchema for Note {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> Cow<'static, str> {
-        "note".into()
-    }
-
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({"type": ["string", "number", "boolean"]})
+    fn try_from(Three(vector): Vector) -> Result<Direction, String> {
+        let length = vector.iter().map(|x| x * x).sum::<f64>().sqrt();
+        if length < 1e-9 { Err("zero".into()) } else { Ok(Direction(vector.map(|x| x / length))) }
     }
 }
+
+/// Any number, also `inf`.
+#[derive(Deserialize, JsonSchema)]
+#[schemars(inline)]
+pub struct Unlimited(f64);
+
+/// Standard uncertainty, µm; 0 or absent: exactly known; inf: no prior.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "Unlimited")]
+#[schemars(inline, extend("minimum" = 0))]
+pub struct Uncertainty(pub f64);
+
+impl TryFrom<Unlimited> for Uncertainty {
+    type Error = String;
+
+    fn try_from(Unlimited(u): Unlimited) -> Result<Uncertainty, String> {
+        if u < 0.0 {
+            let u = words::number(u);
+            return Err(format!("{u}; an uncertainty cannot be negative: 0 means exactly known, `inf` means unknown"));
+        }
+        limits::too_small_um(u).map_or(Ok(Uncertainty(u)), |fault| Err(format!("{fault}; 0 means exactly known")))
+    }
+}
+
+/// Standard uncertainty of each coordinate, µm: a number for all or three; 0 or absent: exactly known; inf: no prior.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[schemars(inline)]
+pub struct Uncertainties(#[schemars(with = "OneOrThree")] pub [Uncertainty; 3]);
+
+/// The forms of uncertainties in the schema.
+#[derive(JsonSchema)]
+#[schemars(inline, untagged)]
+#[allow(dead_code, reason = "the schema alone uses it")]
+enum OneOrThree {
+    One(Uncertainty),
+    Three(Three<Uncertainty>),
+}
+
+impl<'de> Deserialize<'de> for Uncertainties {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct OneOrThree;
+        impl<'de> Visitor<'de> for OneOrThree {
+            type Value = Uncertainties;
+
+            fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+                formatter.write_str("a number or a list of three")
+            }
+
+            fn visit_f64<E: serde::de::Error>(self, u: f64) -> Result<Uncertainties, E> {
+                Uncertainty::try_from(Unlimited(u)).map(|u| Uncertainties([u; 3])).map_err(E::custom)
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, items: A) -> Result<Uncertainties, A::Error> {
+                let u: Vec<Uncertainty> = Deserialize::deserialize(value::SeqAccessDeserializer::new(items))?;
+                let count = u.len();
+                u.try_into().map(Uncertainties).map_err(|_| serde::de::Error::invalid_length(count, &self))
+            }
+        }
+        deserializer.deserialize_any(OneOrThree)
+    }
+}
+
+/// A note: a text, a number or a date, as it is written.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[schemars(inline, extend("type" = ["string", "number", "boolean"]))]
+pub struct Note(pub String);

@@ -3,18 +3,23 @@
 //! The reading refers to the stated length of the bar: a bar that is `δ` longer than stated reads `L − δ`. A sensor
 //! with the gain error `k` adds `k·(L − L_bar)`.
 
+use schemars::JsonSchema;
+use serde::Deserialize;
+
 use super::column::{Column, Quantity};
 use super::kind::{MAX_MM, median};
-use super::set_up::{Balls, SetUp, SetUpForm, SetUpKey, SetUpReader};
+use super::set_up::{self, SetUp};
 use super::{
     Checked, Entry, Fault, Following, Geometry, Instrument, InstrumentKind, InstrumentParameter, InternalUnit, Reading,
     SharedBy, Station, default_errors, displaced, point,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
-use crate::document::Fault as KeyFault;
+use crate::document::node::Node;
+use crate::document::{Fault as KeyFault, schema, value as document};
 use crate::frames::Point;
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
+use crate::session::expression::Constant;
 
 /// Both balls, the length of the bar, the gain of the sensor.
 pub const PARAMETERS: [InstrumentParameter; 8] = [
@@ -44,15 +49,7 @@ pub(super) const ENTRY: Entry = Entry {
     needs_every_axis: false,
     default_errors: default_errors::positions_and_orientations,
     spindle_setup: None,
-    keys: &[
-        SetUpKey::new("bar_mm", SetUpForm::Length, "ballbar: calibrated length"),
-        SetUpKey::new("bar_u_um", SetUpForm::Uncertainty, ""),
-        SetUpKey::new("workpiece_ball_mm", SetUpForm::Point, "ballbar: workpiece ball in the table frame"),
-        SetUpKey::new("workpiece_ball_u_um", SetUpForm::Uncertainties, ""),
-        SetUpKey::new("spindle_ball_mm", SetUpForm::Point, "ballbar: spindle ball in the tool frame"),
-        SetUpKey::new("spindle_ball_u_um", SetUpForm::Uncertainties, ""),
-        SetUpKey::new("bar_setup", SetUpForm::Text, "ballbar: tests with the same name share the assembled bar"),
-    ],
+    keys: schema::properties::<Keys>,
     read,
 };
 
@@ -63,13 +60,36 @@ const COLUMNS: [Column; 2] =
 /// Balls that are closer to each other than this coincide, mm.
 const MIN_MM: f64 = 1e-6;
 
-fn read(keys: &SetUpReader<'_>) -> Result<SetUp, KeyFault> {
-    let bar = keys.positive_length("bar_mm", "the calibrated length of the bar")?;
-    let Balls { workpiece_ball, spindle_ball, mut priors } = Balls::read(keys)?;
-    priors.extend(keys.priors("bar_u_um", 1)?);
-    priors.push(Prior::Known); // gain of the sensor
+/// The keys of a test.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Keys {
+    /// Calibrated length.
+    bar_mm: document::Length,
+    #[serde(default)]
+    bar_u_um: document::Uncertainty,
+    /// Workpiece ball in the table frame, such as [0, 100, 0].
+    workpiece_ball_mm: document::Point,
+    #[serde(default)]
+    workpiece_ball_u_um: document::Uncertainties,
+    /// Spindle ball in the tool frame, such as [0, 0, 0].
+    spindle_ball_mm: document::Point,
+    #[serde(default)]
+    spindle_ball_u_um: document::Uncertainties,
+    /// Tests with the same name share the assembled bar.
+    bar_setup: Option<String>,
+}
+
+fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
+    let keys: Keys = set_up::keys(set_up)?;
+    let bar = set_up::positive("bar_mm", &keys.bar_mm, constants)?;
+    let workpiece_ball = set_up::point("workpiece_ball_mm", &keys.workpiece_ball_mm, constants)?;
+    let spindle_ball = set_up::point("spindle_ball_mm", &keys.spindle_ball_mm, constants)?;
+    let balls = set_up::lengths(&keys.workpiece_ball_u_um).chain(set_up::lengths(&keys.spindle_ball_u_um));
+    // The bar, and the gain of its sensor.
+    let priors = balls.chain([set_up::length(keys.bar_u_um), Prior::Known]).collect();
     let station = Station::BallBar(BallBar { workpiece_ball, spindle_ball, bar });
-    Ok(SetUp { station, priors, socket: None })
+    Ok(SetUp { bar_setup: keys.bar_setup, ..SetUp::new(station, priors) })
 }
 
 /// A ball bar as set up for one test, lengths in mm.

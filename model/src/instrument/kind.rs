@@ -3,12 +3,14 @@
 use nalgebra::Vector3;
 
 use super::column::{Column, Quantity};
-use super::set_up::{SetUp, SetUpKey, SetUpReader};
+use super::set_up::SetUp;
 use super::{InstrumentKind, InstrumentParameter, Reading, SharedBy, Station};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::component::ErrorName;
 use crate::document::Fault as KeyFault;
+use crate::document::node::Node;
 use crate::scalar::{Nominal, Scalar};
+use crate::session::expression::Constant;
 use crate::session::readings::Readings;
 
 /// An instrument in the registry: what is known of it without a set-up.
@@ -35,10 +37,10 @@ pub struct Entry {
     /// The name that all tests share for the mounted object in the tool frame if a session states none; `None`: it is
     /// mounted for each test.
     pub spindle_setup: Option<&'static str>,
-    /// The keys of a test that only some instruments have.
-    pub keys: &'static [SetUpKey],
-    /// Reads the set-up of a test.
-    pub read: fn(&SetUpReader<'_>) -> Result<SetUp, KeyFault>,
+    /// The schemas of the keys of a test that only some instruments have.
+    pub keys: fn() -> serde_json::Map<String, serde_json::Value>,
+    /// Reads the set-up of a test, whose lengths may be expressions in the constants.
+    pub read: fn(&Node, &[Constant]) -> Result<SetUp, KeyFault>,
 }
 
 /// The nominal geometry of an instrument over an open number.

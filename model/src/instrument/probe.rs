@@ -12,18 +12,23 @@
 //! lies ahead. A form deviation of `w` outwards reduces the distance by `w`. The "measured radius less the target" of
 //! the literature is `−d`.
 
+use schemars::JsonSchema;
+use serde::Deserialize;
+
 use super::column::{Column, Quantity};
 use super::kind::MAX_MM;
-use super::set_up::{SetUp, SetUpForm, SetUpKey, SetUpReader, Written};
+use super::set_up::{self, SetUp, Written};
 use super::{
     Checked, Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
     default_errors, displaced, point, pose_error,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
-use crate::document::Fault as KeyFault;
+use crate::document::node::Node;
+use crate::document::{Fault as KeyFault, schema, value as document};
 use crate::frames::Point;
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
+use crate::session::expression::Constant;
 
 /// The pose of the artefact on the table, its radius, its form deviation; the stylus in the tool frame.
 pub const PARAMETERS: [InstrumentParameter; 11] = [
@@ -58,29 +63,7 @@ pub(super) const ENTRY: Entry = Entry {
     needs_every_axis: true,
     default_errors: default_errors::positions_and_orientations,
     spindle_setup: None,
-    keys: &[
-        SetUpKey::new("artefact_mm", SetUpForm::Point, "probe: a point of the cylinder's axis in the table frame"),
-        SetUpKey::new("artefact_u_um", SetUpForm::Uncertainties, ""),
-        SetUpKey::new(
-            "artefact_u_arcsec",
-            SetUpForm::Uncertainties,
-            "Standard uncertainty of the cylinder's direction, arcsec",
-        ),
-        SetUpKey::new(
-            "artefact_axis",
-            SetUpForm::Vector,
-            "probe: direction of the cylinder in the table frame; default [0, 0, 1]",
-        ),
-        SetUpKey::new("radius_mm", SetUpForm::Length, "probe: radius of the cylinder plus that of the stylus"),
-        SetUpKey::new("radius_u_um", SetUpForm::Uncertainty, ""),
-        SetUpKey::new("stylus_mm", SetUpForm::Point, "probe: centre of the stylus in the tool frame"),
-        SetUpKey::new("stylus_u_um", SetUpForm::Uncertainties, ""),
-        SetUpKey::new(
-            "direction",
-            SetUpForm::Vector,
-            "probe: probing direction in R; default: straight towards the axis",
-        ),
-    ],
+    keys: schema::properties::<Keys>,
     read,
 };
 
@@ -88,19 +71,43 @@ pub(super) const ENTRY: Entry = Entry {
 const COLUMNS: [Column; 2] =
     [Column::new("distance", "mm", Quantity::Length), Column::new("deviation", "um", Quantity::Outward)];
 
-fn read(keys: &SetUpReader<'_>) -> Result<SetUp, KeyFault> {
-    let artefact = keys.point("artefact_mm", "a point of the cylinder's axis in the table frame")?;
-    let radius = keys.positive_length("radius_mm", "the radius of the cylinder plus that of the stylus")?;
-    let stylus = keys.point("stylus_mm", "the stylus' centre in the tool frame")?;
-    let axis = keys.direction("artefact_axis")?.unwrap_or([0.0, 0.0, 1.0]).map(Written::number);
-    let direction = keys.direction("direction")?.map(|direction| direction.map(Written::number));
-    let mut priors = keys.priors("artefact_u_um", 3)?;
-    priors.extend(keys.angle_priors("artefact_u_arcsec")?);
-    priors.extend(keys.priors("radius_u_um", 1)?);
-    priors.push(Prior::Known); // form deviation
-    priors.extend(keys.priors("stylus_u_um", 3)?);
-    let station = Station::Probe(Probe { artefact, axis, radius, stylus, direction });
-    Ok(SetUp { station, priors, socket: None })
+/// The keys of a test.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Keys {
+    /// A point of the cylinder's axis in the table frame.
+    artefact_mm: document::Point,
+    #[serde(default)]
+    artefact_u_um: document::Uncertainties,
+    /// Standard uncertainty of the cylinder's direction, arcsec.
+    #[serde(default)]
+    artefact_u_arcsec: document::Uncertainties,
+    /// Direction of the cylinder in the table frame; default [0, 0, 1].
+    artefact_axis: Option<document::Direction>,
+    /// Radius of the cylinder plus that of the stylus.
+    radius_mm: document::Length,
+    #[serde(default)]
+    radius_u_um: document::Uncertainty,
+    /// Centre of the stylus in the tool frame.
+    stylus_mm: document::Point,
+    #[serde(default)]
+    stylus_u_um: document::Uncertainties,
+    /// Probing direction in R; default: straight towards the axis.
+    direction: Option<document::Direction>,
+}
+
+fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
+    let keys: Keys = set_up::keys(set_up)?;
+    let artefact = set_up::point("artefact_mm", &keys.artefact_mm, constants)?;
+    let radius = set_up::positive("radius_mm", &keys.radius_mm, constants)?;
+    let stylus = set_up::point("stylus_mm", &keys.stylus_mm, constants)?;
+    let axis = keys.artefact_axis.map_or([0.0, 0.0, 1.0], |axis| axis.0).map(Written::number);
+    let direction = keys.direction.map(|direction| direction.0.map(Written::number));
+    let artefact_priors = set_up::lengths(&keys.artefact_u_um).chain(set_up::angles(&keys.artefact_u_arcsec));
+    // The radius, and the deviation of form.
+    let priors = artefact_priors.chain([set_up::length(keys.radius_u_um), Prior::Known]);
+    let priors = priors.chain(set_up::lengths(&keys.stylus_u_um)).collect();
+    Ok(SetUp::new(Station::Probe(Probe { artefact, axis, radius, stylus, direction }), priors))
 }
 
 /// A probe and a cylindrical artefact as set up for one test, lengths in mm.

@@ -14,17 +14,22 @@
 //! Section 4: sensor outputs become machine coordinates by `R = R_φ·R_θ·R_ω` (Eqs. 1–3). The matrices above Eq. 1 are
 //! printed in a different order from the expanded equations and the text.
 
+use schemars::JsonSchema;
+use serde::Deserialize;
+
 use super::column::{Column, Quantity};
 use super::kind::{MAX_MM, median};
-use super::set_up::{Balls, SetUp, SetUpForm, SetUpKey, SetUpReader, Written};
+use super::set_up::{self, SetUp, Written};
 use super::{
     Checked, Entry, Fault, Following, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy,
     Station, default_errors, displaced, point,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
-use crate::document::Fault as KeyFault;
+use crate::document::node::Node;
+use crate::document::{Fault as KeyFault, schema, value as document};
 use crate::frames::{Coordinate, Point, Rotation, SinCos, cross, turn_about};
 use crate::scalar::{Nominal, Scalar};
+use crate::session::expression::Constant;
 
 /// Both points, then ω₁, φ₁ and θ₁ of the nest.
 pub const PARAMETERS: [InstrumentParameter; 9] = [
@@ -53,32 +58,7 @@ pub(super) const ENTRY: Entry = Entry {
     needs_every_axis: true,
     default_errors: default_errors::positions_and_orientations,
     spindle_setup: None,
-    keys: &[
-        SetUpKey::new(
-            "setting",
-            SetUpForm::Words(&["E", "Es"]),
-            "r-test: sensors on the table (E) or in the spindle (Es)",
-        ),
-        SetUpKey::new("workpiece_ball_mm", SetUpForm::Point, "r-test: master ball or centre of the nest on the table"),
-        SetUpKey::new("workpiece_ball_u_um", SetUpForm::Uncertainties, ""),
-        SetUpKey::new("spindle_ball_mm", SetUpForm::Point, "r-test: master ball or centre of the nest in the spindle"),
-        SetUpKey::new("spindle_ball_u_um", SetUpForm::Uncertainties, ""),
-        SetUpKey::new(
-            "sensor_angles_deg",
-            SetUpForm::Vector,
-            "r-test: omega, phi, theta of the sensors; readings are then the values of the single sensors",
-        ),
-        SetUpKey::new(
-            "sensor_directions",
-            SetUpForm::Vectors,
-            "r-test: the direction of each sensor in the frame that carries them, instead of the angles",
-        ),
-        SetUpKey::new(
-            "sensor_u_arcsec",
-            SetUpForm::Uncertainties,
-            "Standard uncertainty of the sensors' orientation, arcsec",
-        ),
-    ],
+    keys: schema::properties::<Keys>,
     read,
 };
 
@@ -89,27 +69,64 @@ const SENSORS: [Column; 3] = Column::vector(["du", "dv", "dw"], "um");
 /// Least triple product of three measuring directions. Below it, one coordinate has twenty times the noise.
 const MIN_VOLUME: f64 = 0.05;
 
-fn read(keys: &SetUpReader<'_>) -> Result<SetUp, KeyFault> {
-    let settings = "\"E\" (sensors on the table) or \"Es\" (sensors in the spindle)";
-    let setting = [Setting::Table, Setting::Spindle][keys.choice("setting", settings, &["E", "Es"])?];
-    let Balls { workpiece_ball, spindle_ball, mut priors } = Balls::read(keys)?;
-    let sensors = read_sensors(keys)?.map(|rows| rows.map(|row| row.map(Written::number)));
-    priors.extend(keys.angle_priors("sensor_u_arcsec")?);
-    let station = Station::RTest(RTest { setting, workpiece_ball, spindle_ball, sensors });
-    Ok(SetUp { station, priors, socket: None })
+/// The keys of a test.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Keys {
+    /// Sensors on the table ("E") or in the spindle ("Es").
+    setting: Setting,
+    /// Master ball or centre of the nest on the table, in the table frame, such as [0, 100, 0].
+    workpiece_ball_mm: document::Point,
+    #[serde(default)]
+    workpiece_ball_u_um: document::Uncertainties,
+    /// Master ball or centre of the nest in the spindle, in the tool frame, such as [0, 0, 0].
+    spindle_ball_mm: document::Point,
+    #[serde(default)]
+    spindle_ball_u_um: document::Uncertainties,
+    /// Omega, phi, theta of the sensors; readings are then the values of the single sensors.
+    sensor_angles_deg: Option<document::Three<Degrees>>,
+    /// The direction of each sensor in the frame that carries them, instead of the angles.
+    sensor_directions: Option<document::Three<document::Direction>>,
+    /// Standard uncertainty of the sensors' orientation, arcsec.
+    #[serde(default)]
+    sensor_u_arcsec: document::Uncertainties,
+}
+
+/// One of three angles.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[schemars(inline)]
+struct Degrees(f64);
+
+impl document::Coordinate for Degrees {
+    const THREE: &'static str = "the three angles ω, φ, θ";
+}
+
+fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
+    let keys: Keys = set_up::keys(set_up)?;
+    let workpiece_ball = set_up::point("workpiece_ball_mm", &keys.workpiece_ball_mm, constants)?;
+    let spindle_ball = set_up::point("spindle_ball_mm", &keys.spindle_ball_mm, constants)?;
+    let sensors = read_sensors(&keys)?.map(|rows| rows.map(|row| row.map(Written::number)));
+    let balls = set_up::lengths(&keys.workpiece_ball_u_um).chain(set_up::lengths(&keys.spindle_ball_u_um));
+    let priors = balls.chain(set_up::angles(&keys.sensor_u_arcsec)).collect();
+    let station = Station::RTest(RTest { setting: keys.setting, workpiece_ball, spindle_ball, sensors });
+    Ok(SetUp::new(station, priors))
 }
 
 /// The measuring directions of three sensors: from ω, φ, θ, or stated; `None` if readings are in X, Y, Z.
-fn read_sensors(keys: &SetUpReader<'_>) -> Result<Option<[[f64; 3]; 3]>, KeyFault> {
-    let help = "keep one of them: either states the measuring directions of the sensors";
-    keys.not_both("sensor_angles_deg", "sensor_directions", help)?;
-    if let Some(angles) = keys.three_angles("sensor_angles_deg", "the three angles ω, φ, θ")? {
-        let orientation = Orientation::new(angles, Rotation::Exact);
-        let unit = |i: usize| Point(std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
-        return Ok(Some(std::array::from_fn(|i| orientation.to_machine(unit(i)).0)));
-    }
-    let Some([a, b, c]) = keys.three_directions("sensor_directions")? else {
-        return Ok(None);
+fn read_sensors(keys: &Keys) -> Result<Option<[[f64; 3]; 3]>, KeyFault> {
+    let [a, b, c] = match (&keys.sensor_angles_deg, &keys.sensor_directions) {
+        (None, None) => return Ok(None),
+        (Some(document::Three(angles)), None) => {
+            let orientation = Orientation::new(angles.map(|angle| angle.0.to_radians()), Rotation::Exact);
+            let unit = |i: usize| Point(std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
+            return Ok(Some(std::array::from_fn(|i| orientation.to_machine(unit(i)).0)));
+        }
+        (None, Some(document::Three(directions))) => directions.map(|direction| direction.0),
+        (Some(_), Some(_)) => {
+            let help = "keep one of them: either states the measuring directions of the sensors";
+            let message = "both `sensor_angles_deg` and `sensor_directions`";
+            return Err(KeyFault::new(message, help).on_key().at("sensor_directions"));
+        }
     };
     let normal = cross(a, Point(b)).0;
     let volume: f64 = (0..3).map(|i| normal[i] * c[i]).sum();
@@ -125,12 +142,28 @@ fn read_sensors(keys: &SetUpReader<'_>) -> Result<Option<[[f64; 3]; 3]>, KeyFaul
 }
 
 /// The body that carries the sensors.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(try_from = "String")]
+#[schemars(inline, extend("enum" = ["E", "Es"]))]
 pub enum Setting {
     /// E: the sensors on the table, the master ball in the spindle.
     Table,
     /// Es: the sensors in the spindle, the master ball on the table.
     Spindle,
+}
+
+impl TryFrom<String> for Setting {
+    type Error = String;
+
+    fn try_from(word: String) -> Result<Setting, String> {
+        match word.as_str() {
+            "E" => Ok(Setting::Table),
+            "Es" => Ok(Setting::Spindle),
+            _ => Err(format!(
+                "the text \"{word}\"; \"E\" (sensors on the table) or \"Es\" (sensors in the spindle) is expected"
+            )),
+        }
+    }
 }
 
 /// An R-test as set up for one test, lengths in mm.

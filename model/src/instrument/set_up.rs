@@ -1,16 +1,17 @@
-//! The set-up of an instrument in files: the keys of a test that only some instruments have, and how they are read.
+//! The set-up of an instrument in files: the keys of a test that only some instruments have. Each instrument states its
+//! own as a type of documents.
+
+use schemars::JsonSchema;
+use serde::de::DeserializeOwned;
 
 use super::Station;
-use serde::Deserialize;
-
 use crate::document::fault::{Fault, Within};
-use crate::document::from_node;
-use crate::document::node::{Entries, Value};
-use crate::document::value::{self as document, Point, Three, Uncertainty, Vector};
+use crate::document::node::Node;
+use crate::document::value::{self as document, Point, Three, Uncertainties, Uncertainty};
+use crate::document::{from_node, schema};
 use crate::session::Prior;
 use crate::session::expression::{Constant, Length};
 use crate::session::limits;
-use crate::words;
 
 /// A micrometre in mm.
 const MICROMETRE: f64 = 1e-3;
@@ -39,244 +40,59 @@ pub struct SetUp {
     pub priors: Vec<Prior>,
     /// The socket, if the test states one.
     pub socket: Option<String>,
+    /// The group of tests that share the assembled bar, if the test states one.
+    pub bar_setup: Option<String>,
 }
 
-/// What a key of a set-up holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SetUpForm {
-    /// A length, mm.
-    Length,
-    /// Three lengths, mm.
-    Point,
-    /// Three numbers.
-    Vector,
-    /// A list of three vectors.
-    Vectors,
-    /// The standard uncertainty of one quantity.
-    Uncertainty,
-    /// The standard uncertainty of three quantities: one number or three.
-    Uncertainties,
-    /// A text.
-    Text,
-    /// One of these words.
-    Words(&'static [&'static str]),
-}
-
-/// A key of a set-up.
-#[derive(Clone, Copy, Debug)]
-pub struct SetUpKey {
-    /// The key.
-    pub name: &'static str,
-    /// What it holds.
-    pub form: SetUpForm,
-    /// Its description in the schema without a full stop, or empty.
-    pub meaning: &'static str,
-}
-
-impl SetUpKey {
-    pub(super) const fn new(name: &'static str, form: SetUpForm, meaning: &'static str) -> SetUpKey {
-        SetUpKey { name, form, meaning }
+impl SetUp {
+    /// A set-up without a socket and without a group of its own.
+    pub(super) fn new(station: Station<Written>, priors: Vec<Prior>) -> SetUp {
+        SetUp { station, priors, socket: None, bar_setup: None }
     }
 }
 
-/// Reads the keys of a set-up. A fault has the path of its key; `what` says what to add if a required key is absent.
-#[derive(Debug)]
-pub struct SetUpReader<'e> {
-    entries: &'e Entries,
-    constants: &'e [Constant],
+/// The keys of a set-up. A missing one is explained by its documentation.
+pub(super) fn keys<T: DeserializeOwned + JsonSchema>(set_up: &Node) -> Result<T, Fault> {
+    from_node(set_up).map_err(|fault| fault.explained(|key| schema::description::<T>(key)))
 }
 
-impl<'e> SetUpReader<'e> {
-    /// The keys of a set-up whose lengths may be expressions in the constants.
-    pub fn new(entries: &'e Entries, constants: &'e [Constant]) -> SetUpReader<'e> {
-        SetUpReader { entries, constants }
-    }
-
-    fn get<T: Deserialize<'e>>(&self, key: &str) -> Result<Option<T>, Fault> {
-        self.entries.get(key).map(|node| from_node(node).within(key)).transpose()
-    }
-
-    fn require<T: Deserialize<'e>>(&self, key: &str, what: &str) -> Result<T, Fault> {
-        self.get(key)?.ok_or_else(|| Fault::missing(key, what))
-    }
-
-    fn written(&self, length: &document::Length) -> Result<Written, Fault> {
-        let (length, mm) = length.in_mm(self.constants)?;
-        Ok(Written { length, mm })
-    }
-
-    fn coordinates(&self, key: &str, point: &Point) -> Result<[Written; 3], Fault> {
-        let mut coordinates = [const { Written::number(0.0) }; 3];
-        for (item, (coordinate, length)) in coordinates.iter_mut().zip(&point.0).enumerate() {
-            *coordinate = self.written(length).within_item(item).within(key)?;
-        }
-        Ok(coordinates)
-    }
-
-    /// A length above zero.
-    ///
-    /// # Errors
-    /// If it is absent, no length or not above zero.
-    pub fn positive_length(&self, key: &str, what: &str) -> Result<Written, Fault> {
-        let length = self.written(&self.require(key, what)?).within(key)?;
-        limits::positive(length.mm).within(key)?;
-        Ok(length)
-    }
-
-    /// A point.
-    ///
-    /// # Errors
-    /// If it is absent or not three lengths.
-    pub fn point(&self, key: &str, what: &str) -> Result<[Written; 3], Fault> {
-        self.coordinates(key, &self.require(key, what)?)
-    }
-
-    /// A point that need not be stated.
-    ///
-    /// # Errors
-    /// If it is not three lengths.
-    pub fn stated_point(&self, key: &str) -> Result<Option<[Written; 3]>, Fault> {
-        self.get(key)?.map(|point| self.coordinates(key, &point)).transpose()
-    }
-
-    /// A direction of three numbers, normalised to unit length.
-    ///
-    /// # Errors
-    /// If it is not three numbers, or zero.
-    pub fn direction(&self, key: &str) -> Result<Option<[f64; 3]>, Fault> {
-        self.get::<Vector>(key)?.map(|vector| unit(&vector).within(key)).transpose()
-    }
-
-    /// Three directions, normalised to unit length.
-    ///
-    /// # Errors
-    /// As [`SetUpReader::direction`].
-    pub fn three_directions(&self, key: &str) -> Result<Option<[[f64; 3]; 3]>, Fault> {
-        let Some(vectors) = self.get::<Three<Vector>>(key)? else { return Ok(None) };
-        let mut rows = [[0.0; 3]; 3];
-        for (item, (row, vector)) in rows.iter_mut().zip(&vectors.0).enumerate() {
-            *row = unit(vector).within_item(item).within(key)?;
-        }
-        Ok(Some(rows))
-    }
-
-    /// Three angles, converted from degrees to radians.
-    ///
-    /// # Errors
-    /// If it is not three numbers; `what` names them.
-    pub fn three_angles(&self, key: &str, what: &str) -> Result<Option<[f64; 3]>, Fault> {
-        match self.get::<Vec<f64>>(key)?.map(<[f64; 3]>::try_from) {
-            None => Ok(None),
-            Some(Ok(degrees)) => Ok(Some(degrees.map(f64::to_radians))),
-            Some(Err(_)) => Err(Fault::unexpected(what).at(key)),
-        }
-    }
-
-    /// The place of one of the words in their list.
-    ///
-    /// # Errors
-    /// If it is absent or another word; `what` says which words there are.
-    pub fn choice(&self, key: &str, what: &str, words: &[&str]) -> Result<usize, Fault> {
-        let text: String = self.require(key, what)?;
-        words.iter().position(|word| *word == text).ok_or_else(|| Fault::unexpected(what).at(key))
-    }
-
-    /// A text.
-    ///
-    /// # Errors
-    /// If it is none.
-    pub fn text(&self, key: &str) -> Result<Option<String>, Fault> {
-        self.get(key)
-    }
-
-    /// `…_u_um`: a number for all coordinates or a list with one for each. Absent or 0 is known, `inf` is no prior.
-    ///
-    /// # Errors
-    /// If it is neither, or negative.
-    pub fn priors(&self, key: &str, count: usize) -> Result<Vec<Prior>, Fault> {
-        let Some(node) = self.entries.get(key) else {
-            return Ok(vec![Prior::Known; count]);
-        };
-        if !matches!(node.value, Value::List(_)) {
-            return Ok(vec![from_node(node).and_then(prior).within(key)?; count]);
-        }
-        if count == 1 {
-            return Err(Fault::unexpected("a number").at(key));
-        }
-        if node.items().len() != count {
-            return Err(Fault::unexpected("a number or a list of three").at(key));
-        }
-        let items = node.items().iter().enumerate();
-        items.map(|(item, node)| from_node(node).and_then(prior).within_item(item).within(key)).collect()
-    }
-
-    /// `…_u_arcsec` of three angles, as [`SetUpReader::priors`].
-    ///
-    /// # Errors
-    /// As [`SetUpReader::priors`].
-    pub fn angle_priors(&self, key: &str) -> Result<Vec<Prior>, Fault> {
-        const ARCSECOND: f64 = std::f64::consts::PI / (180.0 * 3600.0);
-        let in_mm = self.priors(key, 3)?.into_iter();
-        Ok(in_mm
-            .map(|prior| match prior {
-                Prior::Gaussian(u) => Prior::Gaussian(u / MICROMETRE * ARCSECOND),
-                other => other,
-            })
-            .collect())
-    }
-
-    /// Refuses two keys of which a test has at most one.
-    ///
-    /// # Errors
-    /// If it has both.
-    pub fn not_both(&self, first: &str, second: &str, help: &str) -> Result<(), Fault> {
-        match (self.entries.get(first), self.entries.get(second)) {
-            (Some(_), Some(_)) => {
-                let message = format!("both `{first}` and `{second}`");
-                Err(Fault::new(message, help).on_key().at(second))
-            }
-            _ => Ok(()),
-        }
-    }
+/// A length above zero.
+pub(super) fn positive(key: &str, length: &document::Length, constants: &[Constant]) -> Result<Written, Fault> {
+    let (length, mm) = length.in_mm(constants).within(key)?;
+    limits::positive(mm).within(key)?;
+    Ok(Written { length, mm })
 }
 
-/// A direction, normalised to unit length.
-fn unit(vector: &Vector) -> Result<[f64; 3], Fault> {
-    let length = vector.0.iter().map(|x| x * x).sum::<f64>().sqrt();
-    if length < 1e-9 { Err(Fault::is("zero")) } else { Ok(vector.0.map(|x| x / length)) }
-}
-
-fn prior(Uncertainty(u): Uncertainty) -> Result<Prior, Fault> {
-    if u < 0.0 {
-        let help = "0 means exactly known, `inf` means unknown";
-        return Err(Fault::of_key(format!("is {}; an uncertainty cannot be negative", words::number(u)), help));
+/// A point.
+pub(super) fn point(key: &str, Three(point): &Point, constants: &[Constant]) -> Result<[Written; 3], Fault> {
+    let mut coordinates = [const { Written::number(0.0) }; 3];
+    for (item, (coordinate, length)) in coordinates.iter_mut().zip(point).enumerate() {
+        let (length, mm) = length.in_mm(constants).within_item(item).within(key)?;
+        *coordinate = Written { length, mm };
     }
-    if let Some(fault) = limits::too_small_um(u) {
-        return Err(Fault::of_key(format!("is {fault}"), "0 means exactly known"));
-    }
-    Ok(if u == 0.0 {
-        Prior::Known
-    } else if u.is_infinite() {
-        Prior::Free
-    } else {
-        Prior::Gaussian(u * MICROMETRE)
-    })
+    Ok(coordinates)
 }
 
-/// The points on the table and in the spindle of a ball bar or an R-test, and their priors.
-pub(super) struct Balls {
-    pub workpiece_ball: [Written; 3],
-    pub spindle_ball: [Written; 3],
-    pub priors: Vec<Prior>,
+/// Priors of lengths from their uncertainties, µm.
+pub(super) fn lengths(Uncertainties(u): &Uncertainties) -> impl Iterator<Item = Prior> {
+    u.map(length).into_iter()
 }
 
-impl Balls {
-    pub fn read(keys: &SetUpReader<'_>) -> Result<Balls, Fault> {
-        let workpiece_ball =
-            keys.point("workpiece_ball_mm", "the workpiece ball in the table frame, such as [0, 100, 0]")?;
-        let spindle_ball = keys.point("spindle_ball_mm", "the spindle ball in the tool frame, such as [0, 0, 0]")?;
-        let mut priors = keys.priors("workpiece_ball_u_um", 3)?;
-        priors.extend(keys.priors("spindle_ball_u_um", 3)?);
-        Ok(Balls { workpiece_ball, spindle_ball, priors })
+/// The prior of a length from its uncertainty, µm.
+pub(super) fn length(u: Uncertainty) -> Prior {
+    prior(u, MICROMETRE)
+}
+
+/// Priors of angles from their uncertainties, arcsec.
+pub(super) fn angles(Uncertainties(u): &Uncertainties) -> impl Iterator<Item = Prior> {
+    const ARCSECOND: f64 = std::f64::consts::PI / (180.0 * 3600.0);
+    u.map(|u| prior(u, ARCSECOND)).into_iter()
+}
+
+fn prior(Uncertainty(u): Uncertainty, unit: f64) -> Prior {
+    match u {
+        0.0 => Prior::Known,
+        u if u.is_infinite() => Prior::Free,
+        u => Prior::Gaussian(u * unit),
     }
 }

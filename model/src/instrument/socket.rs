@@ -3,17 +3,21 @@
 //! The reading is the closure `P_s − s`, the ball in R less the socket in R; the observed value is zero.
 
 use nalgebra::Vector3;
+use schemars::JsonSchema;
+use serde::Deserialize;
 
 use super::column::{Column, Quantity};
-use super::set_up::{SetUp, SetUpForm, SetUpKey, SetUpReader, Written};
+use super::set_up::{self, SetUp, Written};
 use super::{
     Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
     default_errors, displaced, point,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
-use crate::document::Fault as KeyFault;
+use crate::document::node::Node;
+use crate::document::{Fault as KeyFault, schema, value as document};
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
+use crate::session::expression::Constant;
 
 /// The socket in R, then the ball in the tool frame.
 pub const PARAMETERS: [InstrumentParameter; 6] = [
@@ -37,35 +41,40 @@ pub(super) const ENTRY: Entry = Entry {
     default_errors: default_errors::all_locations,
     // The ball at a robot's flange stays mounted from socket to socket.
     spindle_setup: Some("tool"),
-    keys: &[
-        SetUpKey::new("ball_mm", SetUpForm::Point, "socket: ball in the tool frame"),
-        SetUpKey::new("ball_u_um", SetUpForm::Uncertainties, ""),
-        SetUpKey::new("socket", SetUpForm::Text, "socket: the socket of all poses of the test"),
-        SetUpKey::new(
-            "socket_mm",
-            SetUpForm::Point,
-            "socket: where it is in R, for plans; default: the mean of the poses in the data",
-        ),
-    ],
+    keys: schema::properties::<Keys>,
     read,
 };
 
 /// The column of a socket: a pose consists of axis positions only.
 const COLUMNS: [Column; 1] = [Column::new("socket", "", Quantity::Socket)];
 
-fn read(keys: &SetUpReader<'_>) -> Result<SetUp, KeyFault> {
-    let ball = keys.point("ball_mm", "the ball in the tool frame")?;
-    let mut priors = vec![Prior::Free; 3];
-    priors.extend(keys.priors("ball_u_um", 3)?);
-    let name = keys.text("socket")?;
-    let stated = keys.stated_point("socket_mm")?;
-    if stated.is_some() && name.is_none() {
+/// The keys of a test.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Keys {
+    /// Ball in the tool frame.
+    ball_mm: document::Point,
+    #[serde(default)]
+    ball_u_um: document::Uncertainties,
+    /// The socket of all poses of the test.
+    socket: Option<String>,
+    /// Where it is in R, for plans; default: the mean of the poses in the data.
+    socket_mm: Option<document::Point>,
+}
+
+fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
+    let keys: Keys = set_up::keys(set_up)?;
+    let ball = set_up::point("ball_mm", &keys.ball_mm, constants)?;
+    let priors = [Prior::Free; 3].into_iter().chain(set_up::lengths(&keys.ball_u_um)).collect();
+    let stated = keys.socket_mm.map(|point| set_up::point("socket_mm", &point, constants)).transpose()?;
+    if stated.is_some() && keys.socket.is_none() {
         let help = "add `socket = \"…\"`, the name of the socket of all poses of the test";
         return Err(KeyFault::new("`socket_mm` without the name of the socket", help).at("socket_mm"));
     }
     let is_located = stated.is_some();
     let socket = stated.unwrap_or_else(|| [0.0; 3].map(Written::number));
-    Ok(SetUp { station: Station::Socket(Socket { ball, socket, is_located }), priors, socket: name })
+    let station = Station::Socket(Socket { ball, socket, is_located });
+    Ok(SetUp { socket: keys.socket, ..SetUp::new(station, priors) })
 }
 
 /// A ball and its socket, mm.

@@ -4,17 +4,21 @@
 //! rigid motion. `B` keeps the estimated angles small for any orientation of the tracker.
 
 use nalgebra::{Matrix3, Vector3};
+use schemars::JsonSchema;
+use serde::Deserialize;
 
 use super::column::{Column, Quantity};
-use super::set_up::{SetUp, SetUpForm, SetUpKey, SetUpReader, Written};
+use super::set_up::{self, SetUp, Written};
 use super::{
     Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
     default_errors, displaced, point, pose_error,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
-use crate::document::Fault as KeyFault;
+use crate::document::node::Node;
+use crate::document::{Fault as KeyFault, schema, value as document};
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
+use crate::session::expression::Constant;
 
 /// The pose, then the target in the tool frame.
 pub const PARAMETERS: [InstrumentParameter; 9] = [
@@ -40,23 +44,30 @@ pub(super) const ENTRY: Entry = Entry {
     needs_every_axis: true,
     default_errors: default_errors::all_locations,
     spindle_setup: None,
-    keys: &[
-        SetUpKey::new("target_mm", SetUpForm::Point, "tracker: target in the tool frame"),
-        SetUpKey::new("target_u_um", SetUpForm::Uncertainties, ""),
-    ],
+    keys: schema::properties::<Keys>,
     read,
 };
 
 /// The columns of a tracker.
 const COLUMNS: [Column; 3] = Column::vector(["px", "py", "pz"], "mm");
 
-fn read(keys: &SetUpReader<'_>) -> Result<SetUp, KeyFault> {
-    let target = keys.point("target_mm", "the target in the tool frame")?;
-    let mut priors = vec![Prior::Free; 6];
-    priors.extend(keys.priors("target_u_um", 3)?);
+/// The keys of a test.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Keys {
+    /// Target in the tool frame.
+    target_mm: document::Point,
+    #[serde(default)]
+    target_u_um: document::Uncertainties,
+}
+
+fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
+    let keys: Keys = set_up::keys(set_up)?;
+    let target = set_up::point("target_mm", &keys.target_mm, constants)?;
+    let priors = [Prior::Free; 6].into_iter().chain(set_up::lengths(&keys.target_u_um)).collect();
     let rotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|row| row.map(Written::number));
     let origin = [0.0; 3].map(Written::number);
-    Ok(SetUp { station: Station::Tracker(Tracker { target, rotation, origin }), priors, socket: None })
+    Ok(SetUp::new(Station::Tracker(Tracker { target, rotation, origin }), priors))
 }
 
 /// A tracker as set up for one test, lengths in mm.

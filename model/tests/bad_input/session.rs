@@ -59,6 +59,23 @@ fn effects_on_missing_components() {
         &["\"harmonics\" is not a shape", "did you mean `harmonic`?"],
     );
     assert_contains(&effect("component = \"EZC\"\nshape = \"harmonic\""), &["needs `order`"]);
+    let alias = |keys: &str| effect(&format!("component = \"EXX\"\nshape = \"constant\"\n[[effect.alias]]\n{keys}"));
+    assert_contains(
+        &alias("component = \"EZC\"\nshape = \"harmonic\"\nordr = 2"),
+        &["session.toml:21", "[[effect.alias]] has the unknown key `ordr`", "did you mean `order`?"],
+    );
+    assert_contains(
+        &alias("component = \"EZB\"\nshape = \"constant\""),
+        &["session.toml:19", "the machine \"Small\" has no axis `B`"],
+    );
+    assert_contains(
+        &alias("component = \"EXX\"\nshape = \"constant\"\nassumed = true"),
+        &["session.toml:", "[[effect.alias]] has the unknown key `assumed`"],
+    );
+    assert_contains(
+        &with_session("[[test]]", "[test]"),
+        &["session.toml:8", "`test` is a table; a list in square brackets is expected", "write [[test]]"],
+    );
     assert_contains(
         &effect("component = \"EXX\"\nshape = \"harmonic\"\norder = 1"),
         &["cannot have the driver \"X\"", "rotary"],

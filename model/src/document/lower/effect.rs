@@ -58,6 +58,11 @@ fn one(
         let message = format!("\"{word}\" is not a shape");
         return Err(Fault::new(message, known_names(word, &words)).at("shape"));
     };
+    let own = schema::shape_keys(entry);
+    if let Some((unknown, _)) = document.keys.0.iter().find(|(key, _)| !own.contains(key)) {
+        let known = schema::fields::<document::Effect>().into_iter().chain(own).collect();
+        return Err(Fault::unknown_key(unknown, known));
+    }
     let axis = driver.kind_of_axis(context.machine, component.axis(context.machine));
     let kind = driver.kind();
     let keys = KeyReader::new(&document.keys, entry.word, kind.unit(axis), kind.default_scale(axis));
@@ -70,11 +75,6 @@ fn one(
     let tests = tests(document.tests.as_deref().unwrap_or_default(), declared).within("tests")?;
     let prior = prior(document, &component, &shape, context.instrument.unknowns())?;
     shape.check().map_err(|fault| Fault::new(fault.to_string(), None).at("shape"))?;
-    let own = schema::shape_keys(entry);
-    if let Some((unknown, _)) = document.keys.0.iter().find(|(key, _)| !own.contains(key)) {
-        let known = schema::fields::<document::Effect>().into_iter().chain(own).collect();
-        return Err(Fault::unknown_key(unknown, known));
-    }
     Ok(Effect { tests, prior, ..Effect::new(component, driver, shape) })
 }
 

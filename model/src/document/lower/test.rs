@@ -6,15 +6,15 @@ use std::sync::Arc;
 use super::{Context, Found, layout, movement};
 use crate::axis::AxisKind;
 use crate::document::fault::{Fault, Within};
-use crate::document::node::{Entries, Named};
+use crate::document::node::{Named, Node};
 use crate::document::test as document;
 use crate::document::value;
 use crate::document::{lower::Data, schema};
 use crate::files::access;
 use crate::files::quantity;
 use crate::files::table::{self, memory, request::Request};
-use crate::instrument::set_up::{SetUp, SetUpReader};
-use crate::instrument::{InstrumentKind, SharedBy};
+use crate::instrument::InstrumentKind;
+use crate::instrument::set_up::SetUp;
 use crate::session::expression::Length;
 use crate::session::motion::Motion;
 use crate::session::{Test, check, planned};
@@ -27,12 +27,8 @@ pub(super) fn tests(
     found: &mut Found,
 ) -> Result<Vec<Test>, Fault> {
     let name = &document.name;
-    let SetUp { station: written, priors, socket } = set_up(context, &document.set_up)?;
+    let SetUp { station: written, priors, socket, bar_setup } = set_up(context, &document.set_up)?;
     let (station, geometry) = (written.map(|length| length.mm), written.map(|length| length.length.clone()));
-    let has_bar = context.instrument.shares(SharedBy::BarSetup);
-    let bar_setup = document.set_up.get("bar_setup").filter(|_| has_bar).map(|node| {
-        node.as_text().map(str::to_string).ok_or_else(|| Fault::unexpected("a text in quotes").at("bar_setup"))
-    });
     let HeldPositions { mut at, written: at_written, listed } = at(context, &document.at).within("at")?;
     let format = document.format.as_ref().map(|format| layout::format(format).within("format")).transpose()?;
     let columns = document.columns.as_ref().map(|columns| {
@@ -66,7 +62,7 @@ pub(super) fn tests(
             .spindle_setup
             .clone()
             .unwrap_or_else(|| context.instrument.spindle_setup(name).to_string()),
-        bar_setup: bar_setup.transpose()?.unwrap_or_else(|| name.clone()),
+        bar_setup: bar_setup.unwrap_or_else(|| name.clone()),
         socket,
         motion,
         at,
@@ -123,23 +119,18 @@ pub(super) fn tests(
 }
 
 /// The instrument's keys of a test.
-fn set_up(context: &Context<'_>, entries: &Entries) -> Result<SetUp, Fault> {
+fn set_up(context: &Context<'_>, keys: &Node) -> Result<SetUp, Fault> {
     let own = context.instrument.entry();
-    let is_own = |name: &str| own.keys.iter().any(|known| known.name == name);
-    if let Some((name, _)) = entries.0.iter().find(|(name, _)| !is_own(name)) {
-        let of_other = InstrumentKind::ALL.iter().find(|kind| kind.entry().keys.iter().any(|key| key.name == *name));
-        return Err(match of_other {
+    (own.read)(keys, context.constants).map_err(|fault| {
+        let Some(key) = fault.unknown().map(str::to_string) else { return fault };
+        match InstrumentKind::ALL.iter().find(|kind| (kind.entry().keys)().contains_key(&key)) {
             Some(kind) => {
                 let what = format!("belongs to a {}; this session's instrument is a {}", kind.word(), own.word);
-                Fault::of_key(what, None).on_key().at(name)
+                Fault::of_key(what, None).on_key().at(&key)
             }
-            None => {
-                let own = own.keys.iter().map(|key| key.name.to_string());
-                Fault::unknown_key(name, own.chain(schema::fields::<document::Test>()).collect())
-            }
-        });
-    }
-    (own.read)(&SetUpReader::new(entries, context.constants))
+            None => fault.also_known(schema::fields::<document::Test>()),
+        }
+    })
 }
 
 /// Positions at which a test holds its axes, by axis.

@@ -109,6 +109,7 @@ pub(super) fn read(
         }
         push(&mut filled, &row)?;
     }
+    filled.complete(filled.line.len());
     let warning = filled.remove_duplicates(file);
     match filled.line[..] {
         [] => Err(empty("a header without readings")),
@@ -159,7 +160,7 @@ impl<'a> Filled<'a> {
     pub fn new(request: &'a Request<'a>, columns: Vec<Column>, rows: usize) -> Self {
         let coordinates = request.instrument().coordinates();
         let mut readings = Readings {
-            positions: vec![Vec::with_capacity(rows); request.machine.axes.len()],
+            positions: vec![Vec::new(); request.machine.axes.len()],
             coordinates,
             observed: Vec::with_capacity(rows * coordinates),
             ..Readings::default()
@@ -169,7 +170,8 @@ impl<'a> Filled<'a> {
                 Role::Time => readings.time_s.reserve_exact(rows),
                 Role::Run => readings.run.reserve_exact(rows),
                 Role::Driver(name) => _ = readings.drivers.insert(name.clone(), Vec::with_capacity(rows)),
-                Role::Axis(..) | Role::Reading(..) | Role::Socket => {}
+                Role::Axis(axis, _) => readings.positions[*axis].reserve_exact(rows),
+                Role::Reading(..) | Role::Socket => {}
             }
         }
         let (line, socket, sockets, cells) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
@@ -183,9 +185,6 @@ impl<'a> Filled<'a> {
     pub fn push(&mut self, row: &impl Cells) -> Result<(), ModelError> {
         let readings = &mut self.readings;
         let mut observed = [0.0; 3];
-        for (positions, &at) in readings.positions.iter_mut().zip(&self.request.test.at) {
-            positions.push(at);
-        }
         for column in &self.columns {
             let fault = |message: String, help: &str| row.error(column, (message, help.to_string()));
             if column.role == Role::Socket {
@@ -217,11 +216,7 @@ impl<'a> Filled<'a> {
                         values.push(value);
                     }
                 }
-                Role::Axis(axis, unit) => {
-                    if let Some(last) = readings.positions[*axis].last_mut() {
-                        *last = unit.to_internal(value);
-                    }
-                }
+                Role::Axis(axis, unit) => readings.positions[*axis].push(unit.to_internal(value)),
                 Role::Reading(quantity, unit) => {
                     let value = unit.to_internal(value);
                     let (coordinate, value) = match quantity {
@@ -238,6 +233,15 @@ impl<'a> Filled<'a> {
         }
         readings.observed.extend(&observed[..readings.coordinates]);
         Ok(())
+    }
+
+    /// Completes the columns: the axes without one stay where the test holds them.
+    pub fn complete(&mut self, rows: usize) {
+        for (positions, at) in self.readings.positions.iter_mut().zip(&self.request.test.at) {
+            if positions.is_empty() {
+                *positions = vec![*at; rows];
+            }
+        }
     }
 
     /// Whether a column tells copies of rows from repeats.

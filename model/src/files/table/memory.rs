@@ -111,6 +111,7 @@ pub(crate) fn read(given: &[MemoryColumn<'_>], request: &Request<'_>) -> Result<
     for row in 0..found {
         filled.push(&item(row))?;
     }
+    filled.complete(found);
     let mut warnings = Vec::new();
     if found < rows {
         warnings.push(missing::warning(&marks, rows, found));
