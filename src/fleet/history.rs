@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use abbe_identify::history::events::{Compensation, Kind};
 use abbe_identify::history::faults::{Fault, FoundEffect, faults};
-use abbe_identify::history::results::{History, MachineHistory};
+use abbe_identify::history::results::{Estimate, History, MachineHistory};
 use abbe_identify::history::{HistoryOptions, MachineSessions, SessionValues, analyse};
 use abbe_identify::results::{NextStep, Statements};
 use schemars::JsonSchema;
@@ -46,6 +46,11 @@ pub struct ChangedInHistory {
     pub machine_id: String,
     /// The parameter.
     pub id: String,
+    /// Its drift, in `unit` a year; absent if it has shifted only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub drift_per_year: Option<Estimate>,
+    /// Unit of the parameter.
+    pub unit: String,
 }
 
 /// The statements of a history.
@@ -62,7 +67,13 @@ pub fn statements(machines: &[MachineHistory]) -> HistoryStatements {
         let shifted: BTreeSet<&String> = shifts.flat_map(|change| &change.parameters).collect();
         let own = machine.parameters.iter();
         let own = own.filter(|one| one.drift_per_year.is_some() || shifted.contains(&one.id));
-        own.map(|one| ChangedInHistory { machine_id: machine.machine_id.clone(), id: one.id.clone() }).collect()
+        own.map(|one| ChangedInHistory {
+            machine_id: machine.machine_id.clone(),
+            id: one.id.clone(),
+            drift_per_year: one.drift_per_year,
+            unit: one.unit.clone(),
+        })
+        .collect()
     };
     let step = if machines.is_empty() { NextStep::Nothing } else { NextStep::NextCheck };
     Statements {

@@ -250,9 +250,13 @@ pub fn of_history(statements: &HistoryStatements, check: Option<(&str, String)>)
         _ => format!("Out of control: {}", first(out.iter().cloned(), "further machine")),
     };
     let several = statements.good.machines > 1;
-    let changed = statements.correct.iter().map(|changed| match several {
-        true => format!("{} of {}", changed.id, changed.machine_id),
-        false => changed.id.clone(),
+    let changed = statements.correct.iter().map(|changed| {
+        let of = if several { format!(" of {}", changed.machine_id) } else { String::new() };
+        let how = match changed.drift_per_year {
+            Some(drift) => format!("drifts by {} a year", estimate(drift.value, drift.u, &changed.unit)),
+            None => "has shifted".to_string(),
+        };
+        format!("{}{of} {how}", changed.id)
     });
     let correct = match statements.correct.is_empty() {
         true => "nothing; no parameter drifts or has shifted".to_string(),
