@@ -85,7 +85,7 @@ def test_guesses_lead_on(results, guess, ours):
 def test_compare_and_export(results, tmp_path):
     fit = results[0]
     found = abbe.compare(fit, fit.model(), names=["first", "again"], places=3)
-    assert found.inputs == ("first", "again") and not any(pair.significant for pair in found.pairs)
+    assert found.models == ("first", "again") and not any(pair.significant for pair in found.pairs)
     assert "no significant difference" in str(found) and found.figures
     found.report(tmp_path / "compare.html")
     with pytest.raises(TypeError, match="at least two"):

@@ -40,31 +40,6 @@ _OURS = {
 """What other packages call it, and what it is called here."""
 
 
-_OURS = {
-    "chi2": "chi_square",
-    "chisq": "chi_square",
-    "chisqr": "chi_square",
-    "cov": "covariance",
-    "dof": "degrees_of_freedom",
-    "nfree": "degrees_of_freedom",
-    "params": "parameters",
-    "popt": "parameters",
-    "pcov": "covariance",
-    "resid": "residuals",
-    "rms": "rms_um",
-    "std": "u",
-    "stderr": "u",
-    "summary": "`print(result)`",
-    "to_csv": "`table.to_csv()`",
-    "to_dataframe": "`table.to_pandas()`",
-    "to_html": "`report(path)`",
-    "to_json": "to_dict",
-    "to_pandas": "`table.to_pandas()`",
-    "uncertainty": "u",
-}
-"""What other packages call it, and what it is called here."""
-
-
 class Record:
     """A JSON object with its keys as attributes.
 
