@@ -39,6 +39,9 @@ def test_print_and_notebook_show_the_report(results):
     assert "worst determined" in str(plan) and f"Verdict: {validation.verdict}" in str(validation)
     for result in results:
         text, page = str(result), result._repr_html_()
+        for words in ("What to correct: ", "What to measure next: "):
+            assert words in text and words in page, words
+        assert set(result.statements.to_dict()) == {"good", "correct", "measure"}
         assert "<script" not in page and "<svg" not in page
         for words in ("worst determined", "Goodness of fit", "indistinguishable", "inside the range"):
             assert (words in text) == (words in page), words

@@ -138,3 +138,42 @@ fn a_plan_names_errors_that_are_not_identifiable() {
     let first = screen.lines().next().unwrap();
     assert!(first.starts_with("The plan does not identify ") && first.contains("EC0A"), "{screen}");
 }
+
+/// Every result opens with three statements, and JSON has them: is it good, what to correct, what to measure next.
+#[test]
+fn results_open_with_three_statements() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let (measured, model, results) = (ready("hermle-c600u/measured/session.toml"), at("model.json"), at("results"));
+    let session = at("dated.toml");
+    let dated = std::fs::read_to_string(&measured).unwrap();
+    std::fs::write(&session, format!("[about]\ndate = \"2026-01-10\"\n{dated}")).unwrap();
+    for file in std::fs::read_dir(measured.parent().unwrap()).unwrap().map(|entry| entry.unwrap().path()) {
+        std::fs::copy(&file, at(file.file_name().unwrap().to_str().unwrap())).unwrap();
+    }
+    let analysed = abbe(&["run", text(&session), "--out", text(&results), "--no-trace", "--quiet"]);
+    assert!(analysed.status.success(), "{}", String::from_utf8_lossy(&analysed.stderr));
+    for command in [
+        vec!["fit", text(&measured), "--save", text(&model)],
+        vec!["plan", text(&measured), "--no-effects"],
+        vec!["validate", text(&model), text(&measured)],
+        vec!["compare", text(&model), text(&measured), "--places", "0"],
+        vec!["history", text(&results)],
+    ] {
+        let (json, page) = (at("result.json"), at("result.html"));
+        let output = abbe(&[&command[..], &["--json", text(&json), "--report", text(&page)]].concat());
+        let screen = String::from_utf8(output.stdout).unwrap();
+        assert!(output.status.success(), "{command:?}: {}", String::from_utf8_lossy(&output.stderr));
+        let result: Value = serde_json::from_slice(&std::fs::read(&json).unwrap()).unwrap();
+        for part in ["good", "correct", "measure"] {
+            assert!(!result["statements"][part].is_null(), "{command:?}: {part}");
+        }
+        let page = std::fs::read_to_string(&page).unwrap();
+        for words in ["What to correct: ", "What to measure next: "] {
+            let place = screen.find(words).unwrap_or_else(|| panic!("{command:?}: {words} in\n{screen}"));
+            // Above all tables and figures.
+            assert!(screen[..place].lines().count() <= 5, "{command:?}\n{screen}");
+            assert!(page.split("<h2").next().unwrap().contains(words), "{command:?}: {words}");
+        }
+    }
+}
