@@ -9,6 +9,9 @@ use abbe_model::files::{self, Source};
 use super::FleetError;
 use super::date;
 
+/// The columns of the file.
+const COLUMNS: [&str; 5] = ["machine_id", "date", "parameter", "change", "unit"];
+
 /// Reads known compensations: a CSV file with the columns `machine_id`, `date`, `parameter`, `change` and `unit`, one
 /// row for each parameter. The unit is that of the parameter: `um`, `arcsec`.
 ///
@@ -42,18 +45,22 @@ pub fn of_source(source: &Source) -> Result<Vec<Compensation>, FleetError> {
     let mut found: Vec<Compensation> = Vec::new();
     let mut reader =
         csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(contents.as_bytes());
-    let expected = |line: usize, error: csv::Error| {
-        fault(line, format!("{error}; columns machine_id, date, parameter, change, unit are expected"))
+    let expected = |line: usize, error: &dyn std::fmt::Display| {
+        fault(line, format!("{error}; columns {} are expected", COLUMNS.join(", ")))
     };
-    let columns = reader.headers().map_err(|error| expected(1, error))?.clone();
+    let columns = reader.headers().map_err(|error| expected(1, &error))?.clone();
+    // A header without rows is checked too.
+    if let Some(lacking) = COLUMNS.iter().find(|column| !columns.iter().any(|stated| stated == **column)) {
+        return Err(expected(1, &format!("no column `{lacking}`")));
+    }
     let mut cells = csv::StringRecord::new();
     loop {
         let read = reader.read_record(&mut cells);
         let line = usize::try_from(reader.position().line()).unwrap_or(usize::MAX).saturating_sub(1);
-        if !read.map_err(|error| expected(line, error))? {
+        if !read.map_err(|error| expected(line, &error))? {
             break;
         }
-        let row: Row = cells.deserialize(Some(&columns)).map_err(|error| expected(line, error))?;
+        let row: Row = cells.deserialize(Some(&columns)).map_err(|error| expected(line, &error))?;
         let days = date::interval(&row.date)
             .ok_or_else(|| fault(line, format!("date `{}`: the form 2026-11-23T08:00:00 is expected", row.date)))?;
         if !row.change.is_finite() {

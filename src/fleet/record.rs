@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use abbe_identify::noise::NoiseSource;
-use abbe_identify::results::{Covariance, EffectName, ParameterResult, TraceVerdict, Unobservable};
+use abbe_identify::results::{
+    Covariance, DeterminedBy, EffectName, GoodnessVerdict, ParameterResult, TraceVerdict, Unobservable,
+};
 use abbe_identify::tolerance::Conformity;
 use abbe_identify::validate::ValidationVerdict;
 use schemars::JsonSchema;
@@ -54,6 +56,8 @@ pub struct Record {
     pub noise_source: Option<NoiseSource>,
     /// Verdict of the trace; `null` without a trace.
     pub verdict: Option<TraceVerdict>,
+    /// Whether the residual of the final model agrees with the noise.
+    pub goodness: Option<GoodnessVerdict>,
     /// Rms of the residual of the declared model, µm.
     pub rms_before_um: Option<f64>,
     /// Rms of the residual of the final model, µm: with the found effects if there was a trace.
@@ -125,6 +129,12 @@ pub struct ParameterRecord {
     pub meaning: Option<String>,
     /// Whether the readings identify it.
     pub identifiable: bool,
+    /// What determines the estimate.
+    pub determined_by: DeterminedBy,
+    /// Whether the estimate exceeds its expanded uncertainty and is quotable.
+    pub significant: bool,
+    /// Whether the estimate may be quoted with `u`: the readings determine it, and the model lacks no effect.
+    pub quotable: bool,
 }
 
 /// A found effect.
@@ -208,9 +218,13 @@ impl Record {
                 unit: Some(parameter.unit.clone()),
                 meaning: Some(parameter.meaning.clone()),
                 identifiable: true,
+                determined_by: parameter.determined_by,
+                significant: parameter.significant,
+                quotable: parameter.quotable,
             })
             .collect();
-        for id in unobservable.iter().flat_map(|direction| direction.combination.keys()) {
+        let combinations = unobservable.iter().map(|direction| &direction.combination);
+        for (id, count) in combinations.flat_map(|combination| combination.keys().map(|id| (id, combination.len()))) {
             if !self.parameters.iter().any(|known| known.id == *id) {
                 self.parameters.push(ParameterRecord {
                     id: id.clone(),
@@ -219,6 +233,9 @@ impl Record {
                     unit: None,
                     meaning: None,
                     identifiable: false,
+                    determined_by: if count == 1 { DeterminedBy::Nothing } else { DeterminedBy::BaseCombination },
+                    significant: false,
+                    quotable: false,
                 });
             }
         }

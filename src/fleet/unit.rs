@@ -268,6 +268,7 @@ fn set_fit(record: &mut Record, fit: &FitResult) {
     record.outliers = Some(fit.outliers.len());
     record.noise_um = Some(fit.noise_um);
     record.noise_source = Some(fit.noise_source);
+    record.goodness = Some(fit.outcome.goodness.verdict);
     record.rms_before_um = Some(fit.rms_um);
     record.rms_um = Some(fit.rms_um);
     record.heldout_rms_um = Some(fit.heldout_rms_um);
@@ -285,6 +286,7 @@ fn set_trace(record: &mut Record, trace: &TraceResult) {
     record.noise_um = Some(trace.noise_um);
     record.noise_source = Some(trace.noise_source);
     record.verdict = Some(trace.verdict);
+    record.goodness = Some(trace.outcome.goodness.verdict);
     record.rms_before_um = Some(trace.before.rms_um);
     record.rms_um = Some(trace.after.rms_um);
     record.heldout_rms_um = Some(trace.after.heldout_rms_um);

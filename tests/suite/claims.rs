@@ -68,6 +68,23 @@ fn a_constant_in_noise_does_not_exceed_the_null_distribution() {
     assert!(result.rejected_candidates.is_empty(), "{:?}", result.rejected_candidates);
 }
 
+/// A squareness that warms up within half of the first of two runs, in noise of 0.3 µm with an autocorrelation of 0.8. The
+/// repeats of that run differ by the warm-up too: as noise it would be 0.43 µm with an autocorrelation of 0.89, in which no
+/// candidate is significant.
+#[test]
+fn a_warm_up_in_one_run_is_an_effect_and_no_slow_noise() {
+    let squareness = Component::parse("EC0Y").unwrap();
+    let effect = Injected::new(squareness, Driver::Time, Shape::Warmup { tau_s: 35.764 }, 8.82);
+    let noise = Noise::Serial { sigma_um: 0.3, coefficient: 0.8 };
+    let recipe = Recipe::new(Kind::SquarenessCircles, 7037).with(effect).noise(noise);
+    let result = traced(&session_of(&recipe), TraceOptions::default().significance);
+    let found: Vec<&EffectName> = result.effects.iter().map(|effect| &effect.name).collect();
+    let [name] = found.as_slice() else { panic!("{found:?}") };
+    assert_eq!([&name.component, &name.driver, &name.shape], ["EC0Y", "time", "warmup"]);
+    assert!((result.noise_um / 0.3 - 1.0).abs() < 0.1, "{}", result.noise_um);
+    assert_consistent(&result, "a warm-up");
+}
+
 /// White noise of 0.20 µm without an effect, at a significance level at which most sessions have a candidate beyond the
 /// null distribution. A decrease of the held-out error by more than its standard error has a probability of 16 %
 /// without an effect. No more of the sessions have a claim, within four standard errors of their number.

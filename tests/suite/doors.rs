@@ -1,5 +1,6 @@
-//! One answer, whichever door one asks at: `trace`, `fit` of the session that it writes, the saved model and `fit` again
-//! agree in value, uncertainty, significance, quotability, verdict and decision.
+//! One answer, whichever door one asks at: `trace`, `fit` of the session that it writes, the saved model, `validate`,
+//! `compare`, `compensate`, `export` and the record of `run`, from which histories and data sets are made, agree in value,
+//! uncertainty, significance, quotability, verdict and decision. The tests of the Python module compare its results with those of the command.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -50,8 +51,79 @@ impl Door {
         let traced = ["trace", text(&session), "--write", text(&next), "--save", text(&model)];
         let trace = self.run(&[&traced[..], &search].concat(), "trace.json");
         let fit = self.run(&["fit", text(&next), "--save", text(&again)], "fit.json");
-        let read = |file: &Path| serde_json::from_str(&fs::read_to_string(file).unwrap()).unwrap();
-        Walk { trace, fit, models: [read(&model), read(&again)] }
+        let walk = Walk { trace, fit, models: [parsed(&model), parsed(&again)] };
+        self.agree_beyond(&walk, &[], "x_mm");
+        walk
+    }
+
+    /// Asserts that the doors beyond the models agree. `reading` are the options that a session needs, `axis` is a column of
+    /// commands.
+    #[track_caller]
+    fn agree_beyond(&self, walk: &Walk, reading: &[&str], axis: &str) {
+        let [next, model, again] = ["next.toml", "model.json", "again.json"].map(|name| self.at(name));
+        let [next, model, again] = [text(&next), text(&model), text(&again)];
+        // The two models do not differ, nor a model and the session that it is from.
+        for other in [again, next] {
+            let options = if other == next { reading } else { &[] };
+            let compared = self.run(&[&["compare", model, other], options].concat(), "compared.json");
+            let differences = list(&compared["differences"], "differences");
+            assert!(!differences.is_empty());
+            for difference in differences {
+                let (value, u) = (difference["value"].as_f64().unwrap(), difference["u"].as_f64().unwrap());
+                assert!(value.abs() <= 1e-4 * u && difference["significant"] == false, "{difference}");
+            }
+        }
+        // The model holds for its own readings unless its residual was judged to lack an effect. Poses without a stated
+        // noise are judged by that of the model.
+        let validation = self.run(&[&["validate", model, next], reading].concat(), "validation.json");
+        let lacks = matches!(walk.trace["outcome"]["goodness"]["verdict"].as_str(), Some("exceeds" | "structured"));
+        assert_eq!(validation["verdict"] == "holds", !lacks, "{} {}", walk.trace["verdict"], validation["verdict"]);
+        // Both correct a command alike, and export the same chain.
+        let commands = self.at("commands.csv");
+        fs::write(&commands, format!("{axis}\n-12.5\n0\n31\n")).unwrap();
+        let corrected = [model, again].map(|model| {
+            let to = self.at("corrected.csv");
+            let summary = self.run(&["compensate", model, text(&commands), "--out", text(&to)], "summary.json");
+            (fs::read_to_string(to).unwrap(), summary["largest_error_um"].as_f64().unwrap())
+        });
+        assert!((corrected[0].1 / corrected[1].1 - 1.0).abs() < 1e-5, "{corrected:?}");
+        let cells = |table: &str| -> Vec<f64> {
+            let cells = table.lines().skip(1).flat_map(|line| line.split(',').take(1));
+            cells.map(|cell| cell.parse().unwrap()).collect()
+        };
+        for (a, b) in cells(&corrected[0].0).into_iter().zip(cells(&corrected[1].0)) {
+            assert!((a - b).abs() < 1e-6, "{corrected:?}");
+        }
+        let exported = [model, again].map(|model| {
+            let to = self.at("chain.urdf");
+            let output = abbe(&["export", model, "--as", "urdf", "--out", text(&to), "--quiet"]);
+            assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+            fs::read_to_string(to).unwrap()
+        });
+        let numbers = |urdf: &str| -> Vec<f64> {
+            urdf.split(|c: char| c.is_whitespace() || c == '"').filter_map(|word| word.parse().ok()).collect()
+        };
+        let [a, b] = exported.each_ref().map(|urdf| numbers(urdf));
+        assert!(a.len() == b.len() && a.len() > 10, "{exported:?}");
+        assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-8), "{exported:?}");
+        if reading.is_empty() {
+            self.record_agrees(walk, next);
+        }
+    }
+
+    /// Asserts that the record of a fleet agrees.
+    #[track_caller]
+    fn record_agrees(&self, walk: &Walk, next: &str) {
+        let results = self.at("results");
+        self.run(&["run", next, "--no-trace", "--out", text(&results)], "run.json");
+        let record = parsed(&files_below(&results.join("results"))[0]);
+        assert_eq!(record["goodness"], walk.fit["outcome"]["goodness"]["verdict"]);
+        for own in list(&walk.fit["parameters"], "fit") {
+            let recorded = list(&record["parameters"], "record").iter().find(|other| other["id"] == own["id"]).unwrap();
+            for field in ["value", "u", "unit", "significant", "determined_by", "quotable"] {
+                assert!(near(&recorded[field], &own[field]), "{field}: {recorded} {own}");
+            }
+        }
     }
 }
 
@@ -60,6 +132,16 @@ struct Walk {
     trace: Value,
     fit: Value,
     models: [Value; 2],
+}
+
+fn parsed(file: &Path) -> Value {
+    serde_json::from_str(&fs::read_to_string(file).unwrap()).unwrap()
+}
+
+/// The files of a folder and of those in it.
+fn files_below(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    entries.flat_map(|path| if path.is_dir() { files_below(&path) } else { vec![path] }).collect()
 }
 
 fn list<'v>(value: &'v Value, what: &str) -> &'v [Value] {
@@ -260,14 +342,14 @@ fn robot() {
     let door = Door::of("kuka-iiwa14", "session.toml", |text| text);
     let [session, next] = ["session.toml", "next.toml"].map(|name| door.at(name));
     let reading = ["--data", text(&folder), "--allow-outside"];
-    let first = door.at("a");
+    let first = door.at("model.json");
     let traced = ["trace", text(&session), "--max-effects", "3", "--write", text(&next), "--save", text(&first)];
     let trace = door.run(&[&traced[..], &reading].concat(), "trace.json");
-    let again = door.at("b");
+    let again = door.at("again.json");
     let fit = door.run(&[&["fit", text(&next), "--save", text(&again)], &reading[..]].concat(), "fit.json");
-    let read = |name: &str| serde_json::from_str(&fs::read_to_string(door.at(name)).unwrap()).unwrap();
-    let walk = Walk { trace, fit, models: [read("a"), read("b")] };
+    let walk = Walk { trace, fit, models: [parsed(&first), parsed(&again)] };
     walk.agrees("robot");
+    door.agree_beyond(&walk, &reading, "j1_deg");
     assert_eq!(walk.verdict(), "not-judged");
     assert_eq!(walk.fit["outcome"]["goodness"]["verdict"], "not-judged");
 }

@@ -187,6 +187,11 @@ fn a_history_has_pages_and_names_a_compensation() {
     let unknown: Value = serde_json::from_slice(&unknown.stdout).unwrap();
     assert_eq!(unknown["machines"], plain["machines"]);
     assert_eq!(unknown["not_used"][0]["file"], "table.csv:2");
+    // A file without rows has these columns too.
+    place.put("table.csv", "machine,date,parameter,change,unit\n");
+    let wrong = place.shell("abbe history results --compensations table.csv");
+    assert_eq!(wrong.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&wrong.stderr).contains("table.csv:1: no column `machine_id`"));
     // A table in another unit is no table.
     place.put("table.csv", "machine_id,date,parameter,change,unit\nM,2024-10-20,EC0Y,-20,um\n");
     let wrong = place.shell("abbe history results --compensations table.csv");

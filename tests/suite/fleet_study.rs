@@ -64,6 +64,12 @@ fn unusable_study_files_are_named() {
                 [[noise]]\nname = \"n\"\num = 0.3\n[[effect]]\nname = \"none\"\n";
     for (from, to, expected) in [
         ("draws = 1", "draws = 0", "draws = 0"),
+        ("draws = 1", "draws = 1000001", "draws = 1000001: 1 to 1000000 are expected"),
+        (
+            "[[effect]]",
+            "[[noise]]\nname = \"m\"\num = 1\n[[effect]]",
+            "1 plans × 1 effects × 2 kinds of noise × 600000 draws: at most 1000000 draws",
+        ),
         ("draws = 1", "draws = 1\nfoo = 2", "foo"),
         ("um = 0.3", "um = 0.3\nautocorrelation = 1", "noise `n`"),
         ("name = \"none\"", "name = \"none\"\nsize = 5", "effect `none`"),
@@ -82,7 +88,9 @@ fn unusable_study_files_are_named() {
         ),
     ] {
         assert!(file.contains(from));
-        place.put("study.toml", &file.replacen(from, to, 1));
+        // Every number of draws is allowed by itself, and not with two kinds of noise.
+        let draws = if to.contains("name = \"m\"") { "draws = 600000" } else { "draws = 1" };
+        place.put("study.toml", &file.replacen("draws = 1", draws, 1).replacen(from, to, 1));
         let output = place.shell("abbe study study.toml --out study");
         let message = String::from_utf8_lossy(&output.stderr);
         assert!(!output.status.success() && message.contains(expected), "{to}: {message}");

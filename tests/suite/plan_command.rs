@@ -63,7 +63,14 @@ fn the_effects_list_what_a_clean_residual_does_not_exclude() {
 #[test]
 fn invalid_requests_fail_with_the_reason() {
     let session = chapter_5();
+    let bars: Vec<String> = (0..2001).map(|k| format!("{:.2}", 100.0 + 0.01 * f64::from(k))).collect();
+    let bars = bars.join(",");
     for (arguments, words) in [
+        // Counted before any is made.
+        (
+            vec!["plan", &session, "--improve", "1", "--bars-mm", &bars],
+            "the limit is 100000: state fewer of the 2001 bars",
+        ),
         (vec!["plan", &session, "--separate", "EZC~C:q2,EAC~C:h1"], "similar ones: EZC~C:h1"),
         (vec!["plan", &session, "--separate", "EZC~C:h2"], "two different effects"),
         (vec!["plan", &session, "--noise-um", "0"], "is expected"),

@@ -78,6 +78,7 @@ impl TraceOutcome {
             alias_effects: Vec::new(),
             competing_effects: Vec::new(),
             steps: Vec::new(),
+            strongest: None,
             result,
         }
     }

@@ -40,7 +40,7 @@ use crate::candidates::columns::{Columns, EffectColumns};
 use crate::candidates::moments::Moments;
 use crate::circular;
 use crate::error::IdentifyError;
-use crate::fit::{Fit, fit, prepare};
+use crate::fit::{Fit, fit, prepare, prepare_with};
 use crate::numerics::parallel;
 use crate::problem::Problem;
 use crate::results::TraceResult;
@@ -139,6 +139,8 @@ pub struct TraceOutcome {
     pub competing_effects: Vec<Vec<alias::CompetingEffect>>,
     /// The additions of the search, in order.
     pub steps: Vec<SearchStep>,
+    /// The best candidate that was not significant when the search ended.
+    pub(crate) strongest: Option<Effect>,
     /// The result as it is reported.
     pub result: TraceResult,
 }
@@ -215,6 +217,10 @@ fn with_noise_of_repeats(
     }
     let residuals = before_fit.residuals.clone();
     let first = trace_with(problem, before_fit, &residuals, options, progress)?;
+    let first = match with_noise_less_strongest(&first, options, progress)? {
+        Some(again) => again,
+        None => first,
+    };
     // Variation between runs counts as noise as long as the model lacks its cause.
     let mut problem = first.before.clone();
     if first.result.interrupted
@@ -232,6 +238,29 @@ fn with_noise_of_repeats(
     let mut first = first;
     first.result.mark_interrupted();
     Ok(first)
+}
+
+/// Searches again with the noise that remains beside the best candidate, if no effect was found in autocorrelated noise and
+/// this candidate changes that noise. An effect that acts in one of two runs, such as a warm-up, counts as slow noise, and
+/// can raise the threshold above its own score. In noise alone the best candidate leaves the noise model as it is. Returns
+/// `None` if this search finds nothing either.
+fn with_noise_less_strongest(
+    first: &TraceOutcome,
+    options: &TraceOptions,
+    progress: &(dyn Fn(Progress) -> bool + Sync),
+) -> Result<Option<TraceOutcome>, IdentifyError> {
+    let mut problem = first.before.clone();
+    let Some(strongest) = &first.strongest else { return Ok(None) };
+    if first.result.interrupted || !first.effects.is_empty() || problem.noise.ar_coefficients.is_empty() {
+        return Ok(None);
+    }
+    let (_, beside) = prepare_with(&problem.session, std::slice::from_ref(strongest), options.seed)?;
+    if !estimate_noise_model(&mut problem, &beside.residuals) {
+        return Ok(None);
+    }
+    let before_fit = fit(&problem, Some(&first.before_fit.beta))?;
+    let again = trace_with(problem, before_fit, &beside.residuals, options, progress)?;
+    Ok((!again.effects.is_empty()).then_some(again))
 }
 
 /// Traces with a given noise model. The null distribution is drawn from the repeats in the residuals `pure`.
@@ -307,7 +336,8 @@ fn trace_or_interrupted(
     let gains = search.model_without(None)?.gains(&|candidate| !search.candidates[candidate].last_resort)?;
     let observable = gains.iter().filter(|gain| gain.freedom > 0).count();
 
-    let mut record = SearchRecord { steps: Vec::new(), noise_um: problem.noise.sigma_mm * 1e3, progress };
+    let mut record =
+        SearchRecord { steps: Vec::new(), noise_um: problem.noise.sigma_mm * 1e3, strongest: None, progress };
     let structure_before = structure_before.as_ref();
     let judge = |search: &SearchState<'_>| RefittedModel::of(problem, before_fit, search, options, structure_before);
     let found = match search_and_refit(&mut search, &mut record, judge) {
@@ -354,6 +384,7 @@ fn trace_or_interrupted(
         alias_effects: reported.alias_effects,
         competing_effects: reported.competing_effects,
         steps: record.steps,
+        strongest: record.strongest,
         result: reported.result,
     })
 }

@@ -3,6 +3,8 @@
 //! best remaining candidate is no better than the best on readings without structure and no move finds a better set, or
 //! when additions do not lower the held-out error.
 
+use abbe_model::effect::Effect;
+
 use super::constants::MAX_REJECTED_IN_A_ROW;
 use super::judge::RefittedModel;
 use super::moves::add::Add;
@@ -19,6 +21,8 @@ pub(super) struct SearchRecord<'t> {
     pub steps: Vec<SearchStep>,
     /// Standard deviation of a reading, µm.
     pub noise_um: f64,
+    /// The best candidate that was not significant when the search ended.
+    pub strongest: Option<Effect>,
     /// Receives the progress. Returns whether to continue.
     pub progress: &'t (dyn Fn(Progress) -> bool + Sync),
 }
@@ -88,7 +92,7 @@ fn search_on(search: &mut SearchState<'_>, record: &mut SearchRecord<'_>) -> Res
     let mut ended = None;
     // A merge of effects permits further additions. The limit on rounds guarantees termination.
     for _ in 0..search.policy.max_effects.saturating_add(search.policy.max_effects / 2).max(1) {
-        match round(search)? {
+        match round(search, record)? {
             Round::Done(p_value) => ended = Some(p_value),
             Round::Changed => pending.push(None),
             Round::Added(candidate) => pending.push(Some(candidate)),
@@ -107,8 +111,8 @@ fn search_on(search: &mut SearchState<'_>, record: &mut SearchRecord<'_>) -> Res
 }
 
 /// Adds the best candidate if it is significant, and improves the selected effects.
-fn round(search: &mut SearchState<'_>) -> Result<Round, IdentifyError> {
-    let (p_value, added) = add_best(search)?;
+fn round(search: &mut SearchState<'_>, record: &mut SearchRecord<'_>) -> Result<Round, IdentifyError> {
+    let (p_value, added) = add_best(search, record)?;
     if let Some(candidate) = added {
         for name in search.policy.after_addition {
             moves::run(*name, search)?;
@@ -124,11 +128,15 @@ fn round(search: &mut SearchState<'_>) -> Result<Round, IdentifyError> {
 }
 
 /// Adds the best candidate if it is significant. Returns its p-value, and the candidate if it was added.
-fn add_best(search: &mut SearchState<'_>) -> Result<(f64, Option<usize>), IdentifyError> {
-    let Some((p_value, threshold)) = search.best_against_null()? else {
+fn add_best(
+    search: &mut SearchState<'_>,
+    record: &mut SearchRecord<'_>,
+) -> Result<(f64, Option<usize>), IdentifyError> {
+    let Some((best, p_value, threshold)) = search.best_against_null()? else {
         return Ok((1.0, None));
     };
     search.thresholds.push(threshold);
+    record.strongest = Some(search.effect(best).clone());
     if p_value > search.policy.significance || search.selected().len() >= search.policy.max_effects {
         return Ok((p_value, None));
     }

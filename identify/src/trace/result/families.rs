@@ -89,6 +89,7 @@ pub(in crate::trace) fn outcome_with_families(
         alias_effects: vec![Vec::new(); count],
         competing_effects: (0..count).map(|_| Vec::new()).collect(),
         steps,
+        strongest: None,
         result,
     })
 }

@@ -167,12 +167,12 @@ impl SearchState<'_> {
         Ok(scored.into_iter().map(|(c, _)| c).collect())
     }
 
-    /// The p-value of the best candidate with respect to the best scores of the null draws, and the score that these
-    /// exceed with the probability of the significance level. `None` if no candidate can be added.
-    pub fn best_against_null(&self) -> Result<Option<(f64, f64)>, IdentifyError> {
+    /// The best candidate, its p-value with respect to the best scores of the null draws, and the score that these exceed
+    /// with the probability of the significance level. `None` if no candidate can be added.
+    pub fn best_against_null(&self) -> Result<Option<(usize, f64, f64)>, IdentifyError> {
         let chosen = self.selection.branches[ALL].chosen();
         let model = self.model_without(None)?;
-        let Some((_, score)) = self.best_of(&model, &self.gains(&model)?, &chosen) else {
+        let Some((best, score)) = self.best_of(&model, &self.gains(&model)?, &chosen) else {
             return Ok(None);
         };
         let score = self.step_tables(&model)?.iter().map(StepTable::score).fold(score, f64::max);
@@ -188,6 +188,6 @@ impl SearchState<'_> {
         let p_value = (above + 1) as f64 / (null.len() + 1) as f64;
         let rank = ((1.0 - self.policy.significance) * null.len() as f64).ceil() as usize;
         let threshold = null.get(rank.min(null.len().saturating_sub(1)));
-        Ok(Some((p_value, threshold.copied().unwrap_or(0.0))))
+        Ok(Some((best, p_value, threshold.copied().unwrap_or(0.0))))
     }
 }

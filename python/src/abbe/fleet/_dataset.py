@@ -43,6 +43,7 @@ SCHEMAS: dict[str, dict[str, tuple[str, str]]] = {
         "error_stage": ("string", "where the analysis failed: `read`, `fit`, `trace`, `validate`"),
         "error": ("string", "why there is no result"),
         "verdict": ("string", "verdict of the trace"),
+        "goodness": ("string", "whether the residual agrees with the noise: `agrees`, `exceeds`, `structured`, …"),
         "readings": ("int64", "readings without outliers"),
         "outliers": ("int64", "readings excluded as outliers"),
         "noise_um": ("double", "standard deviation of one reading"),
@@ -70,6 +71,9 @@ SCHEMAS: dict[str, dict[str, tuple[str, str]]] = {
         "unit": ("string", "`um`, `arcsec`, …"),
         "meaning": ("string", "what the parameter is"),
         "identifiable": ("bool", "whether the readings identify it"),
+        "determined_by": ("string", "`readings`, `prior`, `base-combination` or `nothing`"),
+        "significant": ("bool", "whether the estimate exceeds 2u and is quotable"),
+        "quotable": ("bool", "whether the estimate may be quoted with its u"),
         "covariance": ("doubles", "its row of the covariance, by `position`; the unit is that of both"),
     },
     "effects": {
