@@ -25,7 +25,8 @@ mod tests {
         report.key(vec![KeyFigure::new("label-words", "value-words", "note-words")]);
         report.section("section-words");
         report.key("paragraph-words [@jcgm100]");
-        report.key(Text::List(vec!["list-words".into()]));
+        // A page writes the first letter of an entry as a capital.
+        report.key(Text::List(vec!["a list-words".into()]));
         report.key(Text::Note("remark-words".into()));
         report.key(Text::Steps(vec![("step-words".into(), "purpose-words".into())]));
         report.key(Table::new(["heading-words"], [cells!["cell-words"]]).named("table"));

@@ -300,7 +300,10 @@ fn unusable_requests_are_named() {
             "abbe run fleet --out results --no-trace -q; abbe history results --machine X",
             "no session of the machine `X`",
         ),
-        ("echo 'a,b' > c.csv; echo '1,2' >> c.csv; abbe history results --compensations c.csv", "c.csv:1: no column `machine_id`"),
+        (
+            "echo 'a,b' > c.csv; echo '1,2' >> c.csv; abbe history results --compensations c.csv",
+            "c.csv:1: no column `machine_id`",
+        ),
         (
             "printf '# tables\nmachine_id,date,parameter,change,unit\n\nM0,2024-01-05,EX0C,many,um' > c.csv; \
              abbe history results --compensations c.csv",
