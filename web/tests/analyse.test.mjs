@@ -119,12 +119,16 @@ test("what cannot be used is refused with a message", async () => {
     "more than 2000 files",
   );
   await refused({ "session.toml": "[[test]]\nname = [" }, "not valid TOML");
+  // A session whose own keys are complete: they are read before the machine file.
+  const complete =
+    '[instrument]\nkind = "ballbar"\n[[test]]\nname = "A"\nbar_mm = 100\n' +
+    "workpiece_ball_mm = [0, 0, 0]\nspindle_ball_mm = [0, 0, 0]\n[machine]\n";
   await refused(
-    { "session.toml": '[[test]]\nname = "A"\n[machine]\nfile = "machine.toml"\n' },
+    { "session.toml": complete + 'file = "machine.toml"\n' },
     "the machine file `machine.toml` does not exist",
   );
   await refused(
-    { "session.toml": '[[test]]\n[machine]\nfile = "../../etc/passwd"\n', "machine.toml": "" },
+    { "session.toml": complete + 'file = "../../etc/passwd"\n', "machine.toml": "" },
     "does not exist",
   );
   const broken = filesOf(hermle);
