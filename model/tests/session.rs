@@ -300,6 +300,33 @@ fn degrees_in_a_column_of_radians_are_doubted() {
     }
 }
 
+/// The session states no runs; a gap in their numbers shows a run that was removed.
+#[test]
+fn a_gap_in_the_numbers_of_runs_is_reported() {
+    let warnings_of = |runs: &[i64]| {
+        let folder = tempfile::tempdir().unwrap();
+        let rows: String =
+            (runs.iter()).flat_map(|run| (0..4).map(move |k| format!("{run},{},100.0\n", 90 * k))).collect();
+        fs::write(folder.path().join("t.csv"), format!("run,c_deg,length_mm\n{rows}")).unwrap();
+        let text = "[machine]\nchain = \"w C b Y X Z t\"\n[machine.axis.C]\n[machine.axis.X]\n[machine.axis.Y]\n\
+                    [machine.axis.Z]\n\n[instrument]\nkind = \"ballbar\"\n\n[unknowns]\nerrors = []\n\n[[test]]\n\
+                    name = \"T\"\ndata = \"t.csv\"\nbar_mm = 100\nworkpiece_ball_mm = [100, 0, 0]\n\
+                    spindle_ball_mm = [0, 0, 0]\n";
+        let path = folder.path().join("session.toml");
+        fs::write(&path, text).unwrap();
+        files::session(&path, &ReadOptions::default()).unwrap().warnings
+    };
+    for complete in [&[1, 2, 3, 4][..], &[5, 6, 7], &[1, 3, 5], &[2], &[0, 100_000, 1_000_000]] {
+        assert!(warnings_of(complete).is_empty(), "{complete:?}: {:?}", warnings_of(complete));
+    }
+    for (runs, words) in
+        [(&[1, 3, 4][..], "lack run 2 between runs 1 and 4"), (&[1, 2, 5, 6, 7], "lack runs 3, 4 between runs 1 and 7")]
+    {
+        let warnings = warnings_of(runs);
+        assert!(warnings.len() == 1 && warnings[0].contains(words), "{warnings:?}");
+    }
+}
+
 #[test]
 fn missing_runs_are_reported() {
     let sweep = "sweep = { axis = \"C\", from_deg = 0, to_deg = 270, step_deg = 90, runs = 2, both_directions = true }";

@@ -37,7 +37,7 @@ pub(crate) fn readings(machine: &Machine, test: &Test, readings: &Readings) -> R
     let doubts = [
         planned::beyond_travel(machine, readings),
         planned::many_turns(machine, readings),
-        runs::difference_from_stated(test.motion.as_ref(), readings),
+        runs::difference_from_stated(test.motion.as_ref(), readings).or_else(|| runs::missing_numbers(readings)),
     ];
     Ok(doubts
         .into_iter()

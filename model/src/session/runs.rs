@@ -1,5 +1,6 @@
 //! Comparison of the runs of measured data with those that the session states.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use super::motion::Motion;
@@ -48,6 +49,22 @@ pub(crate) fn difference_from_stated(motion: Option<&Motion>, readings: &Reading
     let only_forward = *both_directions || backward == 0;
     (!(enough && only_forward))
         .then(|| format!("the data contain {} forward and {backward} backward, but {states}", counted(forward, "run")))
+}
+
+/// A description of the gaps in the numbers of the runs, if any: `1, 3, 4` lacks run 2. Numbers with as many gaps as steps
+/// (`1, 3`, `2, 4, 6`) are a numbering of their own.
+pub(crate) fn missing_numbers(readings: &Readings) -> Option<String> {
+    let present: BTreeSet<i64> = readings.run.iter().copied().collect();
+    let (first, last) = (*present.first()?, *present.last()?);
+    let steps = present.len() as i64 - 1;
+    // A large number is no count of runs.
+    let gaps = last.checked_sub(first)?.checked_sub(steps)?;
+    if !(1..steps).contains(&gaps) {
+        return None;
+    }
+    let missing: Vec<String> = (first..=last).filter(|run| !present.contains(run)).map(|run| run.to_string()).collect();
+    let runs = if missing.len() == 1 { "run" } else { "runs" };
+    Some(format!("the data lack {runs} {} between runs {first} and {last}", missing.join(", ")))
 }
 
 /// Net advance of a run in the direction of the motion, and its total path length: along an axis, or around a circle by
