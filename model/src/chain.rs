@@ -128,17 +128,6 @@ impl Machine {
         self.axes.iter().position(|axis| axis.name == name)
     }
 
-    /// The index of an axis, or a message that lists the axes, and what to do.
-    pub(crate) fn named_axis(&self, name: &str) -> Result<usize, (String, String)> {
-        self.axis_index(name).ok_or_else(|| {
-            let names: Vec<&str> = self.axes.iter().map(|axis| axis.name.as_str()).collect();
-            (
-                format!("the machine \"{}\" has no axis `{name}`", self.name),
-                format!("its axes are {}", names.join(", ")),
-            )
-        })
-    }
-
     /// The positions of all axes, mm or rad, as the chain takes them.
     pub fn axis_positions(&self, positions: &[f64]) -> Vec<AxisPosition<f64>> {
         self.axes.iter().zip(positions).map(|(axis, position)| AxisPosition::new(axis.kind, *position)).collect()

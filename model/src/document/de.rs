@@ -248,20 +248,7 @@ impl<'de> Deserializer<'de> for De<'de> {
         self.deserialize_str(visitor)
     }
 
-    fn deserialize_u32<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
-        self.deserialize_u64(visitor)
-    }
-
-    fn deserialize_i64<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
-        let number = self.number()?;
-        if number.fract() == 0.0 {
-            visitor.visit_i64(number as i64)
-        } else {
-            Err(Fault::is(format!("{}; a whole number is expected", words::number(number))))
-        }
-    }
-
-    forward_to_deserialize_any! { f32 i8 i16 i32 i128 u8 u16 u128 char bytes byte_buf tuple_struct unit unit_struct ignored_any }
+    forward_to_deserialize_any! { f32 i8 i16 i32 i64 i128 u8 u16 u32 u128 char bytes byte_buf tuple_struct unit unit_struct ignored_any }
 }
 
 /// Checks the numbers of a key against its limits, which depend on its unit.

@@ -307,14 +307,6 @@ impl<'de> Deserialize<'de> for Node {
                 Ok(number.into())
             }
 
-            fn visit_i64<E>(self, number: i64) -> Result<Node, E> {
-                Ok((number as f64).into())
-            }
-
-            fn visit_u64<E>(self, number: u64) -> Result<Node, E> {
-                Ok((number as f64).into())
-            }
-
             fn visit_str<E>(self, text: &str) -> Result<Node, E> {
                 Ok(text.into())
             }

@@ -7,17 +7,19 @@ use super::source_map::{BodyFile, SourceMap};
 use super::stamp::FileStamp;
 use super::store::Store;
 use super::table::memory::MemoryColumn;
+use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use crate::chain::Machine;
+use crate::document::effect;
 use crate::document::fault::{Fault, Step, Within};
 use crate::document::lower::body::BodyFiles;
 use crate::document::lower::{self, Data, Parts, Surroundings};
 use crate::document::machine as machine_document;
 use crate::document::node::Node;
-use crate::document::session::{MachineFile, Session as Document, SessionMachine};
+use crate::document::session::{MachineFile, Session as Document, SessionMachine, SocketDistance};
 use crate::document::source::{Parsed, Source};
-use crate::document::{effect, from_node};
+use crate::document::test::Test;
 use crate::effect::Effect;
 use crate::error::{Location, ModelError};
 use crate::instrument::InstrumentKind;
@@ -80,11 +82,8 @@ pub fn effects_of_nodes(
     tests: &[String],
 ) -> Result<Vec<Effect>, ModelError> {
     let source = Parsed::of_node(Node::table([("effect".to_string(), nodes.into_iter().collect::<Node>())]));
-    let read = || {
-        let documents: Vec<effect::Effect> = from_node(source.root.get("effect").unwrap_or(&source.root))?;
-        lower::effects_of(machine, instrument, tests, &documents)
-    };
-    read().within("effect").map_err(|fault| source.error_of(fault))
+    let Additions { effect, .. } = source.document()?;
+    lower::effects_of(machine, instrument, tests, &effect).within("effect").map_err(|fault| source.error_of(fault))
 }
 
 /// A document of another kind, from its TOML text.
@@ -267,24 +266,19 @@ pub fn add_node(
     columns: &[MemoryColumn<'_>],
 ) -> Result<(), ModelError> {
     let source = Parsed::of_node(Node::table([(list.to_string(), Node::from_iter([entry]))]));
-    let read = |session: &mut Session| {
-        let (mut tests, mut effects, mut distances) = (Vec::new(), Vec::new(), Vec::new());
-        for entry in source.root.entries() {
-            let within = |fault: Fault| fault.at(&entry.key);
-            match entry.key.as_str() {
-                "test" => tests = from_node(&entry.node).map_err(within)?,
-                "effect" => effects = from_node(&entry.node).map_err(within)?,
-                "socket_distance" => distances = from_node(&entry.node).map_err(within)?,
-                other => {
-                    let known = ["test", "effect", "socket_distance"].map(str::to_string);
-                    return Err(Fault::unknown_key(other, known.to_vec()));
-                }
-            }
-        }
-        let parts = Parts { test: &tests, effect: &effects, socket_distance: &distances, ..Parts::default() };
-        lower::add(session, parts, &in_memory(Data::Columns(columns), &ReadOptions::default())).map(|_| ())
-    };
-    read(session).map_err(|fault| source.error_of(fault))
+    let Additions { test, effect, socket_distance } = &source.document()?;
+    let parts = Parts { test, effect, socket_distance, ..Parts::default() };
+    let added = lower::add(session, parts, &in_memory(Data::Columns(columns), &ReadOptions::default()));
+    added.map(|_| ()).map_err(|fault| source.error_of(fault))
+}
+
+/// The lists of a session that a program extends.
+#[derive(Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Additions {
+    test: Vec<Test>,
+    effect: Vec<effect::Effect>,
+    socket_distance: Vec<SocketDistance>,
 }
 
 fn in_memory<'a>(data: Data<'a>, options: &'a ReadOptions) -> Surroundings<'a> {

@@ -5,7 +5,7 @@
 use super::readings::Readings;
 use super::{Test, planned, plausibility, runs};
 use crate::chain::Machine;
-use crate::instrument::{Fault, InstrumentKind};
+use crate::instrument::Fault;
 
 /// Least number of readings of a test.
 pub(crate) const MIN_READINGS: usize = 2;
@@ -49,36 +49,4 @@ pub(crate) fn readings(machine: &Machine, test: &Test, readings: &Readings) -> R
 /// The fault of a time after another, if it decreases.
 pub(crate) fn decreasing_time(before_s: f64, time_s: f64) -> Option<String> {
     (time_s < before_s).then(|| format!("time decreases: {time_s} s after {before_s} s in the row before"))
-}
-
-/// A position that the readings of a test lack.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum MissingPosition {
-    /// Of an axis that moves in the test, by index.
-    Moved(usize),
-    /// Of an axis that the test does not state, by index.
-    NotStated(usize),
-    /// Of every axis.
-    All,
-}
-
-/// The first position that readings lack, if any. `stated` are axes whose position the test states, `read` those with a
-/// column of positions, `moved` those that move in its plan. An instrument needs those, or every axis.
-pub(crate) fn missing_position(
-    machine: &Machine,
-    instrument: InstrumentKind,
-    stated: impl Fn(usize) -> bool,
-    read: impl Fn(usize) -> bool,
-    moved: &[usize],
-) -> Option<MissingPosition> {
-    let axes = 0..machine.axes.len();
-    for axis in axes.clone().filter(|&axis| !stated(axis) && !read(axis)) {
-        if moved.contains(&axis) {
-            return Some(MissingPosition::Moved(axis));
-        }
-        if instrument.entry().needs_every_axis {
-            return Some(MissingPosition::NotStated(axis));
-        }
-    }
-    (!axes.clone().any(read)).then_some(MissingPosition::All)
 }

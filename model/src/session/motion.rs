@@ -4,8 +4,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::axis::AxisKind;
-use crate::chain::Machine;
-use crate::error::ModelError;
 
 /// Largest number of readings of one planned test.
 pub const MAX_READINGS: usize = 1_000_000;
@@ -86,19 +84,6 @@ pub(crate) fn default_speed(kind: AxisKind) -> f64 {
     match kind {
         AxisKind::Linear => DEFAULT_FEED_MM_S,
         AxisKind::Rotary => DEFAULT_ROTARY_SPEED_RAD_S,
-    }
-}
-
-impl Motion {
-    /// One run of an axis forward and backward, from and to these positions with this step, mm or rad, at 1000 mm/min or
-    /// 120 °/min.
-    ///
-    /// # Errors
-    /// [`ModelError::Session`] if the machine has no axis of this name.
-    pub fn sweep(machine: &Machine, axis: &str, [from, to]: [f64; 2], step: f64) -> Result<Motion, ModelError> {
-        let axis = machine.named_axis(axis).map_err(|(message, help)| ModelError::Session { message, help })?;
-        let speed = default_speed(machine.axes[axis].kind);
-        Ok(Motion::Sweep { axis, from, to, step, speed, runs: 1, both_directions: true })
     }
 }
 

@@ -58,7 +58,7 @@ fn circle(context: &Context<'_>, document: &document::Circle) -> Result<Motion, 
         return Err(Fault::unexpected("two linear axes, such as \"XY\",").at("plane"));
     };
     let linear = |name: &str| -> Result<usize, Fault> {
-        let axis = named_axis(context, name)?;
+        let axis = quantity::axis(context.machine, name)?;
         if context.machine.axes[axis].kind != AxisKind::Linear {
             return Err(Fault::new(format!("axis `{name}` is rotary; a circle moves two linear axes"), None));
         }
@@ -118,12 +118,8 @@ fn follow(context: &Context<'_>, document: &document::Follow, station: &Station<
     Ok(Motion::Follow { axis, from, to, step, speed, runs, both_directions, offset })
 }
 
-fn named_axis(context: &Context<'_>, name: &str) -> Result<usize, Fault> {
-    Ok(quantity::axis(context.machine, name)?)
-}
-
 fn moved_axis(context: &Context<'_>, name: &str) -> Result<(usize, AxisKind), Fault> {
-    let axis = named_axis(context, name).within("axis")?;
+    let axis = quantity::axis(context.machine, name).within("axis")?;
     Ok((axis, context.machine.axes[axis].kind))
 }
 

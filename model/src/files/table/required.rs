@@ -4,7 +4,6 @@ use super::columns::{Column, Role, known, listed};
 use super::request::Request;
 use crate::instrument::Fault;
 use crate::instrument::column::Quantity;
-use crate::session::check::{self, MissingPosition};
 
 /// Returns a fault if one of them is missing.
 pub(super) fn required(request: &Request<'_>, columns: &[Column], header: Option<&[String]>) -> Result<(), Fault> {
@@ -21,33 +20,24 @@ pub(super) fn required(request: &Request<'_>, columns: &[Column], header: Option
     if let Some((what, help)) = request.test.station.missing(&reads) {
         return missing(what, help);
     }
-    let missed = check::missing_position(
-        request.machine,
-        request.instrument(),
-        |axis| request.at_listed.get(axis).copied().unwrap_or(false),
-        |axis| has(&|role| matches!(role, Role::Axis(i, _) if *i == axis)),
-        &request.moved(),
-    );
-    match missed {
-        None => Ok(()),
-        Some(MissingPosition::Moved(index)) => {
-            let axis = &request.machine.axes[index];
-            let name = axis.column("");
-            missing(
-                format!("`{name}`, though axis `{}` moves in this test", axis.name),
-                "add its positions to the data".into(),
-            )
+    let moved = request.moved();
+    let is_read = |index: usize| has(&|role| matches!(role, Role::Axis(own, _) if *own == index));
+    for (index, axis) in request.machine.axes.iter().enumerate() {
+        if request.at_listed.get(index) == Some(&true) || is_read(index) {
+            continue;
         }
-        Some(MissingPosition::NotStated(index)) => {
-            let axis = &request.machine.axes[index];
-            let name = axis.column("");
-            missing(
-                format!("`{name}`"),
-                format!("add the positions of axis `{}` to the data, or state it: `at = {{ {name} = 0 }}`", axis.name),
-            )
+        let name = axis.column("");
+        if moved.contains(&index) {
+            let what = format!("`{name}`, though axis `{}` moves in this test", axis.name);
+            return missing(what, "add its positions to the data".into());
         }
-        Some(MissingPosition::All) => {
-            missing("with the position of an axis".into(), format!("known here: {}", listed(&known(request))))
+        if request.instrument().entry().needs_every_axis {
+            let help = format!("add the positions of axis `{}` to the data, or state it", axis.name);
+            return missing(format!("`{name}`"), format!("{help}: `at = {{ {name} = 0 }}`"));
         }
     }
+    if (0..request.machine.axes.len()).any(is_read) {
+        return Ok(());
+    }
+    missing("with the position of an axis".into(), format!("known here: {}", listed(&known(request))))
 }
