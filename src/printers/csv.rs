@@ -3,11 +3,6 @@
 use crate::report::block::{Body, Report, Text};
 use crate::report::table::{Cell, Table};
 
-/// How the signs of a table of figures are meant, as comments in front of it.
-const CONVENTION: &str = "# Errors by their names of ISO 230-1: EX0C is a location error, EXC an error motion. Value = actual less nominal: the body that the axis\n\
-# carries is displaced along +X, +Y, +Z of R and turned about them by the right-hand rule, E = Trans(EX, EY, EZ) Rx(EA) Ry(EB) Rz(EC), whatever\n\
-# the axis' own direction. A correction has the opposite sign. u is one standard uncertainty.\n";
-
 /// A cell that a spreadsheet takes for text: one that begins as a formula does (`=`, `+`, `-`, `@`) and is no number
 /// stands behind an apostrophe.
 ///
@@ -38,26 +33,29 @@ pub fn text(table: &Table) -> Result<Vec<u8>, String> {
     writer.into_inner().map_err(|error| error.to_string())
 }
 
-/// The values of a report, under a comment that states the convention of their signs; of a report without them, its
-/// tables, each under a comment with its title.
+/// The values of a report, or its tables if it has no values; each under a comment with its title.
 ///
 /// # Errors
 /// If a row is not as long as the header.
 pub fn report(report: &Report) -> Result<Vec<u8>, String> {
     if !report.values.rows.is_empty() {
-        return Ok([CONVENTION.as_bytes(), &text(&report.values)?].concat());
+        return titled(&report.values.title, &report.values);
     }
     let (mut printed, mut heading) = (Vec::new(), "");
     for block in &report.blocks {
         match &block.body {
             Body::Text(Text::Section(words) | Text::Heading(words) | Text::Fold(words)) => heading = words,
             Body::Table(table) => {
-                let title = if table.title.is_empty() { heading } else { &table.title };
-                printed.extend(format!("# {}\n", title.replace('\n', " ")).into_bytes());
-                printed.extend(text(table)?);
+                printed.extend(titled(if table.title.is_empty() { heading } else { &table.title }, table)?);
             }
             _ => {}
         }
     }
     Ok(printed)
+}
+
+/// A table under its title, each line of which is a comment.
+fn titled(title: &str, table: &Table) -> Result<Vec<u8>, String> {
+    let comment: String = title.lines().map(|line| format!("# {line}\n")).collect();
+    Ok([comment.as_bytes(), &text(table)?].concat())
 }

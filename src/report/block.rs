@@ -206,6 +206,13 @@ impl Report {
         self.key(Text::Opening { word: word.into(), sentences: sentences.into_iter().collect() });
     }
 
+    /// Adds what to do next. The last step leads to what a page or `--all` shows, and is left out there.
+    pub fn steps(&mut self, steps: Vec<(String, String)>, more: (String, &str)) {
+        let with_more = steps.iter().cloned().chain([(more.0, more.1.to_string())]).collect();
+        self.brief(Text::Steps(with_more));
+        self.detail(Text::Steps(steps));
+    }
+
     /// Begins a section.
     pub fn section(&mut self, heading: &str) {
         self.key(Text::Section(heading.to_string()));
@@ -262,18 +269,34 @@ impl Report {
     }
 }
 
-/// A text as pieces: words, and the keys of the citations after them.
+/// The sources that texts cite, as BibTeX.
+pub const BIBLIOGRAPHY: &str = include_str!("paper/refs.bib");
+
+/// A text as pieces: words, and the keys of the citations after them. Only sources of the bibliography are cited: a name
+/// from a user's file that looks like a citation is a name.
 pub fn pieces(text: &str) -> Vec<(&str, Vec<&str>)> {
     let mut pieces = Vec::new();
-    let mut rest = text;
-    while let Some((words, (keys, after))) =
-        rest.split_once("[@").and_then(|(words, after)| Some((words, after.split_once(']')?)))
-    {
-        pieces.push((words, keys.split(';').map(|key| key.trim().trim_start_matches('@')).collect()));
-        rest = after;
+    let (mut start, mut from) = (0, 0);
+    while let Some(at) = text[from..].find("[@").map(|offset| from + offset) {
+        let inside = at + "[@".len();
+        let Some(length) = text[inside..].find(']') else { break };
+        let keys: Vec<&str> =
+            text[inside..inside + length].split(';').map(|key| key.trim().trim_start_matches('@')).collect();
+        from = inside;
+        if keys.iter().all(|key| is_source(key)) {
+            pieces.push((&text[start..at], keys));
+            from = inside + length + "]".len();
+            start = from;
+        }
     }
-    pieces.push((rest, Vec::new()));
+    pieces.push((&text[start..], Vec::new()));
     pieces
+}
+
+/// Whether the bibliography has an entry of this key.
+fn is_source(key: &str) -> bool {
+    let entries = BIBLIOGRAPHY.lines().filter(|line| line.starts_with('@'));
+    entries.filter_map(|line| line.split_once('{')).any(|(_, named)| named.trim_end_matches(',') == key)
 }
 
 /// A text without its citations.
@@ -288,10 +311,16 @@ mod tests {
 
     #[test]
     fn citations_are_separated_from_words() {
-        let found = pieces("Rank [@a;@b] and x [@c].");
-        assert_eq!(found, [("Rank ", vec!["a", "b"]), (" and x ", vec!["c"]), (".", vec![])]);
-        assert_eq!(pieces("no [citation]"), [("no [citation]", vec![])]);
-        assert_eq!(uncited("Rank [@a;@b] and x [@c]."), "Rank and x.");
+        let found = pieces("Rank [@jcgm100;@iso230] and x [@khalil1991].");
+        assert_eq!(found, [("Rank ", vec!["jcgm100", "iso230"]), (" and x ", vec!["khalil1991"]), (".", vec![])]);
+        assert_eq!(uncited("Rank [@jcgm100;@iso230] and x [@khalil1991]."), "Rank and x.");
+        // Names from files are no citations.
+        for words in
+            ["no [citation]", "A[@1]", "H [@x}\\input{/etc/passwd}\\cite{y]", "[@jcgm100;@x>)#read(\"f\")]", "[@", ""]
+        {
+            assert_eq!(pieces(words), [(words, vec![])]);
+        }
+        assert_eq!(uncited("test A[@1] [@jcgm100]"), "test A[@1]");
     }
 
     #[test]

@@ -7,7 +7,7 @@ use abbe::identify::noise::NoiseSource;
 use abbe::identify::plan::candidate_tests;
 use abbe::identify::problem::Problem;
 use abbe::identify::results::{
-    CrossValidation, FitMonteCarlo, FitResult, GoodnessVerdict, ParameterResult, Statements, Verdict,
+    CrossValidation, FitMonteCarlo, FitResult, NextStep, ParameterResult, Statements, Verdict,
 };
 use abbe::identify::series::{spectrum, views};
 use abbe::identify::tolerance::Conformity;
@@ -70,7 +70,8 @@ pub fn report(
     confounded::section(&mut report, &result.unobservable, by_prior, &result.outliers);
     circular::section(&mut report, &result.circular);
     report.section("Next");
-    report.key(Text::Steps(next(problem, result, commands)));
+    let steps = next(problem, result, statements.measure.step, commands);
+    report.steps(steps, (commands.command("fit", "--report fit.html"), "write residuals, plots and sliders as a page"));
     report.section("Residuals");
     report.detail(Text::List(quality.held_out_sentences(None)));
     if !figures {
@@ -114,32 +115,29 @@ fn method(result: &FitResult) -> String {
     )
 }
 
-/// What to do next.
-fn next(problem: &Problem, result: &FitResult, commands: &Commands) -> Vec<(String, String)> {
+/// What to do next: the step of the opening, as a command.
+fn next(problem: &Problem, result: &FitResult, step: NextStep, commands: &Commands) -> Vec<(String, String)> {
     let mut steps: Vec<(String, String)> = Vec::new();
-    let mut step = |step: String, purpose: &str| steps.push((step, purpose.to_string()));
-    if !result.plausibility.conflicts.is_empty() {
-        step("correct the session".into(), "remove what the readings contradict");
-    }
-    let goodness = result.outcome.goodness.verdict;
-    if goodness.forbids_decisions().is_some() {
-        step(commands.command("trace", ""), "find the unmodelled effect behind the residual");
-    }
-    if goodness == GoodnessVerdict::NotJudged {
-        step("state `noise_um` or repeat a run".into(), "have χ² judge the model");
-    }
-    match (candidate_tests::has_candidates(problem), result.unobservable.is_empty()) {
-        (true, true) => {
-            step(commands.command("plan", "--improve"), "propose the test that most lowers the largest uncertainty")
+    let mut add = |step: String, purpose: &str| steps.push((step, purpose.to_string()));
+    match step {
+        NextStep::CorrectSession => add("correct the session".into(), "remove what the readings contradict"),
+        NextStep::StateNoise => add("state `noise_um` or repeat a run".into(), "have χ² judge the model"),
+        NextStep::Improve => {
+            add(commands.command("plan", "--improve"), "propose the test that most lowers the largest uncertainty")
         }
-        (true, false) => step(
+        NextStep::Identify => add(
             commands.command("plan", "--improve"),
             "propose the test that makes the confounded parameters identifiable",
         ),
-        (false, true) => {}
-        (false, false) => step("measure a further test".into(), "move axes that these tests leave at rest"),
+        _ => {}
     }
-    step(commands.command("fit", "--report fit.html"), "write residuals, plots and sliders as a page");
+    // A model that is not judged may lack an effect too.
+    if matches!(step, NextStep::Trace | NextStep::StateNoise) {
+        add(commands.command("trace", ""), "find the unmodelled effect behind the residual");
+    }
+    if !result.unobservable.is_empty() && !candidate_tests::has_candidates(problem) {
+        add("measure a further test".into(), "move axes that these tests leave at rest");
+    }
     steps
 }
 
@@ -191,13 +189,18 @@ fn agreement_of_propagations(drawn: &FitMonteCarlo) -> String {
     )
 }
 
+/// How the signs of figures are meant: a comment in front of them.
+const CONVENTION: &str = "Errors by their names of ISO 230-1: EX0C is a location error, EXC an error motion. Value = actual less nominal: the body that the axis\n\
+carries is displaced along +X, +Y, +Z of R and turned about them by the right-hand rule, E = Trans(EX, EY, EZ) Rx(EA) Ry(EB) Rz(EC), whatever\n\
+the axis' own direction. A correction has the opposite sign. u is one standard uncertainty.";
+
 /// Every figure of a result with all its digits, one row per figure.
 pub struct Figures(Table);
 
 impl Default for Figures {
     fn default() -> Figures {
         let headings = ["section", "id", "meaning", "value", "u", "unit"];
-        Figures(Table::new(headings.map(words), []))
+        Figures(Table::new(headings.map(words), []).titled(CONVENTION))
     }
 }
 

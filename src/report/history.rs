@@ -117,7 +117,8 @@ fn opening(machines: &[MachineHistory]) -> Vec<String> {
     let dated = machines.iter().filter_map(|machine| Some((machine, machine.due_days?)));
     let first = dated.min_by(|a, b| a.1.total_cmp(&b.1));
     let check = first.map(|(machine, days)| (machine.machine_id.as_str(), date(days)));
-    statements::of_history(&abbe::fleet::history::statements(machines), check)
+    let beyond_ten_years = machines.iter().any(|machine| machine.due == Due::BeyondTenYears);
+    statements::of_history(&abbe::fleet::history::statements(machines), check, beyond_ten_years)
 }
 
 /// Whether a parameter has a drift or a step.

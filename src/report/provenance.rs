@@ -62,7 +62,7 @@ impl Input {
 }
 
 /// Quotes an argument for a shell.
-fn quoted(argument: String) -> String {
+pub(super) fn quoted(argument: String) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+%@~".contains(c);
     if !argument.is_empty() && argument.chars().all(plain) {
         argument

@@ -243,7 +243,11 @@ pub fn of_comparison(statements: &Statements<ComparisonStatement, Difference>) -
 
 /// What to correct and to measure by a history; `check`, the machine whose next check is due first, and when.
 #[cfg(feature = "fleet")]
-pub fn of_history(statements: &HistoryStatements, check: Option<(&str, String)>) -> Vec<String> {
+pub fn of_history(
+    statements: &HistoryStatements,
+    check: Option<(&str, String)>,
+    beyond_ten_years: bool,
+) -> Vec<String> {
     let out = &statements.good.out_of_control;
     let control = match out.len() {
         0 => "No machine is out of control".to_string(),
@@ -264,7 +268,9 @@ pub fn of_history(statements: &HistoryStatements, check: Option<(&str, String)>)
     };
     let next = match check {
         Some((machine, when)) => format!("{machine}, whose next check is due {when}"),
-        None => "two dated sessions of a machine; its next check follows from them".to_string(),
+        None if beyond_ten_years => "nothing within ten years, if the drifts stay as they are".to_string(),
+        None => "a further dated session of each machine: too few bound a drift, from which the next check follows"
+            .to_string(),
     };
     vec![control, format!("What to correct: {correct}"), format!("What to measure next: {next}")]
 }

@@ -76,7 +76,8 @@ pub fn report(trace: &TraceOutcome, commands: &Commands, figures: bool) -> Resul
     confounded::section(&mut report, &result.unobservable, by_prior, &result.outliers);
     report.section("Next");
     report.headed(Level::Key, "Tests that separate an effect from its aliases:", Text::List(measure_next(result)));
-    report.key(Text::Steps(next(trace, commands)));
+    let page = "write residuals, plots and alternatives as a page";
+    report.steps(next(trace, commands), (commands.command("trace", "--report trace.html"), page));
     if !figures {
         return Ok(report);
     }
@@ -215,14 +216,14 @@ fn next(trace: &TraceOutcome, commands: &Commands) -> Vec<(String, String)> {
     if result.interrupted {
         step(commands.command("trace", ""), "search to the end");
     } else if !result.effects.is_empty() {
-        let purpose = "declare the effects in a session, which `abbe fit next.toml` fits";
-        step(commands.command("trace", "--write next.toml"), purpose);
+        let written = commands.next_session();
+        let purpose = format!("declare the effects in a session, which `abbe fit {written}` fits");
+        step(commands.command("trace", &format!("--write {written}")), &purpose);
     }
     if !result.unobservable.is_empty() && candidate_tests::has_candidates(&trace.after) {
         let purpose = "propose the test that makes the confounded parameters identifiable";
         step(commands.command("plan", "--improve"), purpose);
     }
-    step(commands.command("trace", "--report trace.html"), "write residuals, plots and alternatives as a page");
     steps
 }
 

@@ -319,7 +319,7 @@ fn notes_and_ball_bar_figures_are_in_the_report() {
 }
 
 /// A report suggests `--improve` only if the command accepts it: it is refused for other instruments than a ball bar
-/// and without a rotary axis.
+/// and without a rotary axis. A model that lacks an effect is traced first, as the opening says.
 #[test]
 fn a_report_suggests_no_command_that_is_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -329,7 +329,8 @@ fn a_report_suggests_no_command_that_is_refused() {
         assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
         std::fs::read_to_string(&report).unwrap().contains("--improve")
     };
-    assert!(offers(&super::ready("hermle-c600u/measured/session.toml")));
+    assert!(offers(&super::ready("table-and-head/measured/session.toml")));
+    assert!(!offers(&super::ready("hermle-c600u/measured/session.toml")));
     let r_test = super::ready("r-test/measured/session.toml");
     assert!(!offers(&r_test));
     let run = abbe(&["plan", text(&r_test), "--no-effects", "--improve", "1"]);

@@ -54,7 +54,8 @@ pub fn report(
     report.key(clearances(&analysis.clearances));
     undeclared(&mut report, analysis);
     report.section("Next");
-    report.key(Text::Steps(next(problem, analysis, commands)));
+    let all = "list sensitivities, budgets, correlations, indices, tests, effects";
+    report.steps(next(problem, analysis, commands), (commands.command("plan", "--all"), all));
     let each = analysis.leave_one_out.iter().map(|without| without.why.clone());
     report.headed(Level::Detail, "Contribution of each test:", Text::List(each.collect()));
     report.section("Sensitivity");
@@ -232,7 +233,6 @@ fn next(problem: &Problem, analysis: &PlanAnalysis, commands: &Commands) -> Vec<
         step("--improve", purpose);
         step("--separate A,B", "propose the test that best separates two effects");
     }
-    step("--all", "list sensitivities, budgets, correlations, indices, tests, effects");
     steps.push((commands.command("simulate", "--out run1"), "simulate readings of these tests".into()));
     steps
 }
