@@ -4,6 +4,7 @@ use std::path::Path;
 
 use abbe_model::document::fault::Fault;
 use abbe_model::document::node::{Named, Node};
+use abbe_model::document::value::Long;
 use abbe_model::files;
 use abbe_model::files::read::lowered;
 use abbe_model::session::limits::{LARGEST, MAX_LENGTH_MM};
@@ -159,7 +160,7 @@ pub fn read(path: &Path) -> Result<Vec<Given>, IdentifyError> {
         }
     };
     let source = files::text(path, "the file of values")?;
-    Ok(lowered(&source, |values: &Named<Node>| values.0.iter().map(given).collect())?)
+    Ok(lowered(&source, |Long(values): &Long<Named<Node>>| values.0.iter().map(given).collect())?)
 }
 
 #[cfg(test)]

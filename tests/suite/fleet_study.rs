@@ -14,7 +14,7 @@ fn a_study_has_its_nominal_coverage() {
     let plan = super::ready("hermle-c600u/chapter4.toml");
     let study = |draws: usize| {
         let file = format!(
-            "[study]\nanalysis = \"fit\"\ndraws = {draws}\nlocation_um = 20\nlocation_arcsec = 8\n\
+            "[study]\nanalysis = \"fit\"\nseed = 20260101120000\ndraws = {draws}\nlocation_um = 20\nlocation_arcsec = 8\n\
              [[plan]]\nname = \"four\"\nsession = {plan:?}\n[[noise]]\nname = \"white\"\num = 0.3\n[[effect]]\nname = \"none\"\n"
         );
         place.put("study.toml", &file);

@@ -177,6 +177,21 @@ fn the_command_writes_map_and_summary_and_names_what_is_wrong() {
         assert_eq!(status, Some(1));
         assert!(printed.contains(expected) && printed.contains("errors.toml"), "{written}: {printed}");
     }
+    // A harmonic whose argument would be constant, or no number.
+    for harmonic in ["order = 1e-309", "period_deg = 1e-320"] {
+        std::fs::write(
+            &file,
+            format!("[[function]]\nerror = \"EZC\"\nharmonic = {{ {harmonic}, amplitude_um = 1 }}\n"),
+        )
+        .unwrap();
+        let (status, printed) = run(text(&file), &[]);
+        assert!(status == Some(1) && printed.contains("a period from"), "{printed}");
+    }
+    // The table of a fine measurement is as long as it is.
+    let at = (0..2001).map(|k| (k - 1000).to_string()).collect::<Vec<_>>().join(", ");
+    let table = format!("[[function]]\nerror = \"EXX\"\ntable = {{ at_mm = [{at}], um = [{at}] }}\n");
+    std::fs::write(&file, table).unwrap();
+    assert_eq!(run(text(&file), &[]).0, Some(0));
     let (status, printed) = run(text(&errors), &["--axis", "Q=3"]);
     assert!(status == Some(1) && printed.contains("no axis `Q`"), "{printed}");
 }

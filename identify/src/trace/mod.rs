@@ -216,8 +216,13 @@ fn with_noise_of_repeats(
         before_fit = fit(&problem, Some(&before_fit.beta))?;
     }
     let residuals = before_fit.residuals.clone();
-    let first = trace_with(problem, before_fit, &residuals, options, progress)?;
-    let first = match with_noise_less_strongest(&first, options, progress)? {
+    let mut first = trace_with(problem, before_fit, &residuals, options, progress)?;
+    let mut first = match with_noise_less_strongest(&first, options, progress)? {
+        // The first search is complete, although the repeated one is not.
+        Some(again) if again.result.interrupted => {
+            first.result.mark_interrupted();
+            return Ok(first);
+        }
         Some(again) => again,
         None => first,
     };
@@ -235,7 +240,6 @@ fn with_noise_of_repeats(
         return Ok(again);
     }
     // The first search is complete, although its noise model is less accurate.
-    let mut first = first;
     first.result.mark_interrupted();
     Ok(first)
 }
@@ -243,7 +247,7 @@ fn with_noise_of_repeats(
 /// Searches again with the noise that remains beside the best candidate, if no effect was found in autocorrelated noise and
 /// this candidate changes that noise. An effect that acts in one of two runs, such as a warm-up, counts as slow noise, and
 /// can raise the threshold above its own score. In noise alone the best candidate leaves the noise model as it is. Returns
-/// `None` if this search finds nothing either.
+/// `None` if this search finds nothing either, unless it was interrupted.
 fn with_noise_less_strongest(
     first: &TraceOutcome,
     options: &TraceOptions,
@@ -260,7 +264,7 @@ fn with_noise_less_strongest(
     }
     let before_fit = fit(&problem, Some(&first.before_fit.beta))?;
     let again = trace_with(problem, before_fit, &beside.residuals, options, progress)?;
-    Ok((!again.effects.is_empty()).then_some(again))
+    Ok((again.result.interrupted || !again.effects.is_empty()).then_some(again))
 }
 
 /// Traces with a given noise model. The null distribution is drawn from the repeats in the residuals `pure`.

@@ -136,10 +136,11 @@ fn add_best(
         return Ok((1.0, None));
     };
     search.thresholds.push(threshold);
-    record.strongest = Some(search.effect(best).clone());
     if p_value > search.policy.significance || search.selected().len() >= search.policy.max_effects {
+        record.strongest = Some(search.effect(best).clone());
         return Ok((p_value, None));
     }
+    record.strongest = None;
     let before = search.selection.branches.clone();
     if !moves::on_every_branch(&Add { p_value }, search)? {
         return Ok((p_value, None));

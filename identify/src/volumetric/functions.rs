@@ -6,7 +6,7 @@ use abbe_model::axis::AxisKind;
 use abbe_model::chain::{ERRORS_PER_AXIS, Machine};
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::document::fault::{Fault, Within};
-use abbe_model::document::value::Positive;
+use abbe_model::document::value::{Long, Positive};
 use abbe_model::files::read::lowered;
 use abbe_model::files::{self, Source};
 use abbe_model::instrument::InternalUnit;
@@ -85,14 +85,17 @@ pub struct ErrorFunction {
     pub form: Form,
 }
 
+/// Periods of a harmonic, mm or rad. Beyond them its argument is no number, or constant.
+const PERIODS: std::ops::RangeInclusive<f64> = 1e-6..=1e9;
+
 /// The keys of a file of error functions.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
     #[serde(default)]
-    constant: BTreeMap<String, String>,
+    constant: Long<BTreeMap<String, String>>,
     #[serde(default)]
-    function: Vec<Function>,
+    function: Long<Vec<Function>>,
 }
 
 #[derive(Deserialize)]
@@ -108,10 +111,10 @@ struct Function {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Table {
-    at_mm: Option<Vec<f64>>,
-    at_deg: Option<Vec<f64>>,
-    um: Option<Vec<f64>>,
-    arcsec: Option<Vec<f64>>,
+    at_mm: Option<Long<Vec<f64>>>,
+    at_deg: Option<Long<Vec<f64>>>,
+    um: Option<Long<Vec<f64>>>,
+    arcsec: Option<Long<Vec<f64>>>,
 }
 
 #[derive(Deserialize)]
@@ -171,11 +174,11 @@ pub fn read(path: &Path, machine: &Machine) -> Result<Vec<ErrorFunction>, Identi
 pub fn of_source(source: &Source, machine: &Machine) -> Result<Vec<ErrorFunction>, IdentifyError> {
     Ok(lowered(source, |file: &File| {
         let mut functions = Vec::new();
-        for (id, quantity) in &file.constant {
+        for (id, quantity) in &file.constant.0 {
             let constant = constant(machine, id, quantity).map_err(|fault| fault.on_key().at(id));
             functions.push(constant.within("constant")?);
         }
-        for (item, entry) in file.function.iter().enumerate() {
+        for (item, entry) in file.function.0.iter().enumerate() {
             functions.push(function(machine, entry).within_item(item).within("function")?);
         }
         Ok(functions)
@@ -202,7 +205,10 @@ fn function(machine: &Machine, entry: &Function) -> Result<ErrorFunction, Fault>
         (None, Some(Polynomial { scale_mm, scale_deg, um, arcsec }), None) => {
             let scale = of_axis(kind, "scale", scale_mm, scale_deg).within("polynomial")?;
             let scale = scale.map_or(1.0, |scale| kind.to_internal(scale.0));
-            Form::Polynomial { scale, coefficients: values(angle, um, arcsec).within("polynomial")? }
+            Form::Polynomial {
+                scale,
+                coefficients: values(angle, um.as_deref(), arcsec.as_deref()).within("polynomial")?,
+            }
         }
         (None, None, Some(harmonic)) => self::harmonic(kind, angle, harmonic).within("harmonic")?,
         _ => {
@@ -218,8 +224,9 @@ fn function(machine: &Machine, entry: &Function) -> Result<ErrorFunction, Fault>
 }
 
 fn table(kind: AxisKind, angle: bool, table: &Table) -> Result<Form, Fault> {
-    let values = values(angle, &table.um, &table.arcsec)?;
-    let at = of_axis(kind, "at", &table.at_mm, &table.at_deg)?.ok_or_else(|| {
+    let [um, arcsec] = [&table.um, &table.arcsec].map(|list| list.as_ref().map(|Long(list)| list.as_slice()));
+    let values = values(angle, um, arcsec)?;
+    let Long(at) = of_axis(kind, "at", &table.at_mm, &table.at_deg)?.ok_or_else(|| {
         let key = format!("at_{}", kind.unit());
         Fault::missing(&key, "the positions of the values")
     })?;
@@ -243,8 +250,13 @@ fn harmonic(kind: AxisKind, angle: bool, harmonic: &Harmonic) -> Result<Form, Fa
             return Err(Fault::new(message, None));
         }
     };
-    let single = |value: Option<f64>| value.map(|value| vec![value]);
-    let amplitude = values(angle, &single(harmonic.amplitude_um), &single(harmonic.amplitude_arcsec))?[0];
+    if !PERIODS.contains(&period) {
+        let [least, most] = [PERIODS.start(), PERIODS.end()].map(|period| kind.to_display(*period));
+        let message = format!("a period from {least:.1e} to {most:.1e} {} is expected", kind.unit());
+        return Err(Fault::new(message, None));
+    }
+    let [um, arcsec] = [harmonic.amplitude_um, harmonic.amplitude_arcsec].map(|value| value.map(|value| [value]));
+    let amplitude = values(angle, um.as_ref().map(<[f64; 1]>::as_slice), arcsec.as_ref().map(<[f64; 1]>::as_slice))?[0];
     Ok(Form::Harmonic { period, amplitude, phase: harmonic.phase_deg.to_radians() })
 }
 
@@ -284,7 +296,7 @@ fn of_axis<'v, T>(kind: AxisKind, stem: &str, mm: &'v Option<T>, deg: &'v Option
 }
 
 /// Values of an error, mm or rad.
-fn values(angle: bool, um: &Option<Vec<f64>>, arcsec: &Option<Vec<f64>>) -> Result<Vec<f64>, Fault> {
+fn values(angle: bool, um: Option<&[f64]>, arcsec: Option<&[f64]>) -> Result<Vec<f64>, Fault> {
     let (right, wrong, per_internal, word) =
         if angle { (arcsec, um, ARCSEC, "arcsec") } else { (um, arcsec, 1e3, "um") };
     match (right, wrong) {

@@ -3,6 +3,8 @@
 //!
 //! The deserialisers of `toml` and `serde_json` speak of types of Rust and lose the key; this one does not.
 
+use std::collections::VecDeque;
+
 use serde::de::value::{F64Deserializer, MapAccessDeserializer, StrDeserializer, StringDeserializer};
 use serde::de::{self, DeserializeSeed, Deserializer, Expected, IntoDeserializer, MapAccess, SeqAccess, Visitor};
 
@@ -26,6 +28,9 @@ pub(super) const REST: &str = "$rest";
 /// The type whose value is the text of any scalar, as written.
 pub(super) const NOTE: &str = "Note";
 
+/// The type of a list or a table of names whose length only the size of its file limits.
+pub(super) const LONG: &str = "Long";
+
 /// The type whose value is a number that may be infinite.
 pub(super) const UNLIMITED: &str = "Unlimited";
 
@@ -34,11 +39,12 @@ pub(super) const UNLIMITED: &str = "Unlimited";
 /// # Errors
 /// What is wrong, with the path from the tree.
 pub fn from_node<'de, T: Deserialize<'de>>(node: &'de Node) -> Result<T, Fault> {
-    T::deserialize(De(node))
+    T::deserialize(De(node, MAX_ITEMS))
 }
 
+/// A value, and the largest number of items if it is a list or a table of names.
 #[derive(Clone, Copy)]
-struct De<'de>(&'de Node);
+struct De<'de>(&'de Node, usize);
 
 impl<'de> De<'de> {
     /// A value of another type than the expected one.
@@ -73,8 +79,8 @@ impl<'de> De<'de> {
 
     fn items(self, expected: &dyn Expected) -> Result<&'de [Node], Fault> {
         match &self.0.value {
-            Value::List(items) if items.len() > MAX_ITEMS => {
-                Err(Fault::is(format!("a list of {}; the limit is {MAX_ITEMS}", items.len())))
+            Value::List(items) if items.len() > self.1 => {
+                Err(Fault::is(format!("a list of {}; the limit is {}", items.len(), self.1)))
             }
             Value::List(items) => Ok(items),
             _ => Err(self.unexpected(expected)),
@@ -110,7 +116,7 @@ impl<'de> Deserializer<'de> for De<'de> {
             Value::Number(number, _) if number.is_nan() => Err(Fault::unexpected("a number")),
             Value::Number(number, _) => visitor.visit_f64(checked(*number).map_err(Fault::is)?),
             Value::Truth(truth) => visitor.visit_bool(*truth),
-            Value::Date(date) => visitor.visit_borrowed_str(date),
+            Value::Date(_) => Err(self.unexpected(&visitor)),
             Value::List(_) => self.deserialize_seq(visitor),
             Value::Table(entries) => visitor.visit_map(Map::all(entries)),
         }
@@ -121,6 +127,12 @@ impl<'de> Deserializer<'de> for De<'de> {
     }
 
     fn deserialize_u64<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+        // With all its digits, which a float does not hold above 2⁵³.
+        if let Value::Number(_, written) = &self.0.value
+            && let Ok(number) = written.parse()
+        {
+            return visitor.visit_u64(number);
+        }
         let number = self.number()?;
         if number.fract() == 0.0 && number >= 0.0 {
             visitor.visit_u64(number as u64)
@@ -168,6 +180,7 @@ impl<'de> Deserializer<'de> for De<'de> {
                 };
                 visitor.visit_newtype_struct(StringDeserializer::<Fault>::new(text))
             }
+            LONG => visitor.visit_newtype_struct(De(self.0, usize::MAX)),
             _ => visitor.visit_newtype_struct(self),
         }
     }
@@ -187,10 +200,7 @@ impl<'de> Deserializer<'de> for De<'de> {
 
     fn deserialize_map<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
         let entries = self.entries()?;
-        if entries.len() > MAX_ITEMS {
-            let what = format!("has {} entries; the limit is {MAX_ITEMS}", entries.len());
-            return Err(Fault::of_table(what, None));
-        }
+        not_too_many(entries.len(), self.1)?;
         visitor.visit_map(Map::all(entries))
     }
 
@@ -236,7 +246,7 @@ impl<'de> Deserializer<'de> for De<'de> {
         let Some(kind) = self.0.get("kind") else {
             return Err(Fault::missing("kind", &expected()));
         };
-        let word = De(kind).text().ok().and_then(known);
+        let word = De(kind, MAX_ITEMS).text().ok().and_then(known);
         let variant = word.ok_or_else(|| Fault::unexpected(expected()).at("kind"))?;
         let mut map = Map::all(entries);
         map.entries.retain(|entry| entry.key != "kind");
@@ -251,10 +261,21 @@ impl<'de> Deserializer<'de> for De<'de> {
     forward_to_deserialize_any! { f32 i8 i16 i32 i64 i128 u8 u16 u32 u128 char bytes byte_buf tuple_struct unit unit_struct ignored_any }
 }
 
+/// Checks the number of entries of a table of names.
+fn not_too_many(entries: usize, limit: usize) -> Result<(), Fault> {
+    if entries <= limit {
+        return Ok(());
+    }
+    Err(Fault::of_table(format!("has {entries} entries; the limit is {limit}"), None))
+}
+
 /// Checks the numbers of a key against its limits, which depend on its unit.
 fn within_limits(key: &str, node: &Node) -> Result<(), Fault> {
     match &node.value {
-        Value::Number(number, _) => limits::too_large_for(key, *number).map_or(Ok(()), |fault| Err(Fault::is(fault))),
+        // A number whose key has no unit is checked by its type.
+        Value::Number(number, _) if key.contains('_') => {
+            limits::too_large_for(key, *number).map_or(Ok(()), |fault| Err(Fault::is(fault)))
+        }
         Value::List(items) => {
             items.iter().enumerate().try_for_each(|(item, node)| within_limits(key, node).within_item(item))
         }
@@ -275,13 +296,13 @@ impl<'de> SeqAccess<'de> for Items<'de> {
             return Ok(None);
         };
         self.next += 1;
-        seed.deserialize(De(item)).map(Some).within_item(self.next - 1)
+        seed.deserialize(De(item, MAX_ITEMS)).map(Some).within_item(self.next - 1)
     }
 }
 
 struct Map<'de> {
     /// The entries still to be visited, in the order of the file.
-    entries: std::collections::VecDeque<&'de Entry>,
+    entries: VecDeque<&'de Entry>,
     value: Option<&'de Entry>,
     /// The keys that the struct does not name.
     rest: Option<Vec<&'de Entry>>,
@@ -312,10 +333,11 @@ impl<'de> MapAccess<'de> for Map<'de> {
     fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, Fault> {
         match self.value.take() {
             Some(entry) => within_limits(&entry.key, &entry.node)
-                .and_then(|()| seed.deserialize(De(&entry.node)))
+                .and_then(|()| seed.deserialize(De(&entry.node, MAX_ITEMS)))
                 .within(&entry.key),
             None => {
-                let entries = self.rest.take().unwrap_or_default().into();
+                let entries: VecDeque<&Entry> = self.rest.take().unwrap_or_default().into();
+                not_too_many(entries.len(), MAX_ITEMS)?;
                 let rest = Map { entries, value: None, rest: None, also: None };
                 seed.deserialize(MapAccessDeserializer::new(rest))
             }

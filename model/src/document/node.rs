@@ -292,7 +292,7 @@ impl<'de> Deserialize<'de> for Node {
             type Value = Node;
 
             fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-                formatter.write_str("a value")
+                formatter.write_str("a number, a text, a list or a table")
             }
 
             fn visit_unit<E>(self) -> Result<Node, E> {

@@ -31,11 +31,11 @@ impl From<f64> for Length {
 }
 
 impl Length {
-    /// The length with its expression resolved, and its value, mm.
+    /// The length with its expression resolved, and its value, in the unit of its key: mm but for a position in `at`.
     ///
     /// # Errors
-    /// If it is no expression in the constants, infinite or too large.
-    pub(crate) fn in_mm(&self, constants: &[Constant]) -> Result<(expression::Length, f64), Fault> {
+    /// If it is no expression in the constants, infinite or too large for its key.
+    pub(crate) fn evaluated(&self, key: &str, constants: &[Constant]) -> Result<(expression::Length, f64), Fault> {
         let text = match self {
             Length::Number(number) if number.is_finite() => return Ok((expression::Length::Number(*number), *number)),
             Length::Number(_) => return Err(Fault::is("infinite; a length is expected")),
@@ -50,7 +50,7 @@ impl Length {
             let found = constants.iter().find(|known| known.name == name);
             found.map_or(f64::NAN, |constant| constant.mm)
         });
-        if let Some(fault) = limits::too_large_for("_mm", number) {
+        if let Some(fault) = limits::too_large_for(key, number) {
             return Err(Fault::of_key(format!("= \"{text}\" evaluates to {fault}"), None));
         }
         if !number.is_finite() {
@@ -245,6 +245,10 @@ impl<'de> Deserialize<'de> for Uncertainties {
         deserializer.deserialize_any(OneOrThree)
     }
 }
+
+/// A list or a table of names of any length: the size of its file is the limit. Others have at most 1000 items.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+pub struct Long<T>(pub T);
 
 /// A note: a text, a number or a date, as it is written.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

@@ -58,7 +58,7 @@ pub(super) fn keys<T: DeserializeOwned + JsonSchema>(set_up: &Node) -> Result<T,
 
 /// A length above zero.
 pub(super) fn positive(key: &str, length: &document::Length, constants: &[Constant]) -> Result<Written, Fault> {
-    let (length, mm) = length.in_mm(constants).within(key)?;
+    let (length, mm) = length.evaluated(key, constants).within(key)?;
     limits::positive(mm).within(key)?;
     Ok(Written { length, mm })
 }
@@ -67,7 +67,7 @@ pub(super) fn positive(key: &str, length: &document::Length, constants: &[Consta
 pub(super) fn point(key: &str, Three(point): &Point, constants: &[Constant]) -> Result<[Written; 3], Fault> {
     let mut coordinates = [const { Written::number(0.0) }; 3];
     for (item, (coordinate, length)) in coordinates.iter_mut().zip(point).enumerate() {
-        let (length, mm) = length.in_mm(constants).within_item(item).within(key)?;
+        let (length, mm) = length.evaluated(key, constants).within_item(item).within(key)?;
         *coordinate = Written { length, mm };
     }
     Ok(coordinates)

@@ -68,12 +68,12 @@ fn circle(context: &Context<'_>, document: &document::Circle) -> Result<Motion, 
     if first == second {
         return Err(Fault::of_key(format!("= \"{plane}\" names one axis twice"), None).at("plane"));
     }
-    let (_, radius) = document.radius_mm.in_mm(context.constants).within("radius_mm")?;
+    let (_, radius) = document.radius_mm.evaluated("radius_mm", context.constants).within("radius_mm")?;
     limits::positive(radius).within("radius_mm")?;
     let mut centre = [0.0; 3];
     for (item, (to, length)) in centre.iter_mut().zip(document.centre_mm.iter().flat_map(|point| &point.0)).enumerate()
     {
-        (_, *to) = length.in_mm(context.constants).within_item(item).within("centre_mm")?;
+        (_, *to) = length.evaluated("centre_mm", context.constants).within_item(item).within("centre_mm")?;
     }
     let range = StepRange::turn(document.from_deg, document.to_deg, document.step_deg)?;
     let speed = document.feed_mm_min.map_or(DEFAULT_FEED_MM_S, |feed| feed.0 / 60.0);

@@ -157,7 +157,7 @@ fn at(context: &Context<'_>, entries: &Named<value::Length>) -> Result<HeldPosit
             let message = format!("`at` gives the position of axis `{}` twice", machine.axes[axis].name);
             return Err(Fault::new(message, None).on_key().at(key));
         }
-        let (written, number) = length.in_mm(context.constants).within(key)?;
+        let (written, number) = length.evaluated(key, context.constants).within(key)?;
         held.at[axis] = unit.to_internal(number);
         let in_mm = machine.axes[axis].kind == AxisKind::Linear && unit == quantity::Unit::Times(1.0);
         held.written[axis] = in_mm.then_some(written);
