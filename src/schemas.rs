@@ -10,7 +10,7 @@ use abbe_identify::plan::poses::PoseSelection;
 use abbe_identify::repeated::Repeated;
 use abbe_identify::self_calibration::SelfCalibration;
 use abbe_identify::simulate::SimulationResult;
-use abbe_identify::volumetric::Summary;
+use abbe_identify::volumetric::{Summary, functions as error_functions};
 use abbe_model::document::schema;
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
@@ -63,7 +63,10 @@ pub const SCHEMAS: &[FileSchema] = &[
     file("run", "`abbe run --json`", of::<RunResult>),
     file("history", "`abbe history --json`", of::<StatedHistory>),
     file("study", "`abbe study --json`", of::<StudyResult>),
-    file("study-file", "The study file of `abbe study`, as JSON", plain::<StudyFile>),
+    file("functions", "The error functions of `abbe volumetric --functions`, as JSON", || {
+        schema::of::<error_functions::File>("Abbe file of error functions")
+    }),
+    file("study-file", "The study file of `abbe study`, as JSON", || schema::of::<StudyFile>("Abbe study file")),
     file("record", "The result of a session in the folder of `abbe run`", plain::<Record>),
 ];
 
@@ -71,6 +74,7 @@ pub const SCHEMAS: &[FileSchema] = &[
 fn plain<T: JsonSchema>() -> Value {
     let mut schema = open::<T>();
     close(&mut schema);
+    schema::share(&mut schema);
     schema
 }
 

@@ -9,6 +9,7 @@ use abbe_model::document::print;
 use abbe_model::document::session::Session;
 use abbe_model::files::Source;
 use abbe_model::files::read::document_of;
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -24,7 +25,7 @@ fn files_in(folder: &Path, files: &mut Vec<PathBuf>) {
 }
 
 #[track_caller]
-fn reads_back<T: Serialize + DeserializeOwned + PartialEq + Debug>(file: &Path, text: &str) {
+fn reads_back<T: Serialize + DeserializeOwned + JsonSchema + PartialEq + Debug>(file: &Path, text: &str) {
     let document: T = document_of(&Source::new(file, text)).unwrap();
     let printed = print::text_of(&document).unwrap();
     let again: T = document_of(&Source::new(file, &printed)).unwrap_or_else(|fault| panic!("{fault}\n{printed}"));

@@ -63,20 +63,24 @@ fn unusable_study_files_are_named() {
     let file = "[study]\nanalysis = \"fit\"\ndraws = 1\n[[plan]]\nname = \"a\"\nsession = \"session.toml\"\n\
                 [[noise]]\nname = \"n\"\num = 0.3\n[[effect]]\nname = \"none\"\n";
     for (from, to, expected) in [
-        ("draws = 1", "draws = 0", "draws = 0"),
-        ("draws = 1", "draws = 1000001", "draws = 1000001: 1 to 1000000 are expected"),
+        ("draws = 1", "draws = 0", "study.toml:3: `draws` is 0; a whole number from 1 to 1000000 is expected"),
+        ("draws = 1", "draws = 1000001", "`draws` is 1000001; a whole number from 1 to 1000000 is expected"),
         (
             "[[effect]]",
             "[[noise]]\nname = \"m\"\num = 1\n[[effect]]",
             "1 plans × 1 effects × 2 kinds of noise × 600000 draws: at most 1000000 draws",
         ),
         ("draws = 1", "draws = 1\nfoo = 2", "foo"),
-        ("um = 0.3", "um = 0.3\nautocorrelation = 1", "noise `n`"),
+        (
+            "um = 0.3",
+            "um = 0.3\nautocorrelation = 1",
+            "study.toml:10: `autocorrelation` is 1; 0 to below 1 is expected",
+        ),
         ("name = \"none\"", "name = \"none\"\nsize = 5", "effect `none`"),
         (
             "name = \"none\"",
             "name = \"x\"\nsize = 5\neffect = { component = \"EZQ\", shape = \"constant\" }",
-            "effect `x`",
+            "study.toml:13: effect on \"EZQ\": the machine \"w X b Y t\" has no axis `Q`",
         ),
         ("session = \"session.toml\"", "session = \"nowhere.toml\"", "nowhere.toml"),
         ("[[noise]]", "[[noise]]\nname = \"n\"\num = 1\n[[noise]]", "two [[noise]] are called `n`"),

@@ -136,7 +136,7 @@ fn what_cannot_be_validated_is_refused_and_nothing_is_written() {
         (&second, &model, "this is a session or machine file, not a model"),
         (&edited, &second, "changed after it was saved"),
         (&newer, &second, "`schema_version` is 9"),
-        (&wrong, &second, "`parameters[0].held`: invalid type"),
+        (&wrong, &second, "`parameters[0].held` is a number; true or false is expected"),
         (&model, &other, "the model is of another machine than the session: the chain is"),
         (&model, &plan, "no readings"),
         (&missing, &second, "cannot be read"),

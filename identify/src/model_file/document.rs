@@ -2,9 +2,17 @@
 
 use std::collections::BTreeMap;
 
+use abbe_model::document::effect::Effect;
+use abbe_model::document::machine::Machine;
+use abbe_model::document::print;
+use abbe_model::document::session::Kind;
+use abbe_model::document::value::{Json, Long, Positive};
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::ser::Error;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
+
+use crate::noise::NoiseSource;
 
 /// The word that marks a model file.
 pub const SCHEMA: &str = "abbe-model";
@@ -24,19 +32,21 @@ pub struct Document {
     /// Where the model comes from.
     pub provenance: Provenance,
     /// The machine, with the keys of a machine file.
-    pub machine: Value,
+    #[serde(serialize_with = "sorted")]
+    pub machine: Machine,
     /// The instrument of the readings: `ballbar`, `tracker`, …
-    pub instrument: String,
+    pub instrument: Kind,
     /// The effects, with the keys of `[[effect]]`.
-    pub effects: Vec<Value>,
+    #[serde(serialize_with = "sorted")]
+    pub effects: Long<Vec<Effect>>,
     /// All parameters in the order of `covariance`.
-    pub parameters: Vec<Parameter>,
+    pub parameters: Long<Vec<Parameter>>,
     /// Lower triangle of the covariance of the parameters, row by row, internal units (mm, rad, s).
-    pub covariance: Vec<Vec<f64>>,
+    pub covariance: Long<Vec<Long<Vec<f64>>>>,
     /// Directions that the readings do not determine, internal units.
-    pub null_directions: Vec<Vec<f64>>,
+    pub null_directions: Long<Vec<Long<Vec<f64>>>>,
     /// Location errors as estimated without any effect.
-    pub locations: Vec<Location>,
+    pub locations: Long<Vec<Location>>,
     /// The noise of a reading.
     pub noise: Noise,
     /// How well the model describes its own readings.
@@ -51,6 +61,13 @@ pub struct Document {
     pub reference: Reference,
 }
 
+/// A document of a session, with the keys of each table in alphabetical order.
+fn sorted<S: Serializer>(document: &impl Serialize, serializer: S) -> Result<S::Ok, S::Error> {
+    let mut value = print::json_of(document).map_err(S::Error::custom)?;
+    value.sort_all_objects();
+    value.serialize(serializer)
+}
+
 /// The command and the files from which a model follows.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -60,13 +77,28 @@ pub struct Provenance {
     /// `fit` or `trace`.
     pub command: String,
     /// The options on the command line.
+    #[serde(deserialize_with = "options")]
     pub options: Map<String, Value>,
     /// Seed of all random numbers.
     pub seed: u64,
     /// The session file.
     pub session: String,
     /// All files that were read.
+    #[serde(deserialize_with = "long")]
     pub inputs: Vec<InputFile>,
+}
+
+/// The options with all digits of their numbers.
+fn options<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Map<String, Value>, D::Error> {
+    match Json::deserialize(deserializer)? {
+        Json(Value::Object(options)) => Ok(options),
+        Json(_) => Err(serde::de::Error::invalid_type(serde::de::Unexpected::Other("value"), &"a table")),
+    }
+}
+
+/// A list of any length.
+fn long<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Result<T, D::Error> {
+    Long::deserialize(deserializer).map(|Long(list)| list)
 }
 
 /// An input file.
@@ -86,8 +118,8 @@ pub struct InputFile {
 pub struct Parameter {
     /// Identifier, as in the results of a fit.
     pub id: String,
-    /// `location`, `set-up` or `coefficient`.
-    pub role: String,
+    /// What it is.
+    pub role: Role,
     /// Index of the effect of a coefficient.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub effect: Option<usize>,
@@ -101,15 +133,28 @@ pub struct Parameter {
     /// Unit of `value` and `u`.
     pub unit: String,
     /// Number of display units per internal unit.
-    pub display_per_internal: f64,
+    pub display_per_internal: Positive,
     /// Value in the internal unit, from which predictions follow.
     pub internal: f64,
     /// Whether it is held at nominal, since it is not separable from other parameters.
     pub held: bool,
     /// Standard uncertainty of its Gaussian prior about 0, internal unit; `null` without a prior.
-    pub prior_u: Option<f64>,
+    pub prior_u: Option<Positive>,
     /// Physical size, internal unit.
-    pub size: f64,
+    pub size: Positive,
+}
+
+/// What a parameter is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+#[schemars(rename = "ModelRole")]
+pub enum Role {
+    /// A location error.
+    Location,
+    /// A quantity of the set-up.
+    SetUp,
+    /// A coefficient of an effect.
+    Coefficient,
 }
 
 /// A location error.
@@ -133,9 +178,9 @@ pub struct Location {
 #[schemars(rename = "ModelNoise")]
 pub struct Noise {
     /// Standard deviation, µm.
-    pub noise_um: f64,
-    /// `stated`, `repeats` or `residual`.
-    pub source: String,
+    pub noise_um: Positive,
+    /// Where it comes from.
+    pub source: NoiseSource,
     /// Autoregressive coefficients along a run.
     pub ar_coefficients: Vec<f64>,
     /// Standard uncertainty of their sum.

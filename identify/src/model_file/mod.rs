@@ -8,11 +8,10 @@
 //! - `of_fit`: the model of a fit; [`carried`]: the part that another session shares, with the errors of the machine at
 //!   any state;
 //! - [`range`]: the range of axes and drivers;
-//! - [`document`]: the JSON form; `read`, `write`: from and to a file, with a checksum; `location`: the path of a key.
+//! - [`document`]: the JSON form; `read`, `write`: from and to a file, with a checksum.
 
 pub mod carried;
 pub mod document;
-mod location;
 mod of_fit;
 pub mod range;
 mod read;

@@ -5,22 +5,24 @@ use std::path::Path;
 use abbe_model::ModelError;
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
+use abbe_model::document::fault::{Fault, Within};
+use abbe_model::document::session::Kind;
+use abbe_model::document::source::Source;
+use abbe_model::document::value::{Long, Positive};
 use abbe_model::driver::{Driver, Reference, TEMPERATURE};
 use abbe_model::effect::Effect;
 use abbe_model::error::Location;
 use abbe_model::files;
-use abbe_model::files::read::{effects_of_nodes, machine_of_node};
-use abbe_model::instrument::InstrumentKind;
+use abbe_model::files::read::{effect_of_document, machine_of_document};
 use abbe_model::session::Prior;
 use faer::Mat;
 use serde_json::Value;
 
 use super::document::{self, Document, SCHEMA, SCHEMA_VERSION};
-use super::location::path_at;
 use super::write::{CHECKSUM, checksum};
 use super::{DriverRange, IdentifiedModel, ModelParameter, Quality};
 use crate::error::IdentifyError;
-use crate::noise::{Noise, NoiseSource};
+use crate::noise::Noise;
 use crate::numerics::symmetric::Symmetric;
 use crate::parameters::Role;
 use crate::unit::Unit;
@@ -28,11 +30,16 @@ use crate::unit::Unit;
 /// Least eigenvalue of a covariance over its largest, in scaled parameters, below 0 by rounding.
 const ROUNDING_OF_COVARIANCE: f64 = 1e-9;
 
+/// What to do about a file that is no model.
+const ANOTHER: &str = "name a file in which a fit was saved as a model";
+/// What to do about a model that cannot be used.
+const SAVE_AGAIN: &str = "save the model again";
+
 /// Reads a model file.
 ///
 /// # Errors
-/// If the file cannot be read, is no model, is of a newer version, or was changed by hand: the file, the key, what was
-/// found and what to do.
+/// If the file cannot be read, is no model, is of a newer version, or was changed by hand: the file, the line, the key,
+/// what was found and what to do.
 pub fn read(path: &Path) -> Result<IdentifiedModel, IdentifyError> {
     read_text(path, &files::text(path, "the model file")?.text)
 }
@@ -42,287 +49,222 @@ pub fn read(path: &Path) -> Result<IdentifiedModel, IdentifyError> {
 /// # Errors
 /// As [`read`].
 pub fn read_text(path: &Path, text: &str) -> Result<IdentifiedModel, IdentifyError> {
-    let file = File { path };
-    let value: Value = serde_json::from_str(text).map_err(|cause| file.not_json(text, &cause))?;
-    file.check_header(&value)?;
-    let document: Document = serde_json::from_str(text).map_err(|cause| file.wrong_value(text, &cause))?;
-    if document.sha256 != checksum(&value) {
-        let message = format!(
-            "`{CHECKSUM}` is \"{}\", but the checksum of the other keys is another: the file was changed after it \
-             was saved",
+    Ok(model_of(&Source::new(path, text))?)
+}
+
+fn model_of(source: &Source) -> Result<IdentifiedModel, ModelError> {
+    let whole: Value = serde_json::from_str(&source.text).map_err(|cause| not_json(source, &cause))?;
+    let parsed = source.json()?;
+    let here = |fault: Fault| helped(parsed.error_of(fault));
+    header(&whole).map_err(here)?;
+    let document: Document = parsed.document().map_err(helped)?;
+    if document.sha256 != checksum(&whole) {
+        let what = format!(
+            "is \"{}\", but the checksum of the other keys is another: the file was changed after it was saved",
             document.sha256
         );
-        return Err(file.error(message, SAVE_AGAIN));
+        return Err(here(Fault::of_key(what, None).at(CHECKSUM)));
     }
-    file.model(document)
+    model(document).map_err(here)
 }
 
-/// The file in messages.
-struct File<'p> {
-    path: &'p Path,
+/// The error with what to do, which is the same about every value that a program wrote.
+fn helped(mut error: ModelError) -> ModelError {
+    if let ModelError::Input { help, .. } = &mut error {
+        help.get_or_insert_with(|| SAVE_AGAIN.to_string());
+    }
+    error
 }
 
-const SAVE_AGAIN: &str = "save the model again";
+fn not_json(source: &Source, cause: &serde_json::Error) -> ModelError {
+    let is_toml = ["[[test]]", "[machine]", "[axis."].iter().any(|header| source.text.contains(header));
+    let (location, message) = if is_toml {
+        (Location::file(&source.file), "this is a session or machine file, not a model".to_string())
+    } else {
+        (Location::line(&source.file, cause.line()), format!("not valid JSON: {cause}"))
+    };
+    ModelError::Input { location, message, help: Some(ANOTHER.to_string()) }
+}
 
-impl File<'_> {
-    fn error(&self, message: impl Into<String>, help: &str) -> IdentifyError {
-        self.error_in(Location::file(self.path), message, help)
+/// Checks that it is a model of a version that can be read.
+fn header(whole: &Value) -> Result<(), Fault> {
+    match whole.get("schema").and_then(Value::as_str) {
+        Some(SCHEMA) => {}
+        Some(other) => {
+            return Err(Fault::of_key(format!("is \"{other}\"; \"{SCHEMA}\" is expected"), ANOTHER).at("schema"));
+        }
+        None if whole.get("command").is_some() => {
+            return Err(Fault::new("this is the result of a command, not a model", ANOTHER));
+        }
+        None => return Err(Fault::new(format!("the file has no `schema`; \"{SCHEMA}\" is expected"), ANOTHER)),
     }
-
-    fn error_in(&self, location: Location, message: impl Into<String>, help: &str) -> IdentifyError {
-        IdentifyError::Model(ModelError::Input { location, message: message.into(), help: Some(help.to_string()) })
-    }
-
-    fn not_json(&self, text: &str, cause: &serde_json::Error) -> IdentifyError {
-        let is_toml = text.contains("[[test]]") || text.contains("[machine]") || text.contains("[axis.");
-        if is_toml {
-            return self.error(
-                "this is a session or machine file, not a model",
-                "name a file in which a fit was saved as a model",
+    match whole.get("schema_version").and_then(Value::as_u64) {
+        Some(version) if version == u64::from(SCHEMA_VERSION) => Ok(()),
+        Some(version) if version > u64::from(SCHEMA_VERSION) => {
+            let what = format!(
+                "is {version}; this program reads versions up to {SCHEMA_VERSION}: a newer program saved the model"
             );
+            let help = "use a newer version of Abbe, or save the model again with this one";
+            Err(Fault::of_key(what, help).at("schema_version"))
         }
-        let message = format!("not valid JSON: {cause}");
-        self.error_in(
-            Location::line(self.path, cause.line()),
-            message,
-            "name a file in which a fit was saved as a model",
-        )
+        _ => {
+            let what = format!("is missing or not a version; {SCHEMA_VERSION} is expected");
+            Err(Fault::of_key(what, SAVE_AGAIN).at("schema_version"))
+        }
     }
+}
 
-    fn check_header(&self, value: &Value) -> Result<(), IdentifyError> {
-        let help = "name a file in which a fit was saved as a model";
-        match value.get("schema").and_then(Value::as_str) {
-            Some(SCHEMA) => {}
-            Some(other) => {
-                return Err(self.error(format!("`schema` is \"{other}\"; \"{SCHEMA}\" is expected"), help));
+fn model(document: Document) -> Result<IdentifiedModel, Fault> {
+    let machine = machine_of_document(&document.machine).within("machine")?;
+    let Kind(instrument) = document.instrument;
+    let Long(effects) = document.effects;
+    let mut tests: Vec<String> = effects.iter().flat_map(|effect| effect.tests.iter().flatten().cloned()).collect();
+    tests.sort_unstable();
+    tests.dedup();
+    let effects = effects.iter().enumerate();
+    let effects = effects.map(|(k, effect)| effect_of_document(effect, &machine, instrument, &tests).within_item(k));
+    let effects = effects.collect::<Result<Vec<_>, _>>().within("effects")?;
+    let parameters = parameters(&document.parameters.0, &effects, &machine).within("parameters")?;
+    let covariance = covariance(&document.covariance.0, &parameters).within("covariance")?;
+    let null_directions: Vec<Vec<f64>> = document.null_directions.0.into_iter().map(|Long(row)| row).collect();
+    if let Some((k, row)) = null_directions.iter().enumerate().find(|(_, row)| row.len() != parameters.len()) {
+        let what =
+            format!("has {} numbers; one for each of the {} parameters is expected", row.len(), parameters.len());
+        return Err(Fault::of_key(what, None).at_item(k).at("null_directions"));
+    }
+    let locations = document.locations.0.iter().enumerate().map(|(k, location)| {
+        let name = ErrorName::parse(&location.id).filter(|name| machine.error_slot(name).is_some());
+        let fault = || Fault::of_key(format!("is \"{}\", an error that the machine does not have", location.id), None);
+        let name = name.ok_or_else(|| fault().at("id").at_item(k).at("locations"))?;
+        Ok((name, location.internal))
+    });
+    Ok(IdentifiedModel {
+        locations: locations.collect::<Result<_, Fault>>()?,
+        ranges: document.ranges.iter().map(|of| range(&machine, of)).collect(),
+        quality: Quality {
+            readings: document.fit.readings,
+            rms_um: document.fit.rms_um,
+            heldout_rms_um: document.fit.heldout_rms_um,
+            u_enlargement: document.fit.u_enlargement,
+        },
+        tool_mm: document.tool_mm,
+        table_mm: document.table_mm,
+        reference: reference(&document.reference),
+        noise: noise(document.noise).within("noise")?,
+        machine,
+        instrument,
+        effects,
+        parameters,
+        covariance,
+        null_directions,
+        provenance: document.provenance,
+    })
+}
+
+fn parameters(
+    entries: &[document::Parameter],
+    effects: &[Effect],
+    machine: &Machine,
+) -> Result<Vec<ModelParameter>, Fault> {
+    let parameters: Vec<ModelParameter> = (0..entries.len())
+        .map(|j| parameter(&entries[..j], &entries[j], effects, machine).within_item(j))
+        .collect::<Result<_, _>>()?;
+    for (k, effect) in effects.iter().enumerate() {
+        let own = |j: &&ModelParameter| matches!(j.role, Role::Coefficient { effect, .. } if effect == k);
+        let (needed, found) = (effect.shape.coefficients(), parameters.iter().filter(own).count());
+        if found != needed {
+            let what = format!("have {found} coefficients of `effects[{k}]`, whose shape has {needed}");
+            return Err(Fault::of_key(what, None));
+        }
+    }
+    Ok(parameters)
+}
+
+/// A parameter after the `others`.
+fn parameter(
+    others: &[document::Parameter],
+    entry: &document::Parameter,
+    effects: &[Effect],
+    machine: &Machine,
+) -> Result<ModelParameter, Fault> {
+    let fault = |what: &str| Fault::of_key(format!("({}): {what}", entry.id), None);
+    if others.iter().any(|other| other.id == entry.id) {
+        return Err(fault("another parameter has the same name"));
+    }
+    let same = |other: &&document::Parameter| {
+        entry.effect.is_some() && (other.effect, other.coefficient) == (entry.effect, entry.coefficient)
+    };
+    if let Some(other) = others.iter().find(same) {
+        return Err(fault(&format!("it is the coefficient of an effect that {} is too", other.id)));
+    }
+    let role = match (entry.role, entry.effect, entry.coefficient) {
+        (document::Role::Location, None, None) => {
+            let known = ErrorName::parse(&entry.id).is_some_and(|name| machine.error_slot(&name).is_some());
+            if !known {
+                return Err(fault("the machine has no such error"));
             }
-            None if value.get("command").is_some() => {
-                return Err(self.error("this is the result of a command, not a model", help));
-            }
-            None => return Err(self.error(format!("the file has no `schema`; \"{SCHEMA}\" is expected"), help)),
+            Role::Error
         }
-        let version = value.get("schema_version").and_then(Value::as_u64);
-        match version {
-            Some(version) if version == u64::from(SCHEMA_VERSION) => Ok(()),
-            Some(version) if version > u64::from(SCHEMA_VERSION) => Err(self.error(
-                format!(
-                    "`schema_version` is {version}; this program reads versions up to {SCHEMA_VERSION}: a newer \
-                     program saved the model"
-                ),
-                "use a newer version of Abbe, or save the model again with this one",
-            )),
-            _ => Err(self.error(
-                format!("`schema_version` is missing or not a version; {SCHEMA_VERSION} is expected"),
-                SAVE_AGAIN,
-            )),
+        (document::Role::SetUp, None, None) => Role::Setup,
+        (document::Role::Coefficient, Some(effect), Some(coefficient))
+            if effects.get(effect).is_some_and(|effect| coefficient < effect.shape.coefficients()) =>
+        {
+            Role::Coefficient { effect, coefficient }
         }
-    }
+        _ => {
+            return Err(fault(
+                "`role` is \"location\", \"set-up\", or \"coefficient\" with an index of `effects` and of its coefficients",
+            ));
+        }
+    };
+    Ok(ModelParameter {
+        id: entry.id.clone(),
+        role,
+        unit: Unit { name: entry.unit.clone(), display_per_internal: entry.display_per_internal.0 },
+        value: entry.internal,
+        held: entry.held,
+        prior: entry.prior_u.map_or(Prior::Free, |Positive(u)| Prior::Gaussian(u)),
+        size: entry.size.0,
+    })
+}
 
-    /// A value of the wrong type, with the path of its key.
-    fn wrong_value(&self, text: &str, cause: &serde_json::Error) -> IdentifyError {
-        let before: usize = text.split_inclusive('\n').take(cause.line().saturating_sub(1)).map(str::len).sum();
-        let path = path_at(text, before + cause.column());
-        let cause_text = cause.to_string();
-        let what = cause_text.split(" at line ").next().unwrap_or_default();
-        let message = if path.is_empty() { what.to_string() } else { format!("`{path}`: {what}") };
-        self.error_in(Location::line(self.path, cause.line()), message, SAVE_AGAIN)
+/// The covariance, which must be positive semidefinite.
+fn covariance(rows: &[Long<Vec<f64>>], parameters: &[ModelParameter]) -> Result<Mat<f64>, Fault> {
+    let count = parameters.len();
+    if rows.len() != count || rows.iter().enumerate().any(|(i, Long(row))| row.len() != i + 1) {
+        return Err(Fault::is(format!("no lower triangle of {count} rows, one for each parameter")));
     }
+    let entry = |i: usize, j: usize| rows[i.max(j)].0[i.min(j)];
+    // In units of the uncertainties the matrix has ones on its diagonal.
+    let deviation: Vec<f64> = (0..count).map(|j| entry(j, j).max(0.0).sqrt()).collect();
+    let scaled = Mat::from_fn(count, count, |i, j| match deviation[i] * deviation[j] {
+        0.0 => entry(i, j) / (parameters[i].size * parameters[j].size),
+        product => entry(i, j) / product,
+    });
+    let not_definite = |what: String| Fault::is(format!("not positive semidefinite: {what}"));
+    if let Some(j) = (0..count).find(|j| entry(*j, *j) < 0.0) {
+        return Err(not_definite(format!("the variance of {} is negative", parameters[j].id)).at_item(j).at_item(j));
+    }
+    let Symmetric { values, .. } =
+        Symmetric::of(scaled.as_ref()).map_err(|_| not_definite("it has entries that are not finite".to_string()))?;
+    let largest = values.last().copied().unwrap_or(0.0).max(1.0);
+    if let Some(least) = values.first().filter(|least| **least < -ROUNDING_OF_COVARIANCE * largest) {
+        return Err(not_definite(format!("its correlation matrix has the eigenvalue {least:.2e}")));
+    }
+    Ok(Mat::from_fn(count, count, entry))
+}
 
-    fn model(&self, document: Document) -> Result<IdentifiedModel, IdentifyError> {
-        let machine = self.machine(&document.machine)?;
-        let Some(instrument) = InstrumentKind::of_word(&document.instrument) else {
-            let message = format!("`instrument`: \"{}\" is not an instrument", document.instrument);
-            return Err(self.error(message, SAVE_AGAIN));
-        };
-        let effects = self.effects(&document.effects, &machine, instrument)?;
-        let parameters = self.parameters(&document.parameters, &effects, &machine)?;
-        let covariance = self.covariance(&document, &parameters)?;
-        for (k, direction) in document.null_directions.iter().enumerate() {
-            if direction.len() != parameters.len() || !direction.iter().all(|share| share.is_finite()) {
-                let message = format!(
-                    "`null_directions[{k}]` has {} numbers; one for each of the {} parameters is expected",
-                    direction.len(),
-                    parameters.len()
-                );
-                return Err(self.error(message, SAVE_AGAIN));
-            }
-        }
-        let locations = document.locations.iter().map(|location| {
-            let name = ErrorName::parse(&location.id).filter(|name| machine.error_slot(name).is_some());
-            let name = name.ok_or_else(|| {
-                self.error(format!("`locations`: the machine has no error \"{}\"", location.id), SAVE_AGAIN)
-            })?;
-            Ok((name, location.internal))
-        });
-        let noise = self.noise(&document.noise)?;
-        Ok(IdentifiedModel {
-            locations: locations.collect::<Result<_, IdentifyError>>()?,
-            ranges: document.ranges.iter().map(|of| range(&machine, of)).collect(),
-            quality: Quality {
-                readings: document.fit.readings,
-                rms_um: document.fit.rms_um,
-                heldout_rms_um: document.fit.heldout_rms_um,
-                u_enlargement: document.fit.u_enlargement,
-            },
-            tool_mm: document.tool_mm,
-            table_mm: document.table_mm,
-            reference: reference(&document.reference),
-            machine,
-            instrument,
-            effects,
-            parameters,
-            covariance,
-            null_directions: document.null_directions,
-            noise,
-            provenance: document.provenance,
-        })
+fn noise(noise: document::Noise) -> Result<Noise, Fault> {
+    if noise.inflation < 1.0 {
+        return Err(Fault::is(format!("{}; at least 1 is expected", noise.inflation)).at("inflation"));
     }
-
-    /// The error of a part with the keys of TOML, as one of this file.
-    fn part(&self, key: &str, error: ModelError) -> IdentifyError {
-        let help = error.help().unwrap_or(SAVE_AGAIN).to_string();
-        self.error(format!("`{key}`: {error}"), &help)
-    }
-
-    fn machine(&self, value: &Value) -> Result<Machine, IdentifyError> {
-        machine_of_node(value.clone().into()).map_err(|error| self.part("machine", error))
-    }
-
-    fn effects(
-        &self,
-        values: &[Value],
-        machine: &Machine,
-        instrument: InstrumentKind,
-    ) -> Result<Vec<Effect>, IdentifyError> {
-        let lists = values.iter().filter_map(|effect| effect.get("tests")?.as_array());
-        let mut tests: Vec<String> = lists.flatten().filter_map(|name| Some(name.as_str()?.to_string())).collect();
-        tests.sort_unstable();
-        tests.dedup();
-        let mut effects = Vec::with_capacity(values.len());
-        for (k, value) in values.iter().enumerate() {
-            let key = format!("effects[{k}]");
-            let read = effects_of_nodes(vec![value.clone().into()], machine, instrument, &tests);
-            effects.extend(read.map_err(|error| self.part(&key, error))?);
-        }
-        Ok(effects)
-    }
-
-    fn parameters(
-        &self,
-        entries: &[document::Parameter],
-        effects: &[Effect],
-        machine: &Machine,
-    ) -> Result<Vec<ModelParameter>, IdentifyError> {
-        let mut parameters = Vec::with_capacity(entries.len());
-        for (j, entry) in entries.iter().enumerate() {
-            let fault = |message: &str| self.error(format!("`parameters[{j}]` ({}): {message}", entry.id), SAVE_AGAIN);
-            if entries[..j].iter().any(|other| other.id == entry.id) {
-                return Err(fault("another parameter has the same name"));
-            }
-            let same = |other: &&document::Parameter| {
-                entry.effect.is_some() && (other.effect, other.coefficient) == (entry.effect, entry.coefficient)
-            };
-            if let Some(other) = entries[..j].iter().find(same) {
-                return Err(fault(&format!("it is the coefficient of an effect that {} is too", other.id)));
-            }
-            let role = match (entry.role.as_str(), entry.effect, entry.coefficient) {
-                ("location", None, None) => {
-                    let known = ErrorName::parse(&entry.id).is_some_and(|name| machine.error_slot(&name).is_some());
-                    if !known {
-                        return Err(fault("the machine has no such error"));
-                    }
-                    Role::Error
-                }
-                ("set-up", None, None) => Role::Setup,
-                ("coefficient", Some(effect), Some(coefficient))
-                    if effects.get(effect).is_some_and(|effect| coefficient < effect.shape.coefficients()) =>
-                {
-                    Role::Coefficient { effect, coefficient }
-                }
-                _ => {
-                    let what = "`role` is \"location\", \"set-up\", or \"coefficient\" with an index of `effects` and of its \
-                                coefficients";
-                    return Err(fault(what));
-                }
-            };
-            let prior = match entry.prior_u {
-                Some(u) if u > 0.0 => Prior::Gaussian(u),
-                None => Prior::Free,
-                Some(_) => return Err(fault("`prior_u` must be above 0, or `null`")),
-            };
-            if !(entry.size > 0.0 && entry.display_per_internal > 0.0) {
-                return Err(fault("`size` and `display_per_internal` must be above 0"));
-            }
-            parameters.push(ModelParameter {
-                id: entry.id.clone(),
-                role,
-                unit: Unit { name: entry.unit.clone(), display_per_internal: entry.display_per_internal },
-                value: entry.internal,
-                held: entry.held,
-                prior,
-                size: entry.size,
-            });
-        }
-        for (k, effect) in effects.iter().enumerate() {
-            let own = |j: &&ModelParameter| matches!(j.role, Role::Coefficient { effect, .. } if effect == k);
-            if parameters.iter().filter(own).count() != effect.shape.coefficients() {
-                let message = format!("`effects[{k}]` has {} coefficients", effect.shape.coefficients());
-                return Err(self.error(format!("{message}, `parameters` other ones"), SAVE_AGAIN));
-            }
-        }
-        Ok(parameters)
-    }
-
-    /// The covariance, which must be positive semidefinite.
-    fn covariance(&self, document: &Document, parameters: &[ModelParameter]) -> Result<Mat<f64>, IdentifyError> {
-        let rows = &document.covariance;
-        let count = parameters.len();
-        if rows.len() != count || rows.iter().enumerate().any(|(i, row)| row.len() != i + 1) {
-            let message = format!("`covariance` is no lower triangle of {count} rows, one for each parameter");
-            return Err(self.error(message, SAVE_AGAIN));
-        }
-        let entry = |i: usize, j: usize| rows[i.max(j)][i.min(j)];
-        // In units of the uncertainties the matrix has ones on its diagonal.
-        let deviation: Vec<f64> = (0..count).map(|j| entry(j, j).max(0.0).sqrt()).collect();
-        let scaled = Mat::from_fn(count, count, |i, j| match deviation[i] * deviation[j] {
-            0.0 => entry(i, j) / (parameters[i].size * parameters[j].size),
-            product => entry(i, j) / product,
-        });
-        let not_definite =
-            |what: String| self.error(format!("`covariance` is not positive semidefinite: {what}"), SAVE_AGAIN);
-        if let Some(j) = (0..count).find(|j| entry(*j, *j) < 0.0) {
-            return Err(not_definite(format!("the variance of {} is negative", parameters[j].id)));
-        }
-        let Symmetric { values, .. } = Symmetric::of(scaled.as_ref())
-            .map_err(|_| not_definite("it has entries that are not finite".to_string()))?;
-        let largest = values.last().copied().unwrap_or(0.0).max(1.0);
-        if let Some(least) = values.first().filter(|least| **least < -ROUNDING_OF_COVARIANCE * largest) {
-            return Err(not_definite(format!("its correlation matrix has the eigenvalue {least:.2e}")));
-        }
-        Ok(Mat::from_fn(count, count, entry))
-    }
-
-    fn noise(&self, noise: &document::Noise) -> Result<Noise, IdentifyError> {
-        let sources = [NoiseSource::Stated, NoiseSource::Repeats, NoiseSource::Residual];
-        let Some(source) = sources.into_iter().find(|source| source.word() == noise.source) else {
-            let message = format!("`noise.source` is \"{}\"; stated, repeats or residual is expected", noise.source);
-            return Err(self.error(message, SAVE_AGAIN));
-        };
-        if noise.noise_um <= 0.0 {
-            return Err(self.error(format!("`noise.noise_um` is {}; it must be above 0", noise.noise_um), SAVE_AGAIN));
-        }
-        if noise.inflation < 1.0 {
-            let message = format!("`noise.inflation` is {}; at least 1 is expected", noise.inflation);
-            return Err(self.error(message, SAVE_AGAIN));
-        }
-        Ok(Noise {
-            sigma_mm: noise.noise_um * 1e-3,
-            ar_coefficients: noise.ar_coefficients.clone(),
-            ar_sum_u: noise.ar_sum_u,
-            source,
-            inflation: noise.inflation,
-        })
-    }
+    Ok(Noise {
+        sigma_mm: noise.noise_um.0 * 1e-3,
+        ar_coefficients: noise.ar_coefficients,
+        ar_sum_u: noise.ar_sum_u,
+        source: noise.source,
+        inflation: noise.inflation,
+    })
 }
 
 fn range(machine: &Machine, range: &document::Range) -> DriverRange {

@@ -1,9 +1,11 @@
 use std::path::{Path, PathBuf};
 
-use abbe_model::document::node::Node;
+use abbe_model::document::effect;
+use abbe_model::document::node::Named;
 use abbe_model::driver::Driver;
 use abbe_model::effect::shape::Shape;
 use abbe_model::effect::{Component, Effect};
+use abbe_model::files::read::effect_of_document;
 use abbe_model::files::{self, ReadOptions};
 use abbe_model::session::Session;
 use serde_json::Value;
@@ -21,10 +23,10 @@ fn fitted() -> (Session, Problem, Fit) {
     let mut session = files::session(&file, &ReadOptions::default()).unwrap();
     let text = "[[effect]]\ncomponent = \"EZC\"\nshape = \"harmonic\"\norder = 2\n[[effect]]\ncomponent = \"EXA\"\n\
                 shape = \"periodic\"\nperiod_deg = 33.3\n";
-    let document: Node = files::read::document_of(&files::Source::new(&file, text)).unwrap();
-    let nodes = document.get("effect").unwrap().items().to_vec();
-    let read = files::read::effects_of_nodes(nodes, &session.machine, session.instrument, &[]);
-    session.effects = read.unwrap();
+    let document: Named<Vec<effect::Effect>> = files::read::document_of(&files::Source::new(&file, text)).unwrap();
+    let effects = document.0[0].1.iter();
+    let read = effects.map(|of| effect_of_document(of, &session.machine, session.instrument, &[]).unwrap());
+    session.effects = read.collect();
     let (problem, fit) = prepare(&session, 1).unwrap();
     (session, problem, fit)
 }
@@ -122,7 +124,10 @@ fn a_file_that_cannot_be_used_is_refused_with_its_key() {
         ("{}".to_string(), "has no `schema`"),
         (changed("/schema_version", json!(2), true), "a newer program saved the model"),
         (changed("/parameters/0/internal", json!(1e-3), false), "the file was changed after it was saved"),
-        (changed("/parameters/2/internal", json!("1"), true), "`parameters[2].internal`: invalid type: string"),
+        (
+            changed("/parameters/2/internal", json!("1"), true),
+            "`parameters[2].internal` is the text \"1\"; a number is expected",
+        ),
         (
             changed("/parameters/2/id", json!("EX0C"), true),
             "`parameters[4]` (EX0C): another parameter has the same name",
@@ -130,10 +135,10 @@ fn a_file_that_cannot_be_used_is_refused_with_its_key() {
         (changed("/covariance/3/3", json!(-1.0), true), "the variance of EC0A is negative"),
         (changed("/covariance/3/2", json!(1.0), true), "`covariance` is not positive semidefinite"),
         (changed("/covariance/3", json!([1.0]), true), "`covariance` is no lower triangle"),
-        (changed("/effects/0/shape", json!("wave"), true), "`effects[0]`: \"wave\" is not a shape"),
-        (changed("/machine/chain", json!("w C b"), true), "`machine`: "),
-        (changed("/instrument", json!("eye"), true), "\"eye\" is not an instrument"),
-        (changed("/noise/source", json!("guess"), true), "`noise.source` is \"guess\""),
+        (changed("/effects/0/shape", json!("wave"), true), "`effects[0].shape`: \"wave\" is not a shape"),
+        (changed("/machine/chain", json!("w C b"), true), "`machine.chain`: "),
+        (changed("/instrument", json!("eye"), true), "`instrument` is the text \"eye\"; \"ballbar\", "),
+        (changed("/noise/source", json!("guess"), true), "`noise.source` is the text \"guess\"; \"stated\", "),
     ] {
         let message = message(&text);
         assert!(message.contains(expected), "{message}\nexpected {expected}");

@@ -1,7 +1,8 @@
 //! A model as a JSON text.
 
-use abbe_model::ModelError;
-use abbe_model::document::{of_domain, print};
+use abbe_model::document::of_domain;
+use abbe_model::document::session::Kind;
+use abbe_model::document::value::{Long, Positive};
 use abbe_model::driver::TEMPERATURE;
 use abbe_model::session::Prior;
 use serde_json::Value;
@@ -28,8 +29,7 @@ impl IdentifiedModel {
         if !finite {
             return Err(fault("a value or an uncertainty is not finite".into()));
         }
-        let document = self.document().map_err(fault)?;
-        let mut value = serde_json::to_value(document).map_err(|cause| fault(cause.to_string()))?;
+        let mut value = serde_json::to_value(self.document()).map_err(|cause| fault(cause.to_string()))?;
         let sum = checksum(&value);
         value[CHECKSUM] = Value::String(sum);
         let mut text = String::new();
@@ -38,32 +38,23 @@ impl IdentifiedModel {
         Ok(text)
     }
 
-    fn document(&self) -> Result<Document, String> {
-        let sorted = |printed: Result<Value, ModelError>| {
-            let mut value = printed.map_err(|cause| cause.to_string())?;
-            value.sort_all_objects();
-            Ok::<Value, String>(value)
-        };
-        let machine = sorted(print::json_of(&of_domain::machine(&self.machine)))?;
-        let effects = self.effects.iter();
-        let effects = effects.map(|effect| sorted(print::json_of(&of_domain::effect(effect, &self.machine))));
-        let effects = effects.collect::<Result<_, _>>()?;
+    fn document(&self) -> Document {
         let size = self.parameters.len();
-        Ok(Document {
+        Document {
             schema: SCHEMA.to_string(),
             schema_version: SCHEMA_VERSION,
             sha256: String::new(),
             provenance: self.provenance.clone(),
-            machine,
-            instrument: self.instrument.word().to_string(),
-            effects,
-            parameters: (0..size).map(|j| self.parameter(j)).collect(),
-            covariance: (0..size).map(|i| (0..=i).map(|j| self.covariance[(i, j)]).collect()).collect(),
-            null_directions: self.null_directions.clone(),
-            locations: self.locations.iter().map(location).collect(),
+            machine: of_domain::machine(&self.machine),
+            instrument: Kind(self.instrument),
+            effects: Long(self.effects.iter().map(|effect| of_domain::effect(effect, &self.machine)).collect()),
+            parameters: Long((0..size).map(|j| self.parameter(j)).collect()),
+            covariance: Long((0..size).map(|i| Long((0..=i).map(|j| self.covariance[(i, j)]).collect())).collect()),
+            null_directions: Long(self.null_directions.iter().cloned().map(Long).collect()),
+            locations: Long(self.locations.iter().map(location).collect()),
             noise: document::Noise {
-                noise_um: self.noise.sigma_mm * 1e3,
-                source: self.noise.source.word().to_string(),
+                noise_um: Positive(self.noise.sigma_mm * 1e3),
+                source: self.noise.source,
                 ar_coefficients: self.noise.ar_coefficients.clone(),
                 ar_sum_u: self.noise.ar_sum_u,
                 inflation: self.noise.inflation,
@@ -88,33 +79,33 @@ impl IdentifiedModel {
                     .map(|(name, mean)| (name.clone(), *mean))
                     .collect(),
             },
-        })
+        }
     }
 
     fn parameter(&self, j: usize) -> document::Parameter {
         let parameter = &self.parameters[j];
         let (role, effect, coefficient) = match parameter.role {
-            Role::Error => ("location", None, None),
-            Role::Setup => ("set-up", None, None),
-            Role::Coefficient { effect, coefficient } => ("coefficient", Some(effect), Some(coefficient)),
+            Role::Error => (document::Role::Location, None, None),
+            Role::Setup => (document::Role::SetUp, None, None),
+            Role::Coefficient { effect, coefficient } => (document::Role::Coefficient, Some(effect), Some(coefficient)),
         };
         let display = parameter.unit.display_per_internal;
         document::Parameter {
             id: parameter.id.clone(),
-            role: role.to_string(),
+            role,
             effect,
             coefficient,
             value: parameter.value * display,
             u: (!parameter.held).then(|| self.u(j) * display),
             unit: parameter.unit.name.clone(),
-            display_per_internal: display,
+            display_per_internal: Positive(display),
             internal: parameter.value,
             held: parameter.held,
             prior_u: match parameter.prior {
-                Prior::Gaussian(u) => Some(u),
+                Prior::Gaussian(u) => Some(Positive(u)),
                 Prior::Free | Prior::Known => None,
             },
-            size: parameter.size,
+            size: Positive(parameter.size),
         }
     }
 

@@ -10,6 +10,7 @@ use abbe_model::document::value::{Long, Positive};
 use abbe_model::files::read::lowered;
 use abbe_model::files::{self, Source};
 use abbe_model::instrument::InternalUnit;
+use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
@@ -88,52 +89,77 @@ pub struct ErrorFunction {
 /// Periods of a harmonic, mm or rad. Beyond them its argument is no number, or constant.
 const PERIODS: std::ops::RangeInclusive<f64> = 1e-6..=1e9;
 
-/// The keys of a file of error functions.
-#[derive(Deserialize)]
+/// A file of error functions. Several functions of one error are summed.
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct File {
+pub struct File {
+    /// Constant errors with their units, such as EX0C = "12 um".
     #[serde(default)]
     constant: Long<BTreeMap<String, String>>,
+    /// Functions of the position of an axis.
     #[serde(default)]
     function: Long<Vec<Function>>,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+/// A function of the position of an axis: a table, a polynomial or a harmonic.
+#[derive(Deserialize, JsonSchema)]
+#[serde(rename = "error_function", deny_unknown_fields)]
 struct Function {
+    /// The error, such as EXX.
     error: String,
+    /// The axis of the position; default: the own axis of an error motion.
     over: Option<String>,
+    /// Linear interpolation, constant beyond the ends.
     table: Option<Table>,
+    /// The sum of coefficients times powers of position over scale, from power 0.
     polynomial: Option<Polynomial>,
+    /// An amplitude times the cosine of the position.
     harmonic: Option<Harmonic>,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+/// Values at positions.
+#[derive(Deserialize, JsonSchema)]
+#[serde(rename = "table", deny_unknown_fields)]
 struct Table {
+    /// Ascending positions of a linear axis.
     at_mm: Option<Long<Vec<f64>>>,
+    /// Ascending positions of a rotary axis.
     at_deg: Option<Long<Vec<f64>>>,
+    /// The values of an error of length.
     um: Option<Long<Vec<f64>>>,
+    /// The values of an angular error.
     arcsec: Option<Long<Vec<f64>>>,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+/// A polynomial in position over scale.
+#[derive(Deserialize, JsonSchema)]
+#[serde(rename = "polynomial", deny_unknown_fields)]
 struct Polynomial {
+    /// The scale of a linear axis; default 1 mm.
     scale_mm: Option<Positive>,
+    /// The scale of a rotary axis; default 1 rad.
     scale_deg: Option<Positive>,
+    /// The coefficients of an error of length, from power 0.
     um: Option<Vec<f64>>,
+    /// The coefficients of an angular error, from power 0.
     arcsec: Option<Vec<f64>>,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+/// A harmonic of the position.
+#[derive(Deserialize, JsonSchema)]
+#[serde(rename = "harmonic", deny_unknown_fields)]
 struct Harmonic {
+    /// Cycles per turn of a rotary axis.
     order: Option<Positive>,
+    /// The period over a linear axis.
     period_mm: Option<Positive>,
+    /// The period over a rotary axis.
     period_deg: Option<Positive>,
+    /// The amplitude of an error of length.
     amplitude_um: Option<f64>,
+    /// The amplitude of an angular error.
     amplitude_arcsec: Option<f64>,
+    /// The phase at position 0; default 0.
     #[serde(default)]
     phase_deg: f64,
 }

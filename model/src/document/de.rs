@@ -31,6 +31,9 @@ pub(super) const NOTE: &str = "Note";
 /// The type of a list or a table of names whose length only the size of its file limits.
 pub(super) const LONG: &str = "Long";
 
+/// The type whose value is any JSON.
+pub(super) const JSON: &str = "Json";
+
 /// The type whose value is a number that may be infinite.
 pub(super) const UNLIMITED: &str = "Unlimited";
 
@@ -141,6 +144,10 @@ impl<'de> Deserializer<'de> for De<'de> {
         }
     }
 
+    fn deserialize_u32<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+        self.deserialize_u64(visitor)
+    }
+
     fn deserialize_bool<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
         match &self.0.value {
             Value::Truth(truth) => visitor.visit_bool(*truth),
@@ -178,6 +185,10 @@ impl<'de> Deserializer<'de> for De<'de> {
                     Value::Text(text) => plain(text, |c| !matches!(c, '\t' | '\n'))?.trim().to_string(),
                     _ => return Err(Fault::unexpected("a text in quotes, a number or a date")),
                 };
+                visitor.visit_newtype_struct(StringDeserializer::<Fault>::new(text))
+            }
+            JSON => {
+                let text = serde_json::Value::from(self.0).to_string();
                 visitor.visit_newtype_struct(StringDeserializer::<Fault>::new(text))
             }
             LONG => visitor.visit_newtype_struct(De(self.0, usize::MAX)),
@@ -258,7 +269,7 @@ impl<'de> Deserializer<'de> for De<'de> {
         self.deserialize_str(visitor)
     }
 
-    forward_to_deserialize_any! { f32 i8 i16 i32 i64 i128 u8 u16 u32 u128 char bytes byte_buf tuple_struct unit unit_struct ignored_any }
+    forward_to_deserialize_any! { f32 i8 i16 i32 i64 i128 u8 u16 u128 char bytes byte_buf tuple_struct unit unit_struct ignored_any }
 }
 
 /// Checks the number of entries of a table of names.

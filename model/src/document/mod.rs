@@ -21,7 +21,7 @@ pub mod of_domain;
 pub mod print;
 pub mod schema;
 pub mod session;
-pub(crate) mod source;
+pub mod source;
 pub mod test;
 pub mod tolerance;
 pub mod value;

@@ -6,6 +6,7 @@ use std::ops::Range;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde_json::value::RawValue;
 use toml::de::{DeTable, DeValue};
 
 use super::fault::Step;
@@ -102,6 +103,24 @@ impl From<serde_json::Value> for Node {
     }
 }
 
+impl From<&Node> for serde_json::Value {
+    fn from(node: &Node) -> serde_json::Value {
+        match &node.value {
+            Value::Null => serde_json::Value::Null,
+            Value::Text(text) | Value::Date(text) => text.as_str().into(),
+            // As written: a whole number keeps all its digits.
+            Value::Number(number, written) => {
+                written.parse::<serde_json::Number>().map_or_else(|_| (*number).into(), serde_json::Value::Number)
+            }
+            Value::Truth(truth) => (*truth).into(),
+            Value::List(items) => items.iter().map(serde_json::Value::from).collect(),
+            Value::Table(entries) => {
+                entries.iter().map(|entry| (entry.key.clone(), serde_json::Value::from(&entry.node))).collect()
+            }
+        }
+    }
+}
+
 impl Node {
     /// A table of these entries.
     pub fn table<N: Into<Node>>(entries: impl IntoIterator<Item = (String, N)>) -> Node {
@@ -121,6 +140,28 @@ impl Node {
             .collect();
         entries.sort_by_key(|entry| entry.key_span.start);
         Node { value: Value::Table(entries), span }
+    }
+
+    /// A value of a JSON text that is a part of the whole text.
+    pub(super) fn of_json(raw: &RawValue, whole: &str) -> serde_json::Result<Node> {
+        let text = raw.get();
+        let start = text.as_ptr() as usize - whole.as_ptr() as usize;
+        let value = match text.as_bytes().first() {
+            Some(b'{') => {
+                let pairs: Named<&RawValue> = serde_json::from_str(text)?;
+                let entries = pairs.0.into_iter().map(|(key, raw)| {
+                    let node = Node::of_json(raw, whole)?;
+                    Ok(Entry { key, key_span: node.span.clone(), node })
+                });
+                Value::Table(entries.collect::<serde_json::Result<_>>()?)
+            }
+            Some(b'[') => {
+                let items: Vec<&RawValue> = serde_json::from_str(text)?;
+                Value::List(items.into_iter().map(|raw| Node::of_json(raw, whole)).collect::<serde_json::Result<_>>()?)
+            }
+            _ => Node::from(serde_json::from_str::<serde_json::Value>(text)?).value,
+        };
+        Ok(Node { value, span: start..start + text.len() })
     }
 
     /// The entries of a table; none of any other value.

@@ -25,9 +25,7 @@ pub fn session() -> Value {
     if let Some(required) = schema["required"].as_array_mut() {
         required.push(json!("test"));
     }
-    for (definition, registered) in
-        [("effect", effect_properties()), ("instrument", instrument_properties()), ("test", test_properties())]
-    {
+    for (definition, registered) in [("effect", effect_properties()), ("test", test_properties())] {
         if let Some(properties) = schema["$defs"][definition]["properties"].as_object_mut() {
             properties.extend(registered);
         }
@@ -45,16 +43,32 @@ pub(crate) fn shape_keys(entry: &Entry) -> Vec<String> {
     entry.keys.iter().flat_map(names).collect()
 }
 
-/// What a key of the table at a path is, as the end of a sentence; of a session or a machine file.
-pub(crate) fn meaning(path: &[Step], key: &str) -> Option<String> {
-    let session = session();
-    let property = [&session, &session["$defs"]["machine"]].into_iter().find_map(|root| {
-        let tables = path.iter().fold(alternatives(&session, root), |tables, step| {
+/// Schema of another file that contains documents.
+pub fn of<T: JsonSchema>(title: &str) -> Value {
+    let mut schema = schema_of::<T>(title);
+    share(&mut schema);
+    schema
+}
+
+/// Gives the documents in the schema of another file their keys in sessions.
+pub fn share(schema: &mut Value) {
+    let known = session();
+    for (name, definition) in schema["$defs"].as_object_mut().into_iter().flatten() {
+        if let Some(known) = known["$defs"].get(name) {
+            definition.clone_from(known);
+        }
+    }
+}
+
+/// What a key of the table at a path is in a schema, as the end of a sentence; or in the schema of its machine.
+pub(crate) fn meaning(schema: &Value, path: &[Step], key: &str) -> Option<String> {
+    let property = [schema, &schema["$defs"]["machine"]].into_iter().find_map(|root| {
+        let tables = path.iter().fold(alternatives(schema, root), |tables, step| {
             let inner = tables.into_iter().filter_map(|table| match step {
                 Step::Key(key) => table["properties"].get(key).or_else(|| table.get("additionalProperties")),
                 Step::Item(_) => table.get("items"),
             });
-            inner.flat_map(|schema| alternatives(&session, schema)).collect()
+            inner.flat_map(|inner| alternatives(schema, inner)).collect()
         });
         tables.into_iter().find_map(|table| table["properties"].get(key))
     })?;
@@ -124,12 +138,6 @@ fn tidy(schema: &mut Value) {
         Value::Array(items) => items.iter_mut().for_each(tidy),
         _ => {}
     }
-}
-
-fn instrument_properties() -> Map<String, Value> {
-    let words: Vec<&str> = InstrumentKind::ALL.iter().map(|kind| kind.word()).collect();
-    let kind = json!({"enum": words, "description": "The kind of the instrument."});
-    Map::from_iter([("kind".to_string(), kind)])
 }
 
 /// The properties of a type's own fields.

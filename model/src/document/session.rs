@@ -1,7 +1,11 @@
 //! The tables of a session: `session.toml`.
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize, Serializer};
+use std::borrow::Cow;
+use std::fmt;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::de::{self, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::effect::Effect;
 use super::layout::{Columns, Format};
@@ -10,6 +14,8 @@ use super::node::{Entries, Named};
 use super::test::Test;
 use super::tolerance::Tolerance;
 use super::value::{NotNegative, Note, Positive};
+use crate::instrument::InstrumentKind;
+use crate::words::listed;
 
 /// session.toml: a machine, a plan of tests, and the readings of the tests that were run. The name of a number contains
 /// its unit.
@@ -108,15 +114,65 @@ enum ConstantForms {
 }
 
 /// The instrument of a session.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename = "instrument", deny_unknown_fields)]
 pub struct Instrument {
     /// "ballbar", "r-test", "probe", "tracker" or "socket".
-    pub kind: String,
+    pub kind: Kind,
     /// Noise standard deviation of one scalar reading, µm; estimated if absent.
     pub noise_um: Option<NotNegative>,
     /// Resolution of a reading, µm.
     pub resolution_um: Option<NotNegative>,
+}
+
+/// The kind of an instrument, by its word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Kind(pub InstrumentKind);
+
+impl Kind {
+    fn words() -> Vec<&'static str> {
+        InstrumentKind::ALL.iter().map(|kind| kind.word()).collect()
+    }
+}
+
+impl Serialize for Kind {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.0.word().serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Kind {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct OfWord;
+        impl Visitor<'_> for OfWord {
+            type Value = Kind;
+
+            fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+                let words: Vec<String> = Kind::words().iter().map(|word| format!("\"{word}\"")).collect();
+                formatter.write_str(&listed(&words, "or"))
+            }
+
+            fn visit_str<E: de::Error>(self, word: &str) -> Result<Kind, E> {
+                let kind = InstrumentKind::of_word(word).map(Kind);
+                kind.ok_or_else(|| E::invalid_value(de::Unexpected::Str(word), &self))
+            }
+        }
+        deserializer.deserialize_any(OfWord)
+    }
+}
+
+impl JsonSchema for Kind {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "kind".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({"enum": Kind::words()})
+    }
 }
 
 /// The errors to estimate.

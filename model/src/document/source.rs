@@ -5,7 +5,9 @@ use std::io::Read;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
+use serde_json::value::RawValue;
 use toml::de::DeTable;
 
 use super::de::{LIST, from_node};
@@ -53,7 +55,10 @@ impl Source {
     }
 
     /// The document of a TOML text.
-    pub(crate) fn parse(&self) -> Result<Parsed<'_>, ModelError> {
+    ///
+    /// # Errors
+    /// If it is no TOML, with the line.
+    pub fn parse(&self) -> Result<Parsed<'_>, ModelError> {
         let root = DeTable::parse(&self.text).map_err(|fault| ModelError::Input {
             location: self.location(fault.span().unwrap_or(0..0)),
             message: format!("not valid TOML: {}", fault.message()),
@@ -62,7 +67,24 @@ impl Source {
                 .contains("recursion")
                 .then(|| format!("tables, lists and the parts of a key may be nested {MAX_DEPTH} levels deep")),
         })?;
-        Ok(Parsed { source: Cow::Borrowed(self), root: Node::of_toml(root.into_inner(), 0..0) })
+        Ok(Parsed { source: Cow::Borrowed(self), is_json: false, root: Node::of_toml(root.into_inner(), 0..0) })
+    }
+
+    /// The document of a JSON text.
+    ///
+    /// # Errors
+    /// If it is no JSON, with the line.
+    pub fn json(&self) -> Result<Parsed<'_>, ModelError> {
+        // It limits the depth of nesting.
+        let root = serde_json::from_str::<serde_json::Value>(&self.text)
+            .and_then(|_| serde_json::from_str::<&RawValue>(&self.text))
+            .and_then(|raw| Node::of_json(raw, &self.text));
+        let root = root.map_err(|cause| ModelError::Input {
+            location: Location::line(&self.file, cause.line()),
+            message: format!("not valid JSON: {cause}"),
+            help: None,
+        })?;
+        Ok(Parsed { source: Cow::Borrowed(self), is_json: true, root })
     }
 
     /// The location of some bytes of the text.
@@ -77,25 +99,33 @@ impl Source {
 }
 
 /// A document with its text, which is empty if no text holds it.
-pub(crate) struct Parsed<'s> {
+pub struct Parsed<'s> {
     source: Cow<'s, Source>,
+    /// Whether the text is JSON, whose tables have no headers: messages name paths of keys.
+    is_json: bool,
     /// The tree of values.
-    pub root: Node,
+    pub(crate) root: Node,
 }
 
 impl Parsed<'_> {
     /// A document that no text holds. Messages about it have no place.
-    pub fn of_node(root: Node) -> Parsed<'static> {
-        Parsed { source: Cow::Owned(Source::new(Path::new(""), "")), root }
+    pub(crate) fn of_node(root: Node) -> Parsed<'static> {
+        Parsed { source: Cow::Owned(Source::new(Path::new(""), "")), is_json: false, root }
     }
 
-    /// The document as typed values.
-    pub fn document<T: DeserializeOwned>(&self) -> Result<T, ModelError> {
-        from_node(&self.root).map_err(|fault| self.error_of(fault))
+    /// The document as typed values. A key that is absent is explained by its documentation.
+    ///
+    /// # Errors
+    /// What is wrong, with its place.
+    pub fn document<T: DeserializeOwned + JsonSchema>(&self) -> Result<T, ModelError> {
+        from_node(&self.root).map_err(|fault| {
+            let path: Vec<Step> = fault.path.iter().rev().cloned().collect();
+            self.error_of(fault.explained(|key| schema::meaning(&schema::of::<T>(""), &path, key)))
+        })
     }
 
     /// The comment behind the value of a path, up to the first semicolon.
-    pub fn comment(&self, path: &[&str]) -> Option<String> {
+    pub(crate) fn comment(&self, path: &[&str]) -> Option<String> {
         let steps: Vec<Step> = path.iter().map(|key| Step::Key((*key).to_string())).collect();
         let (node, _) = self.root.follow(steps.iter());
         let rest = self.source.text.get(node.span.end..)?.lines().next()?;
@@ -106,7 +136,7 @@ impl Parsed<'_> {
     }
 
     /// The location of a key with its value.
-    pub fn location_of(&self, path: &[Step]) -> Location {
+    pub(crate) fn location_of(&self, path: &[Step]) -> Location {
         let (node, entry) = self.root.follow(path.iter());
         self.source.location(entry.map_or(node.span.start, |entry| entry.key_span.start)..node.span.end)
     }
@@ -115,7 +145,11 @@ impl Parsed<'_> {
     pub fn error_of(&self, fault: Fault) -> ModelError {
         let path: Vec<Step> = fault.path.into_iter().rev().collect();
         let (node, entry) = self.root.follow(path.iter());
-        let quoted = || entry.map_or("the file".to_string(), |entry| format!("`{}`", entry.key));
+        let quoted = || match entry {
+            _ if self.is_json && !path.is_empty() => format!("`{}`", dotted(&path)),
+            Some(entry) => format!("`{}`", entry.key),
+            None => "the file".to_string(),
+        };
         let mut span =
             if fault.on_key { entry.map_or(0..0, |entry| entry.key_span.clone()) } else { place(node, entry) };
         let (message, help) = match fault.finding {
@@ -126,12 +160,17 @@ impl Parsed<'_> {
             Finding::File { message, help } => {
                 return ModelError::FileAccess { location: self.source.location(span), message, help };
             }
+            Finding::Said { message, help } if self.is_json && !path.is_empty() => {
+                (format!("{}: {message}", quoted()), help)
+            }
             Finding::Said { message, help } => (message, help),
             Finding::OfKey { what, help } => (format!("{} {what}", quoted()), help),
             Finding::OfTable { what, help } => (format!("{} {what}", self.name(&path)), help),
             Finding::Unexpected(expected) => {
                 let help = match (&node.value, entry) {
-                    (Value::Table(_), Some(entry)) if expected == LIST => Some(format!("write [[{}]]", entry.key)),
+                    (Value::Table(_), Some(entry)) if expected == LIST && !self.is_json => {
+                        Some(format!("write [[{}]]", entry.key))
+                    }
                     _ => None,
                 };
                 (format!("{} is {}; {expected} is expected", quoted(), node.found()), help)
@@ -145,8 +184,9 @@ impl Parsed<'_> {
                 (format!("{} has the unknown key `{key}`", self.name(&path)), Some(known_names(&key, &known)))
             }
             Finding::MissingKey { key, what } => {
-                let what =
-                    what.or_else(|| schema::meaning(&path, &key)).map_or(String::new(), |what| format!(": {what}"));
+                let what = what
+                    .or_else(|| schema::meaning(&schema::session(), &path, &key))
+                    .map_or(String::new(), |what| format!(": {what}"));
                 (format!("{} has no `{key}`", self.name(&path)), Some(format!("add `{key}`{what}")))
             }
         };
@@ -190,16 +230,27 @@ impl Parsed<'_> {
         let in_line = self.source.text.get(node.span.start..).is_some_and(|rest| rest.starts_with('{'));
         match path {
             [] => "the file".to_string(),
+            _ if self.is_json => format!("`{}`", dotted(path)),
             _ if in_line && path.len() > 1 => inner(path),
-            [keys @ .., Step::Item(_)] => format!("[[{}]]", dotted(keys)),
-            keys => format!("[{}]", dotted(keys)),
+            [keys @ .., Step::Item(_)] => format!("[[{}]]", header(keys)),
+            keys => format!("[{}]", header(keys)),
         }
     }
 }
 
-fn dotted(path: &[Step]) -> String {
+/// The keys of a path, as a header of TOML has them.
+fn header(path: &[Step]) -> String {
     let keys = path.iter().filter_map(|step| if let Step::Key(key) = step { Some(key.as_str()) } else { None });
     keys.collect::<Vec<_>>().join(".")
+}
+
+/// A path with its items: `parameters[3].value`.
+fn dotted(path: &[Step]) -> String {
+    let steps = path.iter().map(|step| match step {
+        Step::Key(key) => format!(".{key}"),
+        Step::Item(item) => format!("[{item}]"),
+    });
+    steps.collect::<String>().trim_start_matches('.').to_string()
 }
 
 /// Messages about a table point at its header `[name]`.

@@ -170,6 +170,33 @@ impl TryFrom<f64> for NotNegative {
     }
 }
 
+/// A whole number in these limits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "f64")]
+pub struct Count<const LEAST: usize, const MOST: usize>(pub usize);
+
+impl<const LEAST: usize, const MOST: usize> TryFrom<f64> for Count<LEAST, MOST> {
+    type Error = String;
+
+    fn try_from(number: f64) -> Result<Self, String> {
+        limits::count(number, LEAST, MOST).map(Count)
+    }
+}
+
+impl<const LEAST: usize, const MOST: usize> JsonSchema for Count<LEAST, MOST> {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "count".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({"type": "integer", "minimum": LEAST, "maximum": MOST})
+    }
+}
+
 /// A direction of length 1.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(try_from = "Vector")]
@@ -247,8 +274,33 @@ impl<'de> Deserialize<'de> for Uncertainties {
 }
 
 /// A list or a table of names of any length: the size of its file is the limit. Others have at most 1000 items.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(inline)]
 pub struct Long<T>(pub T);
+
+/// Any JSON: numbers keep the digits with which they are written.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[schemars(inline)]
+pub struct Json(pub serde_json::Value);
+
+impl<'de> Deserialize<'de> for Json {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct OfText;
+        impl<'de> Visitor<'de> for OfText {
+            type Value = Json;
+
+            fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+                formatter.write_str("any value")
+            }
+
+            fn visit_newtype_struct<D: Deserializer<'de>>(self, text: D) -> Result<Json, D::Error> {
+                let text = String::deserialize(text)?;
+                serde_json::from_str(&text).map(Json).map_err(serde::de::Error::custom)
+            }
+        }
+        deserializer.deserialize_newtype_struct(super::de::JSON, OfText)
+    }
+}
 
 /// A note: a text, a number or a date, as it is written.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

@@ -7,6 +7,7 @@ use super::source_map::{BodyFile, SourceMap};
 use super::stamp::FileStamp;
 use super::store::Store;
 use super::table::memory::MemoryColumn;
+use schemars::JsonSchema;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
@@ -71,26 +72,32 @@ fn machine_source(store: &Store, path: &Path) -> Result<Source, ModelError> {
     Source::read(store, path, "the machine file")
 }
 
-/// Effects of a session with this machine, instrument and names of tests, from documents in memory.
+/// The machine of a part of another document.
 ///
 /// # Errors
-/// [`ModelError::Session`] as for a session file, without its line.
-pub fn effects_of_nodes(
-    nodes: Vec<Node>,
+/// If it does not describe a machine: the fault in the part.
+pub fn machine_of_document(document: &machine_document::Machine) -> Result<Machine, Fault> {
+    lower::machine(document, &mut BodyFiles::default())
+}
+
+/// An effect of a session with this machine, instrument and names of tests, from a part of another document.
+///
+/// # Errors
+/// As for a session file: the fault in the part.
+pub fn effect_of_document(
+    document: &effect::Effect,
     machine: &Machine,
     instrument: InstrumentKind,
     tests: &[String],
-) -> Result<Vec<Effect>, ModelError> {
-    let source = Parsed::of_node(Node::table([("effect".to_string(), nodes.into_iter().collect::<Node>())]));
-    let Additions { effect, .. } = source.document()?;
-    lower::effects_of(machine, instrument, tests, &effect).within("effect").map_err(|fault| source.error_of(fault))
+) -> Result<Effect, Fault> {
+    lower::effect_of(machine, instrument, tests, document)
 }
 
 /// A document of another kind, from its TOML text.
 ///
 /// # Errors
 /// As [`machine()`].
-pub fn document_of<T: DeserializeOwned>(source: &Source) -> Result<T, ModelError> {
+pub fn document_of<T: DeserializeOwned + JsonSchema>(source: &Source) -> Result<T, ModelError> {
     source.parse()?.document()
 }
 
@@ -98,7 +105,7 @@ pub fn document_of<T: DeserializeOwned>(source: &Source) -> Result<T, ModelError
 ///
 /// # Errors
 /// As [`machine()`], and the fault of `lower`.
-pub fn lowered<T: DeserializeOwned, V>(
+pub fn lowered<T: DeserializeOwned + JsonSchema, V>(
     source: &Source,
     lower: impl FnOnce(&T) -> Result<V, Fault>,
 ) -> Result<V, ModelError> {
@@ -273,7 +280,7 @@ pub fn add_node(
 }
 
 /// The lists of a session that a program extends.
-#[derive(Default, Deserialize)]
+#[derive(Default, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct Additions {
     test: Vec<Test>,

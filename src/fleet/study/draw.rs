@@ -79,8 +79,8 @@ impl Study {
     pub fn draws(&self) -> usize {
         let file = &self.file;
         match file.study.combinations {
-            Combinations::Grid => file.study.draws * file.plan.len() * file.effect.len() * file.noise.len(),
-            Combinations::Random => file.study.draws,
+            Combinations::Grid => file.study.draws.0 * file.plan.len() * file.effect.len() * file.noise.len(),
+            Combinations::Random => file.study.draws.0,
         }
     }
 
@@ -119,7 +119,7 @@ impl Study {
         match self.file.study.combinations {
             Combinations::Random => counts.map(|count| random.random_range(0..count)),
             Combinations::Grid => {
-                let cell = number / self.file.study.draws;
+                let cell = number / self.file.study.draws.0;
                 [cell / (counts[1] * counts[2]), cell / counts[2] % counts[1], cell % counts[2]]
             }
         }
@@ -137,8 +137,8 @@ impl Study {
         let mut given: Vec<Given> = Vec::new();
         for parameter in parameters(session)?.iter().filter(|parameter| parameter.role == Role::Error) {
             let sigma = match parameter.unit.name.as_str() {
-                "arcsec" => self.file.study.location_arcsec,
-                _ => self.file.study.location_um,
+                "arcsec" => self.file.study.location_arcsec.0,
+                _ => self.file.study.location_um.0,
             };
             let normal: f64 = StandardNormal.sample(random);
             given.push(value(&parameter.id, sigma * normal, &parameter.unit.name));
@@ -157,7 +157,7 @@ impl Study {
             // A stated effect has its stated size, however large.
             let most = if stated.library { largest_plausible_share(unit, session.instrument) } else { f64::INFINITY };
             machine.effects = [session.effects.as_slice(), std::slice::from_ref(&truth)].concat();
-            match coefficients(session, &machine, (stated.size, most), noise, random) {
+            match coefficients(session, &machine, (stated.size.0, most), noise, random) {
                 // Another effect of the library, which the plan observes.
                 Err(Unmade::NotObserved) if tries > 0 => {}
                 coefficients => {
@@ -312,7 +312,7 @@ fn coefficients(
     let noise_mm = noise_mm(noise);
     let chi_square = chi_square(&measured, noise_mm)?;
     // Slow structure stands out less from autocorrelated noise: by the spectral density at frequency zero.
-    let inflation = (1.0 + noise.autocorrelation) / (1.0 - noise.autocorrelation);
+    let inflation = (1.0 + noise.autocorrelation.0) / (1.0 - noise.autocorrelation.0);
     let strength = (chi_square / inflation).sqrt();
     if strength.is_nan() || chi_square <= SURVIVES * change / (noise_mm * noise_mm) || strength <= 0.0 {
         return Err(Unmade::NotObserved);
@@ -332,15 +332,15 @@ fn add_noise(
     random: &mut impl Rng,
 ) {
     let coordinates = readings.coordinates.max(1);
-    let innovation = (1.0 - noise.autocorrelation * noise.autocorrelation).sqrt();
+    let innovation = (1.0 - noise.autocorrelation.0 * noise.autocorrelation.0).sqrt();
     let mut last = vec![0.0; coordinates];
     for row in 0..readings.observed.len() / coordinates {
         let begins = row == 0 || readings.run.get(row) != readings.run.get(row - 1);
-        let outlier = random.random::<f64>() < noise.outlier_share;
+        let outlier = random.random::<f64>() < noise.outlier_share.0;
         for (coordinate, last) in last.iter_mut().enumerate() {
             let normal: f64 = StandardNormal.sample(random);
-            *last = if begins { normal } else { noise.autocorrelation * *last + innovation * normal };
-            let mut um = noise.um * *last;
+            *last = if begins { normal } else { noise.autocorrelation.0 * *last + innovation * normal };
+            let mut um = noise.um.0 * *last;
             if outlier {
                 let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
                 um += sign * random.random_range(OUTLIER_UM[0]..OUTLIER_UM[1]);

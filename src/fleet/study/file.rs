@@ -3,12 +3,15 @@
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
+use abbe_identify::IdentifyError;
 use abbe_identify::simulate::{Simulation, simulate};
 use abbe_identify::trace::TraceOptions;
 use abbe_identify::trace::screening::screened_effects;
-use abbe_model::document::node::Node;
+use abbe_model::document::effect::Effect as EffectDocument;
+use abbe_model::document::fault::{Fault, Within};
+use abbe_model::document::value::Count;
 use abbe_model::effect::Effect;
-use abbe_model::files::read::{document_of, effects_of_nodes};
+use abbe_model::files::read::effect_of_document;
 use abbe_model::files::stamp::FileStamp;
 use abbe_model::files::{self, ReadOptions};
 use abbe_model::session::Session;
@@ -39,7 +42,7 @@ pub struct Head {
     /// The analysis.
     pub analysis: Analysis,
     /// Draws of each combination of plan, effect and noise (`grid`), or of all together (`random`).
-    pub draws: usize,
+    pub draws: Count<1, MAX_DRAWS>,
     /// Whether all combinations are drawn, or each draw chooses one.
     #[serde(default)]
     pub combinations: Combinations,
@@ -48,10 +51,10 @@ pub struct Head {
     pub seed: u64,
     /// Standard deviation of the drawn position errors, µm.
     #[serde(default)]
-    pub location_um: f64,
+    pub location_um: Size,
     /// Standard deviation of the drawn orientation errors, arcsec.
     #[serde(default)]
-    pub location_arcsec: f64,
+    pub location_arcsec: Size,
 }
 
 fn one() -> u64 {
@@ -98,14 +101,13 @@ pub struct TrueEffect {
     /// Size over the smallest significant one: the root of the χ² that the effect adds to the residual of the plan's
     /// parameters, over 2.807 (0.5 % two-sided).
     #[serde(default)]
-    pub size: f64,
+    pub size: Size,
     /// `true`: each draw chooses an effect of the library that the plan can observe.
     #[serde(default)]
     pub library: bool,
     /// The effect otherwise, with the keys of `[[effect]]` of a session file.
     #[serde(default)]
-    #[schemars(with = "Option<serde_json::Value>")]
-    pub effect: Option<Node>,
+    pub effect: Option<EffectDocument>,
 }
 
 /// The noise of simulated readings.
@@ -115,20 +117,47 @@ pub struct Noise {
     /// Its name in the results.
     pub name: String,
     /// Standard deviation of a reading, µm.
-    pub um: f64,
+    pub um: Size,
     /// Correlation of neighbouring readings of a run.
     #[serde(default)]
-    pub autocorrelation: f64,
+    pub autocorrelation: Share,
     /// Share of outliers: 5 to 30 µm of either sign.
     #[serde(default)]
-    pub outlier_share: f64,
+    pub outlier_share: Share,
+}
+
+/// A number from 0 to 10⁶.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, JsonSchema)]
+#[serde(try_from = "f64")]
+#[schemars(inline, extend("minimum" = 0, "maximum" = 1_000_000))]
+pub struct Size(pub f64);
+
+impl TryFrom<f64> for Size {
+    type Error = String;
+
+    fn try_from(number: f64) -> Result<Size, String> {
+        let usable = (0.0..=1e6).contains(&number);
+        if usable { Ok(Size(number)) } else { Err(format!("{number}; 0 to 1000000 is expected")) }
+    }
+}
+
+/// A number from 0 to below 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, JsonSchema)]
+#[serde(try_from = "f64")]
+#[schemars(inline, extend("minimum" = 0, "exclusiveMaximum" = 1))]
+pub struct Share(pub f64);
+
+impl TryFrom<f64> for Share {
+    type Error = String;
+
+    fn try_from(number: f64) -> Result<Share, String> {
+        let usable = (0.0..1.0).contains(&number);
+        if usable { Ok(Share(number)) } else { Err(format!("{number}; 0 to below 1 is expected")) }
+    }
 }
 
 /// Largest number of draws of a study, which are summarised together.
 const MAX_DRAWS: usize = 1_000_000;
-/// Largest number of plans, of effects and of kinds of noise.
-const MAX_ENTRIES: usize = 1000;
-
 /// A study with its plans.
 pub struct Study {
     /// The file.
@@ -152,32 +181,37 @@ pub struct Study {
 /// With file and line or key of what cannot be used.
 pub fn read(path: &Path) -> Result<Study, FleetError> {
     let source = files::text(path, "the study file")?;
-    let text = &source.text;
-    let fault = |what: String| FleetError::Request(format!("{}: {what}", path.display()));
-    let file: StudyFile = document_of(&source)?;
-    check(&file).map_err(fault)?;
+    let parsed = source.parse()?;
+    let here = |fault: Fault| parsed.error_of(fault);
+    let file: StudyFile = parsed.document()?;
+    check(&file).map_err(here)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut digest = Sha256::new();
     digest.update(concat!("abbe study 3 ", env!("CARGO_PKG_VERSION"), "\n"));
-    digest.update(text);
+    digest.update(&source.text);
     let (mut plans, mut effects) = (Vec::new(), Vec::new());
-    for plan in &file.plan {
+    for (item, plan) in file.plan.iter().enumerate() {
         let place = folder.join(&plan.session);
         let options = ReadOptions { allow_outside: true, ..ReadOptions::default() };
         let (session, sources) = files::session_with_sources(&place, &options)?;
         for read in sources.files.iter().filter_map(FileStamp::read) {
             digest.update(read.sha256);
         }
-        let own: Vec<Option<Effect>> =
-            file.effect.iter().map(|effect| declared(path, effect, &session)).collect::<Result<_, _>>()?;
-        let of_plan = |error| fault(format!("plan `{}`: {error}", plan.name));
+        let own: Vec<Option<Effect>> = per_effect(&file, |effect| declared(effect, &session)).map_err(here)?;
+        let of_plan = |error: IdentifyError| {
+            here(Fault::new(format!("plan `{}`: {error}", plan.name), None).at_item(item).at("plan"))
+        };
         let nominal = Simulation { noise_mm: Some(0.0), ..Simulation::default() };
         let drawn = simulate(&session, &nominal).map_err(of_plan)?;
         let session = session.with_readings(drawn.readings);
         if file.study.analysis == Analysis::Trace && own.iter().any(Option::is_some) {
             let library = screened_effects(&session, &TraceOptions::default()).map_err(of_plan)?;
             let ids: HashSet<String> = library.iter().map(|screened| screened.effect.id()).collect();
-            check_searched(&own, &file, &ids).map_err(fault)?;
+            let mut known = own.iter();
+            per_effect(&file, |_| {
+                known.next().and_then(Option::as_ref).map_or(Ok(()), |effect| searched(effect, &ids))
+            })
+            .map_err(here)?;
         }
         effects.push(own);
         plans.push(session);
@@ -185,90 +219,76 @@ pub fn read(path: &Path) -> Result<Study, FleetError> {
     let hexadecimal = |digest: Sha256| digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect::<String>();
     let digest = hexadecimal(digest);
     let key = hexadecimal(Sha256::new().chain_update(&digest).chain_update(BUILD));
-    Ok(Study { file, plans, effects, digest, key, stamp: source.stamp })
+    let stamp = source.stamp.clone();
+    Ok(Study { file, plans, effects, digest, key, stamp })
+}
+
+/// What follows from each entry of `effect`. A fault has its place.
+fn per_effect<T>(file: &StudyFile, mut of: impl FnMut(&TrueEffect) -> Result<T, Fault>) -> Result<Vec<T>, Fault> {
+    let entries = file.effect.iter().enumerate();
+    entries.map(|(item, effect)| of(effect).within_item(item)).collect::<Result<_, _>>().within("effect")
 }
 
 /// The declared effect of an entry in a plan.
-fn declared(path: &Path, effect: &TrueEffect, session: &Session) -> Result<Option<Effect>, FleetError> {
-    let Some(keys) = &effect.effect else { return Ok(None) };
+fn declared(entry: &TrueEffect, session: &Session) -> Result<Option<Effect>, Fault> {
     let tests: Vec<String> = session.tests.iter().map(|test| test.name.clone()).collect();
-    let read = effects_of_nodes(vec![keys.clone()], &session.machine, session.instrument, &tests);
-    let wrong = |what: String| FleetError::Request(format!("{}: effect `{}`: {what}", path.display(), effect.name));
-    let mut effects = read.map_err(|error| wrong(error.to_string()))?;
-    Ok(effects.pop())
+    let effect = entry.effect.as_ref();
+    let effect = effect.map(|effect| effect_of_document(effect, &session.machine, session.instrument, &tests));
+    effect.transpose().within("effect")
 }
 
-/// An effect that no search has under its name cannot be found, whatever the readings.
-fn check_searched(own: &[Option<Effect>], file: &StudyFile, ids: &HashSet<String>) -> Result<(), String> {
-    for (effect, stated) in own.iter().zip(&file.effect) {
-        let Some(id) = effect.as_ref().map(Effect::id).filter(|id| !ids.contains(id)) else { continue };
-        let mut alike: Vec<&str> = ids.iter().map(String::as_str).collect();
-        alike.retain(|other| other.split(':').next() == id.split(':').next());
-        alike.sort_unstable();
-        alike.truncate(8);
-        let help = match alike.is_empty() {
-            true => "it has none of this component and driver".to_string(),
-            false => format!("it has {}", alike.join(", ")),
-        };
-        return Err(format!("effect `{}`: the library of the trace has no effect `{id}`; {help}", stated.name));
+/// Checks that a search has the effect under its name: no other can be found, whatever the readings.
+fn searched(effect: &Effect, ids: &HashSet<String>) -> Result<(), Fault> {
+    let id = effect.id();
+    if ids.contains(&id) {
+        return Ok(());
     }
-    Ok(())
+    let mut alike: Vec<&str> = ids.iter().map(String::as_str).collect();
+    alike.retain(|other| other.split(':').next() == id.split(':').next());
+    alike.sort_unstable();
+    alike.truncate(8);
+    let help = match alike.is_empty() {
+        true => "it has none of this component and driver".to_string(),
+        false => format!("it has {}", alike.join(", ")),
+    };
+    Err(Fault::new(format!("the library of the trace has no effect `{id}`"), help).at("effect"))
 }
 
-fn check(file: &StudyFile) -> Result<(), String> {
+fn check(file: &StudyFile) -> Result<(), Fault> {
     let head = &file.study;
     let named = [
         ("plan", file.plan.iter().map(|plan| plan.name.as_str()).collect::<Vec<_>>()),
         ("effect", file.effect.iter().map(|effect| effect.name.as_str()).collect()),
         ("noise", file.noise.iter().map(|noise| noise.name.as_str()).collect()),
     ];
-    for (kind, names) in named {
+    for (kind, names) in &named {
         if let Some(twice) = (1..names.len()).find(|k| names[..*k].contains(&names[*k])) {
-            return Err(format!("two [[{kind}]] are called `{}`: give each its own name", names[twice]));
+            let message = format!("two [[{kind}]] are called `{}`", names[twice]);
+            return Err(Fault::new(message, "give each its own name").at("name").at_item(twice).at(kind));
+        }
+        if names.is_empty() {
+            return Err(Fault::of_key("is an empty list; at least one is expected", None).at(kind));
         }
     }
-    if !(1..=MAX_DRAWS).contains(&head.draws) {
-        return Err(format!("draws = {}: 1 to {MAX_DRAWS} are expected", head.draws));
-    }
-    let lists = [file.plan.len(), file.effect.len(), file.noise.len()];
-    let all = lists.iter().try_fold(head.draws, |product, list| product.checked_mul(*list));
-    if all.is_none_or(|all| all > MAX_DRAWS) || lists.iter().any(|list| *list > MAX_ENTRIES) {
+    let lists = named.map(|(_, names)| names.len());
+    let all = lists.iter().try_fold(head.draws.0, |product, list| product.checked_mul(*list));
+    if all.is_none_or(|all| all > MAX_DRAWS) {
         let [plans, effects, noises] = lists;
-        return Err(format!(
-            "{plans} plans × {effects} effects × {noises} kinds of noise × {} draws: at most {MAX_DRAWS} draws of at \
-             most {MAX_ENTRIES} plans, effects and kinds of noise are expected; state fewer of them",
-            head.draws
-        ));
+        let message = format!(
+            "{plans} plans × {effects} effects × {noises} kinds of noise × {} draws: at most {MAX_DRAWS} draws are expected",
+            head.draws.0
+        );
+        return Err(Fault::new(message, "state fewer of them").at("draws").at("study"));
     }
-    for (name, list) in [("plan", file.plan.len()), ("effect", file.effect.len()), ("noise", file.noise.len())] {
-        if list == 0 {
-            return Err(format!("no [[{name}]]: at least one is expected"));
-        }
-    }
-    for (name, value) in [("location_um", head.location_um), ("location_arcsec", head.location_arcsec)] {
-        if !(0.0..=1e6).contains(&value) {
-            return Err(format!("{name} = {value}: 0 to 1e6 is expected"));
-        }
-    }
-    for noise in &file.noise {
-        let usable = (0.0..=1e6).contains(&noise.um)
-            && (0.0..1.0).contains(&noise.autocorrelation)
-            && (0.0..1.0).contains(&noise.outlier_share);
-        if !usable {
-            return Err(format!(
-                "noise `{}`: um from 0 to 1e6, autocorrelation and outlier_share from 0 to below 1 are expected",
-                noise.name
-            ));
-        }
-    }
-    for effect in &file.effect {
+    let checked = |effect: &TrueEffect| {
         if effect.library && effect.effect.is_some() {
-            return Err(format!("effect `{}`: either library = true or a table `effect` is expected", effect.name));
+            return Err(Fault::new("either `library = true` or a table `effect` is expected", None).at("library"));
         }
-        let has_effect = effect.library || effect.effect.is_some();
-        if has_effect != (effect.size > 0.0) || !(0.0..=1e6).contains(&effect.size) {
-            return Err(format!("effect `{}`: an effect has a size above 0, and no effect has none", effect.name));
+        if (effect.library || effect.effect.is_some()) != (effect.size.0 > 0.0) {
+            let message = format!("effect `{}`: an effect has a size above 0, and no effect has none", effect.name);
+            return Err(Fault::new(message, None));
         }
-    }
-    Ok(())
+        Ok(())
+    };
+    per_effect(file, checked).map(|_| ())
 }

@@ -57,7 +57,7 @@ pub(super) fn alone(plan: &Session, machine: &Session, given: Vec<Given>) -> Res
 
 /// The noise of a study in mm. It is not zero, so that χ² is finite.
 pub(super) fn noise_mm(noise: &Noise) -> f64 {
-    noise.um.max(1e-3) * 1e-3
+    noise.um.0.max(1e-3) * 1e-3
 }
 
 /// χ² of the fit of a session. The model has no noise to estimate: it is stated.

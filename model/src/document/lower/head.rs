@@ -6,14 +6,13 @@ use crate::component::ErrorName;
 use crate::document::fault::{Fault, Within};
 use crate::document::from_node;
 use crate::document::node::{Entries, Named, Value};
-use crate::document::session as document;
+use crate::document::session::{self as document, Kind};
 use crate::document::value::{NotNegative, Note};
 use crate::files::quantity::{self, MICROMETRE};
 use crate::instrument::{InstrumentKind, SharedBy};
 use crate::pattern;
 use crate::session::expression::Constant;
 use crate::session::{SocketDistance, Test, limits};
-use crate::words::listed;
 
 /// Notes that reports repeat.
 pub(super) fn about(notes: &Named<Note>) -> Result<Vec<(String, String)>, Fault> {
@@ -56,10 +55,7 @@ pub(super) fn constants(entries: &Entries, comment: impl Fn(&str) -> Option<Stri
 
 /// The kind of the instrument, and noise and resolution of a reading, mm.
 pub(super) fn instrument(document: &document::Instrument) -> Result<(InstrumentKind, Option<f64>, Option<f64>), Fault> {
-    let kind = InstrumentKind::of_word(&document.kind).ok_or_else(|| {
-        let words: Vec<String> = InstrumentKind::ALL.iter().map(|kind| format!("\"{}\"", kind.word())).collect();
-        Fault::unexpected(listed(&words, "or")).at("kind")
-    })?;
+    let Kind(kind) = document.kind;
     let in_mm = |um: Option<NotNegative>, key: &str| {
         let mm = um.map(|NotNegative(um)| limits::too_small_um(um).map_or(Ok(um * MICROMETRE), Err));
         mm.transpose().within(key)

@@ -153,7 +153,9 @@ pub(crate) fn add(session: &mut Session, document: Parts<'_>, surroundings: &Sur
         }
     }
     let columns = driver_columns(&context, &tests);
-    let effects = effects(&context, &declared, &columns, document.effect).within("effect")?;
+    let effects = document.effect.iter().enumerate();
+    let effects = effects.map(|(item, effect)| effect::effect(&context, &declared, &columns, effect).within_item(item));
+    let effects = effects.collect::<Result<Vec<_>, _>>().within("effect")?;
     let read = !matches!(surroundings.data, Data::None);
     let distances = head::socket_distances(session.instrument, &tests, document.socket_distance, read);
     let distances = distances.within("socket_distance")?;
@@ -171,23 +173,13 @@ pub(crate) fn add(session: &mut Session, document: Parts<'_>, surroundings: &Sur
     Ok(found)
 }
 
-fn effects(
-    context: &Context<'_>,
-    declared: &[Declared],
-    columns: &BTreeSet<String>,
-    documents: &[effect_document::Effect],
-) -> Result<Vec<Effect>, Fault> {
-    let effect = |(item, document)| effect::effect(context, declared, columns, document).within_item(item);
-    documents.iter().enumerate().map(effect).collect()
-}
-
-/// Effects of a session with this machine, instrument and names of tests.
-pub(crate) fn effects_of(
+/// An effect of a session with this machine, instrument and names of tests.
+pub(crate) fn effect_of(
     machine: &Machine,
     instrument: InstrumentKind,
     tests: &[String],
-    documents: &[effect_document::Effect],
-) -> Result<Vec<Effect>, Fault> {
+    document: &effect_document::Effect,
+) -> Result<Effect, Fault> {
     let context = Context {
         file: Path::new(""),
         machine,
@@ -201,7 +193,7 @@ pub(crate) fn effects_of(
     };
     let declared: Vec<Declared> =
         tests.iter().map(|name| Declared { name: name.clone(), parts: vec![name.clone()] }).collect();
-    effects(&context, &declared, &BTreeSet::new(), documents)
+    effect::effect(&context, &declared, &BTreeSet::new(), document)
 }
 
 /// The driver columns of the data, and those that `[columns]` names.
