@@ -8,6 +8,7 @@ mod claims;
 mod closed_loop;
 mod codes;
 mod collision;
+mod compare_figures;
 mod compensation;
 mod conformity;
 mod conformity_set_up;

@@ -38,7 +38,7 @@ direction = [0, 0, 1]
 "#;
 
 /// Three tests in two set-ups, of different lengths, with a bar of known length, one of stated uncertainty and one free.
-fn plan(unknowns: &str, effects: &str) -> Session {
+pub fn plan(unknowns: &str, effects: &str) -> Session {
     let test = |name: &str, bar: &str, balls: &str, priors: &str, at: &str, sweep: &str| {
         format!("[[test]]\nname = \"{name}\"\nbar_mm = {bar}\n{balls}\n{priors}\n{at}\nsweep = {{ {sweep} }}\n")
     };
@@ -71,7 +71,7 @@ fn plan(unknowns: &str, effects: &str) -> Session {
     ))
 }
 
-const EIGHT: &str = r#"["EY0A", "EZ0A", "EB0A", "EC0A", "EX0C", "EY0C", "EA0C", "EB0C"]"#;
+pub const EIGHT: &str = r#"["EY0A", "EZ0A", "EB0A", "EC0A", "EX0C", "EY0C", "EA0C", "EB0C"]"#;
 const TWELVE: &str = r#"["EX0A", "EY0A", "EZ0A", "EB0A", "EC0A", "EA0A", "EX0C", "EY0C", "EZ0C", "EA0C", "EB0C", "EC0C"]"#;
 
 /// A parameter as this test knows it.
