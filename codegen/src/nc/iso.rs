@@ -147,10 +147,8 @@ pub(super) fn plain(text: &str) -> String {
 /// A number without superfluous zeros.
 pub(super) fn number(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
-    let text = text.trim_end_matches('0');
-    match text.trim_end_matches('.') {
-        "-0" | "" => "0.".into(),
-        whole if whole.len() < text.len() => text.into(),
+    match text.trim_end_matches('0') {
+        "-0." | "0." | "" => "0.".into(),
         text => text.into(),
     }
 }
@@ -300,5 +298,21 @@ impl Control for Iso {
     }
     fn main(&self, calls: &[(String, String)], options: &NcOptions) -> String {
         (self.main)(calls, options.number())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A position is a number with a point, whose last digit is not zero; nothing is zero with a sign.
+    #[test]
+    fn positions_are_numbers_with_a_point() {
+        let written = [(12.5, "12.5"), (12.0, "12."), (100.0, "100."), (0.1, "0.1"), (-7.25, "-7.25"), (-30.0, "-30.")];
+        for (value, text) in written.into_iter().chain([(0.0, "0."), (-0.0004, "0."), (0.0004, "0."), (-0.0006, "-0.001")]) {
+            assert_eq!(number(value, 3), text);
+        }
+        assert_eq!(simple("C 150-µ", '_'), "C_150__");
+        assert_eq!(plain("A (90°, 5 µm) [x]; \"é\""), "A 90 deg, 5 um x ");
     }
 }

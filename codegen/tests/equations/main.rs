@@ -12,6 +12,7 @@ mod julia;
 mod named;
 mod nc;
 mod operators;
+mod pages;
 mod probe;
 mod programs;
 mod second;

@@ -71,7 +71,7 @@ impl Source for Touch {
     }
 }
 
-fn errors(machine: &Machine) -> Vec<ErrorName> {
+pub fn errors(machine: &Machine) -> Vec<ErrorName> {
     let names = ["EX0C", "EY0C", "EA0C", "EB0C", "EXC", "ECC", "EY0A", "EB0A", "EC0A", "EXX", "EBX", "EC0Y", "EAZ"];
     let names = names.iter().filter_map(|name| ErrorName::parse(name));
     names.filter(|name| machine.axis_index(&name.axis).is_some()).collect()

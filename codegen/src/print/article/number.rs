@@ -58,3 +58,58 @@ fn over(numerator: f64, factor: Option<Tree>, denominator: u32) -> Tree {
     let whole = product(number.into_iter().chain(factor).collect());
     if denominator == 1 { whole } else { binary(Binary::Div, whole, Tree::Number(f64::from(denominator))) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn text(tree: &Tree) -> String {
+        match tree {
+            Tree::Number(value) if *value == PI => "π".into(),
+            Tree::Number(value) => format!("{value}"),
+            Tree::Unary(Unary::Sqrt, of) => format!("√{}", text(of)),
+            Tree::Unary(Unary::Neg, of) => format!("−{}", text(of)),
+            Tree::Binary(Binary::Mul, a, b) => format!("{}·{}", text(a), text(b)),
+            Tree::Binary(Binary::Div, a, b) => format!("{}/{}", text(a), text(b)),
+            other => format!("{other:?}"),
+        }
+    }
+
+    /// A root, a fraction or a multiple of π where it is shorter than the decimals; whole numbers and short decimals as
+    /// they are.
+    #[test]
+    fn numbers_have_their_shortest_exact_form() {
+        for (value, wanted) in [
+            (0.5, "1/2"),
+            (0.75, "3/4"),
+            (0.25, "1/4"),
+            (1.5, "1.5"),
+            (2.25, "2.25"),
+            (0.2, "0.2"),
+            (0.3125, "0.3125"),
+            (0.125, "0.125"),
+            (1.0 / 3.0, "1/3"),
+            (7.0 / 3.0, "7/3"),
+            (5.0 / 12.0, "5/12"),
+            (1.0 / 13.0, "0.07692307692307693"),
+            (2.0, "2"),
+            (12.5, "12.5"),
+            (0.5_f64.sqrt(), "√2/2"),
+            (0.75_f64.sqrt(), "√3/2"),
+            (2.0_f64.sqrt(), "√2"),
+            (1.5 * 3.0_f64.sqrt(), "3·√3/2"),
+            (3.0 * 2.0_f64.sqrt(), "3·√2"),
+            (6.0_f64.sqrt() / 4.0, "√6/4"),
+            (PI, "π"),
+            (PI / 2.0, "π/2"),
+            (3.0 * PI / 4.0, "3·π/4"),
+            (12.0 * PI, "12·π"),
+            (PI / 180.0, "π/180"),
+            (-0.5, "−1/2"),
+            (-0.75_f64.sqrt(), "−√3/2"),
+            (-1.5, "-1.5"),
+        ] {
+            assert_eq!(text(&exact(&Tree::Number(value))), wanted, "{value}");
+        }
+    }
+}
