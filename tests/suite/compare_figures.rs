@@ -214,7 +214,8 @@ fn the_volumetric_error_is_that_of_the_chain_on_a_grid() {
             own.unwrap().range
         };
         let (from, to) = (of(&a)[0].max(of(&b)[0]), of(&a)[1].min(of(&b)[1]));
-        let (display, unit) = if axis.name == "A" || axis.name == "C" { (1f64.to_degrees(), "deg") } else { (1.0, "mm") };
+        let (display, unit) =
+            if axis.name == "A" || axis.name == "C" { (1f64.to_degrees(), "deg") } else { (1.0, "mm") };
         near(reported.from, from * display, &axis.name);
         near(reported.to, to * display, &axis.name);
         assert_eq!((reported.axis.as_str(), reported.unit.as_str()), (axis.name.as_str(), unit));

@@ -224,9 +224,8 @@ fn check_points(machine: &MachineSessions, one: &ParameterHistory, k: usize, ter
             near(points[at].shewhart, z(at), "a Shewhart chart");
             let share = |i: usize| 0.2 * 0.8_f64.powi((at - i) as i32);
             let average: f64 = (first..=at).map(|i| share(i) * z(i)).sum();
-            let covariance = |i: usize, j: usize| {
-                (f64::from(u8::from(i == j)) * u[i] * u[i] + 1.0 / weight) / (scale[i] * scale[j])
-            };
+            let covariance =
+                |i: usize, j: usize| (f64::from(u8::from(i == j)) * u[i] * u[i] + 1.0 / weight) / (scale[i] * scale[j]);
             let pairs = (first..=at).flat_map(|i| (first..=at).map(move |j| (i, j)));
             let variance: f64 = pairs.map(|(i, j)| share(i) * share(j) * covariance(i, j)).sum();
             near(points[at].ewma, average / variance.sqrt(), "a moving average");
@@ -328,7 +327,8 @@ fn figures_of_changes_are_in_the_metric_of_their_covariance() {
     let (at, own) = (day(STEP) - 10.0, [("EX0C", 1.5), ("EA0C", -9.0)]);
     let whole = values.map(f64::from);
     let as_found: Vec<(&str, f64)> = IDS.into_iter().zip(whole.iter().copied()).collect();
-    let more: Vec<(&str, f64)> = as_found.iter().map(|(id, value)| (*id, value + if *id == "EB0C" { 4.0 } else { 0.0 })).collect();
+    let more: Vec<(&str, f64)> =
+        as_found.iter().map(|(id, value)| (*id, value + if *id == "EB0C" { 4.0 } else { 0.0 })).collect();
     let opposite: Vec<(&str, f64)> = as_found.iter().map(|(id, value)| (*id, -value)).collect();
     // Tables of another machine, another time or other parameters say nothing of this change.
     let unknown = [
@@ -356,7 +356,9 @@ fn figures_of_changes_are_in_the_metric_of_their_covariance() {
         (vec![table("M1", at, &opposite)], Some(Kind::Shift)),
     ] {
         let mut stated = DVector::zeros(4);
-        for (id, value) in known.iter().filter(|one| one.machine_id == "M1").flat_map(|one| &one.changes).map(|c| (&c.id, c.value)) {
+        for (id, value) in
+            known.iter().filter(|one| one.machine_id == "M1").flat_map(|one| &one.changes).map(|c| (&c.id, c.value))
+        {
             stated[IDS.iter().position(|own| own == id).unwrap()] += value;
         }
         let history = history(known, std::slice::from_ref(&machine));

@@ -47,7 +47,14 @@ pub fn plan(unknowns: &str, effects: &str) -> Session {
     let u1 = "workpiece_ball_u_um = [2, 3, 4]\nspindle_ball_u_um = [1, 1.5, 0.5]\nbar_u_um = 0.7";
     let u2 = "workpiece_ball_u_um = [5, 2, 3]\nspindle_ball_u_um = [1, 1.5, 0.5]";
     let tests = [
-        test("A", "116.07", p1, u1, "at = { x_mm = 67.6, y_mm = 20.4, z_mm = -39.8 }", "axis = \"A\", from_deg = -20, to_deg = 70, step_deg = 5, feed_deg_min = 360, both_directions = false"),
+        test(
+            "A",
+            "116.07",
+            p1,
+            u1,
+            "at = { x_mm = 67.6, y_mm = 20.4, z_mm = -39.8 }",
+            "axis = \"A\", from_deg = -20, to_deg = 70, step_deg = 5, feed_deg_min = 360, both_directions = false",
+        ),
         test(
             "C",
             "110.2",
@@ -72,7 +79,8 @@ pub fn plan(unknowns: &str, effects: &str) -> Session {
 }
 
 pub const EIGHT: &str = r#"["EY0A", "EZ0A", "EB0A", "EC0A", "EX0C", "EY0C", "EA0C", "EB0C"]"#;
-const TWELVE: &str = r#"["EX0A", "EY0A", "EZ0A", "EB0A", "EC0A", "EA0A", "EX0C", "EY0C", "EZ0C", "EA0C", "EB0C", "EC0C"]"#;
+const TWELVE: &str =
+    r#"["EX0A", "EY0A", "EZ0A", "EB0A", "EC0A", "EA0A", "EX0C", "EY0C", "EZ0C", "EA0C", "EB0C", "EC0C"]"#;
 
 /// A parameter as this test knows it.
 struct Own {
@@ -364,9 +372,8 @@ fn indices_and_ranks_follow_from_differences_of_readings() {
     let (covariance, _) = columns.covariance(NOISE_UM, |_| true);
     let errors: Vec<usize> = (0..columns.own.len()).filter(|j| columns.own[*j].is_error).collect();
     let of_errors = covariance.select_rows(&errors).select_columns(&errors);
-    let scaled = DMatrix::from_fn(8, 8, |i, j| {
-        of_errors[(i, j)] / (columns.own[errors[i]].size * columns.own[errors[j]].size)
-    });
+    let scaled =
+        DMatrix::from_fn(8, 8, |i, j| of_errors[(i, j)] / (columns.own[errors[i]].size * columns.own[errors[j]].size));
     let mut sigma: Vec<f64> = scaled.symmetric_eigenvalues().iter().map(|value| 1.0 / value.sqrt()).collect();
     sigma.sort_by(|a, b| b.total_cmp(a));
     assert_eq!((found.identifiable_count, found.error_count), (8, 8));
@@ -400,7 +407,8 @@ fn indices_and_ranks_follow_from_differences_of_readings() {
     singular.sort_by(|a, b| b.total_cmp(a));
     let rank = |values: &[f64]| values.iter().filter(|value| **value > 1e-9 * values[0]).count();
     assert_eq!((structure.parameter_count, structure.rank), (columns.own.len(), rank(&singular)));
-    let mut of_readings: Vec<f64> = columns.scaled(NOISE_UM, |_| true, false).singular_values().iter().copied().collect();
+    let mut of_readings: Vec<f64> =
+        columns.scaled(NOISE_UM, |_| true, false).singular_values().iter().copied().collect();
     of_readings.sort_by(|a, b| b.total_cmp(a));
     println!("{of_readings:?}");
     assert_eq!(structure.rank_of_readings, rank(&of_readings));
@@ -453,7 +461,10 @@ fn combinations_leave_the_readings_unchanged_in_their_units() {
         let row = found.correlation.ids.iter().position(|id| *id == error.id).unwrap();
         assert_eq!(found.correlation.matrix[row][row].is_some(), error.u.is_some());
     }
-    assert_eq!(found.indices.identifiable_count, identifiable.iter().zip(&columns.own).filter(|(is, own)| **is && own.is_error).count());
+    assert_eq!(
+        found.indices.identifiable_count,
+        identifiable.iter().zip(&columns.own).filter(|(is, own)| **is && own.is_error).count()
+    );
     assert_eq!(found.indices.error_count, 12);
     // One test of C alone: where the balls are is told by their priors only.
     let mut session = plan("[\"EX0C\", \"EY0C\", \"EA0C\"]", "");
@@ -588,8 +599,14 @@ fn detectability_and_biases_follow_from_differences_of_readings() {
             };
             let levels = [0.01, each].map(|level| (needed(level) / weakest).sqrt());
             let is_rounding = weakest < 1e-6 * whole;
-            for (found, wanted) in [effect.detectable_amplitude, effect.detectable_amplitude_screened].iter().zip(levels) {
-                assert_eq!(found.is_some(), !is_rounding && wanted <= kind.size, "{id} at {noise}: {wanted} {effect:?}");
+            for (found, wanted) in
+                [effect.detectable_amplitude, effect.detectable_amplitude_screened].iter().zip(levels)
+            {
+                assert_eq!(
+                    found.is_some(),
+                    !is_rounding && wanted <= kind.size,
+                    "{id} at {noise}: {wanted} {effect:?}"
+                );
                 found.iter().for_each(|found| near(*found, wanted, 1e-3, &format!("amplitude of {id} at {noise}")));
             }
             let confounded = share < 0.01 || levels[0] > kind.size;
@@ -633,7 +650,11 @@ fn detectability_and_biases_follow_from_differences_of_readings() {
                     let j = columns.place(&error.id);
                     assert_eq!(error.unit, columns.own[j].unit);
                     let wanted = bias[(j, k)];
-                    assert!((found - wanted).abs() < 1e-4 * most, "{} by {coefficient}: {found} {wanted} {most}", error.id);
+                    assert!(
+                        (found - wanted).abs() < 1e-4 * most,
+                        "{} by {coefficient}: {found} {wanted} {most}",
+                        error.id
+                    );
                 }
                 assert_eq!(row.largest(), row.bias.iter().fold(0.0, |most, bias| bias.abs().max(most)));
             }

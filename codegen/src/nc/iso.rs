@@ -309,7 +309,9 @@ mod tests {
     #[test]
     fn positions_are_numbers_with_a_point() {
         let written = [(12.5, "12.5"), (12.0, "12."), (100.0, "100."), (0.1, "0.1"), (-7.25, "-7.25"), (-30.0, "-30.")];
-        for (value, text) in written.into_iter().chain([(0.0, "0."), (-0.0004, "0."), (0.0004, "0."), (-0.0006, "-0.001")]) {
+        for (value, text) in
+            written.into_iter().chain([(0.0, "0."), (-0.0004, "0."), (0.0004, "0."), (-0.0006, "-0.001")])
+        {
             assert_eq!(number(value, 3), text);
         }
         assert_eq!(simple("C 150-µ", '_'), "C_150__");
