@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let predict = mean_cpu_s(50, || {
         let values = problem.slot_values(&beta);
         let models = problem.models.iter().zip(&values);
-        black_box(models.map(|(model, values)| model.readings_mm(values)).collect::<Vec<_>>());
+        black_box(models.map(|(model, values)| model.readings(values)).collect::<Vec<_>>());
     })?;
     let blocks = problem.blocks();
     let jacobian = mean_cpu_s(20, || {

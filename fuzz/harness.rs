@@ -73,7 +73,7 @@ fn session_in(folder: &Path) -> Option<Session> {
     for test in &session.tests {
         assert!(test.at.iter().all(|at| at.is_finite()));
         let Some(readings) = &test.readings else { continue };
-        assert_eq!(readings.observed.len(), readings.rows() * readings.coordinates);
+        assert_eq!(readings.observed.len(), readings.rows() * readings.channels);
         assert!(readings.observed.iter().all(|value| value.is_finite()));
         assert!(readings.positions.iter().flatten().all(|value| value.is_finite()));
         // Each row belongs to exactly one run.

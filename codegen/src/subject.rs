@@ -90,7 +90,7 @@ impl<N: Nominal> Subject<N> {
         unknown: impl Fn(usize) -> Option<S>,
     ) -> Vec<S> {
         match self {
-            Subject::Station(station) => station.read(machine, state, errors, unknown).coordinates().to_vec(),
+            Subject::Station(station) => station.read(machine, state, errors, unknown).channels().to_vec(),
             Subject::Volumetric { tool } => {
                 let none = vec![BodyErrors::<S>::NONE; machine.axes.len()];
                 let seen = |errors: &[BodyErrors<S>]| {

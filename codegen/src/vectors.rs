@@ -94,6 +94,15 @@ pub(crate) fn of_subject<'a>(
                 walk.on_workpiece_side(("p", "master ball"), displaced(rtest.workpiece_ball, 0, unknown))
             }
         },
+        Subject::Station(Station::Laser(laser)) => {
+            let mut vectors = walk.on_workpiece_side(("p", "optic"), displaced(laser.optic, 3, unknown));
+            vectors.extend(walk.on_tool_side(("q", "reflector"), displaced(laser.reflector, 0, unknown)));
+            vectors
+        }
+        Subject::Station(Station::Distance(distance)) => {
+            walk.on_tool_side(("q", "reflector"), displaced(distance.reflector, 3, unknown))
+        }
+        Subject::Station(Station::Angle(_) | Station::Pointing(_)) => Vec::new(),
         Subject::Volumetric { tool } => walk.on_tool_side(("q", "tool point"), Point::nominal(*tool)),
     }
 }

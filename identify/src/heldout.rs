@@ -35,11 +35,10 @@ pub struct HeldOut {
 
 /// Root mean square over the scalar readings that are not excluded, mm.
 pub fn rms_mm(problem: &Problem, residuals: &[Vec<f64>]) -> f64 {
-    let coordinates = problem.coordinates();
     let (mut sum, mut count) = (0.0, 0_usize);
-    for (residual, rejected) in residuals.iter().zip(&problem.rejected) {
+    for (test, residual) in residuals.iter().enumerate() {
         for (i, value) in residual.iter().enumerate() {
-            if !rejected[i / coordinates] {
+            if problem.counts(test, i) {
                 sum += value * value;
                 count += 1;
             }
@@ -77,7 +76,6 @@ pub fn held_out(
 /// step.
 fn predicted(problem: &Problem, beta: &[f64], steps: &[Vec<f64>]) -> Result<Vec<Vec<f64>>, IdentifyError> {
     let values = problem.slot_values(beta);
-    let coordinates = problem.coordinates();
     let mut residuals: Vec<Vec<f64>> = vec![Vec::new(); problem.models.len()];
     let blocks = problem.blocks();
     let predicted = parallel::map(blocks.len(), &|number| {
@@ -86,9 +84,10 @@ fn predicted(problem: &Problem, beta: &[f64], steps: &[Vec<f64>]) -> Result<Vec<
         let rows = problem.own_rows(&values[block.test], block)?;
         let mut residual = rows.col(of_test.len()).to_owned();
         let fold_of = &problem.folds.of_row[block.test][block.rows.clone()];
+        let channels = problem.channels(block.test);
         for (parameter, column) in of_test.iter().zip(rows.col_iter()) {
             for (i, residual) in residual.iter_mut().enumerate() {
-                *residual -= column[i] * steps[fold_of[i / coordinates]][*parameter];
+                *residual -= column[i] * steps[fold_of[i / channels]][*parameter];
             }
         }
         Ok::<_, IdentifyError>(residual)

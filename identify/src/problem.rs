@@ -14,7 +14,10 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use abbe_model::effect::Effect;
+use abbe_model::instrument::Station;
+use abbe_model::instrument::channel::{self, Channel};
 use abbe_model::sensitivity::{SlotValues, TestModel};
+use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test};
 use faer::Mat;
 
@@ -31,7 +34,8 @@ use abbe_model::driver::Reference;
 pub struct Problem {
     /// The session.
     pub session: Arc<Session>,
-    /// The tests that have readings, which they share with the session.
+    /// The tests that have readings: the values of their channels, mm. An angle is multiplied by the session's lever
+    /// ([`Session::lever_mm`]), so that all channels have the same noise.
     pub tests: Vec<Test>,
     /// The models of these tests.
     pub models: Vec<TestModel>,
@@ -43,6 +47,8 @@ pub struct Problem {
     pub noise: Noise,
     /// Excluded outliers, by test and row.
     pub rejected: Vec<Vec<bool>>,
+    /// The values that were not read, by test and scalar reading; empty for a test that lacks none.
+    missing: Vec<Vec<bool>>,
     /// The folds of cross-validation.
     pub folds: Folds,
     /// For each test, the parameters that affect its readings.
@@ -58,6 +64,25 @@ pub struct RowBlock {
     pub rows: Range<usize>,
 }
 
+/// Factor on each channel, mm per internal unit: an angle counts as the length that has the same noise.
+fn weights(session: &Session, channels: &[Channel]) -> Vec<f64> {
+    channels.iter().map(|channel| if channel.is_angle() { session.lever_mm } else { 1.0 }).collect()
+}
+
+/// The values of the channels of a test, times their weights.
+fn weighted(session: &Session, station: &Station<f64>, readings: Arc<Readings>) -> Arc<Readings> {
+    let weights = weights(session, station.channels());
+    if weights.iter().all(|weight| *weight == 1.0) && !station.refers_to_nominal() {
+        return readings;
+    }
+    let mut readings = Arc::unwrap_or_clone(readings);
+    readings.columns_to_channels(&session.machine, station);
+    for values in readings.observed.chunks_exact_mut(weights.len()) {
+        values.iter_mut().zip(&weights).for_each(|(value, weight)| *value *= weight);
+    }
+    Arc::new(readings)
+}
+
 /// Mean number of readings below which runs are evaluated together.
 const SHORT_RUN: usize = 8;
 impl Problem {
@@ -66,19 +91,29 @@ impl Problem {
     /// # Errors
     /// If there are no readings, or an effect cannot be evaluated.
     pub fn new(session: &Session, noise: Noise, seed: u64) -> Result<Problem, IdentifyError> {
-        let tests: Vec<Test> = session.tests.iter().filter(|test| test.readings.is_some()).cloned().collect();
+        let mut tests: Vec<Test> = session.tests.iter().filter(|test| test.readings.is_some()).cloned().collect();
         if tests.is_empty() {
             return Err(IdentifyError::NoReadings);
         }
         let stations = crate::start::stations(session, &tests);
-        let models: Vec<TestModel> = tests
-            .iter()
-            .zip(stations)
-            .filter_map(|(test, station)| {
-                let readings = test.readings.as_ref()?;
-                Some(TestModel::new(Arc::clone(&session.machine), station, readings))
-            })
-            .collect();
+        let mut models: Vec<TestModel> = Vec::with_capacity(tests.len());
+        for (test, station) in tests.iter_mut().zip(stations) {
+            if let Some(readings) = &mut test.readings {
+                *readings = weighted(session, &station, Arc::clone(readings));
+                let model = TestModel::new(Arc::clone(&session.machine), station, readings);
+                let weights = weights(session, model.channels());
+                models.push(model.weighted(weights));
+            }
+        }
+        let missing = |test: &Test| -> Vec<bool> {
+            let observed = || test.readings.iter().flat_map(|readings| &readings.observed);
+            if observed().any(|value| value.is_nan()) {
+                observed().map(|value| value.is_nan()).collect()
+            } else {
+                Vec::new()
+            }
+        };
+        let missing = tests.iter().map(missing).collect();
         let reference = session.reference();
         let parameters = Parameters::declared(session, &tests, &models)?;
         let rejected = models.iter().map(|model| vec![false; model.rows()]).collect();
@@ -92,6 +127,7 @@ impl Problem {
             reference,
             noise,
             rejected,
+            missing,
             folds,
             test_parameters: Vec::new(),
         };
@@ -137,7 +173,25 @@ impl Problem {
 
     /// Number of scalar readings of a test that are not excluded.
     pub(crate) fn scalars_of(&self, test: usize) -> usize {
-        self.rejected[test].iter().filter(|rejected| !**rejected).count() * self.coordinates()
+        let rows = self.rejected[test].iter().filter(|rejected| !**rejected).count();
+        let missing = self.missing[test].iter().enumerate();
+        let channels = self.channels(test);
+        rows * channels - missing.filter(|(i, missing)| **missing && !self.rejected[test][i / channels]).count()
+    }
+
+    /// Number of scalar readings that are not excluded.
+    pub fn scalars(&self) -> usize {
+        (0..self.tests.len()).map(|test| self.scalars_of(test)).sum()
+    }
+
+    /// Whether a scalar reading of a test was read and is not excluded.
+    pub fn counts(&self, test: usize, scalar: usize) -> bool {
+        !self.rejected[test][scalar / self.channels(test)] && !self.is_missing(test, scalar)
+    }
+
+    /// Whether a scalar reading of a test was not read.
+    pub(crate) fn is_missing(&self, test: usize, scalar: usize) -> bool {
+        self.missing[test].get(scalar) == Some(&true)
     }
 
     /// Number of readings that are not excluded.
@@ -145,9 +199,20 @@ impl Problem {
         self.rejected.iter().flatten().filter(|rejected| !**rejected).count()
     }
 
-    /// Number of scalar coordinates per reading.
-    pub fn coordinates(&self) -> usize {
-        self.session.instrument.coordinates()
+    /// Number of channels of a reading of a test.
+    pub fn channels(&self, test: usize) -> usize {
+        self.models[test].channels().len()
+    }
+
+    /// The unit of readings and residuals in results: `um`, or `arcsec` if every channel is an angle. At the lever of such
+    /// a session ([`Session::lever_mm`]) one arcsecond is one micrometre.
+    pub fn unit(&self) -> &'static str {
+        if self.session.units().only_angles() { "arcsec" } else { "um" }
+    }
+
+    /// Whether the readings of all tests are vectors, three coordinates each.
+    pub fn are_vectors(&self) -> bool {
+        self.models.iter().all(|model| channel::are_vector(model.channels()))
     }
 
     /// The blocks of rows, in order.
@@ -164,7 +229,7 @@ impl Problem {
                 // A block must not cut a whitening filter. Without a filter, a block has the number of rows that a
                 // factor absorbs at once.
                 let most = if self.noise.ar_coefficients.is_empty() {
-                    (BLOCK_ROWS / self.coordinates()).max(1)
+                    (BLOCK_ROWS / self.channels(test)).max(1)
                 } else {
                     run.len().max(1)
                 };
@@ -184,7 +249,7 @@ impl Problem {
         self.parameters.slot_values(&self.models, beta)
     }
 
-    /// Rows of `[J | r]` of a block in mm, not whitened, outliers included: (rows × coordinates) × (parameters + 1).
+    /// Rows of `[J | r]` of a block in mm, not whitened, outliers included: (rows × channels) × (parameters + 1).
     ///
     /// # Errors
     /// If the model yields a number that is not finite.
@@ -210,25 +275,25 @@ impl Problem {
     /// # Errors
     /// If the model yields a number that is not finite.
     pub fn own_rows(&self, values: &SlotValues, block: &RowBlock) -> Result<Mat<f64>, IdentifyError> {
-        let coordinates = self.coordinates();
+        let channels = self.channels(block.test);
         let own = &self.test_parameters[block.test];
-        let scalars = block.rows.start * coordinates..block.rows.end * coordinates;
+        let scalars = block.rows.start * channels..block.rows.end * channels;
         let mut rows = Mat::zeros(scalars.len(), own.parameters.len() + 1);
         let Some(readings) = &self.tests[block.test].readings else {
             return Ok(rows);
         };
-        let observed = &readings.observed[scalars];
+        let observed = &readings.observed[scalars.clone()];
         let mut columns: Vec<&mut [f64]> =
             (rows.col_iter_mut()).filter_map(|column| Some(column.try_as_col_major_mut()?.as_slice_mut())).collect();
         let mut bad = None;
         self.models[block.test].sweep(values, &own.slots, block.rows.clone(), |output, start, values| {
-            let Some(by) = output.checked_sub(coordinates) else {
-                let first = start * coordinates + output;
-                let residuals = columns[own.parameters.len()][first..].iter_mut().step_by(coordinates);
-                let observed = observed[first..].iter().step_by(coordinates);
+            let Some(by) = output.checked_sub(channels) else {
+                let first = start * channels + output;
+                let residuals = columns[own.parameters.len()][first..].iter_mut().step_by(channels);
+                let observed = observed[first..].iter().step_by(channels);
                 for (i, (residual, (observed, value))) in residuals.zip(observed.zip(values)).enumerate() {
                     *residual = observed - value;
-                    if !residual.is_finite() && bad.is_none() {
+                    if !residual.is_finite() && bad.is_none() && !observed.is_nan() {
                         bad = Some((start + i, *value));
                     }
                 }
@@ -237,12 +302,12 @@ impl Problem {
             for (parameter, basis) in &own.contributions[by % own.slots.len()] {
                 let column = &mut columns[*parameter];
                 let mut add = |terms: &mut dyn Iterator<Item = f64>| {
-                    let entries = column[start * coordinates + by / own.slots.len()..].iter_mut();
-                    entries.step_by(coordinates).zip(terms).for_each(|(entry, term)| *entry += term);
+                    let entries = column[start * channels + by / own.slots.len()..].iter_mut();
+                    entries.step_by(channels).zip(terms).for_each(|(entry, term)| *entry += term);
                 };
                 match basis {
                     // A separate loop for the simple case, so that the compiler can vectorise it.
-                    None if coordinates == 1 => {
+                    None if channels == 1 => {
                         let entries = column[start..].iter_mut();
                         entries.zip(values).for_each(|(entry, d)| *entry += d);
                     }
@@ -254,6 +319,10 @@ impl Problem {
                 }
             }
         });
+        // A value that was not read says nothing.
+        for i in scalars.clone().filter(|i| self.is_missing(block.test, *i)) {
+            rows.row_mut(i - scalars.start).fill(0.0);
+        }
         match bad {
             None => Ok(rows),
             Some((row, value)) => Err(IdentifyError::NotFinite {
@@ -264,13 +333,15 @@ impl Problem {
         }
     }
 
-    /// Residuals observed − model of every test, mm, outliers included.
+    /// Residuals observed − model of every test, mm, outliers included; zero for a value that was not read.
     pub fn residuals(&self, beta: &[f64]) -> Vec<Vec<f64>> {
         let values = self.slot_values(beta);
         parallel::map(self.models.len(), &|test| {
-            let mut residuals = self.models[test].readings_mm(&values[test]);
+            let mut residuals = self.models[test].readings(&values[test]);
             let observed = self.tests[test].readings.iter().flat_map(|readings| &readings.observed);
             residuals.iter_mut().zip(observed).for_each(|(value, observed)| *value = observed - *value);
+            let missing = residuals.iter_mut().zip(&self.missing[test]).filter(|(_, missing)| **missing);
+            missing.for_each(|(value, _)| *value = 0.0);
             residuals
         })
     }
@@ -278,11 +349,11 @@ impl Problem {
     /// Sum of squares of whitened residuals and priors.
     pub fn sum_of_squares(&self, beta: &[f64]) -> f64 {
         let residuals = self.residuals(beta);
-        let coordinates = self.coordinates();
         let blocks = self.blocks();
         let squares = parallel::map(blocks.len(), &|k| {
             let block = &blocks[k];
-            let residual = &residuals[block.test][block.rows.start * coordinates..block.rows.end * coordinates];
+            let channels = self.channels(block.test);
+            let residual = &residuals[block.test][block.rows.start * channels..block.rows.end * channels];
             let column = Mat::from_fn(residual.len(), 1, |i, _| residual[i]);
             let (white, _) = self.whiten(&column, block);
             white.col(0).iter().map(|value| value * value).sum::<f64>()

@@ -173,28 +173,36 @@ pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated,
     assign(&parameters, &given, &mut beta)?;
 
     let warnings = warnings(&parameters, &beta);
-    let noise_mm = simulation.noise_mm.or(session.noise_mm).unwrap_or(0.0);
+    let noise_mm = simulation.noise_mm.or(session.stated_noise_mm()).unwrap_or(0.0);
     let values = parameters.slot_values(&models, &beta);
     let mut readings = Vec::with_capacity(tests.len());
     for (index, (model, values)) in models.iter().zip(&values).enumerate() {
-        let mut observed = model.readings_mm(values);
+        let mut observed = model.readings(values);
         if let Some(bad) = observed.iter().position(|value| !value.is_finite()) {
             return Err(IdentifyError::NotFinite {
                 test: tests[index].name.clone(),
-                row: bad / model.coordinates() + 1,
+                row: bad / model.channels().len() + 1,
                 value: observed[bad],
             });
         }
         let mut random = Pcg64::new(u128::from(simulation.seed), index as u128 + 1);
-        for value in &mut observed {
-            let normal: f64 = StandardNormal.sample(&mut random);
-            *value += noise_mm * normal;
-            if let Some(step) = session.resolution_mm {
-                *value = rounded(*value, step);
+        for values in observed.chunks_exact_mut(model.channels().len()) {
+            for (value, channel) in values.iter_mut().zip(model.channels()) {
+                let normal: f64 = StandardNormal.sample(&mut random);
+                let (noise, resolution) = match channel.is_angle() {
+                    true => (noise_mm / session.lever_mm, session.resolution_rad),
+                    false => (noise_mm, session.resolution_mm),
+                };
+                *value += noise * normal;
+                if let Some(step) = resolution {
+                    *value = rounded(*value, step);
+                }
             }
         }
         let states = tests[index].readings.as_deref().cloned().unwrap_or_default();
-        readings.push(Readings { observed, ..states });
+        let mut of_test = Readings { observed, ..states };
+        of_test.channels_to_columns(&open.machine, model.station());
+        readings.push(of_test);
     }
     let truth = parameters
         .list

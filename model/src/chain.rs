@@ -71,6 +71,23 @@ impl<S: Scalar> BodyErrors<S> {
     /// No errors.
     pub const NONE: BodyErrors<S> = BodyErrors { location: None, squareness: None, motion: None };
 
+    /// Whether no error of the axis turns its frame. A squareness error changes the direction of travel, not the frame.
+    pub fn turns_nothing(&self) -> bool {
+        self.location.is_none() && self.motion.is_none()
+    }
+
+    /// A direction turned from the moved side of an axis to its bed side.
+    pub(crate) fn turn(&self, axis: &Axis, position: &AxisPosition<S::Nominal>, direction: Point<S>) -> Point<S> {
+        let turned = if axis.kind == AxisKind::Rotary { axis.rotate(position.turn, direction) } else { direction };
+        [&self.motion, &self.location].into_iter().flatten().fold(turned, |turned, error| error.rotate(turned))
+    }
+
+    /// The inverse of [`BodyErrors::turn`] without errors.
+    pub(crate) fn turn_back(axis: &Axis, position: &AxisPosition<S::Nominal>, direction: Point<S>) -> Point<S> {
+        let back = SinCos { sin: -position.turn.sin, cos: position.turn.cos };
+        if axis.kind == AxisKind::Rotary { axis.rotate(back, direction) } else { direction }
+    }
+
     /// From location errors and error motions, each `[EX, EY, EZ, EA, EB, EC]` in mm and radians.
     pub fn new(kind: AxisKind, rotation: Rotation, location: Option<[S; 6]>, motion: Option<[S; 6]>) -> Self {
         let motion = motion.map(|six| SmallMotion::new(six, rotation));

@@ -180,6 +180,20 @@ pub fn cross<S: Scalar>(a: [S; 3], b: Point<S>) -> Point<S> {
     Point([b * z - c * y, c * x - a * z, a * y - b * x])
 }
 
+/// `a · b`.
+#[inline(always)]
+pub fn dot<S: Scalar>(a: Point<S>, b: Point<S>) -> S {
+    let ([a, b, c], [x, y, z]) = (a.0, b.0);
+    a * x + b * y + c * z
+}
+
+/// `a · d` with a nominal direction.
+#[inline(always)]
+pub fn dot_nominal<S: Scalar>(a: Point<S>, direction: [S::Nominal; 3]) -> S {
+    let ([a, b, c], [x, y, z]) = (a.0, direction);
+    a * x + b * y + c * z
+}
+
 /// `ω × d` with a nominal direction; zeros of `d` are skipped.
 #[inline(always)]
 pub(crate) fn cross_nominal<S: Scalar>(omega: [S; 3], direction: [f64; 3]) -> Point<S> {

@@ -30,7 +30,7 @@
 //!     let state: Vec<_> = machine.axes.iter().map(|axis| AxisPosition::new(axis.kind, at(&axis.name))).collect();
 //!     let slot = ErrorName::parse("EX0C").and_then(|name| machine.error_slot(&name));
 //!     let errors = machine.body_errors(|each| Some(each) == slot, |_| ex0c);
-//!     bar.read(machine, &state, &errors, |_| None).coordinates()[0]
+//!     bar.read(machine, &state, &errors, |_| None).channels()[0]
 //! }
 //!
 //! let machine = Machine::from_code("[wCAbYXZt]")?;
@@ -80,6 +80,7 @@ pub mod frames;
 pub mod instrument;
 pub mod pattern;
 pub mod replay;
+pub mod rotation_error;
 pub mod scalar;
 pub mod sensitivity;
 pub mod session;

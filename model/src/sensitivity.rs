@@ -15,6 +15,7 @@ use crate::chain::{AxisPosition, Machine};
 use crate::expression::{Arena, Operand, Symbol};
 use crate::frames::SinCos;
 use crate::instrument::Station;
+use crate::instrument::channel::Channel;
 use crate::replay::Replay;
 use crate::scalar::Nominal;
 use crate::session::readings::Readings;
@@ -55,9 +56,9 @@ impl SlotValues {
 pub struct Sensitivities {
     /// The slots in the requested order.
     pub slots: Vec<usize>,
-    /// The readings, mm: rows × coordinates, the coordinates of a reading together.
-    pub readings_mm: Vec<f64>,
-    /// For each slot, the derivative of each scalar reading: mm/mm or mm/rad.
+    /// The readings, mm or rad times the weights: rows × channels, the channels of a reading together.
+    pub readings: Vec<f64>,
+    /// For each slot, the derivative of each scalar reading: in mm or rad per mm or rad.
     pub derivatives: Vec<Vec<f64>>,
 }
 
@@ -124,6 +125,8 @@ pub struct TestModel {
     station: Station<f64>,
     axis_columns: Vec<AxisColumn>,
     rows: usize,
+    /// Factor on each channel.
+    weights: Vec<f64>,
     recorded: Arc<Mutex<HashMap<RecordingKey, Arc<Replay<Quantity>>>>>,
 }
 
@@ -133,7 +136,13 @@ impl TestModel {
         let machine = machine.into();
         let axes = machine.axes.iter().zip(&readings.positions);
         let axis_columns = axes.map(|(axis, positions)| AxisColumn::new(axis.kind, positions)).collect();
-        TestModel { machine, station, axis_columns, rows: readings.rows(), recorded: Arc::default() }
+        let weights = vec![1.0; station.channels().len()];
+        TestModel { machine, station, axis_columns, rows: readings.rows(), weights, recorded: Arc::default() }
+    }
+
+    /// The same with channels multiplied by weights, such that all have the same noise.
+    pub fn weighted(self, weights: Vec<f64>) -> Self {
+        TestModel { weights, recorded: Arc::default(), ..self }
     }
 
     /// The instrument as set up.
@@ -141,14 +150,19 @@ impl TestModel {
         &self.station
     }
 
+    /// Factor on each channel.
+    pub fn weights(&self) -> &[f64] {
+        &self.weights
+    }
+
     /// Number of readings.
     pub fn rows(&self) -> usize {
         self.rows
     }
 
-    /// Number of scalar coordinates of a reading.
-    pub fn coordinates(&self) -> usize {
-        self.station.kind().coordinates()
+    /// The channels of a reading.
+    pub fn channels(&self) -> &[Channel] {
+        self.station.channels()
     }
 
     /// Number of slots: the machine's errors, then the instrument's parameters.
@@ -175,7 +189,7 @@ impl TestModel {
         self.axis_columns.iter().map(|axis_column| axis_column.at(row)).collect()
     }
 
-    /// The recorded chain: the coordinates of the reading, then for each of them its derivatives by the requested
+    /// The recorded chain: the channels of the reading, then for each of them its derivatives by the requested
     /// slots.
     fn recording(&self, values: &SlotValues, derivatives: &[usize]) -> Arc<Replay<Quantity>> {
         let mut included: Vec<bool> = values.constant.iter().map(|value| *value != 0.0).collect();
@@ -225,10 +239,14 @@ impl TestModel {
         let first = self.machine.error_slots();
         let station = self.station.map(|number| constant(*number));
         let reading = station.read(&self.machine, &state, &bodies, |unknown| slots.get(&(first + unknown)).copied());
-        let coordinates: Vec<Operand> = reading.coordinates().iter().map(|value| value.operand()).collect();
+        let weighted = |(value, weight): (&Symbol<'_, Quantity>, &f64)| match *weight {
+            1.0 => value.operand(),
+            weight => (*value * constant(weight)).operand(),
+        };
+        let channels: Vec<Operand> = reading.channels().iter().zip(&self.weights).map(weighted).collect();
         let by: Vec<Operand> = key.derivatives.iter().map(|slot| slots[slot].operand()).collect();
-        let gradients = coordinates.iter().flat_map(|coordinate| arena.gradient(*coordinate, &by));
-        let outputs: Vec<Operand> = coordinates.iter().copied().chain(gradients).collect();
+        let gradients = channels.iter().flat_map(|channel| arena.gradient(*channel, &by));
+        let outputs: Vec<Operand> = channels.iter().copied().chain(gradients).collect();
         Replay::new(&arena, &outputs, |quantity| match quantity {
             Quantity::Slot { varies, .. } => *varies,
             Quantity::Position(_) | Quantity::Sine(_) | Quantity::Cosine(_) => true,
@@ -237,8 +255,8 @@ impl TestModel {
 
     /// Computes the readings of a range of rows and their derivatives by the slots, block by block, so that they need
     /// not be in memory together. `put` receives the index of an output, the first row of the block relative to the
-    /// start of the range, and one value per row. Outputs are the coordinates of the reading in mm, then for each
-    /// coordinate its derivatives by the slots.
+    /// start of the range, and one value per row. Outputs are the channels of the reading in mm or rad, then for
+    /// each channel its derivatives by the slots.
     pub fn sweep(
         &self,
         values: &SlotValues,
@@ -269,42 +287,42 @@ impl TestModel {
         );
     }
 
-    /// The readings, mm: rows × coordinates.
-    pub fn readings_mm(&self, values: &SlotValues) -> Vec<f64> {
-        let coordinates = self.coordinates();
-        let mut readings = vec![0.0; self.rows * coordinates];
-        self.sweep(values, &[], 0..self.rows, |coordinate, start, column| {
-            scatter(&mut readings, coordinates, coordinate, start, column);
+    /// The readings, mm or rad: rows × channels.
+    pub fn readings(&self, values: &SlotValues) -> Vec<f64> {
+        let channels = self.channels().len();
+        let mut readings = vec![0.0; self.rows * channels];
+        self.sweep(values, &[], 0..self.rows, |channel, start, column| {
+            scatter(&mut readings, channels, channel, start, column);
         });
         readings
     }
 
     /// The readings of a range of rows and their derivatives by `slots`.
     pub fn sensitivities(&self, values: &SlotValues, slots: &[usize], rows: Range<usize>) -> Sensitivities {
-        let coordinates = self.coordinates();
-        let scalars = rows.len() * coordinates;
+        let channels = self.channels().len();
+        let scalars = rows.len() * channels;
         let mut result = Sensitivities {
             slots: slots.to_vec(),
-            readings_mm: vec![0.0; scalars],
+            readings: vec![0.0; scalars],
             derivatives: vec![vec![0.0; scalars]; slots.len()],
         };
         self.sweep(values, slots, rows, |output, start, column| {
-            let (coordinate, into) = match output.checked_sub(coordinates) {
-                None => (output, &mut result.readings_mm),
+            let (channel, into) = match output.checked_sub(channels) {
+                None => (output, &mut result.readings),
                 Some(by) => (by / slots.len(), &mut result.derivatives[by % slots.len()]),
             };
-            scatter(into, coordinates, coordinate, start, column);
+            scatter(into, channels, channel, start, column);
         });
         result
     }
 }
 
-/// Writes one coordinate of consecutive readings; `into` is readings × coordinates.
-fn scatter(into: &mut [f64], coordinates: usize, coordinate: usize, start: usize, column: &[f64]) {
-    if coordinates == 1 {
+/// Writes one channel of consecutive readings; `into` is readings × channels.
+fn scatter(into: &mut [f64], channels: usize, channel: usize, start: usize, column: &[f64]) {
+    if channels == 1 {
         into[start..start + column.len()].copy_from_slice(column);
         return;
     }
-    let targets = into[start * coordinates + coordinate..].iter_mut().step_by(coordinates);
+    let targets = into[start * channels + channel..].iter_mut().step_by(channels);
     targets.zip(column).for_each(|(target, value)| *target = *value);
 }

@@ -62,7 +62,7 @@ fn the_ur10_session_reads() {
     assert_eq!(session.unknowns.len(), 36);
     let readings = session.tests[0].readings.as_ref().unwrap();
     assert_eq!(readings.rows(), 11911);
-    assert_eq!(readings.coordinates, 3);
+    assert_eq!(readings.channels, 3);
     assert_eq!(readings.observed[..3], [2361.9831, -1368.5474, 119.39713]);
     assert_eq!(readings.positions[1][1], -2.08493);
     assert!(session.tests[0].priors.iter().all(|prior| *prior == Prior::Free));

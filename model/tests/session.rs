@@ -30,7 +30,7 @@ fn nominal(session: &Session, test: &Test, readings: &Readings) -> Vec<f64> {
     (0..readings.rows())
         .map(|row| {
             readings.state(&session.machine, row, &mut state);
-            test.station.read::<f64>(&session.machine, &state, &none, |_| None).coordinates()[0]
+            test.station.read::<f64>(&session.machine, &state, &none, |_| None).channels()[0]
         })
         .collect()
 }

@@ -118,7 +118,7 @@ fn unpickled_test(declared: &[Test], pickled: &Bound<'_, PyDict>, axes: usize) -
         time_s: numbers(&item("time_s")?)?,
         drivers: drivers.collect::<PyResult<_>>()?,
         positions,
-        coordinates: test.station.kind().coordinates(),
+        channels: test.station.channels().len(),
         observed: numbers(&item("observed")?)?,
         // Whole tests: nothing comes before or after them.
         ..Readings::default()
@@ -127,7 +127,7 @@ fn unpickled_test(declared: &[Test], pickled: &Bound<'_, PyDict>, axes: usize) -
     let fits = |length: usize| length == 0 || length == rows;
     let whole = readings.positions.len() == axes
         && readings.positions.iter().all(|column| column.len() == rows)
-        && readings.observed.len() == rows * readings.coordinates
+        && readings.observed.len() == rows * readings.channels
         && [readings.run.len(), readings.time_s.len()].into_iter().all(fits)
         && readings.drivers.values().all(|values| values.len() == rows);
     if !whole {

@@ -7,10 +7,10 @@ use std::sync::{Arc, Mutex, PoisonError, RwLock};
 use abbe::document::Origin;
 use abbe::identify::noise::{Noise, NoiseSource};
 use abbe::identify::plan::states;
-use abbe::identify::problem::Problem;
+use abbe::identify::problem::{Problem, RowBlock};
 use abbe::identify::quantity::Given;
 use abbe::identify::simulate::{Simulation, simulate};
-use abbe::identify::unit::Unit;
+use abbe::identify::unit::{ARCSEC, Unit};
 use abbe::model::component::ErrorName;
 use abbe::model::document::edit::SessionText;
 use abbe::model::document::node::Node;
@@ -20,6 +20,8 @@ use abbe::model::effect::Component;
 use abbe::model::files::read::{add_node, plan_of_node};
 use abbe::model::files::table::memory::MemoryColumn;
 use abbe::model::files::{self, Changes, ReadOptions, SourceMap};
+use abbe::model::instrument::channel::labels;
+use abbe::model::sensitivity::TestModel;
 use abbe::model::session::{self as domain, Prior};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
@@ -174,12 +176,11 @@ impl Session {
         self.state().sources.text.clone()
     }
 
-    /// Name, number of readings (0 for a plan) and number of coordinates of each test.
+    /// Name, number of readings (0 for a plan) and number of channels of each test.
     fn tests(&self) -> Vec<(String, usize, usize)> {
         let state = self.state();
-        let coordinates = state.session.instrument.coordinates();
         let rows = |test: &domain::Test| test.readings.as_ref().map_or(0, |readings| readings.rows());
-        state.session.tests.iter().map(|test| (test.name.clone(), rows(test), coordinates)).collect()
+        state.session.tests.iter().map(|test| (test.name.clone(), rows(test), test.station.channels().len())).collect()
     }
 
     /// The columns of a test by their names in a data file.
@@ -203,12 +204,15 @@ impl Session {
             let display = positions.iter().map(|position| axis.kind.to_display(*position));
             columns.set_item(axis.column(""), PyArray1::from_vec(py, display.collect()))?;
         }
-        let coordinates = readings.coordinates;
-        let names: &[&str] =
-            if coordinates == 1 { &["reading_mm"] } else { &["x_reading_mm", "y_reading_mm", "z_reading_mm"] };
-        for (first, name) in names.iter().enumerate() {
-            let observed = readings.observed.iter().skip(first).step_by(coordinates).copied();
-            columns.set_item(name, PyArray1::from_vec(py, observed.collect()))?;
+        let channels = found.station.channels();
+        for (first, (channel, label)) in channels.iter().zip(labels(channels)).enumerate() {
+            let (unit, per_internal) = if channel.is_angle() { ("arcsec", ARCSEC) } else { ("mm", 1.0) };
+            let name = match label {
+                "" => format!("reading_{unit}"),
+                label => format!("{label}_reading_{unit}"),
+            };
+            let observed = readings.observed.iter().skip(first).step_by(channels.len());
+            columns.set_item(name, PyArray1::from_vec(py, observed.map(|value| value * per_internal).collect()))?;
         }
         Ok(columns)
     }
@@ -228,25 +232,29 @@ impl Session {
         Ok(problem.parameters.list.iter().map(row).collect())
     }
 
-    /// The readings, mm, test by test and row by row.
+    /// The readings, mm or rad, test by test and row by row.
     fn observed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let state = self.state();
         let observed = work::at_once(py, || {
             let problem = state.problem()?;
-            let readings = problem.tests.iter().filter_map(|test| test.readings.as_ref());
-            Ok(readings.flat_map(|readings| readings.observed.iter().copied()).collect::<Vec<f64>>())
+            let readings = problem.tests.iter().zip(&problem.models).filter_map(|(test, model)| {
+                let observed = test.readings.as_ref()?.observed.clone();
+                Some(unweighted(model, observed))
+            });
+            Ok(readings.flatten().collect::<Vec<f64>>())
         })?;
         Ok(observed.into_pyarray(py))
     }
 
-    /// The readings of the model, mm, at parameters in display units.
+    /// The readings of the model, mm or rad, at parameters in display units.
     fn predict<'py>(&self, py: Python<'py>, parameters: Vec<f64>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let state = self.state();
         let readings = work::at_once(py, || {
             let problem = state.problem()?;
             let values = problem.slot_values(&internal(&problem, &parameters)?);
             let models = problem.models.par_iter().zip(&values);
-            let readings: Vec<Vec<f64>> = models.map(|(model, values)| model.readings_mm(values)).collect();
+            let readings: Vec<Vec<f64>> =
+                models.map(|(model, values)| unweighted(model, model.readings(values))).collect();
             // Of one test, nothing is copied.
             Ok(match <[Vec<f64>; 1]>::try_from(readings) {
                 Ok([one]) => one,
@@ -333,29 +341,41 @@ fn internal(problem: &Problem, display: &[f64]) -> Result<Vec<f64>, Failed> {
     Ok(list.iter().zip(display).map(|(parameter, value)| value / parameter.unit.display_per_internal).collect())
 }
 
-/// The derivatives of all readings in mm by all parameters in display units, row by row.
+/// The readings of a test, mm or rad, from those in which all channels have the same noise.
+fn unweighted(model: &TestModel, mut readings: Vec<f64>) -> Vec<f64> {
+    let weights = model.weights();
+    if weights.iter().any(|weight| *weight != 1.0) {
+        for of_row in readings.chunks_exact_mut(weights.len()) {
+            of_row.iter_mut().zip(weights).for_each(|(value, weight)| *value /= weight);
+        }
+    }
+    readings
+}
+
+/// The derivatives of all readings in mm or rad by all parameters in display units, row by row.
 fn jacobian(problem: &Problem, beta: &[f64]) -> Result<Vec<f64>, Failed> {
     let width = beta.len();
     let scale: Vec<f64> =
         problem.parameters.list.iter().map(|parameter| 1.0 / parameter.unit.display_per_internal).collect();
     let values = problem.slot_values(beta);
     let blocks = problem.blocks();
-    let coordinates = problem.coordinates();
-    let scalars: usize = blocks.iter().map(|block| block.rows.len() * coordinates).sum();
+    let scalars_of = |block: &RowBlock| block.rows.len() * problem.channels(block.test);
+    let scalars: usize = blocks.iter().map(scalars_of).sum();
     let mut matrix = vec![0.0; scalars * width];
     let mut rest = matrix.as_mut_slice();
     let mut parts = Vec::with_capacity(blocks.len());
     for block in &blocks {
-        let (part, after) = rest.split_at_mut(block.rows.len() * coordinates * width);
+        let (part, after) = rest.split_at_mut(scalars_of(block) * width);
         parts.push((block, part));
         rest = after;
     }
     parts.into_par_iter().try_for_each(|(block, part)| {
         let rows = problem.own_rows(&values[block.test], block)?;
         let own = problem.own_parameters(block.test);
+        let weights = problem.models[block.test].weights();
         for (row, to) in part.chunks_exact_mut(width).enumerate() {
             for (place, parameter) in own.iter().enumerate() {
-                to[*parameter] = rows[(row, place)] * scale[*parameter];
+                to[*parameter] = rows[(row, place)] * scale[*parameter] / weights[row % weights.len()];
             }
         }
         Ok::<(), Failed>(())

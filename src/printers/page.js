@@ -32,9 +32,10 @@
         for (let i = 0; i < whole.length; i++) whole[i] -= fraction * share[i];
       });
     }
-    if (data.coordinates === 1) return whole;
+    const channels = whole.length / traversal.n;
+    if (channels === 1) return whole;
     const lengths = new Float64Array(traversal.n);
-    for (let i = 0; i < traversal.n; i++) lengths[i] = Math.hypot(whole[3 * i], whole[3 * i + 1], whole[3 * i + 2]);
+    for (let i = 0; i < traversal.n; i++) lengths[i] = Math.hypot(...whole.subarray(channels * i, channels * (i + 1)));
     return lengths;
   };
   const roundUp = (value) => {
@@ -201,7 +202,7 @@
     const keys = Object.keys(s.abscissa);
     const unit = plot.test.units[Math.max(0, keys.indexOf(plot.interaction.abscissa))];
     lines.push(`${abscissaName} ${c.abscissa[i].toFixed(2)} ${unit}`, `${c.name} ${formatted(c.values[i], 0.01)} µm`);
-    for (const name of ["before", "after"]) if (name !== c.name) lines.push(`residual ${name} ${formatted(values(s, name)[i], 0.01)} µm`);
+    for (const name of ["before", "after"]) if (name !== c.name) lines.push(`residual ${name} ${formatted(values(s, name)[i], 0.01)} ${data.unit}`);
     if (s.line) lines.push(`line ${Math.round(column(s, "line")[i])} of its file`);
     tip.textContent = lines.join("\n");
     tip.hidden = false;

@@ -1,6 +1,7 @@
 //! The change of the readings by each error alone.
 
 use abbe::identify::patterns::{Pattern, Patterns};
+use abbe::model::instrument::channel::labels;
 use abbe::model::session::Session;
 
 use super::block::Report;
@@ -32,16 +33,17 @@ pub fn readings(found: &Patterns, session: &Session) -> Table {
     let axes = &session.machine.axes;
     let mut columns: Vec<Column> = ["test", "error", "size", "unit", "run"].map(words).into();
     columns.extend(axes.iter().map(|axis| numbers(axis.column(""))));
-    match session.instrument.coordinates() {
-        1 => columns.push(numbers("deviation_um")),
-        _ => columns.extend(["x", "y", "z"].map(|k| numbers(format!("deviation_{k}_um")))),
-    }
+    let channels = session.tests.first().map_or(&[][..], |test| test.station.channels());
+    columns.extend(labels(channels).into_iter().map(|label| match label {
+        "" => numbers("deviation_um"),
+        label => numbers(format!("deviation_{label}_um")),
+    }));
     let mut rows = Vec::new();
     for pattern in &found.patterns {
         let Some((name, states)) = found.tests.iter().find(|(name, _)| *name == pattern.test) else {
             continue;
         };
-        for (row, deviations) in pattern.deviations_um.chunks(states.coordinates.max(1)).enumerate() {
+        for (row, deviations) in pattern.deviations_um.chunks(states.channels.max(1)).enumerate() {
             let run = states.run.get(row).map_or(String::new(), ToString::to_string);
             let mut cells = cells![name, &pattern.error, Cell::exact(pattern.size), &pattern.unit, run];
             // Rounded to 1e-9 to omit rounding errors of the last digits.

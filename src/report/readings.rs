@@ -4,6 +4,8 @@ use abbe::identify::IdentifyError;
 use abbe::identify::directions::{DirectionFrame, views};
 use abbe::identify::fit::Fit;
 use abbe::identify::problem::Problem;
+use abbe::identify::unit::Unit;
+use abbe::model::instrument::channel;
 use abbe::model::session::readings::Readings;
 
 use super::table::{Cell, Column, Table, cells, numbers, words};
@@ -27,29 +29,55 @@ fn axes<'r>(problem: &'r Problem) -> impl Iterator<Item = Column> + 'r {
     problem.session.machine.axes.iter().map(|axis| numbers(axis.column("")))
 }
 
-/// Reading, residual in µm and over the noise standard deviation, and whether the reading counts or is an outlier.
+/// The channels of all tests, each once: their names in columns, and the units of reading and residual.
+fn labels(problem: &Problem) -> Vec<(String, [&'static str; 2])> {
+    let mut labels: Vec<(String, [&'static str; 2])> = Vec::new();
+    for model in &problem.models {
+        for (channel, label) in model.channels().iter().zip(channel::labels(model.channels())) {
+            let name = if label.is_empty() { String::new() } else { format!("_{label}") };
+            if labels.iter().all(|(known, _)| *known != name) {
+                labels.push((name, if channel.is_angle() { ["arcsec"; 2] } else { ["mm", "um"] }));
+            }
+        }
+    }
+    labels
+}
+
+/// Reading, residual and residual over the noise standard deviation, and whether the reading counts or is an outlier.
 pub fn residuals(problem: &Problem, fit: &Fit) -> Table {
-    let coordinates = problem.coordinates();
-    let labels: &[&str] = if coordinates == 3 { &["_x", "_y", "_z"] } else { &[""] };
+    let labels = labels(problem);
     let mut columns: Vec<Column> = ["test", "run", "line"].map(words).into();
     columns.extend(axes(problem));
-    columns.extend(labels.iter().map(|label| numbers(format!("reading{label}_mm"))));
-    columns.extend(labels.iter().map(|label| numbers(format!("residual{label}_um"))));
-    columns.extend(labels.iter().map(|label| numbers(format!("standardised_residual{label}"))));
+    columns.extend(labels.iter().map(|(label, [unit, _])| numbers(format!("reading{label}_{unit}"))));
+    columns.extend(labels.iter().map(|(label, [_, unit])| numbers(format!("residual{label}_{unit}"))));
+    columns.extend(labels.iter().map(|(label, _)| numbers(format!("standardised_residual{label}"))));
     columns.push(words("counts"));
     let mut rows = Vec::new();
     for (number, test) in problem.tests.iter().enumerate() {
         let Some(readings) = &test.readings else { continue };
+        let model = &problem.models[number];
+        let channels = model.channels();
+        // The column of each channel of this test.
+        let own = channel::labels(channels);
+        let place = |column: usize| own.iter().position(|label| *label == labels[column].0.trim_start_matches('_'));
+        let places: Vec<Option<usize>> = (0..labels.len()).map(place).collect();
         for row in 0..readings.rows() {
-            let own = row * coordinates..(row + 1) * coordinates;
             let mut cells = start(&test.name, readings, row);
             cells.push(readings.line(row).map_or(String::new(), |line| line.to_string()).into());
             cells.extend(positions(problem, readings, row));
-            let observed = own.clone().map(|k| readings.observed.get(k));
-            cells.extend(observed.map(|mm| mm.map_or("".into(), |mm| Cell::fixed(*mm, 6))));
-            let residuals = &fit.residuals[number][own];
-            cells.extend(residuals.iter().map(|mm| Cell::fixed(mm * 1e3, 4)));
-            cells.extend(residuals.iter().map(|mm| Cell::fixed(mm / problem.noise.sigma_mm, 4)));
+            let mut column = |value: &dyn Fn(usize, usize) -> Option<f64>, places_of_decimals: usize| {
+                cells.extend(places.iter().map(|place| {
+                    let found = place.and_then(|channel| value(row * channels.len() + channel, channel));
+                    found.map_or("".into(), |value| Cell::fixed(value, places_of_decimals))
+                }));
+            };
+            let display = |channel: usize| Unit::of(channels[channel].unit).display_per_internal;
+            let read = |k: usize| readings.observed.get(k).copied().filter(|value| !value.is_nan());
+            let unit = |channel: usize| if channels[channel].is_angle() { display(channel) } else { 1.0 };
+            column(&|k, channel| Some(read(k)? / model.weights()[channel] * unit(channel)), 6);
+            let residual = |k: usize| read(k).map(|_| fit.residuals[number][k]);
+            column(&|k, channel| Some(residual(k)? / model.weights()[channel] * display(channel)), 4);
+            column(&|k, _| Some(residual(k)? / problem.noise.sigma_mm), 4);
             cells.push(if problem.rejected[number][row] { "outlier" } else { "yes" }.into());
             rows.push(cells);
         }

@@ -65,7 +65,7 @@ fn coverage(validation: &Validation) -> Figure {
     let share = |test: usize| {
         let rows = validation.residuals[test].iter().zip(&validation.predicted_mm[test]).enumerate();
         let kept: Vec<bool> = rows
-            .filter(|(i, _)| !validation.rejected[test][i / validation.coordinates])
+            .filter(|(i, _)| !validation.rejected[test][i / validation.channels[test]])
             .map(|(_, (residual, deviation))| residual.abs() <= INTERVAL * deviation)
             .collect();
         100.0 * kept.iter().filter(|inside| **inside).count() as f64 / kept.len().max(1) as f64
@@ -81,10 +81,10 @@ fn residuals(validation: &Validation, test: usize) -> Figure {
     let count = validation.residuals[test].len();
     let step = count.div_ceil(MAX_POINTS).max(1);
     let points = |value: &dyn Fn(usize) -> f64| -> Vec<(f64, f64)> {
-        (0..count).step_by(step).map(|i| ((i / validation.coordinates + 1) as f64, value(i))).collect()
+        (0..count).step_by(step).map(|i| ((i / validation.channels[test] + 1) as f64, value(i))).collect()
     };
     // The interval of the first coordinate of a reading, so that its line is smooth.
-    let end = |i: usize| INTERVAL * validation.predicted_mm[test][i - i % validation.coordinates] * 1e3;
+    let end = |i: usize| INTERVAL * validation.predicted_mm[test][i - i % validation.channels[test]] * 1e3;
     let nominal = points(&|i| validation.residuals_nominal[test][i] * 1e3);
     let series = vec![
         Series::new("nominal machine", "before", Mark::Dots, nominal),
@@ -93,7 +93,7 @@ fn residuals(validation: &Validation, test: usize) -> Figure {
         Series::new("95 % interval, lower end", "after", Mark::Line, points(&|i| -end(i))),
     ];
     let [low, high] = span(series.iter().flat_map(|series| series.points.iter().map(|point| point.1)));
-    let last = (count / validation.coordinates).max(2) as f64;
+    let last = (count / validation.channels[test]).max(2) as f64;
     let name = &validation.tests[test];
     let x = Axis::new("reading", "", Scale::rounded([1.0, last], 6));
     let y = Axis::new("residual", "um", Scale::rounded([low.min(0.0), high.max(0.0)], 6));

@@ -91,7 +91,7 @@ fn predicted_uncertainties_are_those_of_simulated_readings() {
     for _ in 0..DRAWS {
         let mut noise = || -> f64 { StandardNormal.sample(&mut random) };
         let observed = nominal.iter().map(|mm| mm + NOISE_MM * noise()).collect();
-        let readings = Readings { positions: positions.clone(), coordinates: 3, observed, ..Readings::default() };
+        let readings = Readings { positions: positions.clone(), channels: 3, observed, ..Readings::default() };
         let (problem, fitted) = fit::prepare(&session.clone().with_readings([readings]), 1).unwrap();
         let parameters = fit::parameters(&problem, &fitted);
         for (square, error) in squares.iter_mut().zip(&found.uncertainties) {

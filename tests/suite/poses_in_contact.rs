@@ -180,7 +180,7 @@ fn socket_uncertainties_are_those_of_simulated_poses() {
             let poses: Vec<Vec<f64>> = own.map(noisy).collect();
             Readings {
                 positions: (0..7).map(|axis| poses.iter().map(|pose| pose[axis]).collect()).collect(),
-                coordinates: 3,
+                channels: 3,
                 observed: vec![0.0; 3 * poses.len()],
                 ..Readings::default()
             }
@@ -252,7 +252,7 @@ fn probe_uncertainties_are_those_of_simulated_readings() {
     for _ in 0..DRAWS {
         let mut noise = || -> f64 { StandardNormal.sample(&mut random) };
         let observed = found.poses.iter().map(|_| NOISE_MM * noise()).collect();
-        let readings = Readings { positions: positions.clone(), coordinates: 1, observed, ..Readings::default() };
+        let readings = Readings { positions: positions.clone(), channels: 1, observed, ..Readings::default() };
         add_squares(session.clone().with_readings([readings]), &found, &mut squares);
     }
     assert_predicted(&squares, &found);

@@ -74,7 +74,7 @@ fn session(drawn: &Drawn, balls: &[([f64; 3], [f64; 3])], bar: bool, seed: u64) 
                     AxisKind::Rotary => column(3.0, &mut random),
                 })
                 .collect(),
-            coordinates: station.kind().coordinates(),
+            channels: station.channels().len(),
             ..Readings::default()
         };
         let model = TestModel::new(Arc::new(machine.clone()), station.clone(), &readings);
@@ -83,7 +83,7 @@ fn session(drawn: &Drawn, balls: &[([f64; 3], [f64; 3])], bar: bool, seed: u64) 
         for (slot, error) in drawn.errors.iter().enumerate().filter(|(slot, _)| slot % 12 < 6) {
             values.constant[slot] = 0.1 * error;
         }
-        readings.observed = model.readings_mm(&values);
+        readings.observed = model.readings(&values);
         for value in &mut readings.observed {
             *value += NOISE_MM * random.sample::<f64, _>(StandardNormal);
         }

@@ -63,8 +63,7 @@ fn the_sensitivities_of_an_r_test_are_those_of_each_coordinate() {
     let beta = vec![0.0; problem.parameters.list.len()];
     let found = sensitivities::sensitivities(&problem, &beta).unwrap();
     for (coordinate, wanted) in [("dx", (|c: f64| -c.cos()) as fn(f64) -> f64), ("dy", |c| c.sin())] {
-        let of =
-            |test: &&sensitivities::TestSensitivities| test.test == "C-alone" && test.coordinate == Some(coordinate);
+        let of = |test: &&sensitivities::TestSensitivities| test.test == "C-alone" && test.channel == Some(coordinate);
         let test = found.iter().find(of).unwrap();
         let own = test.columns.iter().find(|column| column.id == "EX0C").unwrap();
         for (angle, value) in test.way.values.iter().zip(&own.values) {
@@ -72,7 +71,7 @@ fn the_sensitivities_of_an_r_test_are_those_of_each_coordinate() {
             assert!((value - wanted).abs() < 1e-9, "{coordinate} at {angle}: {value} {wanted}");
         }
     }
-    let vertical = |test: &&sensitivities::TestSensitivities| test.test == "C-alone" && test.coordinate == Some("dz");
+    let vertical = |test: &&sensitivities::TestSensitivities| test.test == "C-alone" && test.channel == Some("dz");
     let vertical = found.iter().find(vertical).unwrap();
     assert!(vertical.columns.iter().all(|column| column.id != "EX0C"));
 }

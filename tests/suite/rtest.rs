@@ -167,7 +167,7 @@ fn both_settings_agree_with_the_plant() {
             ..Readings::default()
         };
         let model = TestModel::new(Arc::new(machine.clone()), station, &readings);
-        let found = model.readings_mm(&slots);
+        let found = model.readings(&slots);
         near([found[0], found[1], found[2]], expected, 1e-10);
     }
 }
@@ -231,7 +231,7 @@ fn linear_axes_that_follow_keep_the_ball_in_the_nest() {
                 .count();
             assert_eq!(moving, if test.name == "C-alone" { 0 } else { 2 }, "{}", test.name);
             let model = TestModel::new(session.machine.clone(), test.station.clone(), &planned);
-            let nominal = model.readings_mm(&SlotValues::zero(model.slots()));
+            let nominal = model.readings(&SlotValues::zero(model.slots()));
             assert!(nominal.iter().all(|reading| reading.abs() < 1e-9), "{}", test.name);
         }
     }

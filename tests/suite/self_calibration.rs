@@ -218,7 +218,7 @@ fn a_declared_direction_is_the_one_that_is_probed_along() {
     let along = -0.8 * from[0] + 0.6 * from[1];
     let beside = 0.6 * from[0] + 0.8 * from[1];
     let expected = -along - (45.0_f64.powi(2) - beside * beside).sqrt();
-    let found = model.readings_mm(&values)[0];
+    let found = model.readings(&values)[0];
     assert!((found - expected).abs() < 1e-11, "{found} {expected}");
 }
 

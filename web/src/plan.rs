@@ -76,7 +76,7 @@ impl Plan {
             };
             let moved = moved_axes(machine, test);
             let readings = test.readings.as_ref().map_or(0, |readings| readings.rows());
-            let coordinates = test.station.coordinate_names();
+            let channels: Vec<&str> = test.station.channels().iter().map(|channel| channel.name).collect();
             let moves: Vec<&str> = moved.iter().map(|axis| machine.axes[*axis].name.as_str()).collect();
             json!({
                 "name": test.name,
@@ -85,7 +85,7 @@ impl Plan {
                 "table_point_mm": test.station.table_point_mm(),
                 "tool_point_mm": test.station.tool_point_mm(),
                 "moves": moves,
-                "coordinates": &coordinates[..test.station.kind().coordinates()],
+                "coordinates": channels,
                 "readings": readings,
                 "table_path_mm": path.workpiece_mm,
                 "tool_path_mm": path.tool_mm,
@@ -221,6 +221,6 @@ impl Plan {
     /// The readings at these parameters, mm, by test.
     fn readings(&self, values: &[f64]) -> Vec<Vec<f64>> {
         let values = self.problem.slot_values(&self.internal(values));
-        self.problem.models.iter().zip(&values).map(|(model, values)| model.readings_mm(values)).collect()
+        self.problem.models.iter().zip(&values).map(|(model, values)| model.readings(values)).collect()
     }
 }

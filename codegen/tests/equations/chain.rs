@@ -40,7 +40,7 @@ fn the_symbolic_chain_evaluates_to_the_chain_over_numbers() {
             let slot = |slot| errors.iter().position(|e| machine.error_slot(e) == Some(slot));
             let bodies = machine.body_errors(|s| slot(s).is_some(), |s| slot(s).map_or(0.0, |i| values[i]));
             let expected = Station::BallBar(bar).read::<f64>(&machine, &state, &bodies, |_| None);
-            let expected = expected.coordinates()[0];
+            let expected = expected.channels()[0];
             let found = evaluate_f64(&equation.arena, &equation.exact, |variable| match variable {
                 Variable::Length(name) => match name.as_str() {
                     "R" => r,

@@ -143,7 +143,7 @@ fn case(what: What, machine: &Machine, errors: &[ErrorName], random: &mut impl r
             What::Bar => {
                 let l = |i: usize| lengths[i];
                 let bar = BallBar { workpiece_ball: [l(0), l(1), l(2)], spindle_ball: [l(3), l(4), l(5)], bar: 100.0 };
-                Station::BallBar(bar).read(machine, &state, &bodies, |_| None).coordinates().to_vec()
+                Station::BallBar(bar).read(machine, &state, &bodies, |_| None).channels().to_vec()
             }
             What::Volumetric => {
                 let none = machine.body_errors::<Pack>(|_| false, |_| Pack::from_re(0.0));

@@ -106,7 +106,7 @@ impl Path {
         };
         debug_assert_eq!(test.station.kind(), InstrumentKind::BallBar);
         let model = TestModel::new(Arc::clone(machine), test.station.clone(), readings);
-        let nominal_mm = model.readings_mm(&SlotValues::zero(model.slots()));
+        let nominal_mm = model.readings(&SlotValues::zero(model.slots()));
         let moves = moves(machine, &readings.positions, &nominal_mm)?;
         let mut angle = match moves {
             MovingAxes::Rotary(axis) => readings.positions[axis].clone(),

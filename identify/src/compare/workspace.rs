@@ -113,7 +113,7 @@ fn grid(ranges: &[[f64; 2]], places: usize) -> Readings {
         positions = positions.iter().flat_map(longer).collect();
     }
     let columns = (0..ranges.len()).map(|axis| positions.iter().map(|row| row[axis]).collect()).collect();
-    Readings { positions: columns, coordinates: 1, ..Readings::default() }
+    Readings { positions: columns, channels: 1, ..Readings::default() }
 }
 
 fn of_model(

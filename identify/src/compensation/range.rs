@@ -42,9 +42,9 @@ pub(super) fn observed_range(problem: &Problem, error: &ErrorName, axis: usize) 
             let values = SlotValues::zero(model.slots());
             let found = model.sensitivities(&values, &[slot], 0..model.rows());
             let derivatives = found.derivatives.first().map_or(&[][..], Vec::as_slice);
-            let coordinates = model.coordinates().max(1);
+            let channels = model.channels().len().max(1);
             let length = |of_row: &[f64]| of_row.iter().map(|d| d * d).sum::<f64>().sqrt();
-            derivatives.chunks(coordinates).map(length).collect()
+            derivatives.chunks(channels).map(length).collect()
         })
         .collect();
     let best = sensitivity.iter().flatten().copied().fold(0.0, f64::max);

@@ -74,7 +74,7 @@ fn effect(id: &str, driver: Driver, shape: Shape, coefficients: &[f64]) -> Estim
 }
 
 fn readings(positions: Vec<Vec<f64>>) -> Readings {
-    Readings { positions, coordinates: 1, ..Readings::default() }
+    Readings { positions, channels: 1, ..Readings::default() }
 }
 
 fn uniform(random: &mut impl Rng, low: f64, high: f64) -> f64 {

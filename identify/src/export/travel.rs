@@ -57,7 +57,7 @@ impl Travel {
         // A grid has neither time nor driver columns: the reference values stand for them.
         let readings = Readings {
             positions: columns,
-            coordinates: 1,
+            channels: 1,
             time_s: vec![model.reference.time_s; rows],
             drivers: model.reference.means.iter().map(|(name, mean)| (name.clone(), vec![*mean; rows])).collect(),
             ..Readings::default()

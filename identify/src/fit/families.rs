@@ -162,9 +162,10 @@ impl FoldEquations {
             (rows, y)
         };
         let mut readings = vec![0.0; triangles.len()];
-        for (fold_of, rejected) in problem.folds.of_row.iter().zip(&problem.rejected) {
-            for (fold, _) in fold_of.iter().zip(rejected).filter(|(_, rejected)| !**rejected) {
-                readings[*fold] += problem.coordinates() as f64;
+        for (test, fold_of) in problem.folds.of_row.iter().enumerate() {
+            let channels = problem.channels(test);
+            for i in (0..fold_of.len() * channels).filter(|i| problem.counts(test, *i)) {
+                readings[fold_of[i / channels]] += 1.0;
             }
         }
         let folds: Vec<FoldRows> = parallel::map(triangles.len(), &|k| {

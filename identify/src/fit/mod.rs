@@ -183,9 +183,8 @@ fn finish(problem: &Problem, minimum: Minimum) -> Result<Fit, IdentifyError> {
     let (penalised, of_priors) = (whole.sum_of_squares(), problem.prior_triangle(&beta).sum_of_squares());
     let chi_square = penalised + (problem.noise.inflation - 1.0) * (penalised - of_priors);
     // Each prior counts as an observation in χ².
-    let degrees_of_freedom = (problem.readings() * problem.coordinates() + problem.prior_rows())
-        .saturating_sub(rank.identifiable_basis.ncols())
-        .max(1);
+    let degrees_of_freedom =
+        (problem.scalars() + problem.prior_rows()).saturating_sub(rank.identifiable_basis.ncols()).max(1);
     let free = degrees_of_freedom as f64;
     let p_value = residual_tail(chi_square, free, freedom_of_noise(problem, &residuals));
     let birge_ratio = (chi_square / free).sqrt();

@@ -39,8 +39,8 @@ pub fn prepare(session: &Session, seed: u64) -> Result<(Problem, Fit), IdentifyE
 /// # Errors
 /// See [`prepare`].
 pub(crate) fn prepare_with(session: &Session, effects: &[Effect], seed: u64) -> Result<(Problem, Fit), IdentifyError> {
-    let stated = session.noise_mm.filter(|sigma| *sigma > 0.0);
-    let floor = session.resolution_mm.unwrap_or(0.0) / 12.0_f64.sqrt();
+    let stated = session.stated_noise_mm();
+    let floor = session.resolution_noise_mm();
     let first = match stated {
         Some(sigma) => Noise::white(sigma, NoiseSource::Stated),
         None => Noise::white(START_NOISE_MM.max(floor), NoiseSource::Residual),
@@ -117,7 +117,7 @@ fn nominal_residual_mm(problem: &Problem) -> Result<f64, IdentifyError> {
         Some(setup) => r[(i, *setup)],
         None => c[i],
     });
-    let count = (problem.readings() * problem.coordinates()) as f64;
+    let count = problem.scalars() as f64;
     let sum_of_squares = Triangle::of(rows).parts().2 + rest;
     Ok((sum_of_squares / count.max(1.0)).sqrt() * problem.noise.sigma_mm)
 }
@@ -127,7 +127,7 @@ fn estimated_noise(problem: &Problem, fit: &Fit, floor: f64) -> Noise {
     if let Some(sigma) = pure.sigma_mm() {
         return Noise::white(sigma.max(floor).max(MIN_NOISE_MM), NoiseSource::Repeats);
     }
-    let count = (problem.readings() * problem.coordinates()) as f64;
+    let count = problem.scalars() as f64;
     let freedom = (count - fit.rank.identifiable_basis.ncols() as f64).max(1.0);
     let sigma = rms_mm(problem, &fit.residuals) * (count / freedom).sqrt();
     Noise::white(sigma.max(floor).max(MIN_NOISE_MM), NoiseSource::Residual)

@@ -23,10 +23,10 @@ use crate::tolerance::conformity;
 /// # Errors
 /// If the model cannot be evaluated for the cross-validation.
 pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> {
-    let three = problem.coordinates() == 3;
+    let vectors = problem.are_vectors();
     let rms = rms_mm(problem, &fit.residuals);
     let held = fit.held_out.rms_mm;
-    let in_3d = |rms: f64| three.then(|| rms * 3.0_f64.sqrt() * 1e3);
+    let in_3d = |rms: f64| vectors.then(|| rms * 3.0_f64.sqrt() * 1e3);
     let plausibility = plausibility::examine(problem, fit);
     let mut warnings = problem.session.warnings.clone();
     warnings.extend(plausibility::warnings(&plausibility));
@@ -189,13 +189,12 @@ pub fn unobservable(problem: &Problem, rank: &Rank) -> Vec<Unobservable> {
 
 /// The excluded outliers, by test, file and line.
 pub fn outliers(problem: &Problem, fit: &Fit) -> Vec<Outlier> {
-    let coordinates = problem.coordinates();
     let mut list = Vec::new();
     for (number, test) in problem.tests.iter().enumerate() {
         let Some(readings) = &test.readings else { continue };
-        let origin = readings.origin.as_ref();
+        let (origin, channels) = (readings.origin.as_ref(), problem.channels(number));
         for row in (0..readings.rows()).filter(|row| problem.rejected[number][*row]) {
-            let residual = &fit.residuals[number][row * coordinates..(row + 1) * coordinates];
+            let residual = &fit.residuals[number][row * channels..(row + 1) * channels];
             list.push(Outlier {
                 test: test.name.clone(),
                 file: origin.map_or(String::new(), |origin| origin.file.display().to_string()),

@@ -193,7 +193,7 @@ fn observed<'p>(problem: &'p Problem) -> Vec<&'p [f64]> {
 fn readings(problem: &Problem, beta: &[f64]) -> Vec<Vec<f64>> {
     let values = problem.slot_values(beta);
     let models = problem.models.iter().zip(&values);
-    models.map(|(model, values)| model.readings_mm(values)).collect()
+    models.map(|(model, values)| model.readings(values)).collect()
 }
 
 /// The parameters of the full fit to other readings of the same tests.

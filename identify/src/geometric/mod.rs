@@ -216,7 +216,7 @@ fn sensitivities(problem: &Problem, tests: &[usize], geometries: &[CircleGeometr
     let nominal = problem.slot_values(&vec![0.0; parameters]);
     let mut sensitivities = Mat::zeros(2 * tests.len(), parameters);
     for (k, (test, geometry)) in tests.iter().zip(geometries).enumerate() {
-        let lengths = problem.models[*test].readings_mm(&nominal[*test]);
+        let lengths = problem.models[*test].readings(&nominal[*test]);
         let centre = geometry.centre(&lengths, &problem.rejected[*test]).map_err(|why| {
             IdentifyError::Request(format!("test \"{}\", nominally: {why}", problem.tests[*test].name))
         })?;

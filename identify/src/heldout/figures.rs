@@ -35,7 +35,7 @@ pub(crate) fn cross_validation(
     let run = matches!(kind, FoldKind::Runs | FoldKind::RunGroups).then_some(deciding_mm);
     let left_out = left_out_tests(problem, &fit.beta)?;
     let test = left_out.rms_mm(judged);
-    let three = (problem.coordinates() == 3).then_some(3.0_f64.sqrt());
+    let three = problem.are_vectors().then_some(3.0_f64.sqrt());
     let in_3d = |mm: Option<f64>| Some(in_um(mm?) * three?);
     Ok(CrossValidation {
         interpolation_rms_um: interpolation.map(in_um),

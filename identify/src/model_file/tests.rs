@@ -73,7 +73,7 @@ fn errors_at_states_are_those_of_the_effects() {
     let angles = [0.1, 0.7, 2.0];
     let mut positions = vec![vec![0.0; 3]; model.machine.axes.len()];
     positions[c] = angles.to_vec();
-    let readings = abbe_model::session::readings::Readings { positions, coordinates: 1, ..Default::default() };
+    let readings = abbe_model::session::readings::Readings { positions, channels: 1, ..Default::default() };
     let states = States { readings, tool_mm: [0.0; 3], table_mm: [0.0; 3] };
     let errors = model.errors_at(&states).unwrap();
     let slot = |name: &str| model.machine.error_slot(&ErrorName::parse(name).unwrap()).unwrap();

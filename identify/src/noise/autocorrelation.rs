@@ -34,7 +34,7 @@ impl PureError {
         let mut lengths: BTreeMap<usize, usize> = BTreeMap::new();
         for (number, test) in tests.iter().enumerate() {
             let readings = test.readings.as_ref()?;
-            if readings.coordinates != 1 {
+            if readings.channels != 1 {
                 return None;
             }
             for run in readings.runs() {

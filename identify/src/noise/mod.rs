@@ -115,7 +115,7 @@ impl Noise {
     }
 }
 
-/// Pure error: residuals (rows × coordinates, mm) without the trend of their run and their mean over repeats, rescaled
+/// Pure error: residuals (rows × channels, mm) without the trend of their run and their mean over repeats, rescaled
 /// for the variance that these remove. `None` for readings without repeats.
 pub struct PureError {
     /// For each test, one value per scalar reading. The expected mean square within a test is the variance of white
@@ -194,27 +194,35 @@ fn deviations(
     kept: impl Fn(usize) -> bool,
     deviation: &mut [Option<f64>],
 ) -> (f64, f64) {
-    let coordinates = readings.coordinates;
-    let trends = Trends::of(readings, &kept);
-    let level = trends.detrend(residual, coordinates);
+    let channels = readings.channels;
     let keys = RepeatKeys::of(readings);
-    let mut order: Vec<usize> = (0..readings.rows()).filter(|row| kept(*row)).collect();
-    order.sort_by(|a, b| keys.of_row(*a).cmp(keys.of_row(*b)));
-    // Over one coordinate: the trace, the expected sum of squares of deviations rescaled for the means alone, and their
+    // Channels that were read in the same rows are treated together.
+    let together = match readings.observed.iter().any(|value| value.is_nan()) {
+        true => 1,
+        false => channels,
+    };
+    // Over one channel: the trace, the expected sum of squares of deviations rescaled for the means alone, and their
     // number.
     let (mut freedom, mut expected, mut count) = (0.0, 0.0, 0_usize);
-    for rows in order.chunk_by(|a, b| keys.of_row(*a) == keys.of_row(*b)).filter(|rows| rows.len() > 1) {
-        let repeats = rows.len() as f64;
-        let square = repeats / (repeats - 1.0);
-        let of_group = trends.freedom_of(rows);
-        freedom += of_group;
-        expected += of_group * square;
-        count += rows.len();
-        for coordinate in 0..coordinates {
-            let at = |row: &usize| level[row * coordinates + coordinate];
-            let mean = rows.iter().map(at).sum::<f64>() / repeats;
-            for row in rows {
-                deviation[row * coordinates + coordinate] = Some((at(row) - mean) * square.sqrt());
+    for first in (0..channels).step_by(together.max(1)) {
+        let present = |row: usize| kept(row) && readings.was_read(row, first);
+        let trends = Trends::of(readings, present);
+        let level = trends.detrend(residual, channels);
+        let mut order: Vec<usize> = (0..readings.rows()).filter(|row| present(*row)).collect();
+        order.sort_by(|a, b| keys.of_row(*a).cmp(keys.of_row(*b)));
+        for rows in order.chunk_by(|a, b| keys.of_row(*a) == keys.of_row(*b)).filter(|rows| rows.len() > 1) {
+            let repeats = rows.len() as f64;
+            let square = repeats / (repeats - 1.0);
+            let of_group = trends.freedom_of(rows);
+            freedom += of_group;
+            expected += of_group * square;
+            count += rows.len();
+            for channel in first..first + together {
+                let at = |row: &usize| level[row * channels + channel];
+                let mean = rows.iter().map(at).sum::<f64>() / repeats;
+                for row in rows {
+                    deviation[row * channels + channel] = Some((at(row) - mean) * square.sqrt());
+                }
             }
         }
     }
@@ -224,7 +232,7 @@ fn deviations(
     }
     let enlarged = (count as f64 / expected).sqrt();
     deviation.iter_mut().flatten().for_each(|value| *value *= enlarged);
-    (freedom * coordinates as f64, enlarged)
+    (freedom * together as f64, enlarged)
 }
 
 /// Least share of the variance that the trends must leave.
@@ -296,7 +304,7 @@ mod tests {
         Readings {
             run: rows().map(|(run, _)| run as i64).collect(),
             positions: vec![rows().map(|(_, place)| 0.1 * place as f64).collect()],
-            coordinates: 1,
+            channels: 1,
             ..Readings::default()
         }
     }
@@ -366,7 +374,7 @@ mod tests {
         let readings = Readings {
             run: (0..48).map(|row| i64::from(row >= 36)).collect(),
             positions: vec![places.iter().map(|place| (*place as f64).sin()).collect()],
-            coordinates: 1,
+            channels: 1,
             ..Readings::default()
         };
         let kept = |row: usize| row % 11 != 5;

@@ -29,12 +29,15 @@ const OUTLIER_ALONE: f64 = 6.0;
 
 /// The outliers of the problem, by test and row, from the residuals of a fit, mm.
 pub fn reject(problem: &Problem, residuals: &[Vec<f64>]) -> Vec<Vec<bool>> {
-    let coordinates = problem.coordinates();
     if problem.folds.kind.is_poses() {
         let lengths: Vec<Vec<f64>> = residuals
             .iter()
-            .map(|residual| {
-                residual.chunks_exact(coordinates).map(|v| v.iter().map(|x| x * x).sum::<f64>().sqrt()).collect()
+            .enumerate()
+            .map(|(test, residual)| {
+                residual
+                    .chunks_exact(problem.channels(test))
+                    .map(|v| v.iter().map(|x| x * x).sum::<f64>().sqrt())
+                    .collect()
             })
             .collect();
         let mut all: Vec<f64> = lengths.iter().flatten().copied().collect();
@@ -42,7 +45,7 @@ pub fn reject(problem: &Problem, residuals: &[Vec<f64>]) -> Vec<Vec<bool>> {
         return lengths.iter().map(|test| test.iter().map(|length| *length > limit).collect()).collect();
     }
     parallel::map(problem.tests.len(), &|test| match &problem.tests[test].readings {
-        Some(readings) => reject_along_runs(readings, &residuals[test], coordinates, problem.noise.sigma_mm),
+        Some(readings) => reject_along_runs(readings, &residuals[test], problem.channels(test), problem.noise.sigma_mm),
         None => Vec::new(),
     })
 }
@@ -59,14 +62,14 @@ pub(crate) fn alone(residual: &[f64]) -> impl Iterator<Item = usize> {
     })
 }
 
-fn reject_along_runs(readings: &Readings, residual: &[f64], coordinates: usize, sigma_mm: f64) -> Vec<bool> {
+fn reject_along_runs(readings: &Readings, residual: &[f64], channels: usize, sigma_mm: f64) -> Vec<bool> {
     let mut reject = vec![false; readings.rows()];
-    for coordinate in 0..coordinates {
+    for channel in 0..channels {
         // The deviation of each reading from its neighbours, and the limits that single readings exceed.
         let mut deviations = vec![0.0; readings.rows()];
         let mut conspicuous = Vec::new();
         for run in readings.runs().into_iter().filter(|run| run.len() > 2 * NEIGHBOURS) {
-            let values: Vec<f64> = (run.clone().map(|row| residual[row * coordinates + coordinate])).collect();
+            let values: Vec<f64> = (run.clone().map(|row| residual[row * channels + channel])).collect();
             let of_run = deviations_from_neighbours(&values);
             let limit = OUTLIER_ALONG_RUN * robust_deviation(&of_run).max(sigma_mm);
             let exceeds = |row: &usize| of_run[*row - run.start].abs() > limit;
@@ -144,7 +147,7 @@ mod tests {
         let readings = Readings {
             positions: vec![(0..4 * PLACES).map(|row| place(row) as f64).collect()],
             run: (0..4 * PLACES).map(|row| (row / PLACES) as i64).collect(),
-            coordinates: 1,
+            channels: 1,
             ..Readings::default()
         };
         let mut residual: Vec<f64> = (0..4 * PLACES).map(|row| 1e-4 * (((row * 7) % 11) as f64 - 5.0)).collect();

@@ -12,10 +12,10 @@ const DISAGREEMENT_P: f64 = 0.001;
 /// A warning if repeated readings scatter by more than twice or less than half of the stated noise, significantly.
 /// `residuals` are those of any model, mm, test by test.
 pub(crate) fn stated_against_repeats(problem: &Problem, residuals: &[Vec<f64>]) -> Option<String> {
-    let stated_mm = problem.session.noise_mm.filter(|sigma| *sigma > 0.0)?;
+    let stated_mm = problem.session.stated_noise_mm()?;
     let pure = PureError::of(&problem.tests, residuals, |test, row| !problem.rejected[test][row]);
     let sigma_mm = pure.sigma_mm()?;
-    let resolution_mm = problem.session.resolution_mm.unwrap_or(0.0) / 12.0_f64.sqrt();
+    let resolution_mm = problem.session.resolution_noise_mm();
     let ratio = sigma_mm.max(resolution_mm) / stated_mm;
     let freedom = pure.freedom as f64;
     let [below, above] = chi_square_tails(freedom * ratio * ratio, freedom)?;

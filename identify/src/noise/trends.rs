@@ -88,12 +88,12 @@ impl Trends {
         self.terms[row]
     }
 
-    /// Residuals without the trend of each run and coordinate.
-    pub fn detrend(&self, residual: &[f64], coordinates: usize) -> Vec<f64> {
+    /// Residuals without the trend of each run and channel.
+    pub fn detrend(&self, residual: &[f64], channels: usize) -> Vec<f64> {
         let mut level = residual.to_vec();
         for rows in &self.rows {
-            for coordinate in 0..coordinates {
-                let at = |row: usize| row * coordinates + coordinate;
+            for channel in 0..channels {
+                let at = |row: usize| row * channels + channel;
                 let along: [f64; TERMS] =
                     std::array::from_fn(|i| rows.iter().map(|row| residual[at(*row)] * self.terms[*row][i]).sum());
                 for row in rows {

@@ -124,12 +124,7 @@ fn analyse_problem(problem: &Problem, travel_mm: f64) -> Result<PlanAnalysis, Id
         determined_by_prior: identifiability::determined_by_prior(problem, &linear)?,
         nearly_collinear: identifiability::nearly_collinear(problem, &linear, &of_interest)?,
         correlation: correlation(problem, &linear, &of_interest),
-        indices: indices::indices(
-            &linear,
-            &of_interest,
-            problem.readings() * problem.coordinates(),
-            found.g_efficiency,
-        )?,
+        indices: indices::indices(&linear, &of_interest, problem.scalars(), found.g_efficiency)?,
         leave_one_out: leave_one_out(problem, &linear, &of_interest)?,
         effects: None,
         clearances,
@@ -152,7 +147,7 @@ fn summary(problem: &Problem, number: usize) -> TestSummary {
         moving_min: time.first().zip(time.last()).map(|(first, last)| (last - first) / 60.0),
         reach_mm: match model.station() {
             Station::BallBar(bar) => {
-                let nominal = model.readings_mm(&SlotValues::zero(model.slots()));
+                let nominal = model.readings(&SlotValues::zero(model.slots()));
                 Some(nominal.iter().fold(0.0, |most: f64, reading| most.max((reading - bar.bar).abs())))
             }
             _ => None,

@@ -125,7 +125,7 @@ fn whitened(problem: &Problem, test: usize, axis: usize) -> Result<Vec<PlacedRow
         .filter(|block| block.test == test)
         .map(|block| {
             let (white, _) = problem.whiten(&problem.rows(&values, block)?, block);
-            let row = |i: &usize| block.rows.start + i / problem.coordinates();
+            let row = |i: &usize| block.rows.start + i / problem.channels(test);
             let positions = problem.kept_rows(block).iter().map(|i| readings.positions[axis][row(i)]).collect();
             Ok((positions, white))
         })

@@ -75,7 +75,7 @@ fn of_block(
     parameters: usize,
     covariance: &Mat<f64>,
 ) -> BlockSensitivity {
-    let coordinates = problem.coordinates();
+    let channels = problem.channels(block.test);
     let first_run = problem.tests[block.test]
         .readings
         .as_ref()
@@ -101,10 +101,9 @@ fn of_block(
             squares[j] += value * value;
         }
         for i in &picked {
-            curve[j].push(if coordinates == 1 {
-                rows[(*i, j)]
-            } else {
-                (0..coordinates).map(|c| rows[(i * coordinates + c, j)].powi(2)).sum::<f64>().sqrt()
+            curve[j].push(match channels {
+                1 => rows[(*i, j)],
+                _ => (0..channels).map(|c| rows[(i * channels + c, j)].powi(2)).sum::<f64>().sqrt(),
             });
         }
     }

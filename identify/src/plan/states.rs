@@ -41,9 +41,9 @@ pub fn complete(session: &Session, planned_only: bool) -> Result<Session, Identi
 /// If the movement leaves the travel or there is none.
 pub fn planned(session: &Session, test: &Test) -> Result<Readings, IdentifyError> {
     let mut readings = planned::planned(&session.machine, test)?;
-    readings.coordinates = test.station.kind().coordinates();
     let model = TestModel::new(Arc::clone(&session.machine), test.station.clone(), &readings);
-    readings.observed = model.readings_mm(&SlotValues::zero(model.slots()));
+    readings.observed = model.readings(&SlotValues::zero(model.slots()));
+    readings.channels_to_columns(&session.machine, &test.station);
     Ok(readings)
 }
 
@@ -87,7 +87,7 @@ pub(crate) fn noise_warning(noise: &Noise) -> Option<String> {
 /// # Errors
 /// If the data cannot be fitted.
 pub(crate) fn noise_of(session: &Session) -> Result<Noise, IdentifyError> {
-    if let Some(sigma) = session.noise_mm.filter(|sigma| *sigma > 0.0) {
+    if let Some(sigma) = session.stated_noise_mm() {
         return Ok(Noise::white(sigma, NoiseSource::Stated));
     }
     if session.tests.iter().all(|test| test.readings.is_some()) {

@@ -18,7 +18,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use abbe_model::instrument::{SharedBy, Station};
+use abbe_model::instrument::SharedBy;
 use abbe_model::session::{Session, Test};
 use faer::Mat;
 use rand::RngExt;
@@ -123,21 +123,10 @@ fn random_geometry(session: &Session, tests: &[Test], draw: u64) -> Session {
         let [at_workpiece, at_tool] =
             groups.map(|group| *changes.entry(group).or_insert_with(|| std::array::from_fn(|_| change())));
         let add = |point: &mut [f64; 3], by: [f64; 3]| point.iter_mut().zip(by).for_each(|(x, by)| *x += by);
-        match &mut test.station {
-            Station::BallBar(bar) => {
-                add(&mut bar.workpiece_ball, at_workpiece);
-                add(&mut bar.spindle_ball, at_tool);
+        for (point, by) in test.station.points_mut().into_iter().zip([at_workpiece, at_tool]) {
+            if let Some(point) = point {
+                add(point, by);
             }
-            Station::RTest(rtest) => {
-                add(&mut rtest.workpiece_ball, at_workpiece);
-                add(&mut rtest.spindle_ball, at_tool);
-            }
-            Station::Probe(probe) => {
-                add(&mut probe.artefact, at_workpiece);
-                add(&mut probe.stylus, at_tool);
-            }
-            Station::Tracker(tracker) => add(&mut tracker.target, at_tool),
-            Station::Socket(socket) => add(&mut socket.ball, at_tool),
         }
         let Some(readings) = &mut test.readings else { continue };
         for (axis, positions) in machine.axes.iter().zip(&mut Arc::make_mut(readings).positions) {

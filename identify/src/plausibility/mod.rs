@@ -173,10 +173,8 @@ fn residual(problem: &Problem, fit: &Fit) -> Option<Conflict> {
     if problem.noise.source == NoiseSource::Residual || noise <= 0.0 {
         return None;
     }
-    let coordinates = problem.coordinates();
     let of_test = |number: usize| {
-        let rejected = &problem.rejected[number];
-        let kept = fit.residuals[number].iter().enumerate().filter(|(i, _)| !rejected[i / coordinates]);
+        let kept = fit.residuals[number].iter().enumerate().filter(|(i, _)| problem.counts(number, *i));
         let (sum, count) = kept.fold((0.0, 0_usize), |(sum, count), (_, value)| (sum + value * value, count + 1));
         (count > 0).then(|| (sum / count as f64).sqrt())
     };
@@ -249,11 +247,11 @@ fn symbol(unit: &str) -> &str {
 
 /// Poses: what the model explains of the spread of the measured positions.
 fn of_poses(problem: &Problem, fit: &Fit) -> Plausibility {
-    let three = problem.coordinates() as f64;
+    let channels = problem.channels(0) as f64;
     let Some(spread) = poses::spread_mm2(problem) else {
         return Plausibility::default();
     };
-    let left = three * rms_mm(problem, &fit.residuals).powi(2);
+    let left = channels * rms_mm(problem, &fit.residuals).powi(2);
     let explained = 1.0 - left / spread;
     let suggestions = if explained < WELL_EXPLAINED { poses::suggestions(problem) } else { Vec::new() };
     let little = explained < MIN_EXPLAINED;

@@ -135,20 +135,17 @@ fn limit(count: usize) -> f64 {
 /// By how much the noise of an average exceeds what the fit assumes: the readings' own χ² over their degrees of
 /// freedom, where that is above 1, times what the autocorrelation of the residual along a run adds.
 fn excess(problem: &Problem, fit: &Fit) -> f64 {
-    let coordinates = problem.coordinates();
     let (mut squares, mut count, mut products, mut pairs) = (0.0, 0_usize, 0.0, 0.0);
     for (number, test) in problem.tests.iter().enumerate() {
         let Some(readings) = &test.readings else { continue };
-        let (residual, rejected) = (&fit.residuals[number], &problem.rejected[number]);
+        let (residual, channels) = (&fit.residuals[number], problem.channels(number));
         for run in readings.runs() {
-            for row in run.clone().filter(|row| !rejected[*row]) {
-                for i in row * coordinates..(row + 1) * coordinates {
-                    squares += residual[i] * residual[i];
-                    count += 1;
-                    if row > run.start && !rejected[row - 1] {
-                        products += residual[i] * residual[i - coordinates];
-                        pairs += 0.5 * (residual[i].powi(2) + residual[i - coordinates].powi(2));
-                    }
+            for i in (run.start * channels..run.end * channels).filter(|i| problem.counts(number, *i)) {
+                squares += residual[i] * residual[i];
+                count += 1;
+                if i / channels > run.start && problem.counts(number, i - channels) {
+                    products += residual[i] * residual[i - channels];
+                    pairs += 0.5 * (residual[i].powi(2) + residual[i - channels].powi(2));
                 }
             }
         }

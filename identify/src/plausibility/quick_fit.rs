@@ -49,7 +49,7 @@ pub(super) fn trial(session: &Session, noise: &Noise) -> Option<Trial> {
             Prior::Free | Prior::Known => 0.0,
         })
         .sum();
-    let readings = problem.readings() * problem.coordinates();
+    let readings = problem.scalars();
     let free = list.iter().filter(|parameter| parameter.prior == Prior::Free).count();
     let freedom = readings.saturating_sub(free.min(found.rank.identifiable_basis.ncols())).max(1) as f64;
     chi_square.is_finite().then(|| Trial {

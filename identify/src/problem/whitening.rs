@@ -29,21 +29,20 @@ impl Filter {
 }
 
 impl Problem {
-    /// The scalar rows of a block that remain after whitening. A row is dropped if its reading, or one within the
-    /// filter's order before it, is an outlier.
+    /// The scalar rows of a block that remain after whitening. A row is dropped if its value, or one within the filter's
+    /// order before it, was not read or is an outlier.
     pub fn kept_rows(&self, block: &RowBlock) -> Vec<usize> {
-        let coordinates = self.coordinates();
-        let rejected = &self.rejected[block.test];
-        if !rejected[block.rows.clone()].contains(&true) {
-            return (0..block.rows.len() * coordinates).collect();
+        let channels = self.channels(block.test);
+        let all = 0..block.rows.len() * channels;
+        if !self.rejected[block.test][block.rows.clone()].contains(&true) && self.missing[block.test].is_empty() {
+            return all.collect();
         }
-        (0..block.rows.len() * coordinates)
-            .filter(|i| {
-                let row = block.rows.start + i / coordinates;
-                let reach = self.noise.ar_coefficients.len().min(i / coordinates);
-                (row - reach..=row).all(|row| !rejected[row])
-            })
-            .collect()
+        let start = block.rows.start * channels;
+        all.filter(|i| {
+            let reach = self.noise.ar_coefficients.len().min(i / channels);
+            (0..=reach).all(|lag| self.counts(block.test, start + i - lag * channels))
+        })
+        .collect()
     }
 
     /// Whitens rows along a run, `(x_t − Σ a_k x_{t−k})/σ_innovation`, and drops outliers. Returns the remaining rows
@@ -57,8 +56,8 @@ impl Problem {
     /// The fold of each of the given scalar rows of a block.
     pub fn folds_of(&self, rows: &[usize], block: &RowBlock) -> impl Iterator<Item = usize> {
         let fold_of = &self.folds.of_row[block.test][block.rows.clone()];
-        let coordinates = self.coordinates();
-        rows.iter().map(move |i| fold_of[i / coordinates])
+        let channels = self.channels(block.test);
+        rows.iter().map(move |i| fold_of[i / channels])
     }
 
     /// What whitening makes of each scalar row of a block: the value of that row times the first factor, plus earlier
@@ -66,19 +65,17 @@ impl Problem {
     pub fn filter(&self) -> Filter {
         let inflation = self.noise.inflation.sqrt();
         let innovation = 1.0 / (self.noise.innovation_mm() * inflation);
-        let coordinates = self.coordinates();
-        let lagged = self.noise.ar_coefficients.iter().enumerate();
-        let lagged = lagged.map(|(lag, a)| ((lag + 1) * coordinates, -a * innovation));
+        // Noise is autocorrelated only where every reading has one channel.
+        let lagged = self.noise.ar_coefficients.iter().enumerate().map(|(lag, a)| (lag + 1, -a * innovation));
         Filter {
             at_start: 1.0 / self.noise.likelihood_mm(),
-            past: self.noise.ar_coefficients.len() * coordinates,
+            past: self.noise.ar_coefficients.len(),
             terms: std::iter::once((0, innovation)).chain(lagged).collect(),
         }
     }
 
     /// The rows of [`Problem::whiten`] for known remaining rows.
     pub fn whitened(&self, mut rows: Mat<f64>, kept: &[usize]) -> Mat<f64> {
-        let coordinates = self.coordinates();
         let ar_coefficients = &self.noise.ar_coefficients;
         let inflation = self.noise.inflation.sqrt();
         let innovation = 1.0 / (self.noise.innovation_mm() * inflation);
@@ -90,11 +87,11 @@ impl Problem {
         let mut white = Mat::zeros(kept.len(), rows.ncols());
         for (mut white, column) in white.col_iter_mut().zip(rows.col_iter()) {
             for (k, &i) in kept.iter().enumerate() {
-                white[k] = if i / coordinates < ar_coefficients.len() {
+                white[k] = if i < ar_coefficients.len() {
                     column[i] * marginal
                 } else {
                     let lags = ar_coefficients.iter().enumerate();
-                    let past: f64 = lags.map(|(lag, a)| a * column[i - (lag + 1) * coordinates]).sum();
+                    let past: f64 = lags.map(|(lag, a)| a * column[i - lag - 1]).sum();
                     (column[i] - past) * innovation
                 };
             }

@@ -153,11 +153,10 @@ impl SimulatedFit<'_, '_> {
     fn rows(&self, beta: &[f64], mut take: impl FnMut(&[usize], Mat<f64>)) -> Result<(), IdentifyError> {
         let problem = self.refit.problem;
         let values = problem.slot_values(beta);
-        let coordinates = problem.coordinates();
         for block in &self.refit.blocks {
             let mut rows = problem.own_rows(&values[block.test], block)?;
             let last = rows.ncols() - 1;
-            let start = self.refit.starts[block.test] + block.rows.start * coordinates;
+            let start = self.refit.starts[block.test] + block.rows.start * problem.channels(block.test);
             for i in 0..rows.nrows() {
                 rows[(i, last)] += self.deviations[start + i];
             }
@@ -210,20 +209,19 @@ impl LeastSquares for SimulatedFit<'_, '_> {
         let refit = self.refit;
         let beta = refit.beta(z);
         let problem = refit.problem;
-        let coordinates = problem.coordinates();
         let values = problem.slot_values(&beta);
         let mut sum = 0.0;
         for ((test, model), values) in problem.models.iter().enumerate().zip(&values) {
             let Some(readings) = &problem.tests[test].readings else {
                 continue;
             };
-            let start = refit.starts[test];
-            let read = model.readings_mm(values);
+            let (start, channels) = (refit.starts[test], problem.channels(test));
+            let read = model.readings(values);
             let residual: Vec<f64> =
                 (0..read.len()).map(|i| readings.observed[i] + self.deviations[start + i] - read[i]).collect();
             for block in refit.blocks.iter().filter(|block| block.test == test) {
-                let first = block.rows.start * coordinates;
-                let column = Mat::from_fn(block.rows.len() * coordinates, 1, |i, _| residual[first + i]);
+                let first = block.rows.start * channels;
+                let column = Mat::from_fn(block.rows.len() * channels, 1, |i, _| residual[first + i]);
                 let (white, _) = problem.whiten(&column, block);
                 sum += (0..white.nrows()).map(|i| white[(i, 0)].powi(2)).sum::<f64>();
             }

@@ -229,7 +229,7 @@ impl Equations {
                 Ok(TouchEquation {
                     angles: [angles.position, angles.position, angles.angle, angles.on_artefact],
                     coefficients: [axis_varies * by(0), axis_varies * by(1), -1.0, spot_varies * by(2)],
-                    outward_mm: sensitivities.readings_mm[row] - readings.observed[row],
+                    outward_mm: sensitivities.readings[row] - readings.observed[row],
                 })
             })
             .collect()

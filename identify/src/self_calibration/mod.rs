@@ -62,7 +62,7 @@ pub fn calibrate(session: &Session) -> Result<Calibration, IdentifyError> {
     let equations = Equations::of(session)?;
     let conditions = conditions(&equations, &session.machine.axes[equations.axis].name)?;
     let reduction = reduce(equations.columns(), &conditions);
-    let stated = session.noise_mm.filter(|sigma| *sigma > 0.0);
+    let stated = session.stated_noise_mm();
     // The residual estimates the noise only if the radius is a parameter: relative to one reading, all rows share that
     // reading's noise.
     let free_radius = Equations { reference: Reference::Estimated, ..equations.clone() };

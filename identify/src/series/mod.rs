@@ -15,7 +15,8 @@ pub mod paths;
 pub mod sensitivities;
 pub mod spectrum;
 
-use abbe_model::instrument::InstrumentKind;
+use abbe_model::instrument::channel::Channel;
+use abbe_model::sensitivity::TestModel;
 
 use crate::error::IdentifyError;
 use crate::fit::Fit;
@@ -53,6 +54,8 @@ pub struct Share {
 pub struct TestSeries {
     /// Its name.
     pub name: String,
+    /// Number of channels of a reading.
+    pub channels: usize,
     /// Its abscissa.
     pub way: Abscissa,
     /// Segments of one run in one direction.
@@ -75,8 +78,11 @@ pub struct SessionSeries {
     pub shares: Vec<Share>,
     /// The tests.
     pub tests: Vec<TestSeries>,
-    /// Scalar coordinates of a reading.
-    pub coordinates: usize,
+    /// The unit of all values: `um`, or `arcsec` if every channel is an angle. An angle beside lengths is the length that
+    /// has the same noise, µm.
+    pub unit: &'static str,
+    /// Whether every reading is a vector.
+    pub vectors: bool,
     /// The largest difference between the sum of shares and the model over all readings, µm.
     pub second_order_um: f64,
 }
@@ -122,7 +128,7 @@ fn shares(problem: &Problem, fit: &Fit) -> Vec<Share> {
 /// If the model cannot be evaluated.
 pub fn views(problem: &Problem, fit: &Fit, before_mm: Option<&[Vec<f64>]>) -> Result<SessionSeries, IdentifyError> {
     let shares = shares(problem, fit);
-    let three = problem.coordinates() == 3;
+    let vectors = problem.are_vectors();
     let nominal_mm = problem.residuals(&vec![0.0; fit.beta.len()]);
     let mut of_tests = shares_of_readings(problem, fit, &shares)?;
     let mut second_order_um = 0.0_f64;
@@ -135,7 +141,7 @@ pub fn views(problem: &Problem, fit: &Fit, before_mm: Option<&[Vec<f64>]>) -> Re
         for (i, deviation) in deviation_um.iter_mut().enumerate() {
             let sum: f64 = shares_um.iter().map(|share| share[i]).sum();
             second_order_um = second_order_um.max((*deviation - sum - after_um[i]).abs());
-            if three {
+            if vectors {
                 let of_setup = shares.iter().position(|share| share.cause == Cause::Setup);
                 *deviation -= of_setup.map_or(0.0, |k| shares_um[k][i]);
             }
@@ -148,6 +154,7 @@ pub fn views(problem: &Problem, fit: &Fit, before_mm: Option<&[Vec<f64>]>) -> Re
         let poses = problem.folds.kind.is_poses();
         tests.push(TestSeries {
             name: test.name.clone(),
+            channels: problem.channels(number),
             stretches: way.stretches(readings, poses),
             way,
             deviation_um,
@@ -156,35 +163,34 @@ pub fn views(problem: &Problem, fit: &Fit, before_mm: Option<&[Vec<f64>]>) -> Re
             shares_um,
         });
     }
-    Ok(SessionSeries { shares, tests, coordinates: problem.coordinates(), second_order_um })
+    Ok(SessionSeries { shares, tests, unit: problem.unit(), vectors, second_order_um })
 }
 
 /// `J_k β_k` of every share, µm, by test.
 fn shares_of_readings(problem: &Problem, fit: &Fit, shares: &[Share]) -> Result<Vec<Vec<Vec<f64>>>, IdentifyError> {
-    let coordinates = problem.coordinates();
     let values = problem.slot_values(&fit.beta);
-    let mut of_tests: Vec<Vec<Vec<f64>>> =
-        problem.models.iter().map(|model| vec![vec![0.0; model.rows() * coordinates]; shares.len()]).collect();
+    let zero = |model: &TestModel| vec![vec![0.0; model.rows() * model.channels().len()]; shares.len()];
+    let mut of_tests: Vec<Vec<Vec<f64>>> = problem.models.iter().map(zero).collect();
     for block in problem.blocks() {
         let rows = problem.rows(&values, &block)?;
         for (k, share) in shares.iter().enumerate() {
             let column = &mut of_tests[block.test][k];
             for i in 0..rows.nrows() {
                 let sum: f64 = share.unknowns.iter().map(|j| rows[(i, *j)] * fit.beta[*j]).sum();
-                column[block.rows.start * coordinates + i] = sum * 1e3;
+                column[block.rows.start * problem.channels(block.test) + i] = sum * 1e3;
             }
         }
     }
     Ok(of_tests)
 }
 
-/// Lengths of vector readings; scalar readings unchanged.
-pub fn lengths(values: &[f64], coordinates: usize) -> Vec<f64> {
-    if coordinates == 1 {
+/// Lengths of vector readings; readings of one channel unchanged.
+pub fn lengths(values: &[f64], channels: usize) -> Vec<f64> {
+    if channels == 1 {
         return values.to_vec();
     }
     let length = |reading: &[f64]| reading.iter().map(|v| v * v).sum::<f64>().sqrt();
-    values.chunks(coordinates).map(length).collect()
+    values.chunks(channels).map(length).collect()
 }
 
 /// Correlation matrix of the identified errors and effects' coefficients, with identifiers, row by row. Set-up
@@ -200,7 +206,7 @@ pub fn correlation(problem: &Problem, fit: &Fit) -> (Vec<String>, Vec<Vec<f64>>)
     (ids, matrix)
 }
 
-/// Whether this instrument measures a length about a nominal one, for polar plots.
-pub fn is_round(instrument: InstrumentKind) -> bool {
-    instrument.coordinates() == 1
+/// Whether an instrument measures one length about a nominal one, for polar plots.
+pub fn is_round(channels: &[Channel]) -> bool {
+    matches!(channels, [one] if !one.is_angle())
 }

@@ -25,8 +25,8 @@ pub struct TestSensitivities {
     pub test: String,
     /// Its abscissa, thinned as the columns.
     pub way: Abscissa,
-    /// The coordinate of the columns for vector readings; `None` for a length.
-    pub coordinate: Option<&'static str>,
+    /// The channel of the columns; `None` if a reading has only one.
+    pub channel: Option<&'static str>,
     /// The errors that affect the test.
     pub columns: Vec<Sensitivity>,
 }
@@ -43,13 +43,12 @@ pub struct Sensitivity {
 }
 
 /// The sensitivity of the tests' first runs to every error to be estimated, at the parameters `beta`; for vector
-/// readings coordinate by coordinate.
+/// readings channel by channel.
 ///
 /// # Errors
 /// If the model cannot be evaluated.
 pub fn sensitivities(problem: &Problem, beta: &[f64]) -> Result<Vec<TestSensitivities>, IdentifyError> {
     let values = problem.slot_values(beta);
-    let coordinates = problem.coordinates();
     let list = &problem.parameters.list;
     let mut of_tests = Vec::new();
     for (number, test) in problem.tests.iter().enumerate() {
@@ -67,13 +66,13 @@ pub fn sensitivities(problem: &Problem, beta: &[f64]) -> Result<Vec<TestSensitiv
         way.values = picked.iter().map(|i| way.values[run.start + i]).collect();
         let block = RowBlock { test: number, rows: run };
         let rows = problem.rows(&values, &block)?;
-        let names = test.station.coordinate_names();
-        for coordinate in 0..coordinates {
+        let channels = problem.models[number].channels();
+        for (channel, of) in channels.iter().enumerate() {
             let columns = (0..list.len())
                 .filter(|j| is_of_interest(&list[*j]))
                 .filter_map(|j| {
                     let scale = 1e3 / list[j].unit.display_per_internal;
-                    let value = |i: &usize| rows[(i * coordinates + coordinate, j)] * scale;
+                    let value = |i: &usize| rows[(i * channels.len() + channel, j)] * scale;
                     let values: Vec<f64> = picked.iter().map(value).collect();
                     let moves = values.iter().any(|value| value.abs() > MIN_SENSITIVITY_UM);
                     moves.then(|| sensitivity(&list[j], values))
@@ -82,7 +81,7 @@ pub fn sensitivities(problem: &Problem, beta: &[f64]) -> Result<Vec<TestSensitiv
             of_tests.push(TestSensitivities {
                 test: test.name.clone(),
                 way: way.clone(),
-                coordinate: (coordinates > 1).then(|| names[coordinate]),
+                channel: (channels.len() > 1).then_some(of.name),
                 columns,
             });
         }

@@ -22,14 +22,14 @@ pub struct Spectrum {
     pub of: String,
     /// The axis, or `XY` for a circle of two.
     pub over: String,
-    /// Amplitude of orders 1, 2, … of the residual before, µm; for vector readings the length of the three amplitudes.
+    /// Amplitude of orders 1, 2, … of the residual before, µm; for readings of several channels the length of their amplitudes.
     pub before_um: Vec<f64>,
     /// The same after.
     pub after_um: Vec<f64>,
 }
 
-/// The amplitude of each order from 1 in values over an angle in degrees; `coordinates` values per reading.
-pub fn amplitudes(angle_deg: &[f64], values: &[f64], coordinates: usize) -> Vec<f64> {
+/// The amplitude of each order from 1 in values over an angle in degrees; `channels` values per reading.
+pub fn amplitudes(angle_deg: &[f64], values: &[f64], channels: usize) -> Vec<f64> {
     parallel::map(HIGHEST_ORDER, &|place| {
         let order = place + 1;
         let basis: Vec<[f64; 3]> = angle_deg
@@ -39,22 +39,22 @@ pub fn amplitudes(angle_deg: &[f64], values: &[f64], coordinates: usize) -> Vec<
                 [1.0, cos, sin]
             })
             .collect();
-        explained(&basis, values, coordinates)
+        explained(&basis, values, channels)
     })
 }
 
-fn explained(basis: &[[f64; 3]], values: &[f64], coordinates: usize) -> f64 {
+fn explained(basis: &[[f64; 3]], values: &[f64], channels: usize) -> f64 {
     let count = basis.len().max(1) as f64;
     let gram = Mat::from_fn(3, 3, |i, j| {
         // Over a short arc the three functions are nearly collinear. A ridge term bounds the solution.
         let ridge = if i == j { 1e-9 * count } else { 0.0 };
         basis.iter().map(|row| row[i] * row[j]).sum::<f64>() + ridge
     });
-    let sides = Mat::from_fn(3, coordinates, |i, c| {
-        basis.iter().zip(values.chunks(coordinates)).map(|(row, reading)| row[i] * reading[c]).sum::<f64>()
+    let sides = Mat::from_fn(3, channels, |i, c| {
+        basis.iter().zip(values.chunks(channels)).map(|(row, reading)| row[i] * reading[c]).sum::<f64>()
     });
     let solution = solve_square(gram.as_ref(), sides.as_ref());
-    let sum: f64 = (0..coordinates)
+    let sum: f64 = (0..channels)
         .map(|c| {
             let all: f64 = (0..3).map(|i| sides[(i, c)] * solution[(i, c)]).sum();
             all - sides[(0, c)].powi(2) / count
@@ -66,21 +66,23 @@ fn explained(basis: &[[f64; 3]], values: &[f64], coordinates: usize) -> f64 {
 /// The spectra of a session: each test over its angular abscissa, poses over every rotary axis.
 pub fn spectra(problem: &Problem, views: &SessionSeries) -> Vec<Spectrum> {
     let machine = &problem.session.machine;
-    let coordinates = views.coordinates;
-    let of = |of: &str, over: &str, angle: &[f64], before: &[f64], after: &[f64]| Spectrum {
+    let of = |of: &str, over: &str, angle: &[f64], channels: usize, [before, after]: [&[f64]; 2]| Spectrum {
         of: of.to_string(),
         over: over.to_string(),
-        before_um: amplitudes(angle, before, coordinates),
-        after_um: amplitudes(angle, after, coordinates),
+        before_um: amplitudes(angle, before, channels),
+        after_um: amplitudes(angle, after, channels),
     };
-    if coordinates == 1 {
-        return views
-            .tests
-            .iter()
-            .filter(|test| test.way.is_angle)
-            .map(|test| of(&test.name, &test.way.name, &test.way.values, &test.before_um, &test.after_um))
+    if !problem.folds.kind.is_poses() && !problem.are_vectors() {
+        let angular = views.tests.iter().filter(|test| test.way.is_angle);
+        return angular
+            .map(|test| {
+                let values = [test.before_um.as_slice(), &test.after_um];
+                of(&test.name, &test.way.name, &test.way.values, test.channels, values)
+            })
             .collect();
     }
+    // Poses of one session have an instrument of the same channels.
+    let Some(channels) = views.tests.first().map(|test| test.channels) else { return Vec::new() };
     let joined = |of: &dyn Fn(usize) -> Vec<f64>| (0..views.tests.len()).flat_map(of).collect::<Vec<f64>>();
     let before = joined(&|test| views.tests[test].before_um.clone());
     let after = joined(&|test| views.tests[test].after_um.clone());
@@ -91,7 +93,7 @@ pub fn spectra(problem: &Problem, views: &SessionSeries) -> Vec<Spectrum> {
                 let readings = problem.tests[test].readings.as_ref();
                 readings.map_or(Vec::new(), |r| r.positions[axis].iter().map(|q| q.to_degrees()).collect())
             });
-            of("all poses", &machine.axes[axis].name, &angle, &before, &after)
+            of("all poses", &machine.axes[axis].name, &angle, channels, [&before, &after])
         })
         .collect()
 }

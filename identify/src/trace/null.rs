@@ -75,8 +75,8 @@ struct Stretch {
     values: Vec<f64>,
     /// The orthonormal terms of the trend that the values lack, at each value. Empty if they lack none.
     trend: Vec<[f64; TERMS]>,
-    /// Readings have this number of coordinates, one after another, each with a trend of its own.
-    coordinates: usize,
+    /// Readings have this number of channels, one after another, each with a trend of its own.
+    channels: usize,
 }
 
 /// The autocorrelation that an inaccurate whitening leaves.
@@ -150,9 +150,9 @@ impl NoiseDraws {
 
 impl Stretch {
     /// A stretch of white noise without its trend, given by terms at each value that need not be orthonormal.
-    fn without_trend(mut values: Vec<f64>, mut trend: Vec<[f64; TERMS]>, coordinates: usize) -> Stretch {
-        for coordinate in 0..coordinates {
-            let own = || (coordinate..values.len()).step_by(coordinates);
+    fn without_trend(mut values: Vec<f64>, mut trend: Vec<[f64; TERMS]>, channels: usize) -> Stretch {
+        for channel in 0..channels {
+            let own = || (channel..values.len()).step_by(channels);
             for term in 0..TERMS {
                 let product = |trend: &[[f64; TERMS]], a: usize, b: usize| -> f64 {
                     own().map(|i| trend[i][a] * trend[i][b]).sum()
@@ -167,12 +167,12 @@ impl Stretch {
                 own().for_each(|i| trend[i][term] *= scale);
             }
             for term in 0..TERMS {
-                let own = || (coordinate..trend.len()).step_by(coordinates);
+                let own = || (channel..trend.len()).step_by(channels);
                 let along: f64 = own().map(|i| values[i] * trend[i][term]).sum();
                 own().for_each(|i| values[i] -= along * trend[i][term]);
             }
         }
-        Stretch { values, trend, coordinates }
+        Stretch { values, trend, channels }
     }
 
     /// Draws the values of a range with one sign, and a trend of white noise.
@@ -190,9 +190,9 @@ impl Stretch {
             return;
         }
         let coefficients: Vec<[f64; TERMS]> =
-            (0..self.coordinates).map(|_| std::array::from_fn(|_| generator.sample(StandardNormal))).collect();
+            (0..self.channels).map(|_| std::array::from_fn(|_| generator.sample(StandardNormal))).collect();
         values.extend(range.map(|i| {
-            let of_trend = self.trend[i].iter().zip(&coefficients[i % self.coordinates]).map(|(q, z)| q * z);
+            let of_trend = self.trend[i].iter().zip(&coefficients[i % self.channels]).map(|(q, z)| q * z);
             sign * self.values[i] + of_trend.sum::<f64>()
         }));
     }
@@ -234,21 +234,21 @@ impl Spectrum {
 
 /// The deviations of repeats of each run, without the trend of the run.
 fn pool_of_repeats(problem: &Problem, pure: &PureError) -> Vec<Stretch> {
-    let coordinates = problem.coordinates();
     let mut pool = Vec::new();
     for (number, test) in problem.tests.iter().enumerate() {
         let Some(readings) = &test.readings else { continue };
+        let channels = problem.channels(number);
         let trends = Trends::of(readings, |row| !problem.rejected[number][row]);
         // The trend is given back, so the deviations are not rescaled for it.
         let of_scalar = |i: usize| -> Option<[f64; TERMS + 1]> {
-            let (trend, deviation) = (trends.terms_at(i / coordinates), pure.deviations[number][i]?);
+            let (trend, deviation) = (trends.terms_at(i / channels), pure.deviations[number][i]?);
             Some(std::array::from_fn(|k| *trend.get(k).unwrap_or(&(deviation / pure.rescaling(number)))))
         };
         for run in readings.runs() {
             for stretch in whitened(problem, number, run, of_scalar) {
                 let trend: Vec<[f64; TERMS]> = stretch.iter().map(|row| std::array::from_fn(|k| row[k])).collect();
                 let values = stretch.iter().map(|row| row[TERMS]).collect();
-                pool.push(Stretch::without_trend(values, trend, coordinates));
+                pool.push(Stretch::without_trend(values, trend, channels));
             }
         }
     }
@@ -258,13 +258,13 @@ fn pool_of_repeats(problem: &Problem, pure: &PureError) -> Vec<Stretch> {
 /// The residual of each run less its running median, at unit variance. The stated noise may differ from the true noise,
 /// and the search uses whitened readings.
 fn pool_of_residual(problem: &Problem, residuals: &[Vec<f64>]) -> Vec<Stretch> {
-    let coordinates = problem.coordinates();
     let mut pool = Vec::new();
     for block in problem.blocks() {
-        let first = block.rows.start * coordinates;
-        let rough = without_smooth(&residuals[block.test][first..block.rows.end * coordinates], coordinates);
+        let channels = problem.channels(block.test);
+        let first = block.rows.start * channels;
+        let rough = without_smooth(&residuals[block.test][first..block.rows.end * channels], channels);
         for stretch in whitened(problem, block.test, block.rows, |i| Some([rough[i - first]])) {
-            pool.push(Stretch { values: stretch.into_iter().flatten().collect(), trend: Vec::new(), coordinates });
+            pool.push(Stretch { values: stretch.into_iter().flatten().collect(), trend: Vec::new(), channels });
         }
     }
     let values = || pool.iter().flat_map(|stretch| &stretch.values);
@@ -284,32 +284,32 @@ fn whitened<const N: usize>(
     rows: Range<usize>,
     values_at: impl Fn(usize) -> Option<[f64; N]>,
 ) -> Vec<Vec<[f64; N]>> {
-    let coordinates = problem.coordinates();
+    let channels = problem.channels(test);
     let (ar, innovation) = (&problem.noise.ar_coefficients, problem.noise.innovation_mm());
     let whitened_at = |i: usize| {
-        let mut now = values_at(i).filter(|_| !problem.rejected[test][i / coordinates])?;
+        let mut now = values_at(i).filter(|_| problem.counts(test, i))?;
         for (lag, a) in ar.iter().enumerate() {
-            let past = values_at(i - (lag + 1) * coordinates)?;
+            let past = values_at(i - (lag + 1) * channels)?;
             now.iter_mut().zip(past).for_each(|(now, past)| *now -= a * past);
         }
         Some(now.map(|value| value / innovation))
     };
-    let first = (rows.start + ar.len()) * coordinates;
-    let values: Vec<Option<[f64; N]>> = (first..rows.end * coordinates).map(whitened_at).collect();
+    let first = (rows.start + ar.len()) * channels;
+    let values: Vec<Option<[f64; N]>> = (first..rows.end * channels).map(whitened_at).collect();
     let stretches = values.split(Option::is_none).filter(|stretch| !stretch.is_empty());
     stretches.map(|stretch| stretch.iter().flatten().copied().collect()).collect()
 }
 
 /// A residual less its running median.
-fn without_smooth(residual: &[f64], coordinates: usize) -> Vec<f64> {
-    let rows = residual.len() / coordinates;
+fn without_smooth(residual: &[f64], channels: usize) -> Vec<f64> {
+    let rows = residual.len() / channels;
     let mut rough = vec![0.0; residual.len()];
     for row in 0..rows {
         let (start, end) = (row.saturating_sub(SMOOTHING), (row + SMOOTHING + 1).min(rows));
-        for coordinate in 0..coordinates {
-            let mut window: Vec<f64> = (start..end).map(|r| residual[r * coordinates + coordinate]).collect();
+        for channel in 0..channels {
+            let mut window: Vec<f64> = (start..end).map(|r| residual[r * channels + channel]).collect();
             let level = median(&mut window);
-            rough[row * coordinates + coordinate] = residual[row * coordinates + coordinate] - level;
+            rough[row * channels + channel] = residual[row * channels + channel] - level;
         }
     }
     rough

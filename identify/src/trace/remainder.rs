@@ -11,6 +11,7 @@ use abbe_model::axis::{Axis, AxisKind};
 use abbe_model::driver::Driver;
 use abbe_model::effect::shape::{Curve, Local, Periodic};
 use abbe_model::effect::{Component, Effect, Shape};
+use abbe_model::instrument::channel::{Channel, labels};
 use abbe_model::session::readings::Readings;
 use faer::Mat;
 
@@ -50,9 +51,10 @@ struct Detector {
 fn detectors(problem: &Problem, columns: &Columns<'_>) -> Vec<Detector> {
     let machine = &problem.session.machine;
     let mut detectors = Vec::new();
-    for test in &problem.tests {
+    for (test, model) in problem.tests.iter().zip(&problem.models) {
         let Some(readings) = &test.readings else { continue };
-        let mut of_test = TestResidual { columns, name: &test.name, readings, detectors: Vec::new() };
+        let channels = model.channels();
+        let mut of_test = TestResidual { columns, name: &test.name, readings, channels, detectors: Vec::new() };
         for (axis, column) in readings.positions.iter().enumerate() {
             let low = column.iter().copied().fold(f64::INFINITY, f64::min);
             let high = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -71,11 +73,12 @@ struct TestResidual<'t, 'p> {
     columns: &'t Columns<'p>,
     name: &'t str,
     readings: &'t Readings,
+    channels: &'t [Channel],
     detectors: Vec<Detector>,
 }
 
 impl TestResidual<'_, '_> {
-    /// Adds a shape over each coordinate of the readings.
+    /// Adds a shape over each channel of the readings.
     fn add(&mut self, driver: &Driver, shape: Shape, description: String) {
         self.add_confined(driver, shape, false, None, description);
     }
@@ -90,12 +93,11 @@ impl TestResidual<'_, '_> {
         description: String,
     ) {
         let effect = Effect::new(Component::Reading(self.name.to_string()), driver.clone(), shape);
-        for coordinate in 0..self.readings.coordinates {
-            let column_set = self.columns.reading_columns(&effect, coordinate, by_direction, rows);
-            let description = if self.readings.coordinates == 3 {
-                format!("{description} in {}", ["x", "y", "z"][coordinate])
-            } else {
-                description.clone()
+        for (channel, label) in labels(self.channels).into_iter().enumerate() {
+            let column_set = self.columns.reading_columns(&effect, channel, by_direction, rows);
+            let description = match label {
+                "" => description.clone(),
+                label => format!("{description} in {label}"),
             };
             self.detectors.extend(column_set.map(|column_set| Detector { column_set, description }));
         }

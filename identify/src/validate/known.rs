@@ -25,8 +25,8 @@ const MAX_ROUNDS: usize = 4;
 pub(super) struct Rms {
     /// Over scalar readings.
     pub scalar_mm: f64,
-    /// Number of coordinates of a reading.
-    pub coordinates: usize,
+    /// Whether the readings are vectors.
+    pub vectors: bool,
     /// `√(χ²/ν)` of the whitened residual and of the set-up about its priors.
     pub noise_ratio: f64,
 }
@@ -160,7 +160,7 @@ impl<'m> KnownErrors<'m> {
     /// If the iterations do not converge.
     pub fn settle(&mut self, values: &[f64]) -> Result<Vec<f64>, IdentifyError> {
         let mut problem = self.problem(values);
-        let floor = problem.session.resolution_mm.unwrap_or(0.0) / 12.0_f64.sqrt();
+        let floor = problem.session.resolution_noise_mm();
         let mut beta = minimum(&problem, None)?.beta;
         for _ in 0..MAX_ROUNDS {
             let residuals = problem.residuals(&beta);
@@ -219,7 +219,7 @@ impl<'m> KnownErrors<'m> {
         let freedom = observations.saturating_sub(beta.len()).max(1) as f64;
         let rms = Rms {
             scalar_mm: rms_mm(&self.set_up, &residuals),
-            coordinates: self.set_up.coordinates(),
+            vectors: self.set_up.are_vectors(),
             noise_ratio: (problem.sum_of_squares(beta) / freedom).sqrt(),
         };
         (rms, residuals)
@@ -318,7 +318,7 @@ fn whitened_readings(problem: &Problem) -> usize {
 
 /// The noise before repeats are examined, and its source.
 fn first_noise(model: &IdentifiedModel, session: &Session) -> (Noise, NoiseSource) {
-    if let Some(sigma) = session.noise_mm.filter(|sigma| *sigma > 0.0) {
+    if let Some(sigma) = session.stated_noise_mm() {
         return (Noise::white(sigma, NoiseSource::Stated), NoiseSource::Stated);
     }
     let noise = match model.noise.source {

@@ -46,8 +46,8 @@ pub struct Validation {
     pub inside: Vec<Vec<bool>>,
     /// Excluded outliers, by test.
     pub rejected: Vec<Vec<bool>>,
-    /// Number of scalar coordinates of a reading.
-    pub coordinates: usize,
+    /// Number of channels of a reading, by test.
+    pub channels: Vec<usize>,
 }
 
 /// Validates a model on a session.
@@ -168,7 +168,7 @@ pub fn validate(model: &IdentifiedModel, session: &Session) -> Result<Validation
         predicted_mm: all.prediction.predicted_mm,
         inside,
         rejected,
-        coordinates: known.set_up.coordinates(),
+        channels: (0..known.set_up.tests.len()).map(|test| known.set_up.channels(test)).collect(),
     })
 }
 

@@ -55,11 +55,10 @@ impl Prediction {
         let freedom = at.freedom;
         let (predicted_mm, residuals) = predicted(known, at)?;
         let limit = normal_quantile((1.0 - COVERAGE) / 2.0);
-        let coordinates = known.full.coordinates();
         let (mut inside, mut count, mut sum) = (0_usize, 0_usize, 0.0);
-        for ((predicted, residuals), rejected) in predicted_mm.iter().zip(&residuals).zip(&known.full.rejected) {
+        for (test, (predicted, residuals)) in predicted_mm.iter().zip(&residuals).enumerate() {
             for (i, (deviation, residual)) in predicted.iter().zip(residuals).enumerate() {
-                if !rejected[i / coordinates] {
+                if known.full.counts(test, i) {
                     inside += usize::from(residual.abs() <= limit * deviation);
                     sum += deviation * deviation;
                     count += 1;

@@ -92,7 +92,7 @@ pub struct RmsResult {
 impl RmsResult {
     pub(super) fn of(rms: &Rms) -> RmsResult {
         let rms_um = rms.scalar_mm * 1e3;
-        let rms_3d_um = (rms.coordinates == 3).then(|| rms_um * 3.0_f64.sqrt());
+        let rms_3d_um = rms.vectors.then(|| rms_um * 3.0_f64.sqrt());
         RmsResult { rms_um, rms_3d_um, noise_ratio: rms.noise_ratio }
     }
 }

@@ -113,7 +113,7 @@ impl MachineWithErrors<'_> {
     pub fn compensate(&self, positions: &[f64]) -> Result<Compensated, IdentifyError> {
         let correction = Correction { machine: self.machine, errors: self, tool_mm: self.tool_mm, aim: Aim::Position };
         let columns = positions.iter().map(|position| vec![*position]).collect();
-        let commanded = Readings { positions: columns, coordinates: 1, ..Readings::default() };
+        let commanded = Readings { positions: columns, channels: 1, ..Readings::default() };
         let corrected = correction.correct(&commanded)?.into_iter().next();
         match corrected.map(|row| (row.state, row.condition, row.positions)) {
             Some((State::Corrected | State::BeyondTravel, _, commands)) => {

@@ -53,7 +53,7 @@ pub fn changes(mut session: Session, effects: &[Effect]) -> Changes {
     let read = |beta: &[f64]| -> Vec<f64> {
         let values = problem.slot_values(beta);
         let models = problem.models.iter().zip(&values);
-        models.flat_map(|(model, values)| model.readings_mm(values)).collect()
+        models.flat_map(|(model, values)| model.readings(values)).collect()
     };
     let list = &problem.parameters.list;
     let mut beta = vec![0.0; list.len()];
@@ -82,7 +82,7 @@ pub fn changes(mut session: Session, effects: &[Effect]) -> Changes {
         let readings = problem.tests[test].readings.as_ref().unwrap();
         for (run, rows) in readings.runs().into_iter().enumerate() {
             for _ in rows {
-                at.extend((0..model.coordinates()).map(|coordinate| At { test, run, coordinate }));
+                at.extend((0..model.channels().len()).map(|coordinate| At { test, run, coordinate }));
             }
         }
     }

@@ -127,7 +127,7 @@ fn over_time(changes: &Changes, effects: &[Effect], effect: usize, wanted: &dyn 
     let constant = constant.unwrap_or_else(|| panic!("{} has no row without its driver", own.id()));
     let readings = || changes.session.tests.iter().filter_map(|test| test.readings.as_ref());
     let times: Vec<f64> =
-        readings().flat_map(|r| r.time_s.iter().flat_map(|t| std::iter::repeat_n(*t, r.coordinates))).collect();
+        readings().flat_map(|r| r.time_s.iter().flat_map(|t| std::iter::repeat_n(*t, r.channels))).collect();
     let mean_k = times.iter().sum::<f64>() / times.len() as f64 / 3600.0;
     let times = times.iter().zip(&changes.at).filter(|(_, at)| wanted(at)).map(|(time, _)| *time);
     let still = changes.of(constant, wanted);

@@ -117,12 +117,16 @@ enum ConstantForms {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename = "instrument", deny_unknown_fields)]
 pub struct Instrument {
-    /// "ballbar", "r-test", "probe", "tracker" or "socket".
+    /// The kind of the instrument, such as "ballbar".
     pub kind: Kind,
-    /// Noise standard deviation of one scalar reading, µm; estimated if absent.
+    /// Noise standard deviation of one length, µm; estimated if absent.
     pub noise_um: Option<NotNegative>,
-    /// Resolution of a reading, µm.
+    /// Noise standard deviation of one angle, arcsec; estimated if absent.
+    pub noise_arcsec: Option<NotNegative>,
+    /// Resolution of a length, µm.
     pub resolution_um: Option<NotNegative>,
+    /// Resolution of an angle, arcsec.
+    pub resolution_arcsec: Option<NotNegative>,
 }
 
 /// The kind of an instrument, by its word.

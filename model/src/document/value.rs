@@ -212,6 +212,59 @@ impl TryFrom<Vector> for Direction {
     }
 }
 
+/// One direction of length 1, or a list of them.
+#[derive(Clone, Debug, PartialEq, JsonSchema)]
+#[schemars(inline)]
+pub struct Directions(#[schemars(with = "OneOrMoreDirections")] pub Vec<[f64; 3]>);
+
+/// The forms of directions in the schema.
+#[derive(JsonSchema)]
+#[schemars(inline, untagged)]
+#[allow(dead_code, reason = "the schema alone uses it")]
+enum OneOrMoreDirections {
+    One(Direction),
+    More(Vec<Direction>),
+}
+
+impl<'de> Deserialize<'de> for Directions {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        /// A number of one direction, or a direction of a list.
+        struct Item(Option<f64>, Option<Direction>);
+        impl<'de> Deserialize<'de> for Item {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                struct Of;
+                impl<'de> Visitor<'de> for Of {
+                    type Value = Item;
+
+                    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+                        formatter.write_str("a number or a direction")
+                    }
+
+                    fn visit_f64<E: serde::de::Error>(self, number: f64) -> Result<Item, E> {
+                        Ok(Item(Some(number), None))
+                    }
+
+                    fn visit_seq<A: SeqAccess<'de>>(self, items: A) -> Result<Item, A::Error> {
+                        let direction = Direction::deserialize(value::SeqAccessDeserializer::new(items))?;
+                        Ok(Item(None, Some(direction)))
+                    }
+                }
+                deserializer.deserialize_any(Of)
+            }
+        }
+        let items: Vec<Item> = Vec::deserialize(deserializer)?;
+        let numbers: Vec<f64> = items.iter().filter_map(|item| item.0).collect();
+        let directions: Vec<[f64; 3]> = items.iter().filter_map(|item| Some(item.1?.0)).collect();
+        let fault = || serde::de::Error::custom("neither a direction, such as [0, 0, 1], nor a list of directions");
+        if !directions.is_empty() && numbers.is_empty() {
+            return Ok(Directions(directions));
+        }
+        let vector: [f64; 3] = numbers.try_into().map_err(|_| fault())?;
+        let one = Direction::try_from(Three(vector)).map_err(serde::de::Error::custom)?;
+        if directions.is_empty() { Ok(Directions(vec![one.0])) } else { Err(fault()) }
+    }
+}
+
 /// Any number, also `inf`.
 #[derive(Deserialize, JsonSchema)]
 #[schemars(inline)]
@@ -222,6 +275,20 @@ pub struct Unlimited(f64);
 #[serde(try_from = "Unlimited")]
 #[schemars(inline, extend("minimum" = 0))]
 pub struct Uncertainty(pub f64);
+
+impl Uncertainty {
+    /// No prior.
+    pub fn unknown() -> Uncertainty {
+        Uncertainty(f64::INFINITY)
+    }
+}
+
+impl Uncertainties {
+    /// No prior.
+    pub fn unknown() -> Uncertainties {
+        Uncertainties([Uncertainty::unknown(); 3])
+    }
+}
 
 impl TryFrom<Unlimited> for Uncertainty {
     type Error = String;

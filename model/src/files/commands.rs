@@ -241,7 +241,7 @@ impl CommandFile {
         let has = |wanted: Role| self.meanings.contains(&Meaning::Of(wanted));
         let (time, run) = (has(Role::Time), has(Role::Run));
         let mut block = Block {
-            rows: Readings { positions: vec![Vec::new(); machine.axes.len()], coordinates: 1, ..Readings::default() },
+            rows: Readings { positions: vec![Vec::new(); machine.axes.len()], channels: 1, ..Readings::default() },
             poses: Vec::new(),
             cells: Vec::new(),
             lines: Vec::new(),

@@ -6,6 +6,8 @@ use crate::files::spelling::suggestion;
 
 /// A micrometre in mm.
 pub(crate) const MICROMETRE: f64 = 1e-3;
+/// An arcsecond in rad.
+pub(crate) const ARCSECOND: f64 = std::f64::consts::PI / (180.0 * 3600.0);
 /// An inch in mm (exact since 1959).
 const INCH: f64 = 25.4;
 
@@ -69,6 +71,24 @@ impl Unit {
         match self {
             Unit::Times(factor) => value / factor,
             Unit::Degrees => value.to_degrees(),
+        }
+    }
+
+    /// A unit of a column: of angle if `is_angle`, else of length.
+    pub fn of_column(unit: &str, is_angle: bool) -> Option<Unit> {
+        if is_angle { Unit::of_angle(unit) } else { Unit::of_length(unit) }
+    }
+
+    /// A unit of angle: `deg`, `arcmin`, `arcsec`, `rad`, `mrad`, `urad`.
+    fn of_angle(unit: &str) -> Option<Unit> {
+        match unit {
+            "deg" => Some(Unit::Degrees),
+            "arcmin" => Some(Unit::Times(60.0 * ARCSECOND)),
+            "arcsec" => Some(Unit::Times(ARCSECOND)),
+            "rad" => Some(Unit::Times(1.0)),
+            "mrad" => Some(Unit::Times(1e-3)),
+            "urad" => Some(Unit::Times(1e-6)),
+            _ => None,
         }
     }
 

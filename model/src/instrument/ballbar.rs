@@ -6,6 +6,7 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::kind::{MAX_MM, median};
 use super::set_up::{self, SetUp};
@@ -43,8 +44,9 @@ pub(super) const ENTRY: Entry = Entry {
     word: "ballbar",
     parameters: &PARAMETERS,
     free: None,
-    coordinates: 1,
     is_two_sided: true,
+    reads_poses: false,
+    rows_can_lack_channels: false,
     has_readings: true,
     needs_every_axis: false,
     default_errors: default_errors::positions_and_orientations,
@@ -52,6 +54,9 @@ pub(super) const ENTRY: Entry = Entry {
     keys: schema::properties::<Keys>,
     read,
 };
+
+/// The channels.
+const CHANNELS: [Channel; 1] = [Channel::length("length")];
 
 /// The columns of a ball bar.
 const COLUMNS: [Column; 2] =
@@ -104,10 +109,10 @@ fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
 /// let none = vec![BodyErrors::<f64>::NONE; 3];
 /// let bar = BallBar { workpiece_ball: [0.0; 3], spindle_ball: [60.0, 0.0, 80.0], bar: 100.0 };
 /// let station = Station::BallBar(bar);
-/// assert_eq!(station.read(&machine, &state, &none, |_| None).coordinates(), [100.0]);
+/// assert_eq!(station.read(&machine, &state, &none, |_| None).channels(), [100.0]);
 /// // A bar that is 2 µm longer than stated reads 2 µm less.
 /// let longer = |unknown| (unknown == BAR).then_some(0.002);
-/// assert_eq!(station.read(&machine, &state, &none, longer).coordinates(), [99.998]);
+/// assert_eq!(station.read(&machine, &state, &none, longer).channels(), [99.998]);
 /// # Ok::<(), abbe_model::ModelError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -162,7 +167,7 @@ impl<N> Geometry<N> for BallBar<N> {
             Some(bar) => distance - bar,
             None => distance,
         };
-        Reading::length(match unknown(GAIN) {
+        Reading::scalar(match unknown(GAIN) {
             Some(gain) => length + gain * (distance - self.bar),
             None => length,
         })
@@ -176,6 +181,12 @@ impl<N> Geometry<N> for BallBar<N> {
 }
 
 impl Instrument for BallBar<f64> {
+    fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
+        [Some(&mut self.workpiece_ball), Some(&mut self.spindle_ball)]
+    }
+    fn channels(&self) -> &[Channel] {
+        &CHANNELS
+    }
     fn columns(&self) -> &'static [Column] {
         &COLUMNS
     }
@@ -197,7 +208,7 @@ impl Instrument for BallBar<f64> {
     fn check_set_up(&self, checked: &Checked<'_>) -> Result<(), Fault> {
         let mut deviations: Vec<f64> = Vec::with_capacity(checked.readings.rows());
         for (row, reading) in checked.nominal(self).enumerate() {
-            let length = reading.coordinates()[0];
+            let length = reading.channels()[0];
             // A length of zero has no direction, so that no error changes it to first order.
             if length < MIN_MM {
                 return Err((

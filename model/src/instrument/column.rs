@@ -9,10 +9,23 @@ pub enum Quantity {
     Deviation,
     /// Against the probing direction: the distance by which the surface lies beyond the target.
     Outward,
-    /// One coordinate of a vector.
-    Coordinate(usize),
+    /// The value of a channel.
+    Channel(usize),
+    /// The value of a channel less the nominal reading.
+    FromNominal(usize),
     /// The name of the socket; it has no unit.
     Socket,
+}
+
+impl Quantity {
+    /// The channel that the column holds, among all that the instrument can have.
+    pub(crate) fn channel(self) -> Option<usize> {
+        match self {
+            Quantity::Length | Quantity::Deviation | Quantity::Outward => Some(0),
+            Quantity::Channel(channel) | Quantity::FromNominal(channel) => Some(channel),
+            Quantity::Socket => None,
+        }
+    }
 }
 
 /// A column of readings.
@@ -20,7 +33,7 @@ pub enum Quantity {
 pub struct Column {
     /// Its name without the unit.
     pub stem: &'static str,
-    /// The unit in which messages name it; empty for a column without one. A file may use any unit of length.
+    /// The unit in which messages name it; empty for a column without one. A file may use any unit of length or angle.
     pub unit: &'static str,
     /// What it holds.
     pub quantity: Quantity,
@@ -34,8 +47,13 @@ impl Column {
     /// Three coordinates.
     pub(super) const fn vector(stems: [&'static str; 3], unit: &'static str) -> [Column; 3] {
         let [x, y, z] = stems;
-        let coordinate = Quantity::Coordinate;
-        [Column::new(x, unit, coordinate(0)), Column::new(y, unit, coordinate(1)), Column::new(z, unit, coordinate(2))]
+        let channel = Quantity::Channel;
+        [Column::new(x, unit, channel(0)), Column::new(y, unit, channel(1)), Column::new(z, unit, channel(2))]
+    }
+
+    /// Whether it is an angle.
+    pub(crate) fn is_angle(&self) -> bool {
+        matches!(self.unit, "arcsec" | "deg")
     }
 
     /// Its name, with a unit if it has one.

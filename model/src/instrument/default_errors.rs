@@ -18,6 +18,30 @@ pub(super) fn all_locations(machine: &Machine) -> Vec<ErrorName> {
     errors
 }
 
+/// None: the readings determine error motions of the axis that moves, which are declared as effects or found by a search.
+pub(super) fn none(_: &Machine) -> Vec<ErrorName> {
+    Vec::new()
+}
+
+/// The orientation errors of every rotary axis, those about its own direction included: an index error. The rotation about
+/// the direction of the axis before is excluded, because it is confounded with that axis' index error.
+pub(super) fn orientations(machine: &Machine) -> Vec<ErrorName> {
+    let rotary: Vec<usize> =
+        (0..machine.axes.len()).filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary).collect();
+    let mut errors = Vec::new();
+    for (place, axis) in rotary.iter().enumerate() {
+        let before = place.checked_sub(1).map(|place| machine.axes[rotary[place]].own_freedom().index() % 3);
+        let freedoms = Freedom::ALL.into_iter().filter(|freedom| freedom.index() >= 3);
+        let own = freedoms.filter(|freedom| Some(freedom.index() % 3) != before);
+        errors.extend(own.map(|freedom| ErrorName {
+            kind: ErrorKind::Location,
+            freedom,
+            axis: machine.axes[*axis].name.clone(),
+        }));
+    }
+    errors
+}
+
 /// The position and orientation errors of every rotary axis, in alphabetical order of the axes. The two location errors
 /// in the axis' own degrees of freedom are excluded, because its own motion is confounded with them.
 pub(super) fn positions_and_orientations(machine: &Machine) -> Vec<ErrorName> {

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::set_up::SetUp;
 use super::{InstrumentKind, InstrumentParameter, Reading, SharedBy, Station};
@@ -10,6 +11,7 @@ use crate::component::ErrorName;
 use crate::document::Fault as KeyFault;
 use crate::document::node::Node;
 use crate::scalar::{Nominal, Scalar};
+use crate::session::Prior;
 use crate::session::expression::Constant;
 use crate::session::readings::Readings;
 
@@ -24,10 +26,12 @@ pub struct Entry {
     /// The object that stands at a place that no session knows: its parameters have no prior by default. All others are
     /// known exactly.
     pub free: Option<&'static str>,
-    /// Number of scalar coordinates of a reading.
-    pub coordinates: usize,
     /// Whether a reading connects a point of the table and a point of the tool, so that errors of both sides affect it.
     pub is_two_sided: bool,
+    /// Whether readings without runs are independent poses.
+    pub reads_poses: bool,
+    /// Whether a row may lack the value of a channel.
+    pub rows_can_lack_channels: bool,
     /// Whether it has readings of its own; otherwise the positions of the axes are all that is read.
     pub has_readings: bool,
     /// Whether data must give the position of every axis. Otherwise the axes that move are enough.
@@ -59,6 +63,10 @@ pub trait Geometry<N> {
     ) -> Reading<S>
     where
         N: Nominal;
+    /// Keeps the channels for which data have a column, for an instrument whose channels the data determine.
+    fn keep_channels(&mut self, has: &dyn Fn(Quantity) -> bool) {
+        let _ = has;
+    }
     /// The instrument's point in the table frame, mm, if it has one.
     fn table_point_mm(&self) -> Option<&[N; 3]>;
     /// The instrument's point in the tool frame, mm.
@@ -104,8 +112,32 @@ impl Checked<'_> {
 
 /// Everything that is particular to one instrument as set up for a test, except its reading: see [`Geometry`].
 pub trait Instrument {
+    /// The channels of a reading, in order.
+    fn channels(&self) -> &[Channel];
+    /// The place among the channels of one of all that the instrument can have; `None` if the data have no column of
+    /// it.
+    fn kept_channel(&self, of_all: usize) -> Option<usize> {
+        Some(of_all)
+    }
+    /// Sets the priors of parameters that only absent channels have to known.
+    fn absent_channels_known(&self, priors: &mut [Prior]) {
+        let _ = priors;
+    }
     /// The columns of its readings in data files.
     fn columns(&self) -> &'static [Column];
+    /// Whether a channel refers to the nominal reading at the state of the axes, so that its value is another than that
+    /// of its column.
+    fn refers_to_nominal(&self) -> bool {
+        false
+    }
+    /// The values of the channels at a state of the axes, from those of the columns, if they differ.
+    fn channels_of_columns(&self, machine: &Machine, state: &[AxisPosition<f64>], values: &mut [f64]) {
+        let _ = (machine, state, values);
+    }
+    /// The inverse of [`Instrument::channels_of_columns`].
+    fn columns_of_channels(&self, machine: &Machine, state: &[AxisPosition<f64>], values: &mut [f64]) {
+        let _ = (machine, state, values);
+    }
     /// What data lack: the columns and what to do. `has` says whether there is a column of a quantity.
     fn missing(&self, has: &dyn Fn(Quantity) -> bool) -> Option<Fault>;
 
@@ -113,10 +145,6 @@ pub trait Instrument {
     fn help_on_column(&self, stem: &str) -> Option<&'static str> {
         let _ = stem;
         None
-    }
-    /// The names of the coordinates of a vector reading in results.
-    fn coordinate_names(&self) -> [&'static str; 3] {
-        ["x", "y", "z"]
     }
     /// The length to which deviations refer, mm; 0 without one.
     fn reference_mm(&self) -> f64 {
@@ -140,11 +168,23 @@ pub trait Instrument {
     fn balls_mut(&mut self) -> Option<[&mut [f64; 3]; 2]> {
         None
     }
+    /// Its point on the table and its point on the tool, if they are its own.
+    fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
+        [None, None]
+    }
     /// Checks that the instrument nominally fits at the positions of the readings.
     ///
     /// # Errors
     /// If it does not.
     fn check_set_up(&self, checked: &Checked<'_>) -> Result<(), Fault> {
+        let _ = checked;
+        Ok(())
+    }
+    /// Checks the readings against the nominal set-up.
+    ///
+    /// # Errors
+    /// If they cannot be readings of it.
+    fn check_readings(&self, checked: &Checked<'_>) -> Result<(), Fault> {
         let _ = checked;
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! Instruments: readings as functions of chain and state, over the open scalar. Each file holds one; the registry below
 //! lists them.
 
+pub mod channel;
 pub mod column;
 mod default_errors;
 mod kind;
@@ -11,6 +12,8 @@ pub use kind::{Checked, Entry, Fault, Following, Geometry, Instrument};
 pub use parameter::{InstrumentParameter, InternalUnit, SharedBy};
 
 use std::ops::{Deref, DerefMut};
+
+use column::Quantity;
 
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::component::ErrorName;
@@ -97,6 +100,13 @@ macro_rules! instruments {
                     $(Station::$kind(geometry) => *geometry.tool_point_mm(),)+
                 }
             }
+
+            /// Keeps the channels for which data have a column; see [`Geometry::keep_channels`].
+            pub fn keep_channels(&mut self, has: &dyn Fn(Quantity) -> bool) {
+                match self {
+                    $(Station::$kind(geometry) => geometry.keep_channels(has),)+
+                }
+            }
         }
 
         impl Deref for Station<f64> {
@@ -130,6 +140,14 @@ instruments! {
     tracker: Tracker,
     /// A ball in fixed sockets.
     socket: Socket,
+    /// A laser interferometer: displacement, straightness, angles.
+    laser: Laser,
+    /// A sensor of angles: autocollimator, level, encoder.
+    angle: Angle,
+    /// A distance from an unknown place.
+    distance: Distance,
+    /// The pointing of a mount.
+    pointing: Pointing,
 }
 
 impl InstrumentKind {
@@ -146,11 +164,6 @@ impl InstrumentKind {
     /// Whether a reading connects a point of the table and a point of the tool, so that errors of both sides affect it.
     pub fn is_two_sided(self) -> bool {
         self.entry().is_two_sided
-    }
-
-    /// Number of scalar coordinates of a reading.
-    pub fn coordinates(self) -> usize {
-        self.entry().coordinates
     }
 
     /// The instrument's parameters in the order of its slots.
@@ -185,27 +198,34 @@ impl Station<f64> {
     }
 }
 
-/// The scalar coordinates of one reading in mm: one length, or three coordinates.
+/// Largest number of channels of an instrument.
+pub const MAX_CHANNELS: usize = 6;
+
+/// The values of the channels of one reading, mm or rad.
 #[derive(Clone, Copy, Debug)]
 pub struct Reading<S> {
-    values: [S; 3],
+    values: [S; MAX_CHANNELS],
     count: usize,
 }
 
 impl<S: Scalar> Reading<S> {
-    /// A reading of one length.
-    pub fn length(value: S) -> Self {
-        let zero = S::constant(0.0);
-        Reading { values: [value, zero, zero], count: 1 }
+    /// A reading of one channel.
+    pub fn scalar(value: S) -> Self {
+        Reading::of([value])
     }
 
-    /// A reading of three coordinates.
-    pub fn vector(values: [S; 3]) -> Self {
-        Reading { values, count: 3 }
+    /// The values of at most [`MAX_CHANNELS`] channels.
+    pub fn of(values: impl IntoIterator<Item = S>) -> Self {
+        let mut reading = Reading { values: [S::constant(0.0); MAX_CHANNELS], count: 0 };
+        for (place, value) in reading.values.iter_mut().zip(values) {
+            *place = value;
+            reading.count += 1;
+        }
+        reading
     }
 
-    /// The coordinates.
-    pub fn coordinates(&self) -> &[S] {
+    /// The values, one for each channel.
+    pub fn channels(&self) -> &[S] {
         &self.values[..self.count]
     }
 }

@@ -15,6 +15,7 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::kind::MAX_MM;
 use super::set_up::{self, SetUp, Written};
@@ -25,7 +26,7 @@ use super::{
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
-use crate::frames::Point;
+use crate::frames::{Point, dot};
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
 use crate::session::expression::Constant;
@@ -57,8 +58,9 @@ pub(super) const ENTRY: Entry = Entry {
     word: "probe",
     parameters: &PARAMETERS,
     free: None,
-    coordinates: 1,
     is_two_sided: true,
+    reads_poses: false,
+    rows_can_lack_channels: false,
     has_readings: true,
     needs_every_axis: true,
     default_errors: default_errors::positions_and_orientations,
@@ -66,6 +68,9 @@ pub(super) const ENTRY: Entry = Entry {
     keys: schema::properties::<Keys>,
     read,
 };
+
+/// The channels.
+const CHANNELS: [Channel; 1] = [Channel::length("distance")];
 
 /// The columns of a probe.
 const COLUMNS: [Column; 2] =
@@ -241,7 +246,7 @@ impl<N> Geometry<N> for Probe<N> {
     where
         N: Nominal,
     {
-        Reading::length(self.geometry(machine, state, errors, unknown).distance())
+        Reading::scalar(self.geometry(machine, state, errors, unknown).distance())
     }
     fn table_point_mm(&self) -> Option<&[N; 3]> {
         Some(&self.artefact)
@@ -252,6 +257,12 @@ impl<N> Geometry<N> for Probe<N> {
 }
 
 impl Instrument for Probe<f64> {
+    fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
+        [Some(&mut self.artefact), Some(&mut self.stylus)]
+    }
+    fn channels(&self) -> &[Channel] {
+        &CHANNELS
+    }
     fn columns(&self) -> &'static [Column] {
         &COLUMNS
     }
@@ -263,7 +274,7 @@ impl Instrument for Probe<f64> {
     /// The stylus is in front of the artefact and near it at every reading.
     fn check_set_up(&self, checked: &Checked<'_>) -> Result<(), Fault> {
         for (row, reading) in checked.nominal(self).enumerate() {
-            let distance = reading.coordinates()[0];
+            let distance = reading.channels()[0];
             if distance.abs() <= MAX_MM {
                 continue;
             }
@@ -281,11 +292,6 @@ impl Instrument for Probe<f64> {
         }
         Ok(())
     }
-}
-
-fn dot<S: Scalar>(a: Point<S>, b: Point<S>) -> S {
-    let ([a, b, c], [x, y, z]) = (a.0, b.0);
-    a * x + b * y + c * z
 }
 
 /// The component of `v` perpendicular to the unit vector `along`.

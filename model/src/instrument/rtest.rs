@@ -17,6 +17,7 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::kind::{MAX_MM, median};
 use super::set_up::{self, SetUp, Written};
@@ -52,8 +53,9 @@ pub(super) const ENTRY: Entry = Entry {
     word: "r-test",
     parameters: &PARAMETERS,
     free: None,
-    coordinates: 3,
     is_two_sided: true,
+    reads_poses: false,
+    rows_can_lack_channels: false,
     has_readings: true,
     needs_every_axis: true,
     default_errors: default_errors::positions_and_orientations,
@@ -61,6 +63,10 @@ pub(super) const ENTRY: Entry = Entry {
     keys: schema::properties::<Keys>,
     read,
 };
+
+/// The channels.
+const VECTOR_CHANNELS: [Channel; 3] = Channel::vector(["dx", "dy", "dz"]);
+const SENSOR_CHANNELS: [Channel; 3] = Channel::vector(["du", "dv", "dw"]);
 
 /// The columns of a vector in the frame that carries the sensors, and those of the single sensors.
 const VECTOR: [Column; 3] = Column::vector(["dx", "dy", "dz"], "um");
@@ -287,10 +293,10 @@ impl<N> Geometry<N> for RTest<N> {
             vector = Orientation::new(angles, machine.rotation).to_sensors(vector);
         }
         let Some(sensors) = &self.sensors else {
-            return Reading::vector(vector.0);
+            return Reading::of(vector.0);
         };
         let [x, y, z] = vector.0;
-        Reading::vector(sensors.map(|[a, b, c]| x * a + y * b + z * c))
+        Reading::of(sensors.map(|[a, b, c]| x * a + y * b + z * c))
     }
     fn table_point_mm(&self) -> Option<&[N; 3]> {
         Some(&self.workpiece_ball)
@@ -313,6 +319,12 @@ impl RTest<f64> {
 }
 
 impl Instrument for RTest<f64> {
+    fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
+        [Some(&mut self.workpiece_ball), Some(&mut self.spindle_ball)]
+    }
+    fn channels(&self) -> &[Channel] {
+        if self.sensors.is_some() { &SENSOR_CHANNELS } else { &VECTOR_CHANNELS }
+    }
     fn columns(&self) -> &'static [Column] {
         if self.sensors.is_some() { &SENSORS } else { &VECTOR }
     }
@@ -323,10 +335,6 @@ impl Instrument for RTest<f64> {
     fn help_on_column(&self, stem: &str) -> Option<&'static str> {
         let other = if self.sensors.is_some() { &VECTOR } else { &SENSORS };
         other.iter().any(|column| column.stem == stem).then(|| self.columns_help())
-    }
-    fn coordinate_names(&self) -> [&'static str; 3] {
-        let columns = if self.sensors.is_some() { &SENSORS } else { &VECTOR };
-        columns.each_ref().map(|column| column.stem)
     }
     fn sensors(&self) -> SharedBy {
         match self.setting {
@@ -346,7 +354,7 @@ impl Instrument for RTest<f64> {
     /// The master ball is nominally in the nest at every reading.
     fn check_set_up(&self, checked: &Checked<'_>) -> Result<(), Fault> {
         for (row, reading) in checked.nominal(self).enumerate() {
-            let apart = reading.coordinates().iter().map(|x| x * x).sum::<f64>().sqrt();
+            let apart = reading.channels().iter().map(|x| x * x).sum::<f64>().sqrt();
             if apart > MAX_MM {
                 return Err((
                     format!(
@@ -387,7 +395,7 @@ mod tests {
     use super::*;
 
     fn three(reading: Reading<f64>) -> [f64; 3] {
-        std::array::from_fn(|i| reading.coordinates()[i])
+        std::array::from_fn(|i| reading.channels()[i])
     }
 
     /// Each sensor angle transforms the reading by the transpose of its own matrix above, and by nothing else.

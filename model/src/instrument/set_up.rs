@@ -9,12 +9,10 @@ use crate::document::fault::{Fault, Within};
 use crate::document::node::Node;
 use crate::document::value::{self as document, Point, Three, Uncertainties, Uncertainty};
 use crate::document::{from_node, schema};
+use crate::files::quantity::{ARCSECOND, MICROMETRE};
 use crate::session::Prior;
 use crate::session::expression::{Constant, Length};
 use crate::session::limits;
-
-/// A micrometre in mm.
-const MICROMETRE: f64 = 1e-3;
 
 /// A nominal length, as written and in mm.
 #[derive(Clone, Debug)]
@@ -85,8 +83,12 @@ pub(super) fn length(u: Uncertainty) -> Prior {
 
 /// Priors of angles from their uncertainties, arcsec.
 pub(super) fn angles(Uncertainties(u): &Uncertainties) -> impl Iterator<Item = Prior> {
-    const ARCSECOND: f64 = std::f64::consts::PI / (180.0 * 3600.0);
-    u.map(|u| prior(u, ARCSECOND)).into_iter()
+    u.map(angle).into_iter()
+}
+
+/// The prior of an angle from its uncertainty, arcsec.
+pub(super) fn angle(u: Uncertainty) -> Prior {
+    prior(u, ARCSECOND)
 }
 
 fn prior(Uncertainty(u): Uncertainty, unit: f64) -> Prior {

@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::set_up::{self, SetUp, Written};
 use super::{
@@ -34,8 +35,9 @@ pub(super) const ENTRY: Entry = Entry {
     word: "socket",
     parameters: &PARAMETERS,
     free: Some("socket"),
-    coordinates: 3,
     is_two_sided: false,
+    reads_poses: true,
+    rows_can_lack_channels: false,
     has_readings: false,
     needs_every_axis: true,
     default_errors: default_errors::all_locations,
@@ -44,6 +46,9 @@ pub(super) const ENTRY: Entry = Entry {
     keys: schema::properties::<Keys>,
     read,
 };
+
+/// The channels.
+const CHANNELS: [Channel; 3] = Channel::vector(["x", "y", "z"]);
 
 /// The column of a socket: a pose consists of axis positions only.
 const COLUMNS: [Column; 1] = [Column::new("socket", "", Quantity::Socket)];
@@ -106,7 +111,7 @@ impl<N> Geometry<N> for Socket<N> {
         N: Nominal,
     {
         let ball = machine.tool_point(state, errors, displaced(self.ball, 3, &unknown));
-        Reading::vector(ball.minus(displaced(self.socket, 0, &unknown)).0)
+        Reading::of(ball.minus(displaced(self.socket, 0, &unknown)).0)
     }
     fn table_point_mm(&self) -> Option<&[N; 3]> {
         None
@@ -117,6 +122,12 @@ impl<N> Geometry<N> for Socket<N> {
 }
 
 impl Instrument for Socket<f64> {
+    fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
+        [None, Some(&mut self.ball)]
+    }
+    fn channels(&self) -> &[Channel] {
+        &CHANNELS
+    }
     fn columns(&self) -> &'static [Column] {
         &COLUMNS
     }

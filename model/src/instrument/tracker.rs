@@ -7,6 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::set_up::{self, SetUp, Written};
 use super::{
@@ -38,8 +39,9 @@ pub(super) const ENTRY: Entry = Entry {
     word: "tracker",
     parameters: &PARAMETERS,
     free: Some("tracker"),
-    coordinates: 3,
     is_two_sided: false,
+    reads_poses: true,
+    rows_can_lack_channels: false,
     has_readings: true,
     needs_every_axis: true,
     default_errors: default_errors::all_locations,
@@ -47,6 +49,9 @@ pub(super) const ENTRY: Entry = Entry {
     keys: schema::properties::<Keys>,
     read,
 };
+
+/// The channels.
+const CHANNELS: [Channel; 3] = Channel::vector(["x", "y", "z"]);
 
 /// The columns of a tracker.
 const COLUMNS: [Column; 3] = Column::vector(["px", "py", "pz"], "mm");
@@ -107,7 +112,7 @@ impl<N> Geometry<N> for Tracker<N> {
             point = pose.push(point);
         }
         let [x, y, z] = point.0;
-        Reading::vector(std::array::from_fn(|i| {
+        Reading::of((0..3).map(|i| {
             let [a, b, c] = self.rotation[i];
             x * a + y * b + z * c + self.origin[i]
         }))
@@ -121,6 +126,12 @@ impl<N> Geometry<N> for Tracker<N> {
 }
 
 impl Instrument for Tracker<f64> {
+    fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
+        [None, Some(&mut self.target)]
+    }
+    fn channels(&self) -> &[Channel] {
+        &CHANNELS
+    }
     fn columns(&self) -> &'static [Column] {
         &COLUMNS
     }

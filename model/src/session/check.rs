@@ -5,7 +5,7 @@
 use super::readings::Readings;
 use super::{Test, planned, plausibility, runs};
 use crate::chain::Machine;
-use crate::instrument::Fault;
+use crate::instrument::{Checked, Fault};
 
 /// Least number of readings of a test.
 pub(crate) const MIN_READINGS: usize = 2;
@@ -34,6 +34,7 @@ pub(crate) fn plan(machine: &Machine, test: &Test) -> Result<(), Fault> {
 pub(crate) fn readings(machine: &Machine, test: &Test, readings: &Readings) -> Result<Vec<String>, Fault> {
     plausibility::check(machine, test, readings)?;
     test.station.check_observed(&test.name, &readings.observed)?;
+    test.station.check_readings(&Checked { machine, test: &test.name, readings })?;
     let doubts = [
         planned::beyond_travel(machine, readings),
         planned::many_turns(machine, readings),

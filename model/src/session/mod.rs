@@ -28,6 +28,9 @@ use expression::Constant;
 use readings::Readings;
 use tolerance::Tolerance;
 
+/// The lever at which one arcsecond is one micrometre, mm.
+pub const NATURAL_LEVER_MM: f64 = 1e-3 * 180.0 * 3600.0 / std::f64::consts::PI;
+
 /// A validated session. Lengths in mm, angles in rad.
 #[derive(Clone, Debug)]
 pub struct Session {
@@ -37,10 +40,17 @@ pub struct Session {
     pub constants: Vec<Constant>,
     /// The instrument.
     pub instrument: InstrumentKind,
-    /// Standard deviation of one scalar reading, mm; `None` if it is to be estimated.
+    /// Standard deviation of one length, mm; `None` if it is to be estimated.
     pub noise_mm: Option<f64>,
-    /// Resolution of a reading, mm.
+    /// Standard deviation of one angle, rad; `None` if it is to be estimated.
+    pub noise_rad: Option<f64>,
+    /// The length at which an angle of one radian has the noise of a length, mm. By default
+    /// [`NATURAL_LEVER_MM`].
+    pub lever_mm: f64,
+    /// Resolution of a length, mm.
     pub resolution_mm: Option<f64>,
+    /// Resolution of an angle, rad.
+    pub resolution_rad: Option<f64>,
     /// The errors to be estimated.
     pub unknowns: Vec<ErrorName>,
     /// The effects that the user declares.
@@ -69,7 +79,10 @@ impl Session {
             constants: Vec::new(),
             instrument,
             noise_mm: None,
+            noise_rad: None,
+            lever_mm: NATURAL_LEVER_MM,
             resolution_mm: None,
+            resolution_rad: None,
             effects: Vec::new(),
             tests: Vec::new(),
             socket_distances: Vec::new(),
@@ -78,6 +91,30 @@ impl Session {
             warnings: Vec::new(),
             about: Vec::new(),
         }
+    }
+
+    /// Whether a channel of a test is a length, and whether one is an angle.
+    pub fn units(&self) -> ChannelUnits {
+        let channels = || self.tests.iter().flat_map(|test| test.station.channels());
+        ChannelUnits {
+            lengths: channels().any(|channel| !channel.is_angle()),
+            angles: channels().any(|channel| channel.is_angle()),
+        }
+    }
+
+    /// The stated standard deviation of a channel, mm; of an angle at [`Session::lever_mm`].
+    pub fn stated_noise_mm(&self) -> Option<f64> {
+        let lengths = self.noise_mm.filter(|_| !self.units().only_angles());
+        let angles = || Some(self.noise_rad? * self.lever_mm);
+        lengths.or_else(angles).filter(|sigma| *sigma > 0.0)
+    }
+
+    /// The standard deviation that the resolution of the channels causes, mm; of an angle at [`Session::lever_mm`].
+    pub fn resolution_noise_mm(&self) -> f64 {
+        let units = self.units();
+        let lengths = self.resolution_mm.filter(|_| units.lengths).unwrap_or(0.0);
+        let angles = self.resolution_rad.filter(|_| units.angles).unwrap_or(0.0) * self.lever_mm;
+        lengths.max(angles) / 12.0_f64.sqrt()
     }
 
     /// Reference time and temperature, from which the drivers of effects count.
@@ -91,6 +128,22 @@ impl Session {
             test.readings = Some(Arc::new(readings));
         }
         self
+    }
+}
+
+/// The units of the channels of a session.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ChannelUnits {
+    /// Whether a channel is a length.
+    pub lengths: bool,
+    /// Whether a channel is an angle.
+    pub angles: bool,
+}
+
+impl ChannelUnits {
+    /// Whether all channels are angles.
+    pub fn only_angles(self) -> bool {
+        self.angles && !self.lengths
     }
 }
 

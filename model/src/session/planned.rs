@@ -57,8 +57,8 @@ pub(crate) fn checked_plan(machine: &Machine, test: &Test) -> Result<Readings, (
         }
         Some(motion) => trajectory::states(machine, test, motion)?,
     };
-    readings.coordinates = test.station.kind().coordinates();
-    readings.observed = vec![0.0; readings.rows() * readings.coordinates];
+    readings.channels = test.station.channels().len();
+    readings.observed = vec![0.0; readings.rows() * readings.channels];
     match beyond_travel(machine, &readings) {
         None => Ok(readings),
         Some(beyond) => Err((

@@ -91,7 +91,7 @@ fn misfit(machine: &Machine, test: &Test, readings: &Readings) -> f64 {
         readings.state(machine, row, &mut state);
         let reading = test.station.read::<f64>(machine, &state, &none, |_| None);
         let nominal = test.station.reference_mm();
-        sum += reading.coordinates().iter().map(|x| (x - nominal).powi(2)).sum::<f64>();
+        sum += reading.channels().iter().map(|x| (x - nominal).powi(2)).sum::<f64>();
     }
     (sum / readings.rows().max(1) as f64).sqrt()
 }

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use crate::axis::AxisKind;
-use crate::chain::{AxisPosition, Machine};
+use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::driver::DriverSample;
+use crate::instrument::{Reading, Station};
 
 /// The file of readings, for messages about single readings.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -29,9 +30,9 @@ pub struct Readings {
     pub drivers: BTreeMap<String, Vec<f64>>,
     /// Position of every axis of the machine: `positions[axis][row]`.
     pub positions: Vec<Vec<f64>>,
-    /// Number of scalar coordinates of a reading: 1 or 3.
-    pub coordinates: usize,
-    /// The observed values, row by row, `coordinates` each, mm.
+    /// Number of channels of a reading.
+    pub channels: usize,
+    /// The observed values, row by row, one for each channel, mm or rad; NaN for a value that was not read.
     pub observed: Vec<f64>,
     /// The travel of every axis before the first row, if the rows continue others of the same run; otherwise empty.
     pub travel_before: Vec<AxisTravel>,
@@ -69,6 +70,39 @@ impl Readings {
         self.positions.first().map_or(0, Vec::len)
     }
 
+    /// Whether the value of a channel was read in a row.
+    pub fn was_read(&self, row: usize, channel: usize) -> bool {
+        self.observed.get(row * self.channels + channel).is_none_or(|value| !value.is_nan())
+    }
+
+    /// The nominal reading of an instrument in a row.
+    pub fn nominal(&self, machine: &Machine, station: &Station<f64>, row: usize) -> Reading<f64> {
+        let mut state = Vec::new();
+        self.state(machine, row, &mut state);
+        let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
+        station.read::<f64>(machine, &state, &none, |_| None)
+    }
+
+    /// Turns the observed values of the columns into those of the channels, for channels that refer to the nominal
+    /// reading.
+    pub fn columns_to_channels(&mut self, machine: &Machine, station: &Station<f64>) {
+        self.change(machine, |state, values| station.channels_of_columns(machine, state, values));
+    }
+
+    /// The inverse of [`Readings::columns_to_channels`].
+    pub fn channels_to_columns(&mut self, machine: &Machine, station: &Station<f64>) {
+        self.change(machine, |state, values| station.columns_of_channels(machine, state, values));
+    }
+
+    fn change(&mut self, machine: &Machine, change: impl Fn(&[AxisPosition<f64>], &mut [f64])) {
+        let (mut state, mut observed) = (Vec::new(), std::mem::take(&mut self.observed));
+        for (row, values) in observed.chunks_exact_mut(self.channels.max(1)).enumerate() {
+            self.state(machine, row, &mut state);
+            change(&state, values);
+        }
+        self.observed = observed;
+    }
+
     /// Line of a row in the file of the readings, from 1; `None` for readings that come from no file.
     pub fn line(&self, row: usize) -> Option<usize> {
         self.origin.as_ref()?.line.get(row).copied()
@@ -91,12 +125,12 @@ impl Readings {
             time_s: of(&self.time_s, rows),
             drivers: self.drivers.iter().map(|(name, values)| (name.clone(), of(values, rows))).collect(),
             positions: self.positions.iter().map(|column| of(column, rows)).collect(),
-            coordinates: self.coordinates,
+            channels: self.channels,
             observed: rows
                 .iter()
                 .flat_map(|&row| {
-                    let start = row * self.coordinates;
-                    self.observed.get(start..start + self.coordinates).unwrap_or(&[])
+                    let start = row * self.channels;
+                    self.observed.get(start..start + self.channels).unwrap_or(&[])
                 })
                 .copied()
                 .collect(),

@@ -94,8 +94,8 @@ fn worst(machine: &Machine, station: Station<f64>, random: &mut impl Rng) -> f64
     let slots: Vec<usize> = (0..model.slots()).collect();
     let values = errors(model.slots(), machine, kind, random);
     let found = model.sensitivities(&values, &slots, 0..model.rows());
-    assert_eq!(found.readings_mm.len(), model.rows() * model.coordinates());
-    for (found, plain) in found.readings_mm.iter().zip(model.readings_mm(&values)) {
+    assert_eq!(found.readings.len(), model.rows() * model.channels().len());
+    for (found, plain) in found.readings.iter().zip(model.readings(&values)) {
         assert!((found - plain).abs() <= 1e-12 * plain.abs(), "{found} {plain}");
     }
     let mut worst = 0.0_f64;
@@ -104,7 +104,7 @@ fn worst(machine: &Machine, station: Station<f64>, random: &mut impl Rng) -> f64
         let at = |value: f64| {
             let mut moved = values.clone();
             moved.constant[slot] += value;
-            model.readings_mm(&moved)
+            model.readings(&moved)
         };
         for ((above, below), derivative) in at(step).iter().zip(&at(-step)).zip(&found.derivatives[slot]) {
             let difference = (above - below) / (2.0 * step);
@@ -172,10 +172,10 @@ fn worst_against_duals(machine: &Machine, station: Station<f64>, random: &mut im
             let dual = |slot: usize| Dual64::new(value(slot), if slot == *seed { 1.0 } else { 0.0 });
             let bodies = machine.body_errors(|_| true, dual);
             let reading = station.read(machine, &state, &bodies, |unknown| Some(dual(machine.error_slots() + unknown)));
-            for (coordinate, expected) in reading.coordinates().iter().enumerate() {
-                let scalar = (row - range.start) * model.coordinates() + coordinate;
+            for (coordinate, expected) in reading.channels().iter().enumerate() {
+                let scalar = (row - range.start) * model.channels().len() + coordinate;
                 let off = (found.derivatives[place][scalar] - expected.eps).abs() / expected.eps.abs().max(1.0);
-                let value_off = (found.readings_mm[scalar] - expected.re).abs() / expected.re.abs().max(1.0);
+                let value_off = (found.readings[scalar] - expected.re).abs() / expected.re.abs().max(1.0);
                 worst = worst.max(off).max(value_off);
             }
         }
@@ -223,7 +223,7 @@ fn the_first_order_of_the_bar_is_the_closed_form() {
             let (sc, cc) = readings.positions[machine.axis_index("C").unwrap()][row].sin_cos();
             let (sa, ca) = readings.positions[machine.axis_index("A").unwrap()][row].sin_cos();
             let length = (r * r + d * d + h * h - 2.0 * r * d * sc).sqrt();
-            assert!((found.readings_mm[row] - length).abs() < 1e-10 * length.max(1.0));
+            assert!((found.readings[row] - length).abs() < 1e-10 * length.max(1.0));
             let (y, z) = (r * cc * ca - h * sa, r * cc * sa + h * ca);
             let closed = [y, -d * y, z, d * z, d - r * sc, r * cc, d * h, 0.0].map(|term| term / length);
             for ((name, closed), derivatives) in names.iter().zip(closed).zip(&found.derivatives) {

@@ -49,7 +49,7 @@ fn tests() -> impl Strategy<Value = DrawnTest> {
         let column = |axis: usize| places.iter().map(|row| reach(axis) * row[axis]).collect();
         let readings = Readings {
             positions: (0..drawn.machine.axes.len()).map(column).collect(),
-            coordinates: station.kind().coordinates(),
+            channels: station.channels().len(),
             ..Readings::default()
         };
         let mut values = SlotValues::zero(0);
@@ -80,8 +80,8 @@ proptest! {
         rows.reverse();
         let mut other = test.clone();
         other.readings = test.readings.of_rows(&rows);
-        let (plain, turned) = (test.model().readings_mm(&test.values), other.model().readings_mm(&test.values));
-        let coordinates = test.readings.coordinates;
+        let (plain, turned) = (test.model().readings(&test.values), other.model().readings(&test.values));
+        let coordinates = test.readings.channels;
         for (place, row) in rows.into_iter().enumerate() {
             let of = |readings: &[f64], row: usize| readings[row * coordinates..(row + 1) * coordinates].to_vec();
             prop_assert_eq!(of(&turned, place), of(&plain, row));
@@ -104,8 +104,8 @@ proptest! {
         }
         // Derivatives of a range of rows equal that range of the derivatives of all rows.
         let some = model.sensitivities(&test.values, &slots, 1..model.rows());
-        let skipped = test.readings.coordinates;
-        prop_assert_eq!(&some.readings_mm[..], &one.readings_mm[skipped..]);
+        let skipped = test.readings.channels;
+        prop_assert_eq!(&some.readings[..], &one.readings[skipped..]);
         for (some, whole) in some.derivatives.iter().zip(&one.derivatives) {
             prop_assert_eq!(&some[..], &whole[skipped..]);
         }
@@ -130,7 +130,7 @@ proptest! {
         let mut without = test.values.clone();
         without.constant[slot] = 0.0;
         with.constant[slot] = 0.0;
-        for (with, without) in model.readings_mm(&with).iter().zip(model.readings_mm(&without)) {
+        for (with, without) in model.readings(&with).iter().zip(model.readings(&without)) {
             prop_assert!((with - without).abs() <= 1e-12 * without.abs().max(1.0), "{with} {without}");
         }
     }
@@ -142,12 +142,12 @@ proptest! {
         let mut varying = test.values.clone();
         let sizes: Vec<f64> = (0..model.rows()).map(|row| 1e-3 * row as f64).collect();
         varying.varying.push((slot, sizes.clone()));
-        let found = model.readings_mm(&varying);
-        let coordinates = test.readings.coordinates;
+        let found = model.readings(&varying);
+        let coordinates = test.readings.channels;
         for (row, size) in sizes.into_iter().enumerate() {
             let mut constant = test.values.clone();
             constant.constant[slot] += size;
-            let expected = model.readings_mm(&constant);
+            let expected = model.readings(&constant);
             for k in row * coordinates..(row + 1) * coordinates {
                 prop_assert!((found[k] - expected[k]).abs() <= 1e-12 * expected[k].abs().max(1.0));
             }

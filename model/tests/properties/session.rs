@@ -72,7 +72,7 @@ fn readings(machine: &Machine, rows: &[Vec<f64>]) -> Readings {
                 rows.iter().map(|row| reach * row[index]).collect()
             })
             .collect(),
-        coordinates: 3,
+        channels: 3,
         observed: rows.iter().flat_map(|row| [6, 7, 8].map(|k| 1000.0 * row[k])).collect(),
         ..Readings::default()
     }
@@ -144,7 +144,7 @@ proptest! {
         prop_assert_eq!(&back.effects, &effects);
         let found = back.tests[0].readings.as_ref().unwrap();
         prop_assert_eq!(&found.run, &readings.run);
-        prop_assert_eq!(found.coordinates, 3);
+        prop_assert_eq!(found.channels, 3);
         let pairs = [
             (&found.observed, &readings.observed),
             (&found.time_s, &readings.time_s),

@@ -331,13 +331,13 @@ fn add_noise(
     resolution_mm: Option<f64>,
     random: &mut impl Rng,
 ) {
-    let coordinates = readings.coordinates.max(1);
+    let channels = readings.channels.max(1);
     let innovation = (1.0 - noise.autocorrelation.0 * noise.autocorrelation.0).sqrt();
-    let mut last = vec![0.0; coordinates];
-    for row in 0..readings.observed.len() / coordinates {
+    let mut last = vec![0.0; channels];
+    for row in 0..readings.observed.len() / channels {
         let begins = row == 0 || readings.run.get(row) != readings.run.get(row - 1);
         let outlier = random.random::<f64>() < noise.outlier_share.0;
-        for (coordinate, last) in last.iter_mut().enumerate() {
+        for (channel, last) in last.iter_mut().enumerate() {
             let normal: f64 = StandardNormal.sample(random);
             *last = if begins { normal } else { noise.autocorrelation.0 * *last + innovation * normal };
             let mut um = noise.um.0 * *last;
@@ -345,7 +345,7 @@ fn add_noise(
                 let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
                 um += sign * random.random_range(OUTLIER_UM[0]..OUTLIER_UM[1]);
             }
-            let value = &mut readings.observed[row * coordinates + coordinate];
+            let value = &mut readings.observed[row * channels + channel];
             *value += um * 1e-3;
             if let Some(step) = resolution_mm {
                 *value = (*value / step).round() * step;

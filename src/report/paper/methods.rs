@@ -53,6 +53,10 @@ fn machine(study: &Study) -> String {
         InstrumentKind::Probe => "a touch probe",
         InstrumentKind::Tracker => "a laser tracker",
         InstrumentKind::Socket => "a ball in fixed sockets",
+        InstrumentKind::Laser => "a laser interferometer",
+        InstrumentKind::Angle => "a sensor of angles",
+        InstrumentKind::Distance => "distances from a station",
+        InstrumentKind::Pointing => "observed directions",
     };
     let moving = analysis.moving_min.map_or(String::new(), |min| format!(" and {min:.1} min of movement"));
     format!(

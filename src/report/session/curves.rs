@@ -34,7 +34,7 @@ pub fn histogram(session: &SessionPlots<'_>, models: [&str; 2]) -> Figure {
             .iter()
             .flat_map(|test| {
                 let values = if after { &test.after_um } else { &test.before_um };
-                lengths(values, session.series.coordinates)
+                lengths(values, test.channels)
             })
             .map(f64::abs)
             .collect()
@@ -56,7 +56,7 @@ pub fn histogram(session: &SessionPlots<'_>, models: [&str; 2]) -> Figure {
     let [before, after] = [counted(&before), counted(&after)];
     let highest = before.iter().chain(&after).map(|p| p.1).fold(0.0, f64::max);
     let lines = Lines::new(
-        Axis::new("residual", "um", Scale::over([0.0, maximum], 7)),
+        Axis::new("residual", session.series.unit, Scale::over([0.0, maximum], 7)),
         Axis::new("readings", "", Scale::rounded([0.0, highest], 5)),
         vec![Series::new(models[0], "before", Mark::Line, before), Series::new(models[1], "after", Mark::Line, after)],
     );
@@ -80,7 +80,7 @@ pub fn over_time(session: &SessionPlots<'_>) -> Figure {
             (preceding..preceding + readings.rows()).map(|row| row as f64 + 1.0).collect()
         };
         preceding += readings.rows();
-        let of = |values: &[f64]| lengths(values, session.series.coordinates);
+        let of = |values: &[f64]| lengths(values, view.channels);
         tests.push((view.name.clone(), [time, of(&view.before_um), of(&view.after_um)]));
     }
     let intervals = (TIME_INTERVALS / tests.len().max(1)).max(MIN_INTERVALS);
@@ -98,10 +98,10 @@ pub fn over_time(session: &SessionPlots<'_>) -> Figure {
     });
     let (abscissa, name, unit) =
         if has_time { ("time", "time", "min") } else { ("reading", "reading, in the order of the files", "") };
-    let residual = if session.series.coordinates == 3 { "length of the residual" } else { "residual" };
+    let residual = if session.series.vectors { "length of the residual" } else { "residual" };
     let lines = Lines::new(
         Axis::new(name, unit, Scale::over(span(all(0)), 7)),
-        Axis::new(residual, "um", Scale::with_zero(span(all(1).chain(all(2))), 6)),
+        Axis::new(residual, session.series.unit, Scale::with_zero(span(all(1).chain(all(2))), 6)),
         series.collect(),
     );
     Figure::new(
@@ -181,11 +181,12 @@ pub fn sensitivities(problem: &Problem, beta: &[f64]) -> Result<Vec<Figure>, Ide
     }
     let mut plots = Vec::new();
     let found = sensitivity::sensitivities(problem, beta)?;
-    for test in found.iter().take(MAX_TESTS * problem.coordinates()) {
+    let most: usize = problem.models.iter().take(MAX_TESTS).map(|model| model.channels().len()).sum();
+    for test in found.iter().take(most) {
         if test.columns.is_empty() {
             continue;
         }
-        if test.way.is_angle && test.coordinate.is_none() {
+        if test.way.is_angle && test.channel.is_none() {
             for chunk in test.columns.chunks(12) {
                 plots.push(polar_sensitivities(test, chunk, DIVISION_UM));
             }
@@ -254,10 +255,8 @@ fn polar_sensitivities(test: &TestSensitivities, columns: &[Sensitivity], um: f6
 
 fn curves(test: &TestSensitivities, columns: &[Sensitivity]) -> Figure {
     const CLASSES: [&str; 8] = ["c0", "c1", "c2", "c3", "c4", "c5", "c6", "c7"];
-    let (name, title) = match test.coordinate {
-        Some(coordinate) => {
-            (format!("{}-{coordinate}", test.test), format!("{}: sensitivity of {coordinate}", test.test))
-        }
+    let (name, title) = match test.channel {
+        Some(channel) => (format!("{}-{channel}", test.test), format!("{}: sensitivity of {channel}", test.test)),
         None => (test.test.clone(), format!("{}: sensitivity", test.test)),
     };
     let way = &test.way;

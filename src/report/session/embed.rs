@@ -1,6 +1,7 @@
 //! Data inside the page: the drawn readings as scaled 16-bit integers, and all readings as compressed CSV.
 
 use abbe::identify::series::Cause;
+use abbe::model::instrument::channel;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
@@ -34,7 +35,7 @@ pub fn sliders(session: &SessionPlots<'_>) -> Vec<usize> {
     let mut chosen: Vec<(f64, usize)> = (0..session.series.shares.len())
         .filter(|k| {
             let cause = session.series.shares[*k].cause;
-            cause != Cause::Setup || session.series.coordinates == 1
+            cause != Cause::Setup || !session.series.vectors
         })
         .map(|k| (session.series.weight_of(k), k))
         .filter(|(weight, _)| *weight > 0.0)
@@ -46,7 +47,6 @@ pub fn sliders(session: &SessionPlots<'_>) -> Vec<usize> {
 
 /// Data of the interactive plots.
 pub fn data(session: &SessionPlots<'_>) -> Value {
-    let coordinates = session.series.coordinates;
     let sliders = sliders(session);
     let tests: Vec<Value> = session
         .tests()
@@ -66,7 +66,7 @@ pub fn data(session: &SessionPlots<'_>) -> Value {
                     });
                     let of = |values: &[f64]| quantised(rows.iter().map(|row| values[*row]));
                     let scalars = |values: &[f64]| {
-                        let all = rows.iter().flat_map(|row| row * coordinates..(row + 1) * coordinates);
+                        let all = rows.iter().flat_map(|row| row * test.channels..(row + 1) * test.channels);
                         quantised(all.map(|i| values[i]))
                     };
                     let abscissae: serde_json::Map<String, Value> = axes
@@ -90,18 +90,27 @@ pub fn data(session: &SessionPlots<'_>) -> Value {
             json!({"name": test.name, "over": test.way.name, "units": units, "traversals": traversals})
         })
         .collect();
-    json!({"coordinates": coordinates, "tests": tests})
+    json!({"unit": unit(session.series.unit), "tests": tests})
 }
 
 /// All readings with deviation and residuals.
 pub fn readings(session: &SessionPlots<'_>) -> Table {
     let machine = &session.problem.session.machine;
-    let coordinates = session.series.coordinates;
-    let labels: &[&str] = if coordinates == 3 { &["_x", "_y", "_z"] } else { &[""] };
+    let labels: Vec<String> = match &session.problem.models[..] {
+        // One column for each channel; of tests with different channels, as many as the largest number.
+        [first, others @ ..] if others.iter().all(|other| other.channels() == first.channels()) => {
+            let labels = channel::labels(first.channels()).into_iter();
+            labels.map(|label| if label.is_empty() { String::new() } else { format!("_{label}") }).collect()
+        }
+        models => {
+            let most = models.iter().map(|model| model.channels().len()).max().unwrap_or(1);
+            (1..=most).map(|channel| format!("_{channel}")).collect()
+        }
+    };
     let mut columns = ["test", ">file_line", ">run", ">time_s"].map(table::Column::from).to_vec();
     columns.extend(machine.axes.iter().map(|axis| numbers(format!("{}_{}", axis.name, axis.kind.unit()))));
     for column in ["deviation", "residual_before", "residual_after"] {
-        columns.extend(labels.iter().map(|label| numbers(format!("{column}{label}_um"))));
+        columns.extend(labels.iter().map(|label| numbers(format!("{column}{label}_{}", session.series.unit))));
     }
     let mut rows = Vec::new();
     for (test, series) in session.problem.tests.iter().zip(&session.series.tests) {
@@ -115,9 +124,10 @@ pub fn readings(session: &SessionPlots<'_>) -> Table {
             ];
             let at = machine.axes.iter().zip(&readings.positions);
             cells.extend(at.map(|(axis, column)| Cell::fixed(axis.kind.to_display(column[row]), 5)));
-            let own = row * coordinates..(row + 1) * coordinates;
+            let own = row * series.channels..(row + 1) * series.channels;
             for column in [Column::Deviation, Column::Before, Column::After] {
                 cells.extend(column.of(series)[own.clone()].iter().map(|um| Cell::fixed(*um, 3)));
+                cells.extend((series.channels..labels.len()).map(|_| "".into()));
             }
             rows.push(cells);
         }

@@ -61,7 +61,7 @@ pub fn add_data(report: &mut Report, session: &SessionPlots<'_>, parameters: &[P
 pub fn traces(report: &mut Report, session: &SessionPlots<'_>) {
     report.section("Traces");
     report.page(Text::Controls);
-    let reference = if session.series.coordinates == 3 {
+    let reference = if session.series.vectors {
         "the nominal machine with the fitted set-up"
     } else {
         "the nominal machine and set-up"

@@ -73,7 +73,7 @@ impl<'d> SessionPlots<'d> {
             .enumerate()
             .map(|(number, test)| {
                 let columns = [Column::Deviation, Column::Before, Column::After]
-                    .map(|column| lengths(column.of(test), series.coordinates));
+                    .map(|column| lengths(column.of(test), test.channels));
                 test.stretches
                     .iter()
                     .map(|stretch| {
@@ -103,7 +103,7 @@ impl<'d> SessionPlots<'d> {
 
     /// Whether the readings are lengths, which a polar plot shows about a nominal circle.
     pub fn is_polar(&self) -> bool {
-        is_round(self.problem.session.instrument)
+        self.problem.models.iter().all(|model| is_round(model.channels()))
     }
 
     /// RMS of the change of the residual from the first to the second model, µm.
@@ -123,10 +123,8 @@ impl<'d> SessionPlots<'d> {
     /// RMS residual of a test, µm, outliers excluded: before, after.
     pub fn rms_um(&self, number: usize) -> [f64; 2] {
         let test = &self.series.tests[number];
-        let coordinates = self.series.coordinates;
-        let rejected = &self.problem.rejected[number];
         [&test.before_um, &test.after_um].map(|values| {
-            let counted = || values.iter().enumerate().filter(|(i, _)| !rejected[i / coordinates]);
+            let counted = || values.iter().enumerate().filter(|(i, _)| self.problem.counts(number, *i));
             (counted().map(|(_, v)| v * v).sum::<f64>() / counted().count().max(1) as f64).sqrt()
         })
     }
@@ -157,7 +155,7 @@ impl<'d> SessionPlots<'d> {
         let quantity = if column == Column::Deviation { "deviation" } else { "residual" };
         let polar = Polar {
             angle: Quantity::new(&test.way.name, "deg"),
-            deviation: Quantity::new(quantity, "um"),
+            deviation: Quantity::new(quantity, self.series.unit),
             division_um: um.unwrap_or_else(|| division_um(drawn_um)),
             series,
             live: (number, column.name()),
@@ -210,7 +208,7 @@ impl<'d> SessionPlots<'d> {
 
     fn against(&self, number: usize, columns: &[Column]) -> Vec<Figure> {
         let test = &self.series.tests[number];
-        let values: Vec<Vec<f64>> = columns.iter().map(|c| lengths(c.of(test), self.series.coordinates)).collect();
+        let values: Vec<Vec<f64>> = columns.iter().map(|c| lengths(c.of(test), test.channels)).collect();
         axes_of(self.problem, test, number)
             .into_iter()
             .map(|(axis, abscissa)| self.against_axis(number, columns, &values, &axis, &abscissa))
@@ -226,10 +224,10 @@ impl<'d> SessionPlots<'d> {
         abscissa: &[f64],
     ) -> Figure {
         let test = &self.series.tests[number];
-        let three = self.series.coordinates == 3;
+        let several = test.channels > 1;
         let range = span(values.iter().flatten().copied());
         let is_deviation = columns == [Column::Deviation];
-        let y = if three {
+        let y = if several {
             Scale::rounded([0.0, range[1]], 5)
         } else if is_deviation {
             let um = round_up(range[0].abs().max(range[1].abs()) / DIVISIONS);
@@ -251,7 +249,7 @@ impl<'d> SessionPlots<'d> {
                 Series { source: Some((k, column.name())), ..Series::new(label, class, mark, points) }
             })
         });
-        let quantity = match (is_deviation, three) {
+        let quantity = match (is_deviation, several) {
             (true, true) => "length of the deviation",
             (true, false) => "deviation",
             (false, true) => "length of the residual",
@@ -259,13 +257,13 @@ impl<'d> SessionPlots<'d> {
         };
         let lines = Lines {
             x: Axis::new(&axis.name, axis.unit, Scale::of_axis(span(abscissa.iter().copied()), axis.is_angle)),
-            y: Axis::new(quantity, "um", y),
+            y: Axis::new(quantity, self.series.unit, y),
             series: series.collect(),
             live: Some(Live {
                 test: number,
                 column: columns[0].name(),
                 abscissa: if is_pose { axis.name.clone() } else { "x".to_string() },
-                scaled: is_deviation && !three,
+                scaled: is_deviation && !several,
             }),
         };
         let caption = match (is_deviation, columns) {

@@ -58,11 +58,10 @@ fn straight(session: &SessionPlots<'_>, number: usize, spectra: &[Spectrum], max
 
 /// Readings and RMS residuals of every test.
 pub fn test_table(session: &SessionPlots<'_>, models: [&str; 2]) -> Table {
-    let coordinates = session.series.coordinates;
     let has_change = session.has_change();
     let rows = session.series.tests.iter().enumerate().map(|(number, test)| {
         let [before, after] = session.rms_um(number).map(micrometres);
-        let mut row = cells![&test.name, integer(test.after_um.len() / coordinates), after];
+        let mut row = cells![&test.name, integer(test.after_um.len() / test.channels), after];
         if has_change {
             row.insert(2, before.into());
         }

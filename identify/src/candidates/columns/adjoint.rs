@@ -38,8 +38,8 @@ pub struct TrainingRows {
     pub blocks: Vec<Arc<WhitenedRows>>,
     /// The filter of every block.
     pub filter: Filter,
-    /// Scalar rows of a reading.
-    pub coordinates: usize,
+    /// Number of channels of a reading of each test.
+    pub channels: Vec<usize>,
 }
 
 impl Columns<'_> {
@@ -54,7 +54,7 @@ impl Columns<'_> {
                 let rows: Vec<(u32, u32)> =
                     kept.iter().zip(target).map(|(scalar, row)| (*scalar as u32, *row as u32)).collect();
                 if !rows.is_empty() {
-                    let start = block.rows.start * self.problem.coordinates();
+                    let start = block.rows.start * self.problem.channels(block.test);
                     blocks.push(Arc::new(WhitenedRows { test: block.test, start, rows }));
                 }
             }
@@ -76,8 +76,8 @@ impl Columns<'_> {
                 blocks.push(Arc::new(WhitenedRows { test: whole.test, start: whole.start, rows }));
             }
         }
-        let coordinates = self.problem.coordinates();
-        TrainingRows { blocks, filter: self.problem.filter(), coordinates }
+        let channels = (0..self.problem.tests.len()).map(|test| self.problem.channels(test)).collect();
+        TrainingRows { blocks, filter: self.problem.filter(), channels }
     }
 }
 

@@ -96,7 +96,6 @@ impl Columns<'_> {
     fn acting(&self, effect: &Effect) -> Option<Acting> {
         let machine = &self.problem.session.machine;
         cached(&self.acting, format!("{} {:?}", effect.component, effect.tests), || {
-            let coordinates = self.problem.coordinates();
             let mut greatest_factor = 0.0_f64;
             let mut sensitivity = Vec::new();
             for (number, test) in self.problem.tests.iter().enumerate() {
@@ -123,7 +122,7 @@ impl Columns<'_> {
                     of_test.resize(derivative.len(), 0.0);
                     let of_row = |row: usize| factor.as_ref().map_or(1.0, |factor| factor[row]);
                     for (i, (sum, derivative)) in of_test.iter_mut().zip(derivative.iter()).enumerate() {
-                        *sum += derivative * of_row(i / coordinates);
+                        *sum += derivative * of_row(i / self.problem.channels(number));
                     }
                 }
                 sensitivity.push(Arc::new(of_test));
@@ -169,13 +168,13 @@ impl Columns<'_> {
         if lag_s.is_some() { sampled() } else { cached(&self.samples, (test, driver_name(driver, axis)), sampled) }
     }
 
-    /// The columns of a term on one coordinate of the readings of a test ([`Component::Reading`]). `by_direction`
+    /// The columns of a term on one channel of the readings of a test ([`Component::Reading`]). `by_direction`
     /// changes its sign with the direction of travel. `rows` confines it. `None` if the session has no such test, or
     /// the data lack its driver.
     pub fn reading_columns(
         &self,
         effect: &Effect,
-        coordinate: usize,
+        channel: usize,
         by_direction: bool,
         rows: Option<&Range<usize>>,
     ) -> Option<EffectColumns> {
@@ -185,19 +184,18 @@ impl Columns<'_> {
         let test = self.problem.tests.iter().position(|test| test.name == *name)?;
         let part = effect.shape.uses();
         let key = format!(
-            "{} {coordinate} {by_direction} {rows:?} {} {part:?} {}",
+            "{} {channel} {by_direction} {rows:?} {} {part:?} {}",
             effect.component,
             effect.driver,
             effect.shape.lag_s().is_some()
         );
         let channel = cached(&self.channels, key, || {
             let samples = self.driver_samples(test, &effect.driver, None, effect.shape.lag_s())?;
-            let coordinates = self.problem.coordinates();
+            let channels = self.problem.channels(test);
             let turned = |row: usize| if by_direction { samples[row].direction } else { 1.0 };
             let inside = |row: usize| rows.is_none_or(|rows| rows.contains(&row));
-            let of_row =
-                |(row, moved): (usize, usize)| if moved == coordinate && inside(row) { turned(row) } else { 0.0 };
-            let of_test = (0..samples.len() * coordinates).map(|i| of_row((i / coordinates, i % coordinates)));
+            let of_row = |(row, moved): (usize, usize)| if moved == channel && inside(row) { turned(row) } else { 0.0 };
+            let of_test = (0..samples.len() * channels).map(|i| of_row((i / channels, i % channels)));
             let mut sensitivity = vec![Arc::default(); self.problem.tests.len()];
             sensitivity[test] = Arc::new(of_test.collect());
             let mut of_tests = vec![None; self.problem.tests.len()];
@@ -219,7 +217,7 @@ impl Columns<'_> {
             return Vec::new();
         };
         let mut column_sets = Vec::new();
-        for test in &self.problem.tests {
+        for (number, test) in self.problem.tests.iter().enumerate() {
             let Some(readings) = &test.readings else { continue };
             let column = &readings.positions[axis];
             let low = column.iter().copied().fold(f64::INFINITY, f64::min);
@@ -233,8 +231,8 @@ impl Columns<'_> {
                 driver.clone(),
                 Shape::Curve(Curve { from: low, to: high, intervals, closed: false }),
             );
-            for coordinate in 0..self.problem.coordinates() {
-                let column_set = self.reading_columns(&effect, coordinate, false, None);
+            for channel in 0..self.problem.channels(number) {
+                let column_set = self.reading_columns(&effect, channel, false, None);
                 column_sets.extend(column_set.map(|column_set| (effect.clone(), column_set)));
             }
         }

@@ -106,20 +106,20 @@ impl<'p> Columns<'p> {
 
     /// The unwhitened columns of effects in one block, mm.
     fn block_rows(&self, column_sets: &[&EffectColumns], block: &RowBlock) -> Mat<f64> {
-        let coordinates = self.problem.coordinates();
+        let channels = self.problem.channels(block.test);
         let total: usize = column_sets.iter().map(|column_set| column_set.count).sum();
-        let mut raw = Mat::<f64>::zeros(block.rows.len() * coordinates, total);
+        let mut raw = Mat::<f64>::zeros(block.rows.len() * channels, total);
         let mut column = 0;
         for column_set in column_sets {
             if column_set.acts_in(block.test) {
                 let Channel { sensitivity, states, .. } = &*column_set.channel;
-                let of_block = block.rows.start * coordinates..block.rows.end * coordinates;
+                let of_block = block.rows.start * channels..block.rows.end * channels;
                 let sensitivity = &sensitivity[block.test][of_block];
                 let states = &states.of_reading[block.test][block.rows.clone()];
                 for k in 0..column_set.count {
                     let basis = column_set.basis.col_as_slice(k);
                     let entries = raw.col_as_slice_mut(column + k).iter_mut().zip(sensitivity).enumerate();
-                    entries.for_each(|(i, (entry, s))| *entry = s * basis[states[i / coordinates] as usize]);
+                    entries.for_each(|(i, (entry, s))| *entry = s * basis[states[i / channels] as usize]);
                 }
             }
             column += column_set.count;
@@ -174,10 +174,10 @@ impl<'p> Columns<'p> {
 
     /// Whitens values by test and scalar reading, in mm, in fold order.
     pub fn whitened_values(&self, values: &[Vec<f64>]) -> Vec<f64> {
-        let coordinates = self.problem.coordinates();
         let mut white = Vec::with_capacity(self.rows);
         for (block, kept) in self.blocks.iter().zip(&self.kept) {
-            let own = &values[block.test][block.rows.start * coordinates..block.rows.end * coordinates];
+            let channels = self.problem.channels(block.test);
+            let own = &values[block.test][block.rows.start * channels..block.rows.end * channels];
             let column = Mat::from_fn(own.len(), 1, |i, _| own[i]);
             white.extend(self.problem.whitened(column, kept).col(0).iter());
         }
@@ -193,15 +193,15 @@ impl<'p> Columns<'p> {
         placed
     }
 
-    /// The test, row and coordinate of each whitened row, in fold order.
+    /// The test, row and channel of each whitened row, in fold order.
     pub fn origin_of_rows(&self) -> Vec<(usize, usize, usize)> {
-        let coordinates = self.problem.coordinates();
         let mut origins = vec![(0, 0, 0); self.rows];
         let mut start = 0;
         for (block, kept) in self.blocks.iter().zip(&self.kept) {
+            let channels = self.problem.channels(block.test);
             for (k, i) in kept.iter().enumerate() {
-                let row = block.rows.start + i / coordinates;
-                origins[self.target[start + k]] = (block.test, row, i % coordinates);
+                let row = block.rows.start + i / channels;
+                origins[self.target[start + k]] = (block.test, row, i % channels);
             }
             start += kept.len();
         }
@@ -232,7 +232,7 @@ fn sensitivities(problem: &Problem, beta: &[f64]) -> Vec<Sensitivities> {
     for ((test, _), part) in pieces.iter().zip(parts) {
         match tests.get_mut(*test) {
             Some(whole) => {
-                whole.readings_mm.extend(part.readings_mm);
+                whole.readings.extend(part.readings);
                 for (column, more) in whole.derivatives.iter_mut().zip(part.derivatives) {
                     column.extend(more);
                 }
@@ -262,7 +262,7 @@ mod tests {
         let (problem, fit) = prepare(&session, 1).unwrap();
         let rows: Vec<usize> = problem.models.iter().map(|model| model.rows()).collect();
         let found: Vec<usize> =
-            sensitivities(&problem, &fit.beta).iter().map(|of_test| of_test.readings_mm.len()).collect();
+            sensitivities(&problem, &fit.beta).iter().map(|of_test| of_test.readings.len()).collect();
         assert_eq!(found, rows);
         assert_eq!(found[1], 0);
     }

@@ -11,11 +11,11 @@ use crate::problem::RowBlock;
 impl Columns<'_> {
     /// The rows of an effect for the accepted readings of one fold, in mm, unwhitened, block after block.
     pub fn unwhitened_rows_of_fold(&self, column_set: &EffectColumns, fold: usize) -> Mat<f64> {
-        let coordinates = self.problem.coordinates();
         let of_row = &self.problem.folds.of_row;
         let mut found: Vec<f64> = Vec::new();
         for block in &self.blocks {
-            let is_inside = |i: &usize| of_row[block.test][block.rows.start + i / coordinates] == fold;
+            let channels = self.problem.channels(block.test);
+            let is_inside = |i: &usize| of_row[block.test][block.rows.start + i / channels] == fold;
             let rows: Vec<usize> = self.counting(block).into_iter().filter(is_inside).collect();
             if !rows.is_empty() {
                 let of_block = self.block_rows(&[column_set], block);
@@ -38,18 +38,18 @@ impl Columns<'_> {
 
     /// The fold of each row of [`Columns::unwhitened_model_rows`].
     pub fn unwhitened_folds(&self) -> Vec<usize> {
-        let coordinates = self.problem.coordinates();
-        let fold =
-            |block: &RowBlock, i: usize| self.problem.folds.of_row[block.test][block.rows.start + i / coordinates];
+        let fold = |block: &RowBlock, i: usize| {
+            self.problem.folds.of_row[block.test][block.rows.start + i / self.problem.channels(block.test)]
+        };
         self.blocks.iter().flat_map(|block| self.counting(block).into_iter().map(move |i| fold(block, i))).collect()
     }
 
     /// The independent units over which held-out errors are paired. Along runs they are the folds (runs or blocks). Among poses they are the blocks of joint space, because one fit predicts a
     /// whole block, or the poses if folds are random. The rows are those of [`Columns::unwhitened_model_rows`].
     pub fn unwhitened_units(&self) -> Units {
-        let coordinates = self.problem.coordinates();
         let rows = self.blocks.iter().flat_map(|block| {
-            let reading = move |i: usize| (block.test, block.rows.start + i / coordinates);
+            let channels = self.problem.channels(block.test);
+            let reading = move |i: usize| (block.test, block.rows.start + i / channels);
             self.counting(block).into_iter().map(reading)
         });
         let fold = |test: usize, row: usize| self.problem.folds.of_row[test][row];
@@ -63,9 +63,9 @@ impl Columns<'_> {
 
     /// The scalar rows of a block whose readings are accepted.
     fn counting(&self, block: &RowBlock) -> Vec<usize> {
-        let coordinates = self.problem.coordinates();
-        let rejected = &self.problem.rejected[block.test];
-        (0..block.rows.len() * coordinates).filter(|i| !rejected[block.rows.start + i / coordinates]).collect()
+        let channels = self.problem.channels(block.test);
+        let start = block.rows.start * channels;
+        (0..block.rows.len() * channels).filter(|i| self.problem.counts(block.test, start + i)).collect()
     }
 
     /// The accepted rows of all blocks, one block below another.

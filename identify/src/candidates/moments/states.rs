@@ -28,9 +28,9 @@ pub(super) struct LocalStates {
 impl LocalStates {
     /// Of some whitened rows. `rows` are the scalar readings that they combine.
     pub fn of(states: &DriverStates, training: &TrainingRows, rows: &[(u32, u32)]) -> LocalStates {
-        let coordinates = training.coordinates;
         let mut place = vec![NONE; states.samples.len()];
-        let readings = rows.iter().map(|(test, scalar)| (*test as usize, *scalar as usize / coordinates));
+        let readings =
+            rows.iter().map(|(test, scalar)| (*test as usize, *scalar as usize / training.channels[*test as usize]));
         for (test, reading) in readings.clone().filter(|(test, _)| !states.of_reading[*test].is_empty()) {
             place[states.of_reading[test][reading] as usize] = 0;
         }
@@ -60,10 +60,9 @@ impl LocalStates {
         }
         for block in training.blocks.iter().filter(|block| !states.of_reading[block.test].is_empty()) {
             for (i, _) in block.iter() {
-                let places = training
-                    .filter
-                    .terms(i)
-                    .map(|(raw, _)| local.of_scalar(&states.of_reading[block.test], block.start + raw, coordinates));
+                let places = training.filter.terms(i).map(|(raw, _)| {
+                    local.of_scalar(&states.of_reading[block.test], block.start + raw, training.channels[block.test])
+                });
                 let (low, high) = places.fold((usize::MAX, 0), |(low, high), p| (low.min(p), high.max(p)));
                 local.band = local.band.max(high - low);
             }
@@ -71,8 +70,8 @@ impl LocalStates {
         local
     }
 
-    fn of_scalar(&self, of_reading: &[u32], scalar: usize, coordinates: usize) -> usize {
-        self.place[of_reading[scalar / coordinates] as usize] as usize
+    fn of_scalar(&self, of_reading: &[u32], scalar: usize, channels: usize) -> usize {
+        self.place[of_reading[scalar / channels] as usize] as usize
     }
 
     /// Number of these states.
@@ -131,7 +130,10 @@ impl<'r> OwnProducts<'r> {
                     terms.clear();
                     terms.extend(training.filter.terms(i).map(|(raw, factor)| {
                         let scalar = block.start + raw;
-                        (local.of_scalar(of_reading, scalar, training.coordinates), factor * sensitivity[scalar])
+                        (
+                            local.of_scalar(of_reading, scalar, training.channels[block.test]),
+                            factor * sensitivity[scalar],
+                        )
                     }));
                     for (k, (p, a)) in terms.iter().enumerate() {
                         band[0][*p] += a * a;
@@ -222,7 +224,9 @@ impl<'r> OwnProducts<'r> {
                     if acts {
                         let term = |(raw, factor): (usize, f64)| {
                             let scalar = block.start + raw;
-                            factor * sensitivity[scalar] * basis[of_reading[scalar / training.coordinates] as usize]
+                            factor
+                                * sensitivity[scalar]
+                                * basis[of_reading[scalar / training.channels[block.test]] as usize]
                         };
                         *value = training.filter.terms(i).map(term).sum();
                     }

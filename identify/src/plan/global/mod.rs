@@ -261,7 +261,7 @@ impl<'p> Plan<'p> {
     /// The readings of each test at parameter values of a problem, mm.
     fn readings(problem: &Problem, beta: &[f64]) -> Vec<Vec<f64>> {
         let values = problem.slot_values(beta);
-        problem.models.iter().zip(&values).map(|(model, values)| model.readings_mm(values)).collect()
+        problem.models.iter().zip(&values).map(|(model, values)| model.readings(values)).collect()
     }
 
     /// The estimates of the errors, internal units, for inputs between 0 and 1.

@@ -166,11 +166,12 @@ fn shortened(from: [f64; 3], to: [f64; 3], by: f64) -> [f64; 3] {
 }
 
 /// States without readings.
-pub(super) fn states_of(machine: &Machine, poses: &[&[f64]], coordinates: usize) -> Readings {
+pub(super) fn states_of(machine: &Machine, poses: &[&[f64]], station: &Station<f64>) -> Readings {
+    let channels = station.channels().len();
     Readings {
         positions: (0..machine.axes.len()).map(|axis| poses.iter().map(|pose| pose[axis]).collect()).collect(),
-        coordinates,
-        observed: vec![0.0; poses.len() * coordinates],
+        channels,
+        observed: vec![0.0; poses.len() * channels],
         ..Readings::default()
     }
 }

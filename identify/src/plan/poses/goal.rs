@@ -44,7 +44,6 @@ impl Goal {
     /// Draws the goal of one candidate. A probe touches its cylinder between two heights above its point, mm.
     pub fn draw(station: &Station<f64>, height_mm: [f64; 2], random: &mut Pcg64) -> Goal {
         match station {
-            Station::Tracker(_) => Goal::Free,
             Station::Socket(socket) => Goal::InR(socket.socket),
             Station::Probe(probe) => {
                 let turn = between(random, [0.0, TAU]);
@@ -55,6 +54,8 @@ impl Goal {
                 let apart_mm = upward(random).map(|x| x * station.reference_mm());
                 Goal::OnTable { point_mm: station.table_point_mm().unwrap_or_default(), apart_mm }
             }
+            // A line of sight or a direction is all that the others need.
+            _ => Goal::Free,
         }
     }
 

@@ -53,14 +53,14 @@ impl Exchange {
         let list = &problem.parameters.list;
         let nominal = vec![0.0; list.len()];
         let values = problem.slot_values(&nominal);
-        let coordinates = problem.coordinates();
         let sigma = problem.noise.sigma_mm;
         let mut rows = Vec::new();
         for (test, model) in problem.models.iter().enumerate() {
+            let channels = problem.channels(test);
             let whole = problem.rows(&values, &RowBlock { test, rows: 0..model.rows() })?;
             rows.extend((0..model.rows()).map(|pose| {
-                Mat::from_fn(coordinates, kept.len(), |i, k| {
-                    whole[(pose * coordinates + i, kept[k])] * list[kept[k]].size / sigma
+                Mat::from_fn(channels, kept.len(), |i, k| {
+                    whole[(pose * channels + i, kept[k])] * list[kept[k]].size / sigma
                 })
             }));
         }

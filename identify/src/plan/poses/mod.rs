@@ -179,7 +179,7 @@ pub fn select(session: &Session, tests: &[&Test], options: &PoseOptions) -> Resu
             "the readings of {} have rank {rank_of_chosen} in {}; ask for at least {} poses",
             counted(options.poses, "pose"),
             counted(involved, "unknown"),
-            options.poses + lacking.div_ceil(problem.coordinates())
+            options.poses + lacking.div_ceil(problem.channels(0))
         )));
     }
     let mut random = Pcg64::new(u128::from(options.seed), RANDOM_SET_STREAM);
@@ -296,9 +296,10 @@ fn problem(
     let with_readings = |(number, test): (usize, &Test)| {
         let poses: Vec<&[f64]> =
             candidates.iter().filter(|pose| pose.test == number).map(|pose| pose.at.as_slice()).collect();
-        let mut readings: Readings = states_of(&session.machine, &poses, test.station.kind().coordinates());
+        let mut readings: Readings = states_of(&session.machine, &poses, &test.station);
         let model = TestModel::new(Arc::clone(&session.machine), test.station.clone(), &readings);
-        readings.observed = model.readings_mm(&SlotValues::zero(model.slots()));
+        readings.observed = model.readings(&SlotValues::zero(model.slots()));
+        readings.channels_to_columns(&session.machine, &test.station);
         let means = means.iter();
         readings.drivers = means.map(|(name, mean)| (name.clone(), vec![*mean; poses.len()])).collect();
         Test { readings: Some(Arc::new(readings)), ..test.clone() }
@@ -309,7 +310,7 @@ fn problem(
 
 /// The noise of a reading: that of the options, else that of the session, else the assumed one.
 fn noise(session: &Session, options: &PoseOptions) -> Noise {
-    let stated = options.noise_mm.or(session.noise_mm).filter(|sigma| *sigma > 0.0);
+    let stated = options.noise_mm.or(session.stated_noise_mm()).filter(|sigma| *sigma > 0.0);
     stated.map_or_else(states::assumed_noise, |sigma| Noise::white(sigma, NoiseSource::Stated))
 }
 

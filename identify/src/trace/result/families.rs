@@ -105,6 +105,6 @@ fn rms_gain_mm(problem: &Problem, fit: &Fit, number: usize) -> f64 {
     let b = Mat::from_fn(own.len(), 1, |k, _| fit.beta[own[k]] / size(k));
     let Ok(factor) = covariance.llt(Side::Lower) else { return 0.0 };
     let increase = (b.transpose() * factor.solve(&b))[(0, 0)];
-    let rows = (problem.readings() * problem.coordinates()).max(1) as f64;
+    let rows = problem.scalars().max(1) as f64;
     (increase.max(0.0) / rows).sqrt() * problem.noise.likelihood_mm()
 }

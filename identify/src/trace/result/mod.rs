@@ -228,10 +228,10 @@ fn before_result(findings: &TraceFindings<'_>) -> Result<ModelResult, IdentifyEr
 }
 
 pub(super) fn model_result(problem: &Problem, fit: &Fit, held_out_mm: f64) -> Result<ModelResult, IdentifyError> {
-    let three = problem.coordinates() == 3;
+    let vectors = problem.are_vectors();
     let rms = rms_mm(problem, &fit.residuals) * 1e3;
     let held = held_out_mm * 1e3;
-    let in_3d = |rms: f64| three.then(|| rms * 3.0_f64.sqrt());
+    let in_3d = |rms: f64| vectors.then(|| rms * 3.0_f64.sqrt());
     let goodness = outcome::goodness(problem, fit);
     let mut parameters = fit::parameters(problem, fit);
     Determined::of(problem, &fit.rank)?.mark(problem, &mut parameters, goodness);

@@ -8,7 +8,7 @@ use crate::document::from_node;
 use crate::document::node::{Entries, Named, Value};
 use crate::document::session::{self as document, Kind};
 use crate::document::value::{NotNegative, Note};
-use crate::files::quantity::{self, MICROMETRE};
+use crate::files::quantity::{self, ARCSECOND, MICROMETRE};
 use crate::instrument::{InstrumentKind, SharedBy};
 use crate::pattern;
 use crate::session::expression::Constant;
@@ -53,15 +53,32 @@ pub(super) fn constants(entries: &Entries, comment: impl Fn(&str) -> Option<Stri
     entries.0.iter().map(constant).collect()
 }
 
-/// The kind of the instrument, and noise and resolution of a reading, mm.
-pub(super) fn instrument(document: &document::Instrument) -> Result<(InstrumentKind, Option<f64>, Option<f64>), Fault> {
+/// The kind of the instrument, and noise and resolution of its channels.
+pub(super) struct Instrument {
+    pub kind: InstrumentKind,
+    pub noise_mm: Option<f64>,
+    pub noise_rad: Option<f64>,
+    pub resolution_mm: Option<f64>,
+    pub resolution_rad: Option<f64>,
+}
+
+pub(super) fn instrument(document: &document::Instrument) -> Result<Instrument, Fault> {
     let Kind(kind) = document.kind;
     let in_mm = |um: Option<NotNegative>, key: &str| {
         let mm = um.map(|NotNegative(um)| limits::too_small_um(um).map_or(Ok(um * MICROMETRE), Err));
         mm.transpose().within(key)
     };
-    let resolution_mm = in_mm(document.resolution_um, "resolution_um")?.filter(|step| *step > 0.0);
-    Ok((kind, in_mm(document.noise_um, "noise_um")?, resolution_mm))
+    let in_rad = |arcsec: Option<NotNegative>, key: &str| {
+        let rad = arcsec.map(|NotNegative(arcsec)| limits::too_small_um(arcsec).map_or(Ok(arcsec * ARCSECOND), Err));
+        rad.transpose().within(key)
+    };
+    Ok(Instrument {
+        kind,
+        noise_mm: in_mm(document.noise_um, "noise_um")?,
+        noise_rad: in_rad(document.noise_arcsec, "noise_arcsec")?,
+        resolution_mm: in_mm(document.resolution_um, "resolution_um")?.filter(|step| *step > 0.0),
+        resolution_rad: in_rad(document.resolution_arcsec, "resolution_arcsec")?.filter(|step| *step > 0.0),
+    })
 }
 
 /// The errors to be estimated: those stated, or the defaults of the instrument.

@@ -25,7 +25,7 @@ use crate::files::table::memory::MemoryColumn;
 use crate::files::table::request::{ColumnMapping, Format};
 use crate::instrument::InstrumentKind;
 use crate::session::expression::Constant;
-use crate::session::{Session, Test, check, setups};
+use crate::session::{self, Session, Test, check, setups};
 pub(crate) use machine::machine;
 
 /// Where the readings of tests with `data` are.
@@ -87,10 +87,25 @@ pub(crate) fn head(
     comment: &dyn Fn(&[&str]) -> Option<String>,
 ) -> Result<Session, Fault> {
     let constants = head::constants(&document.constants, |name| comment(&["constants", name])).within("constants")?;
-    let (kind, noise_mm, resolution_mm) = head::instrument(&document.instrument).within("instrument")?;
+    let instrument = head::instrument(&document.instrument).within("instrument")?;
+    let head::Instrument { kind, noise_mm, noise_rad, resolution_mm, resolution_rad } = instrument;
     let about = head::about(&document.about).within("about")?;
     let unknowns = head::unknowns(&machine, kind, &document.unknowns).within("errors").within("unknowns")?;
-    Ok(Session { constants, noise_mm, resolution_mm, unknowns, about, ..Session::new(machine, kind) })
+    let lever_mm = match (noise_mm, noise_rad) {
+        (Some(mm), Some(rad)) if mm > 0.0 && rad > 0.0 => mm / rad,
+        _ => session::NATURAL_LEVER_MM,
+    };
+    Ok(Session {
+        constants,
+        noise_mm,
+        noise_rad,
+        lever_mm,
+        resolution_mm,
+        resolution_rad,
+        unknowns,
+        about,
+        ..Session::new(machine, kind)
+    })
 }
 
 /// What a document says beside its head.

@@ -12,6 +12,7 @@ use crate::document::value;
 use crate::document::{lower::Data, schema};
 use crate::files::access;
 use crate::files::quantity;
+use crate::files::table::fill::Filling;
 use crate::files::table::{self, memory, request::Request};
 use crate::instrument::InstrumentKind;
 use crate::instrument::set_up::SetUp;
@@ -86,15 +87,19 @@ pub(super) fn tests(
         // An empty table maps no column: the file has the default names.
         columns: columns.map(Vec::as_slice).filter(|columns| !columns.is_empty()),
     };
-    let (by_socket, warnings) = match context.data {
+    let Filling { by_socket, quantities, warnings } = match context.data {
         Data::Columns(columns) => memory::read(columns, &request)?,
         _ => {
             let named = document.data.as_deref().unwrap_or_default();
             let data = table::read(&data_file(context, named).within("data")?, &request)?;
             found.stamps.push(data.stamp);
-            (data.by_socket, data.warnings)
+            Filling { by_socket: data.by_socket, quantities: data.quantities, warnings: data.warnings }
         }
     };
+    let has = |quantity| quantities.contains(&quantity);
+    test.station.keep_channels(&has);
+    test.geometry.keep_channels(&has);
+    test.station.absent_channels_known(&mut test.priors);
     found.warnings.extend(warnings);
     let mut tests = Vec::new();
     for (socket, readings) in by_socket {

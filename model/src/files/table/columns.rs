@@ -11,6 +11,7 @@ use crate::driver::column;
 use crate::error::{Location, ModelError};
 use crate::files::quantity::{self, Unit};
 use crate::files::spelling::suggestion;
+use crate::instrument::Station;
 use crate::instrument::column::Quantity;
 
 /// The content of a column.
@@ -60,20 +61,34 @@ impl Role {
             return Some(role);
         }
         let (what, unit) = name.rsplit_once('_')?;
-        let unit = Unit::of_length(unit)?;
         let column = own.iter().find(|column| !column.unit.is_empty() && column.stem == what)?;
-        Some(Role::Reading(column.quantity, unit))
+        Some(Role::Reading(column.quantity, Unit::of_column(unit, column.is_angle())?))
     }
 
     /// Whether two columns contain the same quantity.
     pub fn same_as(&self, other: &Role) -> bool {
         match (self, other) {
             (Role::Axis(a, _), Role::Axis(b, _)) => a == b,
-            (Role::Reading(Quantity::Coordinate(a), _), Role::Reading(Quantity::Coordinate(b), _)) => a == b,
-            (Role::Reading(..), Role::Reading(..)) => true,
+            (Role::Reading(a, _), Role::Reading(b, _)) => a.channel() == b.channel(),
             _ => self == other,
         }
     }
+}
+
+/// What the columns of readings hold.
+pub(super) fn quantities(columns: &[Column]) -> Vec<Quantity> {
+    let of_role = |column: &Column| match column.role {
+        Role::Reading(quantity, _) => Some(quantity),
+        _ => None,
+    };
+    columns.iter().filter_map(of_role).collect()
+}
+
+/// The set-up with the channels for which there are columns.
+pub(in crate::files) fn kept(station: &Station<f64>, quantities: &[Quantity]) -> Station<f64> {
+    let mut station = station.clone();
+    station.keep_channels(&|quantity| quantities.contains(&quantity));
+    station
 }
 
 /// Every valid column name of this test.

@@ -12,6 +12,7 @@ use super::row::Row;
 use crate::chain::Machine;
 use crate::driver::column;
 use crate::error::ModelError;
+use crate::files::quantity::Unit;
 use crate::instrument::Station;
 use crate::instrument::column::{Column, Quantity};
 use crate::session::readings::Readings;
@@ -100,8 +101,14 @@ pub fn text(machine: &Machine, station: &Station<f64>, readings: &Readings) -> S
         header.push(axis.column(""));
     }
     header.extend(readings.drivers.keys().map(|name| column::in_files(name).into_owned()));
-    let is_reading = |column: &&Column| matches!(column.quantity, Quantity::Length | Quantity::Coordinate(_));
-    header.extend(station.columns().iter().filter(is_reading).map(|column| column.name("mm")));
+    let of_channel = |channel: usize| {
+        station.columns().iter().find(|column| {
+            let holds = matches!(column.quantity, Quantity::Length | Quantity::Channel(_));
+            holds && column.quantity.channel().and_then(|of_all| station.kept_channel(of_all)) == Some(channel)
+        })
+    };
+    let columns: Vec<&Column> = (0..readings.channels).filter_map(of_channel).collect();
+    header.extend(columns.iter().map(|column| column.name(unit_of(column))));
     let mut text = header.join(",");
     text.push('\n');
     for row in 0..readings.rows() {
@@ -116,16 +123,20 @@ pub fn text(machine: &Machine, station: &Station<f64>, readings: &Readings) -> S
             cells.push(decimal(axis.kind.to_display(column[row])));
         }
         cells.extend(readings.drivers.values().filter_map(|values| values.get(row)).map(|value| decimal(*value)));
-        if station.kind().entry().has_readings {
-            let start = row * readings.coordinates;
-            for k in start..start + readings.coordinates {
-                cells.push(readings.observed.get(k).map_or(String::new(), |mm| decimal(*mm)));
-            }
+        for (channel, column) in columns.iter().enumerate() {
+            let value = readings.observed.get(row * readings.channels + channel).filter(|value| !value.is_nan());
+            let unit = Unit::of_column(unit_of(column), column.is_angle()).unwrap_or(Unit::Times(1.0));
+            cells.push(value.map_or(String::new(), |value| decimal(unit.in_unit(*value))));
         }
         text.push_str(&cells.join(","));
         text.push('\n');
     }
     text
+}
+
+/// The unit in which a column of readings is written.
+fn unit_of(column: &Column) -> &'static str {
+    if column.is_angle() { column.unit } else { "mm" }
 }
 
 /// A number with the necessary decimals, at most twelve.

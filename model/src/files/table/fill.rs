@@ -10,8 +10,8 @@ use super::request::{Format, Request};
 use super::row::Row;
 use super::{duplicates, required};
 use crate::error::{Location, ModelError};
-use crate::instrument::Fault;
 use crate::instrument::column::Quantity;
+use crate::instrument::{Fault, MAX_CHANNELS};
 use crate::session::check;
 use crate::session::readings::{Origin, Readings};
 
@@ -21,6 +21,16 @@ const MAX_SOCKETS: usize = 1000;
 /// Readings of one data file: one set per socket in the file, else one.
 pub(crate) type BySocket = Vec<(Option<String>, Readings)>;
 
+/// The readings of a table.
+pub(crate) struct Filling {
+    /// The readings.
+    pub by_socket: BySocket,
+    /// The columns of readings that it has.
+    pub quantities: Vec<Quantity>,
+    /// Warnings about the table.
+    pub warnings: Vec<String>,
+}
+
 /// The cells of one row.
 pub(super) trait Cells {
     /// The number in a column, or what is wrong with it.
@@ -29,6 +39,8 @@ pub(super) trait Cells {
     fn text(&self, column: &Column) -> &str;
     /// The error of a fault in a column, with its place.
     fn error(&self, column: &Column, fault: Fault) -> ModelError;
+    /// Whether the cell of a column is empty.
+    fn lacks(&self, column: &Column) -> bool;
     /// Adds all cells of the row to a hash.
     fn hash(&self, hasher: &mut DefaultHasher);
 }
@@ -57,12 +69,17 @@ impl Cells for FileRow<'_> {
         }
     }
 
+    fn lacks(&self, column: &Column) -> bool {
+        let text = self.text(column);
+        text.is_empty() || text.eq_ignore_ascii_case("nan")
+    }
+
     fn hash(&self, hasher: &mut DefaultHasher) {
         std::hash::Hash::hash(&self.row.cells, hasher);
     }
 }
 
-/// Reads the rows of a data file. Returns the readings, and warnings about the file.
+/// Reads the rows of a data file.
 ///
 /// # Errors
 /// Any cell that is not a finite number where one is expected, with file, line and column; missing or unknown columns;
@@ -72,7 +89,7 @@ pub(super) fn read(
     rows: &mut dyn Rows,
     has_header: bool,
     request: &Request<'_>,
-) -> Result<(BySocket, Vec<String>), ModelError> {
+) -> Result<Filling, ModelError> {
     let empty = |what: &str| ModelError::Input {
         location: Location::file(file),
         message: format!("an empty data file: {what}"),
@@ -118,7 +135,11 @@ pub(super) fn read(
             message: "one reading, which is not enough for a fit".into(),
             help: Some(NOT_ENOUGH.into()),
         }),
-        _ => Ok((filled.by_socket(Some(file)), warning.into_iter().collect())),
+        _ => Ok(Filling {
+            quantities: columns::quantities(&filled.columns),
+            by_socket: filled.by_socket(Some(file)),
+            warnings: warning.into_iter().collect(),
+        }),
     }
 }
 
@@ -145,6 +166,10 @@ fn wrong_width(file: &Path, row: &Row, width: usize, format: &Format) -> ModelEr
 pub(super) struct Filled<'a> {
     request: &'a Request<'a>,
     columns: Vec<Column>,
+    /// For each column its channel among those that the data have.
+    channel: Vec<usize>,
+    /// For each channel whether the values are less the nominal reading.
+    from_nominal: Vec<bool>,
     pub readings: Readings,
     /// The line or item of each row, from 1.
     pub line: Vec<usize>,
@@ -158,13 +183,22 @@ pub(super) struct Filled<'a> {
 impl<'a> Filled<'a> {
     /// Nothing yet, with room for some rows.
     pub fn new(request: &'a Request<'a>, columns: Vec<Column>, rows: usize) -> Self {
-        let coordinates = request.instrument().coordinates();
+        let station = columns::kept(&request.test.station, &columns::quantities(&columns));
+        let channels = station.channels().len();
         let mut readings = Readings {
             positions: vec![Vec::new(); request.machine.axes.len()],
-            coordinates,
-            observed: Vec::with_capacity(rows * coordinates),
+            channels,
+            observed: Vec::with_capacity(rows * channels),
             ..Readings::default()
         };
+        let mut from_nominal = vec![false; channels];
+        let mut channel = vec![0; columns.len()];
+        for (column, channel) in columns.iter().zip(&mut channel) {
+            if let Role::Reading(quantity, _) = column.role {
+                *channel = quantity.channel().and_then(|of_all| station.kept_channel(of_all)).unwrap_or(0);
+                from_nominal[*channel] = matches!(quantity, Quantity::FromNominal(_));
+            }
+        }
         for column in &columns {
             match &column.role {
                 Role::Time => readings.time_s.reserve_exact(rows),
@@ -175,7 +209,12 @@ impl<'a> Filled<'a> {
             }
         }
         let (line, socket, sockets, cells) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Filled { request, columns, readings, line, socket, sockets, cells }
+        Filled { request, columns, channel, from_nominal, readings, line, socket, sockets, cells }
+    }
+
+    /// Whether a row may lack a channel.
+    fn can_lack(&self) -> bool {
+        self.readings.channels > 1 && self.request.instrument().entry().rows_can_lack_channels
     }
 
     /// Adds a row.
@@ -183,13 +222,20 @@ impl<'a> Filled<'a> {
     /// # Errors
     /// A cell that is not what its column expects, with its place.
     pub fn push(&mut self, row: &impl Cells) -> Result<(), ModelError> {
+        let can_lack = self.can_lack();
         let readings = &mut self.readings;
-        let mut observed = [0.0; 3];
-        for column in &self.columns {
+        let mut observed = [f64::NAN; MAX_CHANNELS];
+        if !self.request.instrument().entry().has_readings {
+            observed.fill(0.0);
+        }
+        for (column, channel) in self.columns.iter().zip(&self.channel) {
             let fault = |message: String, help: &str| row.error(column, (message, help.to_string()));
             if column.role == Role::Socket {
                 let index = socket_index(&mut self.sockets, row.text(column));
                 self.socket.push(index.map_err(|fault| row.error(column, fault))?);
+                continue;
+            }
+            if matches!(column.role, Role::Reading(..)) && can_lack && row.lacks(column) {
                 continue;
             }
             let value = row.number(column).map_err(|fault| row.error(column, fault))?;
@@ -219,20 +265,22 @@ impl<'a> Filled<'a> {
                 Role::Axis(axis, unit) => readings.positions[*axis].push(unit.to_internal(value)),
                 Role::Reading(quantity, unit) => {
                     let value = unit.to_internal(value);
-                    let (coordinate, value) = match quantity {
-                        Quantity::Coordinate(i) => (*i, value),
-                        Quantity::Length => (0, value),
-                        Quantity::Deviation => (0, self.request.bar_mm() + value),
-                        Quantity::Outward => (0, -value),
-                        Quantity::Socket => (0, 0.0),
+                    observed[*channel] = match quantity {
+                        Quantity::Deviation => self.request.bar_mm() + value,
+                        Quantity::Outward => -value,
+                        _ => value,
                     };
-                    observed[coordinate] = value;
                 }
                 Role::Socket => {}
             }
         }
-        readings.observed.extend(&observed[..readings.coordinates]);
+        readings.observed.extend(&observed[..readings.channels]);
         Ok(())
+    }
+
+    /// The columns.
+    pub fn columns(&self) -> &[Column] {
+        &self.columns
     }
 
     /// Completes the columns: the axes without one stay where the test holds them.
@@ -241,6 +289,17 @@ impl<'a> Filled<'a> {
             if positions.is_empty() {
                 *positions = vec![*at; rows];
             }
+        }
+        if self.from_nominal.contains(&true) {
+            let station = columns::kept(&self.request.test.station, &columns::quantities(&self.columns));
+            let Readings { observed, channels, .. } = &mut self.readings;
+            let (mut observed, channels) = (std::mem::take(observed), *channels);
+            for (row, values) in observed.chunks_exact_mut(channels).enumerate() {
+                let nominal = self.readings.nominal(self.request.machine, &station, row);
+                let of_nominal = values.iter_mut().zip(&self.from_nominal).zip(nominal.channels());
+                of_nominal.filter(|((_, from), _)| **from).for_each(|((value, _), nominal)| *value += nominal);
+            }
+            self.readings.observed = observed;
         }
     }
 

@@ -3,8 +3,9 @@
 use std::hash::{DefaultHasher, Hash};
 use std::path::Path;
 
+use super::columns::quantities;
 use super::columns::{Column, Role, known, listed};
-use super::fill::{BySocket, Cells, Filled, NOT_ENOUGH};
+use super::fill::{Cells, Filled, Filling, NOT_ENOUGH};
 use super::missing::{self, Marks};
 use super::request::Request;
 use super::{duplicates, required};
@@ -75,6 +76,10 @@ impl Cells for Item<'_> {
         fault((format!("`{}`, item {}: {message}", column.name, self.item), help))
     }
 
+    fn lacks(&self, column: &Column) -> bool {
+        self.given[column.index].missing.get(self.item) == Some(&true)
+    }
+
     fn hash(&self, hasher: &mut DefaultHasher) {
         for column in self.given {
             match column.values {
@@ -90,13 +95,17 @@ impl Cells for Item<'_> {
 /// # Errors
 /// A column of an unknown name, of another length or with a number that is not finite; a missing column; decreasing
 /// time.
-pub(crate) fn read(given: &[MemoryColumn<'_>], request: &Request<'_>) -> Result<(BySocket, Vec<String>), ModelError> {
+pub(crate) fn read(given: &[MemoryColumn<'_>], request: &Request<'_>) -> Result<Filling, ModelError> {
     let columns = roles(given, request).map_err(fault)?;
     let names: Vec<String> = given.iter().map(|column| column.name.to_string()).collect();
     required::required(request, &columns, Some(&names)).map_err(fault)?;
     let rows = given.first().map_or(0, |column| column.values.len());
-    let marks: Vec<Marks<'_>> =
-        given.iter().map(|column| Marks { name: column.name, missing: column.missing }).collect();
+    // A reading that lacks a channel stays, if the instrument has others.
+    let can_lack = request.instrument().entry().rows_can_lack_channels && quantities(&columns).len() > 1;
+    let stays = |column: &Column| can_lack && matches!(column.role, Role::Reading(..));
+    let marks: Vec<Marks<'_>> = (given.iter().zip(&columns))
+        .map(|(of, column)| Marks { name: of.name, missing: if stays(column) { &[] } else { of.missing } })
+        .collect();
     let present = missing::present(&marks, rows).map_err(fault)?;
     let found = present.as_ref().map_or(rows, Vec::len);
     if found < check::MIN_READINGS {
@@ -122,7 +131,8 @@ pub(crate) fn read(given: &[MemoryColumn<'_>], request: &Request<'_>) -> Result<
         filled.line = (0..found).map(|row| item(row).item + 1).collect();
         warnings.extend(filled.remove_duplicates(Path::new("the arrays")));
     }
-    Ok((filled.by_socket(None), request.named(warnings)))
+    let quantities = quantities(filled.columns());
+    Ok(Filling { quantities, by_socket: filled.by_socket(None), warnings: request.named(warnings) })
 }
 
 fn fault((message, help): Fault) -> ModelError {

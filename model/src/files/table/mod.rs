@@ -13,7 +13,7 @@ pub(in crate::files) mod columns;
 pub mod csv;
 mod duplicates;
 pub(crate) mod encoding;
-mod fill;
+pub(crate) mod fill;
 mod format;
 mod formats;
 mod json_lines;
@@ -28,12 +28,13 @@ mod spreadsheet;
 
 use std::path::Path;
 
-use fill::BySocket;
+use fill::{BySocket, Filling};
 use format::Content;
 use request::Request;
 
 use crate::error::ModelError;
 use crate::files::stamp::FileStamp;
+use crate::instrument::column::Quantity;
 
 /// The content of a data file.
 pub(crate) struct Data {
@@ -41,6 +42,8 @@ pub(crate) struct Data {
     pub stamp: FileStamp,
     /// Its readings: one set per socket in the file, else one.
     pub by_socket: BySocket,
+    /// The columns of readings that it has.
+    pub quantities: Vec<Quantity>,
     /// Warnings about the file.
     pub warnings: Vec<String>,
 }
@@ -52,11 +55,13 @@ pub(crate) struct Data {
 pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<Data, ModelError> {
     match formats::of(file).open(file, request)? {
         Content::Table(mut table) => {
-            let (by_socket, warnings) = fill::read(file, table.rows.as_mut(), table.has_header, request)?;
-            Ok(Data { stamp: table.stamp, by_socket, warnings: request.named(warnings) })
+            let Filling { by_socket, quantities, warnings } =
+                fill::read(file, table.rows.as_mut(), table.has_header, request)?;
+            Ok(Data { stamp: table.stamp, by_socket, quantities, warnings: request.named(warnings) })
         }
         Content::Readings(whole) => {
-            Ok(Data { stamp: whole.stamp, by_socket: vec![(None, whole.readings)], warnings: whole.warnings })
+            let by_socket = vec![(None, whole.readings)];
+            Ok(Data { stamp: whole.stamp, by_socket, quantities: Vec::new(), warnings: whole.warnings })
         }
     }
 }

@@ -72,7 +72,7 @@ fn read(file: &Path, request: &Request<'_>) -> Result<WholeReadings, ModelError>
         }
     }
     let mut readings =
-        Readings { positions: vec![Vec::new(); request.machine.axes.len()], coordinates: 1, ..Readings::default() };
+        Readings { positions: vec![Vec::new(); request.machine.axes.len()], channels: 1, ..Readings::default() };
     let mut line = Vec::new();
     let directions = direction::of_runs(&contents.runs, request.format.anticlockwise.as_deref())
         .map_err(|(line, message, help)| fault(line, message, help))?;

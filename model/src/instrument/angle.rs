@@ -1,0 +1,139 @@
+//! An angle: autocollimator and polygon, rotary encoder, electronic level.
+//!
+//! The reading is the component about one direction of R, or two, of the rotation of a frame in addition to the commanded
+//! one, plus a zero that is not known: `φ = d · (θ·n) + φ₀` ([`crate::rotation_error`]).
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::channel::Channel;
+use super::column::{Column, Quantity};
+use super::set_up::{self, SetUp, Written};
+use super::{
+    Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
+    default_errors, point,
+};
+use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::document::node::Node;
+use crate::document::{Fault as KeyFault, schema, value as document};
+use crate::frames::dot_nominal;
+use crate::rotation_error::Body;
+use crate::scalar::{Nominal, Scalar};
+use crate::session::Prior;
+use crate::session::expression::Constant;
+
+/// The zero of each channel.
+pub const PARAMETERS: [InstrumentParameter; 2] = [
+    InstrumentParameter::angle("zero", "angle", SharedBy::SpindleSetup),
+    InstrumentParameter::angle("zero", "angle2", SharedBy::SpindleSetup),
+];
+
+pub(super) const ENTRY: Entry = Entry {
+    kind: InstrumentKind::Angle,
+    word: "angle",
+    parameters: &PARAMETERS,
+    free: None,
+    is_two_sided: true,
+    reads_poses: false,
+    rows_can_lack_channels: true,
+    has_readings: true,
+    needs_every_axis: false,
+    default_errors: default_errors::none,
+    spindle_setup: None,
+    keys: schema::properties::<Keys>,
+    read,
+};
+
+/// The channels.
+const CHANNELS: [Channel; 2] = [Channel::angle("angle"), Channel::angle("angle2")];
+
+/// The columns.
+const COLUMNS: [Column; 2] = [
+    Column::new("angle", "arcsec", Quantity::Channel(0)),
+    Column::new("angle2", "arcsec", Quantity::Channel(1)),
+];
+
+/// The keys of a test.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Keys {
+    /// Direction in R about which the rotation is read, such as [0, 0, 1]; two for two columns, such as [[1, 0, 0], [0, 1,
+    /// 0]].
+    about: document::Directions,
+    /// What turns: the tool against the table ("relative", the default), or the "tool" or the "table" against the bed,
+    /// as a level reads it.
+    #[serde(default)]
+    body: Body,
+}
+
+fn read(set_up: &Node, _: &[Constant]) -> Result<SetUp, KeyFault> {
+    let keys: Keys = set_up::keys(set_up)?;
+    if keys.about.0.len() > CHANNELS.len() {
+        let message = format!("has {} directions; an angle has one or two", keys.about.0.len());
+        return Err(KeyFault::of_key(message, None).at("about"));
+    }
+    let about: Vec<[Written; 3]> = keys.about.0.iter().map(|direction| direction.map(Written::number)).collect();
+    let priors = (0..2).map(|channel| if channel < about.len() { Prior::Free } else { Prior::Known }).collect();
+    let origin = [0.0; 3].map(Written::number);
+    Ok(SetUp::new(Station::Angle(Angle { about, body: keys.body, origin }), priors))
+}
+
+/// A sensor of angles as set up for one test.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Angle<N> {
+    /// The direction of each channel in R, of unit length.
+    pub about: Vec<[N; 3]>,
+    /// The frame that turns.
+    pub body: Body,
+    /// The origin of the tool frame: an angle has no point.
+    pub origin: [N; 3],
+}
+
+impl<N> Geometry<N> for Angle<N> {
+    type Over<M> = Angle<M>;
+
+    fn map<M>(&self, to: &impl Fn(&N) -> M) -> Angle<M> {
+        let about = self.about.iter().map(|direction| point(direction, to)).collect();
+        Angle { about, body: self.body, origin: point(&self.origin, to) }
+    }
+    /// The rotation about each direction, rad.
+    fn reading<S: Scalar<Nominal = N>>(
+        &self,
+        machine: &Machine,
+        state: &[AxisPosition<N>],
+        errors: &[BodyErrors<S>],
+        unknown: impl Fn(usize) -> Option<S>,
+    ) -> Reading<S>
+    where
+        N: Nominal,
+    {
+        let rotation = machine.rotation_error(state, errors, self.body);
+        Reading::of(self.about.iter().enumerate().map(|(channel, about)| {
+            let angle = dot_nominal(rotation, *about);
+            unknown(channel).map_or(angle, |zero| angle + zero)
+        }))
+    }
+    fn table_point_mm(&self) -> Option<&[N; 3]> {
+        None
+    }
+    fn tool_point_mm(&self) -> &[N; 3] {
+        &self.origin
+    }
+}
+
+impl Instrument for Angle<f64> {
+    fn channels(&self) -> &[Channel] {
+        &CHANNELS[..self.about.len()]
+    }
+    fn columns(&self) -> &'static [Column] {
+        &COLUMNS[..self.about.len()]
+    }
+    fn missing(&self, has: &dyn Fn(Quantity) -> bool) -> Option<Fault> {
+        let column = self.columns().iter().find(|column| !has(column.quantity))?;
+        let help = "an angle needs `angle_arcsec`, the deviation from the commanded rotation, and `angle2_arcsec` for a second direction in `about`";
+        Some((format!("`{}`", column.name(column.unit)), help.into()))
+    }
+    fn help_on_column(&self, stem: &str) -> Option<&'static str> {
+        (stem == "angle2").then_some("a second column needs its direction: `about = [[1, 0, 0], [0, 1, 0]]`")
+    }
+}

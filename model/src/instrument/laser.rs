@@ -1,0 +1,316 @@
+//! The laser interferometer and its kin: displacement, straightness and angles of a reflector against an optic.
+//!
+//! With the reflector `P` of the tool, the optic `O` of the table, both in R, the beam `b`, a horizontal and a vertical
+//! direction `h` and `v`, all perpendicular, and the rotation vector `φ` of the tool against the table
+//! ([`crate::rotation_error`]):
+//!
+//! ```text
+//! displacement = b · (P − O)      horizontal = h · (P − O)      vertical = v · (P − O)
+//! pitch = h · φ                   yaw = v · φ                   roll = b · φ
+//! ```
+//!
+//! each plus a zero that is not known. The beam deviates from its nominal direction by two angles, towards `h` and `v`: a
+//! slope of either straightness, and the cosine error of the displacement. A displacement and a straightness refer to
+//! their nominal reading: `displacement_mm` counts from any point.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::channel::Channel;
+use super::column::{Column, Quantity};
+use super::set_up::{self, SetUp, Written};
+use super::{
+    Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
+    default_errors, displaced, point,
+};
+use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::document::node::Node;
+use crate::document::{Fault as KeyFault, schema, value as document};
+use crate::frames::{Point, cross, dot, dot_nominal};
+use crate::rotation_error::Body;
+use crate::scalar::{Nominal, Scalar};
+use crate::session::Prior;
+use crate::session::expression::Constant;
+
+/// Reflector, optic, the beam's deviation, the zero of each channel.
+pub const PARAMETERS: [InstrumentParameter; 14] = [
+    InstrumentParameter::length("reflector", "x", SharedBy::SpindleSetup),
+    InstrumentParameter::length("reflector", "y", SharedBy::SpindleSetup),
+    InstrumentParameter::length("reflector", "z", SharedBy::SpindleSetup),
+    InstrumentParameter::length("optic", "x", SharedBy::Setup),
+    InstrumentParameter::length("optic", "y", SharedBy::Setup),
+    InstrumentParameter::length("optic", "z", SharedBy::Setup),
+    InstrumentParameter::angle("beam", "horizontal", SharedBy::Setup),
+    InstrumentParameter::angle("beam", "vertical", SharedBy::Setup),
+    InstrumentParameter::length("zero", "displacement", SharedBy::Setup),
+    InstrumentParameter::length("zero", "horizontal", SharedBy::Setup),
+    InstrumentParameter::length("zero", "vertical", SharedBy::Setup),
+    InstrumentParameter::angle("zero", "pitch", SharedBy::Setup),
+    InstrumentParameter::angle("zero", "yaw", SharedBy::Setup),
+    InstrumentParameter::angle("zero", "roll", SharedBy::Setup),
+];
+
+const OPTIC: usize = 3;
+const BEAM: usize = 6;
+const ZERO: usize = 8;
+
+pub(super) const ENTRY: Entry = Entry {
+    kind: InstrumentKind::Laser,
+    word: "laser",
+    parameters: &PARAMETERS,
+    free: None,
+    is_two_sided: true,
+    reads_poses: false,
+    rows_can_lack_channels: true,
+    has_readings: true,
+    needs_every_axis: false,
+    default_errors: default_errors::none,
+    spindle_setup: None,
+    keys: schema::properties::<Keys>,
+    read,
+};
+
+/// The channels in the order of their zeros.
+const CHANNELS: [Channel; 6] = [
+    Channel::length("displacement"),
+    Channel::length("horizontal"),
+    Channel::length("vertical"),
+    Channel::angle("pitch"),
+    Channel::angle("yaw"),
+    Channel::angle("roll"),
+];
+
+/// The columns.
+const COLUMNS: [Column; 7] = [
+    Column::new("displacement", "mm", Quantity::Channel(0)),
+    Column::new("deviation", "um", Quantity::FromNominal(0)),
+    Column::new("horizontal", "um", Quantity::Channel(1)),
+    Column::new("vertical", "um", Quantity::Channel(2)),
+    Column::new("pitch", "arcsec", Quantity::Channel(3)),
+    Column::new("yaw", "arcsec", Quantity::Channel(4)),
+    Column::new("roll", "arcsec", Quantity::Channel(5)),
+];
+
+/// A direction whose component along Z is larger is vertical.
+const VERTICAL: f64 = 0.999;
+
+/// The keys of a test.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Keys {
+    /// Reflector in the tool frame; default [0, 0, 0].
+    reflector_mm: Option<document::Point>,
+    #[serde(default)]
+    reflector_u_um: document::Uncertainties,
+    /// The other optic in the table frame; default [0, 0, 0].
+    optic_mm: Option<document::Point>,
+    #[serde(default)]
+    optic_u_um: document::Uncertainties,
+    /// Direction of the beam in R, such as [1, 0, 0].
+    beam: document::Direction,
+    /// Standard uncertainty of the beam's direction, arcsec; default: inf with a straightness, else known.
+    beam_u_arcsec: Option<document::Uncertainty>,
+    /// What a plan reads: some of "displacement", "horizontal", "vertical", "pitch", "yaw", "roll"; data have a column
+    /// for each. Default: displacement.
+    channels: Option<Vec<Word>>,
+}
+
+/// The word of a channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(inline)]
+enum Word {
+    Displacement,
+    Horizontal,
+    Vertical,
+    Pitch,
+    Yaw,
+    Roll,
+}
+
+fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
+    let keys: Keys = set_up::keys(set_up)?;
+    let at = |key: &str, given: &Option<document::Point>| match given {
+        Some(given) => set_up::point(key, given, constants),
+        None => Ok([0.0; 3].map(Written::number)),
+    };
+    let reflector = at("reflector_mm", &keys.reflector_mm)?;
+    let optic = at("optic_mm", &keys.optic_mm)?;
+    let frame = frame(keys.beam.0).map(|direction| direction.map(Written::number));
+    let mut channels: Vec<usize> = match &keys.channels {
+        Some(words) if words.is_empty() => {
+            return Err(KeyFault::of_key("is empty; a laser reads at least one", None).at("channels"));
+        }
+        Some(words) => words.iter().map(|word| *word as usize).collect(),
+        None => vec![0],
+    };
+    channels.sort_unstable();
+    channels.dedup();
+    let beam = keys.beam_u_arcsec.map(set_up::angle);
+    let points = set_up::lengths(&keys.reflector_u_um).chain(set_up::lengths(&keys.optic_u_um));
+    let mut priors: Vec<Prior> = points.chain([beam.unwrap_or(Prior::Free); 2]).chain([Prior::Free; 6]).collect();
+    hold_absent(&channels, beam.is_some(), &mut priors);
+    let kept = of_channels(&channels);
+    let laser = Laser { reflector, optic, frame, channels, kept, is_beam_stated: beam.is_some() };
+    Ok(SetUp::new(Station::Laser(laser), priors))
+}
+
+fn of_channels(channels: &[usize]) -> Vec<Channel> {
+    channels.iter().map(|channel| CHANNELS[*channel]).collect()
+}
+
+/// Holds the zeros of channels that are not read; the beam, if its direction is not stated, in the directions of which no
+/// straightness is read.
+fn hold_absent(channels: &[usize], is_beam_stated: bool, priors: &mut [Prior]) {
+    for channel in 0..CHANNELS.len() {
+        priors[ZERO + channel] = if channels.contains(&channel) { Prior::Free } else { Prior::Known };
+    }
+    if !is_beam_stated {
+        for straightness in 0..2 {
+            let is_read = channels.contains(&(1 + straightness));
+            priors[BEAM + straightness] = if is_read { Prior::Free } else { Prior::Known };
+        }
+    }
+}
+
+/// Beam, horizontal and vertical: perpendicular directions in R. Their signs are those of R's directions: horizontal is
+/// towards +X or +Y, vertical upwards. A vertical beam has X as horizontal and Y as vertical.
+fn frame(beam: [f64; 3]) -> [[f64; 3]; 3] {
+    let above = if beam[2].abs() > VERTICAL { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] };
+    let unit = |v: [f64; 3]| {
+        let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let largest = v.iter().copied().fold(0.0_f64, |a, b| if b.abs() > a.abs() + 1e-12 { b } else { a });
+        v.map(|x| x * largest.signum() / length)
+    };
+    let horizontal = unit(cross(above, Point(beam)).0);
+    [beam, horizontal, unit(cross(beam, Point(horizontal)).0)]
+}
+
+/// A laser as set up for one test, lengths in mm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Laser<N> {
+    /// The reflector in the tool frame.
+    pub reflector: [N; 3],
+    /// The other optic in the table frame.
+    pub optic: [N; 3],
+    /// Beam, horizontal and vertical in R, of unit length.
+    pub frame: [[N; 3]; 3],
+    /// The channels that are read, in ascending order, as indices among all that a laser can have.
+    pub channels: Vec<usize>,
+    /// The same channels.
+    pub kept: Vec<Channel>,
+    /// Whether the uncertainty of the beam is stated.
+    pub is_beam_stated: bool,
+}
+
+impl<N> Geometry<N> for Laser<N> {
+    type Over<M> = Laser<M>;
+
+    fn map<M>(&self, to: &impl Fn(&N) -> M) -> Laser<M> {
+        Laser {
+            reflector: point(&self.reflector, to),
+            optic: point(&self.optic, to),
+            frame: self.frame.each_ref().map(|direction| point(direction, to)),
+            channels: self.channels.clone(),
+            kept: self.kept.clone(),
+            is_beam_stated: self.is_beam_stated,
+        }
+    }
+    fn keep_channels(&mut self, has: &dyn Fn(Quantity) -> bool) {
+        let is_read = |channel: usize| {
+            has(Quantity::Channel(channel)) || has(Quantity::FromNominal(channel))
+        };
+        let read: Vec<usize> = (0..CHANNELS.len()).filter(|channel| is_read(*channel)).collect();
+        if !read.is_empty() {
+            self.kept = of_channels(&read);
+            self.channels = read;
+        }
+    }
+    /// The channels, mm or rad.
+    fn reading<S: Scalar<Nominal = N>>(
+        &self,
+        machine: &Machine,
+        state: &[AxisPosition<N>],
+        errors: &[BodyErrors<S>],
+        unknown: impl Fn(usize) -> Option<S>,
+    ) -> Reading<S>
+    where
+        N: Nominal,
+    {
+        let reads = |channels: std::ops::Range<usize>| self.channels.iter().any(|channel| channels.contains(channel));
+        let optic = || machine.workpiece_point(state, errors, displaced(self.optic, OPTIC, &unknown));
+        let from_optic = reads(0..3).then(|| {
+            machine.tool_point(state, errors, displaced(self.reflector, 0, &unknown)).minus(optic())
+        });
+        let rotation = reads(3..6).then(|| machine.rotation_error(state, errors, Body::Relative));
+        let frame = beam_frame(self.frame, unknown(BEAM), unknown(BEAM + 1));
+        Reading::of(self.channels.iter().map(|channel| {
+            let value = match (*channel, &from_optic, &rotation, &frame) {
+                (0..3, Some(from_optic), _, None) => dot_nominal(*from_optic, self.frame[*channel]),
+                (0..3, Some(from_optic), _, Some(frame)) => dot(*from_optic, frame[*channel]),
+                // Pitch about the horizontal, yaw about the vertical, roll about the beam.
+                (_, _, Some(rotation), _) => dot_nominal(*rotation, self.frame[(*channel - 2) % 3]),
+                _ => S::constant(0.0),
+            };
+            unknown(ZERO + *channel).map_or(value, |zero| value + zero)
+        }))
+    }
+    fn table_point_mm(&self) -> Option<&[N; 3]> {
+        Some(&self.optic)
+    }
+    fn tool_point_mm(&self) -> &[N; 3] {
+        &self.reflector
+    }
+}
+
+/// Beam, horizontal and vertical of a beam that deviates towards horizontal and vertical by angles; `None` for a nominal
+/// one. The beam is turned within the plane of its nominal direction and the deviation, and the others are perpendicular
+/// to it.
+fn beam_frame<S: Scalar>(
+    nominal: [[S::Nominal; 3]; 3],
+    towards_horizontal: Option<S>,
+    towards_vertical: Option<S>,
+) -> Option<[Point<S>; 3]> {
+    if towards_horizontal.is_none() && towards_vertical.is_none() {
+        return None;
+    }
+    let zero = S::constant(0.0);
+    let (alpha, beta) = (towards_horizontal.unwrap_or(zero), towards_vertical.unwrap_or(zero));
+    let [beam, horizontal, vertical] = nominal;
+    let unit = |v: Point<S>| {
+        let length = v.norm();
+        Point(v.0.map(|x| x / length))
+    };
+    let along = |direction: [S::Nominal; 3], angle: S| Point(direction.map(|x| angle * x));
+    let turned = unit(Point::nominal(beam).plus(along(horizontal, alpha)).plus(along(vertical, beta)));
+    let perpendicular = |direction: [S::Nominal; 3]| {
+        let direction = Point::nominal(direction);
+        let part = dot(direction, turned);
+        unit(direction.minus(Point(turned.0.map(|x| x * part))))
+    };
+    Some([turned, perpendicular(horizontal), perpendicular(vertical)])
+}
+
+impl Instrument for Laser<f64> {
+    fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
+        [Some(&mut self.optic), Some(&mut self.reflector)]
+    }
+    fn channels(&self) -> &[Channel] {
+        &self.kept
+    }
+    fn columns(&self) -> &'static [Column] {
+        &COLUMNS
+    }
+    fn kept_channel(&self, of_all: usize) -> Option<usize> {
+        self.channels.iter().position(|channel| *channel == of_all)
+    }
+    fn absent_channels_known(&self, priors: &mut [Prior]) {
+        hold_absent(&self.channels, self.is_beam_stated, priors);
+    }
+    fn missing(&self, has: &dyn Fn(Quantity) -> bool) -> Option<Fault> {
+        let missing = !COLUMNS.iter().any(|column| has(column.quantity));
+        let help = "a laser needs at least one of displacement_mm, deviation_um, horizontal_um, vertical_um, \
+                    pitch_arcsec, yaw_arcsec, roll_arcsec";
+        missing.then(|| ("with the readings of the laser".into(), help.into()))
+    }
+}

@@ -1,0 +1,215 @@
+//! Pointing: a mount carries a direction, and what it points at is known. Telescope, antenna, gimbal, theodolite.
+//!
+//! The nominal line of sight is `U`, with `A` across and `V` up, three directions that the commanded mount carries. The
+//! actual line of sight `p` reads
+//!
+//! ```text
+//! across = (p · A)/(p · U)        up = (p · V)/(p · U)
+//! ```
+//!
+//! which are the difference of azimuth times the cosine of the elevation, and that of elevation. R has X to the north, Y
+//! to the west and Z up; azimuth runs from north through east. The columns are the true azimuth and elevation; the axis
+//! positions are the encoders.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::channel::Channel;
+use super::column::{Column, Quantity};
+use super::kind::{Checked, median};
+use super::set_up::{self, SetUp, Written};
+use super::{
+    Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
+    default_errors, point,
+};
+use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::document::node::Node;
+use crate::document::{Fault as KeyFault, schema, value as document};
+use crate::frames::{Point, cross, dot};
+use crate::scalar::{Nominal, Scalar};
+use crate::session::Prior;
+use crate::session::expression::Constant;
+
+/// The direction of the line of sight: across and up.
+pub const PARAMETERS: [InstrumentParameter; 2] = [
+    InstrumentParameter::angle("line_of_sight", "across", SharedBy::SpindleSetup),
+    InstrumentParameter::angle("line_of_sight", "up", SharedBy::SpindleSetup),
+];
+
+pub(super) const ENTRY: Entry = Entry {
+    kind: InstrumentKind::Pointing,
+    word: "pointing",
+    parameters: &PARAMETERS,
+    free: None,
+    is_two_sided: false,
+    reads_poses: true,
+    rows_can_lack_channels: false,
+    has_readings: true,
+    needs_every_axis: true,
+    default_errors: default_errors::orientations,
+    // The line of sight stays from night to night.
+    spindle_setup: Some("tool"),
+    keys: schema::properties::<Keys>,
+    read,
+};
+
+/// The channels.
+const CHANNELS: [Channel; 2] = [Channel::angle("across"), Channel::angle("up")];
+
+/// The columns.
+const COLUMNS: [Column; 2] = [
+    Column::new("true_azimuth", "deg", Quantity::Channel(0)),
+    Column::new("true_elevation", "deg", Quantity::Channel(1)),
+];
+
+/// The keys of a test.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Keys {
+    /// Line of sight in the tool frame; default [1, 0, 0].
+    line_of_sight: Option<document::Direction>,
+    /// Standard uncertainty of the line of sight, arcsec. Default: across without prior (the collimation error), up
+    /// known, since the index error of the last axis has the same effect.
+    line_of_sight_u_arcsec: Option<document::Uncertainty>,
+}
+
+fn read(set_up: &Node, _: &[Constant]) -> Result<SetUp, KeyFault> {
+    let keys: Keys = set_up::keys(set_up)?;
+    let sight = Point(keys.line_of_sight.map_or([1.0, 0.0, 0.0], |sight| sight.0));
+    // Across is horizontal; of a vertical line of sight it is −Y, as of one to the north.
+    let horizontal = cross(sight.0, Point([0.0, 0.0, 1.0]));
+    let length = horizontal.norm();
+    let across = if length > 1e-6 { Point(horizontal.0.map(|x| x / length)) } else { Point([0.0, -1.0, 0.0]) };
+    let up = cross(across.0, sight);
+    let written = |direction: Point<f64>| direction.0.map(Written::number);
+    let priors = match keys.line_of_sight_u_arcsec {
+        None => vec![Prior::Free, Prior::Known],
+        Some(u) => vec![set_up::angle(u); 2],
+    };
+    let directions = [written(sight), written(across), written(up)];
+    let origin = [0.0; 3].map(Written::number);
+    Ok(SetUp::new(Station::Pointing(Pointing { directions, origin }), priors))
+}
+
+/// A line of sight as mounted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pointing<N> {
+    /// Line of sight, across and up in the tool frame, of unit length.
+    pub directions: [[N; 3]; 3],
+    /// The origin of the tool frame: a direction has no point.
+    pub origin: [N; 3],
+}
+
+impl<N: Nominal> Pointing<N> {
+    /// Line of sight, across and up of the commanded mount, in R.
+    fn nominal<S: Scalar<Nominal = N>>(&self, machine: &Machine, state: &[AxisPosition<N>]) -> [Point<S>; 3] {
+        let none = vec![BodyErrors::<S>::NONE; machine.axes.len()];
+        self.directions.map(|direction| machine.tool_direction(state, &none, Point::nominal(direction)))
+    }
+}
+
+impl<N> Geometry<N> for Pointing<N> {
+    type Over<M> = Pointing<M>;
+
+    fn map<M>(&self, to: &impl Fn(&N) -> M) -> Pointing<M> {
+        Pointing {
+            directions: self.directions.each_ref().map(|direction| point(direction, to)),
+            origin: point(&self.origin, to),
+        }
+    }
+    /// Across and up, rad.
+    fn reading<S: Scalar<Nominal = N>>(
+        &self,
+        machine: &Machine,
+        state: &[AxisPosition<N>],
+        errors: &[BodyErrors<S>],
+        unknown: impl Fn(usize) -> Option<S>,
+    ) -> Reading<S>
+    where
+        N: Nominal,
+    {
+        let mut sight = Point::nominal(self.directions[0]);
+        for (parameter, direction) in self.directions[1..].iter().enumerate() {
+            if let Some(angle) = unknown(parameter) {
+                sight = sight.plus(Point(direction.map(|x| angle * x)));
+            }
+        }
+        let sight = machine.tool_direction(state, errors, sight);
+        let [ahead, across, up] = self.nominal::<S>(machine, state);
+        let along = dot(sight, ahead);
+        Reading::of([dot(sight, across) / along, dot(sight, up) / along])
+    }
+    fn table_point_mm(&self) -> Option<&[N; 3]> {
+        None
+    }
+    fn tool_point_mm(&self) -> &[N; 3] {
+        &self.origin
+    }
+}
+
+impl Instrument for Pointing<f64> {
+    fn channels(&self) -> &[Channel] {
+        &CHANNELS
+    }
+    fn columns(&self) -> &'static [Column] {
+        &COLUMNS
+    }
+    fn refers_to_nominal(&self) -> bool {
+        true
+    }
+    fn channels_of_columns(&self, machine: &Machine, state: &[AxisPosition<f64>], values: &mut [f64]) {
+        if let [azimuth, elevation] = values {
+            let ((sin_a, cos_a), (sin_e, cos_e)) = (azimuth.sin_cos(), elevation.sin_cos());
+            let observed = Point([cos_e * cos_a, -cos_e * sin_a, sin_e]);
+            let [ahead, across, up] = self.nominal::<f64>(machine, state);
+            let along = dot(observed, ahead);
+            // More than a right angle away is no small difference.
+            let of = |direction| if along > 0.0 { dot(observed, direction) / along } else { f64::INFINITY };
+            (*azimuth, *elevation) = (of(across), of(up));
+        }
+    }
+    fn columns_of_channels(&self, machine: &Machine, state: &[AxisPosition<f64>], values: &mut [f64]) {
+        if let [first, second] = values {
+            let [ahead, across, up] = self.nominal::<f64>(machine, state);
+            let [x, y, z]: [f64; 3] =
+                std::array::from_fn(|i| ahead.0[i] + across.0[i] * *first + up.0[i] * *second);
+            *first = (-y).atan2(x).rem_euclid(std::f64::consts::TAU);
+            *second = z.atan2(x.hypot(y));
+        }
+    }
+    fn missing(&self, has: &dyn Fn(Quantity) -> bool) -> Option<Fault> {
+        let column = COLUMNS.iter().find(|column| !has(column.quantity))?;
+        let help = "pointing needs true_azimuth_deg and true_elevation_deg";
+        Some((format!("`{}`", column.name(column.unit)), help.into()))
+    }
+    /// The mount points near what was observed.
+    fn check_readings(&self, checked: &Checked<'_>) -> Result<(), Fault> {
+        let readings = checked.readings;
+        let mut state = Vec::new();
+        let mut away = Vec::with_capacity(readings.rows());
+        for (row, values) in readings.observed.chunks_exact(CHANNELS.len()).enumerate() {
+            readings.state(checked.machine, row, &mut state);
+            let mut values = [values[0], values[1]];
+            self.channels_of_columns(checked.machine, &state, &mut values);
+            away.push(values[0].hypot(values[1]).atan().to_degrees());
+        }
+        let typical = median(&mut away);
+        if typical <= MAX_AWAY_DEG {
+            return Ok(());
+        }
+        Err((
+            format!(
+                "test \"{}\": the mount nominally points {typical:.1}° away from what was observed (median of {} \
+                 readings); the limit is {MAX_AWAY_DEG}°",
+                checked.test,
+                readings.rows()
+            ),
+            "check the directions of the axes (a mount that turns through east as R is defined has `direction = [0, 0, \
+             -1]` for azimuth and `[0, -1, 0]` for elevation), `line_of_sight`, and the units of the columns"
+                .into(),
+        ))
+    }
+}
+
+/// Largest typical angle between the nominal line of sight and what was observed, deg: index errors are smaller.
+const MAX_AWAY_DEG: f64 = 20.0;
