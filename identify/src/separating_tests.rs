@@ -1,10 +1,12 @@
 //! Further tests that separate a found effect from its aliases.
 
+use abbe_model::document::print::Block;
+use abbe_model::document::test::Test as Document;
 use abbe_model::effect::Effect;
 
 use crate::error::IdentifyError;
 use crate::parameters::Role;
-use crate::plan::proposal::{Proposal, proposal};
+use crate::plan::proposal::{self, proposal};
 use crate::plan::separate::{AlternativeSeparation, SeparatingTest, separating_tests};
 use crate::plan::test_variations::TestVariations;
 use crate::results::{AlternativeResult, EffectResult, SeparatingTestResult, SeparationResult};
@@ -37,12 +39,13 @@ pub fn separate_aliases(
                 let propose = |test: &SeparatingTest| {
                     proposal(&trace.after.session, &test.planned, &test.test, variations, &mut taken)
                 };
-                let proposals: Vec<Option<Proposal>> = tests.iter().map(propose).collect();
+                let proposals: Vec<Option<Block<Document>>> = tests.iter().map(propose).collect();
                 let (effect, aliases) = (&mut trace.result.effects[k], &trace.alias_effects[k]);
                 fill_in(effect, aliases, &trace.after.session, tests);
                 for (test, proposal) in effect.separating_tests.iter_mut().zip(proposals) {
-                    (test.name, test.session_toml) =
-                        proposal.map_or_else(Default::default, |proposal| (proposal.name, proposal.block));
+                    let Some(proposal) = proposal else { continue };
+                    test.name = proposal::name(&proposal);
+                    test.proposal = proposal;
                 }
             }
             Err(IdentifyError::Request(_)) => break,
@@ -104,7 +107,7 @@ fn fill_in(
         alternative_count: test.alternatives.len(),
         alternatives: test.alternatives.iter().map(alternative).collect(),
         name: String::new(),
-        session_toml: String::new(),
+        proposal: proposal::none(),
     };
     effect.separating_tests = tests.iter().map(result).collect();
 }

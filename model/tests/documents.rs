@@ -8,7 +8,6 @@ use abbe_model::document::machine::Machine;
 use abbe_model::document::print;
 use abbe_model::document::session::Session;
 use abbe_model::files::Source;
-use abbe_model::files::read::document_of;
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -26,9 +25,10 @@ fn files_in(folder: &Path, files: &mut Vec<PathBuf>) {
 
 #[track_caller]
 fn reads_back<T: Serialize + DeserializeOwned + JsonSchema + PartialEq + Debug>(file: &Path, text: &str) {
-    let document: T = document_of(&Source::new(file, text)).unwrap();
+    let document: T = Source::new(file, text).parse().unwrap().document().unwrap();
     let printed = print::text_of(&document).unwrap();
-    let again: T = document_of(&Source::new(file, &printed)).unwrap_or_else(|fault| panic!("{fault}\n{printed}"));
+    let again = Source::new(file, &printed).parse().and_then(|parsed| parsed.document::<T>());
+    let again = again.unwrap_or_else(|fault| panic!("{fault}\n{printed}"));
     assert_eq!(again, document, "{printed}");
 }
 

@@ -6,7 +6,7 @@ use std::path::Path;
 use abbe_model::ModelError;
 use abbe_model::chain::Machine;
 use abbe_model::document::node::Node;
-use abbe_model::files::read::{add_node, document_of, plan_of_node};
+use abbe_model::files::read::{add_node, plan_of_node};
 use abbe_model::files::table::memory::{MemoryColumn, Values};
 use abbe_model::files::{self, ReadOptions, Source};
 use abbe_model::instrument::InstrumentKind;
@@ -47,7 +47,7 @@ fn empty() -> Session {
 
 /// The test of the session file, without the name of its data.
 fn test() -> Node {
-    let document: Node = document_of(&Source::new(Path::new("session.toml"), SESSION)).unwrap();
+    let document: Node = Source::new(Path::new("session.toml"), SESSION).parse().unwrap().document().unwrap();
     let mut test = document.get("test").unwrap().items()[0].clone();
     test.set("data", Node::default());
     test
@@ -150,7 +150,7 @@ fn an_unusable_test_is_refused_and_the_session_unchanged() {
 /// their places among all items.
 #[test]
 fn missing_readings_are_left_out_and_told() {
-    let document: Node = document_of(&Source::new(Path::new("session.toml"), SESSION)).unwrap();
+    let document: Node = Source::new(Path::new("session.toml"), SESSION).parse().unwrap().document().unwrap();
     let test = &document.get("test").unwrap().items()[0];
     let mut head = document.clone();
     head.set("test", Node::from_iter::<[Node; 0]>([]));

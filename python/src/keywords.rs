@@ -148,12 +148,24 @@ fn held<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Held<'py>> {
     }
 }
 
+/// Largest depth of lists and dicts in one another; the files nest to 80.
+const MAX_DEPTH: usize = 80;
+
 /// A value of Python as a value of a document.
 pub fn node_of(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Node> {
+    nested(name, value, MAX_DEPTH)
+}
+
+/// A value in which lists and dicts may be nested `depth` deep.
+fn nested(name: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<Node> {
+    let Some(depth) = depth.checked_sub(1) else {
+        let message = format!("`{name}` has more than {MAX_DEPTH} lists and dicts in one another");
+        return Err(Failed::argument(message, "a list or a dict must not contain itself").into());
+    };
     if let Ok(table) = value.cast::<PyDict>() {
         let entry = |(key, value): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
             let key: String = key.extract()?;
-            let node = node_of(&key, &value)?;
+            let node = nested(&key, &value, depth)?;
             Ok::<_, PyErr>(Entry { key, key_span: 0..0, node })
         };
         // `None` is what a caller has who states nothing.
@@ -175,10 +187,10 @@ pub fn node_of(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Node> {
     }
     // Numbers and arrays of NumPy become those of Python.
     if let Ok(plain) = value.call_method0("tolist") {
-        return node_of(name, &plain);
+        return nested(name, &plain, depth);
     }
     if value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>() {
-        let items = value.try_iter()?.map(|item| node_of(name, &item?));
+        let items = value.try_iter()?.map(|item| nested(name, &item?, depth));
         return Ok(Value::List(items.collect::<PyResult<_>>()?).into());
     }
     let found: String = value.get_type().name()?.extract()?;

@@ -49,13 +49,13 @@ impl Model {
     #[staticmethod]
     fn read(path: PathBuf) -> Result<Model, Failed> {
         let source = files::text(&path, "the model file")?;
-        let model = Arc::new(model_file::read_text(&path, &source.text)?);
+        let model = Arc::new(model_file::of_source(&source)?);
         Ok(Model { model, origin: Origin::of_files(&source.stamp), text: source.text })
     }
 
     #[staticmethod]
     fn from_text(text: &str) -> Result<Model, Failed> {
-        let model = Arc::new(model_file::read_text("model.json".as_ref(), text)?);
+        let model = Arc::new(model_file::of_source(&files::Source::new("model.json".as_ref(), text))?);
         Ok(Model { model, text: text.to_string(), origin: Origin::default() })
     }
 

@@ -5,9 +5,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use abbe::document::Origin;
-use abbe::model::document::node::Node;
-use abbe::model::document::print;
-use abbe::model::files::read::{document_of, plan_of_node};
+use abbe::model::document::edit::SessionText;
+use abbe::model::files::read::plan_of;
 use abbe::model::files::{Source, SourceMap};
 use abbe::model::session::Test;
 use abbe::model::session::readings::{Origin as Lines, Readings};
@@ -24,7 +23,7 @@ pub fn pickled<'py>(py: Python<'py>, session: &Session) -> PyResult<Bound<'py, P
     let state = session.state();
     let tests: Vec<_> = state.session.tests.iter().map(|test| pickled_test(py, test)).collect::<PyResult<_>>()?;
     let pickled = PyDict::new(py);
-    pickled.set_item("text", whole_text(&state.sources)?)?;
+    pickled.set_item("text", whole(&state.sources)?.to_string())?;
     pickled.set_item("file", &state.sources.file)?;
     let origin = serde_json::to_string(&state.origin).map_err(|cause| Failed::new(cause.to_string()))?;
     pickled.set_item("origin", origin)?;
@@ -41,8 +40,8 @@ pub fn unpickled(pickled: &Bound<'_, PyDict>) -> PyResult<Session> {
         Ok::<_, PyErr>(pickled.get_item(name)?.ok_or_else(missing)?)
     };
     let text: String = item("text")?.extract()?;
-    let document: Node = document_of(&Source::new("session.toml".as_ref(), &text)).map_err(Failed::from)?;
-    let mut session = plan_of_node(document).map_err(Failed::from)?;
+    let source = Source::new("session.toml".as_ref(), &text);
+    let mut session = plan_of(&source).map_err(Failed::from)?;
     let declared = std::mem::take(&mut session.tests);
     for test in item("tests")?.try_iter()? {
         session.tests.push(unpickled_test(&declared, test?.cast::<PyDict>()?, session.machine.axes.len())?);
@@ -51,18 +50,18 @@ pub fn unpickled(pickled: &Bound<'_, PyDict>) -> PyResult<Session> {
     let origin: String = item("origin")?.extract()?;
     let origin: Origin = serde_json::from_str(&origin).map_err(|cause| Failed::new(cause.to_string()))?;
     let file: PathBuf = item("file")?.extract()?;
+    let text = SessionText::new(&text, &file).map_err(Failed::from)?;
     let sources = SourceMap { file, text, machine_text: None, bodies: Vec::new(), files: Vec::new() };
     Ok(Session::of(State::new(session, sources, origin)))
 }
 
-/// The text of a session with its machine in it.
-fn whole_text(sources: &SourceMap) -> Result<String, Failed> {
-    let Some(machine) = &sources.machine_text else {
-        return Ok(sources.text.clone());
-    };
-    let mut document: Node = document_of(&Source::new(&sources.file, &sources.text))?;
-    document.set("machine", document_of::<Node>(&Source::new(&sources.file, machine))?);
-    Ok(print::text_of(&document)?)
+/// A session with its machine in it.
+fn whole(sources: &SourceMap) -> Result<SessionText, Failed> {
+    let mut text = sources.text.clone();
+    if let Some(machine) = &sources.machine_text {
+        text.set_machine(machine)?;
+    }
+    Ok(text)
 }
 
 fn pickled_test<'py>(py: Python<'py>, test: &Test) -> PyResult<Bound<'py, PyDict>> {

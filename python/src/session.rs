@@ -51,11 +51,12 @@ impl State {
         State { session, sources, origin, problem: Mutex::new(None) }
     }
 
-    /// A state of a session with this text and no files.
-    pub fn in_memory(session: domain::Session, text: String) -> State {
+    /// A state of a session with this document and no files.
+    pub fn in_memory(session: domain::Session, document: &Node) -> Result<State, Failed> {
         let file = PathBuf::from("session.toml");
+        let text = SessionText::of_document(document, &file)?;
         let sources = SourceMap { file, text, machine_text: None, bodies: Vec::new(), files: Vec::new() };
-        State::new(session, sources, Origin::default())
+        Ok(State::new(session, sources, Origin::default()))
     }
 
     /// The problem at the readings, and at the planned states of tests without readings.
@@ -92,9 +93,8 @@ impl Session {
         let state = self.state();
         let mut session = state.session.clone();
         add_node(&mut session, list, entry.clone(), columns).map_err(Failed::from)?;
-        let mut text = SessionText::new(&state.sources.text, &state.sources.file).map_err(Failed::from)?;
-        text.add(list, &entry).map_err(Failed::from)?;
-        let sources = SourceMap { text: text.to_string(), ..state.sources.clone() };
+        let mut sources = state.sources.clone();
+        sources.text.add(list, &entry).map_err(Failed::from)?;
         let next = State::new(session, sources, state.origin.clone());
         *self.0.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(next);
         Ok(())
@@ -121,9 +121,8 @@ impl Session {
         let mut document = node_of("session", head.as_any())?;
         let tables = print::json_of(&of_domain::machine(&machine.machine)).map_err(Failed::from)?;
         document.set("machine", tables);
-        let text = print::text_of(&document).map_err(Failed::from)?;
-        let session = plan_of_node(document).map_err(Failed::from)?;
-        Ok(Session::of(State::in_memory(session, text)))
+        let session = plan_of_node(document.clone()).map_err(Failed::from)?;
+        Ok(Session::of(State::in_memory(session, &document)?))
     }
 
     fn add_test(&self, name: &str, keywords: &Bound<'_, PyDict>) -> PyResult<()> {
@@ -173,7 +172,7 @@ impl Session {
 
     #[getter]
     fn text(&self) -> String {
-        self.state().sources.text.clone()
+        self.state().sources.text.to_string()
     }
 
     /// Name, number of readings (0 for a plan) and number of channels of each test.
@@ -299,9 +298,7 @@ impl Session {
             let mut sources = SourceMap { files: Vec::new(), ..state.sources.clone() };
             if let Some(noise_um) = noise_um {
                 session.noise_mm = simulation.noise_mm;
-                let mut text = SessionText::new(&sources.text, &sources.file)?;
-                text.set_noise(noise_um);
-                sources.text = text.to_string();
+                sources.text.set_noise(noise_um);
             }
             Ok((State::new(session, sources, Origin::default()), simulated.truth, simulated.warnings))
         })?;

@@ -8,7 +8,6 @@ use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::results::Statements;
 use abbe::identify::separating_tests::separate_aliases;
 use abbe::identify::trace::{self, Progress, TraceOptions, TraceOutcome};
-use abbe::model::document::edit::SessionText;
 use abbe::model::words::counted;
 use abbe::report::block::Report;
 use abbe::report::commands::Commands;
@@ -160,9 +159,7 @@ impl Trace {
         let mut session = state.session.clone();
         session.effects.extend(self.trace.effects.iter().cloned());
         let mut sources = state.sources.clone();
-        let mut text = SessionText::new(&sources.text, &sources.file)?;
-        text.add_effects(&self.trace.effects, &session.machine)?;
-        sources.text = text.to_string();
+        sources.text.add_effects(&self.trace.effects, &session.machine)?;
         sources.files.clear();
         Ok(Session::of(State::new(session, sources, Default::default())))
     }

@@ -107,7 +107,7 @@ fn read(file: &Path, options: &ReadOptions, outputs: &Outputs) -> Result<File, F
     // A model is JSON; no session begins with a brace.
     if source.text.trim_start().starts_with('{') {
         outputs.refuse_overwrite([file])?;
-        let model = model_file::read_text(file, &source.text)?;
+        let model = model_file::of_source(&source)?;
         return Ok((Input::Model(Box::new(model)), InputFiles::Model(source.stamp)));
     }
     let (session, sources) = files::session_of(&source, options)?;

@@ -54,7 +54,7 @@ pub fn run(arguments: &CompensateArguments) -> Result<(), Failure> {
     let outputs = arguments.output.prepared(&[Some(&arguments.out)])?;
     outputs.refuse_overwrite([arguments.model.as_path(), arguments.commands.as_path()])?;
     let source = files::text(&arguments.model, "the model file")?;
-    let model = model_file::read_text(&source.file, &source.text)?;
+    let model = model_file::of_source(&source)?;
     let machine = &model.machine;
     let tool_mm = values::point_mm("--tool-mm", &arguments.tool_mm, model.tool_mm)?;
     let at = positions::stated(machine, &arguments.at)?;

@@ -78,7 +78,7 @@ pub fn run(arguments: &ExportArguments) -> Result<(), Failure> {
     let outputs = arguments.output.prepared(&[Some(&arguments.out)])?;
     outputs.refuse_overwrite([arguments.model.as_path()])?;
     let source = files::text(&arguments.model, "the model file")?;
-    let model = model_file::read_text(&source.file, &source.text)?;
+    let model = model_file::of_source(&source)?;
     let format = exports::format(&arguments.format)?;
     if !format.takes_entries {
         let other = [(arguments.entries == Entries::Plain, "--entries"), (!arguments.travel.is_empty(), "--travel")];

@@ -7,6 +7,8 @@ use abbe::identify::trace::TraceOutcome;
 use abbe::model::ModelError;
 use abbe::model::chain::Machine;
 use abbe::model::document::edit::SessionText;
+use abbe::model::document::print::Block;
+use abbe::model::document::test::Test;
 use abbe::model::files::SourceMap;
 
 use super::failure::Failure;
@@ -22,7 +24,7 @@ pub fn write(
     edit: impl FnOnce(&mut SessionText) -> Result<(), ModelError>,
 ) -> Result<(), Failure> {
     let data = arguments.data.as_deref();
-    let mut text = SessionText::new(&sources.text, &sources.file)?;
+    let mut text = sources.text.clone();
     text.relocate(output::folder_of(path), data)?;
     edit(&mut text)?;
     output::write_whole(path, text.to_string().as_bytes())?;
@@ -46,7 +48,7 @@ pub fn add_trace(
 ) -> Result<(), ModelError> {
     text.add_effects(&trace.effects, machine)?;
     if with_tests {
-        proposals(&trace.result).iter().try_for_each(|block| text.add_block(block))?;
+        proposals(&trace.result).into_iter().try_for_each(|block| text.add_block(block))?;
     }
     if trace.result.interrupted {
         text.add_remark(&format!("The trace was {}: effects may be missing.", trace.result.interruption()));
@@ -54,15 +56,15 @@ pub fn add_trace(
     Ok(())
 }
 
-/// The proposed tests as blocks of a session, each once.
-fn proposals(result: &TraceResult) -> Vec<String> {
+/// The proposed tests, each once.
+fn proposals(result: &TraceResult) -> Vec<&Block<Test>> {
     let mut seen: Vec<&str> = Vec::new();
-    let mut blocks = Vec::new();
+    let mut proposals = Vec::new();
     for test in result.effects.iter().flat_map(|effect| &effect.separating_tests) {
-        if !test.session_toml.is_empty() && !seen.contains(&test.test.as_str()) {
+        if test.proposal.entry.is_some() && !seen.contains(&test.test.as_str()) {
             seen.push(&test.test);
-            blocks.push(test.session_toml.clone());
+            proposals.push(&test.proposal);
         }
     }
-    blocks
+    proposals
 }

@@ -34,7 +34,7 @@ pub fn run(arguments: &ValidateArguments) -> Result<(), Failure> {
     let outputs = common.output.prepared(&[])?;
     outputs.refuse_overwrite([arguments.model.as_path()])?;
     let source = files::text(&arguments.model, "the model file")?;
-    let model = model_file::read_text(&source.file, &source.text)?;
+    let model = model_file::of_source(&source)?;
     let (session, sources) = read_session(&arguments.session, &outputs)?;
     let validation = validate(&model, &session)?;
     let mut read = Read::session(&session, &sources, common.seed);

@@ -212,7 +212,7 @@ fn record(inputs: Inputs, goes_on: &(dyn Fn() -> bool + Sync)) -> Result<Record,
             Ok(source) => source,
             Err(message) => return failed(record, "validate", message),
         };
-        let model = || model_file::read_text(&source.file, &source.text);
+        let model = || model_file::of_source(&source);
         let validated = catch_unwind(AssertUnwindSafe(|| validate(&model()?, &session)));
         match validated {
             Ok(Ok(validation)) => {

@@ -3,9 +3,10 @@
 use abbe::identify::validate::ValidationVerdict;
 use std::path::Path;
 
-use abbe::identify::model_file::{IdentifiedModel, Provenance, read_text};
+use abbe::identify::model_file::{IdentifiedModel, Provenance, of_source};
 use abbe::identify::trace::{TraceOptions, trace};
 use abbe::identify::validate::{ValidationResult, validate};
+use abbe::model::files::Source;
 use abbe::model::files::{ReadOptions, session};
 use abbe::model::session::Session;
 use rand::RngExt;
@@ -56,7 +57,7 @@ fn pair(number: usize) -> Pair {
     let first = recipe.draw_on(&oracle.plan);
     let found = trace(&read(&first), &TraceOptions::default(), &|_| true).unwrap();
     let model = IdentifiedModel::of_fit(&found.after, &found.after_fit, Provenance::default()).unwrap();
-    let model = read_text(Path::new("model.json"), &model.to_text().unwrap()).unwrap();
+    let model = of_source(&Source::new(Path::new("model.json"), &model.to_text().unwrap())).unwrap();
     let radius_mm = random(32, number).random_range(70.0..130.0);
     let tests = Kind::rotary_at(radius_mm, STEP_DEG);
     let plan = Plan::of_tests(Kind::Rotary, oracle.plan.machine.clone(), tests, false);

@@ -5,7 +5,6 @@ use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::results::Statements;
 use abbe::identify::separating_tests::separate_aliases;
 use abbe::identify::trace::{self, Progress, TraceOptions, TraceOutcome};
-use abbe::model::document::edit::SessionText;
 use abbe::model::words::counted;
 use abbe::report::block::Report;
 use abbe::report::commands::Commands;
@@ -71,7 +70,7 @@ impl Trace {
     /// # Errors
     /// If the session states its effects as something else than tables.
     pub fn session(&self) -> Result<String, Failed> {
-        let mut text = SessionText::new(&self.read.sources.text, &self.read.sources.file)?;
+        let mut text = self.read.sources.text.clone();
         text.add_effects(&self.trace.effects, &self.read.session.machine)?;
         Ok(text.to_string())
     }

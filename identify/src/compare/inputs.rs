@@ -55,7 +55,7 @@ impl Input {
 ///
 /// # Errors
 /// If a session cannot be fitted, for example because its data lack what an effect follows.
-pub fn models(inputs: Vec<Input>, seed: u64) -> Result<Vec<(IdentifiedModel, Vec<Outlier>)>, IdentifyError> {
+fn models(inputs: Vec<Input>, seed: u64) -> Result<Vec<(IdentifiedModel, Vec<Outlier>)>, IdentifyError> {
     let mut errors: Vec<ErrorName> = Vec::new();
     let mut effects: Vec<Effect> = Vec::new();
     for input in &inputs {

@@ -34,7 +34,7 @@ use crate::numerics::symmetric::Symmetric;
 use crate::numerics::tails::{chi_square_tail, normal_tail};
 use crate::parameters::Role;
 use crate::validate::machine::differences;
-pub use inputs::{Input, compare_inputs, models};
+pub use inputs::{Input, compare_inputs};
 use results::{Comparison, Difference, NotComparable, OnlyIn, Pair};
 use shared::SharedDifference;
 

@@ -30,7 +30,7 @@ use crate::parameters::Role;
 use crate::unit::Unit;
 pub use document::{InputFile, Provenance};
 pub use range::DriverRange;
-pub use read::{read, read_text};
+pub use read::{of_source, read};
 
 /// A parameter of a model.
 #[derive(Clone, Debug, PartialEq)]

@@ -41,18 +41,14 @@ const SAVE_AGAIN: &str = "save the model again";
 /// If the file cannot be read, is no model, is of a newer version, or was changed by hand: the file, the line, the key,
 /// what was found and what to do.
 pub fn read(path: &Path) -> Result<IdentifiedModel, IdentifyError> {
-    read_text(path, &files::text(path, "the model file")?.text)
+    Ok(of_source(&files::text(path, "the model file")?)?)
 }
 
-/// As [`read`], from the text of the file.
+/// As [`read`], from a file that has been read.
 ///
 /// # Errors
 /// As [`read`].
-pub fn read_text(path: &Path, text: &str) -> Result<IdentifiedModel, IdentifyError> {
-    Ok(model_of(&Source::new(path, text))?)
-}
-
-fn model_of(source: &Source) -> Result<IdentifiedModel, ModelError> {
+pub fn of_source(source: &Source) -> Result<IdentifiedModel, ModelError> {
     let whole: Value = serde_json::from_str(&source.text).map_err(|cause| not_json(source, &cause))?;
     let parsed = source.json()?;
     let here = |fault: Fault| helped(parsed.error_of(fault));

@@ -1,5 +1,6 @@
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use abbe_model::ModelError;
 use abbe_model::document::effect;
 use abbe_model::document::node::Named;
 use abbe_model::driver::Driver;
@@ -13,7 +14,6 @@ use serde_json::Value;
 use super::carried::States;
 use super::write::checksum;
 use super::*;
-use crate::error::IdentifyError;
 use crate::fit::{Fit, prepare};
 use crate::problem::Problem;
 
@@ -23,7 +23,7 @@ fn fitted() -> (Session, Problem, Fit) {
     let mut session = files::session(&file, &ReadOptions::default()).unwrap();
     let text = "[[effect]]\ncomponent = \"EZC\"\nshape = \"harmonic\"\norder = 2\n[[effect]]\ncomponent = \"EXA\"\n\
                 shape = \"periodic\"\nperiod_deg = 33.3\n";
-    let document: Named<Vec<effect::Effect>> = files::read::document_of(&files::Source::new(&file, text)).unwrap();
+    let document: Named<Vec<effect::Effect>> = files::Source::new(&file, text).parse().unwrap().document().unwrap();
     let effects = document.0[0].1.iter();
     let read = effects.map(|of| effect_of_document(of, &session.machine, session.instrument, &[]).unwrap());
     session.effects = read.collect();
@@ -36,8 +36,8 @@ fn text() -> String {
     IdentifiedModel::of_fit(&problem, &fit, Provenance::default()).unwrap().to_text().unwrap()
 }
 
-fn file() -> PathBuf {
-    PathBuf::from("model.json")
+fn read_text(text: &str) -> Result<IdentifiedModel, ModelError> {
+    of_source(&files::Source::new(Path::new("model.json"), text))
 }
 
 #[test]
@@ -45,7 +45,7 @@ fn a_model_reads_back_to_the_same_bits_and_predicts_the_same_readings() {
     let (_, problem, fit) = fitted();
     let saved = IdentifiedModel::of_fit(&problem, &fit, Provenance::default()).unwrap();
     let text = saved.to_text().unwrap();
-    let read = read_text(&file(), &text).unwrap();
+    let read = read_text(&text).unwrap();
     assert_eq!(read.machine, saved.machine);
     assert_eq!(read.effects, saved.effects);
     assert_eq!(read.parameters, saved.parameters);
@@ -67,7 +67,7 @@ fn a_model_reads_back_to_the_same_bits_and_predicts_the_same_readings() {
 /// `EZC` at an angle is `a cos 2C + b sin 2C`; a location error is constant.
 #[test]
 fn errors_at_states_are_those_of_the_effects() {
-    let model = read_text(&file(), &text()).unwrap();
+    let model = read_text(&text()).unwrap();
     let value = |id: &str| model.parameters.iter().find(|parameter| parameter.id == id).unwrap().value;
     let c = model.machine.axis_index("C").unwrap();
     let angles = [0.1, 0.7, 2.0];
@@ -109,8 +109,7 @@ fn changed(path: &str, value: Value, renew: bool) -> String {
 }
 
 fn message(text: &str) -> String {
-    let error = read_text(&file(), text).unwrap_err();
-    let IdentifyError::Model(error) = error else { panic!("{error}") };
+    let error = read_text(text).unwrap_err();
     format!("{error}; {}", error.help().unwrap_or_default())
 }
 

@@ -4,13 +4,15 @@
 //! turn and replaced by the best candidate test, until no test changes (Fedorov's algorithm: Atkinson, Donev & Tobias,
 //! Optimum Experimental Designs, 2007, ch. 12).
 
+use abbe_model::document::print::Block;
+use abbe_model::document::test::Test as Document;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::candidate_information::PreparedCandidates;
 use super::criterion::{Goal, figure, reported, targets};
 use super::information::{Root, SharedParameters};
-use super::proposal::{Proposal, proposal};
+use super::proposal::{self, proposal};
 use super::ranking::smallest_first;
 use super::test_variations::TestVariations;
 use crate::candidates::named;
@@ -76,7 +78,8 @@ pub struct ProposedTest {
     /// Name of the test in `session_toml`.
     pub name: String,
     /// The test as a `[[test]]` block of a session file.
-    pub session_toml: String,
+    #[serde(rename = "session_toml")]
+    pub proposal: Block<Document>,
 }
 
 /// An error and its standard uncertainty.
@@ -196,7 +199,7 @@ pub fn improve(
             let proposal = proposal(&problem.session, &candidate.test, &candidate.name, variations, &mut taken);
             let step = step(&prepared, &chosen[..=k], &outside, &with_units);
             match proposal {
-                Some(Proposal { name, block }) => ProposedTest { name, session_toml: block, ..step },
+                Some(proposal) => ProposedTest { name: proposal::name(&proposal), proposal, ..step },
                 None => step,
             }
         })
@@ -324,7 +327,7 @@ fn step(
         spindle_ball_mm,
         bar_mm,
         name: String::new(),
-        session_toml: String::new(),
+        proposal: proposal::none(),
     }
 }
 

@@ -1,6 +1,8 @@
-//! Proposed tests as blocks of a session file.
+//! Proposed tests as documents of a session.
 
-use abbe_model::document::{of_domain, print};
+use abbe_model::document::of_domain;
+use abbe_model::document::print::Block;
+use abbe_model::document::test::Test as Document;
 use abbe_model::instrument::Station;
 use abbe_model::instrument::ballbar::BAR;
 use abbe_model::session::motion::Motion;
@@ -8,23 +10,25 @@ use abbe_model::session::{Session, Test};
 
 use super::test_variations::TestVariations;
 
-/// A proposed test with the name and the text under which a session can contain it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Proposal {
-    /// A name that no test of the session and no proposal before it has: `C150`, `C150-2`.
-    pub name: String,
-    /// The `[[test]]` block, with the description of the test as a comment.
-    pub block: String,
+/// No proposal.
+pub fn none() -> Block<Document> {
+    Block { list: "test", entry: None }
 }
 
-/// The proposal of a candidate test. `taken` are the names of earlier proposals; the new name is added to them.
+/// The name of a proposed test; empty without one.
+pub fn name(proposal: &Block<Document>) -> String {
+    proposal.entry.as_ref().map_or(String::new(), |(test, _)| test.name.clone())
+}
+
+/// The proposal of a candidate test, with its description as a remark, under a name that no test of the session and no
+/// proposal before it has: `C150`, `C150-2`. `taken` are the names of earlier proposals; the new name is added to them.
 pub fn proposal(
     session: &Session,
     candidate: &Test,
     description: &str,
     variations: &TestVariations,
     taken: &mut Vec<String>,
-) -> Option<Proposal> {
+) -> Option<Block<Document>> {
     let Station::BallBar(bar) = &candidate.station else {
         return None;
     };
@@ -64,7 +68,7 @@ pub fn proposal(
         }
     }
     test.name.clone_from(&name);
-    let block = print::block_of("test", &of_domain::test(&test, &session.machine)?, description).ok()?;
-    taken.push(name.clone());
-    Some(Proposal { name, block })
+    let document = of_domain::test(&test, &session.machine)?;
+    taken.push(name);
+    Some(Block { list: "test", entry: Some((document, description.to_string())) })
 }

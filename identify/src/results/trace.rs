@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use abbe_model::document::print::Block;
+use abbe_model::document::test::Test;
 use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 
@@ -243,7 +245,8 @@ pub struct SeparatingTestResult {
     /// Name of the test in `session_toml`.
     pub name: String,
     /// The test as a `[[test]]` block of a session file.
-    pub session_toml: String,
+    #[serde(rename = "session_toml")]
+    pub proposal: Block<Test>,
 }
 
 /// Separation of a found effect from one alternative by a test.

@@ -31,6 +31,9 @@ pub(super) const NOTE: &str = "Note";
 /// The type of a list or a table of names whose length only the size of its file limits.
 pub(super) const LONG: &str = "Long";
 
+/// The type whose value may be a text of several lines.
+pub(super) const LINES: &str = "Lines";
+
 /// The type whose value is any JSON.
 pub(super) const JSON: &str = "Json";
 
@@ -187,6 +190,13 @@ impl<'de> Deserializer<'de> for De<'de> {
                 };
                 visitor.visit_newtype_struct(StringDeserializer::<Fault>::new(text))
             }
+            LINES => match &self.0.value {
+                Value::Text(text) => {
+                    let text = plain(text, |c| !matches!(c, '\t' | '\n' | '\r'))?;
+                    visitor.visit_newtype_struct(StrDeserializer::<Fault>::new(text))
+                }
+                _ => visitor.visit_newtype_struct(self),
+            },
             JSON => {
                 let text = serde_json::Value::from(self.0).to_string();
                 visitor.visit_newtype_struct(StringDeserializer::<Fault>::new(text))
@@ -248,7 +258,7 @@ impl<'de> Deserializer<'de> for De<'de> {
                 return Err(Fault::unexpected("a table"));
             }
             let variant = self.text().ok().and_then(known).ok_or_else(|| Fault::unexpected(expected()))?;
-            return visitor.visit_enum(StrDeserializer::<Fault>::new(variant));
+            return visitor.visit_enum(Word(variant));
         };
         let of_key = entries.iter().find_map(|entry| known(&entry.key)).or_else(|| known("other"));
         if let Some(variant) = of_key {
@@ -371,14 +381,50 @@ impl<'de> de::EnumAccess<'de> for Variant<'de> {
     }
 }
 
+/// A word in place of a table of an enum.
+struct Word(&'static str);
+
+impl<'de> de::EnumAccess<'de> for Word {
+    type Error = Fault;
+    type Variant = Word;
+
+    fn variant_seed<V: DeserializeSeed<'de>>(self, seed: V) -> Result<(V::Value, Word), Fault> {
+        let variant: StrDeserializer<'_, Fault> = self.0.into_deserializer();
+        Ok((seed.deserialize(variant)?, self))
+    }
+}
+
+impl Word {
+    fn fault(&self) -> Fault {
+        Fault::unexpected(format!("a table such as {{ kind = \"{}\" }}", self.0))
+    }
+}
+
+impl<'de> de::VariantAccess<'de> for Word {
+    type Error = Fault;
+
+    fn unit_variant(self) -> Result<(), Fault> {
+        Ok(())
+    }
+
+    fn newtype_variant_seed<T: DeserializeSeed<'de>>(self, _: T) -> Result<T::Value, Fault> {
+        Err(self.fault())
+    }
+
+    fn tuple_variant<V: Visitor<'de>>(self, _: usize, _: V) -> Result<V::Value, Fault> {
+        Err(self.fault())
+    }
+
+    fn struct_variant<V: Visitor<'de>>(self, _: &'static [&'static str], _: V) -> Result<V::Value, Fault> {
+        Err(self.fault())
+    }
+}
+
 impl<'de> de::VariantAccess<'de> for Map<'de> {
     type Error = Fault;
 
     fn unit_variant(self) -> Result<(), Fault> {
-        match self.entries.front() {
-            None => Ok(()),
-            Some(entry) => Err(Fault::unknown_key(&entry.key, Vec::new()).also_known(self.also.map(str::to_string))),
-        }
+        Err(Fault::unexpected("a word in quotes"))
     }
 
     fn newtype_variant_seed<T: DeserializeSeed<'de>>(self, seed: T) -> Result<T::Value, Fault> {

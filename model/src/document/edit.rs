@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use toml_edit::{DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
 use super::of_domain;
-use super::print::{number_of, table_of};
+use super::print::{Block, document_of, number_of, table_of};
 use crate::chain::Machine;
 use crate::effect::Effect;
 use crate::error::{Location, ModelError};
@@ -29,7 +29,7 @@ use crate::error::{Location, ModelError};
 /// text.add_effects(&[effect], &machine)?;
 /// assert_eq!(
 ///     text.to_string(),
-///     "# end\n\n[[effect]]\ncomponent = \"EZC\"\ndriver = \"C\"\nshape = \"harmonic\"\norder = 2\n"
+///     "# a session\n# end\n\n[[effect]]\ncomponent = \"EZC\"\ndriver = \"C\"\nshape = \"harmonic\"\norder = 2\n"
 /// );
 /// # Ok::<(), abbe_model::ModelError>(())
 /// ```
@@ -62,6 +62,27 @@ impl SessionText {
             help: None,
         })?;
         Ok(SessionText { file: file.to_path_buf(), remark: None, document })
+    }
+
+    /// The text of a document that no text holds.
+    ///
+    /// # Errors
+    /// If a value has no form in TOML.
+    pub fn of_document(document: &impl serde::Serialize, file: &Path) -> Result<SessionText, ModelError> {
+        Ok(SessionText { file: file.to_path_buf(), remark: None, document: document_of(document)? })
+    }
+
+    /// States the machine in place of its file: the tables of a machine file.
+    ///
+    /// # Errors
+    /// If it is not TOML.
+    pub fn set_machine(&mut self, text: &str) -> Result<(), ModelError> {
+        let SessionText { document, .. } = SessionText::new(text, &self.file)?;
+        let mut tables = document.into_table();
+        // They follow the table that contains them.
+        each_table(&mut tables, &mut |table| table.set_position(None));
+        self.document.insert("machine", Item::Table(tables));
+        Ok(())
     }
 
     /// Reads the machine from another file; a session with the machine's own tables is unchanged.
@@ -97,11 +118,26 @@ impl SessionText {
 
     /// Removes tables of these names, of the session and of its tests.
     pub fn remove(&mut self, names: &[&str]) {
+        let mut removed: Vec<Item> = Vec::new();
         for name in names {
-            self.document.remove(name);
+            removed.extend(self.document.remove(name));
             for mut test in tables(&mut self.document, "test") {
-                test.table().remove(name);
+                removed.extend(test.table().remove(name));
             }
+        }
+        let removed = removed.iter().flat_map(|item| match item {
+            Item::Table(table) => vec![table],
+            Item::ArrayOfTables(tables) => tables.iter().collect(),
+            _ => Vec::new(),
+        });
+        // Later ones first: a comment goes on to the next table that stays, below those that are there already.
+        let mut comments: Vec<(isize, &str)> = removed
+            .filter_map(|table| Some((table.position()?, table.decor().prefix()?.as_str()?)))
+            .filter(|(_, prefix)| prefix.contains('#'))
+            .collect();
+        comments.sort_unstable_by_key(|(position, _)| std::cmp::Reverse(*position));
+        for (position, comment) in comments {
+            self.put_after(position, comment);
         }
     }
 
@@ -153,17 +189,31 @@ impl SessionText {
         self.push(list, table_of(entry)?)
     }
 
-    /// Adds the tables of a text, as [`print::block_of`](super::print::block_of) writes one, at the end.
+    /// Adds a proposed entry with its remark at the end.
     ///
     /// # Errors
-    /// As [`SessionText::add_effects`], or if it is not TOML.
-    pub fn add_block(&mut self, block: &str) -> Result<(), ModelError> {
-        for (list, item) in SessionText::new(block, &self.file)?.document.into_table() {
-            if let Item::ArrayOfTables(tables) = item {
-                tables.into_iter().try_for_each(|table| self.push(&list, table))?;
+    /// As [`SessionText::add_effects`].
+    pub fn add_block(&mut self, block: &Block<impl serde::Serialize>) -> Result<(), ModelError> {
+        block.table()?.map_or(Ok(()), |table| self.push(block.list, table))
+    }
+
+    /// Puts a comment above the first table after a position, or at the end.
+    fn put_after(&mut self, position: isize, comment: &str) {
+        let mut next = None;
+        each_table(self.document.as_table_mut(), &mut |table| {
+            next = table.position().filter(|own| *own > position).into_iter().chain(next).min();
+        });
+        let Some(next) = next else {
+            let rest = self.document.trailing().as_str().unwrap_or_default().to_string();
+            return self.document.set_trailing(format!("{comment}{rest}"));
+        };
+        each_table(self.document.as_table_mut(), &mut |table| {
+            if table.position() == Some(next) {
+                let own = table.decor().prefix().and_then(|prefix| prefix.as_str()).unwrap_or_default();
+                let prefix = format!("{comment}{own}");
+                table.decor_mut().set_prefix(prefix);
             }
-        }
-        Ok(())
+        });
     }
 
     fn push(&mut self, list: &str, mut table: Table) -> Result<(), ModelError> {
@@ -175,7 +225,7 @@ impl SessionText {
         }
         prefix.push_str(table.decor().prefix().and_then(|prefix| prefix.as_str()).unwrap_or_default());
         table.decor_mut().set_prefix(prefix);
-        at_the_end(&mut table);
+        each_table(&mut table, &mut |table| table.set_position(Some(isize::MAX)));
         let place = self.document.entry(list).or_insert_with(|| Item::ArrayOfTables(toml_edit::ArrayOfTables::new()));
         match place {
             Item::ArrayOfTables(tables) => tables.push(table),
@@ -192,13 +242,13 @@ impl SessionText {
     }
 }
 
-/// Moves a table with those below its own keys behind all others.
-fn at_the_end(table: &mut Table) {
-    table.set_position(Some(isize::MAX));
+/// Changes a table and those below its own keys.
+fn each_table(table: &mut Table, change: &mut impl FnMut(&mut Table)) {
+    change(table);
     for (_, item) in table.iter_mut() {
         match item {
-            Item::Table(inner) => at_the_end(inner),
-            Item::ArrayOfTables(tables) => tables.iter_mut().for_each(at_the_end),
+            Item::Table(inner) => each_table(inner, change),
+            Item::ArrayOfTables(tables) => tables.iter_mut().for_each(|table| each_table(table, change)),
             _ => {}
         }
     }
@@ -348,6 +398,18 @@ mod tests {
         let text = "# head\n[format]\nheader = false\n\n[[test]] # first\nname = \"A\"\ncolumns = { x_mm = 1 }\n\
                     [test.format]\nheader = true\n# end\n";
         let kept = edited(text, |text| text.remove(&["format", "columns"]));
-        assert_eq!(kept, "\n[[test]] # first\nname = \"A\"\n# end\n");
+        assert_eq!(kept, "# head\n\n[[test]] # first\nname = \"A\"\n# end\n");
+        let text = "# a\n[format]\n\n# b\n[columns]\n\n# c\n[[test]]\n# d\n[test.format]\n";
+        let kept = edited(text, |text| text.remove(&["format", "columns"]));
+        assert_eq!(kept, "# a\n\n# b\n\n# c\n[[test]]\n# d\n");
+    }
+
+    #[test]
+    fn the_tables_of_a_machine_stand_in_place_of_its_file() {
+        let machine = "# ours\nchain = \"w X b Y t\" # two axes\n\n[axis.X]\ntravel_mm = [0, 1]\n";
+        let text = edited(SESSION, |text| text.set_machine(machine).unwrap());
+        let expected =
+            "[machine]\n# ours\nchain = \"w X b Y t\" # two axes\n\n[machine.axis.X]\ntravel_mm = [0, 1]\n\n";
+        assert_eq!(text, format!("{expected}{}", &SESSION[SESSION.find("[instrument]").unwrap()..]));
     }
 }

@@ -1,10 +1,13 @@
 //! `[format]` and `[columns]`: the layout of data files.
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use std::fmt;
 
-use super::node::Node;
-use super::node::{Entries, Named};
+use schemars::JsonSchema;
+use serde::de::{self, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
+
+use super::node::{Named, Node};
+use super::value::Count;
 
 /// Layout of the data files.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -28,8 +31,7 @@ pub struct Format {
     /// where absent.
     pub encoding: Option<String>,
     /// Lines (of a spreadsheet: rows) above the header.
-    #[schemars(range(min = 0, max = 1_000_000))]
-    pub skip_lines: Option<u64>,
+    pub skip_lines: Option<Count<0, MANY>>,
 }
 
 /// Own name = foreign name or number; the own name contains the unit.
@@ -38,21 +40,50 @@ pub struct Format {
 pub struct Columns {
     /// Columns that effects follow: NAME_unit = foreign name or number.
     #[serde(default, skip_serializing_if = "Named::is_empty")]
-    #[schemars(with = "Named<ForeignColumn>", extend("propertyNames" = {"pattern": "_"}))]
-    pub driver: Entries,
+    #[schemars(extend("propertyNames" = {"pattern": "_"}))]
+    pub driver: Named<ForeignColumn>,
     /// The other columns.
     #[serde(rename = "$rest", default)]
-    #[schemars(flatten, with = "Named<ForeignColumn>")]
-    pub own: Entries,
+    #[schemars(flatten)]
+    pub own: Named<ForeignColumn>,
 }
 
-/// The column of another program: its name, or its number from 1.
-#[derive(JsonSchema)]
-#[schemars(rename = "foreign_column", untagged)]
-#[allow(dead_code, reason = "the schema alone uses it")]
-enum ForeignColumn {
-    /// The name in the header.
+/// Largest number of a column, and of lines above the header.
+const MANY: usize = 1_000_000;
+
+/// The column of another program.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(untagged)]
+#[schemars(rename = "foreign_column")]
+pub enum ForeignColumn {
+    /// The name in the header, which may have several lines.
     Name(String),
     /// The number from 1.
-    Number(std::num::NonZeroU32),
+    Number(Count<1, MANY>),
+}
+
+impl<'de> Deserialize<'de> for ForeignColumn {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct OfColumn;
+        impl<'de> Visitor<'de> for OfColumn {
+            type Value = ForeignColumn;
+
+            fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+                formatter.write_str("the name of a column in quotes, or its number from 1,")
+            }
+
+            fn visit_newtype_struct<D: Deserializer<'de>>(self, column: D) -> Result<ForeignColumn, D::Error> {
+                column.deserialize_any(self)
+            }
+
+            fn visit_f64<E: de::Error>(self, number: f64) -> Result<ForeignColumn, E> {
+                Count::try_from(number).map(ForeignColumn::Number).map_err(E::custom)
+            }
+
+            fn visit_str<E>(self, name: &str) -> Result<ForeignColumn, E> {
+                Ok(ForeignColumn::Name(name.trim().to_string()))
+            }
+        }
+        deserializer.deserialize_newtype_struct(super::de::LINES, OfColumn)
+    }
 }

@@ -26,5 +26,5 @@ pub mod test;
 pub mod tolerance;
 pub mod value;
 
-pub use de::from_node;
+pub(crate) use de::from_node;
 pub use fault::Fault;

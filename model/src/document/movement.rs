@@ -3,8 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, Serializer};
 
-use super::value::{Length, Point, Positive};
-use crate::session::motion::FollowOffset;
+use super::value::{Count, Length, Point, Positive};
+use crate::session::motion::{FollowOffset, MAX_READINGS};
 
 /// One axis moves.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -31,8 +31,7 @@ pub struct Sweep {
     /// Speed of a rotary axis.
     pub feed_deg_min: Option<Positive>,
     /// Number of runs; default 1.
-    #[schemars(range(min = 1))]
-    pub runs: Option<u64>,
+    pub runs: Option<Count<1, MAX_READINGS>>,
     /// Whether each run has a forward and a backward traversal; default true.
     pub both_directions: Option<bool>,
 }
@@ -43,7 +42,7 @@ pub struct Sweep {
 #[schemars(tag = "kind", deny_unknown_fields)]
 pub enum Path {
     /// The data file contains the states.
-    List,
+    List(List),
     /// Two linear axes move on a circle.
     Circle(Circle),
     /// A rotary axis turns and the linear axes keep the tool at the point of the table.
@@ -55,18 +54,24 @@ impl Serialize for Path {
         #[derive(Serialize)]
         #[serde(tag = "kind", rename_all = "lowercase")]
         enum Tagged<'p> {
-            List,
+            List(&'p List),
             Circle(&'p Circle),
             Follow(&'p Follow),
         }
         let tagged = match self {
-            Path::List => Tagged::List,
+            Path::List(list) => Tagged::List(list),
             Path::Circle(circle) => Tagged::Circle(circle),
             Path::Follow(follow) => Tagged::Follow(follow),
         };
         tagged.serialize(serializer)
     }
 }
+
+/// The data file contains the states.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename = "list", deny_unknown_fields)]
+#[schemars(inline)]
+pub struct List {}
 
 /// Two linear axes move on a circle.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -89,8 +94,7 @@ pub struct Circle {
     /// Feed along the path.
     pub feed_mm_min: Option<Positive>,
     /// Number of runs; default 1.
-    #[schemars(range(min = 1))]
-    pub runs: Option<u64>,
+    pub runs: Option<Count<1, MAX_READINGS>>,
     /// Whether each run has a forward and a backward traversal; default true.
     pub both_directions: Option<bool>,
 }
@@ -118,8 +122,7 @@ pub struct Follow {
     /// Programmed feed F of a control that treats a degree as a millimetre.
     pub programmed_feed_mm_min: Option<Positive>,
     /// Number of runs; default 1.
-    #[schemars(range(min = 1))]
-    pub runs: Option<u64>,
+    pub runs: Option<Count<1, MAX_READINGS>>,
     /// Whether each run has a forward and a backward traversal; default true.
     pub both_directions: Option<bool>,
 }

@@ -7,7 +7,7 @@ use super::machine::{Axis, Machine};
 use super::movement::{Circle, Follow, Path, Sweep};
 use super::node::{Named, Node};
 use super::test::Test;
-use super::value::{Length, Positive, Three};
+use super::value::{Count, Length, Positive, Three};
 use super::{effect, node};
 use crate::axis::AxisKind;
 use crate::driver::DriverUnit;
@@ -147,7 +147,7 @@ pub fn test(test: &DomainTest, machine: &chain::Machine) -> Option<Test> {
 fn motion(motion: &Motion, machine: &chain::Machine) -> Option<(Vec<usize>, Option<Sweep>, Option<Path>)> {
     let name = |axis: usize| machine.axes[axis].name.clone();
     let degrees = |angle: f64| number(angle.to_degrees());
-    let often = |runs: usize| Some(runs as u64);
+    let often = |runs: usize| Some(Count(runs));
     Some(match *motion {
         Motion::Sweep { axis, from, to, step, speed, runs, both_directions } => {
             let kind = machine.axes[axis].kind;

@@ -1,6 +1,10 @@
 //! A document as TOML: the one printer of files.
 
-use serde::Serialize;
+use std::borrow::Cow;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+use serde::ser::Error;
+use serde::{Serialize, Serializer};
 use toml_edit::ser::ValueSerializer;
 use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value};
 
@@ -12,22 +16,59 @@ use crate::error::ModelError;
 /// # Errors
 /// [`ModelError::Session`] if a value has no form in TOML.
 pub fn text_of(document: &impl Serialize) -> Result<String, ModelError> {
+    document_of(document).map(|document| document.to_string())
+}
+
+/// The document of a file.
+pub(super) fn document_of(document: &impl Serialize) -> Result<DocumentMut, ModelError> {
     match value_of(document)? {
-        Value::InlineTable(inline) => Ok(DocumentMut::from(with_headers(inline, "")).to_string()),
-        _ => Ok(String::new()),
+        Value::InlineTable(inline) => Ok(DocumentMut::from(with_headers(inline, ""))),
+        _ => Ok(DocumentMut::new()),
     }
 }
 
-/// An entry of a list of tables, such as `[[test]]`, with a remark above it.
-///
-/// # Errors
-/// As [`text_of`].
-pub fn block_of(list: &str, entry: &impl Serialize, remark: &str) -> Result<String, ModelError> {
-    let mut table = table_of(entry)?;
-    table.decor_mut().set_prefix(remark.lines().map(|line| format!("# {line}\n")).collect::<String>());
-    let mut document = DocumentMut::new();
-    document.insert(list, Item::ArrayOfTables(std::iter::once(table).collect()));
-    Ok(document.to_string())
+/// A proposed entry of a list of tables, such as `[[test]]`, with a remark above it. In JSON it is its text, which is
+/// empty if there is none.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Block<T> {
+    /// The list.
+    pub list: &'static str,
+    /// The entry with the remark, if there is one.
+    pub entry: Option<(T, String)>,
+}
+
+impl<T: Serialize> Block<T> {
+    /// The table of the entry.
+    pub(super) fn table(&self) -> Result<Option<Table>, ModelError> {
+        let Some((entry, remark)) = &self.entry else { return Ok(None) };
+        let mut table = table_of(entry)?;
+        table.decor_mut().set_prefix(remark.lines().map(|line| format!("# {line}\n")).collect::<String>());
+        Ok(Some(table))
+    }
+}
+
+impl<T: Serialize> Serialize for Block<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut document = DocumentMut::new();
+        if let Some(table) = self.table().map_err(S::Error::custom)? {
+            document.insert(self.list, Item::ArrayOfTables(std::iter::once(table).collect()));
+        }
+        serializer.collect_str(&document)
+    }
+}
+
+impl<T> JsonSchema for Block<T> {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "block".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        String::json_schema(generator)
+    }
 }
 
 /// A document as JSON: whole numbers are integers.

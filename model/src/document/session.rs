@@ -10,7 +10,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use super::effect::Effect;
 use super::layout::{Columns, Format};
 use super::machine::Machine;
-use super::node::{Entries, Named};
+use super::node::{Entries, Named, Node};
 use super::test::Test;
 use super::tolerance::Tolerance;
 use super::value::{NotNegative, Note, Positive};
@@ -58,7 +58,8 @@ pub struct Session {
     pub test: Vec<Test>,
     /// Sockets at known distances.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub socket_distance: Vec<SocketDistance>,
+    #[schemars(with = "Vec<SocketDistance>")]
+    pub socket_distance: Vec<Node>,
     /// Limits for decisions of conformity by the rule of ISO 14253-1.
     pub tolerance: Option<Tolerance>,
     /// Sizes of the ball bar for checks of clearance against the bodies of the machine.

@@ -12,13 +12,14 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use crate::chain::Machine;
+use crate::document::edit::SessionText;
 use crate::document::effect;
 use crate::document::fault::{Fault, Step, Within};
 use crate::document::lower::body::BodyFiles;
 use crate::document::lower::{self, Data, Parts, Surroundings};
 use crate::document::machine as machine_document;
 use crate::document::node::Node;
-use crate::document::session::{MachineFile, Session as Document, SessionMachine, SocketDistance};
+use crate::document::session::{MachineFile, Session as Document, SessionMachine};
 use crate::document::source::{Parsed, Source};
 use crate::document::test::Test;
 use crate::effect::Effect;
@@ -93,14 +94,6 @@ pub fn effect_of_document(
     lower::effect_of(machine, instrument, tests, document)
 }
 
-/// A document of another kind, from its TOML text.
-///
-/// # Errors
-/// As [`machine()`].
-pub fn document_of<T: DeserializeOwned + JsonSchema>(source: &Source) -> Result<T, ModelError> {
-    source.parse()?.document()
-}
-
 /// What follows from a document of another kind. A fault of it has its place in the text.
 ///
 /// # Errors
@@ -170,7 +163,7 @@ pub fn session_of(source: &Source, options: &ReadOptions) -> Result<(Session, So
     }
     let sources = SourceMap {
         file: path.to_path_buf(),
-        text: source.text.clone(),
+        text: SessionText::new(&source.text, path)?,
         machine_text: machine_source.map(|source| source.text),
         bodies,
         files,
@@ -218,7 +211,18 @@ fn session_machine(path: &Path, options: &ReadOptions, document: &SessionMachine
 /// # Errors
 /// [`ModelError::Session`] as for a session file, without its line.
 pub fn plan_of_node(node: Node) -> Result<Session, ModelError> {
-    let source = Parsed::of_node(node);
+    plan_in(&Parsed::of_node(node))
+}
+
+/// As [`plan_of_node`], from the text of a session.
+///
+/// # Errors
+/// As for a session file.
+pub fn plan_of(source: &Source) -> Result<Session, ModelError> {
+    plan_in(&source.parse()?)
+}
+
+fn plan_in(source: &Parsed<'_>) -> Result<Session, ModelError> {
     let document: Document = source.document()?;
     let read = || {
         let SessionMachine::Other(tables) = &document.machine else {
@@ -285,7 +289,7 @@ pub fn add_node(
 struct Additions {
     test: Vec<Test>,
     effect: Vec<effect::Effect>,
-    socket_distance: Vec<SocketDistance>,
+    socket_distance: Vec<Node>,
 }
 
 fn in_memory<'a>(data: Data<'a>, options: &'a ReadOptions) -> Surroundings<'a> {

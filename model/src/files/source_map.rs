@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::stamp::FileStamp;
+use crate::document::edit::SessionText;
 
 /// The sources of a session that was read from files. A program that writes a changed session edits its text, so that
 /// comments and everything else remain, and it refers to the files for provenance. The lines of single readings are in
@@ -12,8 +13,8 @@ use super::stamp::FileStamp;
 pub struct SourceMap {
     /// The session file.
     pub file: PathBuf,
-    /// The text of the session file.
-    pub text: String,
+    /// The text of the session file, for edits.
+    pub text: SessionText,
     /// The text of the machine file, if the session names one.
     pub machine_text: Option<String>,
     /// The files of the machine's bodies.

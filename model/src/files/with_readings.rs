@@ -4,7 +4,6 @@ use std::path::{Component, Path};
 
 use super::source_map::{BodyFile, SourceMap};
 use super::table::csv;
-use crate::document::edit::SessionText;
 use crate::error::ModelError;
 use crate::session::Session;
 use crate::session::readings::Readings;
@@ -28,7 +27,6 @@ pub fn with_readings(
     readings: &[Readings],
     changes: Changes,
 ) -> Result<Vec<(String, Vec<u8>)>, ModelError> {
-    let file = sources.file.as_path();
     let mut files = Vec::new();
     let mut data: Vec<(String, String)> = Vec::new();
     for (test, readings) in session.tests.iter().zip(readings) {
@@ -49,7 +47,7 @@ pub fn with_readings(
         }
         files.push((name.clone(), contents.to_vec()));
     }
-    let mut text = SessionText::new(&sources.text, file)?;
+    let mut text = sources.text.clone();
     text.set_data(&data);
     text.set_machine_file("machine.toml");
     if let Some(noise_um) = changes.noise_um {

@@ -53,6 +53,26 @@ fn unknown_keys() {
 }
 
 #[test]
+fn words_and_tables_are_not_each_other() {
+    assert_contains(
+        &with_session("bar_mm", "path = \"list\"\nbar_mm"),
+        &["session.toml:11", "`path` is the text \"list\"; a table such as { kind = \"list\" } is expected"],
+    );
+    assert_contains(
+        &with_machine("name = ", "rotation = { kind = \"exact\" }\nname = "),
+        &["machine.toml:1", "`rotation` is a table; a word in quotes is expected"],
+    );
+    assert_contains(
+        &with_session("kind = \"ballbar\"\n", ""),
+        &["session.toml:4", "[instrument] has no `kind`", "\"ballbar\", \"r-test\""],
+    );
+    assert_contains(
+        &with_session("[[test]]", "[[socket_distance]]\nbetween = [\"0\", \"1\"]\n\n[[test]]"),
+        &["session.toml:8", "[[socket_distance]] in a session whose instrument is a ballbar"],
+    );
+}
+
+#[test]
 fn invalid_numbers() {
     assert_contains(&with_data(&DATA.replace("100.0010", "NaN")), &["C100.csv:3", "column 4", "NaN"]);
     assert_contains(&with_data(&DATA.replace("100.0010", "inf")), &["C100.csv:3", "column 4", "infinite"]);

@@ -35,6 +35,14 @@ fn objects(csv: &str) -> String {
     text
 }
 
+/// A header of a spreadsheet often has several lines.
+#[test]
+fn names_of_columns_may_have_several_lines() {
+    let columns = "[columns]\nrun = \"run\"\nc_deg = \"c_deg\"\nlength_mm = \"Length\\n(mm)\"\n";
+    let read = with_lines(columns, &objects(DATA).replace("length_mm", "Length\\n(mm)")).unwrap();
+    assert_eq!(read.tests[0].readings.as_ref().unwrap().observed, [99.9990, 100.0010, 100.0, 99.9995]);
+}
+
 #[test]
 fn the_readings_are_those_of_the_same_table_as_csv() {
     let csv = session(MACHINE, SESSION, Some(DATA)).unwrap();

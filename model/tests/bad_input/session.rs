@@ -33,7 +33,7 @@ fn tests_without_a_motion() {
     assert_contains(&with_session("data = \"C100.csv\"\n", ""), &["session.toml:8", "neither data nor a motion"]);
     let both = SESSION.to_string()
         + "sweep = { axis = \"C\", from_deg = 0, to_deg = 10, step_deg = 1 }\npath = { kind = \"list\" }\n";
-    assert_contains(&error_text(session(MACHINE, &both, Some(DATA))), &["both `sweep` and `path`"]);
+    assert_contains(&error_text(session(MACHINE, &both, Some(DATA))), &["session.toml:15", "both `sweep` and `path`"]);
 }
 
 #[test]

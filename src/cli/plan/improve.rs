@@ -67,10 +67,8 @@ impl ImproveArguments {
         let Some(path) = &self.write else {
             return Ok(());
         };
-        let blocks = found.steps.iter().map(|step| step.session_toml.clone()).filter(|block| !block.is_empty());
         next_session::write(path, sources, session, |text| {
-            let mut blocks = blocks;
-            blocks.try_for_each(|block| text.add_block(&block))
+            found.steps.iter().try_for_each(|step| text.add_block(&step.proposal))
         })
     }
 

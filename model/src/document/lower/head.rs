@@ -5,7 +5,7 @@ use crate::chain::Machine;
 use crate::component::ErrorName;
 use crate::document::fault::{Fault, Within};
 use crate::document::from_node;
-use crate::document::node::{Entries, Named, Value};
+use crate::document::node::{Entries, Named, Node, Value};
 use crate::document::session::{self as document, Kind};
 use crate::document::value::{NotNegative, Note};
 use crate::files::quantity::{self, ARCSECOND, MICROMETRE};
@@ -30,7 +30,7 @@ pub(super) fn about(notes: &Named<Note>) -> Result<Vec<(String, String)>, Fault>
 /// The constants, in the order of the file. Without `means`, the comment behind the value is its meaning.
 pub(super) fn constants(entries: &Entries, comment: impl Fn(&str) -> Option<String>) -> Result<Vec<Constant>, Fault> {
     let constant = |(name, node): &(String, _)| {
-        let node: &crate::document::node::Node = node;
+        let node: &Node = node;
         let mut letters = name.chars();
         let valid = letters.next().is_some_and(|c| c.is_alphabetic() || c == '_')
             && letters.all(|c| c.is_alphanumeric() || c == '_')
@@ -145,14 +145,16 @@ fn error_name(machine: &Machine, text: &str) -> Result<ErrorName, Fault> {
 pub(super) fn socket_distances(
     kind: InstrumentKind,
     tests: &[Test],
-    documents: &[document::SocketDistance],
+    documents: &[Node],
     read: bool,
 ) -> Result<Vec<SocketDistance>, Fault> {
     if !documents.is_empty() && !kind.shares(SharedBy::Socket) {
         let message = format!("[[socket_distance]] in a session whose instrument is a {}", kind.word());
         return Err(Fault::new(message, None).on_key());
     }
-    let distance = |document: &document::SocketDistance| {
+    let distance = |node: &Node| {
+        // Another instrument has no such table, whatever is in it.
+        let document: document::SocketDistance = from_node(node)?;
         for (item, socket) in document.between.iter().enumerate() {
             // Sockets named by a column are known after the data are read.
             if read && !tests.iter().any(|test| test.socket.as_ref() == Some(socket)) {
@@ -163,7 +165,7 @@ pub(super) fn socket_distances(
                 return Err(Fault::new(message, help).at_item(item).at("between"));
             }
         }
-        let between = <[String; 2]>::try_from(document.between.clone())
+        let between = <[String; 2]>::try_from(document.between)
             .map_err(|_| Fault::of_key("needs two sockets", None).at("between"))?;
         if between[0] == between[1] {
             return Err(Fault::of_key("needs two different sockets", None).at("between"));

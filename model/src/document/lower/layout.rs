@@ -4,14 +4,11 @@ use crate::document::fault::{Fault, Within};
 use crate::document::from_node;
 use crate::document::layout as document;
 use crate::document::node::Value;
+use crate::document::value::Count;
 use crate::driver::column;
 use crate::error::Location;
 use crate::files::table::encoding;
-use crate::files::table::request::{ColumnMapping, ForeignColumn, Format};
-use crate::session::limits;
-
-/// Largest number of a column, and of lines above the header.
-const MANY: usize = 1_000_000;
+use crate::files::table::request::{ColumnMapping, Format};
 
 /// Separator, decimal, header, encoding, lines above the header; sheet of a spreadsheet; direction in a ball-bar file.
 pub(super) fn format(document: &document::Format) -> Result<Format, Fault> {
@@ -32,9 +29,8 @@ pub(super) fn format(document: &document::Format) -> Result<Format, Fault> {
             Value::Truth(truth) => truth.to_string(),
             Value::Text(text) => text.trim().to_string(),
             _ => {
-                let number =
-                    from_node::<f64>(node).and_then(|number| limits::count(number, 0, MANY).map_err(Fault::is));
-                number.within("anticlockwise")?.to_string()
+                let Count(number) = from_node::<Count<0, 1_000_000>>(node).within("anticlockwise")?;
+                number.to_string()
             }
         });
     }
@@ -45,8 +41,8 @@ pub(super) fn format(document: &document::Format) -> Result<Format, Fault> {
             Fault::of_key(what, help).at("encoding")
         })?);
     }
-    if let Some(lines) = document.skip_lines {
-        format.skip_lines = limits::count(lines as f64, 0, MANY).within("skip_lines")?;
+    if let Some(Count(lines)) = document.skip_lines {
+        format.skip_lines = lines;
     }
     if format.decimal == format.separator && document.decimal.is_some() {
         let message = "the decimal comma is also the separator (\",\" unless declared)";
@@ -67,24 +63,12 @@ fn one_of(text: &str, known: &[u8]) -> Result<u8, Fault> {
 }
 
 /// Own name = foreign name or number; `place` finds the lines of the file.
-pub(super) fn columns(
-    document: &document::Columns,
-    place: impl Fn(&[&str]) -> Location,
-) -> Result<Vec<ColumnMapping>, Fault> {
-    let own = document.own.0.iter().map(|(key, node)| (vec![key.as_str()], key.clone(), node));
+pub(super) fn columns(document: &document::Columns, place: impl Fn(&[&str]) -> Location) -> Vec<ColumnMapping> {
+    let own = document.own.0.iter().map(|(key, foreign)| (vec![key.as_str()], key.clone(), foreign));
     // An unquoted `driver.NAME_unit` is a table in TOML.
     let drivers = document.driver.0.iter();
-    let drivers = drivers.map(|(key, node)| (vec!["driver", key], format!("{}{key}", column::PREFIX), node));
+    let drivers = drivers.map(|(key, foreign)| (vec!["driver", key], format!("{}{key}", column::PREFIX), foreign));
     own.chain(drivers)
-        .map(|(path, own, node)| {
-            let foreign = match node.as_text() {
-                Some(text) => Ok(ForeignColumn::Name(text.trim().to_string())),
-                None => from_node(node)
-                    .and_then(|number| limits::count(number, 1, MANY).map_err(Fault::is))
-                    .map(ForeignColumn::Number),
-            };
-            let foreign = foreign.map_err(|fault| path.iter().rev().fold(fault, |fault, key| fault.at(key)))?;
-            Ok(ColumnMapping { own, foreign, location: place(&path) })
-        })
+        .map(|(path, own, foreign)| ColumnMapping { own, foreign: foreign.clone(), location: place(&path) })
         .collect()
 }

@@ -14,6 +14,7 @@ use std::path::Path;
 
 use super::effect as effect_document;
 use super::fault::{Fault, Within};
+use super::node::Node;
 use super::session as document;
 use crate::chain::Machine;
 use crate::driver::column;
@@ -115,7 +116,7 @@ pub(crate) struct Parts<'d> {
     pub columns: Option<&'d super::layout::Columns>,
     pub test: &'d [super::test::Test],
     pub effect: &'d [effect_document::Effect],
-    pub socket_distance: &'d [document::SocketDistance],
+    pub socket_distance: &'d [Node],
     pub tolerance: Option<&'d super::tolerance::Tolerance>,
     pub clearance: Option<&'d document::Clearance>,
 }
@@ -138,16 +139,15 @@ impl<'d> From<&'d document::Session> for Parts<'d> {
 pub(crate) fn add(session: &mut Session, document: Parts<'_>, surroundings: &Surroundings<'_>) -> Result<Found, Fault> {
     let mut found = Found::default();
     let format = document.format.map(|format| layout::format(format).within("format")).transpose()?;
-    let columns = document.columns.map(|columns| {
-        layout::columns(columns, |path| (surroundings.place)(&["columns"], None, path)).within("columns")
-    });
+    let columns =
+        document.columns.map(|columns| layout::columns(columns, |path| (surroundings.place)(&["columns"], None, path)));
     let context = Context {
         file: surroundings.file,
         machine: &session.machine,
         instrument: session.instrument,
         constants: &session.constants,
         format: format.unwrap_or_default(),
-        columns: columns.transpose()?,
+        columns,
         data: surroundings.data,
         options: surroundings.options,
         place: surroundings.place,

@@ -4,7 +4,8 @@ use super::Context;
 use crate::axis::{Axis, AxisKind};
 use crate::document::fault::{Fault, Within};
 use crate::document::movement as document;
-use crate::document::value::Positive;
+use crate::document::schema;
+use crate::document::value::{Count, Positive};
 use crate::files::quantity;
 use crate::instrument::{Following, Station};
 use crate::session::limits;
@@ -45,7 +46,7 @@ pub(super) fn sweep(
 /// Several axes move together.
 pub(super) fn path(context: &Context<'_>, document: &document::Path, station: &Station<f64>) -> Result<Motion, Fault> {
     match document {
-        document::Path::List => Ok(Motion::List),
+        document::Path::List(_) => Ok(Motion::List),
         document::Path::Circle(circle) => self::circle(context, circle),
         document::Path::Follow(follow) => self::follow(context, follow, station),
     }
@@ -101,9 +102,10 @@ fn follow(context: &Context<'_>, document: &document::Follow, station: &Station<
             return Err(Fault::new(message, help).on_key().at("offset"));
         }
         (Following::Apart, Some(_)) => {
-            let known = ["axis", "from_deg", "to_deg", "step_deg", "feed_mm_min", "feed_deg_min"];
-            let known = known.into_iter().chain(["programmed_feed_mm_min", "runs", "both_directions", "kind"]);
-            return Err(Fault::unknown_key("offset", known.map(str::to_string).collect()));
+            let mut known = schema::fields::<document::Follow>();
+            known.retain(|key| key != "offset");
+            known.push("kind".to_string());
+            return Err(Fault::unknown_key("offset", known));
         }
         (Following::Touching(..), None) => FollowOffset::Touching,
         (Following::Apart, None) => FollowOffset::None,
@@ -227,12 +229,16 @@ fn radius_about(axis: &Axis, point: [f64; 3]) -> f64 {
 }
 
 /// The number of runs, and whether each has both directions; the default is one run in both directions.
-fn runs_and_directions(runs: Option<u64>, both: Option<bool>, steps: f64) -> Result<(usize, bool), Fault> {
-    let stated = runs.is_some();
-    let runs = limits::count(runs.unwrap_or(1) as f64, 1, MAX_READINGS).within("runs")?;
-    if stated && runs as f64 * (steps + 1.0) * 2.0 > MAX_READINGS as f64 {
+fn runs_and_directions(
+    runs: Option<Count<1, MAX_READINGS>>,
+    both: Option<bool>,
+    steps: f64,
+) -> Result<(usize, bool), Fault> {
+    if let Some(Count(runs)) = runs
+        && runs as f64 * (steps + 1.0) * 2.0 > MAX_READINGS as f64
+    {
         let message = format!("{runs} runs of {steps:.0} steps; the limit is {MAX_READINGS} readings");
         return Err(Fault::new(message, None).at("runs"));
     }
-    Ok((runs, both.unwrap_or(true)))
+    Ok((runs.map_or(1, |Count(runs)| runs), both.unwrap_or(true)))
 }

@@ -34,13 +34,12 @@ pub(super) fn tests(
     let format = document.format.as_ref().map(|format| layout::format(format).within("format")).transpose()?;
     let columns = document.columns.as_ref().map(|columns| {
         layout::columns(columns, |path| (context.place)(&["test"], Some(item), &[&["columns"], path].concat()))
-            .within("columns")
     });
-    let columns = columns.transpose()?;
     let motion = match (&document.sweep, &document.path) {
         (Some(_), Some(_)) => {
             let help = "a test moves one axis (`sweep`) or several together (`path`)";
-            return Err(Fault::of_table("has both `sweep` and `path`", help));
+            let message = format!("test \"{name}\" has both `sweep` and `path`");
+            return Err(Fault::new(message, help).on_key().at("path"));
         }
         (Some(sweep), None) => Some(movement::sweep(context, sweep, &station).within("sweep")?),
         (None, Some(path)) => Some(movement::path(context, path, &station).within("path")?),

@@ -7,6 +7,7 @@ use super::number::number;
 use super::request::{ColumnMapping, ForeignColumn, Request};
 use super::row::Row;
 use crate::chain::Machine;
+use crate::document::value::Count;
 use crate::driver::column;
 use crate::error::{Location, ModelError};
 use crate::files::quantity::{self, Unit};
@@ -216,7 +217,7 @@ fn mapped_columns(
             return Err(fault(format!("[columns] has the unknown column `{}`", entry.own), help));
         };
         let index = match &entry.foreign {
-            ForeignColumn::Number(number) => number_in(*number, file, first.cells.len()),
+            ForeignColumn::Number(Count(number)) => number_in(*number, file, first.cells.len()),
             ForeignColumn::Name(name) => name_in(name, request, file, header),
         }
         .map_err(|(message, help)| fault(message, help))?;

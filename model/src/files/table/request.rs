@@ -3,6 +3,7 @@
 use encoding_rs::Encoding;
 
 use crate::chain::Machine;
+pub(crate) use crate::document::layout::ForeignColumn;
 use crate::error::Location;
 use crate::files::store::Store;
 use crate::instrument::InstrumentKind;
@@ -50,15 +51,6 @@ pub(crate) struct ColumnMapping {
     pub foreign: ForeignColumn,
     /// The location of the line.
     pub location: Location,
-}
-
-/// The identification of a foreign column.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) enum ForeignColumn {
-    /// By the header.
-    Name(String),
-    /// From 1.
-    Number(usize),
 }
 
 /// What a test requires of its data file.
