@@ -7,6 +7,8 @@ from conftest import SESSIONS
 import abbe
 
 C = np.arange(0.0, 360.0)
+ENDLESS: list = []
+ENDLESS.append(ENDLESS)
 LENGTH = np.full(360, 125.0)
 BAR = {"bar_mm": 125, "workpiece_ball_mm": (0, 100, 0), "spindle_ball_mm": (0, 0, 0), "z_mm": 75}
 
@@ -50,6 +52,7 @@ def nan(column):
         ({"c_deg": C, "length_mm": LENGTH, "bar_mm": 10**30}, ["`bar_mm`", "too large"]),
         ({"c_deg": C, "length_mm": LENGTH, "workpiece_ball_mm": (0, 100)}, ["`workpiece_ball_mm`", "three"]),
         ({"c_deg": C, "length_mm": LENGTH, "setup": 3}, ["`setup`"]),
+        ({"c_deg": C, "length_mm": LENGTH, "workpiece_ball_mm": ENDLESS}, ["`workpiece_ball_mm`", "80 lists"]),
         ({"c_deg": C, "length_mm": LENGTH, "target_mm": (0, 0, 0)}, ["target_mm"]),
         ({"c_deg": C, "length_mm": LENGTH * 2}, ["read 250.000 mm"]),
     ],

@@ -12,6 +12,7 @@ use crate::driver::{Driver, unit_suffixes};
 use crate::effect::keys::{Key, KeyForm};
 use crate::effect::shape::{Entry, SHAPES};
 use crate::instrument::InstrumentKind;
+use crate::words::listed;
 
 /// Schema of `machine.toml`.
 pub fn machine() -> Value {
@@ -72,7 +73,9 @@ pub(crate) fn meaning(schema: &Value, path: &[Step], key: &str) -> Option<String
         });
         tables.into_iter().find_map(|table| table["properties"].get(key))
     })?;
-    property["description"].as_str().map(as_end)
+    let meaning = property["description"].as_str().map(as_end)?;
+    let words: Vec<String> = property["enum"].as_array().into_iter().flatten().map(Value::to_string).collect();
+    Some(if words.is_empty() { meaning } else { format!("{meaning}: {}", listed(&words, "or")) })
 }
 
 /// A description as the end of a sentence.

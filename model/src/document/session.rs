@@ -118,7 +118,7 @@ enum ConstantForms {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename = "instrument", deny_unknown_fields)]
 pub struct Instrument {
-    /// The kind of the instrument, such as "ballbar".
+    /// The kind of the instrument.
     pub kind: Kind,
     /// Noise standard deviation of one length, µm; estimated if absent.
     pub noise_um: Option<NotNegative>,
