@@ -165,7 +165,50 @@ impl<'r, T: Serialize> Document<'r, T> {
     /// # Errors
     /// If the result is no JSON, in words.
     pub fn text(&self) -> Result<String, String> {
-        let text = serde_json::to_string_pretty(self);
+        let text = serde_json::to_string_pretty(self).and_then(in_reading_units);
         text.map(|text| text + "\n").map_err(|error| format!("the result cannot be written as JSON: {error}"))
+    }
+}
+
+/// Figures of readings end in the unit of the readings: where a result states `reading_unit`, its keys and those within
+/// it that end in `_um` and are of readings end in that unit instead.
+///
+/// # Errors
+/// If the text is no JSON.
+pub fn in_reading_units(text: String) -> serde_json::Result<String> {
+    // The key stands nowhere else, and most results have none.
+    if !text.contains("\"reading_unit\":") {
+        return Ok(text);
+    }
+    let mut value: Value = serde_json::from_str(&text)?;
+    rename(&mut value, None);
+    serde_json::to_string_pretty(&value)
+}
+
+/// Whether a key is a figure of readings in µm: noise, residuals, held-out errors, what an effect gains.
+fn is_of_readings(key: &str) -> bool {
+    let words = ["noise", "rms", "residual", "heldout", "prediction_change", "second_order"];
+    key.ends_with("_um") && words.iter().any(|word| key.split('_').any(|part| part == *word) || key.starts_with(word))
+}
+
+fn rename(value: &mut Value, unit: Option<&str>) {
+    match value {
+        Value::Object(entries) => {
+            let own = entries.get("reading_unit").and_then(Value::as_str).map(str::to_string);
+            let unit = own.as_deref().or(unit);
+            entries.values_mut().for_each(|value| rename(value, unit));
+            if let Some(unit) = unit {
+                let renamed = std::mem::take(entries).into_iter().map(|(key, value)| {
+                    let key = match key.strip_suffix("um") {
+                        Some(stem) if is_of_readings(&key) => format!("{stem}{unit}"),
+                        _ => key,
+                    };
+                    (key, value)
+                });
+                *entries = renamed.collect();
+            }
+        }
+        Value::Array(items) => items.iter_mut().for_each(|value| rename(value, unit)),
+        _ => {}
     }
 }

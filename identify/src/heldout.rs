@@ -47,6 +47,21 @@ pub fn rms_mm(problem: &Problem, residuals: &[Vec<f64>]) -> f64 {
     (sum / count.max(1) as f64).sqrt()
 }
 
+/// Root mean square over the scalar readings of lengths, and over those of angles at the session's lever, mm; `None`
+/// without one that is not excluded.
+pub fn rms_by_unit_mm(problem: &Problem, residuals: &[Vec<f64>]) -> [Option<f64>; 2] {
+    let mut sums = [(0.0, 0_usize); 2];
+    for (test, residual) in residuals.iter().enumerate() {
+        let channels = problem.models[test].channels();
+        for (i, value) in residual.iter().enumerate().filter(|(i, _)| problem.counts(test, *i)) {
+            let (sum, count) = &mut sums[usize::from(channels[i % channels.len()].is_angle())];
+            *sum += value * value;
+            *count += 1;
+        }
+    }
+    sums.map(|(sum, count)| (count > 0).then(|| (sum / count as f64).sqrt()))
+}
+
 /// Holds out each fold in turn. `beta` is the fit of all readings, `triangles` are the factors of the folds there,
 /// `whole` is the factor of all readings and priors, `basis` spans the identifiable directions (parameters × rank).
 ///

@@ -27,6 +27,7 @@ use crate::noise::Noise;
 use crate::numerics::parallel;
 use crate::numerics::triangle::BLOCK_ROWS;
 use crate::parameters::{Parameters, TestParameters};
+use crate::unit::ReadingUnit;
 use abbe_model::driver::Reference;
 
 /// A session with readings, its parameters, and the weights of its readings.
@@ -204,10 +205,10 @@ impl Problem {
         self.models[test].channels().len()
     }
 
-    /// The unit of readings and residuals in results: `um`, or `arcsec` if every channel is an angle. At the lever of such
+    /// The unit of readings and residuals in results: µm, or ″ if every channel is an angle. At the lever of such
     /// a session ([`Session::lever_mm`]) one arcsecond is one micrometre.
-    pub fn unit(&self) -> &'static str {
-        if self.session.units().only_angles() { "arcsec" } else { "um" }
+    pub fn unit(&self) -> ReadingUnit {
+        if self.session.units().only_angles() { ReadingUnit::Arcsecond } else { ReadingUnit::Micrometre }
     }
 
     /// Whether the readings of all tests are vectors, three coordinates each.

@@ -17,6 +17,7 @@ use crate::circular::CircularTest;
 use crate::noise::NoiseSource;
 use crate::plausibility::Plausibility;
 use crate::tolerance::Conformity;
+use crate::unit::ReadingUnit;
 pub use base::BaseResult;
 pub use cross_validation::{CrossValidation, TestNotLeftOut};
 pub use monte_carlo::{DrawnParameter, FitMonteCarlo, Verdict};
@@ -50,9 +51,23 @@ pub struct Outlier {
     pub residual_um: f64,
 }
 
+/// Figures of the angles of a session of lengths and angles.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct OfAngles {
+    /// Standard deviation of one angle, arcsec.
+    pub noise_arcsec: f64,
+    /// Rms of the residual over angles, arcsec.
+    pub rms_arcsec: f64,
+    /// Rms of the residual over held-out angles, arcsec.
+    pub heldout_rms_arcsec: f64,
+}
+
 /// Estimates of the parameters of a session, with their uncertainties.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct FitResult {
+    /// The unit of the figures of readings, in which their keys end; absent for µm.
+    #[serde(skip_serializing_if = "ReadingUnit::is_micrometre")]
+    pub reading_unit: ReadingUnit,
     /// Standard deviation of one scalar reading, µm.
     pub noise_um: f64,
     /// Source of `noise_um`: `stated` by the session, `repeats` (repeated readings), or `residual` where there is
@@ -72,6 +87,9 @@ pub struct FitResult {
     /// Rms length of the residual vector over held-out readings, µm, for instruments with three coordinates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub heldout_rms_3d_um: Option<f64>,
+    /// The same of the angles, if readings are lengths and angles; the figures in µm are then those of the lengths.
+    #[serde(flatten)]
+    pub of_angles: Option<OfAngles>,
     /// What each fold of the cross-validation holds out.
     pub heldout_by: String,
     /// Held-out errors by what is held out.

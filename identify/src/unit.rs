@@ -6,6 +6,8 @@ use abbe_model::effect::shape::Per;
 use abbe_model::effect::{Effect, Shape};
 use abbe_model::instrument::InternalUnit;
 use abbe_model::session::Session;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 /// A unit of reported results.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,6 +16,33 @@ pub struct Unit {
     pub name: String,
     /// Number of display units per internal unit (mm, rad, …).
     pub display_per_internal: f64,
+}
+
+/// The unit of the figures of readings: noise, residuals, held-out errors. Keys of results end in it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+pub enum ReadingUnit {
+    /// µm: of lengths, or of lengths beside angles.
+    #[default]
+    #[serde(rename = "um")]
+    Micrometre,
+    /// ″: of a session whose channels are all angles.
+    #[serde(rename = "arcsec")]
+    Arcsecond,
+}
+
+impl ReadingUnit {
+    /// Its name in keys of results.
+    pub fn name(self) -> &'static str {
+        match self {
+            ReadingUnit::Micrometre => "um",
+            ReadingUnit::Arcsecond => "arcsec",
+        }
+    }
+
+    /// Whether it is µm, which results do not state.
+    pub fn is_micrometre(&self) -> bool {
+        *self == ReadingUnit::Micrometre
+    }
 }
 
 /// Arcseconds per radian.

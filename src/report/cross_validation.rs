@@ -1,8 +1,9 @@
 //! Held-out errors by what is held out, in words: interpolation and extrapolation of poses, left-out tests.
 
 use abbe::identify::results::CrossValidation;
+use abbe::identify::unit::ReadingUnit;
 
-use super::number::micrometres;
+use super::number::of_readings;
 
 /// Maximum number of tests that a sentence names.
 const MAX_NAMED: usize = 4;
@@ -11,6 +12,8 @@ const MAX_NAMED: usize = 4;
 pub struct HeldOutFigure {
     /// What it tests.
     pub name: &'static str,
+    /// Its unit.
+    pub unit: ReadingUnit,
     /// Over scalar readings.
     pub rms_um: f64,
     /// Of the vector, for instruments with three coordinates.
@@ -21,8 +24,10 @@ impl HeldOutFigure {
     /// The figure with its unit: `0.305 µm`, or `254 µm (vector 440 µm)`.
     pub fn in_words(&self) -> String {
         match self.rms_3d_um {
-            Some(length) => format!("{} (vector {})", micrometres(self.rms_um), micrometres(length)),
-            None => micrometres(self.rms_um),
+            Some(length) => {
+                format!("{} (vector {})", of_readings(self.rms_um, self.unit), of_readings(length, self.unit))
+            }
+            None => of_readings(self.rms_um, self.unit),
         }
     }
 }
@@ -35,9 +40,9 @@ pub fn figures(model: &CrossValidation) -> Vec<HeldOutFigure> {
         ("left-out run", model.left_out_run_rms_um, model.left_out_run_rms_3d_um),
         ("left-out test", model.left_out_test_rms_um, model.left_out_test_rms_3d_um),
     ];
-    let present = all
-        .into_iter()
-        .filter_map(|(name, rms_um, rms_3d_um)| Some(HeldOutFigure { name, rms_um: rms_um?, rms_3d_um }));
+    let present = all.into_iter().filter_map(|(name, rms_um, rms_3d_um)| {
+        Some(HeldOutFigure { name, unit: model.reading_unit, rms_um: rms_um?, rms_3d_um })
+    });
     present.collect()
 }
 

@@ -11,7 +11,7 @@ use super::figure::bars::{Bars, Fill};
 use super::figure::lines::{Axis, Lines, Mark, Name, Series};
 use super::figure::scale::{Scale, span};
 use super::figure::{Chart, Figure, Quantity};
-use super::number::{integer, micrometres, p_value, quantity, shape_number, value_and_u};
+use super::number::{integer, of_readings, p_value, quantity, shape_number, value_and_u};
 use super::table::{Cell, Column, Table, cells};
 use super::{trace as present, uniqueness};
 
@@ -54,11 +54,15 @@ pub fn section(report: &mut Report, trace: &TraceOutcome) {
 fn values(effect: &EffectResult, screened: usize, is_alone: bool) -> Table {
     let mut rows = vec![cells!["estimate", estimate(effect)]];
     rows.extend(effect.prior.iter().map(|prior| cells!["prior", present::prior(prior)]));
-    let explains = format!("{} rms ({})", micrometres(effect.rms_gain_um), p_value(effect.p_value));
+    let explains =
+        format!("{} rms ({})", of_readings(effect.rms_gain_um, effect.reading_unit), p_value(effect.p_value));
     rows.push(cells!["explains", explains]);
     // Of a single effect it stands among the key figures.
     if !is_alone {
-        rows.push(cells!["held-out rms", format!("{} with this effect", micrometres(effect.heldout_rms_um))]);
+        rows.push(cells![
+            "held-out rms",
+            format!("{} with this effect", of_readings(effect.heldout_rms_um, effect.reading_unit))
+        ]);
     }
     rows.push(cells!["family", &effect.family]);
     rows.push(cells!["uniqueness", uniqueness::standing(effect, screened)]);
@@ -127,7 +131,7 @@ fn explanations(effect: &EffectResult) -> Table {
     let predicts = effect.left_out_test_rms_um.is_some();
     let row = |name_of: &EffectName, likelihood: String, predicted: Option<f64>, outcomes: Vec<String>| {
         let mut row = cells![format!("{} ({})", name_of.meaning, name(name_of)), likelihood];
-        row.extend(predicts.then(|| Cell::or_dash(predicted.map(|um| micrometres(um).into()))));
+        row.extend(predicts.then(|| Cell::or_dash(predicted.map(|um| of_readings(um, effect.reading_unit).into()))));
         row.extend(outcomes.into_iter().map(Cell::from));
         row
     };
@@ -189,7 +193,7 @@ fn curve(effect: &EffectResult) -> Figure {
 
 /// Held-out error after each addition of the search.
 fn convergence(trace: &TraceOutcome) -> Figure {
-    let before = trace.result.before.heldout_rms_um;
+    let (before, unit) = (trace.result.before.heldout_rms_um, trace.result.reading_unit);
     let mut points = vec![(0.0, before)];
     points.extend(trace.steps.iter().enumerate().map(|(k, step)| (k as f64 + 1.0, step.heldout_rms_um)));
     let maximum = points.iter().map(|p| p.1).fold(0.0, f64::max);
@@ -197,7 +201,7 @@ fn convergence(trace: &TraceOutcome) -> Figure {
     let shown = trace.steps.len() <= MAX_NAMED;
     let names = trace.steps.iter().map(|step| Name {
         text: step.id.clone(),
-        note: format!("{}, {}", micrometres(step.heldout_rms_um), counted(step.effects, "effect")),
+        note: format!("{}, {}", of_readings(step.heldout_rms_um, unit), counted(step.effects, "effect")),
         shown,
     });
     // Names need space to the right of the last point.
@@ -211,7 +215,7 @@ fn convergence(trace: &TraceOutcome) -> Figure {
     }
     let lines = Lines::new(
         Axis::new("additions", "", Scale { step: x.step.max(1.0), ..x }),
-        Axis::new("held-out rms", "um", Scale::rounded([0.0, maximum * 1.05], 5)),
+        Axis::new("held-out rms", unit.name(), Scale::rounded([0.0, maximum * 1.05], 5)),
         series,
     );
     Figure::new(

@@ -11,11 +11,12 @@ use abbe::identify::results::{
 };
 use abbe::identify::series::{spectrum, views};
 use abbe::identify::tolerance::Conformity;
+use abbe::identify::unit::ReadingUnit;
 use abbe::model::words::counted;
 
 use super::block::{Level, Report, Text};
 use super::commands::Commands;
-use super::number::{fixed, micrometres, places, unit};
+use super::number::{fixed, of_readings, places, unit};
 use super::parameters::Estimates;
 use super::quality::{self, Quality, noise_sentence};
 use super::session::plots::SessionPlots;
@@ -41,7 +42,7 @@ pub fn report(
     let statements = Statements::of_fit(problem, result);
     let opening = statements::opening(&statements, result.degrees_of_freedom, commands);
     let rank = rank(result.identifiable.len(), result.parameter_count, result.rank);
-    let noise = noise(result.noise_um, result.noise_source);
+    let noise = noise(result.noise_um, result.reading_unit, result.noise_source);
     let extent = format!("{}, {noise}; {rank}.", counted(result.readings, "reading"));
     let failed = conformity::failed(result.conformity.as_ref());
     let contradicted = plausibility::headline(&result.plausibility);
@@ -90,6 +91,8 @@ pub fn report(
 
 fn quality(result: &FitResult) -> Quality<'_> {
     Quality {
+        unit: result.reading_unit,
+        of_angles: result.of_angles,
         chi_square: result.chi_square,
         degrees_of_freedom: result.degrees_of_freedom,
         rms_um: result.rms_um,
@@ -110,7 +113,7 @@ fn method(result: &FitResult) -> String {
         "Least squares on the kinematic chain. All parameters are estimated together in the identifiable subspace. The \
          covariance follows from the law of propagation of uncertainty (JCGM 100, JCGM 102). {}. Held-out error: each \
          fold leaves out {}.",
-        noise_sentence(result.noise_um, result.noise_source),
+        noise_sentence(result.noise_um, result.reading_unit, result.noise_source),
         result.heldout_by
     )
 }
@@ -147,8 +150,8 @@ pub fn rank(identifiable: usize, count: usize, rank: usize) -> String {
 }
 
 /// The noise and its source in words. A residual is not called noise.
-pub fn noise(noise_um: f64, source: NoiseSource) -> String {
-    let figure = micrometres(noise_um);
+pub fn noise(noise_um: f64, unit: ReadingUnit, source: NoiseSource) -> String {
+    let figure = of_readings(noise_um, unit);
     match source {
         NoiseSource::Residual => format!("residual of the declared model {figure} (no noise stated, no repeats)"),
         other => format!("noise {figure} ({other})"),
@@ -208,7 +211,7 @@ impl Figures {
     /// The figures of a fit.
     fn of_fit(result: &FitResult) -> Table {
         let mut figures = Figures::default();
-        figures.figure("residual", "rms", "", result.rms_um, "um");
+        figures.figure("residual", "rms", "", result.rms_um, result.reading_unit.name());
         figures.held_out("residual", result.heldout_rms_um, &result.cross_validation);
         figures.parameters("parameters", &result.parameters);
         result.circular.iter().for_each(|test| figures.circular(test));
@@ -218,9 +221,9 @@ impl Figures {
 
     /// The deciding held-out error, and those by what is held out.
     pub fn held_out(&mut self, section: &str, rms_um: f64, model: &CrossValidation) {
-        self.figure(section, "held out", "", rms_um, "um");
+        self.figure(section, "held out", "", rms_um, model.reading_unit.name());
         for figure in cross_validation::figures(model) {
-            self.figure(section, figure.name, "", figure.rms_um, "um");
+            self.figure(section, figure.name, "", figure.rms_um, figure.unit.name());
         }
     }
 

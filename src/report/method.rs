@@ -2,6 +2,7 @@
 
 use abbe::identify::geometric::{Comparison, ComparisonRow};
 use abbe::identify::problem::Problem;
+use abbe::identify::unit::ReadingUnit;
 use abbe::model::words::counted;
 
 use super::block::Report;
@@ -22,7 +23,7 @@ pub fn report(problem: &Problem, result: &Comparison) -> Report {
          methods are applied to noise-free readings that are simulated with the errors of the full fit; these errors \
          are subtracted.",
         result.method,
-        noise_sentence(result.noise_um, result.noise_source)
+        noise_sentence(result.noise_um, ReadingUnit::Micrometre, result.noise_source)
     );
     report.opening("", [
         format!(
@@ -32,7 +33,7 @@ pub fn report(problem: &Problem, result: &Comparison) -> Report {
             micrometres(result.method_rms_um),
             micrometres(result.rms_um)
         ),
-        format!("{}, {}.", counted(result.readings, "reading"), noise(result.noise_um, result.noise_source)),
+        format!("{}, {}.", counted(result.readings, "reading"), noise(result.noise_um, ReadingUnit::Micrometre, result.noise_source)),
     ]);
     report.section("Errors by both methods");
     report.key(errors(result));

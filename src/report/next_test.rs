@@ -5,6 +5,7 @@ use abbe::identify::plan::next_test::NextTest;
 use abbe::identify::plan::range::Shrinkage;
 use abbe::identify::problem::Problem;
 use abbe::identify::results::Interval;
+use abbe::identify::unit::ReadingUnit;
 use abbe::model::words::counted;
 
 use super::block::{Level, Report, Text};
@@ -30,7 +31,7 @@ pub fn report(problem: &Problem, found: &NextTest) -> Report {
         Some(found) => verdict(found),
         None => format!("Minimum sweep range of {}.", counted(ranges.len(), "test")),
     };
-    let noise = noise(found.noise_um, found.noise_source);
+    let noise = noise(found.noise_um, ReadingUnit::Micrometre, found.noise_source);
     report.opening("", [verdict, format!("{}.", capitalised(&noise))]);
     if let Some(found) = improvement {
         proposed(&mut report, found);

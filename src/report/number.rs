@@ -1,6 +1,7 @@
 //! Numbers and units as people read them: digits by the uncertainty, symbols of units.
 
 use abbe::identify::results::ShapeParameter;
+use abbe::identify::unit::ReadingUnit;
 
 /// A number with decimal places. A number that rounds to zero has no sign.
 pub fn fixed(value: f64, places: usize) -> String {
@@ -59,8 +60,13 @@ pub fn p_equals(p: f64) -> String {
 
 /// A residual or a noise figure in µm.
 pub fn micrometres(value_um: f64) -> String {
-    let places = if value_um >= 100.0 { 1 } else { 3 };
-    format!("{value_um:.places$} µm")
+    of_readings(value_um, ReadingUnit::Micrometre)
+}
+
+/// A residual or a noise figure in the unit of the readings.
+pub fn of_readings(value: f64, of: ReadingUnit) -> String {
+    let places = if value >= 100.0 { 1 } else { 3 };
+    format!("{value:.places$} {}", unit(of.name()))
 }
 
 /// A unit, or a text with units, with its symbols: `um` becomes µm, `arcsec` becomes ″, `deg` becomes °.

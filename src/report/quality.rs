@@ -2,15 +2,20 @@
 
 use abbe::identify::noise::NoiseSource;
 use abbe::identify::problem::Problem;
-use abbe::identify::results::{CrossValidation, Goodness, GoodnessVerdict};
+use abbe::identify::results::{CrossValidation, Goodness, GoodnessVerdict, OfAngles};
+use abbe::identify::unit::ReadingUnit;
 use abbe::model::words::counted;
 
 use super::block::KeyFigure;
 use super::cross_validation;
-use super::number::{integer, micrometres};
+use super::number::{integer, of_readings};
 
 /// The quantities that describe the quality of one model.
 pub struct Quality<'r> {
+    /// The unit of the figures of readings.
+    pub unit: ReadingUnit,
+    /// The figures of the angles beside lengths.
+    pub of_angles: Option<OfAngles>,
     /// χ², priors included.
     pub chi_square: f64,
     /// Degrees of freedom ν.
@@ -43,6 +48,11 @@ impl Quality<'_> {
         self.noise_source.judges()
     }
 
+    /// A figure of readings with its unit.
+    fn shown(&self, value: f64) -> String {
+        of_readings(value, self.unit)
+    }
+
     /// χ²/ν; a dash without degrees of freedom.
     fn ratio(&self) -> String {
         match self.degrees_of_freedom {
@@ -61,19 +71,19 @@ impl Quality<'_> {
 
     fn residual(&self, before: Option<&Quality<'_>>) -> KeyFigure {
         let noise = match self.is_testable() {
-            true => format!("noise {} ({})", micrometres(self.noise_um), self.noise_source),
+            true => format!("noise {} ({})", self.shown(self.noise_um), self.noise_source),
             false => "noise not stated".to_string(),
         };
-        let before = before.map_or(String::new(), |before| format!("before {}; ", micrometres(before.rms_um)));
-        KeyFigure::new("Residual rms", micrometres(self.rms_um), format!("{before}{noise}"))
+        let before = before.map_or(String::new(), |before| format!("before {}; ", self.shown(before.rms_um)));
+        KeyFigure::new("Residual rms", self.shown(self.rms_um), format!("{before}{noise}"))
     }
 
     fn held_out(&self, before: Option<&Quality<'_>>) -> KeyFigure {
         let note = match before {
-            Some(before) => format!("before {}", micrometres(before.heldout_rms_um)),
+            Some(before) => format!("before {}", self.shown(before.heldout_rms_um)),
             None => "cross-validation".to_string(),
         };
-        KeyFigure::new("Held-out rms", micrometres(self.heldout_rms_um), note)
+        KeyFigure::new("Held-out rms", self.shown(self.heldout_rms_um), note)
     }
 
     fn rank(&self) -> KeyFigure {
@@ -88,7 +98,12 @@ impl Quality<'_> {
     pub fn key_figures(&self, before: Option<&Quality<'_>>) -> Vec<KeyFigure> {
         let mut figures = vec![self.chi_square(before), self.residual(before), self.held_out(before)];
         if let (Some(rms), Some(held)) = (self.rms_3d_um, self.heldout_rms_3d_um) {
-            figures.push(KeyFigure::new("3-vector", micrometres(rms), format!("held out {}", micrometres(held))));
+            figures.push(KeyFigure::new("3-vector", self.shown(rms), format!("held out {}", self.shown(held))));
+        }
+        if let Some(angles) = self.of_angles {
+            let in_arcsec = |value: f64| of_readings(value, ReadingUnit::Arcsecond);
+            let [rms, held, noise] = [angles.rms_arcsec, angles.heldout_rms_arcsec, angles.noise_arcsec].map(in_arcsec);
+            figures.push(KeyFigure::new("Angles, rms", rms, format!("held out {held}, noise {noise}")));
         }
         figures.push(self.rank());
         figures
@@ -112,13 +127,13 @@ pub fn readings(problem: &Problem, readings: usize, outliers: usize) -> KeyFigur
 }
 
 /// The noise of a result and its source. The residual of a model is not called noise.
-pub fn noise_sentence(noise_um: f64, source: NoiseSource) -> String {
+pub fn noise_sentence(noise_um: f64, unit: ReadingUnit, source: NoiseSource) -> String {
     match source {
         NoiseSource::Residual => format!(
             "No noise is stated and there are no repeated readings. The uncertainties follow from the residual of the model, {}",
-            micrometres(noise_um)
+            of_readings(noise_um, unit)
         ),
-        other => format!("Noise standard deviation {} ({other})", micrometres(noise_um)),
+        other => format!("Noise standard deviation {} ({other})", of_readings(noise_um, unit)),
     }
 }
 

@@ -2,6 +2,7 @@
 
 use abbe::identify::results::Interval;
 use abbe::identify::self_calibration::{FunctionResult, MonteCarloResult, SelfCalibration};
+use abbe::identify::unit::ReadingUnit;
 use abbe::model::session::Session;
 use abbe::model::words::counted;
 
@@ -24,7 +25,7 @@ pub fn report(session: &Session, result: &SelfCalibration) -> Report {
             format!(
                 "{}, {}, residual {}.",
                 counted(result.readings, "reading"),
-                noise(result.noise_um, result.noise_source),
+                noise(result.noise_um, ReadingUnit::Micrometre, result.noise_source),
                 micrometres(result.rms_um)
             ),
             format!(

@@ -1,11 +1,12 @@
 //! A simulated session and the true values of its parameters.
 
 use abbe::identify::simulate::Simulated;
+use abbe::identify::unit::ReadingUnit;
 use abbe::model::session::Session;
 use abbe::model::words::counted;
 
 use super::block::Report;
-use super::number::{micrometres, unit};
+use super::number::{of_readings, unit};
 use super::table::{Cell, Table, cells};
 
 /// The report of a simulation that was written to this session file.
@@ -14,13 +15,17 @@ pub fn report(session: &Session, file: &str, simulated: &Simulated, seed: u64) -
     report.warnings.clone_from(&simulated.warnings);
     report.method = "Readings of the machine with the stated errors, with Gaussian noise.".to_string();
     let readings: usize = simulated.readings.iter().map(|readings| readings.rows()).sum();
+    let unit = match session.units().only_angles() {
+        true => ReadingUnit::Arcsecond,
+        false => ReadingUnit::Micrometre,
+    };
     report.opening(
         "",
         [format!(
             "{file}: {} of {}, noise {}, seed {seed}",
             counted(readings, "reading"),
             counted(session.tests.len(), "test"),
-            micrometres(simulated.noise_mm * 1e3),
+            of_readings(simulated.noise_mm * 1e3, unit),
         )],
     );
     report.section("True values");

@@ -13,13 +13,13 @@ use super::block::{KeyFigure, Level, Report, Text};
 use super::commands::Commands;
 use super::effect::name;
 use super::fit::{Figures, noise as noise_in_words, rank};
-use super::number::{capitalised, integer, micrometres, p_value, quantity, value_and_u};
+use super::number::{capitalised, integer, of_readings, p_value, quantity, unit, value_and_u};
 use super::parameters::Estimates;
 use super::quality::{self, Quality, noise_sentence};
 use super::session::plots::SessionPlots;
 use super::session::{self, residuals};
 use super::statements;
-use super::table::{Cell, Table, cells};
+use super::table::{Cell, Table, cells, numbers, words};
 use super::{conformity, confounded, cross_validation, effects, plausibility, uniqueness};
 
 /// Effects that the opening names.
@@ -101,7 +101,7 @@ fn method(result: &TraceResult) -> String {
          out {}; the search is repeated in each fold.",
         integer(result.candidates),
         integer(result.candidates_detectable),
-        noise_sentence(result.noise_um, result.noise_source),
+        noise_sentence(result.noise_um, result.reading_unit, result.noise_source),
         result.heldout_by
     )
 }
@@ -159,6 +159,8 @@ fn named(found: &[EffectResult]) -> String {
 /// Quality of a model of a trace.
 fn quality<'r>(result: &'r TraceResult, model: &'r ModelResult) -> Quality<'r> {
     Quality {
+        unit: result.reading_unit,
+        of_angles: model.of_angles,
         chi_square: model.chi_square,
         degrees_of_freedom: model.degrees_of_freedom,
         rms_um: model.rms_um,
@@ -230,12 +232,12 @@ fn next(trace: &TraceOutcome, commands: &Commands) -> Vec<(String, String)> {
 /// The noise and its source in words. A residual is not called noise.
 fn noise(result: &TraceResult) -> String {
     if result.noise_source.judges() || result.effects.is_empty() {
-        return noise_in_words(result.noise_um, result.noise_source);
+        return noise_in_words(result.noise_um, result.reading_unit, result.noise_source);
     }
     format!(
         "residual of the declared model {}, with the effects {} (no noise stated, no repeats)",
-        micrometres(result.before.noise_um),
-        micrometres(result.after.noise_um)
+        of_readings(result.before.noise_um, result.reading_unit),
+        of_readings(result.after.noise_um, result.reading_unit)
     )
 }
 
@@ -254,14 +256,15 @@ pub fn before_and_after(result: &TraceResult) -> Table {
         cells.push(rank(model.identifiable.len(), model.parameter_count, model.rank).into());
         cells
     };
-    let mut columns = vec!["residual, µm", ">rms", ">held out"];
+    let residual = format!("residual, {}", unit(result.reading_unit.name()));
+    let mut columns = vec![words(residual), numbers("rms"), numbers("held out")];
     if result.before.rms_3d_um.is_some() {
-        columns.extend([">3-vector", ">held out"]);
+        columns.extend(["3-vector", "held out"].map(numbers));
     }
     if judges {
-        columns.push(">χ²/ν");
+        columns.push(numbers("χ²/ν"));
     }
-    columns.push("");
+    columns.push(words(""));
     let mut table = Table::new(columns, [row("before", &result.before), row("after", &result.after)]);
     table.notes.push(format!("held out: leaving out {}", result.heldout_by));
     let (before, after) = (&result.before.cross_validation, &result.after.cross_validation);
@@ -277,9 +280,10 @@ pub fn rejected(result: &TraceResult) -> Vec<String> {
     let rejected = result.rejected_candidates.iter().map(|candidate| {
         let (decrease, u) = value_and_u(candidate.heldout_decrease_um, candidate.u_heldout_decrease_um);
         format!(
-            "{} ({}): the held-out rms decreases by {decrease} µm, with a standard error of {u} µm",
+            "{} ({}): the held-out rms decreases by {decrease} {of}, with a standard error of {u} {of}",
             name(&candidate.name),
-            p_value(candidate.p_value)
+            p_value(candidate.p_value),
+            of = unit(result.reading_unit.name())
         )
     });
     rejected.collect()
@@ -327,7 +331,7 @@ fn values(result: &TraceResult) -> Table {
         figures.statement("search", "interrupted", &format!("{}: the result is incomplete", result.interruption()));
     }
     for (name, model) in [("before", &result.before), ("after", &result.after)] {
-        figures.figure(name, "rms", "", model.rms_um, "um");
+        figures.figure(name, "rms", "", model.rms_um, model.reading_unit.name());
         figures.held_out(name, model.heldout_rms_um, &model.cross_validation);
         figures.parameters(name, &model.parameters);
     }

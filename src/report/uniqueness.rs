@@ -4,7 +4,7 @@
 use abbe::identify::results::{AliasResult, EffectName, EffectResult, SeparatingTestResult, TraceResult};
 use abbe::model::words::with_exponent;
 
-use super::number::micrometres;
+use super::number::of_readings;
 
 /// Explanations named in the headline.
 const MAX_NAMED: usize = 3;
@@ -66,7 +66,8 @@ const WORSE: f64 = 1.01;
 pub fn worse_prediction(effect: &EffectResult, alias: usize) -> Option<String> {
     let of_effect = effect.left_out_test_rms_um?;
     let of_alias = effect.aliases_left_out_test_rms_um.get(alias).copied().flatten()?;
-    let words = || format!("left-out test {}, with the effect {}", micrometres(of_alias), micrometres(of_effect));
+    let [alias, own] = [of_alias, of_effect].map(|rms| of_readings(rms, effect.reading_unit));
+    let words = || format!("left-out test {alias}, with the effect {own}");
     (of_alias > WORSE * of_effect).then(words)
 }
 

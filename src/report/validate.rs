@@ -9,9 +9,9 @@ use abbe::model::words::counted;
 use super::block::{KeyFigure, Report, Text};
 use super::commands::Commands;
 use super::fit::Figures;
-use super::number::{capitalised, integer, micrometres, probability, unit};
+use super::number::{capitalised, integer, of_readings, probability, unit};
 use super::statements;
-use super::table::{Cell, Table, cells};
+use super::table::{Cell, Table, cells, numbers, words};
 use super::validate_plots as plots;
 
 /// Rows of a list that a terminal shows without `--all`.
@@ -59,16 +59,17 @@ pub fn report(session: &Session, validation: &Validation, commands: &Commands) -
 }
 
 fn key_figures(result: &ValidationResult) -> Vec<KeyFigure> {
+    let shown = |value: f64| of_readings(value, result.reading_unit);
     let model = &result.model;
-    let predicted = format!("predicted {}", micrometres(model.predicted_rms_um));
-    let mut figures = vec![KeyFigure::new("Residual rms", micrometres(model.rms.rms_um), predicted)];
-    let length = model.rms.rms_3d_um.map(|length| KeyFigure::new("Residual vector", micrometres(length), "rms length"));
+    let predicted = format!("predicted {}", shown(model.predicted_rms_um));
+    let mut figures = vec![KeyFigure::new("Residual rms", shown(model.rms.rms_um), predicted)];
+    let length = model.rms.rms_3d_um.map(|length| KeyFigure::new("Residual vector", shown(length), "rms length"));
     figures.extend(length);
     figures.extend([
         KeyFigure::new(
             "Location errors alone",
-            micrometres(result.locations.rms_um),
-            format!("nominal machine {}", micrometres(result.nominal.rms_um)),
+            shown(result.locations.rms_um),
+            format!("nominal machine {}", shown(result.nominal.rms_um)),
         ),
         KeyFigure::new("In 95 % intervals", format!("{:.1} %", 100.0 * model.coverage_95), "of scalar readings"),
         KeyFigure::new("Readings", integer(result.readings), format!("{} inside the range", result.readings_in_range)),
@@ -96,6 +97,7 @@ fn sentence(result: &ValidationResult) -> String {
 
 /// The readings, those inside the range, and the noise.
 fn readings(result: &ValidationResult) -> String {
+    let shown = |value: f64| of_readings(value, result.reading_unit);
     let outside = match result.outside.as_slice() {
         [] => String::new(),
         names => format!(" (outside: {})", names.join(", ")),
@@ -108,26 +110,27 @@ fn readings(result: &ValidationResult) -> String {
         "{}, {} inside the range of the model{outside}{outliers}; noise {} ({})",
         counted(result.readings, "reading"),
         result.readings_in_range,
-        micrometres(result.noise_um),
+        shown(result.noise_um),
         result.noise_source
     )
 }
 
 /// Rms of each machine, with what the model predicts and covers.
 pub fn residuals(result: &ValidationResult) -> Table {
-    let length = |rms: &RmsResult| rms.rms_3d_um.map_or("–".to_string(), micrometres);
+    let shown = |value: f64| of_readings(value, result.reading_unit);
+    let length = |rms: &RmsResult| rms.rms_3d_um.map_or("–".to_string(), shown);
     let percent = |share: f64| format!("{:.1} %", 100.0 * share);
     let row = |name: &str, rms: &RmsResult| {
-        cells![name, micrometres(rms.rms_um), length(rms), Cell::fixed(rms.noise_ratio, 3), "–", "–", "–"]
+        cells![name, shown(rms.rms_um), length(rms), Cell::fixed(rms.noise_ratio, 3), "–", "–", "–"]
     };
     let model = &result.model;
     let predicted = |rms: &RmsResult, predicted_um: f64, ratio: f64, coverage: f64, name: &str| {
         cells![
             name,
-            micrometres(rms.rms_um),
+            shown(rms.rms_um),
             length(rms),
             Cell::fixed(rms.noise_ratio, 3),
-            micrometres(predicted_um),
+            shown(predicted_um),
             Cell::fixed(ratio, 3),
             percent(coverage)
         ]
@@ -168,14 +171,16 @@ pub fn moved(result: &ValidationResult) -> Table {
 
 /// The model without each effect, the most important first.
 pub fn without(result: &ValidationResult) -> Table {
+    let shown = |value: f64| of_readings(value, result.reading_unit);
     let mut order: Vec<usize> = (0..result.without.len()).collect();
     order.sort_by(|a, b| result.without[*b].rms.rms_um.total_cmp(&result.without[*a].rms.rms_um));
     let rows = order.into_iter().map(|k| {
         let without = &result.without[k];
         let change = without.rms.rms_um - result.model.rms.rms_um;
-        cells![&without.effect, micrometres(without.rms.rms_um), format!("{change:+.3}")]
+        cells![&without.effect, shown(without.rms.rms_um), format!("{change:+.3}")]
     });
-    Table::new(["effect", ">rms without it", ">change, µm"], rows)
+    let change = format!("change, {}", unit(result.reading_unit.name()));
+    Table::new([words("effect"), numbers("rms without it"), numbers(change)], rows)
         .titled("The model without each effect; an effect that lowers no residual does not hold here")
 }
 
@@ -191,12 +196,13 @@ fn set_up(result: &ValidationResult) -> Table {
 
 /// Every figure with all its digits, one row per figure.
 fn values(result: &ValidationResult) -> Table {
+    let unit = result.reading_unit.name();
     let mut figures = Figures::default();
     figures.statement("verdict", result.verdict.word(), &sentence(result));
     let mut rms = |id: &str, rms: &RmsResult| {
-        figures.figure("residual", id, "rms over scalar readings", rms.rms_um, "um");
+        figures.figure("residual", id, "rms over scalar readings", rms.rms_um, unit);
         if let Some(length) = rms.rms_3d_um {
-            figures.figure("residual", id, "rms length of the vector", length, "um");
+            figures.figure("residual", id, "rms length of the vector", length, unit);
         }
     };
     rms("nominal", &result.nominal);
@@ -208,7 +214,7 @@ fn values(result: &ValidationResult) -> Table {
     for without in &result.without {
         rms(&format!("without {}", without.effect), &without.rms);
     }
-    figures.figure("prediction", "predicted rms", "", result.model.predicted_rms_um, "um");
+    figures.figure("prediction", "predicted rms", "", result.model.predicted_rms_um, unit);
     figures.figure("prediction", "coverage", "share inside the 95 % intervals", result.model.coverage_95, "1");
     let mut table = figures.table();
     table.rows.extend(result.moved.iter().map(|moved| {

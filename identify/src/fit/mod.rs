@@ -36,7 +36,7 @@ pub(crate) use covariance::{null_space, of_parameters as covariance_of_parameter
 pub use prepare::prepare;
 pub(crate) use prepare::{prepare_with, with_families};
 pub(crate) use quantities::{Quantity, quantities, values_at};
-pub(crate) use reported::ids;
+pub(crate) use reported::{ids, rms_of_units};
 pub use reported::{outliers, parameters, report, unobservable};
 pub use session::SessionFit;
 

@@ -1,5 +1,7 @@
 //! Preparation of a fit: the noise and the outliers that the readings show, in turn with the fit.
 
+use std::sync::Arc;
+
 use abbe_model::effect::Effect;
 use abbe_model::session::Session;
 use abbe_model::session::limits::MIN_UM;
@@ -8,7 +10,7 @@ use faer::Mat;
 use super::Fit;
 use super::families::{FoldEquations, families};
 use crate::error::IdentifyError;
-use crate::heldout::rms_mm;
+use crate::heldout::{rms_by_unit_mm, rms_mm};
 use crate::noise::outliers;
 use crate::noise::{Noise, NoiseSource, PureError};
 use crate::numerics::triangle::Triangle;
@@ -39,6 +41,54 @@ pub fn prepare(session: &Session, seed: u64) -> Result<(Problem, Fit), IdentifyE
 /// # Errors
 /// See [`prepare`].
 pub(crate) fn prepare_with(session: &Session, effects: &[Effect], seed: u64) -> Result<(Problem, Fit), IdentifyError> {
+    let units = session.units();
+    if !(units.lengths && units.angles) || session.stated_lever_mm().is_some() {
+        return prepare_at_lever(session, effects, seed);
+    }
+    let mut session = session.clone();
+    let mut found = prepare_at_lever(&session, effects, seed)?;
+    for _ in 0..MAX_LEVERS {
+        let Some(factor) = lengths_over_angles(&found.0, &found.1) else { break };
+        session.lever_mm *= factor;
+        found = prepare_at_lever(&session, effects, seed)?;
+        if (factor - 1.0).abs() < LEVER_TOLERANCE {
+            break;
+        }
+    }
+    Ok(found)
+}
+
+/// Maximum number of estimates of the lever of a session that does not state the noise of both lengths and angles.
+const MAX_LEVERS: usize = 6;
+/// Relative change of the lever at which its estimates stop.
+const LEVER_TOLERANCE: f64 = 0.01;
+
+/// The noise of the lengths over that of the angles at the lever of a problem: of repeats if both have them, else of the
+/// residual.
+fn lengths_over_angles(problem: &Problem, fit: &Fit) -> Option<f64> {
+    let of_unit = |is_angle: bool| {
+        let mut part = fit.residuals.clone();
+        let mut tests = problem.tests.clone();
+        for (number, test) in tests.iter_mut().enumerate() {
+            let channels = problem.models[number].channels();
+            let Some(readings) = &mut test.readings else { continue };
+            let readings = Arc::make_mut(readings);
+            let others = |i: &usize| channels[i % channels.len()].is_angle() != is_angle;
+            (0..readings.observed.len()).filter(others).for_each(|i| readings.observed[i] = f64::NAN);
+            (0..part[number].len()).filter(others).for_each(|i| part[number][i] = 0.0);
+        }
+        PureError::of(&tests, &part, |test, row| !problem.rejected[test][row]).sigma_mm()
+    };
+    if let (Some(lengths), Some(angles)) = (of_unit(false), of_unit(true)) {
+        return (lengths > 0.0 && angles > 0.0).then(|| lengths / angles);
+    }
+    match rms_by_unit_mm(problem, &fit.residuals) {
+        [Some(lengths), Some(angles)] if lengths > 0.0 && angles > 0.0 => Some(lengths / angles),
+        _ => None,
+    }
+}
+
+fn prepare_at_lever(session: &Session, effects: &[Effect], seed: u64) -> Result<(Problem, Fit), IdentifyError> {
     let stated = session.stated_noise_mm();
     let floor = session.resolution_noise_mm();
     let first = match stated {

@@ -9,14 +9,15 @@ use super::{aliases, assume};
 use crate::circular;
 use crate::error::IdentifyError;
 use crate::heldout::figures::cross_validation;
-use crate::heldout::{mislabelled_runs, rms_mm};
+use crate::heldout::{mislabelled_runs, rms_by_unit_mm, rms_mm};
 use crate::noise;
 use crate::numerics::rank::Rank;
 use crate::parameter_description::parameter_meaning;
 use crate::plausibility;
 use crate::problem::Problem;
-use crate::results::{FitResult, Outlier, ParameterResult, Unobservable, phases_follow_amplitudes};
+use crate::results::{FitResult, OfAngles, Outlier, ParameterResult, Unobservable, phases_follow_amplitudes};
 use crate::tolerance::conformity;
+use crate::unit::ARCSEC;
 
 /// The fit in its reported form.
 ///
@@ -24,8 +25,7 @@ use crate::tolerance::conformity;
 /// If the model cannot be evaluated for the cross-validation.
 pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> {
     let vectors = problem.are_vectors();
-    let rms = rms_mm(problem, &fit.residuals);
-    let held = fit.held_out.rms_mm;
+    let (rms, held, of_angles) = rms_of_units(problem, &fit.residuals, &fit.held_out.residuals);
     let in_3d = |rms: f64| vectors.then(|| rms * 3.0_f64.sqrt() * 1e3);
     let plausibility = plausibility::examine(problem, fit);
     let mut warnings = problem.session.warnings.clone();
@@ -41,6 +41,8 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> 
     let noise_um = problem.noise.sigma_mm * 1e3;
     let circular = circular::of_session(&problem.session, problem.noise.sigma_mm, &problem.rejected);
     Ok(FitResult {
+        reading_unit: problem.unit(),
+        of_angles,
         noise_um,
         noise_source: problem.noise.source,
         noise_ar_coefficients: problem.noise.ar_coefficients.clone(),
@@ -72,6 +74,27 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> 
         base: None,
         monte_carlo: None,
     })
+}
+
+/// Root mean square of residuals and of held-out residuals, mm: of the lengths, if there are angles too, whose figures are
+/// apart.
+pub(crate) fn rms_of_units(
+    problem: &Problem,
+    residuals: &[Vec<f64>],
+    held_out: &[Vec<f64>],
+) -> (f64, f64, Option<OfAngles>) {
+    let arcsec = |mm: f64| mm / problem.session.lever_mm * ARCSEC;
+    match [residuals, held_out].map(|residuals| rms_by_unit_mm(problem, residuals)) {
+        [[Some(rms), Some(of_angles)], [Some(held), Some(held_of_angles)]] => {
+            let of_angles = OfAngles {
+                noise_arcsec: arcsec(problem.noise.sigma_mm),
+                rms_arcsec: arcsec(of_angles),
+                heldout_rms_arcsec: arcsec(held_of_angles),
+            };
+            (rms, held, Some(of_angles))
+        }
+        _ => (rms_mm(problem, residuals), rms_mm(problem, held_out), None),
+    }
 }
 
 /// The identifiable parameters, in display units, with uncertainties that cover aliases. A harmonic has amplitude and phase of

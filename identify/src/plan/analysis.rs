@@ -111,6 +111,7 @@ fn analyse_problem(problem: &Problem, travel_mm: f64) -> Result<PlanAnalysis, Id
     let clearances = collision::clearances(&problem.session);
     warnings.extend(collision::warnings(&problem.session, &clearances));
     Ok(PlanAnalysis {
+        reading_unit: problem.unit(),
         noise_um: problem.noise.sigma_mm * 1e3,
         noise_source: problem.noise.source,
         readings: problem.readings(),

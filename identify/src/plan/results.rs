@@ -6,12 +6,16 @@ use serde::Serialize;
 use super::collision::TestClearance;
 use crate::noise::NoiseSource;
 use crate::results::{Combination, DeterminedByPrior, Unobservable};
+use crate::unit::ReadingUnit;
 
 /// Identifiability and predicted uncertainties of planned tests.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct PlanAnalysis {
     /// Standard deviation of one scalar reading, µm.
     pub noise_um: f64,
+    /// The unit of the figures of readings, in which their keys end; absent for µm.
+    #[serde(skip_serializing_if = "ReadingUnit::is_micrometre")]
+    pub reading_unit: ReadingUnit,
     /// Source of `noise_um`: `stated` by session or user, `repeats` or `residual` of its readings, or `assumed`.
     pub noise_source: NoiseSource,
     /// Number of readings.

@@ -7,17 +7,21 @@ use abbe_model::document::test::Test;
 use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 
-use super::Outlier;
 use super::cross_validation::CrossValidation;
 use super::outcome::{Goodness, Outcome, TraceVerdict};
 use super::parameter::{Covariance, NullSpace, ParameterResult, Unobservable};
+use super::{OfAngles, Outlier};
 use crate::noise::NoiseSource;
 use crate::plausibility::Plausibility;
 use crate::tolerance::Conformity;
+use crate::unit::ReadingUnit;
 
 /// Residual and parameters of a model.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct ModelResult {
+    /// The unit of the figures of readings.
+    #[serde(skip)]
+    pub reading_unit: ReadingUnit,
     /// Rms of the residual over scalar readings, µm.
     pub rms_um: f64,
     /// Rms of the residual over scalar readings that neither fit nor search used, µm.
@@ -28,6 +32,9 @@ pub struct ModelResult {
     /// Rms length of the residual vector over held-out readings, µm, for instruments with three coordinates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub heldout_rms_3d_um: Option<f64>,
+    /// The same of the angles, if readings are lengths and angles; the figures in µm are then those of the lengths.
+    #[serde(flatten)]
+    pub of_angles: Option<OfAngles>,
     /// Held-out errors by what is held out.
     #[serde(flatten)]
     pub cross_validation: CrossValidation,
@@ -160,6 +167,9 @@ pub struct AliasResult {
 /// An effect that the search has found.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct EffectResult {
+    /// The unit of the figures of readings.
+    #[serde(skip)]
+    pub reading_unit: ReadingUnit,
     /// Component, driver, shape, order.
     #[serde(flatten)]
     pub name: EffectName,
@@ -305,6 +315,9 @@ pub struct ChangedParameter {
 /// Effects that the declared model lacks, and the model before and after they are added.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct TraceResult {
+    /// The unit of the figures of readings, in which their keys end; absent for µm.
+    #[serde(skip_serializing_if = "ReadingUnit::is_micrometre")]
+    pub reading_unit: ReadingUnit,
     /// `clean`, `explained`, `partly-explained`, `unexplained`; `not-judged` without a known noise; `incomplete` for an
     /// interrupted trace.
     pub verdict: TraceVerdict,

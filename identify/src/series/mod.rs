@@ -23,6 +23,7 @@ use crate::fit::Fit;
 use crate::heldout::rms_mm;
 use crate::parameters::Role;
 use crate::problem::Problem;
+use crate::unit::ReadingUnit;
 use abscissa::{Abscissa, PathSegment};
 
 /// The source of a share.
@@ -78,9 +79,9 @@ pub struct SessionSeries {
     pub shares: Vec<Share>,
     /// The tests.
     pub tests: Vec<TestSeries>,
-    /// The unit of all values: `um`, or `arcsec` if every channel is an angle. An angle beside lengths is the length that
+    /// The unit of all values. An angle beside lengths is the length that
     /// has the same noise, µm.
-    pub unit: &'static str,
+    pub unit: ReadingUnit,
     /// Whether every reading is a vector.
     pub vectors: bool,
     /// The largest difference between the sum of shares and the model over all readings, µm.

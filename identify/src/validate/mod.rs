@@ -135,6 +135,7 @@ pub fn validate(model: &IdentifiedModel, session: &Session) -> Result<Validation
         readings_in_range,
         outside: left,
         outliers: rejected.iter().flatten().filter(|rejected| **rejected).count(),
+        reading_unit: known.set_up.unit(),
         noise_um: known.set_up.noise.sigma_mm * 1e3,
         noise_source: known.noise_source,
         nominal: RmsResult::of(&nominal),

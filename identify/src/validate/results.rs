@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::known::Rms;
 use crate::noise::NoiseSource;
 use crate::results::ParameterResult;
+use crate::unit::ReadingUnit;
 
 /// The verdict on a saved model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -56,6 +57,9 @@ pub struct ValidationResult {
     pub outliers: usize,
     /// Standard deviation of one scalar reading, µm.
     pub noise_um: f64,
+    /// The unit of the figures of readings, in which their keys end; absent for µm.
+    #[serde(skip_serializing_if = "ReadingUnit::is_micrometre")]
+    pub reading_unit: ReadingUnit,
     /// Source of `noise_um`: `repeats` or `stated` by the session, or `model`: the noise of the model's readings where
     /// the session has neither; the model's held-out rms where the model's readings have neither.
     pub noise_source: NoiseSource,

@@ -102,6 +102,14 @@ impl Session {
         }
     }
 
+    /// The lever that the stated noise of lengths and of angles requires; `None` if there are not both.
+    pub fn stated_lever_mm(&self) -> Option<f64> {
+        let units = self.units();
+        let positive = |noise: Option<f64>| noise.filter(|sigma| *sigma > 0.0);
+        (units.lengths && units.angles).then_some(())?;
+        Some(positive(self.noise_mm)? / positive(self.noise_rad)?)
+    }
+
     /// The stated standard deviation of a channel, mm; of an angle at [`Session::lever_mm`].
     pub fn stated_noise_mm(&self) -> Option<f64> {
         let lengths = self.noise_mm.filter(|_| !self.units().only_angles());

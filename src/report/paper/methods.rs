@@ -8,7 +8,7 @@ use abbe::model::words::counted;
 use super::Part;
 use super::contents::Study;
 use crate::report::block::Report;
-use crate::report::number::micrometres;
+use crate::report::number::of_readings;
 
 /// The part.
 pub fn part(study: &Study) -> Part {
@@ -33,10 +33,10 @@ pub fn part(study: &Study) -> Part {
             "The fit of {} has a root mean square residual of {} and of {} for held-out readings ({} left out in turn). \
              The noise standard deviation of {} {source}. χ² is {:.0} for {} degrees of freedom (Birge ratio {:.2}).{enlarged}",
             counted(result.readings, "reading"),
-            micrometres(result.rms_um),
-            micrometres(result.heldout_rms_um),
+            of_readings(result.rms_um, result.reading_unit),
+            of_readings(result.heldout_rms_um, result.reading_unit),
             result.heldout_by,
-            micrometres(result.noise_um),
+            of_readings(result.noise_um, result.reading_unit),
             result.chi_square,
             result.degrees_of_freedom,
             result.birge_ratio,
@@ -98,6 +98,6 @@ fn uncertainty(study: &Study) -> String {
     format!(
         "The covariance of the estimates follows from the noise of a reading ({}) and from the priors of the set-up by the \
          law of propagation of uncertainty [@jcgm100;@jcgm102]. Stated uncertainties are standard uncertainties.",
-        micrometres(study.analysis.noise_um)
+        of_readings(study.analysis.noise_um, study.analysis.reading_unit)
     )
 }

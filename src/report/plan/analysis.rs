@@ -16,7 +16,7 @@ use crate::report::confounded::{BY_PRIOR, by_prior};
 use crate::report::figure::bars::{Bars, Fill};
 use crate::report::figure::{Chart, Figure, Quantity};
 use crate::report::fit::noise;
-use crate::report::number::{integer, micrometres, three_digits, unit, units, with_symbols};
+use crate::report::number::{integer, of_readings, three_digits, unit, units, with_symbols};
 use crate::report::session::{correlation_map, model};
 use crate::report::statements;
 
@@ -41,7 +41,7 @@ pub fn report(
         "The model is linearised at the nominal machine and every planned state. The uncertainties follow from the \
          noise ({} per reading, {}) and from the priors of the set-up by the law of propagation of uncertainty (JCGM \
          100, JCGM 102).",
-        micrometres(analysis.noise_um),
+        of_readings(analysis.noise_um, analysis.reading_unit),
         analysis.noise_source
     );
     let statements = statements::of_plan(&Statements::of_plan(problem, analysis), analysis, commands);
@@ -86,7 +86,7 @@ fn extent(analysis: &PlanAnalysis) -> String {
         counted(analysis.readings, "reading"),
         counted(analysis.tests.len(), "test"),
         counted(analysis.setup_count, "set-up"),
-        noise(analysis.noise_um, analysis.noise_source),
+        noise(analysis.noise_um, analysis.reading_unit, analysis.noise_source),
         analysis.rank,
         analysis.parameter_count
     )
@@ -108,7 +108,11 @@ fn key_figures(problem: &Problem, analysis: &PlanAnalysis) -> Vec<KeyFigure> {
     figures.push(KeyFigure::new(
         "Readings",
         integer(analysis.readings),
-        format!("{}, noise {}", counted(problem.tests.len(), "test"), micrometres(analysis.noise_um)),
+        format!(
+            "{}, noise {}",
+            counted(problem.tests.len(), "test"),
+            of_readings(analysis.noise_um, analysis.reading_unit)
+        ),
     ));
     figures
 }

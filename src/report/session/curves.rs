@@ -56,7 +56,7 @@ pub fn histogram(session: &SessionPlots<'_>, models: [&str; 2]) -> Figure {
     let [before, after] = [counted(&before), counted(&after)];
     let highest = before.iter().chain(&after).map(|p| p.1).fold(0.0, f64::max);
     let lines = Lines::new(
-        Axis::new("residual", session.series.unit, Scale::over([0.0, maximum], 7)),
+        Axis::new("residual", session.series.unit.name(), Scale::over([0.0, maximum], 7)),
         Axis::new("readings", "", Scale::rounded([0.0, highest], 5)),
         vec![Series::new(models[0], "before", Mark::Line, before), Series::new(models[1], "after", Mark::Line, after)],
     );
@@ -101,7 +101,7 @@ pub fn over_time(session: &SessionPlots<'_>) -> Figure {
     let residual = if session.series.vectors { "length of the residual" } else { "residual" };
     let lines = Lines::new(
         Axis::new(name, unit, Scale::over(span(all(0)), 7)),
-        Axis::new(residual, session.series.unit, Scale::with_zero(span(all(1).chain(all(2))), 6)),
+        Axis::new(residual, session.series.unit.name(), Scale::with_zero(span(all(1).chain(all(2))), 6)),
         series.collect(),
     );
     Figure::new(

@@ -90,7 +90,7 @@ pub fn data(session: &SessionPlots<'_>) -> Value {
             json!({"name": test.name, "over": test.way.name, "units": units, "traversals": traversals})
         })
         .collect();
-    json!({"unit": unit(session.series.unit), "tests": tests})
+    json!({"unit": unit(session.series.unit.name()), "tests": tests})
 }
 
 /// All readings with deviation and residuals.
@@ -110,7 +110,7 @@ pub fn readings(session: &SessionPlots<'_>) -> Table {
     let mut columns = ["test", ">file_line", ">run", ">time_s"].map(table::Column::from).to_vec();
     columns.extend(machine.axes.iter().map(|axis| numbers(format!("{}_{}", axis.name, axis.kind.unit()))));
     for column in ["deviation", "residual_before", "residual_after"] {
-        columns.extend(labels.iter().map(|label| numbers(format!("{column}{label}_{}", session.series.unit))));
+        columns.extend(labels.iter().map(|label| numbers(format!("{column}{label}_{}", session.series.unit.name()))));
     }
     let mut rows = Vec::new();
     for (test, series) in session.problem.tests.iter().zip(&session.series.tests) {

@@ -155,7 +155,7 @@ impl<'d> SessionPlots<'d> {
         let quantity = if column == Column::Deviation { "deviation" } else { "residual" };
         let polar = Polar {
             angle: Quantity::new(&test.way.name, "deg"),
-            deviation: Quantity::new(quantity, self.series.unit),
+            deviation: Quantity::new(quantity, self.series.unit.name()),
             division_um: um.unwrap_or_else(|| division_um(drawn_um)),
             series,
             live: (number, column.name()),
@@ -257,7 +257,7 @@ impl<'d> SessionPlots<'d> {
         };
         let lines = Lines {
             x: Axis::new(&axis.name, axis.unit, Scale::of_axis(span(abscissa.iter().copied()), axis.is_angle)),
-            y: Axis::new(quantity, self.series.unit, y),
+            y: Axis::new(quantity, self.series.unit.name(), y),
             series: series.collect(),
             live: Some(Live {
                 test: number,

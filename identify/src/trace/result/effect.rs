@@ -78,6 +78,7 @@ pub(super) fn result(
         probability_ratio: ratio(-0.5 * delta_chi2 - prior_cost),
     };
     EffectResult {
+        reading_unit: after.unit(),
         family: families.get(candidate.family).map(|family| family.name.clone()).unwrap_or_default(),
         p_value: taken.p_value,
         rms_gain_um: found.rms_gain_um,
@@ -101,6 +102,7 @@ pub(super) fn described(problem: &Problem, fit: &Fit, number: usize, parameters:
     let (curve_at_unit, curve_unit) = curve_units(problem, effect);
     let meaning = meaning(machine, effect);
     EffectResult {
+        reading_unit: problem.unit(),
         name: effect_name(machine, effect),
         family: String::new(),
         shape_parameters: shape_parameters_of(problem, effect),

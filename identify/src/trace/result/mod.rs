@@ -121,6 +121,7 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
     let changed_parameters = changed_parameters(&before_result.parameters, &after_result.parameters);
     let unique = effects.iter().all(|effect| effect.unique);
     let mut result = TraceResult {
+        reading_unit: after.unit(),
         verdict: verdict.gated(goodness.verdict),
         outcome: outcome::outcome(after, after_fit, goodness, &determined),
         interrupted: false,
@@ -229,13 +230,16 @@ fn before_result(findings: &TraceFindings<'_>) -> Result<ModelResult, IdentifyEr
 
 pub(super) fn model_result(problem: &Problem, fit: &Fit, held_out_mm: f64) -> Result<ModelResult, IdentifyError> {
     let vectors = problem.are_vectors();
-    let rms = rms_mm(problem, &fit.residuals) * 1e3;
-    let held = held_out_mm * 1e3;
+    let (rms, held, of_angles) = fit::rms_of_units(problem, &fit.residuals, &fit.held_out.residuals);
+    let held = if of_angles.is_some() { held } else { held_out_mm };
+    let [rms, held] = [rms, held].map(|mm| mm * 1e3);
     let in_3d = |rms: f64| vectors.then(|| rms * 3.0_f64.sqrt());
     let goodness = outcome::goodness(problem, fit);
     let mut parameters = fit::parameters(problem, fit);
     Determined::of(problem, &fit.rank)?.mark(problem, &mut parameters, goodness);
     Ok(ModelResult {
+        reading_unit: problem.unit(),
+        of_angles,
         cross_validation: cross_validation(problem, fit, held_out_mm, problem)?,
         rms_um: rms,
         heldout_rms_um: held,

@@ -24,6 +24,7 @@ pub(super) fn unsearched_of(problem: &Problem, fit: &Fit, declared: ModelResult)
     warnings.extend(noise::stated_against_repeats(problem, &fit.residuals));
     let determined = Determined::of(problem, &fit.rank)?;
     Ok(TraceResult {
+        reading_unit: problem.unit(),
         outcome: outcome::outcome(problem, fit, declared.goodness, &determined),
         verdict: TraceVerdict::Incomplete,
         interrupted: false,

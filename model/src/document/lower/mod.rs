@@ -26,7 +26,7 @@ use crate::files::table::memory::MemoryColumn;
 use crate::files::table::request::{ColumnMapping, Format};
 use crate::instrument::InstrumentKind;
 use crate::session::expression::Constant;
-use crate::session::{self, Session, Test, check, setups};
+use crate::session::{Session, Test, check, setups};
 pub(crate) use machine::machine;
 
 /// Where the readings of tests with `data` are.
@@ -92,15 +92,10 @@ pub(crate) fn head(
     let head::Instrument { kind, noise_mm, noise_rad, resolution_mm, resolution_rad } = instrument;
     let about = head::about(&document.about).within("about")?;
     let unknowns = head::unknowns(&machine, kind, &document.unknowns).within("errors").within("unknowns")?;
-    let lever_mm = match (noise_mm, noise_rad) {
-        (Some(mm), Some(rad)) if mm > 0.0 && rad > 0.0 => mm / rad,
-        _ => session::NATURAL_LEVER_MM,
-    };
     Ok(Session {
         constants,
         noise_mm,
         noise_rad,
-        lever_mm,
         resolution_mm,
         resolution_rad,
         unknowns,
@@ -185,6 +180,7 @@ pub(crate) fn add(session: &mut Session, document: Parts<'_>, surroundings: &Sur
     session.clearance = document.clearance.map(body::clearance).or(session.clearance);
     session.tolerance = tolerance.or(session.tolerance.take());
     session.warnings.extend(found.warnings.iter().cloned());
+    session.lever_mm = session.stated_lever_mm().unwrap_or(session.lever_mm);
     Ok(found)
 }
 
