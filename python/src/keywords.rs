@@ -6,7 +6,6 @@
 
 use abbe::model::document::node::{Entry, Node, Value};
 use abbe::model::document::schema;
-use abbe::model::document::test::Test;
 use abbe::model::files::table::memory::{MemoryColumn, Values};
 use abbe::model::session::Session;
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyUntypedArray, PyUntypedArrayMethods};
@@ -45,9 +44,8 @@ enum Held<'py> {
 impl<'py> Keywords<'py> {
     /// Sorts the keywords of a test.
     pub fn of_test(session: &Session, keywords: &Bound<'py, PyDict>) -> PyResult<Keywords<'py>> {
-        let mut keys = schema::fields::<Test>();
-        keys.retain(|key| !OF_FILES.contains(&key.as_str()));
-        keys.extend((session.instrument.entry().keys)().into_iter().map(|(key, _)| key));
+        let keys = schema::keys_of_test(session.instrument).into_iter().map(|(key, _)| key);
+        let keys: Vec<String> = keys.filter(|key| !OF_FILES.contains(&key.as_str())).collect();
         let is_key = |name: &String| keys.contains(name);
         let mut sorted = Keywords { table: Vec::new(), columns: Vec::new() };
         let mut at: Vec<(String, Node)> = Vec::new();

@@ -56,23 +56,31 @@ exist are `null`. A field marked *optional* is absent where it does not apply.
 `schema_version` is 2. It increases when a field changes its name or its meaning, or is removed; new fields leave it unchanged.
 ";
 
-fn schema(subject: &str) -> Value {
+pub(super) fn schema(subject: &str) -> Value {
     let printed = abbe(&["schema", subject]);
     assert!(printed.status.success(), "{subject}");
     serde_json::from_slice(&printed.stdout).unwrap()
 }
 
 /// The type of a field, with a link to an object of the page.
-fn kind(schema: &Value) -> String {
+pub(super) fn kind(schema: &Value) -> String {
     if let Some(reference) = schema["$ref"].as_str() {
         let name = reference.rsplit('/').next().unwrap();
         return format!("[{name}](#{})", name.to_lowercase());
+    }
+    if let Some(word) = schema["const"].as_str() {
+        return format!("`\"{word}\"`");
     }
     for key in ["anyOf", "oneOf", "allOf"] {
         if let Some(choices) = schema[key].as_array() {
             let kinds: Vec<String> = choices.iter().map(kind).collect();
             return kinds.join(" or ");
         }
+    }
+    if schema["type"].is_null()
+        && let Some(words) = schema["enum"].as_array()
+    {
+        return words.iter().map(|word| format!("`{word}`")).collect::<Vec<_>>().join(" or ");
     }
     let names: Vec<&str> = match &schema["type"] {
         Value::String(name) => vec![name],
@@ -90,9 +98,12 @@ fn kind(schema: &Value) -> String {
 }
 
 /// The unit of a field by its name, or by its description.
-fn unit(name: &str, description: &str) -> &'static str {
+pub(super) fn unit(name: &str, description: &str) -> &'static str {
     let suffixes = [
         ("_mm_min", "mm/min"),
+        ("_deg_min", "°/min"),
+        ("_um_m", "µm/m"),
+        ("_arcsec", "″"),
         ("_um", "µm"),
         ("_mm", "mm"),
         ("_deg", "°"),
@@ -110,7 +121,7 @@ fn unit(name: &str, description: &str) -> &'static str {
     }
 }
 
-fn one_line(text: &str) -> String {
+pub(super) fn one_line(text: &str) -> String {
     let words: Vec<&str> = text.split_whitespace().collect();
     words.join(" ").replace('|', "\\|")
 }
@@ -139,7 +150,7 @@ fn table(page: &mut String, object: &Value, left_out: &[String]) {
 }
 
 /// An object or a list of words by its name.
-fn definition(page: &mut String, name: &str, schema: &Value) {
+pub(super) fn definition(page: &mut String, name: &str, schema: &Value) {
     writeln!(page, "### {name}\n").unwrap();
     if let Some(text) = schema["description"].as_str() {
         writeln!(page, "{}\n", one_line(text)).unwrap();
@@ -191,17 +202,21 @@ fn generated() -> String {
     format!("{}\n", page.trim_end())
 }
 
-#[test]
-fn the_page_lists_what_the_schemas_state() {
-    let file = workspace().join("docs/reference/json.md");
-    let page = generated();
+/// Writes a page anew if that is asked for, and compares it with the one that is kept.
+pub(super) fn kept_current(file: &str, page: &str) {
+    let file = workspace().join(file);
     if std::env::var_os("ABBE_UPDATE_PAGES").is_some() {
-        std::fs::write(&file, &page).unwrap();
+        std::fs::write(&file, page).unwrap();
     }
     let written = std::fs::read_to_string(&file).unwrap_or_default();
     let differs = page.lines().zip(written.lines()).find(|(new, old)| new != old);
     assert_eq!(differs, None, "write the page anew with ABBE_UPDATE_PAGES=1");
     assert_eq!(page.lines().count(), written.lines().count());
+}
+
+#[test]
+fn the_page_lists_what_the_schemas_state() {
+    kept_current("docs/reference/json.md", &generated());
 }
 
 #[test]

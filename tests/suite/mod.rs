@@ -35,6 +35,7 @@ mod interrupted;
 mod json_document;
 mod json_page;
 mod kept;
+mod keys_page;
 mod kill;
 mod left_out_test;
 mod limits;

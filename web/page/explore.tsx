@@ -38,12 +38,21 @@ export interface Parameter {
   setup: boolean;
 }
 
+/** A key of a file: what it is, and the type of its value. */
+export interface Key {
+  description?: string;
+  type?: string | string[];
+}
+
 export interface Description {
   machine: string;
   chain: string;
   tests: PlannedTest[];
   parameters: Parameter[];
   warnings: string[];
+  /** The keys of a test of this instrument, from the schema; those of its motion. */
+  test_keys: Record<string, Key>;
+  motion_keys: Record<string, Key>;
   abscissae: Float64Array[];
 }
 
@@ -269,6 +278,8 @@ export function Explore({ opened, shared, analyse }: Props) {
             </p>
             <TestForm
               tests={description.tests}
+              keys={description.test_keys}
+              motionKeys={description.motion_keys}
               test={test}
               plan={state.plan}
               select={setTest}

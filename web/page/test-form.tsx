@@ -1,12 +1,15 @@
 // The set-up and the motion of a test by numbers.
 
-import type { PlannedTest } from "./explore";
+import type { Key, PlannedTest } from "./explore";
 import { part, value } from "./plan-text";
 
 type Ball = "workpiece_ball_mm" | "spindle_ball_mm";
 
 interface Props {
   tests: PlannedTest[];
+  /** The keys of a test and of a motion, as the schema describes them. */
+  keys: Record<string, Key>;
+  motionKeys: Record<string, Key>;
   test: number;
   plan: string;
   select: (test: number) => void;
@@ -17,21 +20,42 @@ interface Props {
   remove: () => void;
 }
 
-const PARTS: [string, string][] = [
-  ["from_deg", "from, °"],
-  ["to_deg", "to, °"],
-  ["step_deg", "step, °"],
-  ["from_mm", "from, mm"],
-  ["to_mm", "to, mm"],
-  ["step_mm", "step, mm"],
-  ["radius_mm", "radius, mm"],
-];
+/** Keys with inputs of their own, the name, which the list above shows, and data, which a plan does without. */
+const OWN = ["name", "workpiece_ball_mm", "spindle_ball_mm", "bar_mm", "sweep", "path", "data", "format", "columns"];
 
-export function TestForm({ tests, test, plan, select, set, place, setPart, copy, remove }: Props) {
+/** A key as a label: `from_deg` is "from, °". */
+function labelOf(key: string): string {
+  const [, stem, unit] = /^(.*?)_(mm_min|deg_min|mm|deg)$/.exec(key) ?? [key, key, ""];
+  const units: Record<string, string> = { mm: ", mm", deg: ", °", mm_min: ", mm/min", deg_min: ", °/min" };
+  return `${stem.replaceAll("_", " ")}${units[unit] ?? ""}`;
+}
+
+/** A first value of a key, as TOML has it. */
+function firstValue({ type }: Key): string {
+  const first: Record<string, string> = { number: "0", integer: "1", boolean: "true", array: "[]", object: "{}" };
+  return first[String(Array.isArray(type) ? type[0] : type)] ?? '""';
+}
+
+export function TestForm({
+  tests,
+  keys,
+  motionKeys,
+  test,
+  plan,
+  select,
+  set,
+  place,
+  setPart,
+  copy,
+  remove,
+}: Props) {
   const shown = tests[test] ?? tests[0];
   const motion = value(plan, test, "sweep") !== undefined ? "sweep" : "path";
   const written = value(plan, test, motion);
-  const parts = PARTS.filter(([key]) => part(written, key) !== undefined);
+  const parts = Object.keys(motionKeys).filter((key) => part(written, key) !== undefined);
+  const rows = [0, 3, 6].map((start) => parts.slice(start, start + 3)).filter((row) => row.length > 0);
+  const others = Object.keys(keys).filter((key) => !OWN.includes(key));
+  const stated = others.filter((key) => value(plan, test, key) !== undefined);
   const number = (event: { currentTarget: HTMLInputElement }, act: (number: number) => void) => {
     const found = event.currentTarget.valueAsNumber;
     if (Number.isFinite(found)) act(found);
@@ -83,22 +107,50 @@ export function TestForm({ tests, test, plan, select, set, place, setPart, copy,
           />
         </div>
       )}
-      {written !== undefined && parts.length > 0 && (
-        <div class="point">
-          <span>motion of {shown.moves.join(", ")}</span>
-          {parts.slice(0, 3).map(([key, label]) => (
+      {rows.map((row, k) => (
+        <div class="point" key={row[0]}>
+          <span>{k === 0 && `motion of ${shown.moves.join(", ")}`}</span>
+          {row.map((key) => (
             <input
               key={key}
               type="number"
               step="any"
-              aria-label={label}
-              title={label}
+              aria-label={labelOf(key)}
+              title={`${labelOf(key)}: ${motionKeys[key].description}`}
               value={part(written, key)}
-              onInput={(event) => number(event, (found) => setPart(motion, key, written, found))}
+              onInput={(event) => number(event, (found) => setPart(motion, key, written ?? "", found))}
             />
           ))}
         </div>
-      )}
+      ))}
+      {stated.map((key) => (
+        <div class="point key" key={key}>
+          <label for={`key-${key}`}>{key}</label>
+          <input
+            id={`key-${key}`}
+            title={keys[key].description}
+            value={value(plan, test, key)}
+            onChange={(event) => event.currentTarget.value.trim() && set(key, event.currentTarget.value.trim())}
+          />
+        </div>
+      ))}
+      <select
+        aria-label="Add a key"
+        value=""
+        onChange={(event) => {
+          const key = event.currentTarget.value;
+          if (key) set(key, firstValue(keys[key]));
+        }}
+      >
+        <option value="">add a key …</option>
+        {others
+          .filter((key) => !stated.includes(key))
+          .map((key) => (
+            <option key={key} value={key} title={keys[key].description}>
+              {key}
+            </option>
+          ))}
+      </select>
     </fieldset>
   );
 }

@@ -14,6 +14,7 @@ use abbe::identify::problem::Problem;
 use abbe::identify::series::paths;
 use abbe::model::axis::AxisKind;
 use abbe::model::chain::Machine;
+use abbe::model::document::schema;
 use abbe::model::files::template;
 use abbe::model::instrument::Station;
 use abbe::model::session::Test;
@@ -104,6 +105,8 @@ impl Plan {
             "tests": tests.collect::<Vec<Value>>(),
             "parameters": parameters.collect::<Vec<Value>>(),
             "warnings": self.read.session.warnings,
+            "test_keys": schema::keys_of_test(session.instrument),
+            "motion_keys": schema::keys_of_motions(),
         })
         .to_string()
     }

@@ -97,6 +97,23 @@ test("from slider to picture, four tests of 721 readings with patterns of eight 
   await page.close();
 });
 
+test("the form of a test offers the keys of the schema", async () => {
+  const { page, wrong } = await explorer(own.server.address);
+  const offer = page.getByLabel("Add a key");
+  const offered = await offer.locator("option").allTextContents();
+  for (const key of ["bar_setup", "spindle_setup", "bar_u_um"]) {
+    const isStated = (await page.getByLabel(key, { exact: true }).count()) > 0;
+    assert.ok(isStated || offered.includes(key), key);
+  }
+  await offer.selectOption("bar_setup");
+  const input = page.getByLabel("bar_setup", { exact: true });
+  await input.fill('"one bar"');
+  await input.press("Enter");
+  await page.waitForFunction(() => document.querySelector("textarea")?.value.includes('bar_setup = "one bar"'));
+  assert.deepEqual(wrong, []);
+  await page.close();
+});
+
 test("a plan is shared by its address, saved as a folder, and opened in Analyse", async () => {
   const { page, wrong } = await explorer(own.server.address);
   await fragmentAfter(page, () => slide(page, "EY0C", 7));

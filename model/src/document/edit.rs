@@ -116,7 +116,7 @@ impl SessionText {
         }
     }
 
-    /// Removes tables of these names, of the session and of its tests.
+    /// Removes tables and lists of tables of these names, of the session and of its tests. Comments above a table stay.
     pub fn remove(&mut self, names: &[&str]) {
         let mut removed: Vec<Item> = Vec::new();
         for name in names {
@@ -125,11 +125,8 @@ impl SessionText {
                 removed.extend(test.table().remove(name));
             }
         }
-        let removed = removed.iter().flat_map(|item| match item {
-            Item::Table(table) => vec![table],
-            Item::ArrayOfTables(tables) => tables.iter().collect(),
-            _ => Vec::new(),
-        });
+        // What is said of the entries of a list goes with them.
+        let removed = removed.iter().filter_map(Item::as_table);
         // Later ones first: a comment goes on to the next table that stays, below those that are there already.
         let mut comments: Vec<(isize, &str)> = removed
             .filter_map(|table| Some((table.position()?, table.decor().prefix()?.as_str()?)))

@@ -7,7 +7,9 @@ use serde_json::{Map, Value, json};
 
 use super::fault::Step;
 use super::machine::Machine;
+use super::movement::{Circle, Follow, Sweep};
 use super::session::Session;
+use super::test::Test;
 use crate::driver::{Driver, unit_suffixes};
 use crate::effect::keys::{Key, KeyForm};
 use crate::effect::shape::{Entry, SHAPES};
@@ -32,6 +34,21 @@ pub fn session() -> Value {
         }
     }
     schema
+}
+
+/// The keys of a test of an instrument, with their schemas.
+pub fn keys_of_test(instrument: InstrumentKind) -> Map<String, Value> {
+    let mut keys = properties::<Test>();
+    keys.extend((instrument.entry().keys)());
+    keys
+}
+
+/// The keys of the motions of a test.
+pub fn keys_of_motions() -> Map<String, Value> {
+    let mut keys = properties::<Sweep>();
+    keys.extend(properties::<Circle>());
+    keys.extend(properties::<Follow>());
+    keys
 }
 
 /// The keys of a type's own fields.

@@ -21,7 +21,7 @@ use sha2::{Digest, Sha256};
 
 use crate::fleet::{BUILD, FleetError};
 
-/// A study as its file has it.
+/// A study: which plans are simulated with which effects and noise, and how they are analysed.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StudyFile {
@@ -37,7 +37,7 @@ pub struct StudyFile {
 
 /// What is simulated and analysed.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(rename = "study", deny_unknown_fields)]
 pub struct Head {
     /// The analysis.
     pub analysis: Analysis,
@@ -63,7 +63,7 @@ fn one() -> u64 {
 
 /// The analysis of a study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
+#[serde(rename = "analysis", rename_all = "kebab-case")]
 pub enum Analysis {
     /// The fit of the plan's parameters.
     Fit,
@@ -73,7 +73,7 @@ pub enum Analysis {
 
 /// The combinations that are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
+#[serde(rename = "combinations", rename_all = "kebab-case")]
 pub enum Combinations {
     /// All of them.
     #[default]
@@ -84,7 +84,7 @@ pub enum Combinations {
 
 /// A set-up.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(rename = "plan", deny_unknown_fields)]
 pub struct Plan {
     /// Its name in the results.
     pub name: String,
@@ -94,7 +94,7 @@ pub struct Plan {
 
 /// An effect of the simulated machine. Only a name: no effect.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(rename = "true_effect", deny_unknown_fields)]
 pub struct TrueEffect {
     /// Its name in the results.
     pub name: String,
@@ -112,7 +112,7 @@ pub struct TrueEffect {
 
 /// The noise of simulated readings.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(rename = "noise", deny_unknown_fields)]
 pub struct Noise {
     /// Its name in the results.
     pub name: String,
