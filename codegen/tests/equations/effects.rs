@@ -9,7 +9,7 @@ use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::driver::{Driver, DriverPart};
 use abbe_model::effect::shape::{
-    Curve, Harmonic, Local, Periodic, Polynomial, Power, ReversalSpike, Spectrum, Steps, Triangle, Warmup,
+    Cosine, Curve, Harmonic, Local, Periodic, Polynomial, Power, ReversalSpike, Spectrum, Steps, Triangle, Warmup,
 };
 use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::instrument::{Station, ballbar::BallBar, socket::Socket};
@@ -119,6 +119,14 @@ fn triangles_by_the_arc_sine() {
         near(&bases("X", Shape::Triangle(Triangle { period: 12.0 }), here(q)), &expected);
     }
     near(&bases("X", Shape::Triangle(Triangle { period: 12.0 }), here(38.0)), &[1.0 / 3.0, 2.0 / 3.0]);
+}
+
+#[test]
+fn cosine_and_cotangent_by_hand() {
+    for q in [-2.0, -0.4, 0.3, 1.2, 4.0_f64] {
+        near(&bases("X", Shape::Cosine(Cosine { order: 3.0 }), here(q)), &[(3.0 * q).cos()]);
+        near(&bases("X", Shape::Cotangent, here(q)), &[1.0 / q.tan()]);
+    }
 }
 
 #[test]

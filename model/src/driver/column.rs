@@ -42,7 +42,7 @@ const fn unit(names: [&'static str; 4], scale: f64, from_mean: bool, letter: cha
 }
 
 /// The units that the name of a column can end with. A difference of temperatures is in kelvins.
-const UNITS: [ColumnUnit; 18] = [
+const UNITS: [ColumnUnit; 19] = [
     unit(["c", "K", " °C", "K"], 1.0, true, 'T'),
     unit(["k", "K", " K", "K"], 1.0, true, 'T'),
     unit(["pct", "%", " %", "%"], 1.0, true, 'q'),
@@ -61,6 +61,7 @@ const UNITS: [ColumnUnit; 18] = [
     unit(["kw", "kW", " kW", "kW"], 1.0, false, 'P'),
     unit(["mm", "mm", " mm", "mm"], 1.0, false, 'q'),
     unit(["um", "um", " µm", "um"], 1.0, false, 'q'),
+    unit(["deg", "deg", "°", "deg"], 1.0, false, 'q'),
 ];
 
 const DRIVER_UNITS: [DriverUnit; UNITS.len()] = {

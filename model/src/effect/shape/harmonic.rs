@@ -20,7 +20,8 @@ const HIGHEST_ORDER: usize = 120;
 /// Highest order for poses, which sample an axis at random. An independent search found no significant order above it.
 const HIGHEST_ORDER_OF_POSES: usize = 40;
 
-const ORDER: Key = Key { name: "order", form: KeyForm::Positive, meaning: "cycles per revolution of a harmonic" };
+pub(super) const ORDER: Key =
+    Key { name: "order", form: KeyForm::Positive, meaning: "cycles per revolution of a harmonic" };
 
 pub(super) const ENTRY: Entry = Entry {
     word: "harmonic",

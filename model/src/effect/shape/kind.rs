@@ -57,7 +57,7 @@ impl Follows {
         }
         match self {
             Follows::RotaryAxis if kind != Some(AxisKind::Rotary) => {
-                Err("a harmonic needs a rotary axis; for other drivers use \"periodic\" with its period")
+                Err("it needs a rotary axis; for waves over other drivers use \"periodic\" with its period")
             }
             Follows::Axis if kind.is_none() => Err("its driver must be an axis"),
             Follows::Time if *driver != Driver::Time => Err("its driver must be \"time\""),

@@ -73,6 +73,8 @@ shapes! {
     polynomial: Polynomial(Polynomial),
     power: Power(Power),
     harmonic: Harmonic(Harmonic),
+    cosine: Cosine(Cosine),
+    cotangent: Cotangent,
     periodic: Periodic(Periodic),
     spectrum: Spectrum(Spectrum),
     triangle: Triangle(Triangle),
