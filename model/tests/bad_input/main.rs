@@ -9,6 +9,7 @@ mod json_lines;
 mod machine;
 mod session;
 mod table;
+mod telescope;
 
 use std::fs;
 

@@ -13,6 +13,7 @@ use crate::chain::Machine;
 use crate::driver::column;
 use crate::error::ModelError;
 use crate::files::quantity::Unit;
+use crate::files::store::Store;
 use crate::instrument::Station;
 use crate::instrument::column::{Column, Quantity};
 use crate::session::readings::Readings;
@@ -21,7 +22,7 @@ use crate::session::readings::Readings;
 pub(super) struct Csv;
 
 impl DataFormat for Csv {
-    fn reads(&self, _: &Path) -> bool {
+    fn reads(&self, _: &Path, _: &Store) -> bool {
         true
     }
 

@@ -2,18 +2,20 @@
 //!
 //! A format is one file beside this one and one line in [`formats`](super::formats).
 
+use std::io::Read;
 use std::path::Path;
 
 use super::request::Request;
 use super::row::Row;
 use crate::error::ModelError;
 use crate::files::stamp::FileStamp;
+use crate::files::store::Store;
 use crate::session::readings::Readings;
 
 /// A format of data files.
 pub(super) trait DataFormat: Sync {
     /// Whether the format reads this file: by its extension or its first bytes.
-    fn reads(&self, file: &Path) -> bool;
+    fn reads(&self, file: &Path, store: &Store) -> bool;
 
     /// Opens the file and returns its rows, or its readings if they are more than a table.
     ///
@@ -63,4 +65,14 @@ pub(super) struct WholeReadings {
 pub(super) fn has_extension(file: &Path, known: &[&str]) -> bool {
     let extension = file.extension().map(|extension| extension.to_string_lossy().to_lowercase());
     extension.is_some_and(|extension| known.contains(&extension.as_str()))
+}
+
+/// Bytes at the start of a file from which a format is recognised.
+const START_BYTES: u64 = 1024;
+
+/// Whether a file that can be read starts as `expected` says.
+pub(super) fn starts_with(file: &Path, store: &Store, expected: impl Fn(&str) -> bool) -> bool {
+    let mut start = Vec::new();
+    let read = store.open(file).and_then(|opened| opened.take(START_BYTES).read_to_end(&mut start));
+    read.is_ok() && expected(&String::from_utf8_lossy(&start))
 }

@@ -13,12 +13,13 @@ use super::lines::Lines;
 use super::request::{ForeignColumn, Request};
 use super::row::Row;
 use crate::error::ModelError;
+use crate::files::store::Store;
 
 /// The format, recognised by the extension of the file.
 pub(super) struct JsonLines;
 
 impl DataFormat for JsonLines {
-    fn reads(&self, file: &Path) -> bool {
+    fn reads(&self, file: &Path, _: &Store) -> bool {
         has_extension(file, &["jsonl", "ndjson"])
     }
 

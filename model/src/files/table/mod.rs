@@ -1,8 +1,7 @@
 //! Data files: tables of readings in any format, and foreign files through `[format]` and `[columns]`.
 //!
 //! - `format`: what a data format is; `formats`: the registry; one module per format: `csv`, `spreadsheet`,
-//!   `ballbar_xml`,
-//!   `json_lines`;
+//!   `ballbar_xml`, `json_lines`, `tpoint`, `mmt`;
 //! - `request`: what a test requires of its file; `columns`, `required`: roles of columns; `fill`: readings
 //!   from rows;
 //! - [`memory`]: columns in memory in place of a file; `missing`: readings that they lack;
@@ -20,11 +19,13 @@ mod json_lines;
 mod lines;
 pub mod memory;
 mod missing;
+mod mmt;
 pub(crate) mod number;
 pub(crate) mod request;
 mod required;
 mod row;
 mod spreadsheet;
+mod tpoint;
 
 use std::path::Path;
 
@@ -53,7 +54,7 @@ pub(crate) struct Data {
 /// # Errors
 /// Every fault that prevents the use of the file, with its line and what to do.
 pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<Data, ModelError> {
-    match formats::of(file).open(file, request)? {
+    match formats::of(file, request.store).open(file, request)? {
         Content::Table(mut table) => {
             let Filling { by_socket, quantities, warnings } =
                 fill::read(file, table.rows.as_mut(), table.has_header, request)?;

@@ -21,7 +21,7 @@ use crate::files::store::Store;
 pub(super) struct Spreadsheet;
 
 impl DataFormat for Spreadsheet {
-    fn reads(&self, file: &Path) -> bool {
+    fn reads(&self, file: &Path, _: &Store) -> bool {
         has_extension(file, &["xlsx", "xlsm", "xlsb", "xls", "ods"])
     }
 

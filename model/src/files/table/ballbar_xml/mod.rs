@@ -19,6 +19,7 @@ use super::format::{Content, DataFormat, WholeReadings, has_extension};
 use super::number::number;
 use super::request::{ForeignColumn, Request};
 use crate::error::{Location, ModelError};
+use crate::files::store::Store;
 use crate::instrument::column::Quantity;
 use crate::session::motion::Motion;
 use crate::session::readings::{Origin, Readings};
@@ -28,7 +29,7 @@ use crate::session::trajectory;
 pub(super) struct BallBarXml;
 
 impl DataFormat for BallBarXml {
-    fn reads(&self, file: &Path) -> bool {
+    fn reads(&self, file: &Path, _: &Store) -> bool {
         has_extension(file, &["xml", "b5r"])
     }
 
