@@ -2,7 +2,7 @@
 //! misread.
 
 use abbe_model::axis::AxisKind;
-use abbe_model::instrument::Station;
+use abbe_model::instrument::{Station, channel};
 use abbe_model::session::Session;
 use abbe_model::session::readings::Readings;
 use nalgebra::Vector3;
@@ -28,7 +28,7 @@ const NOISE_MM: f64 = 1.0;
 
 /// Mean square of the distances of the positions from their mean, mm²: of those measured, or, where a ball sits in
 /// sockets, of those that the ball would take if the positions of the axes were combined at random. `None` if they do
-/// not scatter.
+/// not scatter, or if the readings are no positions.
 pub(super) fn spread_mm2(problem: &Problem) -> Option<f64> {
     let (mut sum, mut count) = (0.0, 0_usize);
     let mut groups: Vec<&str> = problem.tests.iter().map(|test| test.setup.as_str()).collect();
@@ -40,6 +40,9 @@ pub(super) fn spread_mm2(problem: &Problem) -> Option<f64> {
             let Some(readings) = test.readings.as_ref().filter(|_| test.setup == group) else {
                 continue;
             };
+            if !test.station.channels().is_empty() && !channel::are_vector(test.station.channels()) {
+                return None;
+            }
             let kept = |row: &usize| !problem.rejected[number][*row];
             if let Station::Socket(_) = test.station {
                 let mut mixed = Readings::clone(readings);
