@@ -5,6 +5,7 @@ mod cross_validation;
 mod monte_carlo;
 mod outcome;
 mod parameter;
+mod pointing;
 mod statements;
 mod trace;
 
@@ -29,6 +30,7 @@ pub(crate) use parameter::phases_follow_amplitudes;
 pub use parameter::{
     Combination, Covariance, DeterminedBy, EnlargedBy, Interval, NullSpace, ParameterResult, Unobservable,
 };
+pub use pointing::{PointingTerm, PointingTerms};
 pub use statements::{
     AxisCorrection, ComparisonStatement, GoodStatement, LineQuantity, MeasureStatement, NextStep, PlanStatement,
     Statements, ValidationStatement,
@@ -139,6 +141,9 @@ pub struct FitResult {
     /// The base parameters, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub base: Option<BaseResult>,
+    /// The terms of TPOINT, if requested.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tpoint: Option<PointingTerms>,
     /// The fit by Monte Carlo, if requested. `u` in `parameters` then is the quoted one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub monte_carlo: Option<FitMonteCarlo>,

@@ -8,6 +8,7 @@ use abbe::identify::{fit, propagation};
 use clap::Args;
 
 use super::failure::Failure;
+use super::forms::FormArguments;
 use super::method::{self, Method};
 use super::results::Read;
 use super::save::SaveArguments;
@@ -26,10 +27,8 @@ pub struct FitArguments {
     common: CommonArguments,
     #[command(flatten)]
     save: SaveArguments,
-    /// Print the base parameters: a minimal set of numbers with u that predicts the same readings, and the parameters
-    /// that are held at nominal because the readings do not separate them.
-    #[arg(long)]
-    base: bool,
+    #[command(flatten)]
+    forms: FormArguments,
     /// Explanation of a declared effect that is accepted on the user's word: the effect, or one of its aliases, which then
     /// takes its place. Uncertainties do not cover the others; every output says so. May be repeated.
     ///
@@ -63,7 +62,7 @@ pub struct FitArguments {
         long,
         value_name = "SESSION",
         num_args = 1..,
-        conflicts_with_all = ["monte_carlo", "views", "residuals", "compensation", "save", "base"]
+        conflicts_with_all = ["monte_carlo", "views", "residuals", "compensation", "save", "base", "terms"]
     )]
     repeat: Vec<PathBuf>,
     #[command(flatten)]
@@ -91,7 +90,8 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
             ("--views", arguments.views.is_some()),
             ("--residuals", arguments.residuals.is_some()),
             ("--compensation", arguments.compensation.wanted()),
-            ("--base", arguments.base),
+            ("--base", arguments.forms.base),
+            ("--terms", arguments.forms.terms.is_some()),
             ("--save", arguments.save.file().is_some()),
         ])?;
         return arguments.method.run(&session, &arguments.draws, (common, &outputs), &read);
@@ -108,9 +108,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     if let Some(draws) = &draws {
         propagation::add_monte_carlo(&problem, &found, draws, &mut result)?;
     }
-    if arguments.base {
-        result.base = Some(fit::base::report(&problem, &found)?);
-    }
+    arguments.forms.add(&problem, &found, &mut result)?;
     let commands = arguments.session.commands();
     let report = report::fit::report(&problem, &found, &result, &commands, common.output.figures())?;
     let stated = Stated::new(&result, Statements::of_fit(&problem, &result));

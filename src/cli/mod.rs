@@ -14,6 +14,7 @@ mod export;
 mod failure;
 mod fit;
 mod folder;
+mod forms;
 mod history;
 mod interrupt;
 mod json;

@@ -23,7 +23,7 @@ use super::session::plots::SessionPlots;
 use super::session::{self, residuals};
 use super::statements;
 use super::table::{Cell, Column, Table, cells, numbers, words};
-use super::{base, circular, conformity, confounded, cross_validation, plausibility};
+use super::{base, circular, conformity, confounded, cross_validation, plausibility, pointing};
 
 /// The report of a fit; with `figures`, for a page.
 ///
@@ -63,6 +63,10 @@ pub fn report(
     if let Some(base) = &result.base {
         report.headed(Level::Key, "Base parameters", base::base_parameters(base));
         report.key(base::base_statement(base));
+    }
+    if let Some(terms) = &result.tpoint {
+        report.headed(Level::Key, "Terms of TPOINT", pointing::terms(terms));
+        report.key(pointing::statement(terms));
     }
     report.detail(statements::corrections(&statements));
     estimates.set_up(&mut report, None);

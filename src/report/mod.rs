@@ -5,7 +5,7 @@
 //!   [`repeated`], [`self_calibration`], [`simulation`], [`patterns`], [`volumetric`], [`compare`], [`compensate`],
 //!   [`compensation`], [`export`], [`nc`], `history`, `run`, `study`;
 //! - parts of several results: [`statements`], [`quality`], [`parameters`], [`effects`], [`confounded`],
-//!   [`cross_validation`], [`circular`], [`conformity`], [`plausibility`], [`effect`], [`uniqueness`], [`readings`],
+//!   [`cross_validation`], [`circular`], [`conformity`], [`plausibility`], [`mod@pointing`], [`effect`], [`uniqueness`], [`readings`],
 //!   [`session`], [`commands`], [`provenance`];
 //! - [`paper`]: the parts of `abbe paper`.
 
@@ -35,6 +35,7 @@ pub mod parameters;
 pub mod patterns;
 pub mod plan;
 pub mod plausibility;
+pub mod pointing;
 pub mod poses;
 pub mod provenance;
 pub mod quality;

@@ -60,6 +60,7 @@ mod plan_powers;
 mod plan_rank;
 mod plan_uncertainty;
 mod plausibility;
+mod pointing;
 mod poses;
 mod poses_in_contact;
 mod propagation;

@@ -29,8 +29,10 @@ fn every_template_is_copied_and_reads() {
                 assert!(!functions::read(&path, &machine).unwrap().is_empty());
                 sessions += 1;
             } else if file.ends_with(".toml") && file != "machine.toml" {
-                let options =
-                    ReadOptions { read_data: !["kuka-iiwa14", "ur10"].contains(&name), ..ReadOptions::default() };
+                let options = ReadOptions {
+                    read_data: !["kuka-iiwa14", "telescope", "ur10"].contains(&name),
+                    ..ReadOptions::default()
+                };
                 files::session(&path, &options).unwrap();
                 sessions += 1;
             }

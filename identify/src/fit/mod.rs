@@ -15,6 +15,7 @@ mod prepare;
 mod quantities;
 mod reported;
 mod session;
+pub mod tpoint;
 
 use std::cell::RefCell;
 

@@ -72,6 +72,7 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> 
         warnings,
         about: problem.session.about.iter().cloned().collect(),
         base: None,
+        tpoint: None,
         monte_carlo: None,
     })
 }

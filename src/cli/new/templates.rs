@@ -63,6 +63,11 @@ pub const TEMPLATES: &[Template] = &[
         ],
     },
     Template {
+        name: "telescope",
+        about: "alt-azimuth mounts: stars of the LSST auxiliary telescope and of the MMT (public data, to be downloaded)",
+        files: files!("telescope": "machine.toml", "auxtel.toml", "mmt.toml"),
+    },
+    Template {
         name: "volumetric",
         about: "five-axis machine with 33 error functions, to map and to compensate (`abbe volumetric --map`)",
         files: files!("volumetric": "machine.toml", "errors.toml"),
