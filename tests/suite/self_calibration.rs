@@ -339,6 +339,55 @@ fn monte_carlo_agrees_with_the_law_of_propagation_and_is_repeatable() {
     assert_ne!(drawn, calibration.monte_carlo(&draws(2)));
 }
 
+/// A report has the distribution of every value that is not fixed, and of the position of the axis by circle and by turn;
+/// where the position is not estimated, not of it. Lengths are in µm.
+#[test]
+fn distributions_are_reported_with_their_quantities() {
+    let draws = MonteCarlo { runs: 20_000, seed: 4, coverage: 0.95 };
+    for (second_deg, count) in [(45.0, 8), (60.0, 6)] {
+        let mut session = plan(count, second_deg);
+        touched(&mut session, &Touched { axis: [0.3, 0.51], ..Touched::default() });
+        let calibration = calibrate(&session).unwrap();
+        let report = calibration.report(&session, Some(&draws));
+        let found = report.monte_carlo.unwrap();
+        assert_eq!((found.runs, found.seed, found.coverage_probability), (20_000, 4, 0.95));
+        let drawn = calibration.monte_carlo(&draws);
+        let ids: Vec<&str> = found.quantities.iter().map(|quantity| quantity.id.as_str()).collect();
+        let positions: Vec<String> = report.parameters.iter().map(|parameter| parameter.id.clone()).collect();
+        let by_turn = positions.iter().map(|id| format!("{id} by turn"));
+        let last: Vec<String> = positions.iter().cloned().chain(by_turn).collect();
+        assert_eq!(ids[ids.len() - last.len()..], last);
+        println!("{} quantities, of them {} positions", ids.len(), last.len());
+        let free = |u: Option<f64>| u.is_some_and(|u| u > 1e-6);
+        let points: usize = report.functions.iter().flat_map(|own| &own.points).filter(|own| free(own.u_um)).count();
+        assert_eq!(ids.len(), points + usize::from(report.radius.is_some()) + last.len());
+        let of_values: Vec<(String, f64, f64)> = report
+            .functions
+            .iter()
+            .flat_map(|function| function.points.iter().map(move |point| (function, point)))
+            .filter(|(_, point)| free(point.u_um))
+            .map(|(function, point)| {
+                (format!("{}({}°)", function.id, point.at_deg), point.value_um.unwrap(), point.u_um.unwrap())
+            })
+            .chain(report.parameters.iter().map(|own| (own.id.clone(), own.value, own.u)))
+            .chain(report.parameters_by_turn.iter().map(|own| (format!("{} by turn", own.id), own.value, own.u)))
+            .collect();
+        for (id, value, u) in of_values {
+            let own = found.quantities.iter().find(|own| own.id == id).unwrap_or_else(|| panic!("{id} {ids:?}"));
+            assert!((own.u_um / u - 1.0).abs() < 0.03, "{id}: {} {u}", own.u_um);
+            assert!((own.mean_um - value).abs() < 0.05 * u, "{id}: {} {value}", own.mean_um);
+            let histogram = &own.histogram;
+            assert_eq!(histogram.counts.iter().sum::<u64>() + histogram.below + histogram.above, 20_000, "{id}");
+            assert!(histogram.from_um < value - 2.0 * u && histogram.to_um > value + 2.0 * u, "{id} {histogram:?}");
+            for interval in [&own.shortest_interval_um, &own.symmetric_interval_um] {
+                assert!(((interval.high - interval.low) / (2.0 * 1.96 * u) - 1.0).abs() < 0.06, "{id} {interval:?}");
+                assert!((0.5 * (interval.high + interval.low) - value).abs() < 0.15 * u, "{id} {interval:?}");
+            }
+        }
+        assert_eq!(drawn.len(), calibration.solution.values_mm.len() + if last.is_empty() { 0 } else { 4 });
+    }
+}
+
 #[test]
 fn noise_that_is_not_stated_follows_from_repeated_cycles() {
     let mut random = Pcg64::seed_from_u64(5);

@@ -195,3 +195,80 @@ fn the_command_writes_map_and_summary_and_names_what_is_wrong() {
     let (status, printed) = run(text(&errors), &["--axis", "Q=3"]);
     assert!(status == Some(1) && printed.contains("no axis `Q`"), "{printed}");
 }
+
+fn with_errors<'m>(machine: &'m Machine, functions: &'m [ErrorFunction]) -> MachineWithErrors<'m> {
+    MachineWithErrors { machine, functions, tool_mm: [3.0, -2.0, 150.0] }
+}
+
+/// Every figure of the summary from the points of the map, and the share of each axis from a machine that has the errors
+/// of that axis alone.
+#[test]
+fn the_summary_of_a_map_follows_from_its_points() {
+    let machine = machine();
+    let functions = errors(&machine);
+    let grid: Vec<Vec<f64>> = machine
+        .axes
+        .iter()
+        .map(|axis| match axis.name.as_str() {
+            "C" => vec![-0.4, 0.9],
+            "A" => vec![0.3],
+            "X" => vec![-120.0, 40.0, 200.0],
+            "Y" => vec![-75.0, 60.0],
+            _ => vec![-100.0, 30.0],
+        })
+        .collect();
+    let (points, summary) = volumetric::map(&with_errors(&machine, &functions), &grid, true).unwrap();
+    let mut places: Vec<Vec<f64>> = vec![Vec::new()];
+    for axis in &grid {
+        places = places.iter().flat_map(|row| axis.iter().map(|at| [row.as_slice(), &[*at]].concat())).collect();
+    }
+    assert_eq!(summary.points, 24);
+    assert_eq!(points.iter().map(|point| point.positions.clone()).collect::<Vec<_>>(), places);
+    let size = |lengths: Vec<f64>| {
+        let squares: f64 = lengths.iter().map(|length| length * length).sum();
+        let most = lengths.iter().fold(0.0_f64, |most, length| most.max(length.abs()));
+        [most * 1e3, (squares / lengths.len() as f64).sqrt() * 1e3]
+    };
+    let near = |found: volumetric::Size, wanted: [f64; 2]| {
+        for (found, wanted) in [found.largest_um, found.rms_um].into_iter().zip(wanted) {
+            assert!((found - wanted).abs() < 1e-9 * wanted.max(1e-3), "{found} instead of {wanted}");
+        }
+    };
+    let norm = |vector: [f64; 3]| Vector3::from(vector).norm();
+    let errors_of = |functions: &[ErrorFunction]| -> Vec<[f64; 3]> {
+        let small = |at: &Vec<f64>| {
+            let nominal = by_matrices(&machine, &vec![0.0; machine.error_slots()], at, [3.0, -2.0, 150.0]);
+            (by_matrices(&machine, &slots(&machine, functions, at), at, [3.0, -2.0, 150.0]) - nominal).into()
+        };
+        places.iter().map(small).collect()
+    };
+    let by_matrix = errors_of(&functions);
+    for (point, error) in points.iter().zip(&by_matrix) {
+        let apart = Vector3::from(point.error_mm) - Vector3::from(*error);
+        assert!(apart.norm() < 1e-6, "{:?}: {:?} instead of {error:?}", point.positions, point.error_mm);
+        let compensated = point.compensated.as_ref().unwrap();
+        assert_eq!(compensated.positions[..2], point.positions[..2]);
+    }
+    near(summary.error, size(points.iter().map(|point| norm(point.error_mm)).collect()));
+    for (k, found) in [summary.coordinates.x, summary.coordinates.y, summary.coordinates.z].into_iter().enumerate() {
+        near(found, size(points.iter().map(|point| point.error_mm[k]).collect()));
+    }
+    let residual = points.iter().filter_map(|point| Some(norm(point.compensated.as_ref()?.error_mm)));
+    near(summary.residual.unwrap(), size(residual.collect()));
+    let largest = points.iter().max_by(|a, b| norm(a.error_mm).total_cmp(&norm(b.error_mm))).unwrap();
+    for ((at, axis), position) in summary.largest_at.iter().zip(&machine.axes).zip(&largest.positions) {
+        let is_rotary = axis.kind == AxisKind::Rotary;
+        assert_eq!((at.axis.as_str(), at.unit.as_str()), (axis.name.as_str(), if is_rotary { "deg" } else { "mm" }));
+        assert!((at.position - if is_rotary { position.to_degrees() } else { *position }).abs() < 1e-9);
+    }
+    for (axis, share) in summary.by_axis.iter().enumerate() {
+        assert_eq!(share.axis, machine.axes[axis].name);
+        let own: Vec<ErrorFunction> =
+            functions.iter().filter(|function| function.slot / ERRORS_PER_AXIS == axis).cloned().collect();
+        let (_, alone) = volumetric::map(&with_errors(&machine, &own), &grid, false).unwrap();
+        near(share.size, [alone.error.largest_um, alone.error.rms_um]);
+        assert!(alone.residual.is_none());
+        let wanted = size(errors_of(&own).into_iter().map(norm).collect());
+        assert!((share.size.rms_um - wanted[1]).abs() < 1e-3, "{}: {:?} {wanted:?}", share.axis, share.size);
+    }
+}

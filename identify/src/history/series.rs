@@ -268,3 +268,23 @@ impl Series {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Differences over the hypotenuse of both uncertainties, less the median rate: of 2, 2, 14 and 2 a year it is 2.
+    #[test]
+    fn pulls_are_differences_less_the_median_drift() {
+        let known =
+            [(0, 0.0, 1.0, 0.3), (1, 0.5, 2.0, 0.4), (2, 1.0, 3.0, 0.3), (3, 1.5, 10.0, 0.4), (4, 2.5, 12.0, 0.3)];
+        let pulls = Series::new(0, &known).pulls();
+        assert_eq!(pulls.len(), 4);
+        for (found, wanted) in pulls.iter().zip([0.0, 0.0, 6.0 / 0.5, 0.0]) {
+            assert!((found - wanted).abs() < 1e-12, "{pulls:?}");
+        }
+        // On one date there is no rate.
+        let pulls = Series::new(0, &[(0, 1.0, 5.0, 0.6), (1, 1.0, 3.0, 0.8)]).pulls();
+        assert!((pulls[0] - 2.0).abs() < 1e-12, "{pulls:?}");
+    }
+}

@@ -175,3 +175,45 @@ fn print(value: &Value, depth: usize, text: &mut String) {
         other => text.push_str(&other.to_string()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two spaces for each level; a list of numbers or words stands on one line.
+    #[test]
+    fn a_model_is_indented_by_its_levels() {
+        let value = serde_json::json!({
+            "name": "A \"B\"",
+            "empty": {},
+            "numbers": [1.5, 2.0],
+            "rows": [[1, 2], [3]],
+            "parts": [{ "id": "x", "of": [{ "deep": [true] }] }, { "id": "y" }],
+        });
+        let mut text = String::new();
+        print(&value, 0, &mut text);
+        let wanted = r#"{
+  "name": "A \"B\"",
+  "empty": {},
+  "numbers": [1.5,2.0],
+  "rows": [
+    [1,2],
+    [3]
+  ],
+  "parts": [
+    {
+      "id": "x",
+      "of": [
+        {
+          "deep": [true]
+        }
+      ]
+    },
+    {
+      "id": "y"
+    }
+  ]
+}"#;
+        assert_eq!(text, wanted);
+    }
+}

@@ -296,3 +296,48 @@ impl Choice<'_> {
             .collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use abbe_model::files::{self, ReadOptions};
+
+    use super::*;
+
+    /// A bar of the session keeps its calibrated length and its uncertainty in every candidate; another bar has its
+    /// nominal length and the uncertainty of the last one. The balls have the uncertainties of the last test.
+    #[test]
+    fn candidates_have_the_bars_of_the_session() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/chapter5.toml");
+        let mut session = files::session(&file, &ReadOptions { read_data: false, ..ReadOptions::default() }).unwrap();
+        let bars = [(99.9881, 1e-4), (149.9946, 2e-4), (100.4, 7e-4)];
+        for (test, (bar, u)) in session.tests.iter_mut().zip(bars.into_iter().chain([(310.0, 9e-4)])) {
+            let Station::BallBar(station) = &mut test.station else { panic!("a ball bar") };
+            station.bar = bar;
+            test.priors[BAR] = Prior::Gaussian(u);
+        }
+        let last = session.tests[3].clone();
+        let mut seen = std::collections::BTreeSet::new();
+        for nominal in [50.0, 100.0, 150.0] {
+            let variations = TestVariations { bars_mm: vec![nominal], ..TestVariations::short() };
+            for draft in drafts(&session, &variations, &last) {
+                let Station::BallBar(station) = &draft.test.station else { panic!("a ball bar") };
+                let wanted = match nominal {
+                    100.0 => (99.9881, 1e-4),
+                    150.0 => (149.9946, 2e-4),
+                    _ => (nominal, 9e-4),
+                };
+                assert_eq!(
+                    (station.bar, draft.test.priors[BAR]),
+                    (wanted.0, Prior::Gaussian(wanted.1)),
+                    "{}",
+                    draft.name
+                );
+                assert_eq!(draft.test.priors[..BAR], last.priors[..BAR], "{}", draft.name);
+                seen.insert(nominal as i64);
+            }
+        }
+        assert_eq!(seen.into_iter().collect::<Vec<_>>(), [50, 100, 150]);
+    }
+}

@@ -155,3 +155,146 @@ fn is_power_of_two(value: f64) -> bool {
     let fraction = value.to_bits() & ((1 << 52) - 1);
     value.is_normal() && fraction == 0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn text(arena: &Arena<char>, operand: Operand) -> String {
+        let own = |operand: Operand| text(arena, operand);
+        match arena.node_of(operand) {
+            None => format!("{}", operand.known().unwrap()),
+            Some(Node::Variable(id)) => arena.variable_at(id).to_string(),
+            Some(Node::Unary(op, a)) => format!("{op:?}({})", own(a)),
+            Some(Node::Binary(op, a, b)) => {
+                let sign = ['+', '-', '*', '/'][[Binary::Add, Binary::Sub, Binary::Mul, Binary::Div]
+                    .iter()
+                    .position(|known| *known == op)
+                    .unwrap()];
+                format!("({}{sign}{})", own(a), own(b))
+            }
+        }
+    }
+
+    /// An expression in reverse Polish notation: letters, digits, `n`egation, `s`ine, `c`osine, `g` the sign, four operations,
+    /// and `h` for one half.
+    fn built(arena: &Arena<char>, words: &str) -> Operand {
+        let mut stack = Vec::new();
+        for word in words.chars() {
+            let operand = match word {
+                'x' | 'y' => arena.intern_variable(word),
+                'h' => Operand::constant(0.5),
+                digit if digit.is_ascii_digit() => Operand::constant(f64::from(digit.to_digit(10).unwrap())),
+                'n' | 's' | 'c' | 'g' => {
+                    let a = stack.pop().unwrap();
+                    let ops = [('n', Unary::Neg), ('s', Unary::Sin), ('c', Unary::Cos), ('g', Unary::Signum)];
+                    unary(arena, ops.into_iter().find(|(own, _)| *own == word).unwrap().1, a)
+                }
+                sign => {
+                    let (b, a) = (stack.pop().unwrap(), stack.pop().unwrap());
+                    let ops = [('+', Binary::Add), ('-', Binary::Sub), ('*', Binary::Mul), ('/', Binary::Div)];
+                    binary(arena, ops.into_iter().find(|(own, _)| *own == sign).unwrap().1, a, b)
+                }
+            };
+            stack.push(operand);
+        }
+        stack.pop().unwrap()
+    }
+
+    /// The value of an expression without any simplification.
+    fn plain(words: &str, x: f64, y: f64) -> f64 {
+        let mut stack: Vec<f64> = Vec::new();
+        for word in words.chars() {
+            let mut pop = || stack.pop().unwrap();
+            let value: f64 = match word {
+                'x' => x,
+                'y' => y,
+                'h' => 0.5,
+                digit if digit.is_ascii_digit() => f64::from(digit.to_digit(10).unwrap()),
+                'n' => -pop(),
+                's' => pop().sin(),
+                'c' => pop().cos(),
+                'g' => pop().signum(),
+                sign => {
+                    let (b, a) = (pop(), pop());
+                    match sign {
+                        '+' => a + b,
+                        '-' => a - b,
+                        '*' => a * b,
+                        _ => a / b,
+                    }
+                }
+            };
+            stack.push(value);
+        }
+        stack.pop().unwrap()
+    }
+
+    fn value(arena: &Arena<char>, operand: Operand, x: f64, y: f64) -> f64 {
+        match arena.node_of(operand) {
+            None => operand.known().unwrap(),
+            Some(Node::Variable(id)) => {
+                if arena.variable_at(id) == 'x' {
+                    x
+                } else {
+                    y
+                }
+            }
+            Some(Node::Unary(op, a)) => op.of(value(arena, a, x, y)),
+            Some(Node::Binary(op, a, b)) => op.of(value(arena, a, x, y), value(arena, b, x, y)),
+        }
+    }
+
+    /// Each rule of the simplification, with its neighbour to which it does not apply.
+    #[test]
+    fn what_is_simplified_keeps_its_bits() {
+        for (words, wanted) in [
+            ("23+", "5"),
+            ("xnn", "x"),
+            ("x3*n", "(-3*x)"),
+            ("xns", "Neg(Sin(x))"),
+            ("xng", "Neg(Signum(x))"),
+            ("xnc", "Cos(x)"),
+            ("x0+", "x"),
+            ("0x+", "x"),
+            ("xy+", "(x+y)"),
+            ("xyn+", "(x-y)"),
+            ("xny+", "(y-x)"),
+            ("xnyn+", "Neg((x+y))"),
+            ("x0-", "x"),
+            ("0x-", "Neg(x)"),
+            ("xx-", "0"),
+            ("xyn-", "(x+y)"),
+            ("xny-", "Neg((x+y))"),
+            ("x0*", "0"),
+            ("x1*", "x"),
+            ("1x*", "x"),
+            ("x1n*", "Neg(x)"),
+            ("xny*", "Neg((x*y))"),
+            ("xyn*", "Neg((x*y))"),
+            ("x3*2*", "(6*x)"),
+            ("x3*3*", "(3*(3*x))"),
+            ("3x/2*", "(6/x)"),
+            ("yx3/*2*", "(2*(y*(x/3)))"),
+            ("y3x/*2*", "(y*(6/x))"),
+            ("y3x/*3*", "(3*(y*(3/x)))"),
+            ("0x/", "0"),
+            ("x2/", "(0.5*x)"),
+            ("x3/", "(x/3)"),
+            ("xx/", "1"),
+            ("xny/", "Neg((x/y))"),
+            ("xyn/", "Neg((x/y))"),
+            ("xh/", "(2*x)"),
+            ("xy3n*+", "(x-(3*y))"),
+            ("x3n+", "(x-3)"),
+        ] {
+            let arena = Arena::new();
+            let found = built(&arena, words);
+            assert_eq!(text(&arena, found), wanted, "{words}");
+            for (x, y) in [(0.7, -1.3), (1e3, 0.1), (-2.0 / 3.0, 1.0 / 7.0)] {
+                let (found, wanted) = (value(&arena, found, x, y), plain(words, x, y));
+                assert!(found == wanted, "{words} at {x}, {y}: {found} instead of {wanted}");
+            }
+        }
+    }
+}

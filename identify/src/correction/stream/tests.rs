@@ -105,3 +105,32 @@ fn a_corrected_file_is_no_file_of_commands() {
     let refused = text(&path, Output::Command).unwrap_err().to_string();
     assert!(refused.contains("a column `remaining_um`"), "{refused}");
 }
+
+/// Poses of a three-axis machine with an axis of little travel: rows beyond it are out of reach, rows with a fault are
+/// not numbers, and both change no other row.
+#[test]
+fn poses_out_of_reach_and_poses_with_a_fault_are_told_apart() {
+    let mut errors = errors();
+    let mut machine = Machine::from_code("w b X Y Z t").unwrap();
+    machine.axes[0].travel = Some([-10.0, 10.0]);
+    errors.machine = Arc::new(machine);
+    errors.constant = vec![0.0; errors.machine.error_slots()];
+    errors.effects.clear();
+    let machine = &errors.machine;
+    let correction = Correction { machine, errors: &errors, tool_mm: [0.0; 3], aim: Aim::of(machine) };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("poses.csv");
+    let x_mm = ["1", "none", "-9", "4", "none", "7"];
+    let rows = x_mm.iter().enumerate().map(|(row, x)| format!("{x},{row},-2\n"));
+    std::fs::write(&path, format!("px_mm,py_mm,pz_mm\n{}", rows.collect::<String>())).unwrap();
+    let start = vec![0.0; 3];
+    let mut file = CommandFile::open(&path, machine, start.clone()).unwrap();
+    let mut last = start;
+    let mut block = file.next_block(machine, 100).unwrap().unwrap();
+    assert_eq!(reach_poses(&correction, &mut file, &mut block, &mut last), [false; 6]);
+    // A row with a fault stands where the last row of numbers stands.
+    let wanted = [1.0, 1.0, -9.0, 4.0, 4.0, 7.0];
+    assert_eq!(block.rows.positions[0], wanted);
+    assert_eq!(block.rows.positions[1], [0.0, 0.0, 2.0, 3.0, 3.0, 5.0]);
+    assert_eq!(block.rows.positions[2], [-2.0; 6]);
+}
