@@ -2,7 +2,7 @@
 
 use abbe_identify::IdentifyError;
 use abbe_identify::compensation::{self, Compensation};
-use abbe_identify::export::control::{self, EntryChoice, KinematicTable};
+use abbe_identify::export::control::{self, ENTRIES, EntryChoice, KinematicTable};
 use abbe_identify::export::dh::{self, DhTable};
 use abbe_identify::export::travel::Travel;
 use abbe_identify::export::{left_out, urdf};
@@ -100,6 +100,17 @@ pub struct ExportResult {
     pub left_out: Vec<String>,
 }
 
+/// The choice of entries of this word.
+///
+/// # Errors
+/// If there is none.
+pub fn entries(word: &str) -> Result<EntryChoice, IdentifyError> {
+    ENTRIES.iter().find(|(_, own, _)| *own == word).map(|(choice, ..)| *choice).ok_or_else(|| {
+        let words = ENTRIES.map(|(_, word, _)| word).join(", ");
+        IdentifyError::Request(format!("there are no entries `{word}`; the choices are {words}"))
+    })
+}
+
 /// The format of this word.
 ///
 /// # Errors
@@ -112,6 +123,16 @@ pub fn format(word: &str) -> Result<&'static ExportFormat, IdentifyError> {
 }
 
 impl ExportFormat {
+    /// An option that is stated and that this format does not take.
+    pub fn ignored(&self, options: &ExportOptions) -> Option<&'static str> {
+        match options {
+            _ if self.takes_entries => None,
+            ExportOptions { entries: EntryChoice::Plain, .. } => Some("entries"),
+            ExportOptions { travel: Travel { is_measured: false, .. }, .. } => Some("travel"),
+            _ => None,
+        }
+    }
+
     /// The model in this format.
     ///
     /// # Errors

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use abbe::document::{Document, Origin, Stated};
 use abbe::exports::{self, ExportOptions};
 use abbe::identify::correction::{Aim, Correction, EstimatedErrors};
+use abbe::identify::export::travel::Travel;
 use abbe::identify::model_file::{self, IdentifiedModel};
 use abbe::identify::results::Statements;
 use abbe::identify::unit::ARCSEC;
@@ -84,11 +85,25 @@ impl Model {
         parameters.map(row).collect()
     }
 
-    /// The file of `abbe export`.
-    fn export(&self, format: &str, tool_mm: Option<[f64; 3]>) -> Result<Vec<u8>, Failed> {
-        let mut options = ExportOptions::of(&self.model);
-        options.tool_mm = tool_mm.unwrap_or(options.tool_mm);
-        Ok(exports::format(format)?.export(&self.model, &options)?.text)
+    /// The file of `abbe export`; `travel` has axes with their ranges, mm or degrees.
+    fn export(
+        &self,
+        format: &str,
+        tool_mm: Option<[f64; 3]>,
+        entries: &str,
+        travel: Vec<(String, [f64; 2])>,
+    ) -> Result<Vec<u8>, Failed> {
+        let format = exports::format(format)?;
+        let measured = Travel::measured(&self.model);
+        let options = ExportOptions {
+            tool_mm: tool_mm.unwrap_or(self.model.tool_mm),
+            entries: exports::entries(entries)?,
+            travel: travel.iter().try_fold(measured, |all, (axis, range)| all.with(&self.model, axis, *range))?,
+        };
+        if let Some(option) = format.ignored(&options) {
+            return Err(Failed::argument(format!("`{option}` belongs to \"linuxcnc\" and \"fanuc\""), ""));
+        }
+        Ok(format.export(&self.model, &options)?.text)
     }
 
     fn validate(&self, py: Python<'_>, session: &Session) -> PyResult<Validation> {

@@ -95,6 +95,18 @@ def test_compare_and_export(results, tmp_path):
         abbe.compare(fit)
     text = fit.model().export("urdf", tmp_path / "machine.urdf")
     assert text.startswith("<?xml") and (tmp_path / "machine.urdf").read_text() == text
+    model = fit.model()
+    best, plain = (model.export("linuxcnc", entries=word) for word in ("best", "plain"))
+    wide = model.export("linuxcnc", travel={"A": (-90, 90)})
+    assert len({best, plain, wide}) == 3
+    with pytest.raises(abbe.Error, match="the choices are best, plain"):
+        model.export("linuxcnc", entries="all")
+    with pytest.raises(ValueError, match="`travel` belongs to"):
+        model.export("urdf", travel={"A": (-90, 90)})
+    with pytest.raises(abbe.Error, match="no such axis"):
+        model.export("linuxcnc", travel={"B": (-90, 90)})
+    with pytest.raises(abbe.Error, match="not below the second"):
+        model.export("linuxcnc", travel={"A": (90, -90)})
     with pytest.raises(abbe.Error, match="the formats are urdf"):
         fit.model().export("nothing")
 

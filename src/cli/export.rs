@@ -5,11 +5,11 @@ mod travel;
 use std::path::PathBuf;
 
 use abbe::exports::{self, ExportOptions, FORMATS};
-use abbe::identify::export::control::EntryChoice;
+use abbe::identify::export::control::ENTRIES;
 use abbe::identify::model_file;
 use abbe::model::files;
+use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
-use clap::{Args, ValueEnum};
 
 use super::failure::Failure;
 use super::results::{OutputArguments, Read};
@@ -23,22 +23,8 @@ fn formats() -> PossibleValuesParser {
     PossibleValuesParser::new(FORMATS.iter().map(|format| PossibleValue::new(format.word).help(format.about)))
 }
 
-/// Entries of a control.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Entries {
-    /// Those that leave the least volumetric error over the travel
-    Best,
-    /// The displacements of the axis lines themselves
-    Plain,
-}
-
-impl Entries {
-    fn choice(self) -> EntryChoice {
-        match self {
-            Entries::Best => EntryChoice::Best,
-            Entries::Plain => EntryChoice::Plain,
-        }
-    }
+fn entries() -> PossibleValuesParser {
+    PossibleValuesParser::new(ENTRIES.iter().map(|(_, word, about)| PossibleValue::new(*word).help(*about)))
 }
 
 /// `abbe export MODEL --as FORMAT --out FILE`
@@ -62,8 +48,8 @@ pub struct ExportArguments {
     #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_hyphen_values = true)]
     tool_mm: Vec<f64>,
     /// Which entries of linuxcnc and fanuc are written.
-    #[arg(long, value_enum, value_name = "ENTRIES", default_value = "best")]
-    entries: Entries,
+    #[arg(long, value_parser = entries(), value_name = "ENTRIES", default_value = "best")]
+    entries: String,
     /// Travel of an axis over which the error of the entries counts, mm or degrees [default: the measured range].
     ///
     /// Example: --travel A=-30..110 --travel C=-180..180
@@ -80,17 +66,14 @@ pub fn run(arguments: &ExportArguments) -> Result<(), Failure> {
     let source = files::text(&arguments.model, "the model file")?;
     let model = model_file::of_source(&source)?;
     let format = exports::format(&arguments.format)?;
-    if !format.takes_entries {
-        let other = [(arguments.entries == Entries::Plain, "--entries"), (!arguments.travel.is_empty(), "--travel")];
-        if let Some((_, option)) = other.iter().find(|(is_given, _)| *is_given) {
-            return Err(Failure::CommandLine(format!("`{option}` belongs to `--as linuxcnc` and `--as fanuc`")));
-        }
-    }
     let options = ExportOptions {
         tool_mm: values::point_mm("--tool-mm", &arguments.tool_mm, model.tool_mm)?,
-        entries: arguments.entries.choice(),
+        entries: exports::entries(&arguments.entries)?,
         travel: travel::stated(&arguments.travel, &model)?,
     };
+    if let Some(option) = format.ignored(&options) {
+        return Err(Failure::CommandLine(format!("`--{option}` belongs to `--as linuxcnc` and `--as fanuc`")));
+    }
     let exported = format.export(&model, &options)?;
     output::write_whole(&arguments.out, &exported.text)?;
     let left_out = &exported.result.left_out;

@@ -155,6 +155,12 @@ pub enum EntryChoice {
     Plain,
 }
 
+/// The choices of entries: word, what it is.
+pub const ENTRIES: [(EntryChoice, &str, &str); 2] = [
+    (EntryChoice::Best, "best", "Those that leave the least volumetric error over the travel"),
+    (EntryChoice::Plain, "plain", "The displacements of the axis lines themselves"),
+];
+
 /// The change of one entry.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct KinematicParameter {

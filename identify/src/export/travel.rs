@@ -1,9 +1,12 @@
 //! The travel over which the entries of a control are judged: a grid of axis positions with weights.
 
 use abbe_model::driver::Driver;
+use abbe_model::session::limits::MAX_LENGTH_MM;
 use abbe_model::session::readings::Readings;
+use abbe_model::words::{cut, number};
 
 use crate::compare::workspace::AxisRange;
+use crate::error::IdentifyError;
 use crate::model_file::IdentifiedModel;
 
 /// Places along a rotary axis, odd.
@@ -29,6 +32,36 @@ impl Travel {
             model.ranges.iter().find(|range| range.driver == driver).map_or([0.0; 2], |range| range.range)
         };
         Travel { ranges: model.machine.axes.iter().map(range).collect(), is_measured: true }
+    }
+
+    /// With another range of an axis, mm or degrees.
+    ///
+    /// # Errors
+    /// If there is no such axis, or the range is none.
+    pub fn with(mut self, model: &IdentifiedModel, name: &str, [from, to]: [f64; 2]) -> Result<Travel, IdentifyError> {
+        let axes = &model.machine.axes;
+        let refused = |why: String| {
+            let names: Vec<&str> = axes.iter().map(|axis| axis.name.as_str()).collect();
+            IdentifyError::Request(format!(
+                "axis `{}`: {why}; the axes of the machine are {}",
+                cut(name, 80),
+                names.join(", ")
+            ))
+        };
+        let index = model.machine.axis_index(name).ok_or_else(|| refused("no such axis".into()))?;
+        if let Some(far) = [from, to].into_iter().find(|position| position.is_nan() || position.abs() > MAX_LENGTH_MM) {
+            let most = number(MAX_LENGTH_MM);
+            return Err(refused(format!(
+                "{}: a position in mm or degrees from -{most} to {most} is expected",
+                number(far)
+            )));
+        }
+        if from >= to {
+            return Err(refused("the first number is not below the second".into()));
+        }
+        self.ranges[index] = [from, to].map(|value| axes[index].kind.to_internal(value));
+        self.is_measured = false;
+        Ok(self)
     }
 
     /// The ranges as results state them.

@@ -126,6 +126,8 @@ class Model:
         path: str | os.PathLike[str] | None = None,
         *,
         tool_mm: tuple[float, float, float] | None = None,
+        entries: str = "best",
+        travel: Mapping[str, tuple[float, float]] | None = None,
     ) -> str:
         """Return the calibrated machine for other programs and for controls, as ``abbe export``.
 
@@ -137,8 +139,14 @@ class Model:
             A file to write it to. It is replaced if it exists.
         tool_mm : tuple of three floats, optional
             The tool point in the tool frame, for ``"urdf"``, ``"dh"`` and controls; that of the instrument by default.
+        entries : str, optional
+            Which entries of ``"linuxcnc"`` and ``"fanuc"`` are written: ``"best"``, which leave the least volumetric error
+            over the travel, or ``"plain"``, the displacements of the axis lines themselves.
+        travel : mapping of axis to two floats, optional
+            Travel of axes over which the error of the entries counts, mm or degrees; the measured range by default.
         """
-        text = self._handle.export(format, tool_mm).decode()
+        ranges = [(axis, (float(low), float(high))) for axis, (low, high) in (travel or {}).items()]
+        text = self._handle.export(format, tool_mm, entries, ranges).decode()
         if path is not None:
             write_whole(path, text)
         return text
