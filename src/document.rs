@@ -4,9 +4,11 @@
 use abbe_identify::compare::results::{Comparison, Difference};
 use abbe_identify::model_file::{InputFile, Provenance};
 use abbe_identify::plan::results::{Contribution, PlanAnalysis};
+use abbe_identify::problem::Problem;
 use abbe_identify::results::{
     ComparisonStatement, FitResult, PlanStatement, Statements, TraceResult, ValidationStatement,
 };
+use abbe_identify::trace::TraceOutcome;
 use abbe_identify::validate::results::{MovedParameter, ValidationResult};
 use abbe_model::files::SourceMap;
 use abbe_model::files::stamp::FileStamp;
@@ -91,10 +93,10 @@ impl Origin {
 #[derive(Serialize, JsonSchema)]
 pub struct Stated<'r, T, S> {
     /// The statements.
-    statements: S,
+    pub statements: S,
     /// The result.
     #[serde(flatten)]
-    result: &'r T,
+    pub result: &'r T,
 }
 
 /// A fit with its statements.
@@ -111,10 +113,46 @@ pub type StatedComparison<'r> = Stated<'r, Comparison, Statements<ComparisonStat
 #[cfg(feature = "fleet")]
 pub type StatedHistory<'r> = Stated<'r, crate::fleet::history::FleetHistory, crate::fleet::history::HistoryStatements>;
 
-impl<'r, T, S> Stated<'r, T, S> {
-    /// A result with its statements.
-    pub fn new(result: &'r T, statements: S) -> Self {
-        Stated { statements, result }
+impl<'r> StatedFit<'r> {
+    /// Of a fit.
+    pub fn of_fit(problem: &Problem, result: &'r FitResult) -> Self {
+        Stated { statements: Statements::of_fit(problem, result), result }
+    }
+}
+
+impl<'r> StatedTrace<'r> {
+    /// Of a trace.
+    pub fn of_trace(trace: &'r TraceOutcome) -> Self {
+        Stated { statements: Statements::of_trace(&trace.after, &trace.result), result: &trace.result }
+    }
+}
+
+impl<'r> StatedPlan<'r> {
+    /// Of a plan.
+    pub fn of_plan(problem: &Problem, result: &'r PlanAnalysis) -> Self {
+        Stated { statements: Statements::of_plan(problem, result), result }
+    }
+}
+
+impl<'r> StatedValidation<'r> {
+    /// Of a validation.
+    pub fn of_validation(result: &'r ValidationResult) -> Self {
+        Stated { statements: Statements::of_validation(result), result }
+    }
+}
+
+impl<'r> StatedComparison<'r> {
+    /// Of a comparison.
+    pub fn of_comparison(result: &'r Comparison) -> Self {
+        Stated { statements: Statements::of_comparison(result), result }
+    }
+}
+
+#[cfg(feature = "fleet")]
+impl<'r> StatedHistory<'r> {
+    /// Of a history.
+    pub fn of_history(result: &'r crate::fleet::history::FleetHistory) -> Self {
+        Stated { statements: crate::fleet::history::statements(&result.history.machines), result }
     }
 }
 

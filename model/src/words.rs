@@ -3,6 +3,27 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
+/// The first names of a list, and the number of the others: of `what`, or of none in particular.
+///
+/// ```
+/// use abbe_model::words::first_of;
+///
+/// assert_eq!(first_of(&["A", "B", "C"], 3, ", ", "error"), "A, B, C");
+/// assert_eq!(first_of(&["A", "B", "C"], 2, ", ", "further error"), "A, B and 1 further error");
+/// assert_eq!(first_of(&["A", "B", "C"], 1, "; ", ""), "A; and 2 more");
+/// ```
+#[must_use]
+pub fn first_of(names: &[impl AsRef<str>], most: usize, between: &str, what: &str) -> String {
+    let shown: Vec<&str> = names.iter().take(most).map(AsRef::as_ref).collect();
+    let and = if between == ", " { " and " } else { "; and " };
+    shown.join(between)
+        + &match (names.len().saturating_sub(most), what) {
+            (0, _) => String::new(),
+            (others, "") => format!("{and}{others} more"),
+            (others, what) => format!("{and}{}", counted(others, what)),
+        }
+}
+
 /// A count with its noun, singular or plural.
 ///
 /// ```

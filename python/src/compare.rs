@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use abbe::document::{Document, Origin, Stated};
+use abbe::document::{Document, Origin, StatedComparison};
 use abbe::identify::compare::results::Comparison as Compared;
 use abbe::identify::compare::{CompareOptions, Input, compare_inputs};
 use abbe::identify::model_file::IdentifiedModel;
-use abbe::identify::results::Statements;
+use abbe::report::block::Report;
 use abbe::report::compare::report;
 use pyo3::prelude::*;
 
@@ -84,24 +84,30 @@ impl Comparison {
     }
 
     fn json(&self, seed: u64) -> Result<String, Failed> {
-        let stated = Stated::new(&self.found, Statements::of_comparison(&self.found));
+        let stated = StatedComparison::of_comparison(&self.found);
         Ok(Document::new(call("compare"), self.origin.clone(), Some(seed), &stated).text()?)
     }
 
     fn tables(&self) -> Vec<Table> {
-        report(&self.machine, &self.found, self.with_workspace).tables().cloned().map(Table).collect()
+        self.report().tables().cloned().map(Table).collect()
     }
 
     /// What `print` and a notebook show.
     fn shown(&self) -> (String, String) {
-        show::shown(&report(&self.machine, &self.found, self.with_workspace))
+        show::shown(&self.report())
     }
 
     fn figures(&self) -> Vec<Figure> {
-        show::figures(&report(&self.machine, &self.found, self.with_workspace))
+        show::figures(&self.report())
     }
 
     fn page(&self) -> Result<String, Failed> {
-        show::page_without_session(&report(&self.machine, &self.found, self.with_workspace), "abbe.compare")
+        show::page_without_session(&self.report(), "abbe.compare")
+    }
+}
+
+impl Comparison {
+    fn report(&self) -> Report {
+        report(&self.machine, &StatedComparison::of_comparison(&self.found), self.with_workspace)
     }
 }

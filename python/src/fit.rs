@@ -2,11 +2,10 @@
 
 use std::sync::Arc;
 
-use abbe::document::{Call, Document, Stated};
+use abbe::document::{Call, Document, StatedFit};
 use abbe::identify::fit::{Fit as Estimated, SessionFit};
 use abbe::identify::model_file::IdentifiedModel;
 use abbe::identify::problem::Problem;
-use abbe::identify::results::Statements;
 use abbe::report::block::Report;
 use abbe::report::commands::Commands;
 use abbe::report::parameters::{self, Estimates};
@@ -40,7 +39,7 @@ impl Fit {
 
     fn json(&self) -> Result<String, Failed> {
         let origin = self.state.origin.clone();
-        let stated = Stated::new(&self.fit.result, Statements::of_fit(&self.fit.problem, &self.fit.result));
+        let stated = StatedFit::of_fit(&self.fit.problem, &self.fit.result);
         Ok(Document::new(call("fit"), origin, Some(self.seed), &stated).text()?)
     }
 
@@ -87,7 +86,7 @@ impl Fit {
 impl Fit {
     fn report(&self, figures: bool) -> Result<Report, Failed> {
         let SessionFit { problem, fit, result, .. } = &*self.fit;
-        Ok(report::fit::report(problem, fit, result, &Commands::default(), figures)?)
+        Ok(report::fit::report(problem, fit, &StatedFit::of_fit(problem, result), &Commands::default(), figures)?)
     }
 }
 

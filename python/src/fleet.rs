@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use abbe::document::StatedHistory;
 use abbe::fleet::history;
 use abbe::fleet::options::Options;
 use abbe::fleet::store::{IfClaimed, Store};
@@ -100,7 +101,8 @@ pub fn fleet_history(
     work::run(py, None, move |_| {
         let known = compensations.map(|file| compensations::read(&file)).transpose()?.unwrap_or_default();
         let options = HistoryOptions { false_discovery_rate, tolerance_u, compensations: known };
-        json(&history::history(&Store::existing(out)?, machine_id.as_deref(), &options)?)
+        let found = history::history(&Store::existing(out)?, machine_id.as_deref(), &options)?;
+        json(&StatedHistory::of_history(&found))
     })
 }
 

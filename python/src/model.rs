@@ -3,16 +3,16 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use abbe::document::{Document, Origin, Stated};
+use abbe::document::{Document, Origin, StatedValidation};
 use abbe::exports::{self, ExportOptions};
 use abbe::identify::correction::{Aim, Correction, EstimatedErrors};
 use abbe::identify::export::travel::Travel;
 use abbe::identify::model_file::{self, IdentifiedModel};
-use abbe::identify::results::Statements;
 use abbe::identify::unit::ARCSEC;
 use abbe::identify::validate::{self, validate};
 use abbe::model::files;
 use abbe::model::session::readings::Readings;
+use abbe::report::block::Report;
 use abbe::report::commands::Commands;
 use abbe::report::validate as present;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
@@ -216,8 +216,7 @@ pub struct Validation {
 #[pymethods]
 impl Validation {
     fn json(&self, seed: u64) -> Result<String, Failed> {
-        let result = &self.validation.result;
-        let stated = Stated::new(result, Statements::of_validation(result));
+        let stated = StatedValidation::of_validation(&self.validation.result);
         Ok(Document::new(call("validate"), self.origin.clone(), Some(seed), &stated).text()?)
     }
 
@@ -242,16 +241,22 @@ impl Validation {
 
     /// What `print` and a notebook show.
     fn shown(&self) -> (String, String) {
-        show::shown(&present::report(&self.state.session, &self.validation, &Commands::default()))
+        show::shown(&self.report())
     }
 
     fn figures(&self) -> Vec<Figure> {
-        show::figures(&present::report(&self.state.session, &self.validation, &Commands::default()))
+        show::figures(&self.report())
     }
 
     fn page(&self, py: Python<'_>, seed: u64) -> PyResult<String> {
         let read = (&self.state.session, &self.state.sources);
-        let report = present::report(&self.state.session, &self.validation, &Commands::default());
-        work::at_once(py, || show::page(&report, read, "abbe.Model.validate", seed))
+        work::at_once(py, || show::page(&self.report(), read, "abbe.Model.validate", seed))
+    }
+}
+
+impl Validation {
+    fn report(&self) -> Report {
+        let stated = StatedValidation::of_validation(&self.validation.result);
+        present::report(&self.state.session, &self.validation, &stated, &Commands::default())
     }
 }

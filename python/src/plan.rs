@@ -2,11 +2,10 @@
 
 use std::sync::Arc;
 
-use abbe::document::{Call, Document, Stated};
+use abbe::document::{Call, Document, StatedPlan};
 use abbe::identify::plan::results::PlanAnalysis;
 use abbe::identify::plan::{self, PlanOptions};
 use abbe::identify::problem::Problem;
-use abbe::identify::results::Statements;
 use abbe::model::session::limits::{LARGEST, MIN_UM};
 use abbe::report::block::Report;
 use abbe::report::commands::Commands;
@@ -57,7 +56,7 @@ impl Plan {
 
     fn json(&self, seed: u64) -> Result<String, Failed> {
         let call = Call { command: "plan".to_string(), options: self.options.clone() };
-        let stated = Stated::new(&*self.analysis, Statements::of_plan(&self.problem, &self.analysis));
+        let stated = StatedPlan::of_plan(&self.problem, &self.analysis);
         Ok(Document::new(call, self.state.origin.clone(), Some(seed), &stated).text()?)
     }
 
@@ -109,6 +108,7 @@ impl Plan {
 
 impl Plan {
     fn report(&self, figures: bool) -> Result<Report, Failed> {
-        Ok(present::analysis::report(&self.problem, &self.analysis, &Commands::default(), figures)?)
+        let stated = StatedPlan::of_plan(&self.problem, &self.analysis);
+        Ok(present::analysis::report(&self.problem, &stated, &Commands::default(), figures)?)
     }
 }

@@ -3,9 +3,8 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use abbe::document::{Call, Document, Stated};
+use abbe::document::{Call, Document, StatedTrace};
 use abbe::identify::plan::test_variations::TestVariations;
-use abbe::identify::results::Statements;
 use abbe::identify::separating_tests::separate_aliases;
 use abbe::identify::trace::{self, Progress, TraceOptions, TraceOutcome};
 use abbe::model::words::counted;
@@ -101,8 +100,7 @@ impl Trace {
 
     fn json(&self) -> Result<String, Failed> {
         let origin = self.state.origin.clone();
-        let stated = Stated::new(&self.trace.result, Statements::of_trace(&self.trace.after, &self.trace.result));
-        Ok(Document::new(self.call(), origin, Some(self.seed), &stated).text()?)
+        Ok(Document::new(self.call(), origin, Some(self.seed), &StatedTrace::of_trace(&self.trace)).text()?)
     }
 
     fn residuals_um<'py>(&self, py: Python<'py>, test: &str, before: bool) -> PyResult<Bound<'py, PyArray1<f64>>> {
@@ -167,7 +165,7 @@ impl Trace {
 
 impl Trace {
     fn report(&self, figures: bool) -> Result<Report, Failed> {
-        Ok(report::trace::report(&self.trace, &Commands::default(), figures)?)
+        Ok(report::trace::report(&self.trace, &StatedTrace::of_trace(&self.trace), &Commands::default(), figures)?)
     }
 
     fn call(&self) -> Call {

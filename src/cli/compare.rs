@@ -2,10 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use abbe::document::Stated;
+use abbe::document::StatedComparison;
 use abbe::identify::compare::{CompareOptions, Input, SIGNIFICANCE, compare_inputs};
 use abbe::identify::model_file;
-use abbe::identify::results::Statements;
 use abbe::model::files::stamp::FileStamp;
 use abbe::model::files::{self, ReadOptions, SourceMap};
 use clap::Args;
@@ -89,8 +88,9 @@ pub fn run(arguments: &CompareArguments) -> Result<(), Failure> {
             _ => {}
         }
     }
-    let report = report::compare::report(&inputs[0].0.machine().name, &found, arguments.places > 0);
-    common.output.put(&outputs, &report, &Stated::new(&found, Statements::of_comparison(&found)), &from)
+    let stated = StatedComparison::of_comparison(&found);
+    let report = report::compare::report(&inputs[0].0.machine().name, &stated, arguments.places > 0);
+    common.output.put(&outputs, &report, &stated, &from)
 }
 
 /// What an input was read from.

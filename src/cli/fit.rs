@@ -2,8 +2,7 @@
 
 use std::path::PathBuf;
 
-use abbe::document::Stated;
-use abbe::identify::results::Statements;
+use abbe::document::StatedFit;
 use abbe::identify::{fit, propagation};
 use clap::Args;
 
@@ -110,8 +109,8 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     }
     arguments.forms.add(&problem, &found, &mut result)?;
     let commands = arguments.session.commands();
-    let report = report::fit::report(&problem, &found, &result, &commands, common.output.figures())?;
-    let stated = Stated::new(&result, Statements::of_fit(&problem, &result));
+    let stated = StatedFit::of_fit(&problem, &result);
+    let report = report::fit::report(&problem, &found, &stated, &commands, common.output.figures())?;
     common.output.put(&outputs, &report, &stated, &read)?;
     arguments.save.run(&problem, &found, &sources, common.seed)?;
     arguments.compensation.run(&problem, &found, outputs.tables())

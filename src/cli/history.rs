@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use abbe::document::Stated;
+use abbe::document::StatedHistory;
 use abbe::fleet::compensations;
 use abbe::fleet::history::{history, statements};
 use abbe::fleet::store::Store;
@@ -77,20 +77,21 @@ pub fn run(arguments: &HistoryArguments) -> Result<(), Failure> {
     };
     let found = history(&store, arguments.machine.as_deref(), &options)?;
     let read = Read::files(known.iter().filter_map(|source| source.stamp.as_ref()));
+    let stated = StatedHistory::of_history(&found);
     let report = match (&arguments.machine, found.history.machines.first()) {
-        (Some(_), Some(machine)) => report::machine(machine, &found.conformity),
-        _ => report::fleet(&found),
+        (Some(_), Some(machine)) => report::machine(machine, &stated.statements, &found.conformity),
+        _ => report::fleet(&stated),
     };
-    let stated = Stated::new(&found, statements(&found.history.machines));
     arguments.output.put(&outputs, &report, &stated, &read)?;
     let Some(path) = &arguments.pages else { return Ok(()) };
     let html = |report: &Report| page::html(report, &read.provenance()).map_err(Failure::Other);
-    let mut files = vec![("index.html".to_string(), html(&report::fleet(&found))?)];
+    let mut files = vec![("index.html".to_string(), html(&report::fleet(&stated))?)];
     for (number, machine) in found.history.machines.iter().enumerate() {
         let plain = |sign: char| if sign.is_alphanumeric() || "-_.".contains(sign) { sign } else { '_' };
         let name: String = machine.machine_id.chars().map(plain).collect();
         // The number keeps machines apart whose identifiers differ in other signs or in case alone.
-        files.push((format!("{:04}-{name}.html", number + 1), html(&report::machine(machine, &found.conformity))?));
+        let own = report::machine(machine, &statements(std::slice::from_ref(machine)), &found.conformity);
+        files.push((format!("{:04}-{name}.html", number + 1), html(&own)?));
     }
     folder::write(path, &files, false, |_| Ok(()))
 }

@@ -8,15 +8,14 @@ use std::path::PathBuf;
 use abbe::model::files;
 use abbe::model::words::counted;
 use clap::Args;
-use clap::builder::PossibleValuesParser;
 
-use self::parts::PARTS;
 use super::failure::Failure;
 use super::message::print_warnings;
 use super::values::{self, Words};
 use super::{SessionArguments, folder, output};
 use crate::printers::paper;
 use crate::printers::paper::layout::{Class, Layout};
+use crate::report::paper::{SUBJECTS, Subject};
 
 /// Examples of `abbe paper`.
 pub const HELP: &str = include_str!("help/paper.txt");
@@ -40,8 +39,8 @@ pub struct PaperArguments {
     /// The parts to write, separated by commas [default: all that the sessions have].
     ///
     /// Example: --parts identifiability,bias
-    #[arg(long, value_name = "PART,…", value_delimiter = ',', value_parser = PossibleValuesParser::new(PARTS))]
-    parts: Vec<String>,
+    #[arg(long, value_name = "PART,…", value_delimiter = ',', value_parser = values::words(SUBJECTS))]
+    parts: Vec<Subject>,
     /// Class of main.tex.
     ///
     /// Example: --class ieeetran
@@ -106,7 +105,7 @@ pub fn run(arguments: &PaperArguments, quiet: bool) -> Result<(), Failure> {
     files.push(("README.md".into(), readme::readme(arguments, &origins, &sections)?.into_bytes()));
     folder::write(&arguments.out, &files, arguments.force, |_| Ok(()))?;
     if !quiet {
-        let names: Vec<&str> = sections.iter().map(|section| section.name).collect();
+        let names: Vec<&str> = sections.iter().map(|section| section.subject.word()).collect();
         say!("{}: {} in {}", arguments.out.display(), counted(files.len(), "file"), counted(names.len(), "section"));
         say!("  {}", names.join(", "));
         say!("typeset: pdflatex main, bibtex main, pdflatex main (three times); or typst compile main.typ");

@@ -5,8 +5,7 @@ mod progress;
 
 use std::path::PathBuf;
 
-use abbe::document::Stated;
-use abbe::identify::results::Statements;
+use abbe::document::StatedTrace;
 use abbe::identify::trace::TraceOptions;
 use clap::Args;
 
@@ -87,8 +86,8 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         return progress::list(&session, &options);
     }
     let trace = progress::trace(&session, &options, arguments.time_limit, common.output.quiet)?;
-    let report = present::report(&trace, &arguments.session.commands(), common.output.figures())?;
-    let stated = Stated::new(&trace.result, Statements::of_trace(&trace.after, &trace.result));
+    let stated = StatedTrace::of_trace(&trace);
+    let report = present::report(&trace, &stated, &arguments.session.commands(), common.output.figures())?;
     common.output.put(&outputs, &report, &stated, &Read::session(&session, &sources, common.seed))?;
     if let Some(path) = &arguments.write {
         next_session::write(path, &sources, &arguments.session, |text| {

@@ -2,9 +2,8 @@
 
 use std::path::PathBuf;
 
-use abbe::document::Stated;
+use abbe::document::StatedValidation;
 use abbe::identify::model_file;
-use abbe::identify::results::Statements;
 use abbe::identify::validate::validate;
 use abbe::model::files;
 use clap::Args;
@@ -39,7 +38,7 @@ pub fn run(arguments: &ValidateArguments) -> Result<(), Failure> {
     let validation = validate(&model, &session)?;
     let mut read = Read::session(&session, &sources, common.seed);
     read.files.extend(&source.stamp);
-    let report = report::validate::report(&session, &validation, &arguments.session.commands());
-    let stated = Stated::new(&validation.result, Statements::of_validation(&validation.result));
+    let stated = StatedValidation::of_validation(&validation.result);
+    let report = report::validate::report(&session, &validation, &stated, &arguments.session.commands());
     common.output.put(&outputs, &report, &stated, &read)
 }

@@ -2,9 +2,6 @@
 
 use toml::value::{Datetime, Offset};
 
-/// Days of a year in the rates of trends.
-pub const DAYS_PER_YEAR: f64 = 365.25;
-
 /// A date with its time, in days since 1970-01-01 UTC. A time without an offset counts as UTC.
 ///
 /// Forms: those of TOML (RFC 3339): `2026-11-23`, `2026-11-23T08:00:00`, `2026-11-23 08:00:00+01:00`. `None` for

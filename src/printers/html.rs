@@ -3,7 +3,7 @@
 use abbe::model::words::counted;
 use maud::{Markup, PreEscaped, html};
 
-use crate::report::block::{Body, Level, Report, Text, uncited};
+use crate::report::block::{Body, Level, Report, Sentence, Text, uncited};
 use crate::report::figure::{Figure, file_name, svg};
 use crate::report::number::{capitalised, with_minus_signs};
 use crate::report::table::{Align, Table};
@@ -199,20 +199,15 @@ fn element(body: &Body) -> Markup {
     }
 }
 
-/// The command of an indented sentence and what it is for.
-fn command(sentence: &str) -> Option<(&str, &str)> {
-    sentence.strip_prefix("  ")?.split_once("  ")
-}
-
 fn words(text: &Text) -> Markup {
     match text {
         Text::Opening { word, sentences } => html! {
             @for (number, sentence) in sentences.iter().enumerate() {
                 p class="verdict" {
                     @if number == 0 && !word.is_empty() { strong class=(format!("word {}", file_name(word))) { (word) } " " }
-                    @match command(sentence) {
-                        Some((command, purpose)) => { code { (command) } " " (purpose) }
-                        None => { (prose(&uncited(sentence))) }
+                    @match sentence {
+                        Sentence::Command(command, purpose) => { code { (command) } " " (purpose) }
+                        Sentence::Words(words) => { (prose(&uncited(words))) }
                     }
                 }
             }

@@ -14,7 +14,7 @@ mod tests {
     use crate::report::block::{Formula, KeyFigure, Report, Text};
     use crate::report::figure::bars::{Bars, Fill};
     use crate::report::figure::{Chart, Figure, Quantity};
-    use crate::report::paper::Part;
+    use crate::report::paper::{Part, Subject};
     use crate::report::provenance::Provenance;
     use crate::report::table::{Table, cells};
     use paper::layout::{Class, Layout};
@@ -60,13 +60,13 @@ mod tests {
         let csv = String::from_utf8(csv::report(&report).unwrap()).unwrap();
         assert_eq!(csv, "# section-words\nheading-words\ncell-words\n");
         let layout = Layout { class: Class::Elsarticle, two_column: false };
-        let files = paper::files("", "", &[Part { name: "part", report }], layout).unwrap();
+        let files = paper::files("", "", &[Part { subject: Subject::Methods, report }], layout).unwrap();
         for language in ["tex", "typ"] {
             let text = |name: &str| {
                 let (_, bytes) = files.iter().find(|(file, _)| *file == format!("{name}.{language}")).unwrap();
                 String::from_utf8(bytes.clone()).unwrap()
             };
-            let part = text("sections/part");
+            let part = text("sections/methods");
             contains(
                 &part,
                 &["title", "opening", "section", "paragraph", "list", "remark", "step", "detail", "figure"],

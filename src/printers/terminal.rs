@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use abbe::model::words::{cut, shortened};
 
-use crate::report::block::{Body, KeyFigure, Level, Report, Text, uncited};
+use crate::report::block::{Body, KeyFigure, Level, Report, Sentence, Text, uncited};
 use crate::report::table::{Align, Table, cells};
 
 /// Largest width of a cell, in characters. A longer text is cut with an ellipsis; CSV and JSON hold it whole.
@@ -92,7 +92,10 @@ pub fn report(report: &Report, more: Option<&str>) -> String {
 fn words(text: &Text, more: Option<&str>, hint: &str) -> (bool, String) {
     match text {
         Text::Opening { word, sentences } => {
-            let mut lines = sentences.iter().map(|sentence| uncited(sentence));
+            let mut lines = sentences.iter().map(|sentence| match sentence {
+                Sentence::Words(words) => uncited(words),
+                Sentence::Command(command, purpose) => format!("  {command}  {purpose}"),
+            });
             let first = lines.next().unwrap_or_default();
             let first = if word.is_empty() { first } else { format!("Verdict: {word}. {first}") };
             (false, std::iter::once(first).chain(lines).collect::<Vec<_>>().join("\n"))

@@ -76,6 +76,21 @@ pub struct KeyFigure {
     pub note: String,
 }
 
+/// A part of what opens a report.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Sentence {
+    /// A sentence.
+    Words(String),
+    /// A command, and what it is for.
+    Command(String, String),
+}
+
+impl From<String> for Sentence {
+    fn from(words: String) -> Sentence {
+        Sentence::Words(words)
+    }
+}
+
 /// Words by their role. Backquotes mark code, `[@key]` or `[@key;@key]` cites.
 #[derive(Clone, Debug)]
 pub enum Text {
@@ -83,8 +98,8 @@ pub enum Text {
     Opening {
         /// `explained`, `holds`; empty if the result has none.
         word: String,
-        /// One sentence each.
-        sentences: Vec<String>,
+        /// One sentence each, or a command.
+        sentences: Vec<Sentence>,
     },
     /// Heading of a section.
     Section(String),
@@ -202,8 +217,8 @@ impl Report {
     }
 
     /// Adds the sentences that open a report, and the verdict in one word.
-    pub fn opening(&mut self, word: impl Into<String>, sentences: impl IntoIterator<Item = String>) {
-        self.key(Text::Opening { word: word.into(), sentences: sentences.into_iter().collect() });
+    pub fn opening(&mut self, word: impl Into<String>, sentences: impl IntoIterator<Item = impl Into<Sentence>>) {
+        self.key(Text::Opening { word: word.into(), sentences: sentences.into_iter().map(Into::into).collect() });
     }
 
     /// Adds what to do next. The last step leads to what a page or `--all` shows, and is left out there.

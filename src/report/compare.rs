@@ -1,7 +1,8 @@
 //! Differences between models of one machine.
 
+use abbe::document::StatedComparison;
 use abbe::identify::compare::results::{Comparison, Difference, Pair};
-use abbe::identify::results::{Outlier, Statements};
+use abbe::identify::results::Outlier;
 use abbe::model::words::counted;
 
 use super::block::{Report, Text};
@@ -23,11 +24,12 @@ const METHOD: &str = "Sessions are fitted with the errors and effects that any i
      parameters are the same. A difference is significant if Holm's procedure rejects that it is zero.";
 
 /// The report of a comparison of models of this machine; `with_workspace`, whether the volumetric error is asked for.
-pub fn report(machine: &str, comparison: &Comparison, with_workspace: bool) -> Report {
+pub fn report(machine: &str, stated: &StatedComparison<'_>, with_workspace: bool) -> Report {
+    let comparison = stated.result;
     let mut report = Report::new(format!("Comparison of models of {machine}"));
     report.method = METHOD.to_string();
     report.values = values(comparison);
-    let statements = statements::of_comparison(&Statements::of_comparison(comparison));
+    let statements = statements::of_comparison(&stated.statements);
     report.opening("", comparison.pairs.iter().map(|pair| sentence(comparison, pair)).chain(statements));
     for pair in &comparison.pairs {
         report.section(&format!("{} → {}", pair.from, pair.to));

@@ -2,7 +2,7 @@
 
 use abbe::identify::tolerance::rule::Decision;
 use abbe::identify::tolerance::{Conformity, ConformityItem};
-use abbe::model::words::counted;
+use abbe::model::words::{counted, first_of};
 
 use super::block::Report;
 use super::number::{places, quantity, unit, value_and_u};
@@ -24,10 +24,7 @@ pub fn section(report: &mut Report, found: Option<&Conformity>) {
 pub fn failed(found: Option<&Conformity>) -> Option<String> {
     let items = &found?.items;
     let failed: Vec<String> = items.iter().filter(|item| item.decision == Decision::Fail).map(beyond).collect();
-    let more = failed.len().saturating_sub(MAX_NAMED);
-    let named = failed[..failed.len() - more].join("; ");
-    let more = if more > 0 { format!("; {more} more") } else { String::new() };
-    (!failed.is_empty()).then(|| format!("Out of limits: {named}{more}."))
+    (!failed.is_empty()).then(|| format!("Out of limits: {}.", first_of(&failed, MAX_NAMED, "; ", "")))
 }
 
 /// An item with its value and limits.

@@ -2,6 +2,7 @@
 
 use abbe::identify::results::CrossValidation;
 use abbe::identify::unit::ReadingUnit;
+use abbe::model::words::first_of;
 
 use super::number::of_readings;
 
@@ -62,7 +63,7 @@ pub fn sentences(model: &CrossValidation, before: Option<&CrossValidation>) -> V
                 ));
             }
             "left-out test" => {
-                let tests = named(model.left_out_tests.clone());
+                let tests = first_of(&model.left_out_tests, MAX_NAMED, ", ", "");
                 sentences.push(format!("left-out test: {value} ({tests}, each predicted by the other tests)"));
             }
             _ => {}
@@ -71,17 +72,10 @@ pub fn sentences(model: &CrossValidation, before: Option<&CrossValidation>) -> V
     if !model.tests_not_left_out.is_empty() {
         let tests = model.tests_not_left_out.iter();
         let tests = tests.map(|test| format!("{} (needs {})", test.test, test.parameters.join(", ")));
-        sentences.push(format!("not predicted by the other tests: {}", named(tests.collect())));
+        sentences.push(format!(
+            "not predicted by the other tests: {}",
+            first_of(&tests.collect::<Vec<_>>(), MAX_NAMED, ", ", "")
+        ));
     }
     sentences
-}
-
-/// The first names, and the number of the others.
-fn named(mut names: Vec<String>) -> String {
-    let others = names.len().saturating_sub(MAX_NAMED);
-    if others > 1 {
-        names.truncate(MAX_NAMED);
-        names.push(format!("{others} others"));
-    }
-    names.join(", ")
 }

@@ -1,27 +1,25 @@
 //! The result of a fit: goodness of fit, both propagations of uncertainty, all figures for a spreadsheet.
 
+use abbe::document::StatedFit;
 use abbe::identify::IdentifyError;
 use abbe::identify::circular::CircularTest;
 use abbe::identify::fit::Fit;
-use abbe::identify::noise::NoiseSource;
 use abbe::identify::plan::candidate_tests;
 use abbe::identify::problem::Problem;
-use abbe::identify::results::{
-    CrossValidation, FitMonteCarlo, FitResult, NextStep, ParameterResult, Statements, Verdict,
-};
+use abbe::identify::results::{CrossValidation, FitMonteCarlo, FitResult, NextStep, ParameterResult, Verdict};
 use abbe::identify::series::{spectrum, views};
 use abbe::identify::tolerance::Conformity;
 use abbe::identify::unit::ReadingUnit;
 use abbe::model::words::counted;
 
-use super::block::{Level, Report, Text};
+use super::block::{Level, Report, Sentence, Text};
 use super::commands::Commands;
-use super::number::{fixed, of_readings, places, unit};
+use super::number::{fixed, places, unit};
 use super::parameters::Estimates;
-use super::quality::{self, Quality, noise_sentence};
+use super::quality::{self, Quality, noise, noise_sentence};
 use super::session::plots::SessionPlots;
 use super::session::{self, residuals};
-use super::statements;
+use super::statements::{self, IDENTIFIES, IMPROVES};
 use super::table::{Cell, Column, Table, cells, numbers, words};
 use super::{base, circular, conformity, confounded, cross_validation, plausibility, pointing};
 
@@ -32,21 +30,22 @@ use super::{base, circular, conformity, confounded, cross_validation, plausibili
 pub fn report(
     problem: &Problem,
     fit: &Fit,
-    result: &FitResult,
+    stated: &StatedFit<'_>,
     commands: &Commands,
     figures: bool,
 ) -> Result<Report, IdentifyError> {
+    let (result, statements) = (stated.result, &stated.statements);
     let mut report = Report::new(format!("Fit of {}", problem.session.machine.name));
     report.warnings.clone_from(&result.warnings);
     report.method = method(result);
-    let statements = Statements::of_fit(problem, result);
-    let opening = statements::opening(&statements, result.degrees_of_freedom, commands);
+    let opening = statements::opening(statements, result.degrees_of_freedom, commands);
     let rank = rank(result.identifiable.len(), result.parameter_count, result.rank);
     let noise = noise(result.noise_um, result.reading_unit, result.noise_source);
     let extent = format!("{}, {noise}; {rank}.", counted(result.readings, "reading"));
     let failed = conformity::failed(result.conformity.as_ref());
     let contradicted = plausibility::headline(&result.plausibility);
-    report.opening("", contradicted.into_iter().chain(failed).chain(opening).chain([extent]));
+    report
+        .opening("", contradicted.into_iter().chain(failed).map(Sentence::from).chain(opening).chain([extent.into()]));
     report.values = Figures::of_fit(result);
     let quality = quality(result);
     let mut figures_of_quality = quality.key_figures(None);
@@ -68,7 +67,7 @@ pub fn report(
         report.headed(Level::Key, "Terms of TPOINT", pointing::terms(terms));
         report.key(pointing::statement(terms));
     }
-    report.detail(statements::corrections(&statements));
+    report.detail(statements::corrections(statements));
     estimates.set_up(&mut report, None);
     conformity::section(&mut report, result.conformity.as_ref());
     let by_prior = &result.outcome.determined_by_prior;
@@ -126,16 +125,12 @@ fn method(result: &FitResult) -> String {
 fn next(problem: &Problem, result: &FitResult, step: NextStep, commands: &Commands) -> Vec<(String, String)> {
     let mut steps: Vec<(String, String)> = Vec::new();
     let mut add = |step: String, purpose: &str| steps.push((step, purpose.to_string()));
+    let test = |purpose: &str| format!("propose the test that {purpose}");
     match step {
         NextStep::CorrectSession => add("correct the session".into(), "remove what the readings contradict"),
         NextStep::StateNoise => add("state `noise_um` or repeat a run".into(), "have χ² judge the model"),
-        NextStep::Improve => {
-            add(commands.command("plan", "--improve"), "propose the test that most lowers the largest uncertainty")
-        }
-        NextStep::Identify => add(
-            commands.command("plan", "--improve"),
-            "propose the test that makes the confounded parameters identifiable",
-        ),
+        NextStep::Improve => add(commands.command("plan", "--improve"), &test(IMPROVES)),
+        NextStep::Identify => add(commands.command("plan", "--improve"), &test(IDENTIFIES)),
         _ => {}
     }
     // A model that is not judged may lack an effect too.
@@ -151,15 +146,6 @@ fn next(problem: &Problem, result: &FitResult, step: NextStep, commands: &Comman
 /// `identifiable` of `count` parameters, and the rank.
 pub fn rank(identifiable: usize, count: usize, rank: usize) -> String {
     format!("{identifiable} of {} identifiable (numerical rank {rank})", counted(count, "parameter"))
-}
-
-/// The noise and its source in words. A residual is not called noise.
-pub fn noise(noise_um: f64, unit: ReadingUnit, source: NoiseSource) -> String {
-    let figure = of_readings(noise_um, unit);
-    match source {
-        NoiseSource::Residual => format!("residual of the declared model {figure} (no noise stated, no repeats)"),
-        other => format!("noise {figure} ({other})"),
-    }
 }
 
 /// Both propagations side by side, with the quoted interval; without `--all`, of the parameters that are no set-up.

@@ -1,13 +1,14 @@
 //! The machines of a fleet over time.
 
+use abbe::document::StatedHistory;
 use abbe::fleet::conformity::{ItemHistory, MachineConformity};
 use abbe::fleet::date::date;
-use abbe::fleet::history::{FleetHistory, NotUsed};
+use abbe::fleet::history::{FleetHistory, HistoryStatements, NotUsed};
 use abbe::identify::history::chart::{EWMA_LIMIT, SHEWHART_LIMIT};
 use abbe::identify::history::events::Kind;
 use abbe::identify::history::results::{Due, MachineHistory, ParameterHistory};
 use abbe::identify::tolerance::rule::Decision;
-use abbe::model::words::counted;
+use abbe::model::words::{counted, first_of};
 
 use super::block::{KeyFigure, Report};
 use super::conformity::limits;
@@ -31,20 +32,19 @@ const METHOD: &str = "A parameter over time has a level, perhaps a drift, and st
      0.2 and limits of 2.962 (Lucas and Saccucci 1990), about the mean of the first six sessions, and again after \
      each step.";
 
-/// Days of a year in the figures.
-const DAYS_PER_YEAR: f64 = 365.25;
 /// Parameters that a cell names.
 const MOST_NAMES: usize = 4;
 /// Rows of a table that a terminal shows without `--all`.
 const MAX_ROWS: usize = 12;
 
 /// The report of the fleet.
-pub fn fleet(found: &FleetHistory) -> Report {
+pub fn fleet(stated: &StatedHistory<'_>) -> Report {
+    let found = stated.result;
     let all = &found.history.machines;
     let mut report = Report::new("History of the fleet");
     report.method = METHOD.to_string();
     let (drifts, changes) = (drifts(all), changes(all));
-    report.opening("", std::iter::once(format!("{}.", headline(found))).chain(opening(all)));
+    report.opening("", std::iter::once(format!("{}.", headline(found))).chain(opening(&stated.statements, all)));
     report.key(vec![
         KeyFigure::new("Machines", all.len().to_string(), ""),
         KeyFigure::new("Drifts", drifts.rows.len().to_string(), ""),
@@ -62,17 +62,21 @@ pub fn fleet(found: &FleetHistory) -> Report {
 }
 
 /// The report of a machine: a small figure for each parameter and its control chart, and its decisions of conformity.
-pub fn machine(machine: &MachineHistory, conformity: &[MachineConformity]) -> Report {
+pub fn machine(machine: &MachineHistory, statements: &HistoryStatements, conformity: &[MachineConformity]) -> Report {
     let own = std::slice::from_ref(machine);
     let changed = machine.parameters.iter().filter(|parameter| has_changed(parameter)).count();
     let mut report = Report::new(format!("History of {}", machine.machine_id));
     report.method = METHOD.to_string();
     let headline = format!("{changed} of {} parameters have changed.", machine.parameters.len());
-    report.opening("", std::iter::once(headline).chain(opening(own)));
+    report.opening("", std::iter::once(headline).chain(opening(statements, own)));
     report.key(vec![
         KeyFigure::new("Sessions", machine.sessions.to_string(), format!("since {}", date(machine.first_days))),
         KeyFigure::new("Last session", date(machine.last_days), ""),
-        KeyFigure::new("Out of control", machine.out_of_control.len().to_string(), named(&machine.out_of_control)),
+        KeyFigure::new(
+            "Out of control",
+            machine.out_of_control.len().to_string(),
+            first_of(&machine.out_of_control, MOST_NAMES, ", ", ""),
+        ),
         KeyFigure::new("Next check", next_check(machine), machine.due_parameter.clone().unwrap_or_default()),
     ]);
     section(&mut report, "Drifts", drifts(own), "No parameter drifts significantly.");
@@ -113,12 +117,12 @@ fn headline(found: &FleetHistory) -> String {
 }
 
 /// Is it in control, what to correct, which machine to measure next.
-fn opening(machines: &[MachineHistory]) -> Vec<String> {
+fn opening(statements: &HistoryStatements, machines: &[MachineHistory]) -> Vec<String> {
     let dated = machines.iter().filter_map(|machine| Some((machine, machine.due_days?)));
     let first = dated.min_by(|a, b| a.1.total_cmp(&b.1));
     let check = first.map(|(machine, days)| (machine.machine_id.as_str(), date(days)));
     let beyond_ten_years = machines.iter().any(|machine| machine.due == Due::BeyondTenYears);
-    statements::of_history(&abbe::fleet::history::statements(machines), check, beyond_ten_years)
+    statements::of_history(statements, check, beyond_ten_years)
 }
 
 /// Whether a parameter has a drift or a step.
@@ -145,13 +149,6 @@ fn next_check(machine: &MachineHistory) -> String {
     }
 }
 
-/// The first names of a list, and the number of the others.
-pub fn named(names: &[String]) -> String {
-    let more = names.len().saturating_sub(MOST_NAMES);
-    let first = names[..names.len() - more].join(", ");
-    if more > 0 { format!("{first} and {more} more") } else { first }
-}
-
 /// The machines, those with the earliest due date first.
 fn machines(found: &FleetHistory) -> Table {
     let mut sorted: Vec<&MachineHistory> = found.history.machines.iter().collect();
@@ -165,7 +162,7 @@ fn machines(found: &FleetHistory) -> Table {
             date(machine.last_days),
             drifting.to_string(),
             machine.changes.len().to_string(),
-            named(&machine.out_of_control),
+            first_of(&machine.out_of_control, MOST_NAMES, ", ", ""),
             next_check(machine),
             machine.due_parameter.clone().unwrap_or_default()
         ]
@@ -285,11 +282,6 @@ fn not_used(not_used: &[NotUsed]) -> Table {
     Table::new(["not used", "why"], rows.collect::<Vec<_>>())
 }
 
-/// Years since the first session of a machine.
-fn years(machine: &MachineHistory, days: f64) -> f64 {
-    (days - machine.first_days) / DAYS_PER_YEAR
-}
-
 fn time_axis(machine: &MachineHistory) -> Axis {
     let last = machine.last_days.max(machine.first_days + 30.0);
     Axis::new("date", "", Scale { words: Some(date), ..Scale::over([machine.first_days, last], 4) })
@@ -307,7 +299,7 @@ fn over_time(machine: &MachineHistory, parameter: &ParameterHistory) -> Figure {
         Series::new("expanded uncertainty (k = 2)", "before", Mark::Bars, ranges),
         Series::new("estimate", "before", Mark::Dots, values),
     ];
-    series.extend(parameter.level.map(|_| Series::new("model", "after", Mark::Line, model(machine, parameter))));
+    series.extend(parameter.level.map(|_| Series::new("model", "after", Mark::Line, parameter.modelled())));
     let [low, high] = span(series.iter().flat_map(|series| series.points.iter().map(|point| point.1)));
     let y = Axis::new(parameter.id.clone(), parameter.unit.clone(), Scale::rounded([low, high], 6));
     Figure::new(
@@ -316,27 +308,6 @@ fn over_time(machine: &MachineHistory, parameter: &ParameterHistory) -> Figure {
         parameter.meaning.clone(),
         Chart::Lines(Lines::new(time_axis(machine), y, series)),
     )
-}
-
-/// The model of a parameter at its sessions, with two points at each step.
-fn model(machine: &MachineHistory, parameter: &ParameterHistory) -> Vec<(f64, f64)> {
-    let middle = parameter.points.iter().map(|point| years(machine, point.days)).sum::<f64>()
-        / parameter.points.len().max(1) as f64;
-    let level = parameter.level.map_or(0.0, |level| level.value);
-    let drift = parameter.drift_per_year.map_or(0.0, |drift| drift.value);
-    let value = |days: f64| {
-        let steps = parameter.steps.iter().filter(|step| step.before_days <= days).map(|step| step.value);
-        level + drift * (years(machine, days) - middle) + steps.sum::<f64>()
-    };
-    let mut points = Vec::with_capacity(parameter.points.len());
-    for (k, point) in parameter.points.iter().enumerate() {
-        let step = parameter.steps.iter().find(|step| step.before_days == point.days);
-        if let (Some(step), true) = (step, k > 0) {
-            points.push((point.days, value(point.days) - step.value));
-        }
-        points.push((point.days, value(point.days)));
-    }
-    points
 }
 
 /// Both control charts of a parameter, each with its limits.

@@ -11,8 +11,8 @@ use abbe::model::words::counted;
 use super::block::{Level, Report, Text};
 use super::figure::bars::{Bars, Fill};
 use super::figure::{Chart, Figure, Quantity};
-use super::fit::noise;
 use super::number::{capitalised, quantity, three_digits, unit};
+use super::quality::noise;
 use super::session;
 use super::table::{Cell, Column, Table, cells, numbers};
 

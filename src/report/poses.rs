@@ -6,8 +6,8 @@ use abbe::model::session::Session;
 use abbe::model::words::counted;
 
 use super::block::Report;
-use super::fit::noise;
 use super::number::{three_digits, unit};
+use super::quality::noise;
 use super::table::{Cell, Table, cells, numbers, words};
 
 /// The report of selected poses.

@@ -71,7 +71,7 @@ impl Quality<'_> {
 
     fn residual(&self, before: Option<&Quality<'_>>) -> KeyFigure {
         let noise = match self.is_testable() {
-            true => format!("noise {} ({})", self.shown(self.noise_um), self.noise_source),
+            true => noise(self.noise_um, self.unit, self.noise_source),
             false => "noise not stated".to_string(),
         };
         let before = before.map_or(String::new(), |before| format!("before {}; ", self.shown(before.rms_um)));
@@ -124,6 +124,15 @@ pub fn readings(problem: &Problem, readings: usize, outliers: usize) -> KeyFigur
         some => format!("{} excluded", counted(some, "outlier")),
     };
     KeyFigure::new("Readings", integer(readings), format!("{tests}, {excluded}"))
+}
+
+/// The noise and its source in words. A residual is not called noise.
+pub fn noise(noise_um: f64, unit: ReadingUnit, source: NoiseSource) -> String {
+    let figure = of_readings(noise_um, unit);
+    match source {
+        NoiseSource::Residual => format!("residual of the declared model {figure} (no noise stated, no repeats)"),
+        other => format!("noise {figure} ({other})"),
+    }
 }
 
 /// The noise of a result and its source. The residual of a model is not called noise.

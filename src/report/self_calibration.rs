@@ -7,8 +7,8 @@ use abbe::model::session::Session;
 use abbe::model::words::counted;
 
 use super::block::{Report, Text};
-use super::fit::noise;
 use super::number::{fixed, micrometres, places, value_and_u};
+use super::quality::noise;
 use super::table::{Cell, Table, cells, numbers, words};
 use super::{confounded, parameters};
 

@@ -11,8 +11,9 @@ use abbe::identify::results::{
 use abbe::identify::tolerance::rule::Decision;
 use abbe::identify::validate::ValidationVerdict;
 use abbe::identify::validate::results::MovedParameter;
-use abbe::model::words::counted;
+use abbe::model::words::{counted, first_of};
 
+use super::block::Sentence;
 use super::commands::Commands;
 use super::number::{fixed, places, quantity, three_digits, value_and_u};
 use super::parameters::PRIOR;
@@ -21,14 +22,19 @@ use super::table::{Cell, Table, cells};
 
 /// Changes that the sentence names.
 const NAMED: usize = 4;
+/// What a proposed test does for parameters that no reading separates.
+pub const IDENTIFIES: &str = "makes the confounded parameters identifiable";
+/// What a proposed test does for uncertainties.
+pub const IMPROVES: &str = "most lowers the largest uncertainty";
 /// Share of the noise in a variance below which more readings do not help.
 const MIN_NOISE_SHARE: f64 = 0.1;
 /// Digits of a component of a unit vector.
 const DIRECTION_PLACES: usize = 6;
 
 /// The statements as sentences that open a report.
-pub fn opening(statements: &Statements, degrees_of_freedom: usize, commands: &Commands) -> Vec<String> {
-    let mut sentences = vec![good("Goodness of fit", &statements.good, degrees_of_freedom), correct(statements)];
+pub fn opening(statements: &Statements, degrees_of_freedom: usize, commands: &Commands) -> Vec<Sentence> {
+    let good = good("Goodness of fit", &statements.good, degrees_of_freedom);
+    let mut sentences = vec![good.into(), correct(statements).into()];
     sentences.extend(measure(&statements.measure, commands));
     sentences
 }
@@ -58,16 +64,13 @@ fn correct(statements: &Statements) -> String {
             false => "What to correct: nothing; no axis deviates by more than the uncertainty".to_string(),
         };
     }
-    let named: Vec<String> = large.iter().take(NAMED).map(|change| in_short(change)).collect();
-    let more = match large.len().saturating_sub(NAMED) {
-        0 => String::new(),
-        more => format!(" and {}", counted(more, "further change")),
-    };
+    let named: Vec<String> = large.iter().map(|change| in_short(change)).collect();
+    let named = first_of(&named, NAMED, ", ", "further change");
     let by_prior = match large.iter().any(|change| change.determined_by == DeterminedBy::Prior) {
         true => format!(" ({PRIOR}: if the set-up is as stated)"),
         false => String::new(),
     };
-    format!("What to correct: {}{more}{by_prior}", named.join(", "))
+    format!("What to correct: {named}{by_prior}")
 }
 
 /// `C in X −36.29 ± 0.92 µm`, `A about … `.
@@ -82,13 +85,14 @@ fn in_short(change: &AxisCorrection) -> String {
 }
 
 /// What to measure next, and the commands for it.
-fn measure(statement: &MeasureStatement, commands: &Commands) -> Vec<String> {
+fn measure(statement: &MeasureStatement, commands: &Commands) -> Vec<Sentence> {
     let (next, command) = (commands.next_session(), |verb: &str, options: &str| commands.command(verb, options));
     let with_program = |what: String, verb: &str, options: &str| {
+        let program = format!("abbe nc {next} --control CONTROL --out programs");
         vec![
-            what,
-            format!("  {}  writes the test,", command(verb, options)),
-            format!("  abbe nc {next} --control CONTROL --out programs  its program"),
+            what.into(),
+            Sentence::Command(command(verb, options), "writes the test,".into()),
+            Sentence::Command(program, "its program".into()),
         ]
     };
     let plan = |purpose: &str| {
@@ -98,7 +102,7 @@ fn measure(statement: &MeasureStatement, commands: &Commands) -> Vec<String> {
             &format!("--improve --write {next}"),
         )
     };
-    let one = |what: &str| vec![format!("What to measure next: {what}")];
+    let one = |what: &str| vec![format!("What to measure next: {what}").into()];
     match statement.step {
         NextStep::CorrectSession => one("nothing before the session is corrected: the readings contradict it"),
         NextStep::Trace => one(&format!("nothing before {}", command("trace", ""))),
@@ -107,23 +111,13 @@ fn measure(statement: &MeasureStatement, commands: &Commands) -> Vec<String> {
             let test = statement.description.as_deref().unwrap_or_default();
             with_program(format!("What to measure next: {test}"), "trace", &format!("--write {next} --with-tests"))
         }
-        NextStep::Identify => plan("makes the confounded parameters identifiable"),
-        NextStep::Improve => plan("most lowers the largest uncertainty"),
+        NextStep::Identify => plan(IDENTIFIES),
+        NextStep::Improve => plan(IMPROVES),
         NextStep::Nothing => one("no candidate test is known for this instrument"),
         NextStep::Refit => one(&format!("nothing before {}, which identifies the machine anew", command("trace", ""))),
         NextStep::WidenRange => one("a session that covers the range of these readings"),
         NextStep::Repeat => one("the session once more"),
         NextStep::NextCheck => one("the next check"),
-    }
-}
-
-/// Names of a list, the first ones and the number of the others.
-fn first(names: impl IntoIterator<Item = String>, what: &str) -> String {
-    let names: Vec<String> = names.into_iter().collect();
-    let shown = names.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
-    match names.len().saturating_sub(NAMED) {
-        0 => shown,
-        more => format!("{shown} and {}", counted(more, what)),
     }
 }
 
@@ -138,19 +132,19 @@ pub fn of_plan(
     statements: &Statements<PlanStatement, Contribution>,
     analysis: &PlanAnalysis,
     commands: &Commands,
-) -> Vec<String> {
+) -> Vec<Sentence> {
     let PlanStatement { errors, not_identifiable, determined_by_prior, .. } = &statements.good;
     let mut good = match not_identifiable.len() {
         0 if *errors == 1 => "The plan identifies its 1 error".to_string(),
         0 => format!("The plan identifies all of its {}", counted(*errors, "error")),
         _ => format!(
             "The plan does not identify {} of {}",
-            first(not_identifiable.iter().cloned(), "further error"),
+            first_of(not_identifiable, NAMED, ", ", "further error"),
             counted(*errors, "error")
         ),
     };
     if !determined_by_prior.is_empty() {
-        good += &format!(", {} by the set-up priors only", first(determined_by_prior.iter().cloned(), "further error"));
+        good += &format!(", {} by the set-up priors only", first_of(determined_by_prior, NAMED, ", ", "further error"));
     }
     let worst = analysis.worst();
     good += &worst.map_or(String::new(), |error| format!("; {}", worst_determined(error)));
@@ -173,7 +167,7 @@ pub fn of_plan(
             }
         ),
     };
-    let mut sentences = vec![good, format!("What to correct: {correct}")];
+    let mut sentences = vec![good.into(), format!("What to correct: {correct}").into()];
     sentences.extend(measure(&statements.measure, commands));
     sentences
 }
@@ -199,13 +193,13 @@ pub fn of_validation(
     statements: &Statements<ValidationStatement, MovedParameter>,
     outside: &[String],
     commands: &Commands,
-) -> Vec<String> {
+) -> Vec<Sentence> {
     let moved = statements
         .correct
         .iter()
         .map(|moved| format!("{} has moved by {}", moved.id, estimate(moved.value, moved.u, &moved.unit)));
     let correct = match (statements.correct.is_empty(), statements.good.verdict) {
-        (false, _) => first(moved, "further parameter"),
+        (false, _) => first_of(&moved.collect::<Vec<_>>(), NAMED, ", ", "further parameter"),
         (true, ValidationVerdict::Holds | ValidationVerdict::HoldsInRange) => {
             "nothing; no parameter has moved".to_string()
         }
@@ -213,13 +207,16 @@ pub fn of_validation(
             "no single parameter; the model lacks what these readings show".to_string()
         }
     };
-    let mut sentences = vec![format!("What to correct: {correct}")];
+    let mut sentences = vec![format!("What to correct: {correct}").into()];
     match statements.measure.step {
-        NextStep::WidenRange => sentences.push(format!(
-            "What to measure next: a session to identify from that covers the range of these readings ({})",
-            outside.join(", ")
-        )),
-        NextStep::Nothing => sentences.push("What to measure next: nothing; the model holds".to_string()),
+        NextStep::WidenRange => sentences.push(
+            format!(
+                "What to measure next: a session to identify from that covers the range of these readings ({})",
+                outside.join(", ")
+            )
+            .into(),
+        ),
+        NextStep::Nothing => sentences.push("What to measure next: nothing; the model holds".to_string().into()),
         _ => sentences.extend(measure(&statements.measure, commands)),
     }
     sentences
@@ -230,7 +227,7 @@ pub fn of_comparison(statements: &Statements<ComparisonStatement, Difference>) -
     let changed = statements.correct.iter().map(|d| format!("{} {}", d.id, estimate(d.value, d.u, &d.unit)));
     let correct = match statements.correct.is_empty() {
         true => "nothing; nothing differs significantly".to_string(),
-        false => first(changed, "further difference"),
+        false => first_of(&changed.collect::<Vec<_>>(), NAMED, ", ", "further difference"),
     };
     let next = match statements.measure.step {
         NextStep::Repeat => {
@@ -251,7 +248,7 @@ pub fn of_history(
     let out = &statements.good.out_of_control;
     let control = match out.len() {
         0 => "No machine is out of control".to_string(),
-        _ => format!("Out of control: {}", first(out.iter().cloned(), "further machine")),
+        _ => format!("Out of control: {}", first_of(out, NAMED, ", ", "further machine")),
     };
     let several = statements.good.machines > 1;
     let changed = statements.correct.iter().map(|changed| {
@@ -264,7 +261,7 @@ pub fn of_history(
     });
     let correct = match statements.correct.is_empty() {
         true => "nothing; no parameter drifts or has shifted".to_string(),
-        false => first(changed, "further parameter"),
+        false => first_of(&changed.collect::<Vec<_>>(), NAMED, ", ", "further parameter"),
     };
     let next = match check {
         Some((machine, when)) => format!("{machine}, whose next check is due {when}"),

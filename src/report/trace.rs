@@ -1,24 +1,23 @@
 //! The result of a trace: verdict, effects, the residual before and after, parameters that changed.
 
+use abbe::document::StatedTrace;
 use abbe::identify::IdentifyError;
 use abbe::identify::plan::candidate_tests;
-use abbe::identify::results::{
-    EffectResult, GoodnessVerdict, ModelResult, PriorResult, Statements, TraceResult, TraceVerdict,
-};
+use abbe::identify::results::{EffectResult, GoodnessVerdict, ModelResult, PriorResult, TraceResult, TraceVerdict};
 use abbe::identify::series::{spectrum, views};
 use abbe::identify::trace::TraceOutcome;
 use abbe::model::words::counted;
 
-use super::block::{KeyFigure, Level, Report, Text};
+use super::block::{KeyFigure, Level, Report, Sentence, Text};
 use super::commands::Commands;
 use super::effect::name;
-use super::fit::{Figures, noise as noise_in_words, rank};
+use super::fit::{Figures, rank};
 use super::number::{capitalised, integer, of_readings, p_value, quantity, unit, value_and_u};
 use super::parameters::Estimates;
 use super::quality::{self, Quality, noise_sentence};
 use super::session::plots::SessionPlots;
 use super::session::{self, residuals};
-use super::statements;
+use super::statements::{self, IDENTIFIES};
 use super::table::{Cell, Table, cells, numbers, words};
 use super::{conformity, confounded, cross_validation, effects, plausibility, uniqueness};
 
@@ -29,26 +28,33 @@ const MAX_NAMED: usize = 3;
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn report(trace: &TraceOutcome, commands: &Commands, figures: bool) -> Result<Report, IdentifyError> {
-    let result = &trace.result;
+pub fn report(
+    trace: &TraceOutcome,
+    stated: &StatedTrace<'_>,
+    commands: &Commands,
+    figures: bool,
+) -> Result<Report, IdentifyError> {
+    let (result, statements) = (stated.result, &stated.statements);
     let problem = &trace.after;
     let mut report = Report::new(format!("Trace of {}", problem.session.machine.name));
     report.warnings.clone_from(&result.warnings);
     report.method = method(result);
     report.values = values(result);
-    let statements = Statements::of_trace(&trace.after, result);
-    let mut sentences = vec![verdict(result)];
-    sentences.extend(uniqueness::headline(result).map(|headline| format!("{}.", capitalised(&headline))));
-    sentences.extend(plausibility::headline(&result.plausibility));
-    sentences.extend(conformity::failed(result.conformity.as_ref()));
-    sentences.extend(statements::opening(&statements, result.after.degrees_of_freedom, commands));
-    sentences.push(format!(
-        "{}, {}; {} of {} detectable.",
-        counted(result.readings, "reading"),
-        noise(result),
-        result.candidates_detectable,
-        counted(result.candidates, "candidate")
-    ));
+    let mut sentences = vec![Sentence::Words(verdict(result))];
+    sentences.extend(uniqueness::headline(result).map(|headline| format!("{}.", capitalised(&headline)).into()));
+    sentences.extend(plausibility::headline(&result.plausibility).map(Sentence::from));
+    sentences.extend(conformity::failed(result.conformity.as_ref()).map(Sentence::from));
+    sentences.extend(statements::opening(statements, result.after.degrees_of_freedom, commands));
+    sentences.push(
+        format!(
+            "{}, {}; {} of {} detectable.",
+            counted(result.readings, "reading"),
+            noise(result),
+            result.candidates_detectable,
+            counted(result.candidates, "candidate")
+        )
+        .into(),
+    );
     report.opening(result.verdict.to_string(), sentences);
     let [before, after] = [&result.before, &result.after].map(|model| quality(result, model));
     report.key(key_figures(trace, &before, &after));
@@ -65,7 +71,7 @@ pub fn report(trace: &TraceOutcome, commands: &Commands, figures: bool) -> Resul
     let heading =
         "Changed by more than their standard uncertainty when the effects were added (bias of the declared model):";
     report.headed(Level::Key, heading, changed);
-    report.detail(statements::corrections(&statements));
+    report.detail(statements::corrections(statements));
     estimates.set_up(&mut report, earlier);
     effects::section(&mut report, trace);
     report.section("Before and after");
@@ -223,8 +229,7 @@ fn next(trace: &TraceOutcome, commands: &Commands) -> Vec<(String, String)> {
         step(commands.command("trace", &format!("--write {written}")), &purpose);
     }
     if !result.unobservable.is_empty() && candidate_tests::has_candidates(&trace.after) {
-        let purpose = "propose the test that makes the confounded parameters identifiable";
-        step(commands.command("plan", "--improve"), purpose);
+        step(commands.command("plan", "--improve"), &format!("propose the test that {IDENTIFIES}"));
     }
     steps
 }
@@ -232,7 +237,7 @@ fn next(trace: &TraceOutcome, commands: &Commands) -> Vec<(String, String)> {
 /// The noise and its source in words. A residual is not called noise.
 fn noise(result: &TraceResult) -> String {
     if result.noise_source.judges() || result.effects.is_empty() {
-        return noise_in_words(result.noise_um, result.reading_unit, result.noise_source);
+        return quality::noise(result.noise_um, result.reading_unit, result.noise_source);
     }
     format!(
         "residual of the declared model {}, with the effects {} (no noise stated, no repeats)",

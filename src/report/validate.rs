@@ -1,6 +1,6 @@
 //! A validated model: verdict, residuals of each machine, moved parameters, share of each effect.
 
-use abbe::identify::results::Statements;
+use abbe::document::StatedValidation;
 use abbe::identify::validate::results::RmsResult;
 use abbe::identify::validate::{Validation, ValidationResult, ValidationVerdict};
 use abbe::model::session::Session;
@@ -25,14 +25,20 @@ const METHOD: &str = "The errors of the machine are those of the saved model. On
      readings, and no parameter has moved (generalised least squares, 0.5 % over all parameters, Bonferroni).";
 
 /// The report of a validation.
-pub fn report(session: &Session, validation: &Validation, commands: &Commands) -> Report {
-    let result = &validation.result;
+pub fn report(
+    session: &Session,
+    validation: &Validation,
+    stated: &StatedValidation<'_>,
+    commands: &Commands,
+) -> Report {
+    let result = stated.result;
     let mut report = Report::new(format!("Validation of a model of {}", session.machine.name));
     report.warnings.clone_from(&result.warnings);
     report.method = METHOD.to_string();
     let sentence = format!("{}.", capitalised(&sentence(result)));
-    let statements = statements::of_validation(&Statements::of_validation(result), &result.outside, commands);
-    let sentences = std::iter::once(sentence).chain(statements).chain([format!("{}.", readings(result))]);
+    let statements = statements::of_validation(&stated.statements, &result.outside, commands);
+    let readings = format!("{}.", readings(result));
+    let sentences = std::iter::once(sentence.into()).chain(statements).chain([readings.into()]);
     report.opening(result.verdict.to_string(), sentences);
     report.key(key_figures(result));
     report.section("Residuals");

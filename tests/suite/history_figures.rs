@@ -179,6 +179,7 @@ fn figures_of_parameters_follow_from_least_squares() {
             let normal = Normal::standard().sf((value / u).abs()) * 2.0;
             assert!(step.p_value >= 0.999 * normal && step.p_value <= own * 1.001, "{normal} {} {own}", step.p_value);
         }
+        check_line(&machine, one, k, &terms[k]);
         check_points(&machine, one, k, &terms[k]);
         check_due(&machine, one, k, &terms[k]);
     }
@@ -192,6 +193,27 @@ fn figures_of_parameters_follow_from_least_squares() {
     assert_eq!(found.out_of_control.iter().collect::<Vec<_>>(), out);
     // The drift is out of control, what stands still after its step is not.
     assert!(out.contains(&&"EY0C".to_string()) && !out.contains(&&"EA0C".to_string()), "{out:?}");
+}
+
+/// The line of a figure is level, drift and steps at each session, with both values where it steps.
+fn check_line(machine: &MachineSessions, one: &ParameterHistory, k: usize, terms: &Terms) {
+    let mut line = one.modelled().into_iter();
+    for (session, point) in machine.sessions.iter().enumerate().filter(|(_, session)| session.values[k].is_some()) {
+        let drift = one.drift_per_year.map_or(0.0, |drift| drift.value) * (point.days - mean_day(machine, k)) / YEAR;
+        let steps = |until: usize| -> f64 {
+            one.steps.iter().zip(&terms.steps).filter(|(_, at)| **at <= until).map(|(step, _)| step.value).sum()
+        };
+        let mut values = vec![steps(session)];
+        if terms.steps.contains(&session) {
+            values.insert(0, steps(session - 1));
+        }
+        for value in values {
+            let (days, found) = line.next().unwrap();
+            assert_eq!(days, point.days);
+            near(found, one.level.unwrap().value + drift + value, &format!("the line of {}", one.id));
+        }
+    }
+    assert_eq!(line.next(), None);
 }
 
 /// Charts by their definitions, with the uncertainties enlarged: from the weighted mean of the first six sessions after

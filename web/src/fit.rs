@@ -1,8 +1,7 @@
 //! A fit.
 
-use abbe::document::Stated;
+use abbe::document::StatedFit;
 use abbe::identify::fit::SessionFit;
-use abbe::identify::results::Statements;
 use abbe::report::block::Report;
 use abbe::report::commands::Commands;
 use abbe::report::{self, readings};
@@ -35,8 +34,7 @@ impl Fit {
 
     /// The document of `--json`.
     pub fn json(&self) -> Result<String, Failed> {
-        let stated = Stated::new(&self.fit.result, Statements::of_fit(&self.fit.problem, &self.fit.result));
-        output::json("fit", &self.read, self.seed, &stated)
+        output::json("fit", &self.read, self.seed, &StatedFit::of_fit(&self.fit.problem, &self.fit.result))
     }
 
     /// The page of `--report`.
@@ -64,6 +62,6 @@ impl Fit {
     fn found(&self, figures: bool) -> Result<Report, Failed> {
         let commands = Commands::of(&self.read.sources.file, None, false);
         let SessionFit { problem, fit, result, .. } = &self.fit;
-        Ok(report::fit::report(problem, fit, result, &commands, figures)?)
+        Ok(report::fit::report(problem, fit, &StatedFit::of_fit(problem, result), &commands, figures)?)
     }
 }

@@ -4,6 +4,7 @@ use std::cell::OnceCell;
 
 use abbe::codegen::print::{LATEX, Numbering, Style};
 use abbe::codegen::{Equation, Options, Order, SessionTest, Symbols, check};
+use abbe::document::StatedPlan;
 use abbe::equation::EquationParameters;
 use abbe::identify::parameters::Role;
 use abbe::identify::plan::criterion::Goal;
@@ -168,7 +169,8 @@ impl Plan {
     /// If the model cannot be evaluated.
     pub fn analysis(&self) -> Result<String, Failed> {
         let analysis = plan::analyse(&self.read.session, &options())?;
-        Ok(serde_json::to_string(&analysis).map_err(|fault| fault.to_string())?)
+        let stated = StatedPlan::of_plan(&self.problem, &analysis);
+        Ok(serde_json::to_string(&stated).map_err(|fault| fault.to_string())?)
     }
 
     /// The proposal of `abbe plan --improve`, as JSON.

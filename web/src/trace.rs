@@ -1,8 +1,7 @@
 //! A trace.
 
-use abbe::document::Stated;
+use abbe::document::StatedTrace;
 use abbe::identify::plan::test_variations::TestVariations;
-use abbe::identify::results::Statements;
 use abbe::identify::separating_tests::separate_aliases;
 use abbe::identify::trace::{self, Progress, TraceOptions, TraceOutcome};
 use abbe::model::words::counted;
@@ -41,8 +40,7 @@ impl Trace {
 
     /// The document of `--json`.
     pub fn json(&self) -> Result<String, Failed> {
-        let stated = Stated::new(&self.trace.result, Statements::of_trace(&self.trace.after, &self.trace.result));
-        output::json("trace", &self.read, self.seed, &stated)
+        output::json("trace", &self.read, self.seed, &StatedTrace::of_trace(&self.trace))
     }
 
     /// The page of `--report`.
@@ -79,7 +77,7 @@ impl Trace {
 impl Trace {
     fn found(&self, figures: bool) -> Result<Report, Failed> {
         let commands = Commands::of(&self.read.sources.file, None, false);
-        Ok(report::trace::report(&self.trace, &commands, figures)?)
+        Ok(report::trace::report(&self.trace, &StatedTrace::of_trace(&self.trace), &commands, figures)?)
     }
 }
 

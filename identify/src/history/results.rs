@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::DAYS_PER_YEAR;
 use super::events::ChangeEvent;
 
 /// The parameters of machines over time.
@@ -102,6 +103,24 @@ pub struct ParameterHistory {
 }
 
 impl ParameterHistory {
+    /// Level, drift and steps at each session: days and value. In front of a session with a step stands the value without
+    /// it.
+    pub fn modelled(&self) -> Vec<(f64, f64)> {
+        let middle = self.points.iter().map(|point| point.days).sum::<f64>() / self.points.len().max(1) as f64;
+        let level = self.level.map_or(0.0, |level| level.value);
+        let drift = self.drift_per_year.map_or(0.0, |drift| drift.value);
+        let value = |days: f64| {
+            let steps = self.steps.iter().filter(|step| step.before_days <= days).map(|step| step.value);
+            level + drift * (days - middle) / DAYS_PER_YEAR + steps.sum::<f64>()
+        };
+        let at = |point: &PointResult| {
+            let step = self.steps.iter().find(|step| step.before_days == point.days);
+            let before = step.map(|step| (point.days, value(point.days) - step.value));
+            before.into_iter().chain([(point.days, value(point.days))])
+        };
+        self.points.iter().flat_map(at).collect()
+    }
+
     /// Whether the latest session is out of control.
     pub fn is_out_of_control(&self) -> bool {
         self.points.last().is_some_and(|last| last.out_of_control)

@@ -19,6 +19,7 @@ mod tracing;
 
 use abbe_model::session::Prior;
 
+use abbe_model::words::first_of;
 pub use pulls::{Pull, Pulls};
 pub use results::{Conflict, ConflictKind, Plausibility, Suggestion, SuggestionKind};
 pub(crate) use tracing::{is_another_session, with_set_ups_freed};
@@ -118,12 +119,8 @@ pub fn warnings(plausibility: &Plausibility) -> Vec<String> {
     let parameters: Vec<&str> =
         (conflicts.iter().filter(is_parameter)).map(|conflict| conflict.words.as_str()).collect();
     if !parameters.is_empty() {
-        let named = parameters[..parameters.len().min(MAX_NAMED)].join("; ");
-        let others = match parameters.len().saturating_sub(MAX_NAMED) {
-            0 => String::new(),
-            n => format!("; and {n} more"),
-        };
-        told.push(format!("the readings contradict the stated set-up: {named}{others}"));
+        let named = first_of(&parameters, MAX_NAMED, "; ", "");
+        told.push(format!("the readings contradict the stated set-up: {named}"));
     }
     if let (Some(last), Some(words)) = (told.last_mut(), in_words(&plausibility.suggestions)) {
         *last = format!("{last}; {words}");

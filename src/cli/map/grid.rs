@@ -9,13 +9,7 @@ use crate::cli::values;
 
 /// Positions of each axis, mm or rad.
 pub fn grid(machine: &Machine, places: usize, axes: &[String]) -> Result<Vec<Vec<f64>>, Failure> {
-    if places > volumetric::MAX_POINTS {
-        return Err(Failure::Other(format!(
-            "--places {}: a map has at most {} places",
-            places,
-            volumetric::MAX_POINTS
-        )));
-    }
+    values::count("--places", "places", places, volumetric::MAX_POINTS)?;
     let mut wanted: Vec<Option<(char, f64)>> = vec![None; machine.axes.len()];
     for text in axes {
         let fault = || {
@@ -46,12 +40,8 @@ pub fn grid(machine: &Machine, places: usize, axes: &[String]) -> Result<Vec<Vec
     }
     let along = |axis: usize| -> Result<Vec<f64>, Failure> {
         let body = &machine.axes[axis];
-        let inside = |q: f64| match body.kind {
-            AxisKind::Linear => q,
-            AxisKind::Rotary => q.to_radians(),
-        };
         let count = match wanted[axis] {
-            Some(('=', at)) => return Ok(vec![inside(at)]),
+            Some(('=', at)) => return Ok(vec![body.kind.to_internal(at)]),
             Some((_, count)) => count as usize,
             None => places,
         };
@@ -66,7 +56,6 @@ pub fn grid(machine: &Machine, places: usize, axes: &[String]) -> Result<Vec<Vec
             }
         };
         Ok(match count {
-            0 => return Err(Failure::Other("--places 0: a map has at least one place".into())),
             1 => vec![0.5 * (least + greatest)],
             _ => (0..count).map(|k| least + (greatest - least) * k as f64 / (count - 1) as f64).collect(),
         })

@@ -14,20 +14,8 @@ use abbe::model::session::Session;
 use super::PaperArguments;
 use crate::cli::failure::Failure;
 use crate::report::paper::contents::{self, Study};
-use crate::report::paper::{Part, comparison, methods};
+use crate::report::paper::{Part, SUBJECTS, Subject, comparison, methods};
 
-/// The parts of a paper, in their order.
-pub const PARTS: [&str; 9] = [
-    "methods",
-    "set-up",
-    "sensitivity",
-    "uncertainty",
-    "correlation",
-    "identifiability",
-    "bias",
-    "comparison",
-    "trace",
-];
 /// Effects of the bias table where none are named.
 const BIASING_EFFECTS: usize = 12;
 
@@ -56,32 +44,32 @@ fn named(problem: &Problem, ids: &[String]) -> Result<Vec<Effect>, Failure> {
 pub fn parts(arguments: &PaperArguments, studies: &[Study]) -> Result<Vec<Part>, Failure> {
     let study = &studies[0];
     let mut sections = Vec::new();
-    for part in PARTS {
-        let is_named = arguments.parts.iter().any(|named| named == part);
+    for (word, subject) in SUBJECTS {
+        let is_named = arguments.parts.contains(subject);
         if !arguments.parts.is_empty() && !is_named {
             continue;
         }
-        let section = match part {
-            "methods" => Some(methods::part(study)),
-            "set-up" => Some(contents::set_up(study)),
-            "sensitivity" => Some(contents::sensitivity(study)?),
-            "uncertainty" => Some(contents::uncertainty(study)),
-            "correlation" => Some(contents::correlation(study)),
-            "identifiability" => Some(contents::identifiability(study)),
-            "bias" => Some(contents::bias(study)),
-            "comparison" => (studies.len() > 1).then(|| comparison::part(studies)),
-            _ => contents::trace(study)?,
+        let section = match subject {
+            Subject::Methods => Some(methods::part(study)),
+            Subject::SetUp => Some(contents::set_up(study)),
+            Subject::Sensitivity => Some(contents::sensitivity(study)?),
+            Subject::Uncertainty => Some(contents::uncertainty(study)),
+            Subject::Correlation => Some(contents::correlation(study)),
+            Subject::Identifiability => Some(contents::identifiability(study)),
+            Subject::Bias => Some(contents::bias(study)),
+            Subject::Comparison => (studies.len() > 1).then(|| comparison::part(studies)),
+            Subject::Trace => contents::trace(study)?,
         };
         match section {
             Some(section) => sections.push(section),
-            None if is_named && part == "comparison" => {
+            None if is_named && *subject == Subject::Comparison => {
                 return Err(Failure::CommandLine(
                     "`--parts comparison` needs at least two sessions; name another".into(),
                 ));
             }
             None if is_named => {
                 return Err(Failure::Other(format!(
-                    "`--parts {part}`: {} has no readings; name a measured session, or leave the part out",
+                    "`--parts {word}`: {} has no readings; name a measured session, or leave the part out",
                     arguments.sessions[0].display()
                 )));
             }

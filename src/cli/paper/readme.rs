@@ -6,7 +6,7 @@ use abbe::model::session::Session;
 use super::PaperArguments;
 use crate::cli::failure::Failure;
 use crate::report::block::Body;
-use crate::report::paper::Part;
+use crate::report::paper::{Part, Subject};
 use crate::report::provenance::Provenance;
 
 /// The commands that make the folder and its results again, and the files that were read.
@@ -29,11 +29,11 @@ pub fn readme(
     text.push_str("## Results\n\n| part | files | command |\n|---|---|---|\n");
     let first = arguments.sessions[0].display();
     for section in sections {
-        let command = match section.name {
-            "sensitivity" => format!("abbe plan {first} --all --patterns patterns.csv"),
-            "trace" => format!("abbe fit {first} --all --residuals residuals.csv --plots plots"),
-            "methods" if section.report.blocks.len() > 3 => format!("abbe fit {first} --json fit.json"),
-            "bias" => format!("abbe paper {first} --out bias --parts bias"),
+        let command = match section.subject {
+            Subject::Sensitivity => format!("abbe plan {first} --all --patterns patterns.csv"),
+            Subject::Trace => format!("abbe fit {first} --all --residuals residuals.csv --plots plots"),
+            Subject::Methods if section.report.blocks.len() > 3 => format!("abbe fit {first} --json fit.json"),
+            Subject::Bias => format!("abbe paper {first} --out bias --parts bias"),
             _ => format!("abbe plan {first} --all --json plan.json"),
         };
         let files = section.report.blocks.iter().filter_map(|block| match &block.body {
@@ -42,7 +42,7 @@ pub fn readme(
             _ => None,
         });
         let files = files.collect::<Vec<_>>().join(", ");
-        text.push_str(&format!("| {} | {files} | `{command}` |\n", section.name));
+        text.push_str(&format!("| {} | {files} | `{command}` |\n", section.subject.word()));
     }
     text.push_str(
         "\nEach table is there for LaTeX, Typst and as CSV. Each figure is there as PDF, as SVG, and its data as CSV, which \

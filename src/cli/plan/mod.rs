@@ -7,11 +7,10 @@ mod overrides;
 mod patterns;
 mod poses;
 
-use abbe::document::Stated;
+use abbe::document::StatedPlan;
 use abbe::identify::plan::next_test::NextTest;
 use abbe::identify::plan::range::shrinkages;
 use abbe::identify::plan::{self, PlanOptions};
-use abbe::identify::results::Statements;
 use clap::Args;
 
 use self::overrides::positive;
@@ -112,7 +111,7 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
         analysis.warnings.extend(clearance::faults(&session, sizes)?);
     }
     let commands = arguments.session.commands();
-    let report = report::plan::analysis::report(&problem, &analysis, &commands, common.output.figures())?;
-    let stated = Stated::new(&analysis, Statements::of_plan(&problem, &analysis));
+    let stated = StatedPlan::of_plan(&problem, &analysis);
+    let report = report::plan::analysis::report(&problem, &stated, &commands, common.output.figures())?;
     common.output.put(&outputs, &report, &stated, &read)
 }

@@ -8,7 +8,7 @@ pub mod layout;
 pub mod typst;
 
 use super::csv;
-use crate::report::block::{BIBLIOGRAPHY, Block, Body, Formula, Level, Text};
+use crate::report::block::{BIBLIOGRAPHY, Block, Body, Formula, Level, Sentence, Text};
 use crate::report::figure::{self, Figure, file_name, svg};
 use crate::report::paper::Part;
 use crate::report::table::Table;
@@ -72,9 +72,9 @@ pub fn files(title: &str, summary: &str, parts: &[Part], layout: Layout) -> Resu
                     }
                 }
             }
-            files.push((format!("sections/{}.{extension}", part.name), text.into_bytes()));
+            files.push((format!("sections/{}.{extension}", part.subject.word()), text.into_bytes()));
         }
-        let names: Vec<String> = parts.iter().map(|part| format!("sections/{}", part.name)).collect();
+        let names: Vec<String> = parts.iter().map(|part| format!("sections/{}", part.subject.word())).collect();
         files.push((format!("main.{extension}"), printer.main(title, summary, &names, layout).into_bytes()));
     }
     files.push(("refs.bib".into(), BIBLIOGRAPHY.as_bytes().to_vec()));
@@ -84,7 +84,13 @@ pub fn files(title: &str, summary: &str, parts: &[Part], layout: Layout) -> Resu
 /// A text as paragraphs.
 fn sentences(text: &Text) -> Vec<String> {
     match text {
-        Text::Opening { sentences, .. } => sentences.clone(),
+        Text::Opening { sentences, .. } => sentences
+            .iter()
+            .map(|sentence| match sentence {
+                Sentence::Words(words) => words.clone(),
+                Sentence::Command(command, purpose) => format!("`{command}` {purpose}"),
+            })
+            .collect(),
         Text::Section(words)
         | Text::Heading(words)
         | Text::Fold(words)
@@ -102,6 +108,7 @@ fn sentences(text: &Text) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::report::block::Report;
+    use crate::report::paper::Subject;
     use crate::report::table::cells;
 
     fn sample() -> Table {
@@ -132,7 +139,7 @@ mod tests {
         let mut report = Report::new("Bias");
         report.key("50 % of A_B [@jcgm100]");
         report.key(sample().named("t 1"));
-        let files = files("50 % & more", "none", &[Part { name: "bias", report }], layout).unwrap();
+        let files = files("50 % & more", "none", &[Part { subject: Subject::Bias, report }], layout).unwrap();
         let text = |name: &str| {
             let (_, bytes) = files.iter().find(|(file, _)| file == name).unwrap();
             String::from_utf8(bytes.clone()).unwrap()

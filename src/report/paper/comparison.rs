@@ -1,7 +1,7 @@
 //! Several plans side by side: predicted uncertainties, ranks and observability indices.
 
-use super::Part;
 use super::contents::Study;
+use super::{Part, Subject};
 use crate::report::block::Report;
 use crate::report::number::{three_digits, unit};
 use crate::report::table::{Align, Cell, Column, Table, cells};
@@ -15,7 +15,7 @@ pub fn part(studies: &[Study]) -> Part {
     report.key(text);
     report.key(uncertainties(studies).named("comparison-uncertainty"));
     report.key(indices(studies).named("comparison-indices"));
-    Part { name: "comparison", report }
+    Part { subject: Subject::Comparison, report }
 }
 
 fn column(study: &Study) -> Column {

@@ -9,7 +9,7 @@ use abbe::identify::problem::Problem;
 use abbe::identify::series::{paths, views};
 use abbe::model::words::counted;
 
-use super::Part;
+use super::{Part, Subject};
 use crate::report::block::{Formula, Report};
 use crate::report::figure::bars::{Bars, Fill};
 use crate::report::figure::{Chart, Figure, Quantity, set_up};
@@ -64,7 +64,7 @@ pub fn set_up(study: &Study) -> Part {
     });
     let tests = Table::new(["test", "set-up", ">readings", ">movement, min"], rows);
     report.key(tests.titled("Tests").named("tests"));
-    Part { name: "set-up", report }
+    Part { subject: Subject::SetUp, report }
 }
 
 /// Sensitivity curves, trace patterns, and the coefficients.
@@ -80,21 +80,21 @@ pub fn sensitivity(study: &Study) -> Result<Part, IdentifyError> {
     let mut report = Report::new("Sensitivity");
     plan::sensitivity(&mut report, &study.analysis.errors);
     report.figures(figures.into_iter().take(MAX_FIGURES));
-    Ok(Part { name: "sensitivity", report })
+    Ok(Part { subject: Subject::Sensitivity, report })
 }
 
 /// Predicted uncertainties and their budgets.
 pub fn uncertainty(study: &Study) -> Part {
     let mut report = Report::new("Predicted uncertainty");
     plan::uncertainty(&mut report, &study.analysis.errors);
-    Part { name: "uncertainty", report }
+    Part { subject: Subject::Uncertainty, report }
 }
 
 /// Correlation of the errors.
 pub fn correlation(study: &Study) -> Part {
     let mut report = Report::new("Correlation");
     plan::correlations(&mut report, &study.analysis);
-    Part { name: "correlation", report }
+    Part { subject: Subject::Correlation, report }
 }
 
 /// Ranks, singular values, null space, base parameters and observability indices.
@@ -137,7 +137,7 @@ pub fn identifiability(study: &Study) -> Part {
         text: "O4 = σm² / σ1,  O5 = (1/σ1 + ⋯ + 1/σm)⁻¹",
     });
     report.key(indices(&analysis.indices).named("observability"));
-    Part { name: "identifiability", report }
+    Part { subject: Subject::Identifiability, report }
 }
 
 fn ranks(structure: &Structure) -> Table {
@@ -229,7 +229,7 @@ pub fn bias(study: &Study) -> Part {
     let caption = "Bias of each error per unit of an undeclared effect; root mean square of the signal in the readings and of \
                    what remains of it in the residual";
     report.key(Table::new(columns, rows).titled(caption).named("bias"));
-    Part { name: "bias", report }
+    Part { subject: Subject::Bias, report }
 }
 
 /// Estimates, and traces before and after. `None` without readings.
@@ -251,5 +251,5 @@ pub fn trace(study: &Study) -> Result<Option<Part>, IdentifyError> {
         None => plots.residuals(number),
     });
     report.figures(figures.take(MAX_FIGURES));
-    Ok(Some(Part { name: "trace", report }))
+    Ok(Some(Part { subject: Subject::Trace, report }))
 }

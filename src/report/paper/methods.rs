@@ -5,8 +5,8 @@ use abbe::identify::parameters::Role;
 use abbe::model::instrument::InstrumentKind;
 use abbe::model::words::counted;
 
-use super::Part;
 use super::contents::Study;
+use super::{Part, Subject};
 use crate::report::block::Report;
 use crate::report::number::of_readings;
 
@@ -42,7 +42,7 @@ pub fn part(study: &Study) -> Part {
             result.birge_ratio,
         ));
     }
-    Part { name: "methods", report }
+    Part { subject: Subject::Methods, report }
 }
 
 fn machine(study: &Study) -> String {

@@ -1,10 +1,10 @@
 //! The report of an analysed plan, and the sections that a paper shares with it.
 
+use abbe::document::StatedPlan;
 use abbe::identify::IdentifyError;
 use abbe::identify::plan::candidate_tests;
 use abbe::identify::plan::results::{ErrorAnalysis, PlanAnalysis};
 use abbe::identify::problem::Problem;
-use abbe::identify::results::Statements;
 use abbe::model::words::counted;
 
 use super::{
@@ -15,8 +15,8 @@ use crate::report::commands::Commands;
 use crate::report::confounded::{BY_PRIOR, by_prior};
 use crate::report::figure::bars::{Bars, Fill};
 use crate::report::figure::{Chart, Figure, Quantity};
-use crate::report::fit::noise;
 use crate::report::number::{integer, of_readings, three_digits, unit, units, with_symbols};
+use crate::report::quality::noise;
 use crate::report::session::{correlation_map, model};
 use crate::report::statements;
 
@@ -31,10 +31,11 @@ const MAX_CORRELATED: usize = 40;
 /// If the model cannot be evaluated.
 pub fn report(
     problem: &Problem,
-    analysis: &PlanAnalysis,
+    stated: &StatedPlan<'_>,
     commands: &Commands,
     figures: bool,
 ) -> Result<Report, IdentifyError> {
+    let analysis = stated.result;
     let mut report = Report::new(format!("Plan for {}", problem.session.machine.name));
     report.warnings.clone_from(&analysis.warnings);
     report.method = format!(
@@ -44,8 +45,8 @@ pub fn report(
         of_readings(analysis.noise_um, analysis.reading_unit),
         analysis.noise_source
     );
-    let statements = statements::of_plan(&Statements::of_plan(problem, analysis), analysis, commands);
-    report.opening("", statements.into_iter().chain([extent(analysis)]));
+    let statements = statements::of_plan(&stated.statements, analysis, commands);
+    report.opening("", statements.into_iter().chain([extent(analysis).into()]));
     report.key(key_figures(problem, analysis));
     report.section("Predicted uncertainty");
     uncertainty(&mut report, &analysis.errors);

@@ -2,6 +2,7 @@
 
 use abbe::identify::plan::effects::confounded_by_error;
 use abbe::identify::plan::results::{Detectability, EffectDetectability, EffectsAnalysis};
+use abbe::model::words::first_of;
 
 use super::optional;
 use crate::report::number::{three_digits, unit};
@@ -57,14 +58,9 @@ pub fn by_error(found: &EffectsAnalysis) -> Table {
     let rows = confounded_by_error(found).into_iter().map(|(error, effects)| {
         let named: Vec<String> = effects
             .iter()
-            .take(MAX_CONFOUNDED)
             .map(|(id, per_unit, name)| format!("{id} {} {}", three_digits(*per_unit), unit(name)))
             .collect();
-        let more = match effects.len().saturating_sub(MAX_CONFOUNDED) {
-            0 => String::new(),
-            more => format!(", {more} more"),
-        };
-        cells![error, format!("{}{more}", named.join(", "))]
+        cells![error, first_of(&named, MAX_CONFOUNDED, ", ", "")]
     });
     Table::new(["error", "effects"], rows).titled("Effects confounded with each error, the largest bias first")
 }

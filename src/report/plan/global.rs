@@ -5,8 +5,8 @@ use abbe::identify::unit::ReadingUnit;
 use abbe::model::session::Session;
 
 use crate::report::block::Report;
-use crate::report::fit::noise;
 use crate::report::number::{three_digits, unit};
+use crate::report::quality::noise;
 use crate::report::table::{Cell, Table, cells};
 
 /// Total indices below this value are not listed, unless the linear share is above it; the JSON lists all.
