@@ -7,7 +7,7 @@ use abbe::model::words::first_of;
 use super::number::of_readings;
 
 /// Maximum number of tests that a sentence names.
-const MAX_NAMED: usize = 4;
+const MAX_NAMED: usize = 5;
 
 /// A held-out error with its name: rms over scalar readings, and rms length of the vector, µm.
 pub struct HeldOutFigure {

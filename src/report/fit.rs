@@ -9,7 +9,6 @@ use abbe::identify::problem::Problem;
 use abbe::identify::results::{CrossValidation, FitMonteCarlo, FitResult, NextStep, ParameterResult, Verdict};
 use abbe::identify::series::{spectrum, views};
 use abbe::identify::tolerance::Conformity;
-use abbe::identify::unit::ReadingUnit;
 use abbe::model::words::counted;
 
 use super::block::{Level, Report, Sentence, Text};

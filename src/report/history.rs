@@ -6,7 +6,7 @@ use abbe::fleet::date::date;
 use abbe::fleet::history::{FleetHistory, HistoryStatements, NotUsed};
 use abbe::identify::history::chart::{EWMA_LIMIT, SHEWHART_LIMIT};
 use abbe::identify::history::events::Kind;
-use abbe::identify::history::results::{Due, MachineHistory, ParameterHistory};
+use abbe::identify::history::results::{Due, Estimate, MachineHistory, ParameterHistory};
 use abbe::identify::tolerance::rule::Decision;
 use abbe::model::words::{counted, first_of};
 
@@ -17,7 +17,7 @@ use super::figure::scale::{Scale, span};
 use super::figure::{Chart, Figure};
 use super::number::unit;
 use super::statements;
-use super::table::{Cell, Table, cells};
+use super::table::{Cell, Table, cells, numbers, words};
 
 /// Method of a history.
 const METHOD: &str = "A parameter over time has a level, perhaps a drift, and steps. A drift, a step and a pair of steps \
@@ -43,6 +43,7 @@ pub fn fleet(stated: &StatedHistory<'_>) -> Report {
     let all = &found.history.machines;
     let mut report = Report::new("History of the fleet");
     report.method = METHOD.to_string();
+    report.values = values(all);
     let (drifts, changes) = (drifts(all), changes(all));
     report.opening("", std::iter::once(format!("{}.", headline(found))).chain(opening(&stated.statements, all)));
     report.key(vec![
@@ -67,6 +68,7 @@ pub fn machine(machine: &MachineHistory, statements: &HistoryStatements, conform
     let changed = machine.parameters.iter().filter(|parameter| has_changed(parameter)).count();
     let mut report = Report::new(format!("History of {}", machine.machine_id));
     report.method = METHOD.to_string();
+    report.values = values(own);
     let headline = format!("{changed} of {} parameters have changed.", machine.parameters.len());
     report.opening("", std::iter::once(headline).chain(opening(statements, own)));
     report.key(vec![
@@ -90,6 +92,44 @@ pub fn machine(machine: &MachineHistory, statements: &HistoryStatements, conform
     report.section("Control charts");
     report.figures(machine.parameters.iter().map(|parameter| control_chart(machine, parameter)));
     report
+}
+
+/// The figures of each parameter with all their digits, one row each.
+fn values(machines: &[MachineHistory]) -> Table {
+    let all = machines.iter().flat_map(|machine| machine.parameters.iter().map(move |one| (machine, one)));
+    let rows = all.flat_map(|(machine, one)| {
+        let row = move |quantity: &str, days: Option<f64>, value: f64, u: Option<f64>, unit: &str| {
+            let u = u.map_or_else(|| Cell::from(""), Cell::exact);
+            let day = days.map_or(String::new(), date);
+            cells![machine.machine_id.clone(), one.id.clone(), quantity, day, Cell::exact(value), u, unit]
+        };
+        let term = |quantity, days, value: Estimate| row(quantity, days, value.value, Some(value.u), &one.unit);
+        let drift = one
+            .drift_per_year
+            .map(|drift| row("drift", None, drift.value, Some(drift.u), &format!("{}/year", one.unit)));
+        let steps = one
+            .steps
+            .iter()
+            .map(|step| term("step", Some(step.before_days), Estimate { value: step.value, u: step.u }));
+        let sessions = one
+            .points
+            .iter()
+            .map(|point| term("session", Some(point.days), Estimate { value: point.value, u: point.u }));
+        let mut rows: Vec<Vec<Cell>> =
+            one.level.map(|level| term("level", None, level)).into_iter().chain(drift).collect();
+        rows.extend(steps.chain(sessions));
+        rows.extend(
+            [("p-value", one.p_value), ("scatter", one.scatter_ratio), ("enlargement of u", one.u_enlargement)]
+                .map(|(quantity, value)| row(quantity, None, value, None, "1")),
+        );
+        rows.extend(
+            one.due_days
+                .map(|days| cells![machine.machine_id.clone(), one.id.clone(), "next check", date(days), "", "", ""]),
+        );
+        rows
+    });
+    let columns = ["machine", "parameter", "quantity", "date"].map(words).into_iter();
+    Table::new(columns.chain(["value", "u"].map(numbers)).chain([words("unit")]), rows.collect::<Vec<_>>())
 }
 
 fn section(report: &mut Report, heading: &str, table: Table, none: &str) {

@@ -25,7 +25,23 @@ fn one_machine_has_the_history_that_it_has_in_the_fleet() {
         format!("serial_number = \"M{}\"\nsession_id = \"{}\"\ndate = 2026-{:02}-05", k % 2, k / 2, k / 2 + 1)
     });
     run(&place, "--no-trace");
-    let (all, one) = (history(&place, ""), history(&place, "--machine M1"));
+    let (all, one) = (history(&place, "--csv all.csv"), history(&place, "--machine M1"));
+    // A history without a change has its figures in CSV too, with all their digits.
+    let csv = read(&place.at("all.csv"));
+    assert!(csv.starts_with("machine,parameter,quantity,date,value,u,unit\n"), "{csv}");
+    for machine in all["machines"].as_array().unwrap() {
+        for parameter in machine["parameters"].as_array().unwrap() {
+            let start = format!("{},{},", machine["machine_id"].as_str().unwrap(), parameter["id"].as_str().unwrap());
+            let unit = parameter["unit"].as_str().unwrap();
+            for (k, point) in parameter["points"].as_array().unwrap().iter().enumerate() {
+                let date = format!("2026-{:02}-05", k + 1);
+                let row = format!("{start}session,{date},{},{},{unit}", point["value"], point["u"]);
+                assert!(csv.lines().any(|line| line == row), "{row}\n{csv}");
+            }
+            let level = &parameter["level"];
+            assert!(csv.contains(&format!("{start}level,,{},{},{unit}\n", level["value"], level["u"])), "{csv}");
+        }
+    }
     assert_eq!(all["not_used"], Value::Array(Vec::new()));
     assert_eq!(all["machines"].as_array().unwrap().len(), 2);
     assert_eq!(all["machines"][1], one["machines"][0]);

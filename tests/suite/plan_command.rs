@@ -38,6 +38,41 @@ fn the_terminal_and_the_json_agree() {
     assert_eq!(screen, String::from_utf8(abbe(&["plan", &session, "--all"]).stdout).unwrap());
 }
 
+/// A number in CSV has all its digits: it reads back to the number of the JSON.
+#[test]
+fn the_csv_of_a_plan_has_the_figures_of_its_json() {
+    let folder = tempfile::tempdir().unwrap();
+    let csv = folder.path().join("plan.csv");
+    let plan = json(&[&chapter_5(), "--csv", text(&csv)]);
+    let rows = std::fs::read_to_string(&csv).unwrap();
+    let rows: Vec<Vec<&str>> = rows.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows[0], ["section", "id", "of", "value", "unit"]);
+    let figure = |section: &str, id: &str, of: &str| -> (f64, String) {
+        let found: Vec<_> = rows.iter().filter(|row| row[..3] == [section, id, of]).collect();
+        assert_eq!(found.len(), 1, "{section}, {id}, {of}");
+        (found[0][3].parse().unwrap(), found[0][4].to_string())
+    };
+    let number = |value: &Value| value.as_f64().unwrap();
+    assert_eq!(figure("plan", "noise", ""), (number(&plan["noise_um"]), "um".to_string()));
+    for error in plan["errors"].as_array().unwrap() {
+        let (id, unit) = (error["id"].as_str().unwrap(), error["unit"].as_str().unwrap().to_string());
+        assert_eq!(figure("uncertainty", id, ""), (number(&error["u"]), unit.clone()));
+        assert_eq!(figure("conditional uncertainty", id, ""), (number(&error["conditional_u"]), unit.clone()));
+        assert_eq!(figure("rms sensitivity", id, "").0, number(&error["sensitivity"]["rms"]));
+        for part in error["budget"].as_array().unwrap() {
+            assert_eq!(figure("budget", id, part["source"].as_str().unwrap()), (number(&part["u"]), unit.clone()));
+        }
+    }
+    assert_eq!(figure("index", "O3", "").0, number(&plan["indices"]["o3"]));
+    let rho = number(&plan["correlation"]["matrix"][1][0]);
+    assert_eq!(figure("correlation", "EZ0A", "EY0A").0, rho);
+    let effect = &plan["effects"]["effects"][0];
+    assert_eq!(
+        figure("share in the residual", effect["id"].as_str().unwrap(), "").0,
+        number(&effect["residual_share"])
+    );
+}
+
 #[test]
 fn the_effects_list_what_a_clean_residual_does_not_exclude() {
     let plan = json(&[&chapter_5()]);

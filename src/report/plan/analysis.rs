@@ -7,6 +7,7 @@ use abbe::identify::plan::results::{ErrorAnalysis, PlanAnalysis};
 use abbe::identify::problem::Problem;
 use abbe::model::words::counted;
 
+use super::values::values;
 use super::{
     budgets, clearances, correlation, effects, indices, sensitivity as sensitivities, small_plots, uncertainties,
 };
@@ -45,6 +46,7 @@ pub fn report(
         of_readings(analysis.noise_um, analysis.reading_unit),
         analysis.noise_source
     );
+    report.values = values(analysis);
     let statements = statements::of_plan(&stated.statements, analysis, commands);
     report.opening("", statements.into_iter().chain([extent(analysis).into()]));
     report.key(key_figures(problem, analysis));

@@ -3,6 +3,7 @@
 pub mod analysis;
 pub mod effects;
 pub mod global;
+mod values;
 
 use abbe::identify::plan::collision::TestClearance;
 use abbe::identify::plan::results::{ErrorAnalysis, Indices, PlanAnalysis};
