@@ -7,7 +7,6 @@ use abbe::document::{Call, Document, StatedTrace};
 use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::separating_tests::separate_aliases;
 use abbe::identify::trace::{self, Progress, TraceOptions, TraceOutcome};
-use abbe::model::words::counted;
 use abbe::report::block::Report;
 use abbe::report::commands::Commands;
 use abbe::report::{self, readings};
@@ -33,17 +32,7 @@ pub struct Trace {
 
 /// Tells the caller about the progress, and returns whether to go on.
 fn reported(caller: &Caller, progress: &Progress) -> bool {
-    let words = match progress {
-        Progress::Working => return caller.goes_on(),
-        Progress::Fitting => "fitting the declared model".to_string(),
-        Progress::Screening(candidates) => format!("screening {}", counted(*candidates, "candidate")),
-        Progress::SelectedEffect(number, id, rms_um) => {
-            format!("{}: {id}, held out {rms_um:.3} µm", counted(*number, "effect"))
-        }
-        Progress::Folds(ended, folds) => format!("searching without one fold: {ended} of {folds}"),
-        Progress::Judging => "refitting and judging".to_string(),
-    };
-    caller.report(words)
+    progress.words().map_or_else(|| caller.goes_on(), |words| caller.report(words))
 }
 
 /// The end of a computation with a limit in seconds. A limit beyond what a clock can hold is none.

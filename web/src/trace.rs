@@ -4,7 +4,6 @@ use abbe::document::StatedTrace;
 use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::separating_tests::separate_aliases;
 use abbe::identify::trace::{self, Progress, TraceOptions, TraceOutcome};
-use abbe::model::words::counted;
 use abbe::report::block::Report;
 use abbe::report::commands::Commands;
 use abbe::report::{self, readings};
@@ -90,15 +89,6 @@ extern "C" {
 
 /// Tells what is done now. The work goes on until the page ends the worker.
 fn tell(progress: &Progress) -> bool {
-    match progress {
-        Progress::Working => {}
-        Progress::Fitting => say("fitting the declared model"),
-        Progress::Screening(candidates) => say(&format!("screening {}", counted(*candidates, "candidate"))),
-        Progress::SelectedEffect(number, id, rms_um) => {
-            say(&format!("{}: {id}, held out {rms_um:.3} µm", counted(*number, "effect")));
-        }
-        Progress::Folds(ended, folds) => say(&format!("searching without one fold: {ended} of {folds}")),
-        Progress::Judging => say("refitting and judging"),
-    }
+    progress.words().iter().for_each(|words| say(words));
     true
 }

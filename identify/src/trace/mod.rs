@@ -24,6 +24,7 @@ pub(crate) mod noise_model;
 mod null;
 mod plausible;
 mod policy;
+mod progress;
 mod remainder;
 pub(crate) mod result;
 pub mod screening;
@@ -52,6 +53,7 @@ use interrupt::Interrupt;
 use judge::RefittedModel;
 use noise_model::estimate_noise_model;
 use policy::{Policy, SIGNIFICANCE};
+pub use progress::Progress;
 use result::FamiliesEnded;
 use search::{SearchRecord, search_and_refit};
 use start::Start;
@@ -91,23 +93,6 @@ impl Default for TraceOptions {
             assume: Vec::new(),
         }
     }
-}
-
-/// Progress of a trace.
-#[derive(Clone, Debug)]
-pub enum Progress {
-    /// The declared model is being fitted.
-    Fitting,
-    /// The candidates are being screened: the number of candidates.
-    Screening(usize),
-    /// An effect was added: the number of effects, its identifier, the held-out rms in µm.
-    SelectedEffect(usize, String, f64),
-    /// Searches without one fold that have ended, and their number. Each predicts the readings that it lacks.
-    Folds(usize, usize),
-    /// The model with the found effects is being refitted, and its residual tested.
-    Judging,
-    /// No new event. Reported often, so that the caller can stop the trace soon.
-    Working,
 }
 
 /// One addition of the search.

@@ -28,27 +28,19 @@ pub fn trace(
     let interrupts = Interrupts::handled(bar.clone());
     let shown = Mutex::new(());
     let report = |progress: Progress| {
-        if matches!(progress, Progress::Working) {
+        let Some(words) = progress.words() else {
             // Called often and from many threads; it shows nothing.
             interrupts.keep_results();
             return !interrupts.came() && !clock.has_run_out();
-        }
+        };
         let _one_at_a_time = shown.lock();
-        match progress {
-            Progress::Fitting => bar.set_message("fitting the declared model"),
-            Progress::Screening(candidates) => {
-                bar.set_message(format!("screening {}", counted(candidates, "candidate")))
+        match &progress {
+            Progress::Folds(ended, folds) => bar.set_message(clock.remaining(*ended, *folds)),
+            Progress::SelectedEffect(_, id, rms_um) if !quiet => {
+                bar.suspend(|| eprintln!("  + {id:<28} held out {rms_um:.3} µm"));
+                bar.set_message(words);
             }
-            Progress::Folds(ended, folds) => bar.set_message(clock.remaining(ended, folds)),
-            Progress::SelectedEffect(number, id, rms_um) => {
-                let effects = counted(number, "effect");
-                bar.set_message(format!("{effects}, held out {rms_um:.2} µm: {id}"));
-                if !quiet {
-                    bar.suspend(|| eprintln!("  + {id:<28} held out {rms_um:.3} µm"));
-                }
-            }
-            Progress::Judging => bar.set_message("refitting and judging"),
-            Progress::Working => {}
+            _ => bar.set_message(words),
         }
         !interrupts.came() && !clock.has_run_out()
     };

@@ -1,0 +1,36 @@
+//! What a trace does now, in words.
+
+use abbe_model::words::counted;
+
+/// Progress of a trace.
+#[derive(Clone, Debug)]
+pub enum Progress {
+    /// The declared model is being fitted.
+    Fitting,
+    /// The candidates are being screened: the number of candidates.
+    Screening(usize),
+    /// An effect was added: the number of effects, its identifier, the held-out rms in µm.
+    SelectedEffect(usize, String, f64),
+    /// Searches without one fold that have ended, and their number. Each predicts the readings that it lacks.
+    Folds(usize, usize),
+    /// The model with the found effects is being refitted, and its residual tested.
+    Judging,
+    /// No new event. Reported often, so that the caller can stop the trace soon.
+    Working,
+}
+
+impl Progress {
+    /// The words of a caller's display; none for no new event.
+    pub fn words(&self) -> Option<String> {
+        Some(match self {
+            Progress::Fitting => "fitting the declared model".to_string(),
+            Progress::Screening(candidates) => format!("screening {}", counted(*candidates, "candidate")),
+            Progress::SelectedEffect(number, id, rms_um) => {
+                format!("{}: {id}, held out {rms_um:.3} µm", counted(*number, "effect"))
+            }
+            Progress::Folds(ended, folds) => format!("searching without one fold: {ended} of {folds}"),
+            Progress::Judging => "refitting and judging".to_string(),
+            Progress::Working => return None,
+        })
+    }
+}
