@@ -257,3 +257,32 @@ fn the_volumetric_error_is_that_of_the_chain_on_a_grid() {
         near(summary.u_um, (variances / count).sqrt() * 1e3, "u over the grid");
     }
 }
+
+/// Of two bars the readings show one to be another, and say nothing of the other one: that has no difference by the
+/// readings alone, and is not shared either.
+#[test]
+fn a_bar_of_which_the_readings_say_nothing_has_no_difference_of_its_own() {
+    let fitted = model(&plan(EIGHT, ""), true, &[], 9);
+    let (ids, prior) = (["EX0C", "bar[A]", "bar[C]"], 0.7e-3);
+    let of = |bar_mm: f64| {
+        let mut model = fitted.clone();
+        model.parameters = ids.map(|id| fitted.parameters[place(&fitted, id)].clone()).to_vec();
+        for (parameter, value) in model.parameters.iter_mut().zip([0.0, bar_mm, 0.0]) {
+            parameter.value = value;
+        }
+        // The first bar is known to 0.1 µm, the second one hardly better than its prior says.
+        let u = [1e-3, 1e-4, 0.9999 * prior];
+        model.covariance = faer::Mat::from_fn(3, 3, |i, j| if i == j { u[i] * u[i] } else { 0.0 });
+        model.null_directions = Vec::new();
+        model.quality.u_enlargement = 1.0;
+        model
+    };
+    let found = compared(&of(0.0), &of(1e-3), None, 0);
+    assert!(found.pairs[0].shared_setup.is_empty(), "{:?}", found.pairs[0].shared_setup);
+    let named: Vec<&str> = found.pairs[0].not_shared.iter().map(|one| one.id.as_str()).collect();
+    assert_eq!(named, ["bar[A]"]);
+    // 1 µm over √2·0.1 µm, each with the prior of 0.7 µm taken out.
+    let alone = 1.0 / (1.0 - (0.1_f64 / 0.7).powi(2));
+    near(found.pairs[0].not_shared[0].value, alone, "the difference");
+    near(found.pairs[0].not_shared[0].u, 0.1 * (2.0 * alone).sqrt(), "its u");
+}
