@@ -83,7 +83,7 @@ impl EquationParameters {
                 ..EquationParameters::default()
             });
         }
-        EquationParameters::parse(names, &session.machine, session.instrument.unknowns(), &effects)
+        EquationParameters::parse(names, &session.machine, test.station.kind().unknowns(), &effects)
     }
 
     /// Reads names and patterns of errors, parameters of the instrument and effects.

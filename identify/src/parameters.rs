@@ -161,7 +161,7 @@ impl Parameters {
             }
         }
         for (position, test) in tests.iter().enumerate() {
-            for (component, unknown) in session.instrument.unknowns().iter().enumerate() {
+            for (component, unknown) in test.station.kind().unknowns().iter().enumerate() {
                 let prior = test.priors[component];
                 if prior == Prior::Known {
                     continue;
@@ -212,7 +212,7 @@ impl Parameters {
         reference: &Reference,
         effect: &Effect,
     ) -> Result<(), IdentifyError> {
-        let size = match effect.component.unit(session.instrument.unknowns()) {
+        let size = match effect.component.unit(&session.instrument_parameters()) {
             Some(unit) => physical_size(unit),
             None if effect.component == Component::TriggerDelay => LONG_DELAY_S,
             None => {

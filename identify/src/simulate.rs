@@ -123,7 +123,7 @@ const SETUP_STREAM: u128 = 0;
 /// If the plan cannot be carried out, a name or a unit does not fit the session, or the model yields a number that is
 /// not finite.
 pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated, IdentifyError> {
-    if !session.instrument.entry().has_readings {
+    if session.instruments().iter().any(|kind| !kind.entry().has_readings) {
         return Err(IdentifyError::Request("a socket session has no readings to draw: its poses are its data".into()));
     }
     let planned = planned::planned_session(session)?;

@@ -61,7 +61,7 @@ impl Unit {
 
     /// The unit in which coefficient `k` of an effect in a session is reported.
     pub fn of_effect(session: &Session, effect: &Effect, k: usize) -> Unit {
-        let Some(internal_unit) = effect.component.unit(session.instrument.unknowns()) else {
+        let Some(internal_unit) = effect.component.unit(&session.instrument_parameters()) else {
             return Unit { name: "ms".to_string(), display_per_internal: 1e3 };
         };
         let driver_axis = effect.driver.axis_kind(&session.machine);

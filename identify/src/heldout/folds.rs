@@ -74,7 +74,8 @@ impl Folds {
     /// The folds of a session.
     pub fn of(session: &Session, tests: &[Test], seed: u64) -> Folds {
         let readings: Vec<&Readings> = tests.iter().filter_map(|test| test.readings.as_deref()).collect();
-        let poses = session.instrument.entry().reads_poses && readings.iter().all(|r| r.run.is_empty());
+        let poses = session.instruments().iter().all(|kind| kind.entry().reads_poses)
+            && readings.iter().all(|r| r.run.is_empty());
         if poses {
             return Folds::of_poses(&session.machine, &readings, seed);
         }

@@ -146,7 +146,7 @@ fn judge(
     let unit = Unit::of_effect(session, effect, 0);
     // The coefficient that moves the component by its physical size somewhere in the tests, whatever the scale of the
     // coefficient.
-    let size = match effect.component.unit(session.instrument.unknowns()) {
+    let size = match effect.component.unit(&session.instrument_parameters()) {
         Some(inside) if greatest > 0.0 => physical_size(inside) / greatest,
         Some(inside) => physical_size(inside),
         None => 0.1,

@@ -43,7 +43,7 @@ const MAX_NAMED: usize = 3;
 
 /// The statements that the readings contradict, and the mistakes that explain it.
 pub fn examine(problem: &Problem, fit: &Fit) -> Plausibility {
-    if !problem.session.instrument.is_two_sided() {
+    if !problem.session.instruments().iter().all(|kind| kind.is_two_sided()) {
         return of_poses(problem, fit);
     }
     let mut conflicts: Vec<Conflict> = residual(problem, fit).into_iter().collect();
@@ -96,7 +96,7 @@ pub(crate) fn checked(problem: &Problem, fit: Result<Fit, IdentifyError>) -> Res
         Err(error @ IdentifyError::NoConvergence { .. }) => error.to_string(),
         Err(error) => return Err(error),
     };
-    let suggestions = if problem.session.instrument.is_two_sided() {
+    let suggestions = if problem.session.instruments().iter().all(|kind| kind.is_two_sided()) {
         suggest::suggestions(problem, &[], Pulls::default().allowed())
     } else {
         poses::suggestions(problem)

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::layout::{Columns, Format};
 use super::movement::{Path, Sweep};
 use super::node::{Named, Node};
+use super::session::Kind;
 use super::value::Length;
 
 /// A test.
@@ -15,6 +16,8 @@ use super::value::Length;
 pub struct Test {
     /// A name that no other test has.
     pub name: String,
+    /// The instrument of this test, if it is another than the session's.
+    pub kind: Option<Kind>,
     /// The data file, relative to the session file or to the data folder.
     pub data: Option<String>,
     /// The keys of the set-up, which depend on the instrument.

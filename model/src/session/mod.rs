@@ -23,7 +23,7 @@ use crate::chain::Machine;
 use crate::component::ErrorName;
 use crate::driver::Reference;
 use crate::effect::Effect;
-use crate::instrument::{Entry, InstrumentKind, SharedBy, Station};
+use crate::instrument::{Entry, InstrumentKind, InstrumentParameter, SharedBy, Station};
 use expression::Constant;
 use readings::Readings;
 use tolerance::Tolerance;
@@ -38,7 +38,7 @@ pub struct Session {
     pub machine: Arc<Machine>,
     /// Named lengths in the order of the file.
     pub constants: Vec<Constant>,
-    /// The instrument.
+    /// The instrument of tests that name no other.
     pub instrument: InstrumentKind,
     /// Standard deviation of one length, mm; `None` if it is to be estimated.
     pub noise_mm: Option<f64>,
@@ -93,6 +93,16 @@ impl Session {
         }
     }
 
+    /// The kinds of instruments of the tests, each once; that of the session without tests.
+    pub fn instruments(&self) -> Vec<InstrumentKind> {
+        instruments(self.instrument, &self.tests)
+    }
+
+    /// The parameters of the instruments of the tests, each once.
+    pub fn instrument_parameters(&self) -> Vec<InstrumentParameter> {
+        instrument_parameters(self.instrument, &self.tests)
+    }
+
     /// Whether a channel of a test is a length, and whether one is an angle.
     pub fn units(&self) -> ChannelUnits {
         let channels = || self.tests.iter().flat_map(|test| test.station.channels());
@@ -137,6 +147,30 @@ impl Session {
         }
         self
     }
+}
+
+/// The kinds of instruments of tests, each once; `other` without tests.
+fn instruments(other: InstrumentKind, tests: &[Test]) -> Vec<InstrumentKind> {
+    let mut kinds: Vec<InstrumentKind> = Vec::new();
+    for kind in tests.iter().map(|test| test.station.kind()) {
+        if !kinds.contains(&kind) {
+            kinds.push(kind);
+        }
+    }
+    if kinds.is_empty() { vec![other] } else { kinds }
+}
+
+/// The parameters of the instruments of tests, each once; those of `other` without tests.
+pub(crate) fn instrument_parameters(other: InstrumentKind, tests: &[Test]) -> Vec<InstrumentParameter> {
+    let mut parameters: Vec<InstrumentParameter> = Vec::new();
+    for parameter in instruments(other, tests).into_iter().flat_map(InstrumentKind::unknowns) {
+        let is_same =
+            |other: &InstrumentParameter| other.thing == parameter.thing && other.coordinate == parameter.coordinate;
+        if !parameters.iter().any(is_same) {
+            parameters.push(*parameter);
+        }
+    }
+    parameters
 }
 
 /// The units of the channels of a session.

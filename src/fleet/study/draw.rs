@@ -153,7 +153,7 @@ impl Study {
                 if stated.library { Some(of_library(session, random)?) } else { self.effects[plan][effect].clone() };
             let Some(truth) = truth else { break };
             draw.truth = Some(truth.id());
-            let unit = truth.component.unit(session.instrument.unknowns());
+            let unit = truth.component.unit(&session.instrument_parameters());
             // A stated effect has its stated size, however large.
             let most = if stated.library { largest_plausible_share(unit, session.instrument) } else { f64::INFINITY };
             machine.effects = [session.effects.as_slice(), std::slice::from_ref(&truth)].concat();

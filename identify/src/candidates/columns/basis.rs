@@ -241,9 +241,9 @@ impl Columns<'_> {
 
     /// The largest plausible coefficient of an effect, in internal units ([`largest_plausible_share`]).
     pub fn plausible(&self, effect: &Effect, column_set: &EffectColumns) -> f64 {
-        let instrument = self.problem.session.instrument;
-        let unit = effect.component.unit(instrument.unknowns());
-        let share = largest_plausible_share(unit, instrument);
+        let session = &self.problem.session;
+        let unit = effect.component.unit(&session.instrument_parameters());
+        let share = largest_plausible_share(unit, session.instrument);
         // The basis function of a delay is the speed.
         let Some(unit) = unit else { return share * LONG_DELAY_S };
         let most = share * physical_size(unit);

@@ -139,7 +139,7 @@ fn is_free_setup(problem: &Problem, effect: &Effect) -> bool {
     let Some(test) = problem.tests.iter().find(|test| effect.tests.contains(&test.name)) else {
         return false;
     };
-    let setup_parameters = problem.session.instrument.unknowns();
+    let setup_parameters = test.station.kind().unknowns();
     let index = setup_parameters.iter().position(|u| u.thing == thing && u.coordinate == coordinate);
     index.is_some_and(|index| test.priors[index] == abbe_model::session::Prior::Free)
 }
@@ -153,9 +153,8 @@ fn components(problem: &Problem, sampling: &Sampling, choice: Components) -> Vec
     let things = |names: &[&str]| -> Vec<Component> {
         problem
             .session
-            .instrument
-            .unknowns()
-            .iter()
+            .instrument_parameters()
+            .into_iter()
             .filter(|parameter| names.contains(&parameter.thing))
             .map(|parameter| Component::Instrument {
                 thing: parameter.thing.to_string(),

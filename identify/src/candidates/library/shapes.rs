@@ -95,9 +95,8 @@ fn mounts(problem: &Problem, component: &Component) -> Vec<Vec<String>> {
     };
     let shared_by = problem
         .session
-        .instrument
-        .unknowns()
-        .iter()
+        .instrument_parameters()
+        .into_iter()
         .find(|parameter| parameter.thing == thing)
         .map_or(SharedBy::Session, |parameter| parameter.shared_by);
     let mut groups: Vec<(String, Vec<String>)> = Vec::new();

@@ -121,10 +121,9 @@ pub(super) fn readings(session: &Session) -> Vec<Hypothesis> {
 
 /// Balls and bars that differ from their statements, and tests from another session.
 pub(super) fn things(session: &Session) -> Vec<Hypothesis> {
-    let unknowns = session.instrument.unknowns();
     let mut list: Vec<Hypothesis> = Vec::new();
     for test in measured(session) {
-        for (place, unknown) in unknowns.iter().enumerate() {
+        for (place, unknown) in test.station.kind().unknowns().iter().enumerate() {
             if !matches!(test.priors[place], Prior::Gaussian(_)) {
                 continue;
             }
@@ -136,7 +135,7 @@ pub(super) fn things(session: &Session) -> Vec<Hypothesis> {
             }
             let mut changed = session.clone();
             for other in &mut changed.tests {
-                for (place, same) in unknowns.iter().enumerate() {
+                for (place, same) in other.station.kind().unknowns().iter().enumerate() {
                     let is_meant = same.thing == unknown.thing && other.group(same.shared_by) == group;
                     if is_meant && let Prior::Gaussian(_) = other.priors[place] {
                         other.priors[place] = Prior::Gaussian(physical_size(same.unit));
@@ -163,7 +162,7 @@ pub(super) fn things(session: &Session) -> Vec<Hypothesis> {
         alone.setup.clone_from(&own);
         alone.spindle_setup.clone_from(&own);
         alone.bar_setup = own;
-        for (prior, unknown) in alone.priors.iter_mut().zip(unknowns) {
+        for (prior, unknown) in alone.priors.iter_mut().zip(test.station.kind().unknowns()) {
             if let Prior::Gaussian(_) = prior {
                 *prior = Prior::Gaussian(physical_size(unknown.unit));
             }

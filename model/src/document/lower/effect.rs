@@ -73,14 +73,14 @@ fn one(
         Fault::new(message, help).at("shape")
     })?;
     let tests = tests(document.tests.as_deref().unwrap_or_default(), declared).within("tests")?;
-    let prior = prior(document, &component, &shape, context.instrument.unknowns())?;
+    let prior = prior(document, &component, &shape, &context.of_instruments)?;
     shape.check().map_err(|fault| Fault::new(fault.to_string(), None).at("shape"))?;
     Ok(Effect { tests, prior, ..Effect::new(component, driver, shape) })
 }
 
 fn component(context: &Context<'_>, text: &str) -> Result<Component, Fault> {
     let instrument = || {
-        let own = context.instrument.unknowns().iter();
+        let own = context.of_instruments.iter();
         let names: Vec<String> = own
             .map(|unknown| match unknown.coordinate {
                 "" => unknown.thing.to_string(),
@@ -97,11 +97,8 @@ fn component(context: &Context<'_>, text: &str) -> Result<Component, Fault> {
             Ok(Component::Axis(name))
         }
         Some(Component::Instrument { thing, coordinate }) => {
-            let own = context
-                .instrument
-                .unknowns()
-                .iter()
-                .any(|unknown| unknown.thing == thing && unknown.coordinate == coordinate);
+            let own =
+                context.of_instruments.iter().any(|unknown| unknown.thing == thing && unknown.coordinate == coordinate);
             if !own {
                 let message = format!("effect on \"{text}\", which a {} does not have", context.instrument.word());
                 return Err(Fault::new(message, format!("it has {}", instrument())));

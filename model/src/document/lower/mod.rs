@@ -24,9 +24,9 @@ use crate::files::access::ReadOptions;
 use crate::files::stamp::FileStamp;
 use crate::files::table::memory::MemoryColumn;
 use crate::files::table::request::{ColumnMapping, Format};
-use crate::instrument::InstrumentKind;
+use crate::instrument::{InstrumentKind, InstrumentParameter};
 use crate::session::expression::Constant;
-use crate::session::{Session, Test, check, setups};
+use crate::session::{self, Session, Test, check, setups};
 pub(crate) use machine::machine;
 
 /// Where the readings of tests with `data` are.
@@ -57,7 +57,10 @@ struct Context<'a> {
     /// The session file.
     file: &'a Path,
     machine: &'a Machine,
+    /// The instrument of tests that name no other.
     instrument: InstrumentKind,
+    /// The parameters of the instruments of the tests that are read.
+    of_instruments: Vec<InstrumentParameter>,
     constants: &'a [Constant],
     format: Format,
     columns: Option<Vec<ColumnMapping>>,
@@ -136,10 +139,11 @@ pub(crate) fn add(session: &mut Session, document: Parts<'_>, surroundings: &Sur
     let format = document.format.map(|format| layout::format(format).within("format")).transpose()?;
     let columns =
         document.columns.map(|columns| layout::columns(columns, |path| (surroundings.place)(&["columns"], None, path)));
-    let context = Context {
+    let mut context = Context {
         file: surroundings.file,
         machine: &session.machine,
         instrument: session.instrument,
+        of_instruments: Vec::new(),
         constants: &session.constants,
         format: format.unwrap_or_default(),
         columns,
@@ -162,6 +166,7 @@ pub(crate) fn add(session: &mut Session, document: Parts<'_>, surroundings: &Sur
             tests.push(test);
         }
     }
+    context.of_instruments = session::instrument_parameters(session.instrument, &tests);
     let columns = driver_columns(&context, &tests);
     let effects = document.effect.iter().enumerate();
     let effects = effects.map(|(item, effect)| effect::effect(&context, &declared, &columns, effect).within_item(item));
@@ -195,6 +200,7 @@ pub(crate) fn effect_of(
         file: Path::new(""),
         machine,
         instrument,
+        of_instruments: instrument.unknowns().to_vec(),
         constants: &[],
         format: Format::default(),
         columns: None,

@@ -28,7 +28,8 @@ pub(super) fn tests(
     found: &mut Found,
 ) -> Result<Vec<Test>, Fault> {
     let name = &document.name;
-    let SetUp { station: written, priors, socket, bar_setup } = set_up(context, &document.set_up)?;
+    let kind = document.kind.map_or(context.instrument, |kind| kind.0);
+    let SetUp { station: written, priors, socket, bar_setup } = set_up(kind, &document.set_up, context)?;
     let (station, geometry) = (written.map(|length| length.mm), written.map(|length| length.length.clone()));
     let HeldPositions { mut at, written: at_written, listed } = at(context, &document.at).within("at")?;
     let format = document.format.as_ref().map(|format| layout::format(format).within("format")).transpose()?;
@@ -58,10 +59,7 @@ pub(super) fn tests(
         geometry,
         priors,
         setup: document.setup.clone().unwrap_or_else(|| name.clone()),
-        spindle_setup: document
-            .spindle_setup
-            .clone()
-            .unwrap_or_else(|| context.instrument.spindle_setup(name).to_string()),
+        spindle_setup: document.spindle_setup.clone().unwrap_or_else(|| kind.spindle_setup(name).to_string()),
         bar_setup: bar_setup.unwrap_or_else(|| name.clone()),
         socket,
         motion,
@@ -123,13 +121,14 @@ pub(super) fn tests(
 }
 
 /// The instrument's keys of a test.
-fn set_up(context: &Context<'_>, keys: &Node) -> Result<SetUp, Fault> {
-    let own = context.instrument.entry();
+fn set_up(kind: InstrumentKind, keys: &Node, context: &Context<'_>) -> Result<SetUp, Fault> {
+    let own = kind.entry();
     (own.read)(keys, context.constants).map_err(|fault| {
         let Some(key) = fault.unknown().map(str::to_string) else { return fault };
         match InstrumentKind::ALL.iter().find(|kind| (kind.entry().keys)().contains_key(&key)) {
             Some(kind) => {
-                let what = format!("belongs to a {}; this session's instrument is a {}", kind.word(), own.word);
+                let whose = if own.kind == context.instrument { "session" } else { "test" };
+                let what = format!("belongs to a {}; this {whose}'s instrument is a {}", kind.word(), own.word);
                 Fault::of_key(what, None).on_key().at(&key)
             }
             None => fault.also_known(schema::fields::<document::Test>()),
