@@ -75,6 +75,7 @@ pub mod parameters;
 pub mod patterns;
 pub mod plan;
 pub mod plausibility;
+pub mod positioning;
 pub mod problem;
 pub mod propagation;
 pub mod quantity;

@@ -17,6 +17,7 @@ use serde::Serialize;
 use crate::circular::CircularTest;
 use crate::noise::NoiseSource;
 use crate::plausibility::Plausibility;
+use crate::positioning::PositioningTest;
 use crate::tolerance::Conformity;
 use crate::unit::ReadingUnit;
 pub use base::BaseResult;
@@ -127,6 +128,9 @@ pub struct FitResult {
     /// Ball-bar figures of the tests whose path is a circle.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub circular: Vec<CircularTest>,
+    /// Figures of ISO 230-2 of the tests in which a laser or a sensor of angles reads the axis that moves.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub positioning: Vec<PositioningTest>,
     /// Decisions of conformity, if the session states limits.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub conformity: Option<Conformity>,

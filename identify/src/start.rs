@@ -9,7 +9,9 @@ use nalgebra::Vector3;
 
 /// The stations of the tests, with start values for free poses and sockets from which the iterations converge.
 pub(crate) fn stations(session: &Session, tests: &[Test]) -> Vec<Station<f64>> {
-    let mut stations: Vec<Station<f64>> = tests.iter().map(|test| test.station.clone()).collect();
+    let datum = |test: &Test| test.station.with_datum(&session.machine, test.readings.as_deref()?);
+    let mut stations: Vec<Station<f64>> =
+        tests.iter().map(|test| datum(test).unwrap_or_else(|| test.station.clone())).collect();
     let places: Vec<Option<&str>> = tests.iter().map(|test| test.free_place()).collect();
     for index in 0..tests.len() {
         if places[index].is_none() || places[..index].contains(&places[index]) {

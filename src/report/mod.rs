@@ -37,6 +37,7 @@ pub mod plan;
 pub mod plausibility;
 pub mod pointing;
 pub mod poses;
+pub mod positioning;
 pub mod provenance;
 pub mod quality;
 pub mod readings;

@@ -14,6 +14,7 @@ use crate::noise;
 use crate::numerics::rank::Rank;
 use crate::parameter_description::parameter_meaning;
 use crate::plausibility;
+use crate::positioning;
 use crate::problem::Problem;
 use crate::results::{FitResult, OfAngles, Outlier, ParameterResult, Unobservable, phases_follow_amplitudes};
 use crate::tolerance::conformity;
@@ -67,6 +68,7 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> 
         conformity: conformity(&problem.session, &parameters, &circular, noise_um, goodness.verdict),
         outcome: outcome::outcome(problem, fit, goodness, &determined),
         circular,
+        positioning: positioning::of_session(&problem.session, &problem.rejected),
         parameters,
         plausibility,
         warnings,

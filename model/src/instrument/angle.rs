@@ -128,6 +128,9 @@ impl Instrument for Angle<f64> {
     fn columns(&self) -> &'static [Column] {
         &COLUMNS[..self.about.len()]
     }
+    fn positioning(&self) -> Option<[f64; 3]> {
+        self.about.first().copied()
+    }
     fn missing(&self, has: &dyn Fn(Quantity) -> bool) -> Option<Fault> {
         let column = self.columns().iter().find(|column| !has(column.quantity))?;
         let help = "an angle needs `angle_arcsec`, the deviation from the commanded rotation, and `angle2_arcsec` for a second direction in `about`";

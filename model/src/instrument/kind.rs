@@ -164,8 +164,17 @@ pub trait Instrument {
         let _ = (points, observed);
         None
     }
+    /// The same with the point from which its readings count, if that is another than the nominal one.
+    fn with_datum(&self, machine: &Machine, readings: &Readings) -> Option<Station<f64>> {
+        let _ = (machine, readings);
+        None
+    }
     /// The points on the table and in the spindle, if the set-up states two balls.
     fn balls_mut(&mut self) -> Option<[&mut [f64; 3]; 2]> {
+        None
+    }
+    /// The direction in R along which, or about which, its first channel reads the positioning of an axis, if it does.
+    fn positioning(&self) -> Option<[f64; 3]> {
         None
     }
     /// Its point on the table and its point on the tool, if they are its own.

@@ -10,14 +10,15 @@
 //! ```
 //!
 //! each plus a zero that is not known. The beam deviates from its nominal direction by two angles, towards `h` and `v`: a
-//! slope of either straightness, and the cosine error of the displacement. A displacement and a straightness refer to
-//! their nominal reading: `displacement_mm` counts from any point.
+//! slope of either straightness, and the cosine error of the displacement. A straightness is read as a deviation from its
+//! nominal value; `displacement_mm` counts from any point.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::channel::Channel;
 use super::column::{Column, Quantity};
+use super::kind::median;
 use super::set_up::{self, SetUp, Written};
 use super::{
     Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
@@ -31,6 +32,7 @@ use crate::rotation_error::Body;
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
 use crate::session::expression::Constant;
+use crate::session::readings::Readings;
 
 /// Reflector, optic, the beam's deviation, the zero of each channel.
 pub const PARAMETERS: [InstrumentParameter; 14] = [
@@ -90,6 +92,13 @@ const COLUMNS: [Column; 7] = [
     Column::new("yaw", "arcsec", Quantity::Channel(4)),
     Column::new("roll", "arcsec", Quantity::Channel(5)),
 ];
+
+/// The channels of straightness.
+const STRAIGHTNESS: std::ops::Range<usize> = 1..3;
+
+/// Largest zero of a displacement that is estimated from its nominal value, mm. Beyond it the column counts from another
+/// point.
+const MAX_ZERO_MM: f64 = 1.0;
 
 /// A direction whose component along Z is larger is vertical.
 const VERTICAL: f64 = 0.999;
@@ -151,12 +160,23 @@ fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
     let mut priors: Vec<Prior> = points.chain([beam.unwrap_or(Prior::Free); 2]).chain([Prior::Free; 6]).collect();
     hold_absent(&channels, beam.is_some(), &mut priors);
     let kept = of_channels(&channels);
-    let laser = Laser { reflector, optic, frame, channels, kept, is_beam_stated: beam.is_some() };
+    let laser = Laser { reflector, optic, frame, channels, kept, is_beam_stated: beam.is_some(), datum: Written::number(0.0) };
     Ok(SetUp::new(Station::Laser(laser), priors))
 }
 
 fn of_channels(channels: &[usize]) -> Vec<Channel> {
     channels.iter().map(|channel| CHANNELS[*channel]).collect()
+}
+
+impl Laser<f64> {
+    /// Adds the nominal reading of each straightness, times a factor.
+    fn add_nominal(&self, machine: &Machine, state: &[AxisPosition<f64>], factor: f64, values: &mut [f64]) {
+        let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
+        let nominal = self.reading::<f64>(machine, state, &none, |_| None);
+        let read = self.channels.iter().zip(values).zip(nominal.channels());
+        let straightness = read.filter(|((channel, _), _)| STRAIGHTNESS.contains(channel));
+        straightness.for_each(|((_, value), nominal)| *value += factor * nominal);
+    }
 }
 
 /// Holds the zeros of channels that are not read; the beam, if its direction is not stated, in the directions of which no
@@ -201,6 +221,8 @@ pub struct Laser<N> {
     pub kept: Vec<Channel>,
     /// Whether the uncertainty of the beam is stated.
     pub is_beam_stated: bool,
+    /// What the displacement counts from, mm: the reading where reflector and optic coincide.
+    pub datum: N,
 }
 
 impl<N> Geometry<N> for Laser<N> {
@@ -214,6 +236,7 @@ impl<N> Geometry<N> for Laser<N> {
             channels: self.channels.clone(),
             kept: self.kept.clone(),
             is_beam_stated: self.is_beam_stated,
+            datum: to(&self.datum),
         }
     }
     fn keep_channels(&mut self, has: &dyn Fn(Quantity) -> bool) {
@@ -252,6 +275,7 @@ impl<N> Geometry<N> for Laser<N> {
                 (_, _, Some(rotation), _) => dot_nominal(*rotation, self.frame[(*channel - 2) % 3]),
                 _ => S::constant(0.0),
             };
+            let value = if *channel == 0 { value + self.datum } else { value };
             unknown(ZERO + *channel).map_or(value, |zero| value + zero)
         }))
     }
@@ -301,8 +325,34 @@ impl Instrument for Laser<f64> {
     fn columns(&self) -> &'static [Column] {
         &COLUMNS
     }
+    fn positioning(&self) -> Option<[f64; 3]> {
+        (self.channels.first() == Some(&0)).then_some(self.frame[0])
+    }
     fn kept_channel(&self, of_all: usize) -> Option<usize> {
         self.channels.iter().position(|channel| *channel == of_all)
+    }
+    fn refers_to_nominal(&self) -> bool {
+        self.channels.iter().any(|channel| STRAIGHTNESS.contains(channel))
+    }
+    /// A straightness is read as a deviation.
+    fn channels_of_columns(&self, machine: &Machine, state: &[AxisPosition<f64>], values: &mut [f64]) {
+        self.add_nominal(machine, state, 1.0, values);
+    }
+    fn columns_of_channels(&self, machine: &Machine, state: &[AxisPosition<f64>], values: &mut [f64]) {
+        self.add_nominal(machine, state, -1.0, values);
+    }
+    /// A displacement may count from any point: its zero is then far from the one that iterations can start from.
+    fn with_datum(&self, machine: &Machine, readings: &Readings) -> Option<Station<f64>> {
+        if self.channels.first() != Some(&0) {
+            return None;
+        }
+        let station = Station::Laser(self.clone());
+        let deviation = |row: usize| {
+            let observed = readings.observed.get(row * readings.channels).copied()?;
+            Some(observed - readings.nominal(machine, &station, row).channels()[0]).filter(|value| value.is_finite())
+        };
+        let from = median(&mut (0..readings.rows()).filter_map(deviation).collect::<Vec<f64>>());
+        (from.abs() > MAX_ZERO_MM).then(|| Station::Laser(Laser { datum: self.datum + from, ..self.clone() }))
     }
     fn absent_channels_known(&self, priors: &mut [Prior]) {
         hold_absent(&self.channels, self.is_beam_stated, priors);

@@ -7,11 +7,17 @@ use abbe_model::axis::AxisKind;
 use abbe_model::chain::{ERRORS_PER_AXIS, Machine};
 use abbe_model::component::ErrorName;
 use abbe_model::frames::Rotation;
+use abbe_model::instrument::angle::Angle;
 use abbe_model::instrument::ballbar::BallBar;
+use abbe_model::instrument::column::Quantity;
+use abbe_model::instrument::distance::{Distance, StationFrame};
+use abbe_model::instrument::laser::Laser;
+use abbe_model::instrument::pointing::Pointing;
 use abbe_model::instrument::probe::Probe;
 use abbe_model::instrument::rtest::{RTest, Setting};
 use abbe_model::instrument::tracker::Tracker;
-use abbe_model::instrument::{InstrumentKind, InternalUnit, Station};
+use abbe_model::instrument::{Geometry, InstrumentKind, InternalUnit, Station};
+use abbe_model::rotation_error::Body;
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
 use num_dual::Dual64;
@@ -46,14 +52,31 @@ fn r_test(setting: Setting, workpiece_ball: [f64; 3], spindle_ball: [f64; 3]) ->
     })
 }
 
+/// A laser along a slanted beam that reads all six channels.
+fn laser(optic: [f64; 3], reflector: [f64; 3]) -> Station<f64> {
+    let frame = [[0.6, 0.8, 0.0], [-0.8, 0.6, 0.0], [0.0, 0.0, 1.0]];
+    let mut laser = Laser { reflector, optic, frame, channels: vec![0], kept: Vec::new(), is_beam_stated: false, datum: 0.0 };
+    laser.keep_channels(&|quantity| matches!(quantity, Quantity::Channel(_)));
+    Station::Laser(laser)
+}
+
 /// Every instrument between two points.
-fn every_station(table: [f64; 3], tool: [f64; 3]) -> [Station<f64>; 5] {
+fn every_station(table: [f64; 3], tool: [f64; 3]) -> [Station<f64>; 11] {
+    let angle = |body| Station::Angle(Angle { about: vec![[0.0, 0.6, 0.8], [1.0, 0.0, 0.0]], body, origin: [0.0; 3] });
+    let distance = |frame| Station::Distance(Distance { station: table, reflector: tool, frame, origin: [0.0; 3] });
+    let directions = [[0.6, 0.0, 0.8], [0.0, -1.0, 0.0], [-0.8, 0.0, 0.6]];
     [
         ball_bar(table, tool),
         tracker(tool),
         probe(table, tool),
         r_test(Setting::Table, table, tool),
         r_test(Setting::Spindle, table, tool),
+        laser(table, tool),
+        angle(Body::Relative),
+        angle(Body::Table),
+        distance(StationFrame::Table),
+        distance(StationFrame::Bed),
+        Station::Pointing(Pointing { directions, origin: [0.0; 3] }),
     ]
 }
 
