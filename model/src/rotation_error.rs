@@ -113,8 +113,9 @@ mod tests {
         let machine = Machine::from_code("wCAbYXBt").unwrap();
         let positions = [0.7, -0.4, 120.0, -80.0, 1.1];
         let state = machine.axis_positions(&positions);
-        let size =
-            |axis: usize, k: usize| 1e-3 * (1.0 + (3 * axis + k) as f64 % 5.0) * if k.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let size = |axis: usize, k: usize| {
+            1e-3 * (1.0 + (3 * axis + k) as f64 % 5.0) * if k.is_multiple_of(2) { 1.0 } else { -1.0 }
+        };
         let slots = crate::chain::ERRORS_PER_AXIS;
         let errors = machine.body_errors(|_| true, |slot| size(slot / slots, slot % slots));
         let small = |six: [f64; 6]| {

@@ -65,7 +65,8 @@ impl State {
 
 /// A laser that reads all channels.
 fn laser(reflector: [f64; 3], optic: [f64; 3], frame: [[f64; 3]; 3]) -> Laser<f64> {
-    let mut laser = Laser { reflector, optic, frame, channels: vec![0], kept: Vec::new(), is_beam_stated: false, datum: 0.0 };
+    let mut laser =
+        Laser { reflector, optic, frame, channels: vec![0], kept: Vec::new(), is_beam_stated: false, datum: 0.0 };
     laser.keep_channels(&|quantity| matches!(quantity, Quantity::Channel(_)));
     laser
 }
