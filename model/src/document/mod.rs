@@ -12,6 +12,7 @@ mod de;
 pub mod edit;
 pub mod effect;
 pub mod fault;
+pub mod kind;
 pub mod layout;
 pub(crate) mod lower;
 pub mod machine;

@@ -3,10 +3,10 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::kind::Kind;
 use super::layout::{Columns, Format};
 use super::movement::{Path, Sweep};
 use super::node::{Named, Node};
-use super::session::Kind;
 use super::value::Length;
 
 /// A test.
