@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use abbe_model::document::effect::Effect;
+use abbe_model::document::kind::Kind;
 use abbe_model::document::machine::Machine;
 use abbe_model::document::print;
-use abbe_model::document::session::Kind;
 use abbe_model::document::value::{Json, Long, Positive};
 use schemars::JsonSchema;
 use serde::ser::Error;

@@ -6,7 +6,7 @@ use abbe_model::ModelError;
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::document::fault::{Fault, Within};
-use abbe_model::document::session::Kind;
+use abbe_model::document::kind::Kind;
 use abbe_model::document::source::Source;
 use abbe_model::document::value::{Long, Positive};
 use abbe_model::driver::{Driver, Reference, TEMPERATURE};

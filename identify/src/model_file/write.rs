@@ -1,7 +1,7 @@
 //! A model as a JSON text.
 
+use abbe_model::document::kind::Kind;
 use abbe_model::document::of_domain;
-use abbe_model::document::session::Kind;
 use abbe_model::document::value::{Long, Positive};
 use abbe_model::driver::TEMPERATURE;
 use abbe_model::session::Prior;

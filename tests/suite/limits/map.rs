@@ -57,8 +57,8 @@ fn arguments_of_a_map() {
     let folder = tempfile::tempdir().unwrap();
     let ready = ready("volumetric/errors.toml");
     for (more, message) in [
-        (["--places", "18446744073709551615"], "a map has at most 1000000 places"),
-        (["--places", "1000000000000"], "a map has at most 1000000 places"),
+        (["--places", "18446744073709551615"], "a number of places from 1 to 1000000 is expected"),
+        (["--places", "1000000000000"], "`--places 1000000000000`: a number of places from 1 to 1000000 is expected"),
         (["--axis", "X:1e18"], "--axis X:1e18: 1000000 places are the most"),
         (["--axis", "A=1e300"], "`--axis A=1e300`: a position in mm or degrees from -1000000 to 1000000 is expected"),
         (["--axis", "A=inf"], "`--axis A=inf`: a position in mm or degrees from -1000000 to 1000000 is expected"),
