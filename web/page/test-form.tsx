@@ -124,12 +124,13 @@ export function TestForm({
         </div>
       ))}
       {stated.map((key) => (
-        <div class="point key" key={key}>
+        // What is typed stays while an analysis ends: only another value in the plan replaces it.
+        <div class="point key" key={`${key} ${value(plan, test, key)}`}>
           <label for={`key-${key}`}>{key}</label>
           <input
             id={`key-${key}`}
             title={keys[key].description}
-            value={value(plan, test, key)}
+            defaultValue={value(plan, test, key)}
             onChange={(event) => event.currentTarget.value.trim() && set(key, event.currentTarget.value.trim())}
           />
         </div>
