@@ -62,6 +62,14 @@ pub fn rms_by_unit_mm(problem: &Problem, residuals: &[Vec<f64>]) -> [Option<f64>
     sums.map(|(sum, count)| (count > 0).then(|| (sum / count as f64).sqrt()))
 }
 
+/// Root mean square over the scalar readings as results state it, mm: over lengths, if there are angles too.
+pub fn stated_rms_mm(problem: &Problem, residuals: &[Vec<f64>]) -> f64 {
+    match rms_by_unit_mm(problem, residuals) {
+        [Some(lengths), Some(_)] => lengths,
+        _ => rms_mm(problem, residuals),
+    }
+}
+
 /// Holds out each fold in turn. `beta` is the fit of all readings, `triangles` are the factors of the folds there,
 /// `whole` is the factor of all readings and priors, `basis` spans the identifiable directions (parameters × rank).
 ///

@@ -73,6 +73,12 @@ pub fn patterns(session: &Session, errors: &[Given]) -> Result<Patterns, Identif
                 .into(),
         ));
     }
+    if session.units().angles {
+        return Err(IdentifyError::Request(
+            "patterns show lengths, and a test of this session reads angles: `plan` and the sensitivities of a report show both"
+                .into(),
+        ));
+    }
     let mut exact = session.clone();
     exact.resolution_mm = None;
     let drawn = |given: Vec<Given>| {

@@ -8,6 +8,7 @@
 //! E = max(x̄ᵢ↑; x̄ᵢ↓) − min(x̄ᵢ↑; x̄ᵢ↓)     A = max(x̄ᵢ↑ + 2sᵢ↑; x̄ᵢ↓ + 2sᵢ↓) − min(x̄ᵢ↑ − 2sᵢ↑; x̄ᵢ↓ − 2sᵢ↓)
 //! ```
 
+use abbe_model::rotation_error::Body;
 use abbe_model::session::{Session, Test};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -135,8 +136,22 @@ fn of_test(session: &Session, test: &Test, left_out: &[bool]) -> Option<Position
     };
     let mut moved = (0..machine.axes.len()).filter(moves);
     let (Some(axis), None) = (moved.next(), moved.next()) else { return None };
-    let direction = test.station.positioning()?;
+    let (direction, body) = test.station.positioning()?;
     let station = test.station.with_datum(machine, readings).unwrap_or_else(|| test.station.clone());
+    let of_table = axis < machine.workpiece_side;
+    // What is read against the table falls where an axis that carries the table rises.
+    let sign = match body {
+        Body::Relative => {
+            if of_table {
+                -1.0
+            } else {
+                1.0
+            }
+        }
+        Body::Tool if !of_table => 1.0,
+        Body::Table if of_table => 1.0,
+        Body::Tool | Body::Table => return None,
+    };
     // Along the axis, or about it.
     let cosine: f64 = direction.iter().zip(machine.axes[axis].direction).map(|(a, b)| a * b).sum();
     let channel = test.station.channels().first()?;
@@ -145,32 +160,35 @@ fn of_test(session: &Session, test: &Test, left_out: &[bool]) -> Option<Position
         return None;
     }
     let unit = Unit::of(channel.unit);
-    let mut found: Vec<(f64, [Vec<f64>; 2])> = Vec::new();
+    let mut found: Vec<(f64, bool, f64)> = Vec::new();
     let samples = readings.axis_samples(axis, machine.axes[axis].kind);
     for row in (0..readings.rows()).filter(|row| !left_out[*row] && readings.was_read(*row, 0)) {
         let nominal = readings.nominal(machine, &station, row).channels()[0];
         let observed = readings.observed[row * readings.channels];
-        let deviation = (observed - nominal) * cosine.signum() * unit.display_per_internal;
+        let deviation = (observed - nominal) * sign * cosine.signum() * unit.display_per_internal;
+        // At rest where the axis has turned, the next movement tells the direction of the approach to come.
         let at = readings.positions[axis][row];
-        let place = match found.iter().position(|(other, _)| (other - at).abs() <= SAME) {
-            Some(place) => place,
-            None => {
-                found.push((at, [Vec::new(), Vec::new()]));
-                found.len() - 1
-            }
-        };
-        found[place].1[usize::from(samples[row].direction < 0.0)].push(deviation);
+        let stands = row > 0 && (at - readings.positions[axis][row - 1]).abs() <= SAME;
+        let next = samples.get(row + 1).filter(|_| stands);
+        found.push((at, next.unwrap_or(&samples[row]).direction < 0.0, deviation));
     }
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     let kind = machine.axes[axis].kind;
     let positions: Vec<Position> = found
-        .iter()
-        .map(|(at, [forward, backward])| Position {
-            at: kind.to_display(*at),
-            forward: Approach::of(forward),
-            backward: Approach::of(backward),
+        .chunk_by(|a, b| b.0 - a.0 <= SAME)
+        .map(|here| {
+            let towards = |backward: bool| {
+                let own = here.iter().filter(|one| one.1 == backward);
+                Approach::of(&own.map(|one| one.2).collect::<Vec<_>>())
+            };
+            Position { at: kind.to_display(here[0].0), forward: towards(false), backward: towards(true) }
         })
         .collect();
+    // A sweep whose positions do not return is no test of positioning.
+    let repeated = |approach: Option<Approach>| approach.is_some_and(|one| one.count > 1);
+    if !positions.iter().any(|position| repeated(position.forward) || repeated(position.backward)) {
+        return None;
+    }
     Some(figures(test.name.clone(), machine.axes[axis].name.clone(), [unit.name, kind.unit().to_string()], positions))
 }
 

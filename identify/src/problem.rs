@@ -208,7 +208,7 @@ impl Problem {
     /// The unit of readings and residuals in results: µm, or ″ if every channel is an angle. At the lever of such
     /// a session ([`Session::lever_mm`]) one arcsecond is one micrometre.
     pub fn unit(&self) -> ReadingUnit {
-        if self.session.units().only_angles() { ReadingUnit::Arcsecond } else { ReadingUnit::Micrometre }
+        ReadingUnit::of(&self.session)
     }
 
     /// Whether the readings of all tests are vectors, three coordinates each.

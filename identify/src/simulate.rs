@@ -20,14 +20,17 @@ use serde::Serialize;
 use crate::error::IdentifyError;
 use crate::parameters::{Parameters, Role};
 use crate::quantity::Given;
+use crate::unit::ARCSEC;
 
 /// The values and options of a simulation.
 #[derive(Clone, Debug, Default)]
 pub struct Simulation {
     /// Values of errors, set-up quantities and coefficients of declared effects; everything else is zero.
     pub given: Vec<Given>,
-    /// Standard deviation of a reading, mm; `None` for that of the session, or zero if it states none.
+    /// Standard deviation of a length, mm; `None` for that of the session, or zero if it states none.
     pub noise_mm: Option<f64>,
+    /// The same of an angle, rad.
+    pub noise_rad: Option<f64>,
     /// Whether set-up quantities without a given value are drawn from their priors.
     pub draw_setups: bool,
     /// Seed of the noise and the set-ups.
@@ -41,8 +44,10 @@ pub struct Simulated {
     pub readings: Vec<Readings>,
     /// Every value that is not zero: name, value, unit.
     pub truth: Vec<(String, f64, String)>,
-    /// Standard deviation of the noise, mm.
+    /// Standard deviation of the noise of a length, mm.
     pub noise_mm: f64,
+    /// Standard deviation of the noise of an angle, rad.
+    pub noise_rad: f64,
     /// Warnings for the user.
     pub warnings: Vec<String>,
 }
@@ -54,8 +59,11 @@ pub struct SimulationResult {
     pub written_session: String,
     /// Number of simulated readings.
     pub readings: usize,
-    /// Standard deviation of the simulated noise, µm.
+    /// Standard deviation of the simulated noise of lengths, µm.
     pub noise_um: f64,
+    /// Standard deviation of the simulated noise of angles, arcsec; absent without angles.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_arcsec: Option<f64>,
     /// Resolution of the readings, µm; `null` for none.
     pub resolution_um: Option<f64>,
     /// The parameters that are not zero.
@@ -84,6 +92,7 @@ impl SimulationResult {
             written_session: file.display().to_string(),
             readings: simulated.readings.iter().map(|readings| readings.rows()).sum(),
             noise_um: simulated.noise_mm * 1e3,
+            noise_arcsec: session.units().angles.then_some(simulated.noise_rad * ARCSEC),
             resolution_um: session.resolution_mm.map(|step| step * 1e3),
             truth: truth.collect(),
             warnings: simulated.warnings.clone(),
@@ -173,7 +182,8 @@ pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated,
     assign(&parameters, &given, &mut beta)?;
 
     let warnings = warnings(&parameters, &beta);
-    let noise_mm = simulation.noise_mm.or(session.stated_noise_mm()).unwrap_or(0.0);
+    let noise_mm = simulation.noise_mm.or(session.noise_mm).unwrap_or(0.0);
+    let noise_rad = simulation.noise_rad.or(session.noise_rad).unwrap_or(0.0);
     let values = parameters.slot_values(&models, &beta);
     let mut readings = Vec::with_capacity(tests.len());
     for (index, (model, values)) in models.iter().zip(&values).enumerate() {
@@ -189,19 +199,20 @@ pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated,
         for values in observed.chunks_exact_mut(model.channels().len()) {
             for (value, channel) in values.iter_mut().zip(model.channels()) {
                 let normal: f64 = StandardNormal.sample(&mut random);
-                let (noise, resolution) = match channel.is_angle() {
-                    true => (noise_mm / session.lever_mm, session.resolution_rad),
-                    false => (noise_mm, session.resolution_mm),
-                };
-                *value += noise * normal;
-                if let Some(step) = resolution {
-                    *value = rounded(*value, step);
-                }
+                *value += normal * if channel.is_angle() { noise_rad } else { noise_mm };
             }
         }
         let states = tests[index].readings.as_deref().cloned().unwrap_or_default();
         let mut of_test = Readings { observed, ..states };
         of_test.channels_to_columns(&open.machine, model.station());
+        for values in of_test.observed.chunks_exact_mut(model.channels().len()) {
+            for (value, channel) in values.iter_mut().zip(model.channels()) {
+                let resolution = if channel.is_angle() { session.resolution_rad } else { session.resolution_mm };
+                if let Some(step) = resolution {
+                    *value = rounded(*value, step);
+                }
+            }
+        }
         readings.push(of_test);
     }
     let truth = parameters
@@ -214,7 +225,7 @@ pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated,
             (parameter.id.clone(), value * unit.display_per_internal, unit.name.clone())
         })
         .collect();
-    Ok(Simulated { readings, truth, noise_mm, warnings })
+    Ok(Simulated { readings, truth, noise_mm, noise_rad, warnings })
 }
 
 /// Rounds to a multiple of a step. Dividing by the whole reciprocal of the step keeps decimals exact.

@@ -9,9 +9,17 @@ use nalgebra::Vector3;
 
 /// The stations of the tests, with start values for free poses and sockets from which the iterations converge.
 pub(crate) fn stations(session: &Session, tests: &[Test]) -> Vec<Station<f64>> {
-    let datum = |test: &Test| test.station.with_datum(&session.machine, test.readings.as_deref()?);
-    let mut stations: Vec<Station<f64>> =
-        tests.iter().map(|test| datum(test).unwrap_or_else(|| test.station.clone())).collect();
+    let mut stations: Vec<Station<f64>> = tests.iter().map(|test| test.station.clone()).collect();
+    for (station, test) in stations.iter_mut().zip(tests) {
+        // Tests of one set-up count from one point: that of the first of them.
+        let first = tests.iter().find(|first| first.station.kind() == test.station.kind() && first.setup == test.setup);
+        if let Some(readings) = first.and_then(|first| first.readings.as_deref()) {
+            let first = first.map_or(&test.station, |first| &first.station);
+            if let Some(counted) = first.with_datum(&session.machine, readings) {
+                *station = station.counted_as(&counted);
+            }
+        }
+    }
     let places: Vec<Option<&str>> = tests.iter().map(|test| test.free_place()).collect();
     for index in 0..tests.len() {
         if places[index].is_none() || places[..index].contains(&places[index]) {

@@ -7,7 +7,7 @@ use abbe_model::effect::{Effect, Shape};
 use abbe_model::instrument::InternalUnit;
 use abbe_model::session::Session;
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A unit of reported results.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,7 +19,7 @@ pub struct Unit {
 }
 
 /// The unit of the figures of readings: noise, residuals, held-out errors. Keys of results end in it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum ReadingUnit {
     /// µm: of lengths, or of lengths beside angles.
     #[default]
@@ -37,6 +37,26 @@ impl ReadingUnit {
             ReadingUnit::Micrometre => "um",
             ReadingUnit::Arcsecond => "arcsec",
         }
+    }
+
+    /// Of the readings of a session.
+    pub fn of(session: &Session) -> ReadingUnit {
+        if session.units().only_angles() { ReadingUnit::Arcsecond } else { ReadingUnit::Micrometre }
+    }
+
+    /// A figure of readings with its symbol.
+    pub fn text(self, value: f64, places: usize) -> String {
+        format!("{value:.places$} {}", self.symbol())
+    }
+
+    /// Its symbol.
+    pub fn symbol(self) -> &'static str {
+        if self.is_micrometre() { "µm" } else { "″" }
+    }
+
+    /// The key of a session that states the noise of readings in this unit.
+    pub fn noise_key(self) -> &'static str {
+        if self.is_micrometre() { "noise_um" } else { "noise_arcsec" }
     }
 
     /// Whether it is µm, which results do not state.

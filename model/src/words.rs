@@ -24,6 +24,12 @@ pub fn first_of(names: &[impl AsRef<str>], most: usize, between: &str, what: &st
         }
 }
 
+/// A noun with its article: `a laser`, `an angle`.
+pub fn with_article(noun: &str) -> String {
+    let article = if noun.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
+    format!("{article} {noun}")
+}
+
 /// A count with its noun, singular or plural.
 ///
 /// ```

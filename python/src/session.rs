@@ -204,6 +204,8 @@ impl Session {
             columns.set_item(axis.column(""), PyArray1::from_vec(py, display.collect()))?;
         }
         let channels = found.station.channels();
+        let mut readings = readings.as_ref().clone();
+        readings.columns_to_channels(&state.session.machine, &found.station);
         for (first, (channel, label)) in channels.iter().zip(labels(channels)).enumerate() {
             let (unit, per_internal) = if channel.is_angle() { ("arcsec", ARCSEC) } else { ("mm", 1.0) };
             let name = match label {
@@ -283,6 +285,7 @@ impl Session {
         given: Vec<(String, f64, Option<String>)>,
         seed: u64,
         noise_um: Option<f64>,
+        noise_arcsec: Option<f64>,
         draw_setups: bool,
     ) -> PyResult<(Session, Vec<(String, f64, String)>, Vec<String>)> {
         let state = self.state();
@@ -292,13 +295,19 @@ impl Session {
                 Ok(Given { id, value, unit })
             });
             let given = given.collect::<Result<Vec<_>, Failed>>()?;
-            let simulation = Simulation { given, noise_mm: noise_um.map(|um| um * 1e-3), draw_setups, seed };
+            let noise_mm = noise_um.map(|um| um * 1e-3);
+            let noise_rad = noise_arcsec.map(|arcsec| arcsec / ARCSEC);
+            let simulation = Simulation { given, noise_mm, noise_rad, draw_setups, seed };
             let simulated = simulate(&state.session, &simulation)?;
             let mut session = state.session.clone().with_readings(simulated.readings);
             let mut sources = SourceMap { files: Vec::new(), ..state.sources.clone() };
             if let Some(noise_um) = noise_um {
-                session.noise_mm = simulation.noise_mm;
+                session.noise_mm = noise_mm;
                 sources.text.set_noise(noise_um);
+            }
+            if let Some(noise_arcsec) = noise_arcsec {
+                session.noise_rad = noise_rad;
+                sources.text.set_noise_of_angles(noise_arcsec);
             }
             Ok((State::new(session, sources, Origin::default()), simulated.truth, simulated.warnings))
         })?;

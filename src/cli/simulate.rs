@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use abbe::identify::quantity::{self, Given};
 use abbe::identify::simulate::{Simulation, SimulationResult, simulate};
+use abbe::identify::unit::ARCSEC;
 use abbe::model::files::{self, Changes, with_readings};
 use clap::Args;
 
@@ -40,11 +41,16 @@ pub struct SimulateArguments {
     /// Example: --errors errors.toml
     #[arg(long = "errors", value_name = "FILE")]
     file: Option<PathBuf>,
-    /// Standard deviation of the noise, µm [default: the noise of the session].
+    /// Standard deviation of the noise of lengths, µm [default: the noise of the session].
     ///
     /// Example: --noise-um 0.5
     #[arg(long, value_name = "X", allow_negative_numbers = true)]
     noise_um: Option<f64>,
+    /// Standard deviation of the noise of angles, arcsec [default: the noise of the session].
+    ///
+    /// Example: --noise-arcsec 0.2
+    #[arg(long, value_name = "X", allow_negative_numbers = true)]
+    noise_arcsec: Option<f64>,
     /// Draw the set-up parameters from their priors.
     #[arg(long)]
     draw_setups: bool,
@@ -76,14 +82,17 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
         given.push(value);
     }
     arguments.noise_um.map(|noise| values::NOISE_UM.check("--noise-um", noise)).transpose()?;
+    arguments.noise_arcsec.map(|noise| values::NOISE_ARCSEC.check("--noise-arcsec", noise)).transpose()?;
     let simulation = Simulation {
         given,
         noise_mm: arguments.noise_um.map(|noise_um| noise_um * 1e-3),
+        noise_rad: arguments.noise_arcsec.map(|arcsec| arcsec / ARCSEC),
         draw_setups: arguments.draw_setups,
         seed: arguments.common.seed,
     };
     let simulated = simulate(&session, &simulation)?;
-    let changes = Changes { noise_um: arguments.noise_um, hide_effects: arguments.hide_effects };
+    let SimulateArguments { noise_um, noise_arcsec, hide_effects, .. } = *arguments;
+    let changes = Changes { noise_um, noise_arcsec, hide_effects };
     let files = with_readings((&session, &sources), &simulated.readings, changes)?;
     if output::is_same(output::folder_of(&sources.file), &arguments.out) {
         return Err(Failure::Other(format!(

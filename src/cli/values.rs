@@ -40,6 +40,9 @@ pub const SIZE_MM: Quantity = Quantity { above: true, ..within("a length", " mm"
 pub const DEVIATION_UM: Quantity = within("a number of µm", "", MIN_UM, LARGEST);
 /// A standard deviation of simulated noise.
 pub const NOISE_UM: Quantity = Quantity { or_zero: true, ..within("a standard deviation in µm", "", MIN_UM, LARGEST) };
+/// The same of angles.
+pub const NOISE_ARCSEC: Quantity =
+    Quantity { or_zero: true, ..within("a standard deviation in arcsec", "", MIN_UM, LARGEST) };
 /// A time that a person takes.
 pub const MINUTES: Quantity = within("a number of minutes", "", 0.0, 1e4);
 /// A limit of the time of a computation: at most ten years.

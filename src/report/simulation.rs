@@ -1,7 +1,7 @@
 //! A simulated session and the true values of its parameters.
 
 use abbe::identify::simulate::Simulated;
-use abbe::identify::unit::ReadingUnit;
+use abbe::identify::unit::{ARCSEC, ReadingUnit};
 use abbe::model::session::Session;
 use abbe::model::words::counted;
 
@@ -15,17 +15,20 @@ pub fn report(session: &Session, file: &str, simulated: &Simulated, seed: u64) -
     report.warnings.clone_from(&simulated.warnings);
     report.method = "Readings of the machine with the stated errors, with Gaussian noise.".to_string();
     let readings: usize = simulated.readings.iter().map(|readings| readings.rows()).sum();
-    let unit = match session.units().only_angles() {
-        true => ReadingUnit::Arcsecond,
-        false => ReadingUnit::Micrometre,
+    let units = session.units();
+    let lengths = of_readings(simulated.noise_mm * 1e3, ReadingUnit::Micrometre);
+    let angles = of_readings(simulated.noise_rad * ARCSEC, ReadingUnit::Arcsecond);
+    let noise = match (units.lengths, units.angles) {
+        (true, true) => format!("{lengths} and {angles}"),
+        (false, true) => angles,
+        _ => lengths,
     };
     report.opening(
         "",
         [format!(
-            "{file}: {} of {}, noise {}, seed {seed}",
+            "{file}: {} of {}, noise {noise}, seed {seed}",
             counted(readings, "reading"),
             counted(session.tests.len(), "test"),
-            of_readings(simulated.noise_mm * 1e3, unit),
         )],
     );
     report.section("True values");

@@ -65,8 +65,7 @@ impl State {
 
 /// A laser that reads all channels.
 fn laser(reflector: [f64; 3], optic: [f64; 3], frame: [[f64; 3]; 3]) -> Laser<f64> {
-    let mut laser =
-        Laser { reflector, optic, frame, channels: vec![0], kept: Vec::new(), is_beam_stated: false, datum: 0.0 };
+    let mut laser = Laser { reflector, optic, frame, channels: Vec::new(), is_beam_stated: false, datum: 0.0 };
     laser.keep_channels(&|quantity| matches!(quantity, Quantity::Channel(_)));
     laser
 }
@@ -611,4 +610,196 @@ fn the_figures_of_a_linear_axis_are_those_of_its_report() {
     assert_eq!((figures.axis.as_str(), figures.unit.as_str(), figures.positions.len()), ("X", "um", 9));
     assert_eq!(format!("{:.2}", figures.mean_range.unwrap()), "93.65");
     assert_eq!(format!("{:.2}", figures.accuracy.unwrap()), "135.27");
+}
+
+/// A table axis: what is read against the table falls where the axis rises. A laser along −X, a positioning error of the
+/// table, and a backlash; and the angle about a rotary axis of the table.
+#[test]
+fn the_figures_of_an_axis_that_carries_the_table_have_the_sign_of_its_deviations() {
+    let folder = Folder::new();
+    // The table goes 3 µm too far at X = 100, and 1 µm less far in negative direction.
+    let mut data = String::from("run,x_mm,displacement_mm\n");
+    let mut angles = String::from("run,c_deg,angle_arcsec\n");
+    for run in 1..=4 {
+        for step in 0..=10 {
+            let step = if run % 2 == 1 { step } else { 10 - step };
+            let (x, c) = (f64::from(10 * step), f64::from(36 * step));
+            let actual = x + 3e-3 * x / 100.0 - if run % 2 == 1 { 0.0 } else { 1e-3 };
+            // Along −X, with the reflector of the tool at rest and the optic on the table at `actual`.
+            data += &format!("{run},{x},{:.9}\n", actual);
+            // The table turns 5″ too far at C = 360°: the tool turns back against it.
+            angles += &format!("{run},{c},{:.6}\n", -5.0 * c / 360.0);
+        }
+    }
+    folder.write("laser.csv", &data);
+    folder.write("angle.csv", &angles);
+    let machine = "[machine]\nname = \"Table\"\nchain = \"w C X b Z t\"\naxis.X.direction = [1, 0, 0]\naxis.Z.direction = [0, 0, 1]\n\
+                   axis.C = { direction = [0, 0, 1], origin_mm = [0, 0, 0] }\n[instrument]\nkind = \"laser\"\n";
+    let tests = "[[test]]\nname = \"L\"\ndata = \"laser.csv\"\nbeam = [-1, 0, 0]\n[[test]]\nname = \"A\"\nkind = \"angle\"\n\
+                 data = \"angle.csv\"\nabout = [0, 0, 1]\n[[test]]\nname = \"bed\"\nkind = \"angle\"\ndata = \"angle.csv\"\nabout = [0, 0, 1]\n\
+                 body = \"tool\"\n";
+    let session = folder.session(&format!("{machine}{tests}"));
+    let rejected: Vec<Vec<bool>> = session.tests.iter().map(|_| vec![false; 44]).collect();
+    let found = abbe::identify::positioning::of_session(&session, &rejected);
+    // What the axis does not move has no figures.
+    let [of_x, of_c] = &found[..] else { panic!("{found:?}") };
+    let mean = |test: &abbe::identify::positioning::PositioningTest, place: usize| {
+        let position = &test.positions[place];
+        [position.forward.unwrap().mean, position.backward.unwrap().mean]
+    };
+    let near = |found: [f64; 2], expected: [f64; 2]| {
+        assert!((0..2).all(|k| (found[k] - expected[k]).abs() < 1e-3), "{found:?}, not {expected:?}");
+    };
+    near(mean(of_x, 10), [3.0, 2.0]);
+    near(mean(of_x, 0), [0.0, -1.0]);
+    assert!((of_x.mean_reversal.unwrap() - 1.0).abs() < 1e-3);
+    near(mean(of_c, 10), [5.0, 5.0]);
+    assert_eq!((of_c.unit.as_str(), of_c.position_unit.as_str()), ("arcsec", "deg"));
+}
+
+/// A residual of 10 µm that no effect explains: the value that was not read is no outlier beside it, and the pitch of its
+/// row stays.
+#[test]
+fn a_value_that_was_not_read_is_no_outlier() {
+    let folder = Folder::new();
+    let mut random = Pcg64::seed_from_u64(3);
+    let mut data = String::from("run,x_mm,deviation_um,pitch_arcsec\n");
+    for row in 0..60 {
+        let x = f64::from(row) * 5.0;
+        let deviation = 10.0 + 0.1 * normal(&mut random) + 0.1 * x;
+        let cell = if row == 30 { String::new() } else { format!("{deviation:.4}") };
+        data += &format!("1,{x},{cell},{:.4}\n", 0.2 * normal(&mut random));
+    }
+    let session = laser_session(&folder, &data, [0.0; 3], &[]);
+    let (problem, _) = prepare(&session, 1).unwrap();
+    assert!(problem.rejected[0].iter().all(|rejected| !rejected));
+    assert_eq!((problem.readings(), problem.scalars()), (60, 119));
+}
+
+/// Where neither noise is stated, that of each unit follows from its own repeats: readings with 0.4 µm and 0.1″, over
+/// sessions. The lever is their ratio, and the figures of each unit are its own.
+#[test]
+fn the_noise_of_lengths_and_angles_is_found_apart() {
+    let folder = Folder::new();
+    let mut random = Pcg64::seed_from_u64(19);
+    let (mut lengths, mut angles, mut chi) = (Vec::new(), Vec::new(), Vec::new());
+    for _ in 0..20 {
+        let mut data = String::from("run,x_mm,deviation_um,pitch_arcsec\n");
+        for run in 1..=6 {
+            for step in 0..=20 {
+                let x = f64::from(if run % 2 == 1 { 10 * step } else { 200 - 10 * step });
+                let (deviation, pitch) = (0.4 * normal(&mut random), 0.1 * normal(&mut random));
+                data += &format!("{run},{x},{deviation:.5},{pitch:.5}\n");
+            }
+        }
+        folder.write("laser.csv", &data);
+        let session = folder.session(&format!(
+            "{MILL}[instrument]\nkind = \"laser\"\n[[test]]\nname = \"L\"\ndata = \"laser.csv\"\nbeam = [1, 0, 0]\n"
+        ));
+        let (problem, found) = prepare(&session, 1).unwrap();
+        let result = fit::report(&problem, &found).unwrap();
+        lengths.push(result.noise_um);
+        angles.push(result.of_angles.unwrap().noise_arcsec);
+        chi.push(result.chi_square / result.degrees_of_freedom as f64);
+        // A plan and a validation of this session weigh its angles alike.
+        let (complete, noise) = abbe::identify::plan::prepared(&session, &Default::default()).unwrap();
+        assert!((complete.lever_mm / problem.session.lever_mm - 1.0).abs() < 1e-12);
+        assert!((noise.sigma_mm * 1e3 / result.noise_um - 1.0).abs() < 1e-9);
+    }
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    // Twenty sessions of about 80 degrees of freedom a unit: 1.8 % of sampling error.
+    assert!((mean(&lengths) / 0.4 - 1.0).abs() < 0.055, "{}", mean(&lengths));
+    assert!((mean(&angles) / 0.1 - 1.0).abs() < 0.055, "{}", mean(&angles));
+    assert!((mean(&chi) - 1.0).abs() < 0.06, "{}", mean(&chi));
+}
+
+/// Noise and resolution of a simulation hold for the columns, each unit its own, and the session that is written states
+/// them.
+#[test]
+fn simulated_noise_and_resolution_are_those_of_each_unit() {
+    use abbe::identify::simulate::{Simulation, simulate};
+    let folder = Folder::new();
+    let text = format!(
+        "{MILL}[instrument]\nkind = \"laser\"\nnoise_um = 0.5\nnoise_arcsec = 3\nresolution_um = 0.1\nresolution_arcsec = 0.5\n[[test]]\n\
+         name = \"L\"\nbeam = [1, 0, 0]\nreflector_mm = [0, 7.77777, -120.123456]\nchannels = [\"vertical\", \"pitch\"]\n\
+         sweep = {{ axis = \"X\", from_mm = 0, to_mm = 1000, step_mm = 1, runs = 1, both_directions = false }}\n"
+    );
+    let session = folder.session(&text);
+    let of = |simulation: &Simulation| -> [f64; 2] {
+        let drawn = simulate(&session, simulation).unwrap();
+        let observed = &drawn.readings[0].observed;
+        let deviation = |place: usize, unit: f64, step: f64| {
+            let values: Vec<f64> = observed.iter().skip(place).step_by(2).map(|value| value / unit).collect();
+            for value in &values {
+                assert!((value / step - (value / step).round()).abs() < 1e-6, "{value} is no multiple of {step}");
+            }
+            (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
+        };
+        [deviation(0, 1e-3, 0.1), deviation(1, ARCSECOND, 0.5)]
+    };
+    // 1001 readings: 2.2 % of sampling error.
+    let [vertical, pitch] = of(&Simulation { seed: 1, ..Simulation::default() });
+    assert!((vertical / 0.5 - 1.0).abs() < 0.07 && (pitch / 3.0 - 1.0).abs() < 0.07, "{vertical} {pitch}");
+    let [vertical, pitch] = of(&Simulation { noise_mm: Some(2e-3), seed: 2, ..Simulation::default() });
+    assert!((vertical / 2.0 - 1.0).abs() < 0.07 && (pitch / 3.0 - 1.0).abs() < 0.07, "{vertical} {pitch}");
+    let [vertical, pitch] = of(&Simulation { noise_rad: Some(10.0 * ARCSECOND), seed: 3, ..Simulation::default() });
+    assert!((vertical / 0.5 - 1.0).abs() < 0.07 && (pitch / 10.0 - 1.0).abs() < 0.07, "{vertical} {pitch}");
+}
+
+/// Tests of one set-up of a laser have one datum: their difference is theirs, and no datum takes it.
+#[test]
+fn tests_of_one_set_up_count_from_one_point() {
+    let folder = Folder::new();
+    let mut random = Pcg64::seed_from_u64(5);
+    for (name, offset) in [("one", 0.0), ("two", 0.020)] {
+        let mut data = String::from("run,x_mm,displacement_mm\n");
+        for run in 1..=2 {
+            for step in 0..=30 {
+                let x = f64::from(if run == 1 { 10 * step } else { 300 - 10 * step });
+                data += &format!("{run},{x},{:.6}\n", x + 431.7 + offset + 1e-4 * normal(&mut random));
+            }
+        }
+        folder.write(&format!("{name}.csv"), &data);
+    }
+    let test =
+        |name: &str| format!("[[test]]\nname = \"{name}\"\ndata = \"{name}.csv\"\nsetup = \"S\"\nbeam = [1, 0, 0]\n");
+    let session = folder.session(&format!("{MILL}{LASER}{}{}", test("one"), test("two")));
+    let (problem, found) = prepare(&session, 1).unwrap();
+    let mean = |test: usize| found.residuals[test].iter().sum::<f64>() / found.residuals[test].len() as f64;
+    assert!((mean(1) - mean(0) - 0.020).abs() < 1e-4, "{} {}", mean(0), mean(1));
+    assert_eq!(problem.parameters.list.iter().filter(|one| one.id.starts_with("zero.displacement")).count(), 1);
+}
+
+/// A file that cannot be what its columns say is refused with the place and what to do.
+#[test]
+fn readings_in_another_unit_and_channels_without_a_value_are_refused() {
+    let folder = Folder::new();
+    let refused = |columns: &str, row: &dyn Fn(f64) -> String, expected: &str| {
+        let rows: String = (0..=20).map(|step| row(10.0 * f64::from(step)) + "\n").collect();
+        folder.write("laser.csv", &format!("run,x_mm,{columns}\n{rows}"));
+        folder.write(
+            "session.toml",
+            &format!("{MILL}{LASER}[[test]]\nname = \"L\"\ndata = \"laser.csv\"\nbeam = [1, 0, 0]\n"),
+        );
+        let path = folder.0.path().join("session.toml");
+        let fault = files::session(&path, &ReadOptions::default()).unwrap_err().to_string();
+        assert!(fault.contains(expected), "{fault}");
+    };
+    refused("displacement_mm", &|x| format!("1,{x},{}", x / 1000.0), "differs from the travel along the beam by");
+    refused("displacement_mm", &|x| format!("1,{x},{}", -x), "has the beam the opposite direction");
+    refused("pitch_deg", &|x| format!("1,{x},{}", x / 20.0), "the readings of `pitch` differ from their median");
+    refused("displacement_mm,pitch_arcsec", &|x| format!("1,{x},{x},"), "no row has a value of `pitch`");
+    let lacks_both = |x: f64| if x == 50.0 { format!("1,{x},,") } else { format!("1,{x},{x},0") };
+    refused("displacement_mm,pitch_arcsec", &lacks_both, "no channel has a value in this row");
+}
+
+/// A noise of a unit in which nothing is read is named.
+#[test]
+fn a_noise_of_another_unit_is_a_warning() {
+    let folder = Folder::new();
+    folder.write("level.csv", "run,x_mm,angle_arcsec\n1,0,0.1\n1,10,0.2\n1,20,0.1\n");
+    let session = folder.session(&format!(
+        "{MILL}[instrument]\nkind = \"angle\"\nnoise_um = 0.2\n[[test]]\nname = \"L\"\ndata = \"level.csv\"\nabout = [0, 1, 0]\n"
+    ));
+    assert!(session.warnings.iter().any(|warning| warning.contains("state `noise_arcsec`")), "{:?}", session.warnings);
 }

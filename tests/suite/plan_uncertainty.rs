@@ -79,7 +79,7 @@ fn squares(code: &str, first_seed: usize, complete_fit: bool) -> Vec<(String, f6
             .collect();
         let drawn = simulate(
             &plan,
-            &Simulation { given, noise_mm: None, draw_setups: true, seed: (first_seed + number) as u64 },
+            &Simulation { given, draw_setups: true, seed: (first_seed + number) as u64, ..Simulation::default() },
         )
         .unwrap();
         let measured = plan.clone().with_readings(drawn.readings);

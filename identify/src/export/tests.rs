@@ -39,6 +39,7 @@ pub(super) fn model(machine: Machine, errors: &[(String, f64)]) -> IdentifiedMod
         null_directions: Vec::new(),
         locations: Vec::new(),
         noise: Noise::white(1e-4, NoiseSource::Stated),
+        reading_unit: crate::unit::ReadingUnit::Micrometre,
         quality: Quality { readings: 1, rms_um: 0.0, heldout_rms_um: 0.0, u_enlargement: 1.0 },
         ranges: Vec::new(),
         tool_mm: [0.0; 3],

@@ -34,7 +34,7 @@ use crate::problem::Problem;
 pub use aliases::{AliasChange, EffectAliases};
 pub use assume::assume;
 pub(crate) use covariance::{null_space, of_parameters as covariance_of_parameters};
-pub use prepare::prepare;
+pub use prepare::{prepare, with_lever};
 pub(crate) use prepare::{prepare_with, with_families};
 pub(crate) use quantities::{Quantity, quantities, values_at};
 pub(crate) use reported::{ids, rms_of_units};

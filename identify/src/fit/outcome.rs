@@ -139,7 +139,7 @@ fn assumptions(problem: &Problem, fit: &Fit) -> Vec<Assumption> {
 }
 
 fn noise(problem: &Problem, fit: &Fit) -> Assumption {
-    let figure = format!("noise of {:.3} µm", problem.noise.sigma_mm * 1e3);
+    let figure = format!("noise of {}", problem.unit().text(problem.noise.sigma_mm * 1e3, 3));
     let contradicted = stated_against_repeats(problem, &fit.residuals);
     let (statement, verdict, test) = match (problem.noise.source, contradicted) {
         (_, Some(why)) => (format!("{figure}, as stated"), AssumptionVerdict::Contradicted, why),

@@ -41,14 +41,14 @@ pub fn prepare(session: &Session, seed: u64) -> Result<(Problem, Fit), IdentifyE
 /// # Errors
 /// See [`prepare`].
 pub(crate) fn prepare_with(session: &Session, effects: &[Effect], seed: u64) -> Result<(Problem, Fit), IdentifyError> {
-    let units = session.units();
-    if !(units.lengths && units.angles) || session.stated_lever_mm().is_some() {
+    if session.is_lever_known() {
         return prepare_at_lever(session, effects, seed);
     }
     let mut session = session.clone();
     let mut found = prepare_at_lever(&session, effects, seed)?;
     for _ in 0..MAX_LEVERS {
         let Some(factor) = lengths_over_angles(&found.0, &found.1) else { break };
+        let factor = factor.clamp(1.0 / MAX_FACTOR, MAX_FACTOR);
         session.lever_mm *= factor;
         found = prepare_at_lever(&session, effects, seed)?;
         if (factor - 1.0).abs() < LEVER_TOLERANCE {
@@ -60,12 +60,32 @@ pub(crate) fn prepare_with(session: &Session, effects: &[Effect], seed: u64) -> 
 
 /// Maximum number of estimates of the lever of a session that does not state the noise of both lengths and angles.
 const MAX_LEVERS: usize = 6;
+/// Largest factor by which one estimate changes the lever.
+const MAX_FACTOR: f64 = 100.0;
 /// Relative change of the lever at which its estimates stop.
 const LEVER_TOLERANCE: f64 = 0.01;
 
-/// The noise of the lengths over that of the angles at the lever of a problem: of repeats if both have them, else of the
-/// residual.
+/// The session with the lever between its lengths and angles: the one that its stated noise requires, or that of its
+/// readings.
+///
+/// # Errors
+/// See [`prepare`].
+pub fn with_lever(session: &Session, seed: u64) -> Result<Session, IdentifyError> {
+    if session.is_lever_known() {
+        return Ok(session.clone());
+    }
+    let lever_mm = prepare(session, seed)?.0.session.lever_mm;
+    Ok(Session { lever_mm, ..session.clone() })
+}
+
+/// The noise of the lengths over that of the angles at the lever of a problem: the stated one, else of repeats if both
+/// have them, else of the residual.
 fn lengths_over_angles(problem: &Problem, fit: &Fit) -> Option<f64> {
+    let session = &problem.session;
+    let stated = |is_angle: bool| {
+        let noise = if is_angle { session.noise_rad.map(|rad| rad * session.lever_mm) } else { session.noise_mm };
+        noise.filter(|sigma| *sigma > 0.0)
+    };
     let of_unit = |is_angle: bool| {
         let mut part = fit.residuals.clone();
         let mut tests = problem.tests.clone();
@@ -79,13 +99,14 @@ fn lengths_over_angles(problem: &Problem, fit: &Fit) -> Option<f64> {
         }
         PureError::of(&tests, &part, |test, row| !problem.rejected[test][row]).sigma_mm()
     };
-    if let (Some(lengths), Some(angles)) = (of_unit(false), of_unit(true)) {
-        return (lengths > 0.0 && angles > 0.0).then(|| lengths / angles);
-    }
-    match rms_by_unit_mm(problem, &fit.residuals) {
-        [Some(lengths), Some(angles)] if lengths > 0.0 && angles > 0.0 => Some(lengths / angles),
-        _ => None,
-    }
+    let repeats = [false, true].map(of_unit);
+    let found = match repeats {
+        [Some(_), Some(_)] => repeats,
+        _ => rms_by_unit_mm(problem, &fit.residuals),
+    };
+    let lengths = stated(false).or(found[0])?;
+    let angles = stated(true).or(found[1])?;
+    (lengths > 0.0 && angles > 0.0).then(|| lengths / angles)
 }
 
 fn prepare_at_lever(session: &Session, effects: &[Effect], seed: u64) -> Result<(Problem, Fit), IdentifyError> {

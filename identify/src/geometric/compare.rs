@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use abbe_model::instrument::InstrumentKind;
 use abbe_model::session::Session;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -106,6 +107,11 @@ pub struct Comparison {
 /// # Errors
 /// See [`Estimator::new`] and [`fit::prepare`].
 pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Comparison, IdentifyError> {
+    if session.instruments() != [InstrumentKind::BallBar] {
+        return Err(IdentifyError::Request(
+            "the methods of circles are those of ball bars, and a test has another instrument".into(),
+        ));
+    }
     let (problem, full) = fit::prepare(session, seed)?;
     let estimator = Estimator::new(&problem, method)?;
     let observed = observed(&problem);

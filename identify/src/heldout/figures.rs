@@ -8,7 +8,7 @@
 //! | independent poses | blocks of joint space | extrapolation | yes |
 
 use super::left_out_test::{LeftOutTests, left_out_tests};
-use super::{FoldKind, held_out, rms_mm};
+use super::{FoldKind, held_out, stated_rms_mm};
 use crate::error::IdentifyError;
 use crate::fit::Fit;
 use crate::problem::Problem;
@@ -29,7 +29,7 @@ pub(crate) fn cross_validation(
     let kind = problem.folds.kind;
     let extrapolation = (kind == FoldKind::PoseBlocks).then_some(deciding_mm);
     let interpolation = match interpolated(problem, fit)? {
-        Some(residuals) => Some(rms_mm(judged, &residuals)),
+        Some(residuals) => Some(stated_rms_mm(judged, &residuals)),
         None => (kind == FoldKind::RandomPoses).then_some(deciding_mm),
     };
     let run = matches!(kind, FoldKind::Runs | FoldKind::RunGroups).then_some(deciding_mm);

@@ -21,7 +21,7 @@ use faer::linalg::solvers::Llt;
 use faer::prelude::Solve;
 use faer::{Mat, Side};
 
-use super::{predicted, rms_mm};
+use super::{predicted, stated_rms_mm};
 use crate::error::IdentifyError;
 use crate::numerics::parallel;
 use crate::numerics::symmetric::Symmetric;
@@ -64,7 +64,7 @@ impl LeftOutTests {
     pub fn rms_mm(&self, problem: &Problem) -> Option<f64> {
         let judged = self.residuals.iter().any(Option::is_some);
         let residuals: Vec<Vec<f64>> = self.residuals.iter().map(|own| own.clone().unwrap_or_default()).collect();
-        judged.then(|| rms_mm(problem, &residuals))
+        judged.then(|| stated_rms_mm(problem, &residuals))
     }
 }
 

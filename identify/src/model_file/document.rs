@@ -13,6 +13,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
 use crate::noise::NoiseSource;
+use crate::unit::ReadingUnit;
 
 /// The word that marks a model file.
 pub const SCHEMA: &str = "abbe-model";
@@ -47,6 +48,10 @@ pub struct Document {
     pub null_directions: Long<Vec<Long<Vec<f64>>>>,
     /// Location errors as estimated without any effect.
     pub locations: Long<Vec<Location>>,
+    /// The unit of the figures of readings, noise and residuals: absent for µm, `arcsec` of a session of angles, whose
+    /// figures stand under the same keys.
+    #[serde(default, skip_serializing_if = "ReadingUnit::is_micrometre")]
+    pub reading_unit: ReadingUnit,
     /// The noise of a reading.
     pub noise: Noise,
     /// How well the model describes its own readings.

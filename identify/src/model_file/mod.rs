@@ -27,6 +27,7 @@ use faer::Mat;
 
 use crate::noise::Noise;
 use crate::parameters::Role;
+use crate::unit::ReadingUnit;
 use crate::unit::Unit;
 pub use document::{InputFile, Provenance};
 pub use range::DriverRange;
@@ -84,6 +85,8 @@ pub struct IdentifiedModel {
     pub locations: Vec<(ErrorName, f64)>,
     /// The noise of a reading.
     pub noise: Noise,
+    /// The unit of noise and residuals.
+    pub reading_unit: ReadingUnit,
     /// How well the model describes its own readings.
     pub quality: Quality,
     /// The range of every axis and driver.

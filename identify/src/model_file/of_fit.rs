@@ -8,7 +8,7 @@ use super::{IdentifiedModel, ModelParameter, Provenance, Quality, range};
 use crate::error::IdentifyError;
 use crate::fit::base::{Gauge, base_parameters};
 use crate::fit::{Fit, minimum};
-use crate::heldout::rms_mm;
+use crate::heldout::stated_rms_mm;
 use crate::parameters::Role;
 use crate::problem::Problem;
 
@@ -46,10 +46,11 @@ impl IdentifiedModel {
                 .collect(),
             locations: locations(problem, fit)?,
             noise: problem.noise.clone(),
+            reading_unit: problem.unit(),
             quality: Quality {
                 readings: problem.readings(),
-                rms_um: rms_mm(problem, &fit.residuals) * 1e3,
-                heldout_rms_um: fit.held_out.rms_mm * 1e3,
+                rms_um: stated_rms_mm(problem, &fit.residuals) * 1e3,
+                heldout_rms_um: stated_rms_mm(problem, &fit.held_out.residuals) * 1e3,
                 u_enlargement: fit.u_enlargement,
             },
             ranges: range::of_problem(problem, &problem.parameters.effects),

@@ -14,7 +14,9 @@ use abbe_model::effect::Effect;
 use abbe_model::error::Location;
 use abbe_model::files;
 use abbe_model::files::read::{effect_of_document, machine_of_document};
+use abbe_model::instrument::InstrumentKind;
 use abbe_model::session::Prior;
+use abbe_model::session::parameters_of;
 use faer::Mat;
 use serde_json::Value;
 
@@ -118,7 +120,9 @@ fn model(document: Document) -> Result<IdentifiedModel, Fault> {
     tests.sort_unstable();
     tests.dedup();
     let effects = effects.iter().enumerate();
-    let effects = effects.map(|(k, effect)| effect_of_document(effect, &machine, instrument, &tests).within_item(k));
+    let effects = effects.map(|(k, effect)| {
+        effect_of_document(effect, &machine, &parameters_of(InstrumentKind::ALL), &tests).within_item(k)
+    });
     let effects = effects.collect::<Result<Vec<_>, _>>().within("effects")?;
     let parameters = parameters(&document.parameters.0, &effects, &machine).within("parameters")?;
     let covariance = covariance(&document.covariance.0, &parameters).within("covariance")?;
@@ -146,6 +150,7 @@ fn model(document: Document) -> Result<IdentifiedModel, Fault> {
         tool_mm: document.tool_mm,
         table_mm: document.table_mm,
         reference: reference(&document.reference),
+        reading_unit: document.reading_unit,
         noise: noise(document.noise).within("noise")?,
         machine,
         instrument,

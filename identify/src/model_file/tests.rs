@@ -25,7 +25,8 @@ fn fitted() -> (Session, Problem, Fit) {
                 shape = \"periodic\"\nperiod_deg = 33.3\n";
     let document: Named<Vec<effect::Effect>> = files::Source::new(&file, text).parse().unwrap().document().unwrap();
     let effects = document.0[0].1.iter();
-    let read = effects.map(|of| effect_of_document(of, &session.machine, session.instrument, &[]).unwrap());
+    let read =
+        effects.map(|of| effect_of_document(of, &session.machine, &session.instrument_parameters(), &[]).unwrap());
     session.effects = read.collect();
     let (problem, fit) = prepare(&session, 1).unwrap();
     (session, problem, fit)

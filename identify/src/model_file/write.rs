@@ -52,6 +52,7 @@ impl IdentifiedModel {
             covariance: Long((0..size).map(|i| Long((0..=i).map(|j| self.covariance[(i, j)]).collect())).collect()),
             null_directions: Long(self.null_directions.iter().cloned().map(Long).collect()),
             locations: Long(self.locations.iter().map(location).collect()),
+            reading_unit: self.reading_unit,
             noise: document::Noise {
                 noise_um: Positive(self.noise.sigma_mm * 1e3),
                 source: self.noise.source,

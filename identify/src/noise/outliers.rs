@@ -69,12 +69,16 @@ fn reject_along_runs(readings: &Readings, residual: &[f64], channels: usize, sig
         let mut deviations = vec![0.0; readings.rows()];
         let mut conspicuous = Vec::new();
         for run in readings.runs().into_iter().filter(|run| run.len() > 2 * NEIGHBOURS) {
-            let values: Vec<f64> = (run.clone().map(|row| residual[row * channels + channel])).collect();
+            let rows: Vec<usize> = run.filter(|row| readings.was_read(*row, channel)).collect();
+            let values: Vec<f64> = rows.iter().map(|row| residual[row * channels + channel]).collect();
             let of_run = deviations_from_neighbours(&values);
             let limit = OUTLIER_ALONG_RUN * robust_deviation(&of_run).max(sigma_mm);
-            let exceeds = |row: &usize| of_run[*row - run.start].abs() > limit;
-            conspicuous.extend(run.clone().filter(exceeds).map(|row| (row, limit)));
-            deviations[run].copy_from_slice(&of_run);
+            for (row, deviation) in rows.into_iter().zip(of_run) {
+                deviations[row] = deviation;
+                if deviation.abs() > limit {
+                    conspicuous.push((row, limit));
+                }
+            }
         }
         retain_unrepeated(&mut conspicuous, readings, &deviations);
         conspicuous.into_iter().for_each(|(row, _)| reject[row] = true);

@@ -20,13 +20,16 @@ pub(crate) fn stated_against_repeats(problem: &Problem, residuals: &[Vec<f64>]) 
     let freedom = pure.freedom as f64;
     let [below, above] = chi_square_tails(freedom * ratio * ratio, freedom)?;
     let by_chance = below.min(above) > DISAGREEMENT_P / 2.0;
+    let unit = problem.unit();
+    let symbol = unit.symbol();
     (!by_chance && !(1.0 / DISAGREEMENT_RATIO..=DISAGREEMENT_RATIO).contains(&ratio)).then(|| {
         format!(
-            "the session states a noise of {} µm, and the repeatability is {:.3} µm ({} degrees of freedom): the uncertainties of a fit follow from \
-             the stated noise; correct `noise_um`, or omit it",
+            "the session states a noise of {} {symbol}, and the repeatability is {} ({} degrees of freedom): the uncertainties of a fit follow from \
+             the stated noise; correct `{}`, or omit it",
             stated_mm * 1e3,
-            sigma_mm * 1e3,
-            pure.freedom
+            unit.text(sigma_mm * 1e3, 3),
+            pure.freedom,
+            unit.noise_key()
         )
     })
 }

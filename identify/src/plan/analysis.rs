@@ -45,7 +45,7 @@ pub fn analyse(session: &Session, options: &PlanOptions) -> Result<PlanAnalysis,
     let (complete, noise) = prepared(session, options)?;
     let problem = states::problem_by_test(&complete, noise)?;
     let mut analysis = analyse_problem(&problem, options.reach_mm)?;
-    analysis.warnings.extend(states::noise_warning(&problem.noise));
+    analysis.warnings.extend(states::noise_warning(&problem.noise, problem.unit()));
     if options.effects {
         analysis.effects = Some(effects::effects(&problem)?);
     }
@@ -57,11 +57,13 @@ pub fn analyse(session: &Session, options: &PlanOptions) -> Result<PlanAnalysis,
 /// # Errors
 /// If a test has neither data nor a movement, or a movement leaves the travel.
 pub fn prepared(session: &Session, options: &PlanOptions) -> Result<(Session, Noise), IdentifyError> {
+    let is_measured = session.tests.iter().all(|test| test.readings.is_some());
+    let session = if is_measured { crate::fit::with_lever(session, 1)? } else { session.clone() };
     let noise = match options.noise_mm {
         Some(sigma) => Noise::white(sigma, NoiseSource::Stated),
-        None => states::noise_of(session)?,
+        None => states::noise_of(&session)?,
     };
-    Ok((states::complete(session, options.planned_only)?, noise))
+    Ok((states::complete(&session, options.planned_only)?, noise))
 }
 
 /// Analyses a problem whose folds are its tests (see [`states::problem_by_test`]), without effects. A test causes a

@@ -10,6 +10,7 @@ use crate::error::IdentifyError;
 use crate::heldout::Folds;
 use crate::noise::{Noise, NoiseSource};
 use crate::problem::Problem;
+use crate::unit::ReadingUnit;
 
 /// Assumed pause between two tests, s.
 const BETWEEN_TESTS_S: f64 = 120.0;
@@ -73,13 +74,13 @@ pub(crate) fn assumed_noise() -> Noise {
 }
 
 /// The warning about a noise that the session does not state.
-pub(crate) fn noise_warning(noise: &Noise) -> Option<String> {
+pub(crate) fn noise_warning(noise: &Noise, unit: ReadingUnit) -> Option<String> {
     let found = match noise.source {
         NoiseSource::Stated => return None,
         NoiseSource::Assumed => "is assumed",
         NoiseSource::Repeats | NoiseSource::Residual | NoiseSource::Model => "is estimated from its data",
     };
-    Some(format!("the session states no `noise_um`: {:.2} µm {found}", noise.sigma_mm * 1e3))
+    Some(format!("the session states no `{}`: {} {found}", unit.noise_key(), unit.text(noise.sigma_mm * 1e3, 2)))
 }
 
 /// The noise model of a plan: that of the session, that of its data, or the assumed one.

@@ -43,7 +43,7 @@ const MAX_NAMED: usize = 3;
 
 /// The statements that the readings contradict, and the mistakes that explain it.
 pub fn examine(problem: &Problem, fit: &Fit) -> Plausibility {
-    if !problem.session.instruments().iter().all(|kind| kind.is_two_sided()) {
+    if !problem.session.instruments().iter().any(|kind| kind.is_two_sided()) {
         return of_poses(problem, fit);
     }
     let mut conflicts: Vec<Conflict> = residual(problem, fit).into_iter().collect();
@@ -65,8 +65,9 @@ pub fn examine(problem: &Problem, fit: &Fit) -> Plausibility {
             unit: "um".to_string(),
             pull: None,
             words: format!(
-                "the session leaves a residual of {rms_um:.3} µm; with one statement changed it leaves {:.3} µm",
-                best.rms_um
+                "the session leaves a residual of {}; with one statement changed it leaves {}",
+                problem.unit().text(rms_um, 3),
+                problem.unit().text(best.rms_um, 3)
             ),
         });
     }
@@ -89,14 +90,15 @@ pub(crate) fn checked(problem: &Problem, fit: Result<Fit, IdentifyError>) -> Res
             return Ok(fit);
         }
         Ok(_) => format!(
-            "none of the {} parameters is identifiable: the nominal machine leaves {:.3e} µm",
+            "none of the {} parameters is identifiable: the nominal machine leaves {:.3e} {}",
             problem.parameters.list.len(),
-            problem.noise.sigma_mm * 1e3
+            problem.noise.sigma_mm * 1e3,
+            problem.unit().symbol()
         ),
         Err(error @ IdentifyError::NoConvergence { .. }) => error.to_string(),
         Err(error) => return Err(error),
     };
-    let suggestions = if problem.session.instruments().iter().all(|kind| kind.is_two_sided()) {
+    let suggestions = if problem.session.instruments().iter().any(|kind| kind.is_two_sided()) {
         suggest::suggestions(problem, &[], Pulls::default().allowed())
     } else {
         poses::suggestions(problem)

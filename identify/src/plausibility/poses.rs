@@ -3,8 +3,8 @@
 
 use abbe_model::axis::AxisKind;
 use abbe_model::instrument::{Station, channel};
-use abbe_model::session::Session;
 use abbe_model::session::readings::Readings;
+use abbe_model::session::{Session, Test};
 use nalgebra::Vector3;
 
 use super::hypotheses::{Hypothesis, lengths, units, with_readings};
@@ -102,11 +102,14 @@ pub(super) fn suggestions(problem: &Problem) -> Vec<Suggestion> {
 fn of_poses(session: &Session) -> Vec<Hypothesis> {
     let machine = &session.machine;
     let mut list = Vec::new();
-    let tracked = session.tests.iter().any(|test| matches!(test.station, Station::Tracker(_)));
+    let is_tracked = |test: &Test| matches!(test.station, Station::Tracker(_));
+    let tracked = session.tests.iter().any(is_tracked);
     if tracked {
         for (factor, unit) in lengths() {
-            let changed = with_readings(session, |_, _, observed| {
-                observed.iter_mut().for_each(|value| *value *= factor);
+            let changed = with_readings(session, |test, _, observed| {
+                if is_tracked(test) {
+                    observed.iter_mut().for_each(|value| *value *= factor);
+                }
             });
             list.push(Hypothesis::new(
                 SuggestionKind::ColumnUnit,
@@ -115,8 +118,10 @@ fn of_poses(session: &Session) -> Vec<Hypothesis> {
                 changed,
             ));
         }
-        let mirrored = with_readings(session, |_, _, observed| {
-            observed.iter_mut().step_by(3).for_each(|value| *value = -*value);
+        let mirrored = with_readings(session, |test, _, observed| {
+            if is_tracked(test) {
+                observed.iter_mut().step_by(3).for_each(|value| *value = -*value);
+            }
         });
         let words =
             "the measured positions are left-handed: one of px, py, pz has the opposite sign, or two are exchanged";

@@ -72,7 +72,8 @@ pub fn spectra(problem: &Problem, views: &SessionSeries) -> Vec<Spectrum> {
         before_um: amplitudes(angle, before, channels),
         after_um: amplitudes(angle, after, channels),
     };
-    if !problem.folds.kind.is_poses() && !problem.are_vectors() {
+    let alike = views.tests.windows(2).all(|pair| pair[0].channels == pair[1].channels);
+    if !alike || !problem.folds.kind.is_poses() && !problem.are_vectors() {
         let angular = views.tests.iter().filter(|test| test.way.is_angle);
         return angular
             .map(|test| {
@@ -81,7 +82,6 @@ pub fn spectra(problem: &Problem, views: &SessionSeries) -> Vec<Spectrum> {
             })
             .collect();
     }
-    // Poses of one session have an instrument of the same channels.
     let Some(channels) = views.tests.first().map(|test| test.channels) else { return Vec::new() };
     let joined = |of: &dyn Fn(usize) -> Vec<f64>| (0..views.tests.len()).flat_map(of).collect::<Vec<f64>>();
     let before = joined(&|test| views.tests[test].before_um.clone());

@@ -74,7 +74,8 @@ pub(super) fn add(
             heldout_rms_mm: held_out_mm,
         });
         let id = candidate.effect.id();
-        (interrupt.0)(Progress::SelectedEffect(found.effects.len(), id, held_out_mm * 1e3));
+        let unit = found.problem.unit();
+        (interrupt.0)(Progress::SelectedEffect(found.effects.len(), id, held_out_mm * 1e3, unit));
     }
     Ok(ended)
 }

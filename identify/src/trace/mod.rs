@@ -388,7 +388,7 @@ fn with_accepted_families(
 ) -> Result<TraceOutcome, IdentifyError> {
     for (k, accepted) in found.effects.iter().enumerate() {
         let held_out_um = accepted.heldout_rms_mm * 1e3;
-        (interrupt.0)(Progress::SelectedEffect(k + 1, accepted.effect.id(), held_out_um));
+        (interrupt.0)(Progress::SelectedEffect(k + 1, accepted.effect.id(), held_out_um, problem.unit()));
     }
     let lines = match lines::add((problem, fit), &mut found, options, policy.max_effects, interrupt) {
         Err(IdentifyError::Interrupted) => None,

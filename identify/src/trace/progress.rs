@@ -1,5 +1,6 @@
 //! What a trace does now, in words.
 
+use crate::unit::ReadingUnit;
 use abbe_model::words::counted;
 
 /// Progress of a trace.
@@ -10,7 +11,7 @@ pub enum Progress {
     /// The candidates are being screened: the number of candidates.
     Screening(usize),
     /// An effect was added: the number of effects, its identifier, the held-out rms in µm.
-    SelectedEffect(usize, String, f64),
+    SelectedEffect(usize, String, f64, ReadingUnit),
     /// Searches without one fold that have ended, and their number. Each predicts the readings that it lacks.
     Folds(usize, usize),
     /// The model with the found effects is being refitted, and its residual tested.
@@ -25,8 +26,8 @@ impl Progress {
         Some(match self {
             Progress::Fitting => "fitting the declared model".to_string(),
             Progress::Screening(candidates) => format!("screening {}", counted(*candidates, "candidate")),
-            Progress::SelectedEffect(number, id, rms_um) => {
-                format!("{}: {id}, held out {rms_um:.3} µm", counted(*number, "effect"))
+            Progress::SelectedEffect(number, id, rms, unit) => {
+                format!("{}: {id}, held out {}", counted(*number, "effect"), unit.text(*rms, 3))
             }
             Progress::Folds(ended, folds) => format!("searching without one fold: {ended} of {folds}"),
             Progress::Judging => "refitting and judging".to_string(),

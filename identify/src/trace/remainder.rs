@@ -224,7 +224,8 @@ pub fn structure(
     let above = null_best.iter().filter(|score| **score >= best.1).count();
     let p_value = (above + 1) as f64 / (null_best.len() + 1) as f64;
     let size_um = (2.0 * best.2.max(0.0) / columns.rows().max(1) as f64).sqrt() * problem.noise.sigma_mm * 1e3;
-    let description = format!("{} ({size_um:.2} µm over all readings)", detectors[best.0].description);
+    let description =
+        format!("{} ({} over all readings)", detectors[best.0].description, problem.unit().text(size_um, 2));
     Ok(Structure { p_value, excess: best.2.max(0.0), description })
 }
 

@@ -36,7 +36,7 @@ impl SearchRecord<'_> {
         for candidate in added {
             let id = search.effect(candidate).id();
             self.steps.push(SearchStep { id: id.clone(), effects, heldout_rms_um });
-            (self.progress)(Progress::SelectedEffect(effects, id, heldout_rms_um));
+            (self.progress)(Progress::SelectedEffect(effects, id, heldout_rms_um, search.columns.unit()));
         }
     }
 }

@@ -6,7 +6,7 @@ use abbe_model::session::limits::MIN_UM;
 use super::is_set_up;
 use crate::error::IdentifyError;
 use crate::fit::{Minimum, minimum};
-use crate::heldout::rms_mm;
+use crate::heldout::stated_rms_mm;
 use crate::model_file::IdentifiedModel;
 use crate::noise::outliers;
 use crate::noise::{Noise, NoiseSource, PureError};
@@ -15,6 +15,7 @@ use crate::parameters::Role;
 use crate::problem::Problem;
 use crate::results::ParameterResult;
 use crate::trace::noise_model::estimate_noise_model;
+use crate::unit::ReadingUnit;
 use abbe_model::session::Prior;
 
 /// Maximum number of rounds that re-estimate noise and outliers.
@@ -71,7 +72,7 @@ impl<'m> KnownErrors<'m> {
     /// # Errors
     /// If the session has no readings, or none that depends on the model.
     pub fn new(model: &'m IdentifiedModel, session: &Session) -> Result<KnownErrors<'m>, IdentifyError> {
-        let (noise, noise_source) = first_noise(model, session);
+        let (noise, noise_source) = first_noise(model, session)?;
         let mut full = Problem::new(&model.session(session), noise.clone(), 1)?;
         // The uncertainty of the model contains the priors of its coefficients.
         full.parameters.list.iter_mut().filter(|p| !is_set_up(p.role)).for_each(|p| p.prior = Prior::Free);
@@ -218,7 +219,7 @@ impl<'m> KnownErrors<'m> {
         let observations = whitened_readings(&problem) + problem.prior_rows();
         let freedom = observations.saturating_sub(beta.len()).max(1) as f64;
         let rms = Rms {
-            scalar_mm: rms_mm(&self.set_up, &residuals),
+            scalar_mm: stated_rms_mm(&self.set_up, &residuals),
             vectors: self.set_up.are_vectors(),
             noise_ratio: (problem.sum_of_squares(beta) / freedom).sqrt(),
         };
@@ -300,12 +301,12 @@ impl<'m> KnownErrors<'m> {
     pub fn noise_warning(&self) -> Option<String> {
         (self.noise_source == NoiseSource::Model).then(|| {
             format!(
-                "the model's {} of {:.2} µm counts as noise",
+                "the model's {} of {} counts as noise",
                 match self.model.noise.source {
                     NoiseSource::Residual => "held-out rms, which contains what the model lacks,",
                     _ => "noise",
                 },
-                self.set_up.noise.sigma_mm * 1e3
+                self.set_up.unit().text(self.set_up.noise.sigma_mm * 1e3, 2)
             )
         })
     }
@@ -317,9 +318,20 @@ fn whitened_readings(problem: &Problem) -> usize {
 }
 
 /// The noise before repeats are examined, and its source.
-fn first_noise(model: &IdentifiedModel, session: &Session) -> (Noise, NoiseSource) {
+///
+/// # Errors
+/// If neither has a noise of the unit of the readings.
+fn first_noise(model: &IdentifiedModel, session: &Session) -> Result<(Noise, NoiseSource), IdentifyError> {
     if let Some(sigma) = session.stated_noise_mm() {
-        return (Noise::white(sigma, NoiseSource::Stated), NoiseSource::Stated);
+        return Ok((Noise::white(sigma, NoiseSource::Stated), NoiseSource::Stated));
+    }
+    let unit = ReadingUnit::of(session);
+    if model.reading_unit != unit {
+        return Err(IdentifyError::Request(format!(
+            "the session states no noise, and that of the model is in {}: state `{}` in [instrument]",
+            model.reading_unit.symbol(),
+            unit.noise_key()
+        )));
     }
     let noise = match model.noise.source {
         // A residual contains what the model lacks; on readings that it has not seen, that is the held-out error.
@@ -331,5 +343,5 @@ fn first_noise(model: &IdentifiedModel, session: &Session) -> (Noise, NoiseSourc
             Noise { source: NoiseSource::Residual, inflation: 1.0, ..model.noise.clone() }
         }
     };
-    (noise, NoiseSource::Model)
+    Ok((noise, NoiseSource::Model))
 }

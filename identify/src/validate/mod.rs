@@ -58,6 +58,8 @@ pub struct Validation {
 pub fn validate(model: &IdentifiedModel, session: &Session) -> Result<Validation, IdentifyError> {
     let mut warnings = session.warnings.clone();
     warnings.extend(machine::check(model, session)?);
+    // Where its own fit fails, the natural lever stays.
+    let session = &crate::fit::with_lever(session, 1).unwrap_or_else(|_| session.clone());
     let mut known = KnownErrors::new(model, session)?;
     warnings.extend(known.not_carried.iter().map(|why| format!("not part of the machine, and left out: {why}")));
     let values = known.model_values();

@@ -92,13 +92,22 @@ impl SessionText {
         }
     }
 
-    /// States the noise of the instrument.
+    /// States the noise of lengths, µm.
     pub fn set_noise(&mut self, noise_um: f64) {
-        match value_in(&mut self.document, &["instrument", "noise_um"]) {
-            Some(noise) => replace(noise, number_of(noise_um)),
+        self.set_of_instrument("noise_um", noise_um);
+    }
+
+    /// States the noise of angles, arcsec.
+    pub fn set_noise_of_angles(&mut self, noise_arcsec: f64) {
+        self.set_of_instrument("noise_arcsec", noise_arcsec);
+    }
+
+    fn set_of_instrument(&mut self, key: &str, number: f64) {
+        match value_in(&mut self.document, &["instrument", key]) {
+            Some(value) => replace(value, number_of(number)),
             None => {
                 if let Some(instrument) = self.document.get_mut("instrument").and_then(Place::of) {
-                    instrument.insert_after("kind", "noise_um", number_of(noise_um));
+                    instrument.insert_after("kind", key, number_of(number));
                 }
             }
         }

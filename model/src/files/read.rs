@@ -24,7 +24,7 @@ use crate::document::source::{Parsed, Source};
 use crate::document::test::Test;
 use crate::effect::Effect;
 use crate::error::{Location, ModelError};
-use crate::instrument::InstrumentKind;
+use crate::instrument::InstrumentParameter;
 use crate::session::Session;
 
 /// Reads the text of another file in the same way: UTF-8 with or without byte order mark, of a limited size, unchanged
@@ -81,17 +81,18 @@ pub fn machine_of_document(document: &machine_document::Machine) -> Result<Machi
     lower::machine(document, &mut BodyFiles::default())
 }
 
-/// An effect of a session with this machine, instrument and names of tests, from a part of another document.
+/// An effect of a session with this machine, these parameters of instruments and names of tests, from a part of another
+/// document.
 ///
 /// # Errors
 /// As for a session file: the fault in the part.
 pub fn effect_of_document(
     document: &effect::Effect,
     machine: &Machine,
-    instrument: InstrumentKind,
+    of_instruments: &[InstrumentParameter],
     tests: &[String],
 ) -> Result<Effect, Fault> {
-    lower::effect_of(machine, instrument, tests, document)
+    lower::effect_of(machine, of_instruments, tests, document)
 }
 
 /// What follows from a document of another kind. A fault of it has its place in the text.

@@ -11,8 +11,10 @@ use crate::session::readings::Readings;
 /// What the copy changes beside the readings.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Changes {
-    /// The noise to state, µm; `None` keeps the session's.
+    /// The noise of lengths to state, µm; `None` keeps the session's.
     pub noise_um: Option<f64>,
+    /// The noise of angles to state, arcsec; `None` keeps the session's.
+    pub noise_arcsec: Option<f64>,
     /// Whether the declared effects are omitted.
     pub hide_effects: bool,
 }
@@ -52,6 +54,9 @@ pub fn with_readings(
     text.set_machine_file("machine.toml");
     if let Some(noise_um) = changes.noise_um {
         text.set_noise(noise_um);
+    }
+    if let Some(noise_arcsec) = changes.noise_arcsec {
+        text.set_noise_of_angles(noise_arcsec);
     }
     // The data files have the standard columns, whatever the columns of the original.
     text.remove(&["format", "columns"]);

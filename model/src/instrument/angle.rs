@@ -8,6 +8,7 @@ use serde::Deserialize;
 
 use super::channel::Channel;
 use super::column::{Column, Quantity};
+use super::kind::{self, Checked};
 use super::set_up::{self, SetUp, Written};
 use super::{
     Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
@@ -128,8 +129,12 @@ impl Instrument for Angle<f64> {
     fn columns(&self) -> &'static [Column] {
         &COLUMNS[..self.about.len()]
     }
-    fn positioning(&self) -> Option<[f64; 3]> {
-        self.about.first().copied()
+    fn positioning(&self) -> Option<([f64; 3], Body)> {
+        Some((*self.about.first()?, self.body))
+    }
+    /// Rotation errors are small.
+    fn check_readings(&self, checked: &Checked<'_>) -> Result<(), Fault> {
+        kind::check_small(self.channels(), checked, 0)
     }
     fn missing(&self, has: &dyn Fn(Quantity) -> bool) -> Option<Fault> {
         let column = self.columns().iter().find(|column| !has(column.quantity))?;

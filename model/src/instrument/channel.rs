@@ -12,20 +12,25 @@ pub struct Channel {
     pub name: &'static str,
     /// Its internal unit: mm or rad.
     pub unit: InternalUnit,
+    /// Whether it is one of three coordinates of a vector.
+    pub is_coordinate: bool,
 }
 
 impl Channel {
     pub(super) const fn length(name: &'static str) -> Channel {
-        Channel { name, unit: InternalUnit::Millimetre }
+        Channel { name, unit: InternalUnit::Millimetre, is_coordinate: false }
     }
 
     pub(super) const fn angle(name: &'static str) -> Channel {
-        Channel { name, unit: InternalUnit::Radian }
+        Channel { name, unit: InternalUnit::Radian, is_coordinate: false }
     }
 
     /// Three coordinates.
     pub(super) const fn vector([x, y, z]: [&'static str; 3]) -> [Channel; 3] {
-        [Channel::length(x), Channel::length(y), Channel::length(z)]
+        const fn coordinate(name: &'static str) -> Channel {
+            Channel { is_coordinate: true, ..Channel::length(name) }
+        }
+        [coordinate(x), coordinate(y), coordinate(z)]
     }
 
     /// Whether it is an angle.
@@ -44,7 +49,7 @@ pub fn labels(channels: &[Channel]) -> Vec<&'static str> {
     }
 }
 
-/// Whether channels are the three coordinates of a vector, which have a length.
+/// Whether channels are the three coordinates of a vector.
 pub fn are_vector(channels: &[Channel]) -> bool {
-    matches!(channels, [a, b, c] if [a, b, c].iter().all(|channel| !channel.is_angle()))
+    channels.len() == 3 && channels.iter().all(|channel| channel.is_coordinate)
 }

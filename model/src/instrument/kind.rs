@@ -10,6 +10,8 @@ use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::component::ErrorName;
 use crate::document::Fault as KeyFault;
 use crate::document::node::Node;
+use crate::files::quantity::ARCSECOND;
+use crate::rotation_error::Body;
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
 use crate::session::expression::Constant;
@@ -173,8 +175,9 @@ pub trait Instrument {
     fn balls_mut(&mut self) -> Option<[&mut [f64; 3]; 2]> {
         None
     }
-    /// The direction in R along which, or about which, its first channel reads the positioning of an axis, if it does.
-    fn positioning(&self) -> Option<[f64; 3]> {
+    /// The direction in R along which, or about which, its first channel reads the positioning of an axis, and the body
+    /// that it reads, if it does.
+    fn positioning(&self) -> Option<([f64; 3], Body)> {
         None
     }
     /// Its point on the table and its point on the tool, if they are its own.
@@ -210,6 +213,40 @@ pub trait Instrument {
 /// The sensor range is one to two millimetres for a ball bar and a few for an R-test. A larger deviation is not an
 /// error of the machine, mm.
 pub(super) const MAX_MM: f64 = 5.0;
+
+/// A typical angle that a sensor reads about its zero is smaller, rad: ten times the rotation errors of a poor machine.
+const MAX_RAD: f64 = 2e-3;
+
+/// Checks that the values of channels stay near their median, 5 mm or 2 mrad, except the first `skipped` channels.
+///
+/// # Errors
+/// If those of a channel do not.
+pub(super) fn check_small(channels: &[Channel], checked: &Checked<'_>, skipped: usize) -> Result<(), Fault> {
+    let readings = checked.readings;
+    for (place, channel) in channels.iter().enumerate().skip(skipped) {
+        let read = readings.observed.iter().skip(place).step_by(channels.len()).copied();
+        let mut values: Vec<f64> = read.filter(|value| !value.is_nan()).collect();
+        let middle = median(&mut values);
+        let away = median(&mut values.iter().map(|value| (value - middle).abs()).collect::<Vec<_>>());
+        let (most, limit, shown) = match channel.is_angle() {
+            true => (MAX_RAD, "2 mrad (412″)", format!("{:.1}″", away / ARCSECOND)),
+            false => (MAX_MM, "5 mm", format!("{away:.3} mm")),
+        };
+        if away > most {
+            return Err((
+                format!(
+                    "test \"{}\": the readings of `{}` differ from their median by {shown} (median of {} readings); the \
+                     limit is {limit}",
+                    checked.test,
+                    channel.name,
+                    values.len()
+                ),
+                "is the column in another unit than its name says, or is it a position and no deviation?".into(),
+            ));
+        }
+    }
+    Ok(())
+}
 
 pub(super) fn median(values: &mut [f64]) -> f64 {
     if values.is_empty() {

@@ -18,7 +18,7 @@ use serde::Deserialize;
 
 use super::channel::Channel;
 use super::column::{Column, Quantity};
-use super::kind::median;
+use super::kind::{self, Checked, MAX_MM, median};
 use super::set_up::{self, SetUp, Written};
 use super::{
     Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
@@ -159,22 +159,40 @@ fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
     let points = set_up::lengths(&keys.reflector_u_um).chain(set_up::lengths(&keys.optic_u_um));
     let mut priors: Vec<Prior> = points.chain([beam.unwrap_or(Prior::Free); 2]).chain([Prior::Free; 6]).collect();
     hold_absent(&channels, beam.is_some(), &mut priors);
-    let kept = of_channels(&channels);
-    let laser = Laser { reflector, optic, frame, channels, kept, is_beam_stated: beam.is_some(), datum: Written::number(0.0) };
+    let channels = of_places(&channels);
+    let laser = Laser { reflector, optic, frame, channels, is_beam_stated: beam.is_some(), datum: Written::number(0.0) };
     Ok(SetUp::new(Station::Laser(laser), priors))
 }
 
-fn of_channels(channels: &[usize]) -> Vec<Channel> {
-    channels.iter().map(|channel| CHANNELS[*channel]).collect()
+fn of_places(places: &[usize]) -> Vec<Channel> {
+    places.iter().map(|place| CHANNELS[*place]).collect()
+}
+
+/// The places of channels among all that a laser can have.
+fn places(channels: &[Channel]) -> impl Iterator<Item = usize> {
+    channels.iter().filter_map(|channel| CHANNELS.iter().position(|other| other == channel))
 }
 
 impl Laser<f64> {
+    /// The displacements less their nominal values, mm; `None` if the laser reads none.
+    fn displacements(&self, machine: &Machine, readings: &Readings) -> Option<Vec<f64>> {
+        if places(&self.channels).next() != Some(0) {
+            return None;
+        }
+        let station = Station::Laser(self.clone());
+        let deviation = |row: usize| {
+            let observed = readings.observed.get(row * readings.channels).copied()?;
+            Some(observed - readings.nominal(machine, &station, row).channels()[0]).filter(|value| value.is_finite())
+        };
+        Some((0..readings.rows()).filter_map(deviation).collect())
+    }
+
     /// Adds the nominal reading of each straightness, times a factor.
     fn add_nominal(&self, machine: &Machine, state: &[AxisPosition<f64>], factor: f64, values: &mut [f64]) {
         let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
         let nominal = self.reading::<f64>(machine, state, &none, |_| None);
-        let read = self.channels.iter().zip(values).zip(nominal.channels());
-        let straightness = read.filter(|((channel, _), _)| STRAIGHTNESS.contains(channel));
+        let read = places(&self.channels).zip(values).zip(nominal.channels());
+        let straightness = read.filter(|((place, _), _)| STRAIGHTNESS.contains(place));
         straightness.for_each(|((_, value), nominal)| *value += factor * nominal);
     }
 }
@@ -215,10 +233,8 @@ pub struct Laser<N> {
     pub optic: [N; 3],
     /// Beam, horizontal and vertical in R, of unit length.
     pub frame: [[N; 3]; 3],
-    /// The channels that are read, in ascending order, as indices among all that a laser can have.
-    pub channels: Vec<usize>,
-    /// The same channels.
-    pub kept: Vec<Channel>,
+    /// The channels that are read, in the order of their zeros.
+    pub channels: Vec<Channel>,
     /// Whether the uncertainty of the beam is stated.
     pub is_beam_stated: bool,
     /// What the displacement counts from, mm: the reading where reflector and optic coincide.
@@ -234,7 +250,6 @@ impl<N> Geometry<N> for Laser<N> {
             optic: point(&self.optic, to),
             frame: self.frame.each_ref().map(|direction| point(direction, to)),
             channels: self.channels.clone(),
-            kept: self.kept.clone(),
             is_beam_stated: self.is_beam_stated,
             datum: to(&self.datum),
         }
@@ -245,8 +260,7 @@ impl<N> Geometry<N> for Laser<N> {
         };
         let read: Vec<usize> = (0..CHANNELS.len()).filter(|channel| is_read(*channel)).collect();
         if !read.is_empty() {
-            self.kept = of_channels(&read);
-            self.channels = read;
+            self.channels = of_places(&read);
         }
     }
     /// The channels, mm or rad.
@@ -260,23 +274,23 @@ impl<N> Geometry<N> for Laser<N> {
     where
         N: Nominal,
     {
-        let reads = |channels: std::ops::Range<usize>| self.channels.iter().any(|channel| channels.contains(channel));
+        let reads = |channels: std::ops::Range<usize>| places(&self.channels).any(|place| channels.contains(&place));
         let optic = || machine.workpiece_point(state, errors, displaced(self.optic, OPTIC, &unknown));
         let from_optic = reads(0..3).then(|| {
             machine.tool_point(state, errors, displaced(self.reflector, 0, &unknown)).minus(optic())
         });
         let rotation = reads(3..6).then(|| machine.rotation_error(state, errors, Body::Relative));
         let frame = beam_frame(self.frame, unknown(BEAM), unknown(BEAM + 1));
-        Reading::of(self.channels.iter().map(|channel| {
-            let value = match (*channel, &from_optic, &rotation, &frame) {
-                (0..3, Some(from_optic), _, None) => dot_nominal(*from_optic, self.frame[*channel]),
-                (0..3, Some(from_optic), _, Some(frame)) => dot(*from_optic, frame[*channel]),
+        Reading::of(places(&self.channels).map(|channel| {
+            let value = match (channel, &from_optic, &rotation, &frame) {
+                (0..3, Some(from_optic), _, None) => dot_nominal(*from_optic, self.frame[channel]),
+                (0..3, Some(from_optic), _, Some(frame)) => dot(*from_optic, frame[channel]),
                 // Pitch about the horizontal, yaw about the vertical, roll about the beam.
-                (_, _, Some(rotation), _) => dot_nominal(*rotation, self.frame[(*channel - 2) % 3]),
+                (_, _, Some(rotation), _) => dot_nominal(*rotation, self.frame[(channel - 2) % 3]),
                 _ => S::constant(0.0),
             };
-            let value = if *channel == 0 { value + self.datum } else { value };
-            unknown(ZERO + *channel).map_or(value, |zero| value + zero)
+            let value = if channel == 0 { value + self.datum } else { value };
+            unknown(ZERO + channel).map_or(value, |zero| value + zero)
         }))
     }
     fn table_point_mm(&self) -> Option<&[N; 3]> {
@@ -320,19 +334,19 @@ impl Instrument for Laser<f64> {
         [Some(&mut self.optic), Some(&mut self.reflector)]
     }
     fn channels(&self) -> &[Channel] {
-        &self.kept
+        &self.channels
     }
     fn columns(&self) -> &'static [Column] {
         &COLUMNS
     }
-    fn positioning(&self) -> Option<[f64; 3]> {
-        (self.channels.first() == Some(&0)).then_some(self.frame[0])
+    fn positioning(&self) -> Option<([f64; 3], Body)> {
+        (places(&self.channels).next() == Some(0)).then_some((self.frame[0], Body::Relative))
     }
     fn kept_channel(&self, of_all: usize) -> Option<usize> {
-        self.channels.iter().position(|channel| *channel == of_all)
+        places(&self.channels).position(|place| place == of_all)
     }
     fn refers_to_nominal(&self) -> bool {
-        self.channels.iter().any(|channel| STRAIGHTNESS.contains(channel))
+        places(&self.channels).any(|place| STRAIGHTNESS.contains(&place))
     }
     /// A straightness is read as a deviation.
     fn channels_of_columns(&self, machine: &Machine, state: &[AxisPosition<f64>], values: &mut [f64]) {
@@ -343,19 +357,32 @@ impl Instrument for Laser<f64> {
     }
     /// A displacement may count from any point: its zero is then far from the one that iterations can start from.
     fn with_datum(&self, machine: &Machine, readings: &Readings) -> Option<Station<f64>> {
-        if self.channels.first() != Some(&0) {
-            return None;
-        }
-        let station = Station::Laser(self.clone());
-        let deviation = |row: usize| {
-            let observed = readings.observed.get(row * readings.channels).copied()?;
-            Some(observed - readings.nominal(machine, &station, row).channels()[0]).filter(|value| value.is_finite())
-        };
-        let from = median(&mut (0..readings.rows()).filter_map(deviation).collect::<Vec<f64>>());
+        let from = median(&mut self.displacements(machine, readings)?);
         (from.abs() > MAX_ZERO_MM).then(|| Station::Laser(Laser { datum: self.datum + from, ..self.clone() }))
     }
+    /// A displacement is about as long as the travel, and straightness and angles are small.
+    fn check_readings(&self, checked: &Checked<'_>) -> Result<(), Fault> {
+        let readings = checked.readings;
+        if let Some(mut deviations) = self.displacements(checked.machine, readings) {
+            let from = median(&mut deviations);
+            let away = median(&mut deviations.iter().map(|value| (value - from).abs()).collect::<Vec<_>>());
+            if away > MAX_MM {
+                return Err((
+                    format!(
+                        "test \"{}\": the displacement differs from the travel along the beam by {away:.3} mm (median \
+                         of {} readings); the limit is {MAX_MM} mm",
+                        checked.test,
+                        deviations.len()
+                    ),
+                    "is the column in another unit than its name says, or has the beam the opposite direction?".into(),
+                ));
+            }
+        }
+        let skipped = usize::from(places(&self.channels).next() == Some(0));
+        kind::check_small(self.channels(), checked, skipped)
+    }
     fn absent_channels_known(&self, priors: &mut [Prior]) {
-        hold_absent(&self.channels, self.is_beam_stated, priors);
+        hold_absent(&places(&self.channels).collect::<Vec<_>>(), self.is_beam_stated, priors);
     }
     fn missing(&self, has: &dyn Fn(Quantity) -> bool) -> Option<Fault> {
         let missing = !COLUMNS.iter().any(|column| has(column.quantity));

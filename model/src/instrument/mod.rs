@@ -188,6 +188,16 @@ impl InstrumentKind {
 }
 
 impl Station<f64> {
+    /// The same, counting from where another counts.
+    pub fn counted_as(&self, other: &Station<f64>) -> Station<f64> {
+        match (self, other) {
+            (Station::Laser(own), Station::Laser(other)) => {
+                Station::Laser(laser::Laser { datum: other.datum, ..own.clone() })
+            }
+            _ => self.clone(),
+        }
+    }
+
     /// Nominal position of the object that a group of tests shares, mm.
     pub fn shared_mm(&self, group: SharedBy) -> [f64; 3] {
         match group {

@@ -32,6 +32,12 @@ pub(crate) fn plan(machine: &Machine, test: &Test) -> Result<(), Fault> {
 
 /// Checks measured readings against the declared set-up. Returns warnings.
 pub(crate) fn readings(machine: &Machine, test: &Test, readings: &Readings) -> Result<Vec<String>, Fault> {
+    for (place, channel) in test.station.channels().iter().enumerate() {
+        if (0..readings.rows()).all(|row| !readings.was_read(row, place)) {
+            let message = format!("test \"{}\": no row has a value of `{}`", test.name, channel.name);
+            return Err((message, "remove its column from the data, or leave it out of [columns]".into()));
+        }
+    }
     plausibility::check(machine, test, readings)?;
     test.station.check_observed(&test.name, &readings.observed)?;
     test.station.check_readings(&Checked { machine, test: &test.name, readings })?;

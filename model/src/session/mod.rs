@@ -112,12 +112,35 @@ impl Session {
         }
     }
 
+    /// Whether the lever is not to be estimated: it is stated or estimated, or there are no lengths beside angles.
+    pub fn is_lever_known(&self) -> bool {
+        let units = self.units();
+        !(units.lengths && units.angles) || self.stated_lever_mm().is_some() || self.lever_mm != NATURAL_LEVER_MM
+    }
+
     /// The lever that the stated noise of lengths and of angles requires; `None` if there are not both.
     pub fn stated_lever_mm(&self) -> Option<f64> {
         let units = self.units();
         let positive = |noise: Option<f64>| noise.filter(|sigma| *sigma > 0.0);
         (units.lengths && units.angles).then_some(())?;
         Some(positive(self.noise_mm)? / positive(self.noise_rad)?)
+    }
+
+    /// The warning about a noise of a unit in which no channel reads, while that of the channels is not stated.
+    pub(crate) fn noise_of_no_channel(&self) -> Option<String> {
+        let units = self.units();
+        let unused =
+            |stated: Option<f64>, other: Option<f64>, reads: bool| stated.is_some() && other.is_none() && !reads;
+        let of = |stated: &str, needed: &str, unit: &str| {
+            Some(format!("`{stated}` is the noise of {unit}, which no test reads: state `{needed}`"))
+        };
+        if unused(self.noise_mm, self.noise_rad, units.lengths || !units.angles) {
+            return of("noise_um", "noise_arcsec", "lengths");
+        }
+        if unused(self.noise_rad, self.noise_mm, units.angles || !units.lengths) {
+            return of("noise_arcsec", "noise_um", "angles");
+        }
+        None
     }
 
     /// The stated standard deviation of a channel, mm; of an angle at [`Session::lever_mm`].
@@ -162,8 +185,13 @@ fn instruments(other: InstrumentKind, tests: &[Test]) -> Vec<InstrumentKind> {
 
 /// The parameters of the instruments of tests, each once; those of `other` without tests.
 pub(crate) fn instrument_parameters(other: InstrumentKind, tests: &[Test]) -> Vec<InstrumentParameter> {
+    parameters_of(&instruments(other, tests))
+}
+
+/// The parameters of instruments, each once.
+pub fn parameters_of(kinds: &[InstrumentKind]) -> Vec<InstrumentParameter> {
     let mut parameters: Vec<InstrumentParameter> = Vec::new();
-    for parameter in instruments(other, tests).into_iter().flat_map(InstrumentKind::unknowns) {
+    for parameter in kinds.iter().flat_map(|kind| kind.unknowns()) {
         let is_same =
             |other: &InstrumentParameter| other.thing == parameter.thing && other.coordinate == parameter.coordinate;
         if !parameters.iter().any(is_same) {

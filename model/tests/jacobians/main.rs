@@ -55,8 +55,7 @@ fn r_test(setting: Setting, workpiece_ball: [f64; 3], spindle_ball: [f64; 3]) ->
 /// A laser along a slanted beam that reads all six channels.
 fn laser(optic: [f64; 3], reflector: [f64; 3]) -> Station<f64> {
     let frame = [[0.6, 0.8, 0.0], [-0.8, 0.6, 0.0], [0.0, 0.0, 1.0]];
-    let mut laser =
-        Laser { reflector, optic, frame, channels: vec![0], kept: Vec::new(), is_beam_stated: false, datum: 0.0 };
+    let mut laser = Laser { reflector, optic, frame, channels: Vec::new(), is_beam_stated: false, datum: 0.0 };
     laser.keep_channels(&|quantity| matches!(quantity, Quantity::Channel(_)));
     Station::Laser(laser)
 }

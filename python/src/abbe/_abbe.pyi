@@ -105,7 +105,12 @@ class Session:
     def predict(self, parameters: _Floats) -> _Floats: ...
     def jacobian(self, parameters: _Floats) -> _Floats: ...
     def simulate(
-        self, given: Sequence[tuple[str, float, str | None]], seed: int, noise_um: float | None, draw_setups: bool
+        self,
+        given: Sequence[tuple[str, float, str | None]],
+        seed: int,
+        noise_um: float | None,
+        noise_arcsec: float | None,
+        draw_setups: bool,
     ) -> tuple[Session, list[tuple[str, float, str]], list[str]]: ...
     def files(self) -> list[tuple[str, bytes]]: ...
 

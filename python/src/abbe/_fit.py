@@ -126,4 +126,7 @@ class Fit(Shown, FitResult):
         return self._handle.page()
 
     def __repr__(self) -> str:
-        return f"<abbe.Fit: {len(self.parameters)} estimates, residual {self.rms_um:.3g} µm rms>"
+        # A session of angles states its figures in arcsec.
+        angles = self._source.get("rms_arcsec")
+        rms = f"{self.rms_um:.3g} µm" if angles is None else f"{angles:.3g} arcsec"
+        return f"<abbe.Fit: {len(self.parameters)} estimates, residual {rms} rms>"

@@ -29,11 +29,16 @@ class Session(Predicting):
         The machine, or its structural code. The path of a session file, as for :meth:`read`, or a mapping with the
         keys of a session file, whose tests may have arrays, gives the whole session.
     instrument : str
-        ``"ballbar"`` (the default), ``"r-test"``, ``"probe"``, ``"tracker"`` or ``"socket"``.
+        ``"ballbar"`` (the default), ``"r-test"``, ``"probe"``, ``"distance"``, ``"laser"``, ``"angle"``, ``"tracker"``,
+        ``"socket"`` or ``"pointing"``.
     noise_um : float, optional
-        Standard deviation of one scalar reading; estimated from the readings by default.
+        Standard deviation of one scalar reading of a length; estimated from the readings by default.
     resolution_um : float, optional
-        Resolution of a reading.
+        Resolution of a reading of a length.
+    noise_arcsec : float, optional
+        Standard deviation of one scalar reading of an angle; estimated from the readings by default.
+    resolution_arcsec : float, optional
+        Resolution of a reading of an angle.
     errors : sequence of str, optional
         The errors to estimate, as in ``[unknowns]`` of a session file; the defaults of the instrument otherwise.
     constants : mapping, optional
@@ -65,16 +70,24 @@ class Session(Predicting):
         *,
         noise_um: float | None = None,
         resolution_um: float | None = None,
+        noise_arcsec: float | None = None,
+        resolution_arcsec: float | None = None,
         errors: Sequence[str] | None = None,
         constants: Mapping[str, float] | None = None,
         about: Mapping[str, str] | None = None,
     ) -> None:
-        known = whole_session(machine, (instrument, noise_um, resolution_um, errors, constants, about))
+        figures = {
+            "noise_um": noise_um,
+            "resolution_um": resolution_um,
+            "noise_arcsec": noise_arcsec,
+            "resolution_arcsec": resolution_arcsec,
+        }
+        known = whole_session(machine, (instrument, *figures.values(), errors, constants, about))
         if known is not None:
             self._handle = known
             return
         instrument = "ballbar" if instrument is None else instrument
-        stated = {"kind": instrument, "noise_um": noise_um, "resolution_um": resolution_um}
+        stated = {"kind": instrument, **figures}
         head: dict[str, Any] = {"instrument": {key: value for key, value in stated.items() if value is not None}}
         if errors is not None:
             head["unknowns"] = {"errors": list(errors)}
@@ -231,6 +244,7 @@ class Session(Predicting):
         *,
         seed: int = 1,
         noise_um: float | None = None,
+        noise_arcsec: float | None = None,
         draw_setups: bool = False,
     ) -> Session:
         """Simulate readings at the planned states of the tests.
@@ -243,7 +257,9 @@ class Session(Predicting):
         seed : int
             Seed of the noise.
         noise_um : float, optional
-            Standard deviation of the noise; that of the session by default.
+            Standard deviation of the noise of lengths; that of the session by default.
+        noise_arcsec : float, optional
+            Standard deviation of the noise of angles; that of the session by default.
         draw_setups : bool
             Draw the set-up parameters from their priors.
 
@@ -263,7 +279,7 @@ class Session(Predicting):
         True
         """
         given = [(name, *quantity(name, value)) for name, value in (values or {}).items()]
-        return Session._of(self._handle.simulate(given, seed, noise_um, draw_setups)[0])
+        return Session._of(self._handle.simulate(given, seed, noise_um, noise_arcsec, draw_setups)[0])
 
     def fit(self, *, seed: int = 1) -> Fit:
         """Estimate the parameters from the readings, as ``abbe fit``.

@@ -36,8 +36,8 @@ pub fn trace(
         let _one_at_a_time = shown.lock();
         match &progress {
             Progress::Folds(ended, folds) => bar.set_message(clock.remaining(*ended, *folds)),
-            Progress::SelectedEffect(_, id, rms_um) if !quiet => {
-                bar.suspend(|| eprintln!("  + {id:<28} held out {rms_um:.3} µm"));
+            Progress::SelectedEffect(_, id, rms, unit) if !quiet => {
+                bar.suspend(|| eprintln!("  + {id:<28} held out {}", unit.text(*rms, 3)));
                 bar.set_message(words);
             }
             _ => bar.set_message(words),

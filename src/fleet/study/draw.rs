@@ -168,7 +168,8 @@ impl Study {
                 }
             }
         }
-        let exact = Simulation { given, noise_mm: Some(0.0), draw_setups: true, seed: random.random() };
+        let seed = random.random();
+        let exact = Simulation { given, noise_mm: Some(0.0), draw_setups: true, seed, ..Simulation::default() };
         machine.resolution_mm = None;
         let mut simulated = simulate(&machine, &exact)?;
         for readings in &mut simulated.readings {

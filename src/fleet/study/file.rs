@@ -197,6 +197,11 @@ pub fn read(path: &Path) -> Result<Study, FleetError> {
         for read in sources.files.iter().filter_map(FileStamp::read) {
             digest.update(read.sha256);
         }
+        if session.units().angles {
+            let what = format!("plan `{}` reads angles, and a study draws noise of lengths", plan.name);
+            let fault = Fault::new(what, "study its tests of lengths alone").at("session").at_item(item).at("plan");
+            return Err(here(fault).into());
+        }
         let own: Vec<Option<Effect>> = per_effect(&file, |effect| declared(effect, &session)).map_err(here)?;
         let of_plan = |error: IdentifyError| {
             here(Fault::new(format!("plan `{}`: {error}", plan.name), None).at_item(item).at("plan"))
@@ -233,7 +238,8 @@ fn per_effect<T>(file: &StudyFile, mut of: impl FnMut(&TrueEffect) -> Result<T, 
 fn declared(entry: &TrueEffect, session: &Session) -> Result<Option<Effect>, Fault> {
     let tests: Vec<String> = session.tests.iter().map(|test| test.name.clone()).collect();
     let effect = entry.effect.as_ref();
-    let effect = effect.map(|effect| effect_of_document(effect, &session.machine, session.instrument, &tests));
+    let effect =
+        effect.map(|effect| effect_of_document(effect, &session.machine, &session.instrument_parameters(), &tests));
     effect.transpose().within("effect")
 }
 

@@ -19,6 +19,7 @@ use faer::{Mat, MatMut};
 use crate::error::IdentifyError;
 use crate::numerics::parallel;
 use crate::problem::{Problem, RowBlock};
+use crate::unit::ReadingUnit;
 pub use adjoint::{Adjoint, TrainingRows, WhitenedRows};
 pub use basis::{EffectColumns, chunked};
 pub use states::{Channel, DriverStates};
@@ -97,6 +98,11 @@ impl<'p> Columns<'p> {
             channels: Default::default(),
             bases: Default::default(),
         }
+    }
+
+    /// The unit of figures of readings.
+    pub fn unit(&self) -> ReadingUnit {
+        self.problem.unit()
     }
 
     /// Number of whitened rows.

@@ -217,8 +217,12 @@ pub fn select(session: &Session, tests: &[&Test], options: &PoseOptions) -> Resu
         held: rank.pivots.iter().map(|j| list[*j].id.clone()).collect(),
         columns: machine.axes.iter().map(|axis| axis.column("")).collect(),
         poses: chosen.iter().map(display).collect(),
-        warnings: [session.warnings.clone(), warnings, states::noise_warning(&problem.noise).into_iter().collect()]
-            .concat(),
+        warnings: [
+            session.warnings.clone(),
+            warnings,
+            states::noise_warning(&problem.noise, problem.unit()).into_iter().collect(),
+        ]
+        .concat(),
     })
 }
 

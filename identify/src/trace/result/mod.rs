@@ -18,11 +18,11 @@ use crate::error::IdentifyError;
 use crate::fit::outcome::{self, Determined};
 use crate::fit::{self, Fit, aliases, assume, prepare_with};
 use crate::heldout::figures::cross_validation;
-use crate::heldout::{mislabelled_runs, rms_mm};
+use crate::heldout::mislabelled_runs;
 use crate::noise;
 use crate::plausibility::Plausibility;
 use crate::problem::Problem;
-use crate::results::{ChangedParameter, EffectResult, ModelResult, ParameterResult, TraceResult};
+use crate::results::{ChangedParameter, EffectResult, ModelResult, OfAngles, ParameterResult, TraceResult};
 pub(crate) use effect::effect_name;
 pub(super) use families::{FamiliesEnded, outcome_with_families};
 pub(super) use unsearched::unsearched;
@@ -214,13 +214,14 @@ fn before_result(findings: &TraceFindings<'_>) -> Result<ModelResult, IdentifyEr
     if before.rejected == after.rejected {
         return Ok(result);
     }
-    let [rms_um, heldout_rms_um] =
-        [&fit.residuals, &fit.held_out.residuals].map(|residuals| rms_mm(after, residuals) * 1e3);
+    let (rms, held_out, of_angles) = fit::rms_of_units(after, &fit.residuals, &fit.held_out.residuals);
+    let [rms_um, heldout_rms_um] = [rms, held_out].map(|mm| mm * 1e3);
     let in_3d = |rms: f64| result.rms_3d_um.map(|_| rms * 3.0_f64.sqrt());
     let cross_validation = cross_validation(before, fit, heldout_rms_um * 1e-3, after)?;
     Ok(ModelResult {
         rms_um,
         heldout_rms_um,
+        of_angles,
         rms_3d_um: in_3d(rms_um),
         heldout_rms_3d_um: in_3d(heldout_rms_um),
         cross_validation,
@@ -231,7 +232,12 @@ fn before_result(findings: &TraceFindings<'_>) -> Result<ModelResult, IdentifyEr
 pub(super) fn model_result(problem: &Problem, fit: &Fit, held_out_mm: f64) -> Result<ModelResult, IdentifyError> {
     let vectors = problem.are_vectors();
     let (rms, held, of_angles) = fit::rms_of_units(problem, &fit.residuals, &fit.held_out.residuals);
-    let held = if of_angles.is_some() { held } else { held_out_mm };
+    // Of lengths and angles: each part of the held-out error of the search in the proportion of the last fit.
+    let held = if of_angles.is_some() { held * held_out_mm / fit.held_out.rms_mm } else { held_out_mm };
+    let of_angles = of_angles.map(|angles| OfAngles {
+        heldout_rms_arcsec: angles.heldout_rms_arcsec * held_out_mm / fit.held_out.rms_mm,
+        ..angles
+    });
     let [rms, held] = [rms, held].map(|mm| mm * 1e3);
     let in_3d = |rms: f64| vectors.then(|| rms * 3.0_f64.sqrt());
     let goodness = outcome::goodness(problem, fit);
@@ -240,7 +246,7 @@ pub(super) fn model_result(problem: &Problem, fit: &Fit, held_out_mm: f64) -> Re
     Ok(ModelResult {
         reading_unit: problem.unit(),
         of_angles,
-        cross_validation: cross_validation(problem, fit, held_out_mm, problem)?,
+        cross_validation: cross_validation(problem, fit, held * 1e-3, problem)?,
         rms_um: rms,
         heldout_rms_um: held,
         rms_3d_um: in_3d(rms),

@@ -16,7 +16,7 @@ use crate::files::quantity;
 use crate::files::spelling::known_names;
 use crate::instrument::{InstrumentParameter, InternalUnit};
 use crate::session::limits::MIN_UM;
-use crate::words::{self, listed};
+use crate::words::{self, listed, with_article};
 
 /// The effect with its aliases; `columns` are the driver columns of the data, `NAME_unit`.
 pub(super) fn effect(
@@ -100,7 +100,8 @@ fn component(context: &Context<'_>, text: &str) -> Result<Component, Fault> {
             let own =
                 context.of_instruments.iter().any(|unknown| unknown.thing == thing && unknown.coordinate == coordinate);
             if !own {
-                let message = format!("effect on \"{text}\", which a {} does not have", context.instrument.word());
+                let message =
+                    format!("effect on \"{text}\", which {} does not have", with_article(context.instrument.word()));
                 return Err(Fault::new(message, format!("it has {}", instrument())));
             }
             Ok(Component::Instrument { thing, coordinate })

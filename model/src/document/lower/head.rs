@@ -14,6 +14,7 @@ use crate::instrument::{InstrumentKind, SharedBy};
 use crate::pattern;
 use crate::session::expression::Constant;
 use crate::session::{SocketDistance, Test, limits};
+use crate::words::with_article;
 
 /// Notes that reports repeat.
 pub(super) fn about(notes: &Named<Note>) -> Result<Vec<(String, String)>, Fault> {
@@ -150,7 +151,7 @@ pub(super) fn socket_distances(
     read: bool,
 ) -> Result<Vec<SocketDistance>, Fault> {
     if !documents.is_empty() && !kind.shares(SharedBy::Socket) {
-        let message = format!("[[socket_distance]] in a session whose instrument is a {}", kind.word());
+        let message = format!("[[socket_distance]] in a session whose instrument is {}", with_article(kind.word()));
         return Err(Fault::new(message, None).on_key());
     }
     let distance = |node: &Node| {

@@ -185,6 +185,9 @@ pub(crate) fn add(session: &mut Session, document: Parts<'_>, surroundings: &Sur
     session.clearance = document.clearance.map(body::clearance).or(session.clearance);
     session.tolerance = tolerance.or(session.tolerance.take());
     session.warnings.extend(found.warnings.iter().cloned());
+    if !document.test.is_empty() {
+        session.warnings.extend(session.noise_of_no_channel());
+    }
     session.lever_mm = session.stated_lever_mm().unwrap_or(session.lever_mm);
     Ok(found)
 }
@@ -192,15 +195,16 @@ pub(crate) fn add(session: &mut Session, document: Parts<'_>, surroundings: &Sur
 /// An effect of a session with this machine, instrument and names of tests.
 pub(crate) fn effect_of(
     machine: &Machine,
-    instrument: InstrumentKind,
+    of_instruments: &[InstrumentParameter],
     tests: &[String],
     document: &effect_document::Effect,
 ) -> Result<Effect, Fault> {
     let context = Context {
         file: Path::new(""),
         machine,
-        instrument,
-        of_instruments: instrument.unknowns().to_vec(),
+        // No test is read with it.
+        instrument: InstrumentKind::BallBar,
+        of_instruments: of_instruments.to_vec(),
         constants: &[],
         format: Format::default(),
         columns: None,

@@ -19,6 +19,7 @@ use crate::instrument::set_up::SetUp;
 use crate::session::expression::Length;
 use crate::session::motion::Motion;
 use crate::session::{Test, check, planned};
+use crate::words::with_article;
 
 /// The tests of one `[[test]]`, the `item`th of its document.
 pub(super) fn tests(
@@ -128,7 +129,11 @@ fn set_up(kind: InstrumentKind, keys: &Node, context: &Context<'_>) -> Result<Se
         match InstrumentKind::ALL.iter().find(|kind| (kind.entry().keys)().contains_key(&key)) {
             Some(kind) => {
                 let whose = if own.kind == context.instrument { "session" } else { "test" };
-                let what = format!("belongs to a {}; this {whose}'s instrument is a {}", kind.word(), own.word);
+                let what = format!(
+                    "belongs to {}; this {whose}'s instrument is {}",
+                    with_article(kind.word()),
+                    with_article(own.word)
+                );
                 Fault::of_key(what, None).on_key().at(&key)
             }
             None => fault.also_known(schema::fields::<document::Test>()),

@@ -274,7 +274,15 @@ impl<'a> Filled<'a> {
                 Role::Socket => {}
             }
         }
-        readings.observed.extend(&observed[..readings.channels]);
+        let values = &observed[..readings.channels];
+        if !values.is_empty() && values.iter().all(|value| value.is_nan()) {
+            let fault = ("no channel has a value in this row".to_string(), "remove the row".to_string());
+            return Err(self
+                .columns
+                .last()
+                .map_or_else(|| row.error(&self.columns[0], fault.clone()), |last| row.error(last, fault.clone())));
+        }
+        readings.observed.extend(values);
         Ok(())
     }
 
