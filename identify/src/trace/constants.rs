@@ -1,4 +1,4 @@
-//! The constants of the search, with their provenance. `docs/development/search.md` shows them in one table.
+//! The constants of the search, with their provenance. `docs/guide/trace.md` describes the search.
 
 /// Difference in `−ln P` below which two candidates are confounded. It corresponds to 2 σ for one column.
 pub const INDISTINGUISHABLE: f64 = 2.0;
