@@ -149,7 +149,7 @@ fn a_repeatable_straightness_of_x_biases_both_chapters_alike() {
 
 #[test]
 fn the_table_in_the_docs_agrees_with_the_computation() {
-    let docs = std::fs::read_to_string(super::workspace().join("docs/guide/compare-methods.md")).unwrap();
+    let docs = std::fs::read_to_string(super::workspace().join("docs/guide/methods.md")).unwrap();
     for (column, chapter) in [4, 5, 6].into_iter().enumerate() {
         let plan = analysis(chapter, 1.0, false);
         let mut one = method(chapter, 1.0);
