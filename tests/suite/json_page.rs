@@ -34,7 +34,8 @@ const COMMANDS: [(&str, &str); 21] = [
 
 const HEAD: &str = "# JSON results
 
-*Reader: the engineer whose program reads the results, and the researcher who archives them.*
+*Reader: the engineer whose program reads the results, and the researcher who archives them. This page is
+generated from the schemas by a test.*
 
 Every command that has `--json FILE` writes one JSON document. Example:
 
@@ -43,7 +44,7 @@ abbe fit sessions/hermle-c600u/measured/session.toml --quiet --json - | jq '.par
 ```
 
 `abbe schema SUBJECT` prints the JSON Schema (draft 2020-12) of each document. A document has the fields of its schema and no
-others. A test generates this page from the schemas:
+others. To write the page anew:
 
 ```console
 ABBE_UPDATE_PAGES=1 cargo test --profile checked -p abbe --test main json_page

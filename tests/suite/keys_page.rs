@@ -16,7 +16,8 @@ const FILES: [(&str, &str); 3] = [
 
 const HEAD: &str = "# Keys of files
 
-*Reader: the metrologist and the engineer who write sessions, machines, studies and error functions.*
+*Reader: the metrologist and the engineer who write sessions, machines, studies and error functions. This page is generated from the
+schemas by a test.*
 
 This page lists every table of a file that is written by hand, and its keys. Example: a test has the keys of [test](#test), and a
 machine file those of [machine](#machine). `abbe schema SUBJECT` prints the same as JSON Schema, with which an editor completes
@@ -24,7 +25,7 @@ keys ([schemas](files.md#schemas)).
 
 A unit stands in the name of a key: `_um` µm, `_mm` mm, `_deg` °, `_arcsec` ″. A key marked *optional* may be absent.
 
-*Generated: a test writes what follows from the schemas.*
+To write the page anew:
 
 ```console
 ABBE_UPDATE_PAGES=1 cargo test --profile checked -p abbe --test main the_page_lists
