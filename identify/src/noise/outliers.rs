@@ -102,12 +102,34 @@ fn deviations_from_neighbours(values: &[f64]) -> Vec<f64> {
         match (from(start..row), from(row + 1..end)) {
             (Some(before), Some(after)) if before * after <= 0.0 => 0.0,
             (Some(before), Some(after)) if before.abs() < after.abs() => before,
-            (_, Some(after)) => after,
-            (Some(before), None) => before,
+            (Some(_), Some(after)) => after,
+            // At an end of the run a slope is structure too: the reading is compared with both medians on its only side,
+            // and with the line through them.
+            (None, Some(after)) => lesser(after, beyond(value, &middle, row + 1, row + 1 + NEIGHBOURS)),
+            (Some(before), None) => {
+                let near = row.saturating_sub(NEIGHBOURS);
+                lesser(before, near.checked_sub(NEIGHBOURS).and_then(|far| beyond(value, &middle, near, far)))
+            }
             (None, None) => 0.0,
         }
     };
     values.iter().enumerate().map(deviation).collect()
+}
+
+/// The deviation of a value at an end from the line through two medians of five, each given by the place of its first
+/// value. The middle of the near five lies three readings away, that of the far five eight.
+fn beyond(value: &f64, middle: &[f64], near: usize, far: usize) -> Option<f64> {
+    let (near, far) = (middle.get(near)?, middle.get(far)?);
+    Some(value - near - 0.6 * (near - far))
+}
+
+/// The deviation nearer to zero, and zero if the two have opposite signs.
+fn lesser(deviation: f64, other: Option<f64>) -> f64 {
+    match other {
+        Some(other) if deviation * other <= 0.0 => 0.0,
+        Some(other) if other.abs() < deviation.abs() => other,
+        _ => deviation,
+    }
 }
 
 /// Keeps the rows, with their limits, that deviate from their repeats too. What returns at the same position in the same
@@ -162,6 +184,27 @@ mod tests {
         let rejected = reject_along_runs(&readings, &residual, 1, 3e-4);
         let rows: Vec<usize> = (0..rejected.len()).filter(|row| rejected[*row]).collect();
         assert_eq!(rows, [PLACES + 17]);
+    }
+
+    /// A slope that the model lacks stays whole. A spike at its first reading does not.
+    #[test]
+    fn the_ends_of_a_slope_are_no_outliers() {
+        let readings = Readings {
+            positions: vec![(0..60).map(f64::from).collect()],
+            run: vec![1; 60],
+            channels: 1,
+            ..Readings::default()
+        };
+        let mut residual: Vec<f64> =
+            (0..60).map(|row| 5e-4 * row as f64 + 1e-4 * (((row * 7) % 11) as f64 - 5.0) / 3.0).collect();
+        let rejected = |residual: &[f64]| -> Vec<usize> {
+            let rejected = reject_along_runs(&readings, residual, 1, 1e-4);
+            (0..60).filter(|row| rejected[*row]).collect()
+        };
+        assert_eq!(rejected(&residual), [0; 0]);
+        residual[0] += 0.01;
+        residual[59] += 0.01;
+        assert_eq!(rejected(&residual), [0, 59]);
     }
 
     #[test]
