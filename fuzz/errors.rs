@@ -1,13 +1,13 @@
-//! Fuzz functions for the readers of `abbe-identify`: files of error functions and of error values, read as the command
+//! Fuzz functions for the readers of `abbe-identify` and `abbe-apply`: files of error functions and of error values, read as the command
 //! reads them.
 //!
-//! `identify/tests/corpus.rs` replays the corpus with these functions on every test run.
+//! `apply/tests/corpus.rs` replays the corpus with these functions on every test run.
 
 use std::fs;
 use std::path::PathBuf;
 
+use abbe_apply::volumetric::{self, MachineWithErrors, functions};
 use abbe_identify::quantity::{self, Given};
-use abbe_identify::volumetric::{self, MachineWithErrors, functions};
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::files;

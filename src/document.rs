@@ -1,17 +1,17 @@
 //! Results as JSON documents: the result of a command with its inputs and options, so that a program can repeat the
 //! command and check what it reads.
 
-use abbe_identify::compare::results::{Comparison, Difference};
+use abbe_apply::compare::ComparisonStatement;
+use abbe_apply::compare::results::{Comparison, Difference};
 use abbe_identify::model_file::{InputFile, Provenance};
-use abbe_identify::plan::results::{Contribution, PlanAnalysis};
 use abbe_identify::problem::Problem;
-use abbe_identify::results::{
-    ComparisonStatement, FitResult, PlanStatement, Statements, TraceResult, ValidationStatement,
-};
+use abbe_identify::results::{FitResult, Statements, TraceResult, ValidationStatement};
 use abbe_identify::trace::TraceOutcome;
 use abbe_identify::validate::results::{MovedParameter, ValidationResult};
 use abbe_model::files::SourceMap;
 use abbe_model::files::stamp::FileStamp;
+use abbe_plan::PlanStatement;
+use abbe_plan::results::{Contribution, PlanAnalysis};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -130,7 +130,7 @@ impl<'r> StatedTrace<'r> {
 impl<'r> StatedPlan<'r> {
     /// Of a plan.
     pub fn of_plan(problem: &Problem, result: &'r PlanAnalysis) -> Self {
-        Stated { statements: Statements::of_plan(problem, result), result }
+        Stated { statements: result.statements(problem), result }
     }
 }
 
@@ -144,7 +144,7 @@ impl<'r> StatedValidation<'r> {
 impl<'r> StatedComparison<'r> {
     /// Of a comparison.
     pub fn of_comparison(result: &'r Comparison) -> Self {
-        Stated { statements: Statements::of_comparison(result), result }
+        Stated { statements: result.statements(), result }
     }
 }
 

@@ -1,11 +1,11 @@
 //! The calibrated machine for other programs and for controls: one line of a registry for each format.
 
-use abbe_identify::IdentifyError;
-use abbe_identify::compensation::{self, Compensation};
-use abbe_identify::export::control::{self, ENTRIES, EntryChoice, KinematicTable};
-use abbe_identify::export::dh::{self, DhTable};
-use abbe_identify::export::travel::Travel;
-use abbe_identify::export::{left_out, urdf};
+use abbe_apply::ApplyError;
+use abbe_apply::compensation::{self, Compensation};
+use abbe_apply::export::control::{self, ENTRIES, EntryChoice, KinematicTable};
+use abbe_apply::export::dh::{self, DhTable};
+use abbe_apply::export::travel::Travel;
+use abbe_apply::export::{left_out, urdf};
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_identify::parameters::Role;
 use abbe_model::component::{ErrorKind, ErrorName};
@@ -24,14 +24,14 @@ pub struct ExportFormat {
     pub about: &'static str,
     /// Whether it takes a choice of entries and the travel over which their error counts.
     pub takes_entries: bool,
-    export: fn(&IdentifiedModel, &ExportOptions) -> Result<Exported, IdentifyError>,
+    export: fn(&IdentifiedModel, &ExportOptions) -> Result<Exported, ApplyError>,
 }
 
 impl ExportFormat {
     const fn new(
         word: &'static str,
         about: &'static str,
-        export: fn(&IdentifiedModel, &ExportOptions) -> Result<Exported, IdentifyError>,
+        export: fn(&IdentifiedModel, &ExportOptions) -> Result<Exported, ApplyError>,
     ) -> ExportFormat {
         ExportFormat { word, about, takes_entries: false, export }
     }
@@ -104,10 +104,10 @@ pub struct ExportResult {
 ///
 /// # Errors
 /// If there is none.
-pub fn entries(word: &str) -> Result<EntryChoice, IdentifyError> {
+pub fn entries(word: &str) -> Result<EntryChoice, ApplyError> {
     ENTRIES.iter().find(|(_, own, _)| *own == word).map(|(choice, ..)| *choice).ok_or_else(|| {
         let words = ENTRIES.map(|(_, word, _)| word).join(", ");
-        IdentifyError::Request(format!("there are no entries `{word}`; the choices are {words}"))
+        ApplyError::Request(format!("there are no entries `{word}`; the choices are {words}"))
     })
 }
 
@@ -115,10 +115,10 @@ pub fn entries(word: &str) -> Result<EntryChoice, IdentifyError> {
 ///
 /// # Errors
 /// If there is none.
-pub fn format(word: &str) -> Result<&'static ExportFormat, IdentifyError> {
+pub fn format(word: &str) -> Result<&'static ExportFormat, ApplyError> {
     FORMATS.iter().find(|format| format.word == word).ok_or_else(|| {
         let words = FORMATS.iter().map(|format| format.word).collect::<Vec<_>>().join(", ");
-        IdentifyError::Request(format!("there is no format `{word}`; the formats are {words}"))
+        ApplyError::Request(format!("there is no format `{word}`; the formats are {words}"))
     })
 }
 
@@ -137,23 +137,23 @@ impl ExportFormat {
     ///
     /// # Errors
     /// If the format cannot hold the model.
-    pub fn export(&self, model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, IdentifyError> {
+    pub fn export(&self, model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, ApplyError> {
         (self.export)(model, options)
     }
 }
 
 /// A table under its header.
-fn tabled(header: String, table: Table, result: ExportResult) -> Result<Exported, IdentifyError> {
-    let rows = csv::text(&table).map_err(IdentifyError::Request)?;
+fn tabled(header: String, table: Table, result: ExportResult) -> Result<Exported, ApplyError> {
+    let rows = csv::text(&table).map_err(ApplyError::Request)?;
     Ok(Exported { text: [header.into_bytes(), rows].concat(), table: Some(table), result })
 }
 
-fn of_urdf(model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, IdentifyError> {
+fn of_urdf(model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, ApplyError> {
     let result = ExportResult { left_out: left_out(model), ..ExportResult::default() };
     Ok(Exported { text: urdf::urdf(model, options.tool_mm)?.into_bytes(), table: None, result })
 }
 
-fn of_dh(model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, IdentifyError> {
+fn of_dh(model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, ApplyError> {
     let [calibrated, nominal] = dh::tables(model, options.tool_mm)?;
     let table = present::dh(&calibrated, &nominal);
     let result = ExportResult {
@@ -165,7 +165,7 @@ fn of_dh(model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, I
     tabled(present::dh_header(&table), table, result)
 }
 
-fn of_control(model: &IdentifiedModel, word: &str, options: &ExportOptions) -> Result<Exported, IdentifyError> {
+fn of_control(model: &IdentifiedModel, word: &str, options: &ExportOptions) -> Result<Exported, ApplyError> {
     let found = control::table(model, word, options.entries, &options.travel, options.tool_mm)?;
     let left_out = found.left_out.clone();
     let (header, table) = (present::kinematics_header(&found), present::kinematics(&found));
@@ -173,8 +173,8 @@ fn of_control(model: &IdentifiedModel, word: &str, options: &ExportOptions) -> R
 }
 
 /// The location errors in the format of the control, and what it does not hold.
-fn of_beckhoff(model: &IdentifiedModel, _: &ExportOptions) -> Result<Exported, IdentifyError> {
-    let refused = |why: &str| IdentifyError::Request(why.to_string());
+fn of_beckhoff(model: &IdentifiedModel, _: &ExportOptions) -> Result<Exported, ApplyError> {
+    let refused = |why: &str| ApplyError::Request(why.to_string());
     let errors = model.parameters.iter().enumerate().filter(|(_, parameter)| parameter.role == Role::Error);
     let named = errors
         .filter(|(index, _)| model.is_estimated(*index))

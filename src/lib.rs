@@ -1,12 +1,14 @@
 //! Abbe: a modelling workspace for the geometric errors of machine tools and other serial chains.
 //!
-//! The facade of three crates. The command `abbe` is built on the same.
+//! The facade of five crates. The command `abbe` is built on the same.
 //!
 //! | for | look in |
 //! |---|---|
 //! | a program that fits, traces, simulates or prints an equation | [`prelude`] |
 //! | the machine, instruments, effects, sessions and their files | [`model`] |
-//! | estimates, uncertainty, plans, the trace of unmodelled effects | [`identify`] |
+//! | estimates, uncertainty, the trace of unmodelled effects | [`identify`] |
+//! | what a set of readings would say: identifiability, next test, poses | [`plan`] |
+//! | what follows from an identified model: correction, export, comparison, history | [`apply`] |
 //! | closed forms and their languages | [`codegen`] |
 //! | results as JSON documents, parameters of equations by name | [`document`], [`equation`] |
 //! | exports of a model | [`exports`] |
@@ -45,9 +47,11 @@
 // The printers name this library as the command does.
 extern crate self as abbe;
 
+pub use abbe_apply as apply;
 pub use abbe_codegen as codegen;
 pub use abbe_identify as identify;
 pub use abbe_model as model;
+pub use abbe_plan as plan;
 
 pub mod document;
 pub mod equation;
@@ -70,7 +74,6 @@ pub mod prelude {
     pub use abbe_codegen::print::Style;
     pub use abbe_codegen::{Equation, Options as EquationOptions, Order, SessionTest, check, language};
     pub use abbe_identify::fit::SessionFit;
-    pub use abbe_identify::plan::{PlanOptions, analyse};
     pub use abbe_identify::quantity::Given;
     pub use abbe_identify::results::{FitResult, ParameterResult, TraceResult};
     pub use abbe_identify::simulate::{Simulated, Simulation, simulate};
@@ -82,6 +85,7 @@ pub mod prelude {
     pub use abbe_model::files::table::memory::MemoryColumn;
     pub use abbe_model::instrument::InstrumentKind;
     pub use abbe_model::session::Session;
+    pub use abbe_plan::{PlanOptions, analyse};
 
     /// Reads a session file and the machine and data that it names.
     ///

@@ -1,17 +1,17 @@
 //! What the files hold, as JSON Schema: one line of a registry for each.
 
-use abbe_identify::correction::stream;
-use abbe_identify::geometric::Comparison as GeometricComparison;
+use abbe_apply::correction::stream;
+use abbe_apply::geometric::Comparison as GeometricComparison;
+use abbe_apply::volumetric::{Summary, functions as error_functions};
 use abbe_identify::model_file;
 use abbe_identify::patterns::Patterns;
-use abbe_identify::plan::global::GlobalAnalysis;
-use abbe_identify::plan::next_test::NextTest;
-use abbe_identify::plan::poses::PoseSelection;
 use abbe_identify::repeated::Repeated;
 use abbe_identify::self_calibration::SelfCalibration;
 use abbe_identify::simulate::SimulationResult;
-use abbe_identify::volumetric::{Summary, functions as error_functions};
 use abbe_model::document::schema;
+use abbe_plan::global::GlobalAnalysis;
+use abbe_plan::next_test::NextTest;
+use abbe_plan::poses::PoseSelection;
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde_json::{Value, json};

@@ -119,7 +119,13 @@ def exclude_mutants_that_do_not_build(copy, originals, mutants, packages):
 
 
 # Folders whose tests cover a package, its own first.
-TESTED_BY = {"abbe-model": ("model", "codegen", "identify", "."), "abbe-identify": ("identify", "."), "abbe-codegen": ("codegen", ".")}
+TESTED_BY = {
+    "abbe-model": ("model", "codegen", "identify", "plan", "apply", "."),
+    "abbe-identify": ("identify", "plan", "apply", "."),
+    "abbe-plan": ("plan", "."),
+    "abbe-apply": ("apply", "."),
+    "abbe-codegen": ("codegen", "."),
+}
 
 
 def binaries(copy, asked):

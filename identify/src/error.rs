@@ -89,32 +89,6 @@ pub enum IdentifyError {
         /// Possible causes.
         diagnosis: String,
     },
-    /// Poses of an instrument need the travel of every linear axis.
-    #[error("axis `{axis}` states no travel, so that no poses can be drawn; add `travel_mm` to the machine")]
-    NoTravel {
-        /// The axis.
-        axis: String,
-    },
-    /// The place of a socket is not known.
-    #[error(
-        "test `{test}`: the place of its socket is not known; state `socket_mm`, or give the data with poses in the socket"
-    )]
-    NoPlace {
-        /// The test.
-        test: String,
-    },
-    /// No pose meets the condition of the instrument.
-    #[error("test `{test}`: none of {drawn} drawn poses {goal} within the travel of the axes; check {check}")]
-    OutOfReach {
-        /// The test.
-        test: String,
-        /// The number of drawn poses.
-        drawn: usize,
-        /// What a pose has to do.
-        goal: String,
-        /// What may be wrong.
-        check: &'static str,
-    },
     /// A matrix decomposition failed.
     #[error("a matrix of the least-squares problem has entries that are not finite")]
     Decomposition,

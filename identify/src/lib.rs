@@ -8,11 +8,10 @@
 //! - [`plausibility`]: consistency of readings and session;
 //! - [`monte_carlo`], [`propagation`]: propagation of distributions by Monte Carlo; [`repeated`]: Type A against Type B
 //!   uncertainty;
-//! - [`compensation`]: identified error motions as functions of the axis position;
 //! - [`circular`]: ball-bar characteristics of ISO 230-4 and the diagnosis of circular tests;
-//! - [`candidates`]: the effects that a plan and a trace examine; [`trace`]: search for the unmodelled effect behind the
+//! - [`candidates`]: the effects that a trace examines; [`trace`]: search for the unmodelled effect behind the
 //!   residual;
-//! - [`plan`]: identifiability and expected uncertainty of a plan, before any measurement;
+//! - [`linear`], [`identifiability`]: the linearised problem, and what its null space confounds;
 //! - [`directions`]: readings and residuals of an R-test by direction;
 //! - [`simulate`]: simulated readings; [`patterns`]: the pattern of each single error in a test; [`quantity`]: values
 //!   with units;
@@ -20,7 +19,6 @@
 //! - [`model_file`]: the identified model as a value and as a file;
 //! - [`tolerance`]: decisions of conformity by ISO 14253-1;
 //! - [`validate`](mod@validate): a model against readings that it never saw;
-//! - [`history`]: the parameters of machines over time: drifts, steps, control charts;
 //! - [`results`]: the reported results, in the form of the JSON output.
 //!
 //! The example fits a bundled session as declared, then traces it. Beside noise of 0.3 µm the readings contain one
@@ -56,24 +54,19 @@
 
 pub mod candidates;
 pub mod circular;
-pub mod compare;
-pub mod compensation;
-pub mod correction;
 pub mod directions;
 pub mod error;
-pub mod export;
 pub mod fit;
-pub mod geometric;
 pub mod heldout;
-pub mod history;
+pub mod identifiability;
+pub mod linear;
 pub mod model_file;
 pub mod monte_carlo;
 pub mod noise;
 pub mod numerics;
-pub(crate) mod parameter_description;
+pub mod parameter_description;
 pub mod parameters;
 pub mod patterns;
-pub mod plan;
 pub mod plausibility;
 pub mod positioning;
 pub mod problem;
@@ -82,15 +75,13 @@ pub mod quantity;
 pub mod repeated;
 pub mod results;
 pub mod self_calibration;
-pub mod separating_tests;
 pub mod series;
 pub mod simulate;
-mod start;
-mod statements;
+pub mod start;
+pub mod statements;
 pub mod tolerance;
 pub mod trace;
 pub mod unit;
 pub mod validate;
-pub mod volumetric;
 
 pub use error::IdentifyError;

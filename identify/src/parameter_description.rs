@@ -71,7 +71,7 @@ pub(crate) fn coefficient_meaning(machine: &Machine, effect: &Effect, coefficien
 
 /// The description of parameter `index` of a problem. `coefficient` replaces the name of a coefficient: `amplitude`,
 /// `phase`.
-pub(crate) fn parameter_meaning(problem: &Problem, index: usize, coefficient: Option<&str>) -> String {
+pub fn parameter_meaning(problem: &Problem, index: usize, coefficient: Option<&str>) -> String {
     let (machine, parameter) = (&problem.session.machine, &problem.parameters.list[index]);
     match parameter.role {
         Role::Error => error_meaning(machine, &parameter.id),

@@ -111,7 +111,7 @@ const START_OF_SCALE: f64 = 0.01;
 pub(crate) const LONG_DELAY_S: f64 = 0.1;
 
 /// The physical size of a component.
-pub(crate) fn physical_size(unit: InternalUnit) -> f64 {
+pub fn physical_size(unit: InternalUnit) -> f64 {
     match unit {
         InternalUnit::Millimetre => 1.0,
         InternalUnit::Radian => 0.01,

@@ -33,8 +33,7 @@ pub use parameter::{
 };
 pub use pointing::{PointingTerm, PointingTerms};
 pub use statements::{
-    AxisCorrection, ComparisonStatement, GoodStatement, LineQuantity, MeasureStatement, NextStep, PlanStatement,
-    Statements, ValidationStatement,
+    AxisCorrection, GoodStatement, LineQuantity, MeasureStatement, NextStep, Statements, ValidationStatement,
 };
 pub use trace::{
     AliasResult, AlternativeResult, ChangedParameter, CurvePoint, EffectName, EffectResult, LargestOrder, ModelResult,

@@ -8,7 +8,7 @@ use abbe_model::session::{Session, Test};
 use nalgebra::Vector3;
 
 /// The stations of the tests, with start values for free poses and sockets from which the iterations converge.
-pub(crate) fn stations(session: &Session, tests: &[Test]) -> Vec<Station<f64>> {
+pub fn stations(session: &Session, tests: &[Test]) -> Vec<Station<f64>> {
     let mut stations: Vec<Station<f64>> = tests.iter().map(|test| test.station.clone()).collect();
     for (station, test) in stations.iter_mut().zip(tests) {
         // Tests of one set-up count from one point: that of the first of them.

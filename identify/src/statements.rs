@@ -14,16 +14,14 @@
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
+use abbe_model::instrument::Station;
 
-use crate::compare::results::{Comparison, Difference};
-use crate::plan::candidate_tests::has_candidates;
-use crate::plan::results::{Contribution, ErrorAnalysis, PlanAnalysis};
+use crate::parameters::Role;
 use crate::plausibility::Plausibility;
 use crate::problem::Problem;
 use crate::results::{
-    AxisCorrection, ComparisonStatement, Covariance, DeterminedBy, FitResult, GoodStatement, Goodness, GoodnessVerdict,
-    LineQuantity, MeasureStatement, NextStep, ParameterResult, PlanStatement, Statements, TraceResult,
-    ValidationStatement,
+    AxisCorrection, Covariance, DeterminedBy, FitResult, GoodStatement, Goodness, GoodnessVerdict, LineQuantity,
+    MeasureStatement, NextStep, ParameterResult, Statements, TraceResult, ValidationStatement,
 };
 use crate::tolerance::Conformity;
 use crate::tolerance::rule::Decision;
@@ -82,44 +80,6 @@ impl Statements {
     }
 }
 
-/// Share of a variance from which a contribution of the set-up limits an error.
-const MIN_LIMITING_SHARE: f64 = 0.1;
-/// Contributions that limit an error, at most.
-const MAX_LIMITING: usize = 2;
-
-impl Statements<PlanStatement, Contribution> {
-    /// Of a plan.
-    pub fn of_plan(problem: &Problem, analysis: &PlanAnalysis) -> Self {
-        let worst = analysis.worst();
-        let step = match analysis.errors.iter().all(|error| error.u.is_some()) {
-            _ if !has_candidates(problem) => NextStep::Nothing,
-            true => NextStep::Improve,
-            false => NextStep::Identify,
-        };
-        let ids = analysis.errors.iter().filter(|error| error.u.is_none()).map(|error| error.id.clone());
-        Statements {
-            good: PlanStatement {
-                errors: analysis.errors.len(),
-                not_identifiable: ids.collect(),
-                determined_by_prior: analysis.determined_by_prior.iter().map(|item| item.error.clone()).collect(),
-                worst: worst.map(|error| error.id.clone()),
-            },
-            correct: worst.map_or(Vec::new(), limiting),
-            measure: step.into(),
-        }
-    }
-}
-
-/// The contributions of the set-up that limit an error: none if the noise has half of the variance.
-fn limiting(error: &ErrorAnalysis) -> Vec<Contribution> {
-    if error.noise_share() >= 0.5 {
-        return Vec::new();
-    }
-    let setup = error.budget.iter().filter(|part| !part.is_noise()).enumerate();
-    let named = setup.take_while(|(k, part)| *k == 0 || (*k < MAX_LIMITING && part.share >= MIN_LIMITING_SHARE));
-    named.map(|(_, part)| part.clone()).collect()
-}
-
 impl Statements<ValidationStatement, MovedParameter> {
     /// Of a validation.
     pub fn of_validation(result: &ValidationResult) -> Self {
@@ -137,18 +97,15 @@ impl Statements<ValidationStatement, MovedParameter> {
     }
 }
 
-impl Statements<ComparisonStatement, Difference> {
-    /// Of a comparison.
-    pub fn of_comparison(comparison: &Comparison) -> Self {
-        let significant = comparison.differences.iter().filter(|difference| difference.significant);
-        let correct: Vec<Difference> = significant.cloned().collect();
-        let step = if correct.is_empty() { NextStep::Nothing } else { NextStep::Repeat };
-        Statements {
-            good: ComparisonStatement { significant: correct.len(), compared: comparison.differences.len() },
-            correct,
-            measure: step.into(),
-        }
-    }
+/// Whether candidate tests exist for a problem: it has errors to identify, the instrument is a ball bar, and a rotary
+/// axis can be swept.
+pub fn has_candidates(problem: &Problem) -> bool {
+    let session = &problem.session;
+    let has_errors = problem.parameters.list.iter().any(|parameter| parameter.role == Role::Error);
+    let last = session.tests.last().map(|test| &test.station);
+    has_errors
+        && matches!(last, Some(Station::BallBar(_)))
+        && session.machine.axes.iter().any(|axis| axis.kind == AxisKind::Rotary)
 }
 
 /// The step that has to come before any further test.

@@ -79,6 +79,7 @@ pub mod files;
 pub mod frames;
 pub mod instrument;
 pub mod pattern;
+pub mod pose;
 pub mod replay;
 pub mod rotation_error;
 pub mod scalar;

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
+use abbe::apply::compare::results::Comparison as Compared;
+use abbe::apply::compare::{CompareOptions, Input, compare_inputs};
 use abbe::document::{Document, Origin, StatedComparison};
-use abbe::identify::compare::results::Comparison as Compared;
-use abbe::identify::compare::{CompareOptions, Input, compare_inputs};
 use abbe::identify::model_file::IdentifiedModel;
 use abbe::report::block::Report;
 use abbe::report::compare::report;

@@ -1,10 +1,12 @@
 //! Errors of the library as exceptions of `abbe`, with the same text.
 
+use abbe::apply::ApplyError;
 use abbe::codegen::CodegenError;
 use abbe::identify::IdentifyError;
 use abbe::model::ModelError;
 use abbe::model::error::Location;
 use abbe::model::words::shortened;
+use abbe::plan::PlanError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -45,6 +47,24 @@ impl From<IdentifyError> for Failed {
     fn from(error: IdentifyError) -> Failed {
         match error {
             IdentifyError::Model(error) => error.into(),
+            other => Failed { class: "IdentificationError", ..Failed::new(other.to_string()) },
+        }
+    }
+}
+
+impl From<PlanError> for Failed {
+    fn from(error: PlanError) -> Failed {
+        match error {
+            PlanError::Identify(error) => error.into(),
+            other => Failed { class: "IdentificationError", ..Failed::new(other.to_string()) },
+        }
+    }
+}
+
+impl From<ApplyError> for Failed {
+    fn from(error: ApplyError) -> Failed {
+        match error {
+            ApplyError::Identify(error) => error.into(),
             other => Failed { class: "IdentificationError", ..Failed::new(other.to_string()) },
         }
     }

@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
+use abbe::apply::history::HistoryOptions;
 use abbe::document::StatedHistory;
 use abbe::fleet::history;
 use abbe::fleet::options::Options;
 use abbe::fleet::store::{IfClaimed, Store};
 use abbe::fleet::unit::{self, Done, Places};
 use abbe::fleet::{FleetError, compensations, list, study};
-use abbe::identify::history::HistoryOptions;
 use pyo3::prelude::*;
 use serde::Serialize;
 

@@ -3,14 +3,16 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use abbe::apply::correction::Correction;
+use abbe::apply::export::travel::Travel;
 use abbe::document::{Document, Origin, StatedValidation};
 use abbe::exports::{self, ExportOptions};
-use abbe::identify::correction::{Aim, Correction, EstimatedErrors};
-use abbe::identify::export::travel::Travel;
+use abbe::identify::model_file::errors::EstimatedErrors;
 use abbe::identify::model_file::{self, IdentifiedModel};
 use abbe::identify::unit::ARCSEC;
 use abbe::identify::validate::{self, validate};
 use abbe::model::files;
+use abbe::model::pose::Aim;
 use abbe::model::session::readings::Readings;
 use abbe::report::block::Report;
 use abbe::report::commands::Commands;

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use abbe::document::{Call, Document, StatedPlan};
-use abbe::identify::plan::results::PlanAnalysis;
-use abbe::identify::plan::{self, PlanOptions};
 use abbe::identify::problem::Problem;
 use abbe::model::session::limits::{LARGEST, MIN_UM};
+use abbe::plan::results::PlanAnalysis;
+use abbe::plan::{self, PlanOptions};
 use abbe::report::block::Report;
 use abbe::report::commands::Commands;
 use abbe::report::plan as present;

@@ -6,7 +6,6 @@ use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use abbe::document::Origin;
 use abbe::identify::noise::{Noise, NoiseSource};
-use abbe::identify::plan::states;
 use abbe::identify::problem::{Problem, RowBlock};
 use abbe::identify::quantity::Given;
 use abbe::identify::simulate::{Simulation, simulate};
@@ -23,6 +22,7 @@ use abbe::model::files::{self, Changes, ReadOptions, SourceMap};
 use abbe::model::instrument::channel::labels;
 use abbe::model::sensitivity::TestModel;
 use abbe::model::session::{self as domain, Prior};
+use abbe::plan::states;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

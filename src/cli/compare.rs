@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use abbe::apply::compare::{CompareOptions, Input, SIGNIFICANCE, compare_inputs};
 use abbe::document::StatedComparison;
-use abbe::identify::compare::{CompareOptions, Input, SIGNIFICANCE, compare_inputs};
 use abbe::identify::model_file;
 use abbe::model::files::stamp::FileStamp;
 use abbe::model::files::{self, ReadOptions, SourceMap};

@@ -5,10 +5,12 @@ mod positions;
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
-use abbe::identify::correction::stream::{self, Output, Summary};
-use abbe::identify::correction::{Aim, Correction, EstimatedErrors};
+use abbe::apply::correction::Correction;
+use abbe::apply::correction::stream::{self, Output, Summary};
 use abbe::identify::model_file;
+use abbe::identify::model_file::errors::EstimatedErrors;
 use abbe::model::files::{self, commands::CommandFile};
+use abbe::model::pose::Aim;
 use clap::Args;
 
 use super::failure::Failure;

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use abbe::identify::compensation::curves::of_fit;
-use abbe::identify::compensation::{CONTROLS, Control, MAX_POINTS, tables};
+use abbe::apply::compensation::curves::of_fit;
+use abbe::apply::compensation::{CONTROLS, Control, MAX_POINTS, tables};
 use abbe::identify::fit::Fit;
 use abbe::identify::problem::Problem;
 use clap::Args;

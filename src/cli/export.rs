@@ -4,8 +4,8 @@ mod travel;
 
 use std::path::PathBuf;
 
+use abbe::apply::export::control::ENTRIES;
 use abbe::exports::{self, ExportOptions, FORMATS};
-use abbe::identify::export::control::ENTRIES;
 use abbe::identify::model_file;
 use abbe::model::files;
 use clap::Args;

@@ -1,8 +1,10 @@
 //! Errors on standard error: what was found and where, what to do, and an excerpt of the file.
 
+use abbe::apply::ApplyError;
 use abbe::fleet::FleetError;
 use abbe::identify::IdentifyError;
 use abbe::model::ModelError;
+use abbe::plan::PlanError;
 
 use super::excerpt::excerpt;
 use super::interrupt;
@@ -17,6 +19,12 @@ pub enum Failure {
     /// The identification failed.
     #[error(transparent)]
     Identify(IdentifyError),
+    /// The plan failed.
+    #[error(transparent)]
+    Plan(PlanError),
+    /// What is derived from a model failed.
+    #[error(transparent)]
+    Apply(ApplyError),
     /// The equation cannot be made.
     #[error(transparent)]
     Codegen(#[from] abbe::codegen::CodegenError),
@@ -50,6 +58,24 @@ impl From<IdentifyError> for Failure {
                 Failure::Other(format!("{error}; `abbe trace --list` lists all candidates"))
             }
             other => Failure::Identify(other),
+        }
+    }
+}
+
+impl From<PlanError> for Failure {
+    fn from(error: PlanError) -> Self {
+        match error {
+            PlanError::Identify(error) => error.into(),
+            other => Failure::Plan(other),
+        }
+    }
+}
+
+impl From<ApplyError> for Failure {
+    fn from(error: ApplyError) -> Self {
+        match error {
+            ApplyError::Identify(error) => error.into(),
+            other => Failure::Apply(other),
         }
     }
 }

@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
+use abbe::apply::history::HistoryOptions;
 use abbe::document::StatedHistory;
 use abbe::fleet::compensations;
 use abbe::fleet::history::{history, statements};
 use abbe::fleet::store::Store;
-use abbe::identify::history::HistoryOptions;
 use abbe::model::files;
 use clap::Args;
 

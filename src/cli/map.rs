@@ -4,7 +4,7 @@ mod grid;
 
 use std::path::PathBuf;
 
-use abbe::identify::volumetric::{self, MachineWithErrors, functions};
+use abbe::apply::volumetric::{self, MachineWithErrors, functions};
 use abbe::model::chain::Machine;
 use abbe::model::files::{self, Source};
 use clap::Args;

@@ -1,6 +1,6 @@
 //! `abbe fit --method`: the methods of identification other than the full fit.
 
-use abbe::identify::geometric;
+use abbe::apply::geometric;
 use abbe::identify::{fit, self_calibration};
 use abbe::model::session::Session;
 use clap::ValueEnum;

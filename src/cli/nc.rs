@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use abbe::codegen::nc::{self, NcFiles, NcOptions};
-use abbe::identify::plan::collision;
 use abbe::model::files::{self, ReadOptions};
+use abbe::plan::collision;
 use clap::Args;
 
 use super::failure::Failure;

@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use abbe::codegen::nc::{self, NcOptions};
-use abbe::identify::plan::collision;
-use abbe::identify::plan::sheet::{SetUpTimes, sheets};
 use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
 use abbe::model::session::motion::Motion;
 use abbe::model::words::counted;
+use abbe::plan::collision;
+use abbe::plan::sheet::{SetUpTimes, sheets};
 use clap::Args;
 
 use super::failure::Failure;

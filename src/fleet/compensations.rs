@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use abbe_identify::history::events::{Compensation, KnownChange};
+use abbe_apply::history::events::{Compensation, KnownChange};
 
 use abbe_model::files::{self, Source};
 

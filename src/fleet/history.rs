@@ -2,10 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
-use abbe_identify::history::events::{Compensation, Kind};
-use abbe_identify::history::faults::{Fault, FoundEffect, faults};
-use abbe_identify::history::results::{Estimate, History, MachineHistory};
-use abbe_identify::history::{HistoryOptions, MachineSessions, SessionValues, analyse};
+use abbe_apply::history::events::{Compensation, Kind};
+use abbe_apply::history::faults::{Fault, FoundEffect, faults};
+use abbe_apply::history::results::{Estimate, History, MachineHistory};
+use abbe_apply::history::{HistoryOptions, MachineSessions, SessionValues, analyse};
 use abbe_identify::results::{NextStep, Statements};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -366,7 +366,7 @@ fn found_effects(dated: &Dated) -> impl Iterator<Item = FoundEffect> {
 
 #[cfg(test)]
 mod tests {
-    use abbe_identify::history::events::KnownChange;
+    use abbe_apply::history::events::KnownChange;
 
     use super::*;
 

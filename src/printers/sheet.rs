@@ -1,8 +1,8 @@
 //! Set-up sheets: one printed page for each test, for the operator at the machine.
 
-use abbe::identify::plan::sheet::{AxisRange, PlacedPoint, TestSheet};
 use abbe::model::session::Session;
 use abbe::model::words::counted;
+use abbe::plan::sheet::{AxisRange, PlacedPoint, TestSheet};
 use maud::{DOCTYPE, Markup, html};
 
 use super::html::{head, table};

@@ -1,7 +1,7 @@
 //! Differences between models of one machine.
 
+use abbe::apply::compare::results::{Comparison, Difference, Pair};
 use abbe::document::StatedComparison;
-use abbe::identify::compare::results::{Comparison, Difference, Pair};
 use abbe::identify::results::Outlier;
 use abbe::model::words::counted;
 

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use abbe::identify::correction::Aim;
-use abbe::identify::correction::stream::Summary;
+use abbe::apply::correction::stream::Summary;
+use abbe::model::pose::Aim;
 use abbe::model::words::{counted, with_exponent};
 
 use super::block::Report;

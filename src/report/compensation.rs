@@ -1,6 +1,6 @@
 //! The standard uncertainty of each point of compensation tables.
 
-use abbe::identify::compensation::PointUncertainty;
+use abbe::apply::compensation::PointUncertainty;
 
 use super::table::{Cell, Table, cells};
 

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use abbe::identify::compare::workspace::AxisRange;
-use abbe::identify::export::control::{EntryChoice, KinematicTable};
-use abbe::identify::export::dh::{DhTable, FixedPose};
+use abbe::apply::compare::workspace::AxisRange;
+use abbe::apply::export::control::{EntryChoice, KinematicTable};
+use abbe::apply::export::dh::{DhTable, FixedPose};
 
 use super::block::Report;
 use super::table::{Cell, Column, Table, cells, numbers};
@@ -26,7 +26,7 @@ pub fn dh(calibrated: &DhTable, nominal: &DhTable) -> Table {
         .chain(names.map(numbers))
         .chain(names.iter().map(|name| numbers(format!("nominal_{name}"))));
     let joints = calibrated.joints.iter().zip(&nominal.joints).map(|(own, design)| {
-        let five = |row: &abbe::identify::export::dh::DhRow| {
+        let five = |row: &abbe::apply::export::dh::DhRow| {
             [row.a_mm, row.alpha_deg, row.beta_deg, row.theta_deg, row.d_mm].map(|value| Cell::fixed(value, 9))
         };
         std::iter::once(Cell::from(own.axis.clone())).chain(five(own)).chain(five(design)).collect()

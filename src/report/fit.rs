@@ -4,10 +4,10 @@ use abbe::document::StatedFit;
 use abbe::identify::IdentifyError;
 use abbe::identify::circular::CircularTest;
 use abbe::identify::fit::Fit;
-use abbe::identify::plan::candidate_tests;
 use abbe::identify::problem::Problem;
 use abbe::identify::results::{CrossValidation, FitMonteCarlo, FitResult, NextStep, ParameterResult, Verdict};
 use abbe::identify::series::{spectrum, views};
+use abbe::identify::statements::has_candidates;
 use abbe::identify::tolerance::Conformity;
 use abbe::model::words::counted;
 
@@ -137,7 +137,7 @@ fn next(problem: &Problem, result: &FitResult, step: NextStep, commands: &Comman
     if matches!(step, NextStep::Trace | NextStep::StateNoise) {
         add(commands.command("trace", ""), "find the unmodelled effect behind the residual");
     }
-    if !result.unobservable.is_empty() && !candidate_tests::has_candidates(problem) {
+    if !result.unobservable.is_empty() && !has_candidates(problem) {
         add("measure a further test".into(), "move axes that these tests leave at rest");
     }
     steps

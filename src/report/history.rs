@@ -1,12 +1,12 @@
 //! The machines of a fleet over time.
 
+use abbe::apply::history::chart::{EWMA_LIMIT, SHEWHART_LIMIT};
+use abbe::apply::history::events::Kind;
+use abbe::apply::history::results::{Due, Estimate, MachineHistory, ParameterHistory};
 use abbe::document::StatedHistory;
 use abbe::fleet::conformity::{ItemHistory, MachineConformity};
 use abbe::fleet::date::date;
 use abbe::fleet::history::{FleetHistory, HistoryStatements, NotUsed};
-use abbe::identify::history::chart::{EWMA_LIMIT, SHEWHART_LIMIT};
-use abbe::identify::history::events::Kind;
-use abbe::identify::history::results::{Due, Estimate, MachineHistory, ParameterHistory};
 use abbe::identify::tolerance::rule::Decision;
 use abbe::model::words::{counted, first_of};
 

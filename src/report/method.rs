@@ -1,6 +1,6 @@
 //! The errors by a geometric method beside those of the full fit.
 
-use abbe::identify::geometric::{Comparison, ComparisonRow};
+use abbe::apply::geometric::{Comparison, ComparisonRow};
 use abbe::identify::problem::Problem;
 use abbe::identify::unit::ReadingUnit;
 use abbe::model::words::counted;

@@ -1,12 +1,12 @@
 //! Proposed tests, and the smallest ranges of sweeps.
 
-use abbe::identify::plan::improve::Improvement;
-use abbe::identify::plan::next_test::NextTest;
-use abbe::identify::plan::range::Shrinkage;
 use abbe::identify::problem::Problem;
 use abbe::identify::results::Interval;
 use abbe::identify::unit::ReadingUnit;
 use abbe::model::words::counted;
+use abbe::plan::improve::Improvement;
+use abbe::plan::next_test::NextTest;
+use abbe::plan::range::Shrinkage;
 
 use super::block::{Level, Report, Text};
 use super::figure::bars::{Bars, Fill};

@@ -1,9 +1,9 @@
 //! Selected poses.
 
-use abbe::identify::plan::poses::PoseSelection;
 use abbe::identify::unit::ReadingUnit;
 use abbe::model::session::Session;
 use abbe::model::words::counted;
+use abbe::plan::poses::PoseSelection;
 
 use super::block::Report;
 use super::number::{three_digits, unit};

@@ -1,17 +1,19 @@
 //! The three statements that open a report: is it good, what to correct, what to measure next.
 
+use abbe::apply::compare::ComparisonStatement;
+use abbe::apply::compare::results::Difference;
 #[cfg(feature = "fleet")]
 use abbe::fleet::history::HistoryStatements;
-use abbe::identify::compare::results::Difference;
-use abbe::identify::plan::results::{Contribution, ErrorAnalysis, PlanAnalysis};
 use abbe::identify::results::{
-    AxisCorrection, ComparisonStatement, DeterminedBy, GoodStatement, LineQuantity, MeasureStatement, NextStep,
-    PlanStatement, Statements, ValidationStatement,
+    AxisCorrection, DeterminedBy, GoodStatement, LineQuantity, MeasureStatement, NextStep, Statements,
+    ValidationStatement,
 };
 use abbe::identify::tolerance::rule::Decision;
 use abbe::identify::validate::ValidationVerdict;
 use abbe::identify::validate::results::MovedParameter;
 use abbe::model::words::{counted, first_of};
+use abbe::plan::PlanStatement;
+use abbe::plan::results::{Contribution, ErrorAnalysis, PlanAnalysis};
 
 use super::block::Sentence;
 use super::commands::Commands;

@@ -2,9 +2,9 @@
 
 use abbe::document::StatedTrace;
 use abbe::identify::IdentifyError;
-use abbe::identify::plan::candidate_tests;
 use abbe::identify::results::{EffectResult, GoodnessVerdict, ModelResult, PriorResult, TraceResult, TraceVerdict};
 use abbe::identify::series::{spectrum, views};
+use abbe::identify::statements::has_candidates;
 use abbe::identify::trace::TraceOutcome;
 use abbe::model::words::counted;
 
@@ -228,7 +228,7 @@ fn next(trace: &TraceOutcome, commands: &Commands) -> Vec<(String, String)> {
         let purpose = format!("declare the effects in a session, which `abbe fit {written}` fits");
         step(commands.command("trace", &format!("--write {written}")), &purpose);
     }
-    if !result.unobservable.is_empty() && candidate_tests::has_candidates(&trace.after) {
+    if !result.unobservable.is_empty() && has_candidates(&trace.after) {
         step(commands.command("plan", "--improve"), &format!("propose the test that {IDENTIFIES}"));
     }
     steps

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use abbe::identify::volumetric::{Size, Summary, VolumetricPoint};
+use abbe::apply::volumetric::{Size, Summary, VolumetricPoint};
 use abbe::model::chain::Machine;
 use abbe::model::words::{counted, with_exponent};
 

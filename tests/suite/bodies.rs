@@ -3,10 +3,10 @@
 
 use std::path::{Path, PathBuf};
 
-use abbe::identify::plan::collision::clearances;
-use abbe::identify::plan::states;
 use abbe::model::files::store::Store;
 use abbe::model::files::{self, ReadOptions};
+use abbe::plan::collision::clearances;
+use abbe::plan::states;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 

@@ -4,9 +4,9 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use abbe::identify::plan::collision::{TestClearance, clearances};
-use abbe::identify::plan::states;
 use abbe::model::files::{self, ReadOptions};
+use abbe::plan::collision::{TestClearance, clearances};
+use abbe::plan::states;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde_json::Value;

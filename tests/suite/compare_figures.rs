@@ -1,7 +1,7 @@
 //! Every figure of a comparison, recomputed by hand from the estimates and the covariances of the two models.
 
-use abbe::identify::compare::results::{Comparison, Difference};
-use abbe::identify::compare::{CompareOptions, Named, compare};
+use abbe::apply::compare::results::{Comparison, Difference};
+use abbe::apply::compare::{CompareOptions, Named, compare};
 use abbe::identify::fit;
 use abbe::identify::model_file::{IdentifiedModel, Provenance};
 use abbe::identify::quantity::Given;

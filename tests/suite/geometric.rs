@@ -3,8 +3,8 @@
 
 use std::sync::Arc;
 
+use abbe::apply::geometric::{Estimator, Method, compare};
 use abbe::identify::fit::prepare;
-use abbe::identify::geometric::{Estimator, Method, compare};
 use abbe::identify::noise::{Noise, NoiseSource};
 use abbe::identify::numerics::circle;
 use abbe::identify::problem::Problem;
@@ -112,7 +112,7 @@ fn by(session: &Session, method: Method) -> [f64; 8] {
 fn centre(session: &Session, test: &str) -> [f64; 2] {
     let problem = problem(session);
     let place = problem.tests.iter().position(|known| known.name == test).unwrap();
-    let geometry = abbe::identify::geometric::CircleGeometry::of(&session.machine, &problem.models[place]).unwrap();
+    let geometry = abbe::apply::geometric::CircleGeometry::of(&session.machine, &problem.models[place]).unwrap();
     let observed = &problem.tests[place].readings.as_ref().unwrap().observed;
     let left_out = vec![false; observed.len()];
     geometry.centre(observed, &left_out).unwrap().offset_mm.map(|mm| mm * 1e3)

@@ -1,9 +1,9 @@
 //! Every figure of a history, recomputed: least squares over all parameters of a machine by another library, control
 //! charts by their definitions, the next check by its formula, and changes in the metric of their covariance.
 
-use abbe::identify::history::events::{ChangeEvent, Compensation, Kind, KnownChange};
-use abbe::identify::history::results::{Due, MachineHistory, ParameterHistory};
-use abbe::identify::history::{HistoryOptions, MachineSessions, SessionValues, analyse};
+use abbe::apply::history::events::{ChangeEvent, Compensation, Kind, KnownChange};
+use abbe::apply::history::results::{Due, MachineHistory, ParameterHistory};
+use abbe::apply::history::{HistoryOptions, MachineSessions, SessionValues, analyse};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 

@@ -1,6 +1,6 @@
 //! `abbe new`: every template is a readable session.
 
-use abbe::identify::volumetric::functions;
+use abbe::apply::volumetric::functions;
 use abbe::model::files::{self, ReadOptions};
 
 use super::{abbe, text};

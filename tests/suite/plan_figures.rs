@@ -3,13 +3,13 @@
 
 use std::collections::BTreeMap;
 
-use abbe::identify::plan::bias::{bias_table, usual_effects};
-use abbe::identify::plan::results::{Detectability, ErrorAnalysis, PlanAnalysis};
-use abbe::identify::plan::structure::structure;
-use abbe::identify::plan::{PlanOptions, analyse, states};
 use abbe::identify::quantity::Given;
 use abbe::identify::simulate::{Simulation, simulate};
 use abbe::model::session::Session;
+use abbe::plan::bias::{bias_table, usual_effects};
+use abbe::plan::results::{Detectability, ErrorAnalysis, PlanAnalysis};
+use abbe::plan::structure::structure;
+use abbe::plan::{PlanOptions, analyse, states};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 

@@ -1,10 +1,10 @@
 //! Helpers for the tests of plans: sessions from text.
 
+use abbe::identify::linear::Linearisation;
 use abbe::identify::noise::{Noise, NoiseSource};
-use abbe::identify::plan::linear::Linearisation;
-use abbe::identify::plan::states;
 use abbe::model::files::{ReadOptions, session as read};
 use abbe::model::session::Session;
+use abbe::plan::states;
 
 /// The `[machine]` table of a structural code with the axis directions of ISO 841 and, if stated, the travel of rotary
 /// axes.

@@ -1,10 +1,10 @@
 //! The three methods of the thesis: identifiability and uncertainty, and the disagreement of chapters 4 and 5 on θ_y0a
 //! and θ_y0c.
 
-use abbe::identify::plan::results::Detectability;
-use abbe::identify::plan::results::PlanAnalysis;
-use abbe::identify::plan::{PlanOptions, analyse};
 use abbe::model::session::{Prior, Session};
+use abbe::plan::results::Detectability;
+use abbe::plan::results::PlanAnalysis;
+use abbe::plan::{PlanOptions, analyse};
 
 use super::plan_help::ready;
 

@@ -1,15 +1,15 @@
 //! The next test: improvement over the published methods, and separation of two effects.
 
-use abbe::identify::plan::candidate_tests::candidate_tests;
-use abbe::identify::plan::criterion::Goal;
-use abbe::identify::plan::improve::{ImproveOptions, improve};
-use abbe::identify::plan::test_variations::TestVariations;
-use abbe::identify::plan::{PlanOptions, analyse, separation, states};
 use abbe::model::driver::Driver;
 use abbe::model::effect::shape::Harmonic;
 use abbe::model::effect::{Component, Effect, Shape};
 use abbe::model::instrument::Station;
 use abbe::model::session::{Prior, Session};
+use abbe::plan::candidate_tests::candidate_tests;
+use abbe::plan::criterion::Goal;
+use abbe::plan::improve::{ImproveOptions, improve};
+use abbe::plan::test_variations::TestVariations;
+use abbe::plan::{PlanOptions, analyse, separation, states};
 
 use super::plan_help::{machine, noise_um, ready, session};
 
@@ -164,7 +164,7 @@ fn gain_per_minute_selects_a_short_test() {
     assert!(!best.steps[0].test.contains("in one direction"), "{}", best.steps[0].test);
     // … and if set-ups dominate, it has nearly as much in less time.
     assert!(quick.steps[0].test.contains("in one direction"), "{}", quick.steps[0].test);
-    let gain = |found: &abbe::identify::plan::improve::Improvement| {
+    let gain = |found: &abbe::plan::improve::Improvement| {
         (found.before / found.steps[0].after).ln() / found.steps[0].duration_min
     };
     assert!(gain(&quick) > gain(&best));

@@ -3,13 +3,13 @@
 use std::f64::consts::PI;
 
 use abbe::identify::candidates::library;
-use abbe::identify::plan::effects::effects;
-use abbe::identify::plan::results::EffectDetectability;
-use abbe::identify::plan::states;
 use abbe::model::driver::Driver;
 use abbe::model::effect::Shape;
 use abbe::model::effect::shape::Power;
 use abbe::model::session::Session;
+use abbe::plan::effects::effects;
+use abbe::plan::results::EffectDetectability;
+use abbe::plan::states;
 
 use super::plan_help::{machine, noise_um, session};
 

@@ -2,12 +2,12 @@
 //! the thesis.
 
 use abbe::identify::fit::fit;
-use abbe::identify::plan::states;
 use abbe::identify::problem::Problem;
 use abbe::identify::quantity::Given;
 use abbe::identify::simulate::{Simulation, simulate};
 use abbe::identify::unit::ARCSEC;
 use abbe::model::session::Session;
+use abbe::plan::states;
 use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
 use rand::SeedableRng;

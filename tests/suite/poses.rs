@@ -1,12 +1,12 @@
 //! `abbe plan --poses`: poses of the UR10 against random sets, the predicted uncertainty against simulation, limits.
 
 use abbe::identify::fit;
-use abbe::identify::plan::poses::candidates::{LineOfSight, PoseLimits};
-use abbe::identify::plan::poses::{PoseCriterion, PoseOptions, PoseSelection, select};
 use abbe::model::component::ErrorName;
 use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
 use abbe::model::session::readings::Readings;
+use abbe::plan::poses::candidates::{LineOfSight, PoseLimits};
+use abbe::plan::poses::{PoseCriterion, PoseOptions, PoseSelection, select};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;

@@ -2,12 +2,12 @@
 //! independent simulator, and simulated readings have the predicted uncertainty.
 
 use abbe::identify::fit;
-use abbe::identify::plan::poses::candidates::PoseLimits;
-use abbe::identify::plan::poses::{PoseCriterion, PoseOptions, PoseSelection, measured_by, select};
 use abbe::model::files::{self, ReadOptions};
 use abbe::model::instrument::Station;
 use abbe::model::session::readings::Readings;
 use abbe::model::session::{Prior, Session, Test};
+use abbe::plan::poses::candidates::PoseLimits;
+use abbe::plan::poses::{PoseCriterion, PoseOptions, PoseSelection, measured_by, select};
 use nalgebra::{DMatrix, DVector, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use abbe::identify::plan::states;
 use abbe::identify::series::{Cause, sensitivities, views};
 use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
+use abbe::plan::states;
 use test_needs::data;
 
 use super::{abbe, ready, text};
@@ -22,7 +22,7 @@ fn session(path: &Path) -> Session {
 #[test]
 fn sensitivities_agree_with_the_closed_form() {
     let session = session(&ready("hermle-c600u/chapter5.toml"));
-    let (complete, noise) = abbe::identify::plan::prepared(&session, &Default::default()).unwrap();
+    let (complete, noise) = abbe::plan::prepared(&session, &Default::default()).unwrap();
     let problem = states::problem_by_test(&complete, noise).unwrap();
     let beta = vec![0.0; problem.parameters.list.len()];
     let found = sensitivities::sensitivities(&problem, &beta).unwrap();

@@ -6,12 +6,9 @@ use std::sync::Arc;
 
 use abbe::identify::fit::fit;
 use abbe::identify::noise::Noise;
-use abbe::identify::plan::candidate_tests::candidate_tests;
-use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::problem::Problem;
 use abbe::identify::quantity::Given;
 use abbe::identify::results::EffectName;
-use abbe::identify::separating_tests::separate_aliases;
 use abbe::identify::simulate::{Simulation, simulate};
 use abbe::identify::trace::{TraceOptions, trace};
 use abbe::model::driver::Driver;
@@ -19,6 +16,9 @@ use abbe::model::effect::shape::{Harmonic, Local};
 use abbe::model::effect::{Component, Effect, Shape};
 use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
+use abbe::plan::candidate_tests::candidate_tests;
+use abbe::plan::separating_tests::separate_aliases;
+use abbe::plan::test_variations::TestVariations;
 
 use super::{abbe, ready, text};
 

@@ -1,6 +1,6 @@
 //! The volumetric error and its compensation against plain matrices and over every topology.
 
-use abbe::identify::volumetric::{self, ErrorFunction, Form, MachineWithErrors, functions};
+use abbe::apply::volumetric::{self, ErrorFunction, Form, MachineWithErrors, functions};
 use abbe::model::axis::AxisKind;
 use abbe::model::chain::{ERRORS_PER_AXIS, Machine};
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};

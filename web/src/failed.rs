@@ -1,11 +1,13 @@
 //! Errors of the library as JSON texts: message, what to do, file, line, column.
 
+use abbe::apply::ApplyError;
 use abbe::codegen::CodegenError;
 use abbe::identify::IdentifyError;
 use abbe::model::ModelError;
 use abbe::model::error::Location;
 use abbe::model::files::store::Store;
 use abbe::model::words::shortened;
+use abbe::plan::PlanError;
 use serde::Serialize;
 use wasm_bindgen::JsValue;
 
@@ -67,6 +69,24 @@ impl From<IdentifyError> for Failed {
     fn from(error: IdentifyError) -> Failed {
         match error {
             IdentifyError::Model(error) => error.into(),
+            other => other.to_string().into(),
+        }
+    }
+}
+
+impl From<PlanError> for Failed {
+    fn from(error: PlanError) -> Failed {
+        match error {
+            PlanError::Identify(error) => error.into(),
+            other => other.to_string().into(),
+        }
+    }
+}
+
+impl From<ApplyError> for Failed {
+    fn from(error: ApplyError) -> Failed {
+        match error {
+            ApplyError::Identify(error) => error.into(),
             other => other.to_string().into(),
         }
     }

@@ -2,7 +2,7 @@
 //! in addition to a model. A plan and a trace use them.
 
 pub(crate) mod candidate;
-pub(crate) mod columns;
+pub mod columns;
 pub(crate) mod gain;
 pub mod library;
 pub(crate) mod moments;

@@ -218,7 +218,7 @@ pub(crate) fn u_enlargement(chi_square: f64, free: f64) -> f64 {
 }
 
 /// The warning about enlarged uncertainties, if they are enlarged.
-pub(crate) fn enlargement_warning(enlargement: f64) -> Option<String> {
+pub fn enlargement_warning(enlargement: f64) -> Option<String> {
     (enlargement > 1.0).then(|| {
         format!(
             "the residual exceeds the noise (χ² is {:.2} times its degrees of freedom); uncertainties are enlarged by {enlargement:.2}; \

@@ -6,11 +6,11 @@ use abbe_model::words::counted;
 
 use super::{Fit, assume};
 use crate::error::IdentifyError;
+use crate::identifiability::determined_by_prior;
+use crate::linear::{Linearisation, is_of_interest};
 use crate::noise::{NoiseSource, stated_against_repeats};
 use crate::numerics::rank::Rank;
 use crate::parameters::Role;
-use crate::plan::identifiability::determined_by_prior;
-use crate::plan::linear::{Linearisation, is_of_interest};
 use crate::plausibility::Pulls;
 use crate::problem::Problem;
 use crate::results::{

@@ -117,7 +117,7 @@ impl Folds {
     }
 
     /// One fold for each test.
-    pub(crate) fn by_test(models: &[TestModel]) -> Folds {
+    pub fn by_test(models: &[TestModel]) -> Folds {
         Folds {
             kind: FoldKind::Runs,
             count: models.len(),

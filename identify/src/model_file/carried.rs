@@ -17,7 +17,7 @@ use abbe_model::session::readings::Readings;
 use abbe_model::session::{Prior, Session, Test};
 
 use super::IdentifiedModel;
-use crate::correction::{EstimatedErrors, MachineErrors};
+use super::errors::{EstimatedErrors, MachineErrors};
 use crate::error::IdentifyError;
 use crate::parameters::{Parameters, Role, SlotContribution};
 

@@ -12,6 +12,7 @@
 
 pub mod carried;
 pub mod document;
+pub mod errors;
 mod of_fit;
 pub mod range;
 mod read;

@@ -1,7 +1,7 @@
 //! The median, and the robust standard deviation that follows from it.
 
 /// The median; reorders the values. Of an even number the upper of the two middle values. 0 for no values.
-pub(crate) fn median(values: &mut [f64]) -> f64 {
+pub fn median(values: &mut [f64]) -> f64 {
     if values.is_empty() {
         return 0.0;
     }
@@ -11,7 +11,7 @@ pub(crate) fn median(values: &mut [f64]) -> f64 {
 }
 
 /// The standard deviation of Gaussian deviations from zero, from the median of their sizes.
-pub(crate) fn robust_deviation(deviations: &[f64]) -> f64 {
+pub fn robust_deviation(deviations: &[f64]) -> f64 {
     // The median of |x| of a Gaussian is 0.6745 standard deviations.
     1.4826 * median(&mut deviations.iter().map(|deviation| deviation.abs()).collect::<Vec<f64>>())
 }

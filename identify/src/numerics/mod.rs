@@ -5,20 +5,21 @@
 //! (`symmetric`). Every share below which a number counts as zero stands in `tolerances`.
 
 pub mod circle;
-pub(crate) mod evidence;
-pub(crate) mod gain;
+pub mod evidence;
+pub mod gain;
 pub mod least_squares;
 mod median;
-pub(crate) mod null_space;
-pub(crate) mod parallel;
-pub(crate) mod power;
+pub mod null_space;
+pub mod parallel;
+pub mod power;
 pub mod rank;
-pub(crate) mod reduction;
-pub(crate) mod regression;
-pub(crate) mod solve;
-pub(crate) mod symmetric;
-pub(crate) mod tails;
-pub(crate) mod tolerances;
+pub mod ranking;
+pub mod reduction;
+pub mod regression;
+pub mod solve;
+pub mod symmetric;
+pub mod tails;
+pub mod tolerances;
 pub mod triangle;
 
-pub(crate) use median::{median, robust_deviation};
+pub use median::{median, robust_deviation};

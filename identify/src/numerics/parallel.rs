@@ -8,7 +8,7 @@ use std::sync::Mutex;
 /// `of(0)`, `of(1)`, … in order.
 ///
 /// The work is passed on without its type, so that the scheduler of the threads is compiled once for all callers.
-pub(crate) fn map<T: Send>(count: usize, of: &(dyn Fn(usize) -> T + Sync)) -> Vec<T> {
+pub fn map<T: Send>(count: usize, of: &(dyn Fn(usize) -> T + Sync)) -> Vec<T> {
     let results: Vec<Mutex<Option<T>>> = (0..count).map(|_| Mutex::new(None)).collect();
     each(count, &|index| {
         let result = of(index);

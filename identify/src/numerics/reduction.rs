@@ -73,7 +73,7 @@ fn without_dropped(r: &Mat<f64>, mut rows: Mat<f64>, kept: &[usize], size: &[f64
 }
 
 /// The inverse of an upper triangular matrix. A zero pivot yields infinity.
-pub(crate) fn inverse_of_upper(r: MatRef<'_, f64>) -> Mat<f64> {
+pub fn inverse_of_upper(r: MatRef<'_, f64>) -> Mat<f64> {
     let n = r.ncols();
     let mut inverse = Mat::zeros(n, n);
     for j in 0..n {

@@ -8,7 +8,7 @@ use super::tolerances::COLLINEAR;
 use super::triangle::Triangle;
 
 /// A solved regression `y ≈ Σ βⱼ·xⱼ`.
-pub(crate) struct Regression {
+pub struct Regression {
     /// The coefficients.
     pub beta: Vec<f64>,
     /// `(XᵀX)⁻¹`.

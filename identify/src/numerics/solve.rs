@@ -8,7 +8,7 @@ use super::tolerances::{MIN_IDENTIFIABLE, ROUNDING};
 use crate::error::IdentifyError;
 
 /// A matrix `A = U·S·Vᵀ` with its singular values in descending order.
-pub(crate) struct Directions {
+pub struct Directions {
     svd: Svd<f64>,
     /// The singular values.
     pub singular_values: Vec<f64>,

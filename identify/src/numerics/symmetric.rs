@@ -6,7 +6,7 @@ use super::tolerances::ROUNDING_OF_SQUARES;
 use crate::error::IdentifyError;
 
 /// The eigenvalues of a symmetric matrix in ascending order, and its eigenvectors, one column each.
-pub(crate) struct Symmetric {
+pub struct Symmetric {
     /// The eigenvalues.
     pub values: Vec<f64>,
     /// The eigenvectors.
@@ -64,7 +64,7 @@ pub(crate) fn eigen_of_two(a: f64, b: f64, c: f64) -> [(f64, [f64; 2]); 2] {
 ///
 /// # Errors
 /// If the product has entries that are not finite.
-pub(crate) fn pseudo_inverse(gram: MatRef<'_, f64>) -> Result<Mat<f64>, IdentifyError> {
+pub fn pseudo_inverse(gram: MatRef<'_, f64>) -> Result<Mat<f64>, IdentifyError> {
     let Symmetric { values, vectors } = Symmetric::of(gram)?;
     let least = values.iter().fold(0.0_f64, |a, b| a.max(*b)) * ROUNDING_OF_SQUARES;
     let entry = |i: usize, k: usize| if values[k] > least { vectors[(i, k)] / values[k] } else { 0.0 };

@@ -125,7 +125,7 @@ impl Triangle {
 ///
 /// Matrices of fewer than 40 columns are reduced column by column. The library blocks from 16 columns on, which takes
 /// two to four times as long in this range.
-pub(crate) fn upper(mut matrix: Mat<f64>) -> Mat<f64> {
+pub fn upper(mut matrix: Mat<f64>) -> Mat<f64> {
     let (rows, columns) = (matrix.nrows(), matrix.ncols());
     let block_columns = if columns < 40 { 1 } else { 16 };
     let mut reflections = Mat::zeros(block_columns, columns);

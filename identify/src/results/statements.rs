@@ -108,20 +108,6 @@ pub struct GoodStatement {
     pub undecided: Vec<String>,
 }
 
-/// Whether a plan is good.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
-pub struct PlanStatement {
-    /// Number of errors that the plan is to identify.
-    pub errors: usize,
-    /// The errors that it does not identify.
-    pub not_identifiable: Vec<String>,
-    /// The errors that set-up priors alone determine.
-    pub determined_by_prior: Vec<String>,
-    /// The error with the largest predicted standard uncertainty; 1 µm counts as 1″.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub worst: Option<String>,
-}
-
 /// Whether a model holds.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ValidationStatement {
@@ -131,15 +117,6 @@ pub struct ValidationStatement {
     pub readings: usize,
     /// Number of them inside the range of the model's data.
     pub readings_in_range: usize,
-}
-
-/// Whether inputs agree.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
-pub struct ComparisonStatement {
-    /// Number of significant differences.
-    pub significant: usize,
-    /// Number of differences.
-    pub compared: usize,
 }
 
 /// What to measure next.

@@ -60,32 +60,3 @@ pub fn set_up(machine: &Machine, test: &str, station: &Station<f64>, readings: &
     };
     Some(SetUpPath { test: test.to_string(), workpiece_mm, tool_mm, axes: rotary.map(line).collect(), is_path })
 }
-
-#[cfg(test)]
-mod tests {
-    use std::path::Path;
-
-    use abbe_model::files::{self, ReadOptions};
-
-    use super::*;
-    use crate::noise::{Noise, NoiseSource};
-    use crate::plan::states;
-
-    /// The C tests of Jiang (2014): the pivot turns on a circle of 100 mm about Z, and the spindle ball stays where the
-    /// extended bar reaches it, √(R_e² − R²) above.
-    #[test]
-    fn the_pivot_turns_about_the_spindle_ball() {
-        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/chapter5.toml");
-        let session = files::session(&file, &ReadOptions::default()).unwrap();
-        let plan = states::complete(&session, true).unwrap();
-        let problem = states::problem_by_test(&plan, Noise::white(3e-4, NoiseSource::Stated)).unwrap();
-        let found = set_ups(&problem);
-        let c150 = found.iter().find(|path| path.test == "C150").unwrap();
-        for (workpiece, tool) in c150.workpiece_mm.iter().zip(&c150.tool_mm) {
-            assert!((workpiece[0].hypot(workpiece[1]) - 100.0).abs() < 1e-9 && workpiece[2].abs() < 1e-9);
-            assert!(tool[0].abs() < 1e-9 && (tool[2] - (149.9946_f64.powi(2) - 1e4).sqrt()).abs() < 1e-9);
-        }
-        let names: Vec<&str> = c150.axes.iter().map(|axis| axis.0.as_str()).collect();
-        assert_eq!((names, c150.is_path), (vec!["C", "A"], true));
-    }
-}

@@ -8,8 +8,8 @@ use abbe_model::sensitivity::TestModel;
 
 use super::abscissa::Abscissa;
 use crate::error::IdentifyError;
+use crate::linear::is_of_interest;
 use crate::parameters::Parameter;
-use crate::plan::linear::is_of_interest;
 use crate::problem::{Problem, RowBlock};
 
 /// Maximum number of points along a run.

@@ -9,7 +9,7 @@ use crate::results::{TraceResult, TraceVerdict};
 
 /// Asks the caller of a trace whether to continue.
 #[derive(Clone, Copy)]
-pub(crate) struct Interrupt<'t>(pub &'t (dyn Fn(Progress) -> bool + Sync));
+pub struct Interrupt<'t>(pub &'t (dyn Fn(Progress) -> bool + Sync));
 
 impl Interrupt<'_> {
     /// Returns if the trace continues.
@@ -23,7 +23,7 @@ impl Interrupt<'_> {
 
 impl TraceResult {
     /// Marks a result as that of an interrupted trace: a field, the verdict, and a warning.
-    pub(crate) fn mark_interrupted(&mut self) {
+    pub fn mark_interrupted(&mut self) {
         self.interrupted = true;
         self.verdict = TraceVerdict::Incomplete;
         self.warnings.push(self.incompleteness());

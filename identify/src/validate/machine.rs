@@ -12,7 +12,7 @@ const ROUNDING: f64 = 1e-9;
 
 /// What differs between two machines: chain, axes, rotation convention, gravity. `places` name them in sentences, as in
 /// "the model" and "the session".
-pub(crate) fn differences(own: &Machine, other: &Machine, places: [&str; 2]) -> Vec<String> {
+pub fn differences(own: &Machine, other: &Machine, places: [&str; 2]) -> Vec<String> {
     let [here, there] = places;
     if own.code() != other.code() {
         return vec![format!("the chain is `{}` in {here} and `{}` in {there}", own.code(), other.code())];

@@ -13,7 +13,7 @@
 //! - `verdict`: the rule; [`results`]: the result as it is reported.
 
 mod known;
-pub(crate) mod machine;
+pub mod machine;
 mod moved;
 mod prediction;
 pub mod results;

@@ -1,6 +1,6 @@
 //! `--travel AXIS=FROM..TO`: the travel over which the entries of a control count.
 
-use abbe::identify::export::travel::Travel;
+use abbe::apply::export::travel::Travel;
 use abbe::identify::model_file::IdentifiedModel;
 use abbe::model::words::cut;
 

@@ -1,6 +1,6 @@
 //! The places of a map.
 
-use abbe::identify::volumetric;
+use abbe::apply::volumetric;
 use abbe::model::axis::AxisKind;
 use abbe::model::chain::Machine;
 

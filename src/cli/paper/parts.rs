@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use abbe::identify::candidates::named::effect;
 use abbe::identify::fit::SessionFit;
-use abbe::identify::plan::bias::{bias_table, usual_effects};
-use abbe::identify::plan::structure::structure;
-use abbe::identify::plan::{self, PlanOptions};
 use abbe::identify::problem::Problem;
 use abbe::model::effect::Effect;
 use abbe::model::session::Session;
+use abbe::plan::bias::{bias_table, usual_effects};
+use abbe::plan::structure::structure;
+use abbe::plan::{self, PlanOptions};
 
 use super::PaperArguments;
 use crate::cli::failure::Failure;

@@ -1,9 +1,9 @@
 //! `abbe plan --clearance-mm`: collisions of spindle, table and device.
 
-use abbe::identify::plan::clearance::Clearance;
 use abbe::model::instrument::Station;
 use abbe::model::instrument::rtest::Setting;
 use abbe::model::session::Session;
+use abbe::plan::clearance::Clearance;
 
 use crate::cli::failure::Failure;
 use crate::cli::values;

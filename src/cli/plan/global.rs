@@ -1,8 +1,8 @@
 //! `abbe plan --global`: Sobol' indices of the estimates.
 
-use abbe::identify::plan::global::{GlobalAnalysis, GlobalOptions, global};
 use abbe::identify::problem::Problem;
 use abbe::identify::quantity::Given;
+use abbe::plan::global::{GlobalAnalysis, GlobalOptions, global};
 use clap::Args;
 
 use crate::cli::failure::Failure;

@@ -4,10 +4,10 @@ mod candidates;
 
 use std::path::PathBuf;
 
-use abbe::identify::plan::criterion::Goal;
-use abbe::identify::plan::improve::{self, ImproveOptions, Improvement};
 use abbe::identify::problem::Problem;
 use abbe::model::files::SourceMap;
+use abbe::plan::criterion::Goal;
+use abbe::plan::improve::{self, ImproveOptions, Improvement};
 use clap::Args;
 
 use self::candidates::CandidateArguments;

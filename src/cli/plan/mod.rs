@@ -8,9 +8,9 @@ mod patterns;
 mod poses;
 
 use abbe::document::StatedPlan;
-use abbe::identify::plan::next_test::NextTest;
-use abbe::identify::plan::range::shrinkages;
-use abbe::identify::plan::{self, PlanOptions};
+use abbe::plan::next_test::NextTest;
+use abbe::plan::range::shrinkages;
+use abbe::plan::{self, PlanOptions};
 use clap::Args;
 
 use self::overrides::positive;

@@ -4,8 +4,8 @@ mod options;
 
 use std::path::PathBuf;
 
-use abbe::identify::plan::poses::{PoseCriterion, without_place};
 use abbe::model::files::{self, ReadOptions};
+use abbe::plan::poses::{PoseCriterion, without_place};
 use clap::Args;
 
 use super::PlanArguments;

@@ -2,12 +2,12 @@
 
 use abbe::identify::IdentifyError;
 use abbe::identify::fit::SessionFit;
-use abbe::identify::plan::bias::BiasTable;
-use abbe::identify::plan::results::PlanAnalysis;
-use abbe::identify::plan::structure::Structure;
 use abbe::identify::problem::Problem;
 use abbe::identify::series::{paths, views};
 use abbe::model::words::counted;
+use abbe::plan::bias::BiasTable;
+use abbe::plan::results::PlanAnalysis;
+use abbe::plan::structure::Structure;
 
 use super::{Part, Subject};
 use crate::report::block::{Formula, Report};

@@ -2,10 +2,10 @@
 
 use abbe::document::StatedPlan;
 use abbe::identify::IdentifyError;
-use abbe::identify::plan::candidate_tests;
-use abbe::identify::plan::results::{ErrorAnalysis, PlanAnalysis};
 use abbe::identify::problem::Problem;
+use abbe::identify::statements::has_candidates;
 use abbe::model::words::counted;
+use abbe::plan::results::{ErrorAnalysis, PlanAnalysis};
 
 use super::values::values;
 use super::{
@@ -231,7 +231,7 @@ fn undeclared(report: &mut Report, analysis: &PlanAnalysis) {
 fn next(problem: &Problem, analysis: &PlanAnalysis, commands: &Commands) -> Vec<(String, String)> {
     let mut steps: Vec<(String, String)> = Vec::new();
     let mut step = |options: &str, purpose: &str| steps.push((commands.command("plan", options), purpose.to_string()));
-    if candidate_tests::has_candidates(problem) {
+    if has_candidates(problem) {
         let purpose = if analysis.unidentifiable.is_empty() {
             "propose the test that most lowers the largest uncertainty"
         } else {

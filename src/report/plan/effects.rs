@@ -1,8 +1,8 @@
 //! Undeclared effects that the tests of a plan detect, and those that are confounded with the errors.
 
-use abbe::identify::plan::effects::confounded_by_error;
-use abbe::identify::plan::results::{Detectability, EffectDetectability, EffectsAnalysis};
 use abbe::model::words::first_of;
+use abbe::plan::effects::confounded_by_error;
+use abbe::plan::results::{Detectability, EffectDetectability, EffectsAnalysis};
 
 use super::optional;
 use crate::report::number::{three_digits, unit};

@@ -1,8 +1,8 @@
 //! Sobol' indices of the estimates of a plan, beside the linear prediction.
 
-use abbe::identify::plan::global::GlobalAnalysis;
 use abbe::identify::unit::ReadingUnit;
 use abbe::model::session::Session;
+use abbe::plan::global::GlobalAnalysis;
 
 use crate::report::block::Report;
 use crate::report::number::{three_digits, unit};

@@ -5,9 +5,9 @@ pub mod effects;
 pub mod global;
 mod values;
 
-use abbe::identify::plan::collision::TestClearance;
-use abbe::identify::plan::results::{ErrorAnalysis, Indices, PlanAnalysis};
 use abbe::model::words::counted;
+use abbe::plan::collision::TestClearance;
+use abbe::plan::results::{ErrorAnalysis, Indices, PlanAnalysis};
 
 use super::number::{three_digits, unit};
 use super::table::{Cell, Table, cells, numbers, words};

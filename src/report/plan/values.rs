@@ -1,6 +1,6 @@
 //! The figures of a plan with all their digits, one row each.
 
-use abbe::identify::plan::results::{EffectDetectability, ErrorAnalysis, PlanAnalysis};
+use abbe::plan::results::{EffectDetectability, ErrorAnalysis, PlanAnalysis};
 
 use crate::report::table::{Cell, Table, cells, numbers, words};
 

@@ -12,7 +12,6 @@ mod pulls;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use abbe::identify::plan::{PlanOptions, analyse};
 use abbe::identify::quantity::Given;
 use abbe::identify::simulate::{Simulation, simulate};
 use abbe::model::files::{self, ReadOptions};
@@ -20,6 +19,7 @@ use abbe::model::instrument::Station;
 use abbe::model::instrument::ballbar::BallBar;
 use abbe::model::session::planned::planned_session;
 use abbe::model::session::{Session, Test};
+use abbe::plan::{PlanOptions, analyse};
 
 use self::draw::draw;
 use super::topologies::{FIGURE_1_1, TABLE_1_1};

@@ -2,8 +2,7 @@
 //!
 //! Other tests show that an answer is right. These tests detect every change of an answer. Answers are the same on
 //! every processor; `ABBE_RUNNER` checks that by running the command under an emulator. Numbers may differ by rounding,
-//! or by one in the last printed digit. `cargo insta accept` accepts an intended change. `snapshots/compare_kept.py`
-//! compares the numbers of two versions after keys were renamed.
+//! or by one in the last printed digit. `cargo insta accept` accepts an intended change.
 
 use std::ffi::OsStr;
 use std::fmt::Write;

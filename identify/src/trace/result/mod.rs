@@ -23,7 +23,7 @@ use crate::noise;
 use crate::plausibility::Plausibility;
 use crate::problem::Problem;
 use crate::results::{ChangedParameter, EffectResult, ModelResult, OfAngles, ParameterResult, TraceResult};
-pub(crate) use effect::effect_name;
+pub use effect::effect_name;
 pub(super) use families::{FamiliesEnded, outcome_with_families};
 pub(super) use unsearched::unsearched;
 use verdict::{not_examined, verdict};

@@ -1,6 +1,6 @@
 //! The candidate tests of `abbe plan --improve`.
 
-use abbe::identify::plan::test_variations::TestVariations;
+use abbe::plan::test_variations::TestVariations;
 use clap::Args;
 
 use crate::cli::failure::Failure;

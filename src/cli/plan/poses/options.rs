@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use abbe::identify::plan::poses::candidates::{LineOfSight, PoseLimits};
-use abbe::identify::plan::poses::{PoseOptions, PoseSelection, measured_by, select};
 use abbe::model::instrument::InstrumentKind;
 use abbe::model::session::{Session, Test};
+use abbe::plan::poses::candidates::{LineOfSight, PoseLimits};
+use abbe::plan::poses::{PoseOptions, PoseSelection, measured_by, select};
 
 use super::PoseArguments;
 use crate::cli::failure::Failure;

@@ -1,0 +1,242 @@
+//! Differences between models of one machine: before and after a compensation, a collision, a year.
+//!
+//! ```text
+//! δ = β_B − β_A,    Cov(δ) = C_A + C_B − C_AB − C_ABᵀ
+//! ```
+//!
+//! `C_AB` is not zero if both sessions share a set-up, such as a bar with its calibrated length. Parameters that one of
+//! the two sessions does not separate have no difference of their own. Both models are brought to one gauge first: it
+//! holds the pivots of both null spaces together.
+//!
+//! A difference is significant if Holm's step-down procedure rejects that it is zero (Holm, S.: A simple sequentially
+//! rejective multiple test procedure, Scand. J. Statist. 6 (1979) 65), so that the probability of any false claim is at
+//! most the level.
+//!
+//! - `inputs`: sessions and models with the same parameters; `shared`: the covariance of two models with a common
+//!   set-up, which the readings test; `gauge`: one gauge for both;
+//! - [`workspace`]: the volumetric error of each model over the common range;
+//! - [`results`]: the reported comparison.
+
+mod gauge;
+mod inputs;
+pub mod results;
+mod shared;
+mod statements;
+pub mod workspace;
+
+use std::collections::BTreeMap;
+
+use abbe_model::chain::Machine;
+use faer::Mat;
+
+use crate::ApplyError;
+use abbe_identify::model_file::IdentifiedModel;
+use abbe_identify::numerics::symmetric::Symmetric;
+use abbe_identify::numerics::tails::{chi_square_tail, normal_tail};
+use abbe_identify::parameters::Role;
+use abbe_identify::validate::machine::differences;
+pub use inputs::{Input, compare_inputs};
+use results::{Comparison, Difference, NotComparable, OnlyIn, Pair};
+use shared::SharedDifference;
+pub use statements::ComparisonStatement;
+
+/// Probability of any false claim of a difference between two models, if the caller states none.
+pub const SIGNIFICANCE: f64 = 0.05;
+/// Eigenvalues of a covariance in units of its variances below this share of the largest one are rounding.
+const LEAST_EIGENVALUE: f64 = 1e-9;
+
+/// What is compared, and how.
+#[derive(Clone, Debug)]
+pub struct CompareOptions {
+    /// Probability of any false claim of a difference between two models.
+    pub significance: f64,
+    /// Set-up quantities that are the same objects in both sessions: `bar`, `workpiece_ball`, `spindle_ball`. `None`:
+    /// bars of the same name with the same prior. Those that the readings show to be different objects are not shared.
+    pub shared: Option<Vec<String>>,
+    /// Places along each axis at which the volumetric error is evaluated; 0 for none.
+    pub places: usize,
+}
+
+impl Default for CompareOptions {
+    fn default() -> Self {
+        CompareOptions { significance: SIGNIFICANCE, shared: None, places: 5 }
+    }
+}
+
+/// A model with its name in results.
+pub struct Named<'m> {
+    /// The file.
+    pub name: String,
+    /// The model.
+    pub model: &'m IdentifiedModel,
+}
+
+/// Checks that two inputs, each with its name, are of one machine.
+///
+/// # Errors
+/// If chain, axes, rotation convention or gravity differ, with what differs.
+pub fn one_machine(a: (&str, &Machine), b: (&str, &Machine)) -> Result<(), ApplyError> {
+    let apart = differences(a.1, b.1, [a.0, b.0]);
+    if apart.is_empty() {
+        return Ok(());
+    }
+    Err(ApplyError::Request(format!("a comparison needs sessions and models of one machine: {}", apart.join("; "))))
+}
+
+/// Compares each model with the first one.
+///
+/// # Errors
+/// If there are fewer than two models, they are not of one machine, or nothing in them can be compared.
+pub fn compare(models: &[Named<'_>], options: &CompareOptions) -> Result<Comparison, ApplyError> {
+    let [first, others @ ..] = models else {
+        return Err(ApplyError::Request("a comparison needs two models or sessions".into()));
+    };
+    if others.is_empty() {
+        return Err(ApplyError::Request("a comparison needs two models or sessions".into()));
+    }
+    let mut comparison = Comparison {
+        significance: options.significance,
+        inputs: models.iter().map(|named| named.name.clone()).collect(),
+        ..Comparison::default()
+    };
+    for other in others {
+        one_machine((&first.name, &first.model.machine), (&other.name, &other.model.machine))?;
+        let pair = pair(first, other, options)?;
+        comparison.differences.extend(pair.differences);
+        comparison.pairs.push(pair.summary);
+    }
+    if options.places > 0 {
+        let models: Vec<&IdentifiedModel> = models.iter().map(|named| named.model).collect();
+        comparison.workspace = workspace::evaluate(&models, options.places)?;
+    }
+    Ok(comparison)
+}
+
+/// The comparison of two models.
+struct Compared {
+    differences: Vec<Difference>,
+    summary: Pair,
+}
+
+fn pair(a: &Named<'_>, b: &Named<'_>, options: &CompareOptions) -> Result<Compared, ApplyError> {
+    let common = common(a.model, b.model);
+    if common.is_empty() {
+        return Err(ApplyError::Request(format!(
+            "{} and {} have no parameter of the machine in common: identify the same errors in both",
+            a.name, b.name
+        )));
+    }
+    let SharedDifference { mut delta, mut covariance, shared, refuted } =
+        shared::difference(a.model, b.model, &common, options.shared.as_deref())?;
+    let held = gauge::one_gauge(a.model, b.model, &common, &mut delta, &mut covariance)?;
+    let id = |k: usize| a.model.parameters[common[k].0].id.clone();
+    let mut differences = Vec::new();
+    for k in (0..common.len()).filter(|k| !held.contains(k)) {
+        let parameter = &a.model.parameters[common[k].0];
+        let display = parameter.unit.display_per_internal;
+        let u = covariance[(k, k)].max(0.0).sqrt();
+        if u == 0.0 {
+            continue;
+        }
+        differences.push(Difference {
+            from: a.name.clone(),
+            to: b.name.clone(),
+            id: id(k),
+            value: delta[k] * display,
+            u: u * display,
+            unit: parameter.unit.name.clone(),
+            p_value: (2.0 * normal_tail((delta[k] / u).abs())).min(1.0),
+            significant: false,
+        });
+    }
+    holm(&mut differences, options.significance);
+    let kept: Vec<usize> = (0..common.len()).filter(|k| !held.contains(k) && covariance[(*k, *k)] > 0.0).collect();
+    if kept.is_empty() {
+        return Err(ApplyError::Request(format!(
+            "no parameter of the machine is determined by both {} and {}, so nothing can be compared: measure what \
+             separates the errors, or identify fewer of them",
+            a.name, b.name
+        )));
+    }
+    let (chi_square, degrees_of_freedom) = chi_square(&delta, &covariance, &kept)?;
+    let only = |own: &IdentifiedModel, of: &Named<'_>, side: fn(&(usize, usize)) -> usize| -> Vec<OnlyIn> {
+        let missing = own.carried_parameters().into_iter().filter(|j| !common.iter().any(|pair| side(pair) == *j));
+        let mut ids: BTreeMap<String, ()> = BTreeMap::new();
+        for j in missing.filter(|j| !own.parameters[*j].held) {
+            let id = match own.parameters[j].role {
+                Role::Coefficient { effect, .. } => own.effects[effect].id(),
+                _ => own.parameters[j].id.clone(),
+            };
+            ids.insert(id, ());
+        }
+        ids.into_keys().map(|id| OnlyIn { id, model: of.name.clone() }).collect()
+    };
+    let mut only_in = only(a.model, a, |pair| pair.0);
+    only_in.extend(only(b.model, b, |pair| pair.1));
+    differences.sort_by(|x, y| x.p_value.total_cmp(&y.p_value));
+    let summary = Pair {
+        from: a.name.clone(),
+        to: b.name.clone(),
+        compared: kept.len(),
+        significant: differences.iter().filter(|difference| difference.significant).count(),
+        chi_square,
+        degrees_of_freedom,
+        p_value: chi_square_tail(chi_square, degrees_of_freedom as f64),
+        shared_setup: shared,
+        not_shared: refuted,
+        not_comparable: held.iter().map(|k| NotComparable { id: id(*k) }).collect(),
+        only_in,
+    };
+    Ok(Compared { differences, summary })
+}
+
+/// The parameters of the machine that both models have, by index in each.
+fn common(a: &IdentifiedModel, b: &IdentifiedModel) -> Vec<(usize, usize)> {
+    let carried = b.carried_parameters();
+    let same = |i: usize, j: usize| {
+        let (p, q) = (&a.parameters[i], &b.parameters[j]);
+        p.id == q.id
+            && match (p.role, q.role) {
+                (Role::Coefficient { effect: e, .. }, Role::Coefficient { effect: f, .. }) => {
+                    a.effects[e].is_same(&b.effects[f])
+                }
+                (p, q) => p == q,
+            }
+    };
+    let pairs = a.carried_parameters().into_iter();
+    pairs.filter_map(|i| carried.iter().copied().find(|j| same(i, *j)).map(|j| (i, j))).collect()
+}
+
+/// Holm's procedure: the smallest p-value against `level/n`, the next against `level/(n − 1)`, … until one is not
+/// rejected.
+fn holm(differences: &mut [Difference], level: f64) {
+    let mut order: Vec<usize> = (0..differences.len()).collect();
+    order.sort_by(|i, j| differences[*i].p_value.total_cmp(&differences[*j].p_value));
+    let count = order.len();
+    for (rank, index) in order.into_iter().enumerate() {
+        if differences[index].p_value * (count - rank) as f64 > level {
+            break;
+        }
+        differences[index].significant = true;
+    }
+}
+
+/// `δᵀ·Cov(δ)⁺·δ` over the kept parameters, and the rank.
+fn chi_square(delta: &[f64], covariance: &Mat<f64>, kept: &[usize]) -> Result<(f64, usize), ApplyError> {
+    let u: Vec<f64> = kept.iter().map(|k| covariance[(*k, *k)].sqrt()).collect();
+    let scaled = Mat::from_fn(kept.len(), kept.len(), |i, j| covariance[(kept[i], kept[j])] / (u[i] * u[j]));
+    let eigen = Symmetric::of(scaled.as_ref())?;
+    let largest = eigen.values.iter().copied().fold(0.0, f64::max);
+    let (mut sum, mut rank) = (0.0, 0);
+    for (value, vector) in eigen.values.iter().zip(eigen.vectors.col_iter()) {
+        if *value > LEAST_EIGENVALUE * largest {
+            let along: f64 = kept.iter().zip(&u).zip(vector.iter()).map(|((k, u), v)| delta[*k] / u * v).sum();
+            sum += along * along / value;
+            rank += 1;
+        }
+    }
+    Ok((sum, rank))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,120 @@
+//! The reported comparison, in the form of the JSON output.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::workspace::VolumetricSummary;
+use abbe_identify::results::Outlier;
+
+/// The result of `abbe compare`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct Comparison {
+    /// The models and sessions, the first one being that with which the others are compared.
+    // The document of a command has its files under `inputs`.
+    #[serde(rename = "models")]
+    pub inputs: Vec<String>,
+    /// Probability of any false claim of a difference between two of them.
+    pub significance: f64,
+    /// The differences, by pair, the most significant first.
+    pub differences: Vec<Difference>,
+    /// Summary of each pair.
+    pub pairs: Vec<Pair>,
+    /// The readings that the fits of the sessions excluded as outliers.
+    pub outliers: Vec<ExcludedReading>,
+    /// The volumetric error over the common range of axes, one entry per input; empty if it was not evaluated.
+    pub workspace: Vec<VolumetricSummary>,
+}
+
+/// A reading of a session that its fit excluded as an outlier.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ExcludedReading {
+    /// The session.
+    pub input: String,
+    /// The reading.
+    #[serde(flatten)]
+    pub outlier: Outlier,
+}
+
+/// The difference of a parameter.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Difference {
+    /// The first input.
+    pub from: String,
+    /// The other input.
+    pub to: String,
+    /// Identifier: `EX0C`, `EZC~C:h2.cos`.
+    pub id: String,
+    /// Value in the other input less that in the first, in `unit`.
+    pub value: f64,
+    /// Standard uncertainty of the difference, in `unit`.
+    pub u: f64,
+    /// Unit of `value` and `u`.
+    pub unit: String,
+    /// Probability of a larger difference by chance, for this parameter alone.
+    pub p_value: f64,
+    /// Whether the difference is significant at the level over all parameters of the pair (Holm).
+    pub significant: bool,
+}
+
+/// The comparison of two inputs.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Pair {
+    /// The first input.
+    pub from: String,
+    /// The other input.
+    pub to: String,
+    /// Number of parameters that are compared.
+    pub compared: usize,
+    /// Number of significant differences.
+    pub significant: usize,
+    /// χ² of all differences together.
+    pub chi_square: f64,
+    /// Its degrees of freedom.
+    pub degrees_of_freedom: usize,
+    /// Probability of a larger χ² if nothing has changed.
+    pub p_value: f64,
+    /// Set-up quantities that are the same object in both sessions.
+    pub shared_setup: Vec<String>,
+    /// Set-up quantities of one name that are not shared, because the readings show that they, or others of their kind, are
+    /// not one object.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub not_shared: Vec<NotShared>,
+    /// Parameters without a difference of their own: one of the sessions does not separate them from others, and they
+    /// are held at nominal in both.
+    pub not_comparable: Vec<NotComparable>,
+    /// Effects and errors that only one of the inputs has.
+    pub only_in: Vec<OnlyIn>,
+}
+
+/// A set-up quantity of one name that is not one object in both sessions.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct NotShared {
+    /// Identifier: `bar[C100]`.
+    pub id: String,
+    /// Deviation in the other input less that in the first, by the readings alone, in `unit`.
+    pub value: f64,
+    /// Standard uncertainty of the difference, in `unit`.
+    pub u: f64,
+    /// Unit of `value` and `u`.
+    pub unit: String,
+    /// Probability of a larger difference if it were one object.
+    pub p_value: f64,
+    /// Whether the readings show that it is not. Otherwise they show it of another object of its kind.
+    pub refuted: bool,
+}
+
+/// A parameter without a difference of its own.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct NotComparable {
+    /// Identifier.
+    pub id: String,
+}
+
+/// An effect or an error of one input.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct OnlyIn {
+    /// Identifier.
+    pub id: String,
+    /// The input that has it.
+    pub model: String,
+}

@@ -1,0 +1,192 @@
+//! Identified error motions as functions of the position of their own axis.
+//!
+//! `E(q) = Σ kᵢ·bᵢ(q)` sums the declared effects of one error motion that depend on the position of its own axis or on
+//! its direction of travel. A curve covers the positions through which its axis moved in runs that observe the error.
+//! Other positions would be an extrapolation: there the axis stood still, or no reading observes the error. The
+//! covariance of the coefficients gives the uncertainty at a position, `u²(q) = b(q)ᵀ·Cov·b(q)`.
+//!
+//! A table over a position cannot hold an effect of time, temperature or speed. Such effects are listed as excluded.
+
+use std::ops::Range;
+
+use abbe_model::component::{ErrorKind, ErrorName};
+use abbe_model::driver::{Driver, DriverPart, DriverSample};
+use abbe_model::effect::{Component, Effect};
+
+use super::range::observed_range;
+use abbe_identify::fit::Fit;
+use abbe_identify::parameters::Role;
+use abbe_identify::problem::Problem;
+
+/// One error motion as a function of the position of its axis.
+#[derive(Clone, Debug)]
+pub struct ErrorCurve {
+    /// The error, for example `EXX`.
+    pub error: ErrorName,
+    /// Its axis, by index in the machine.
+    pub axis: usize,
+    /// The positions through which the axis moved while readings observed the error, mm or rad.
+    pub range: Range<f64>,
+    terms: Vec<(Effect, Vec<f64>)>,
+    /// The indices of the terms' coefficients among the fit's parameters, term by term.
+    coefficients: Vec<usize>,
+    /// Covariance of the coefficients, row by row, with the fit's factor on uncertainties; internal units.
+    covariance: Vec<Vec<f64>>,
+}
+
+impl ErrorCurve {
+    /// The basis functions of all terms at a position (mm or rad), approached in a direction (+1 or −1).
+    fn basis(&self, position: f64, direction: f64) -> Vec<f64> {
+        let sample = DriverSample { value: position, direction, ..DriverSample::default() };
+        let mut basis = Vec::with_capacity(self.coefficients.len());
+        for (effect, _) in &self.terms {
+            effect.shape.basis(&sample, &mut basis);
+        }
+        basis
+    }
+
+    /// The error at a position (mm or rad), approached in a direction (+1 or −1), mm or rad.
+    pub fn at(&self, position: f64, direction: f64) -> f64 {
+        let coefficients = self.terms.iter().flat_map(|(_, coefficients)| coefficients);
+        let basis = self.basis(position, direction);
+        basis.iter().zip(coefficients).map(|(b, k)| b * k).sum()
+    }
+
+    /// The standard uncertainty of [`ErrorCurve::at`], mm or rad.
+    pub fn u_at(&self, position: f64, direction: f64) -> f64 {
+        self.u_of(&self.basis(position, direction))
+    }
+
+    /// The mean of both directions at a position.
+    pub fn mean_at(&self, position: f64) -> f64 {
+        0.5 * (self.at(position, 1.0) + self.at(position, -1.0))
+    }
+
+    /// The standard uncertainty of [`ErrorCurve::mean_at`].
+    pub fn u_of_mean_at(&self, position: f64) -> f64 {
+        let [there, back] = [1.0, -1.0].map(|direction| self.basis(position, direction));
+        let mean: Vec<f64> = there.iter().zip(&back).map(|(a, b)| 0.5 * (a + b)).collect();
+        self.u_of(&mean)
+    }
+
+    fn u_of(&self, basis: &[f64]) -> f64 {
+        let rows = self.covariance.iter().zip(basis);
+        let variance: f64 = rows.map(|(row, b)| b * row.iter().zip(basis).map(|(c, d)| c * d).sum::<f64>()).sum();
+        variance.max(0.0).sqrt()
+    }
+
+    /// Whether it depends on the direction of travel.
+    pub fn is_directional(&self) -> bool {
+        self.terms.iter().any(|(effect, _)| effect.shape.uses() == DriverPart::Direction)
+    }
+}
+
+/// Equidistant positions that all of these curves cover, internal units. Curves without a common position have none.
+pub(super) fn positions<'c>(
+    curves: impl IntoIterator<Item = &'c ErrorCurve>,
+    points: usize,
+) -> impl Iterator<Item = f64> {
+    let ranges = curves.into_iter().map(|curve| &curve.range);
+    let (from, to) =
+        ranges.fold((f64::NEG_INFINITY, f64::INFINITY), |(from, to), range| (from.max(range.start), to.min(range.end)));
+    let points = if from < to { points } else { 0 };
+    (0..points).map(move |k| from + (to - from) * k as f64 / (points - 1) as f64)
+}
+
+/// The identified errors that a control can compensate, and those that it cannot.
+#[derive(Clone, Debug, Default)]
+pub struct Compensation {
+    /// Error motions as functions of their own axis.
+    pub curves: Vec<ErrorCurve>,
+    /// Identified location errors, mm or rad.
+    pub locations: Vec<(ErrorName, f64)>,
+    /// Identified machine errors that are in neither list, with the reason.
+    pub left_out: Vec<String>,
+}
+
+/// The curves and location errors of a fit.
+pub fn of_fit(problem: &Problem, fit: &Fit) -> Compensation {
+    let mut result = Compensation::default();
+    let machine = &problem.session.machine;
+    let list = &problem.parameters.list;
+    for (j, parameter) in list.iter().enumerate() {
+        if parameter.role != Role::Error || !fit.rank.is_identifiable(j) {
+            continue;
+        }
+        match ErrorName::parse(&parameter.id) {
+            Some(name) if name.kind == ErrorKind::Location => result.locations.push((name, fit.beta[j])),
+            _ => result
+                .left_out
+                .push(format!("{}: a constant error motion is not a function of the position", parameter.id)),
+        }
+    }
+    for (index, effect) in problem.parameters.effects.iter().enumerate() {
+        let Component::Axis(error) = &effect.component else {
+            continue;
+        };
+        let id = effect.id();
+        let mut found = vec![None; effect.shape.coefficients()];
+        for (j, parameter) in list.iter().enumerate() {
+            if let Role::Coefficient { effect: of, coefficient } = parameter.role
+                && of == index
+                && fit.rank.is_identifiable(j)
+            {
+                found[coefficient] = Some(j);
+            }
+        }
+        let own = matches!(&effect.driver, Driver::Axis(driver) if *driver == error.axis);
+        let fits_table = own && effect.shape.fits_position_table();
+        if error.kind != ErrorKind::Motion || !fits_table {
+            result.left_out.push(format!("{id}: a table over the position of its axis cannot represent it"));
+            continue;
+        }
+        if !effect.tests.is_empty() {
+            let why = "it acts in some tests only, so it is not a property of the axis";
+            result.left_out.push(format!("{id}: {why}"));
+            continue;
+        }
+        let (Some(axis), Some(coefficients)) =
+            (machine.axis_index(&error.axis), found.into_iter().collect::<Option<Vec<usize>>>())
+        else {
+            result.left_out.push(format!("{id}: not all of its coefficients are identifiable"));
+            continue;
+        };
+        let term = (effect.clone(), coefficients.iter().map(|j| fit.beta[*j]).collect());
+        if let Some(curve) = result.curves.iter_mut().find(|curve| curve.error == *error) {
+            curve.terms.push(term);
+            curve.coefficients.extend(coefficients);
+            continue;
+        }
+        let Some(observed) = observed_range(problem, error, axis) else {
+            let why = "its axis stands still wherever readings observe it, and the positions between are not measured";
+            result.left_out.push(format!("{id}: {why}"));
+            continue;
+        };
+        let kind = machine.axes[axis].kind;
+        for unconnected in &observed.unconnected {
+            result.left_out.push(format!(
+                "{error} from {:.3} to {:.3} {}: not connected to the longest range of motion of the axis",
+                kind.to_display(unconnected.start),
+                kind.to_display(unconnected.end),
+                kind.unit()
+            ));
+        }
+        result.curves.push(ErrorCurve {
+            error: error.clone(),
+            axis,
+            range: observed.range,
+            terms: vec![term],
+            coefficients,
+            covariance: Vec::new(),
+        });
+    }
+    let covariance = fit.covariance_with_aliases();
+    for curve in &mut result.curves {
+        let row = |j: &usize| -> Vec<f64> {
+            let columns = curve.coefficients.iter();
+            columns.map(|k| covariance[(*j, *k)]).collect()
+        };
+        curve.covariance = curve.coefficients.iter().map(row).collect();
+    }
+    result
+}

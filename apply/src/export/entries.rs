@@ -1,0 +1,250 @@
+//! The displacements of axis lines that make the volumetric error of a machine least over a travel.
+//!
+//! A control knows where the lines of its rotary axes are, and nothing of their orientation. Where the lines of the
+//! machine are tilted, or do not meet, displaced lines still describe a part of the error. With `e(q)` the volumetric
+//! error of the machine, `f(q, v)` that of a machine whose lines are displaced by `v`, and `z` the zero of the
+//! workpiece,
+//!
+//! ```text
+//! v = argmin mean |e(q) − f(q, v) − z|²
+//! ```
+//!
+//! over the travel. The zero of a workpiece is measured on the table, so that a constant vector in the table frame is no
+//! error. Gauss and Newton's iteration starts at the plain displacements, the location errors themselves, and leaves
+//! there what the travel does not determine.
+
+use abbe_model::chain::ERRORS_PER_AXIS;
+use abbe_model::driver::Driver;
+use abbe_model::effect::Effect;
+use abbe_model::frames::Point;
+use abbe_model::session::readings::Readings;
+use nalgebra::{DMatrix, DVector, Vector3};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::travel::Travel;
+use crate::ApplyError;
+use crate::compare::workspace::point_by;
+use crate::correction::Correction;
+use crate::volumetric::Size;
+use abbe_identify::model_file::IdentifiedModel;
+use abbe_identify::model_file::carried::States;
+use abbe_identify::model_file::errors::EstimatedErrors;
+use abbe_identify::numerics::parallel;
+use abbe_identify::parameters::Role;
+use abbe_model::pose::Aim;
+
+/// Iterations. The displacements are small against the machine: the second step is already below a nanometre.
+const ITERATIONS: usize = 3;
+/// Least eigenvalue over the largest of the directions of displacements that the travel determines.
+const LEAST_EIGENVALUE: f64 = 1e-8;
+
+/// The volumetric error over the travel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct Remaining {
+    /// Without changes of the entries.
+    pub without: Size,
+    /// With the plain entries: the location errors of the lines themselves.
+    pub plain: Size,
+    /// With the entries that are written.
+    pub written: Size,
+}
+
+/// An error that the control's model does not represent.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct NotRepresented {
+    /// The location error or the effect.
+    pub id: String,
+    /// Rms over the travel of what the best entries leave of it, µm.
+    pub rms_um: f64,
+}
+
+/// The lines of a machine over a travel.
+pub(super) struct Lines<'m> {
+    model: &'m IdentifiedModel,
+    tool_mm: [f64; 3],
+    grid: Readings,
+    weights: Vec<f64>,
+    /// The slots of the displacements.
+    slots: Vec<usize>,
+    /// The volumetric error, centred.
+    error: Vec<Vector3<f64>>,
+    /// Its derivative by each displacement, centred.
+    by_line: Vec<Vec<Vector3<f64>>>,
+}
+
+/// Whether an effect is a function of positions, so that it has a value everywhere in the travel.
+fn follows_position(effect: &Effect) -> bool {
+    matches!(effect.driver, Driver::Axis(_) | Driver::None) && effect.shape.fits_position_table()
+}
+
+impl<'m> Lines<'m> {
+    /// The lines of a model whose displacements have these slots.
+    ///
+    /// # Errors
+    /// If an error of the model cannot be evaluated over the travel.
+    pub fn of(
+        model: &'m IdentifiedModel,
+        slots: Vec<usize>,
+        travel: &Travel,
+        tool_mm: [f64; 3],
+    ) -> Result<Lines<'m>, ApplyError> {
+        let (grid, weights) = travel.grid(model);
+        let mut errors = EstimatedErrors::of_model(model, tool_mm, model.table_mm);
+        errors.effects.retain(|estimated| follows_position(&estimated.effect));
+        let correction = Correction { machine: &model.machine, errors: &errors, tool_mm, aim: Aim::Position };
+        let error = correction.pose_errors(&grid)?.into_iter().map(|six| Vector3::new(six[0], six[1], six[2]));
+        let error = error.collect();
+        let mut lines = Lines { model, tool_mm, error: Vec::new(), by_line: Vec::new(), grid, weights, slots };
+        lines.error = lines.centred(error);
+        lines.by_line = lines.slots.iter().map(|slot| lines.by_slot(*slot)).collect();
+        Ok(lines)
+    }
+
+    /// Vectors less their mean: the zero of the workpiece.
+    fn centred(&self, mut vectors: Vec<Vector3<f64>>) -> Vec<Vector3<f64>> {
+        let mean: Vector3<f64> = vectors.iter().zip(&self.weights).map(|(vector, weight)| vector * *weight).sum();
+        vectors.iter_mut().for_each(|vector| *vector -= mean);
+        vectors
+    }
+
+    /// The derivative of the tool point by an error, centred.
+    fn by_slot(&self, slot: usize) -> Vec<Vector3<f64>> {
+        let machine = &self.model.machine;
+        let derivatives = parallel::map(self.grid.rows(), &|row| {
+            let mut state = Vec::new();
+            self.grid.state(machine, row, &mut state);
+            point_by(machine, &state, self.tool_mm, slot)
+        });
+        self.centred(derivatives)
+    }
+
+    /// The volumetric error of the machine with displaced lines and no other error, centred.
+    fn displaced(&self, displacements: &[f64]) -> Vec<Vector3<f64>> {
+        let machine = &self.model.machine;
+        let value = |slot: usize| {
+            self.slots.iter().zip(displacements).filter(|(own, _)| **own == slot).map(|(_, value)| *value).sum::<f64>()
+        };
+        let bodies = machine.body_errors(|slot| value(slot) != 0.0, value);
+        let none = machine.body_errors(|_| false, |_| 0.0);
+        let vectors = parallel::map(self.grid.rows(), &|row| {
+            let mut state = Vec::new();
+            self.grid.state(machine, row, &mut state);
+            let point = |bodies: &[_]| {
+                let tool = machine.tool_point(&state, bodies, Point(self.tool_mm));
+                Vector3::from(machine.table_point(&state, bodies, tool).0)
+            };
+            point(&bodies) - point(&none)
+        });
+        self.centred(vectors)
+    }
+
+    /// What displacements leave of the volumetric error.
+    fn residual(&self, displacements: &[f64]) -> Vec<Vector3<f64>> {
+        let displaced = self.displaced(displacements);
+        self.error.iter().zip(displaced).map(|(error, displaced)| error - displaced).collect()
+    }
+
+    fn product(&self, a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
+        a.iter().zip(b).zip(&self.weights).map(|((a, b), weight)| a.dot(b) * weight).sum()
+    }
+
+    /// Rms and largest length of vectors.
+    fn size(&self, vectors: &[Vector3<f64>]) -> Size {
+        let largest = vectors.iter().map(Vector3::norm).fold(0.0, f64::max);
+        Size { largest_um: largest * 1e3, rms_um: self.product(vectors, vectors).max(0.0).sqrt() * 1e3 }
+    }
+
+    /// The size of what displacements leave.
+    pub fn remaining(&self, displacements: &[f64]) -> Size {
+        self.size(&self.residual(displacements))
+    }
+
+    /// The displacements by each of some vectors, for the free lines: the pseudo-inverse of their derivatives.
+    fn solve(&self, free: &[bool], vectors: &[&[Vector3<f64>]]) -> DMatrix<f64> {
+        let count = self.slots.len();
+        let kept = |i: usize, j: usize, value: f64| if free[i] && free[j] { value } else { 0.0 };
+        let normal =
+            DMatrix::from_fn(count, count, |i, j| kept(i, j, self.product(&self.by_line[i], &self.by_line[j])));
+        let eigen = normal.symmetric_eigen();
+        let least = LEAST_EIGENVALUE * eigen.eigenvalues.iter().copied().fold(0.0, f64::max);
+        let inverse = eigen.eigenvalues.map(|value| if value > least { 1.0 / value } else { 0.0 });
+        let inverse = &eigen.eigenvectors * DMatrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose();
+        let right =
+            DMatrix::from_fn(count, vectors.len(), |i, j| kept(i, i, self.product(&self.by_line[i], vectors[j])));
+        inverse * right
+    }
+
+    /// The displacements that make the error least; those of lines that are not free stay plain.
+    pub fn best(&self, plain: &[f64], free: &[bool]) -> Vec<f64> {
+        let mut best = DVector::from_row_slice(plain);
+        for _ in 0..ITERATIONS {
+            best += self.solve(free, &[&self.residual(best.as_slice())]).column(0);
+        }
+        best.as_slice().to_vec()
+    }
+
+    /// The change of the best displacements by each parameter of the model, and what the displacements leave of each
+    /// error or effect.
+    ///
+    /// # Errors
+    /// If an error of the model cannot be evaluated over the travel.
+    pub fn by_parameter(&self, free: &[bool]) -> Result<(Vec<(usize, DVector<f64>)>, Vec<NotRepresented>), ApplyError> {
+        let model = self.model;
+        let states = States { readings: self.grid.clone(), tool_mm: self.tool_mm, table_mm: model.table_mm };
+        let carried = model.carried_parameters();
+        let used = |parameter: usize| match model.parameters[parameter].role {
+            Role::Coefficient { effect, .. } => follows_position(&model.effects[effect]),
+            _ => true,
+        };
+        let mut slots: Vec<usize> = Vec::new();
+        let contributions: Vec<_> = model
+            .contributions(&states)?
+            .into_iter()
+            .filter(|one| one.slot < model.machine.axes.len() * ERRORS_PER_AXIS && used(carried[one.parameter]))
+            .collect();
+        slots.extend(contributions.iter().map(|one| one.slot));
+        slots.sort_unstable();
+        slots.dedup();
+        let by_slot: Vec<Vec<Vector3<f64>>> = slots.iter().map(|slot| self.by_slot(*slot)).collect();
+        let mut columns: Vec<Vec<Vector3<f64>>> = vec![Vec::new(); carried.len()];
+        for one in &contributions {
+            let Ok(place) = slots.binary_search(&one.slot) else { continue };
+            let column = &mut columns[one.parameter];
+            column.resize(self.weights.len(), Vector3::zeros());
+            for (row, (sum, vector)) in column.iter_mut().zip(&by_slot[place]).enumerate() {
+                *sum += vector * one.basis.as_ref().map_or(1.0, |basis| basis[row]);
+            }
+        }
+        let (mut changes, mut sources) = (Vec::new(), Vec::<(String, Vec<Vector3<f64>>)>::new());
+        for (column, parameter) in columns.into_iter().zip(carried).filter(|(column, _)| !column.is_empty()) {
+            let column = self.centred(column);
+            changes.push((parameter, self.solve(free, &[&column]).column(0).into_owned()));
+            let own = &model.parameters[parameter];
+            let id = match own.role {
+                Role::Coefficient { effect, .. } => model.effects[effect].id(),
+                _ => own.id.clone(),
+            };
+            let vectors = column.iter().map(|vector| vector * own.value);
+            match sources.iter_mut().find(|(known, _)| *known == id) {
+                Some((_, sum)) => sum.iter_mut().zip(vectors).for_each(|(sum, vector)| *sum += vector),
+                None => sources.push((id, vectors.collect())),
+            }
+        }
+        let mut left: Vec<NotRepresented> = sources
+            .into_iter()
+            .map(|(id, vectors)| {
+                let change = self.solve(free, &[&vectors]);
+                let rest = (0..vectors.len()).map(|row| {
+                    let lines = self.by_line.iter().zip(&change);
+                    vectors[row] - lines.map(|(by_line, change)| by_line[row] * *change).sum::<Vector3<f64>>()
+                });
+                NotRepresented { id, rms_um: self.size(&rest.collect::<Vec<_>>()).rms_um }
+            })
+            // A nanometre is the rounding of the entries.
+            .filter(|left| left.rms_um > 1e-3)
+            .collect();
+        left.sort_by(|a, b| b.rms_um.total_cmp(&a.rms_um));
+        Ok((changes, left))
+    }
+}

@@ -1,0 +1,39 @@
+//! The identified location errors as a description of the machine for other programs and for controls.
+//!
+//! - [`frames`]: the chain at its zero position with location errors;
+//! - [`urdf`]: the calibrated chain as URDF; [`dh`]: Denavit–Hartenberg parameters, modified form of Craig with Hayati's
+//!   angle for parallel axes;
+//! - [`control`]: kinematic parameters of controls, as far as their models are publicly documented; [`entries`]: those
+//!   that leave the least error over a [`travel`].
+//!
+//! A description of fixed geometry holds location errors only. Effects and constant error motions are listed as left
+//! out.
+
+pub mod control;
+pub mod dh;
+pub mod entries;
+pub mod frames;
+pub mod travel;
+pub mod urdf;
+
+use abbe_model::component::{ErrorKind, ErrorName};
+
+use abbe_identify::model_file::IdentifiedModel;
+use abbe_identify::parameters::Role;
+
+/// What a description of fixed geometry cannot hold: the effects of a model, and errors that are no location errors.
+pub fn left_out(model: &IdentifiedModel) -> Vec<String> {
+    let mut left_out: Vec<String> = model.effects.iter().map(abbe_model::effect::Effect::id).collect();
+    for parameter in model.parameters.iter().filter(|parameter| parameter.role == Role::Error && !parameter.held) {
+        let motion = ErrorName::parse(&parameter.id).is_some_and(|name| name.kind == ErrorKind::Motion);
+        if motion {
+            left_out.push(parameter.id.clone());
+        }
+    }
+    left_out
+}
+
+#[cfg(test)]
+mod control_tests;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,22 @@
+//! What follows from an identified model: what to enter in a control, how it is compared, and how it changes.
+//!
+//! - [`correction`]: corrected commands; [`compensation`]: identified error motions as tables of a control;
+//! - [`export`]: a model in the form of a control, a robot or a simulator; [`volumetric`]: the errors over the workspace;
+//! - [`compare`]: two models or sessions of one machine; [`history`]: the parameters of machines over time;
+//! - [`geometric`]: the methods of the literature that take circles apart, beside the fit.
+
+#![cfg_attr(
+    not(test),
+    deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::todo)
+)]
+
+pub mod compare;
+pub mod compensation;
+pub mod correction;
+pub mod error;
+pub mod export;
+pub mod geometric;
+pub mod history;
+pub mod volumetric;
+
+pub use error::ApplyError;

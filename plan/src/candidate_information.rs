@@ -1,0 +1,134 @@
+//! The information of every candidate test, evaluated once.
+
+use super::candidate_tests::CandidateTest;
+use super::information::{Root, SharedParameters, sum};
+use super::test_variations::TestVariations;
+use crate::PlanError;
+use abbe_identify::linear::Linearisation;
+use abbe_identify::numerics::parallel;
+use abbe_identify::numerics::ranking::smallest_first;
+use abbe_identify::numerics::triangle::Triangle;
+use abbe_identify::parameters::{Parameter, Role};
+use abbe_identify::problem::Problem;
+
+/// The information of every candidate test on the shared parameters.
+pub struct PreparedCandidates {
+    /// The shared parameters.
+    pub shared: SharedParameters,
+    /// The information of the plan itself.
+    pub base: Root,
+    /// The candidate tests.
+    pub candidates: Vec<CandidateInformation>,
+}
+
+/// A candidate test with its information.
+pub struct CandidateInformation {
+    /// The test. Its name states which ball stays mounted.
+    pub test: CandidateTest,
+    /// Its information.
+    pub root: Root,
+}
+
+impl PreparedCandidates {
+    /// Evaluates the candidate tests for a problem whose folds are its tests, at the parameter values `beta`. `targets`
+    /// are the parameters of the goal.
+    ///
+    /// # Errors
+    /// If the model cannot be evaluated.
+    pub fn new(
+        problem: &Problem,
+        beta: &[f64],
+        tests: Vec<CandidateTest>,
+        variations: &TestVariations,
+        targets: &[usize],
+    ) -> Result<PreparedCandidates, PlanError> {
+        let list = &problem.parameters.list;
+        let kept: Vec<usize> =
+            (0..list.len()).filter(|j| !targets.contains(j) && may_be_shared(problem, &list[*j])).collect();
+        let shared = SharedParameters::of(problem, &kept, targets);
+        let linear = Linearisation::of(problem, beta)?;
+        let base = shared.root_of(problem, &linear)?;
+        let ready = parallel::map(tests.len(), &|k| ready(problem, &shared, &tests[k], variations));
+        let ready: Vec<Vec<CandidateInformation>> = ready.into_iter().collect::<Result<_, PlanError>>()?;
+        Ok(PreparedCandidates { shared, base, candidates: ready.into_iter().flatten().collect() })
+    }
+
+    /// The plan with some candidate tests added.
+    pub fn with(&self, candidates: &[usize]) -> Root {
+        candidates
+            .iter()
+            .fold(self.base.clone(), |root, candidate| sum(root.as_ref(), self.candidates[*candidate].root.as_ref()))
+    }
+
+    /// The information `root` with a candidate test added.
+    pub fn added(&self, root: &Root, candidate: usize) -> Root {
+        sum(root.as_ref(), self.candidates[candidate].root.as_ref())
+    }
+
+    /// A figure of the information with each candidate test added.
+    pub fn figures<T: Send>(&self, root: &Root, figure: &(impl Fn(&Root) -> T + Sync)) -> Vec<T> {
+        parallel::map(self.candidates.len(), &|candidate| figure(&self.added(root, candidate)))
+    }
+
+    /// The candidate test with the smallest figure, and the figures of all. Of equal tests the first counts. Mounted
+    /// balls come before newly mounted ones.
+    pub fn best(&self, root: &Root, figure: &(impl Fn(&Root) -> f64 + Sync)) -> Option<(usize, Vec<f64>)> {
+        let figures = self.figures(root, figure);
+        let best = (0..figures.len()).min_by(|a, b| smallest_first(figures[*a], figures[*b]))?;
+        Some((best, figures))
+    }
+}
+
+/// Whether a new test can share a parameter: errors and effects, a mounted workpiece ball, the spindle ball of the last
+/// test, the sensor.
+fn may_be_shared(problem: &Problem, parameter: &Parameter) -> bool {
+    if parameter.role != Role::Setup {
+        return true;
+    }
+    let last = problem.tests.last().map_or("", |test| test.spindle_setup.as_str());
+    parameter.id.starts_with("workpiece_ball.")
+        || (parameter.id.starts_with("spindle_ball.") && parameter.id.ends_with(&format!("[{last}]")))
+        || !parameter.id.contains('[')
+}
+
+/// The information of a candidate test with a newly mounted spindle ball and, if permitted, with the spindle ball that
+/// stays mounted. The readings are the same.
+fn ready(
+    problem: &Problem,
+    shared: &SharedParameters,
+    candidate: &CandidateTest,
+    variations: &TestVariations,
+) -> Result<Vec<CandidateInformation>, PlanError> {
+    let mut session = abbe_model::session::Session::clone(&problem.session);
+    session.tests = vec![candidate.test.clone()];
+    session.effects = Vec::new();
+    session.socket_distances = Vec::new();
+    let mut noise = problem.noise.clone();
+    noise.sigma_mm /= (variations.thin.max(1) as f64).sqrt();
+    let mut alone = Problem::new(&session, noise, 0)?;
+    alone.reference = problem.reference.clone();
+    for effect in &problem.parameters.effects {
+        alone.add_effect(effect)?;
+    }
+    let nominal = vec![0.0; alone.parameters.list.len()];
+    let r = Triangle::new(nominal.len()).merged(&alone.triangles(&nominal)?).r();
+    let mut ready = Vec::new();
+    let last = problem.tests.last().filter(|last| {
+        variations.keep_spindle_ball && last.station.tool_point_mm() == candidate.test.station.tool_point_mm()
+    });
+    if let Some(last) = last {
+        let [own, mounted_setup] =
+            [&candidate.test.spindle_setup, &last.spindle_setup].map(|setup| format!("[{setup}]"));
+        let root = shared.root_of_test(&alone, r.as_ref(), |id| match id.strip_suffix(&own) {
+            Some(id_stem) if id.starts_with("spindle_ball.") => format!("{id_stem}{mounted_setup}"),
+            _ => id.to_string(),
+        });
+        let mut candidate = candidate.clone();
+        candidate.test.spindle_setup = last.spindle_setup.clone();
+        candidate.name.push_str(&format!(", spindle ball left mounted as in {}", last.name));
+        ready.push(CandidateInformation { test: candidate, root });
+    }
+    let root = shared.root_of_test(&alone, r.as_ref(), str::to_string);
+    ready.insert(0, CandidateInformation { test: candidate.clone(), root });
+    Ok(ready)
+}

@@ -1,0 +1,95 @@
+//! The candidate ball-bar tests for the next measurement: the permitted variations, and those that the machine can
+//! perform.
+//!
+//! A candidate test sweeps one rotary axis. The other ball is on that axis, in the plane of the circle or beside it, as
+//! the bar length requires. Alternatively the linear axes keep the bar radial, tangential or axial. A part of the
+//! range, or one direction, never gives more information than the whole. Such tests are candidates only if the gain per
+//! minute decides. Tests beyond the travel of an axis or the reach of the bar are not candidates.
+
+use std::sync::Arc;
+
+use abbe_model::instrument::Station;
+use abbe_model::session::{Session, Test};
+use abbe_model::words::{counted, number};
+
+use super::candidate_layout::{Draft, MAX_DRAFTS, draft_count, drafts};
+use super::collision::{Bodies, Parts};
+use super::states;
+use super::test_variations::TestVariations;
+use crate::PlanError;
+use abbe_identify::numerics::parallel;
+
+/// A candidate test.
+#[derive(Clone, Debug)]
+pub struct CandidateTest {
+    /// Description, for example `C150 with the workpiece ball at radius 50 mm`.
+    pub name: String,
+    /// The test with its planned states.
+    pub test: Test,
+    /// Whether a ball has to be mounted for it.
+    pub new_setup: bool,
+    /// Duration, min.
+    pub minutes: f64,
+}
+
+/// The candidate tests that a session's machine can perform. The session is complete (see [`states::complete`]).
+///
+/// # Errors
+/// If the instrument is no ball bar, or no rotary axis can be swept.
+pub fn candidate_tests(session: &Session, variations: &TestVariations) -> Result<Vec<CandidateTest>, PlanError> {
+    let Some(last) = session.tests.last().filter(|test| matches!(test.station, Station::BallBar(_))) else {
+        return Err(PlanError::Request(
+            "candidate tests are available for ball bars only; this session uses another instrument".to_string(),
+        ));
+    };
+    let count = draft_count(session, variations);
+    if count > MAX_DRAFTS as f64 {
+        let TestVariations { bars_mm, radii_mm, heights_mm, feeds, ranges, .. } = variations;
+        return Err(PlanError::Request(format!(
+            "up to {} candidate tests; the limit is {MAX_DRAFTS}: state fewer of the {}, {}, {}, {} and {}",
+            number(count),
+            counted(bars_mm.len(), "bar"),
+            counted(radii_mm.len(), "distance of the ball from its axis"),
+            counted(heights_mm.len(), "height"),
+            counted(feeds.len(), "feed"),
+            counted(ranges.len(), "share of the range"),
+        )));
+    }
+    let drafts = drafts(session, variations, last);
+    let bodies = Bodies::of(&session.machine);
+    let finished = parallel::map(drafts.len(), &|k| finished(session, &bodies, variations, drafts[k].clone()));
+    let tests: Vec<CandidateTest> = finished.into_iter().flatten().collect();
+    if tests.is_empty() {
+        return Err(PlanError::Request(
+            "no candidate test is feasible on this machine: no bar reaches, the travel is too short, or no test clears the bodies of the machine".to_string(),
+        ));
+    }
+    Ok(tests)
+}
+
+/// Plans the states of a candidate test. `None` if the travel forbids them or the bar does not reach.
+fn finished(session: &Session, bodies: &Bodies, variations: &TestVariations, draft: Draft) -> Option<CandidateTest> {
+    let Draft { mut test, name, new_setup } = draft;
+    let Station::BallBar(bar) = &test.station else {
+        return None;
+    };
+    let length = bar.bar;
+    let mut readings = states::planned(session, &test).ok()?;
+    if readings.observed.iter().any(|reading| (reading - length).abs() > variations.reach_mm) {
+        return None;
+    }
+    // Only tests that clear are proposed.
+    if Parts::of(session, bodies, &test).is_some_and(|parts| !parts.clears_all(&readings)) {
+        return None;
+    }
+    let start = session.tests.iter().filter_map(|test| test.readings.as_ref()?.time_s.last().copied());
+    let start = start.fold(0.0, f64::max);
+    let moving_s = readings.time_s.last().copied().unwrap_or(0.0);
+    readings.time_s.iter_mut().for_each(|time| *time += start + variations.test_min * 60.0);
+    let rows = readings.rows();
+    let means = session.reference().means.into_iter();
+    readings.drivers = means.map(|(name, mean)| (name, vec![mean; rows])).collect();
+    test.readings = Some(Arc::new(readings));
+    let minutes = variations.test_min + moving_s / 60.0 + if new_setup { variations.setup_min } else { 0.0 };
+    Some(CandidateTest { name, test, new_setup, minutes })
+}

@@ -1,0 +1,320 @@
+//! Selects poses for an instrument that measures at rest.
+//!
+//! Candidate poses are drawn at random within the travel of the axes and the limits of the user ([`candidates`]), and
+//! brought to where the instrument measures: a tracker anywhere, a socket's ball in the socket. A
+//! first set is built greedily; then poses are exchanged against candidates until no exchange improves the criterion
+//! (Fedorov's algorithm: Atkinson, Donev & Tobias, Optimum Experimental Designs, 2007, ch. 12).
+//!
+//! Parameters that as many average candidates do not separate are held at nominal, as in a base parametrisation, so that
+//! the covariance of the others exists. Set-up quantities are estimated within their priors.
+
+pub mod candidates;
+mod goal;
+mod information;
+
+use abbe_identify::IdentifyError;
+use std::sync::Arc;
+
+use abbe_model::axis::AxisKind;
+use abbe_model::instrument::{InstrumentKind, Station};
+use abbe_model::sensitivity::{SlotValues, TestModel};
+use abbe_model::session::readings::Readings;
+use abbe_model::session::{Session, Test};
+use abbe_model::words::counted;
+use rand::RngExt;
+use rand::seq::index;
+use rand_pcg::Pcg64;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::PlanError;
+use crate::improve::NamedUncertainty;
+use crate::states;
+use abbe_identify::noise::{Noise, NoiseSource};
+use abbe_identify::numerics::median;
+use abbe_identify::numerics::triangle::Triangle;
+use abbe_identify::parameters::Role;
+use abbe_identify::problem::Problem;
+use candidates::{PoseLimits, states_of};
+use goal::Goal;
+use information::Exchange;
+
+/// What the poses are to make small.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PoseCriterion {
+    /// The volume of the confidence ellipsoid of the errors.
+    D,
+    /// The mean variance of the errors, where 1 µm counts as 1″.
+    A,
+    /// The largest standard uncertainty of an error, where 1 µm counts as 1″.
+    WorstUncertainty,
+}
+
+impl PoseCriterion {
+    /// What its value is, with its unit.
+    pub fn words(self) -> &'static str {
+        match self {
+            PoseCriterion::D => {
+                "geometric mean of the standard deviations along the axes of the confidence ellipsoid, um or arcsec"
+            }
+            PoseCriterion::A => "root mean square standard uncertainty, um or arcsec",
+            PoseCriterion::WorstUncertainty => "worst standard uncertainty, um or arcsec",
+        }
+    }
+}
+
+/// Options of the selection.
+#[derive(Clone, Debug)]
+pub struct PoseOptions {
+    /// Number of poses.
+    pub poses: usize,
+    /// The criterion.
+    pub criterion: PoseCriterion,
+    /// Number of candidate poses.
+    pub candidates: usize,
+    /// Seed of the candidates and of the random sets.
+    pub seed: u64,
+    /// Where poses may be.
+    pub limits: PoseLimits,
+    /// Standard deviation of a scalar reading, mm; `None`: that of the session, else the assumed one of a plan.
+    pub noise_mm: Option<f64>,
+}
+
+/// Number of random sets with which the selection is compared.
+const RANDOM_SETS: usize = 100;
+/// Streams of the generator.
+const CANDIDATE_STREAM: u128 = 0;
+const RANDOM_SET_STREAM: u128 = 1;
+
+/// The selected poses.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct PoseSelection {
+    /// The test of each pose, whose instrument measures it.
+    pub tests: Vec<String>,
+    /// The socket of each pose; empty for other instruments.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sockets: Vec<String>,
+    /// The criterion and its unit.
+    pub criterion: String,
+    /// Its value for the selected poses.
+    pub value: f64,
+    /// Median of its values for 100 random sets of as many candidates; infinite (`null` in JSON) if more than half of
+    /// them leave an error undetermined.
+    #[schemars(with = "Option<f64>")]
+    pub random_median: f64,
+    /// Standard deviation of a scalar reading, µm.
+    pub noise_um: f64,
+    /// Source of `noise_um`: `stated` by the session or the user, or `assumed`.
+    pub noise_source: NoiseSource,
+    /// Number of candidate poses.
+    pub candidates: usize,
+    /// Number of drawn poses at which the instrument cannot measure, or that the limits excluded.
+    pub excluded: usize,
+    /// The errors with their standard uncertainties at the selected poses.
+    pub uncertainties: Vec<NamedUncertainty>,
+    /// Parameters that as many candidate poses do not separate from others. They are held at nominal.
+    pub held: Vec<String>,
+    /// Columns of `poses`: `j1_deg`, `x_mm`, …
+    pub columns: Vec<String>,
+    /// The positions of all axes at each pose, in the units of `columns`.
+    pub poses: Vec<Vec<f64>>,
+    /// Warnings in words.
+    pub warnings: Vec<String>,
+}
+
+/// The tests whose instruments measure the poses: that of a name; without a name the last one, or of sockets all. Empty
+/// if no test has the name.
+pub fn measured_by<'s>(session: &'s Session, name: Option<&str>) -> Vec<&'s Test> {
+    match name {
+        Some(name) => session.tests.iter().filter(|test| test.name == name).collect(),
+        None if session.instrument == InstrumentKind::Socket => session.tests.iter().collect(),
+        None => session.tests.last().into_iter().collect(),
+    }
+}
+
+/// The tests whose sockets have no place: neither the session states it, nor do the poses of their readings.
+pub fn without_place<'t>(session: &Session, tests: &[&'t Test]) -> Vec<&'t Test> {
+    let located = located(session, tests);
+    let lacking = |(_, test): &(&&Test, Test)| matches!(&test.station, Station::Socket(own) if !own.is_located);
+    tests.iter().zip(located).filter(lacking).map(|(test, _)| *test).collect()
+}
+
+/// Selects poses for tests of a session, by their instruments, priors and set-up. Readings of the session do not count,
+/// but for the places of sockets that it does not state.
+///
+/// # Errors
+/// If a socket has no place, no pose reaches where the instrument measures, the limits leave too few candidates, or the
+/// model cannot be evaluated.
+pub fn select(session: &Session, tests: &[&Test], options: &PoseOptions) -> Result<PoseSelection, PlanError> {
+    if let Some(test) = without_place(session, tests).first() {
+        return Err(PlanError::NoPlace { test: test.name.clone() });
+    }
+    let Found { tests, candidates, excluded, warnings } = candidates(session, tests, options)?;
+    if candidates.len() < options.poses {
+        return Err(PlanError::Request(format!(
+            "{} of {} drawn poses are within the limits, and {} are asked for; widen the limits or draw more candidates",
+            candidates.len(),
+            candidates.len() + excluded,
+            options.poses
+        )));
+    }
+    let problem = problem(session, &tests, &candidates, noise(session, options))?;
+    let list = &problem.parameters.list;
+    let nominal = vec![0.0; list.len()];
+    // What as many average poses do not determine is held.
+    let mut average = problem.clone();
+    average.noise.sigma_mm *= (candidates.len() as f64 / options.poses as f64).sqrt();
+    let information = Triangle::new(list.len()).merged(&average.triangles(&nominal)?);
+    let rank = problem.parameters.rank(&information.merged([&problem.prior_triangle(&nominal)]))?;
+    let kept: Vec<usize> = (0..list.len()).filter(|j| !rank.pivots.contains(j)).collect();
+    let targets: Vec<usize> = (0..kept.len()).filter(|k| list[kept[*k]].role != Role::Setup).collect();
+    if targets.is_empty() {
+        return Err(IdentifyError::NoUnknowns.into());
+    }
+    let exchange = Exchange::new(&problem, &kept, &targets, options.criterion)?;
+    let chosen = exchange.run(options.poses);
+    let [rank_of_chosen, involved] = exchange.rank(&chosen)?;
+    if rank_of_chosen < involved {
+        let lacking = involved - rank_of_chosen;
+        return Err(PlanError::Request(format!(
+            "the readings of {} have rank {rank_of_chosen} in {}; ask for at least {} poses",
+            counted(options.poses, "pose"),
+            counted(involved, "unknown"),
+            options.poses + lacking.div_ceil(problem.channels(0))
+        )));
+    }
+    let mut random = Pcg64::new(u128::from(options.seed), RANDOM_SET_STREAM);
+    let mut values = (0..RANDOM_SETS)
+        .map(|_| {
+            let poses = index::sample(&mut random, candidates.len(), options.poses).into_vec();
+            let [rank, involved] = exchange.rank(&poses)?;
+            Ok(if rank == involved { exchange.value(&poses) } else { f64::INFINITY })
+        })
+        .collect::<Result<Vec<f64>, PlanError>>()?;
+    let u = exchange.uncertainties(&chosen);
+    let machine = &session.machine;
+    let display = |pose: &usize| -> Vec<f64> {
+        machine.axes.iter().zip(&candidates[*pose].at).map(|(axis, q)| axis.kind.to_display(*q)).collect()
+    };
+    let test = |pose: &usize| &tests[candidates[*pose].test];
+    Ok(PoseSelection {
+        tests: chosen.iter().map(|pose| test(pose).name.clone()).collect(),
+        sockets: chosen.iter().filter_map(|pose| test(pose).socket.clone()).collect(),
+        criterion: options.criterion.words().to_string(),
+        value: exchange.value(&chosen),
+        random_median: median(&mut values),
+        noise_um: problem.noise.sigma_mm * 1e3,
+        noise_source: problem.noise.source,
+        candidates: candidates.len(),
+        excluded,
+        uncertainties: targets
+            .iter()
+            .zip(u)
+            .map(|(k, u)| {
+                let parameter = &list[kept[*k]];
+                NamedUncertainty { id: parameter.id.clone(), u, unit: parameter.unit.name.clone() }
+            })
+            .collect(),
+        held: rank.pivots.iter().map(|j| list[*j].id.clone()).collect(),
+        columns: machine.axes.iter().map(|axis| axis.column("")).collect(),
+        poses: chosen.iter().map(display).collect(),
+        warnings: [
+            session.warnings.clone(),
+            warnings,
+            states::noise_warning(&problem.noise, problem.unit()).into_iter().collect(),
+        ]
+        .concat(),
+    })
+}
+
+/// Copies of tests of a session, with the places of sockets that only their readings tell.
+fn located(session: &Session, tests: &[&Test]) -> Vec<Test> {
+    let stations = abbe_identify::start::stations(session, &session.tests);
+    let of = |test: &&Test| {
+        let place = session.tests.iter().position(|own| own.name == test.name);
+        let station = match (&test.station, place.map(|place| &stations[place])) {
+            (Station::Socket(own), Some(found)) if !own.is_located => found.clone(),
+            (own, _) => own.clone(),
+        };
+        Test { station, ..(*test).clone() }
+    };
+    tests.iter().map(of).collect()
+}
+
+/// A candidate pose.
+struct Candidate {
+    /// Index of its test.
+    test: usize,
+    /// Positions of all axes, mm or rad.
+    at: Vec<f64>,
+}
+
+/// The tests with candidates, and their candidates in the order of the tests.
+struct Found {
+    tests: Vec<Test>,
+    candidates: Vec<Candidate>,
+    excluded: usize,
+    warnings: Vec<String>,
+}
+
+/// Candidates of all tests, as many of each. A test without any is left out with a warning unless all are.
+fn candidates(session: &Session, tests: &[&Test], options: &PoseOptions) -> Result<Found, PlanError> {
+    let mut random = Pcg64::new(u128::from(options.seed), CANDIDATE_STREAM);
+    let mut found = Found { tests: Vec::new(), candidates: Vec::new(), excluded: 0, warnings: untravelled(session) };
+    let mut unmet = None;
+    for (number, test) in located(session, tests).into_iter().enumerate() {
+        let share = options.candidates / tests.len() + usize::from(number < options.candidates % tests.len());
+        let drawn = candidates::draw(session, &test, &options.limits, share, &mut random)?;
+        found.excluded += drawn.excluded;
+        if drawn.states.is_empty() && drawn.unmet > 0 && drawn.unmet == drawn.excluded {
+            let (goal, check) = Goal::words(&test.station);
+            found.warnings.push(format!("test `{}`: no drawn pose {goal}; it is left out", test.name));
+            unmet.get_or_insert(PlanError::OutOfReach { test: test.name, drawn: drawn.unmet, goal, check });
+            continue;
+        }
+        let number = found.tests.len();
+        found.candidates.extend(drawn.states.into_iter().map(|at| Candidate { test: number, at }));
+        found.tests.push(test);
+    }
+    match unmet {
+        Some(error) if found.candidates.is_empty() => Err(error),
+        _ => Ok(found),
+    }
+}
+
+/// The warning about rotary axes without travel.
+fn untravelled(session: &Session) -> Vec<String> {
+    let axes = session.machine.axes.iter().filter(|axis| axis.kind == AxisKind::Rotary && axis.travel.is_none());
+    let names: Vec<String> = axes.map(|axis| format!("`{}`", axis.name)).collect();
+    let sentence = format!("no travel is stated of {}: poses may turn them from -180 to 180 deg", names.join(", "));
+    if names.is_empty() { Vec::new() } else { vec![sentence] }
+}
+
+/// The problem of a session with these tests, which have a reading at every candidate pose.
+fn problem(session: &Session, tests: &[Test], candidates: &[Candidate], noise: Noise) -> Result<Problem, PlanError> {
+    let means = session.reference().means;
+    let with_readings = |(number, test): (usize, &Test)| {
+        let poses: Vec<&[f64]> =
+            candidates.iter().filter(|pose| pose.test == number).map(|pose| pose.at.as_slice()).collect();
+        let mut readings: Readings = states_of(&session.machine, &poses, &test.station);
+        let model = TestModel::new(Arc::clone(&session.machine), test.station.clone(), &readings);
+        readings.observed = model.readings(&SlotValues::zero(model.slots()));
+        readings.channels_to_columns(&session.machine, &test.station);
+        let means = means.iter();
+        readings.drivers = means.map(|(name, mean)| (name.clone(), vec![*mean; poses.len()])).collect();
+        Test { readings: Some(Arc::new(readings)), ..test.clone() }
+    };
+    let tests = tests.iter().enumerate().map(with_readings).collect();
+    states::problem_by_test(&Session { tests, ..session.clone() }, noise)
+}
+
+/// The noise of a reading: that of the options, else that of the session, else the assumed one.
+fn noise(session: &Session, options: &PoseOptions) -> Noise {
+    let stated = options.noise_mm.or(session.stated_noise_mm()).filter(|sigma| *sigma > 0.0);
+    stated.map_or_else(states::assumed_noise, |sigma| Noise::white(sigma, NoiseSource::Stated))
+}
+
+/// A number between two limits.
+fn between(random: &mut Pcg64, [low, high]: [f64; 2]) -> f64 {
+    low + (high - low) * random.random::<f64>()
+}
