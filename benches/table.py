@@ -1,4 +1,4 @@
-"""Runs the benchmarks and writes their table into docs/development/speed.md and README.md, between `<!-- speeds -->` and `<!-- /speeds -->`.
+"""Runs the benchmarks and writes their table into docs/development/speed.md, between `<!-- speeds -->` and `<!-- /speeds -->`.
 
     python benches/table.py                      the release profile
     python benches/table.py --profile checked    another profile
@@ -20,19 +20,19 @@ BENCHES = [("abbe-model", "chain"), ("abbe-identify", "fit"), ("abbe-codegen", "
 CACHE, STREAM = "value and eight derivatives, in cache", "value and eight derivatives, streaming"
 ALL = "value and all components of a five-axis machine/37 components"
 MONTE_CARLO = "Monte Carlo"
-# Benchmark, its name in criterion, divisor of the time, unit; reference, its name in criterion, divisor of its time; whether the README shows the line.
+# Benchmark, its name in criterion, divisor of the time, unit; reference, its name in criterion, divisor of its time.
 LINES = [
-    ("value and eight derivatives, columns in cache", f"{CACHE}/generic chain", 1e3, "ns per reading", "hand-written kernel", f"{CACHE}/by hand", 1e3, True),
-    ("the same", f"{CACHE}/generic chain", 1e3, "ns per reading", "num-dual, one reading at a time", f"{CACHE}/generic chain over num-dual, one at a time", 1e3, False),
-    ("the same, a million readings", f"{STREAM}/generic chain", 1e6, "ns per reading", "hand-written kernel", f"{STREAM}/by hand", 1e6, False),
-    ("value and all 37 components of a five-axis machine", ALL, 1e3, "ns per reading", None, None, None, True),
-    ("fit of 1,000 readings, 36 parameters", "fit/1000", 1, "s", None, None, None, False),
-    ("fit of 10,000 readings", "fit/10000", 1, "s", None, None, None, False),
-    ("fit of 100,000 readings", "fit/100000", 1, "s", None, None, None, False),
-    ("fit of 1,000,000 readings, 36 parameters", "fit/1000000", 1, "s", None, None, None, True),
-    ("trace of 3,616 readings, whole library, 199 null residuals, no effect present", "trace/chapter 5, nothing to find", 1, "s", None, None, None, True),
-    ("1,000 Monte Carlo draws of the fit of 3,616 readings", f"{MONTE_CARLO}/a thousand draws of the fit of chapter 5", 1, "s", "1,000 fits", f"{MONTE_CARLO}/one fit of chapter 5", 1e-3, True),
-    ("equation of the error vector with eight derivatives, as C", "equation/error vector with eight derivatives, as C", 1, "s", None, None, None, True),
+    ("value and eight derivatives, columns in cache", f"{CACHE}/generic chain", 1e3, "ns per reading", "hand-written kernel", f"{CACHE}/by hand", 1e3),
+    ("the same", f"{CACHE}/generic chain", 1e3, "ns per reading", "num-dual, one reading at a time", f"{CACHE}/generic chain over num-dual, one at a time", 1e3),
+    ("the same, a million readings", f"{STREAM}/generic chain", 1e6, "ns per reading", "hand-written kernel", f"{STREAM}/by hand", 1e6),
+    ("value and all 37 components of a five-axis machine", ALL, 1e3, "ns per reading", None, None, None),
+    ("fit of 1,000 readings, 36 parameters", "fit/1000", 1, "s", None, None, None),
+    ("fit of 10,000 readings", "fit/10000", 1, "s", None, None, None),
+    ("fit of 100,000 readings", "fit/100000", 1, "s", None, None, None),
+    ("fit of 1,000,000 readings, 36 parameters", "fit/1000000", 1, "s", None, None, None),
+    ("trace of 3,616 readings, whole library, 199 null residuals, no effect present", "trace/chapter 5, nothing to find", 1, "s", None, None, None),
+    ("1,000 Monte Carlo draws of the fit of 3,616 readings", f"{MONTE_CARLO}/a thousand draws of the fit of chapter 5", 1, "s", "1,000 fits", f"{MONTE_CARLO}/one fit of chapter 5", 1e-3),
+    ("equation of the error vector with eight derivatives, as C", "equation/error vector with eight derivatives, as C", 1, "s", None, None, None),
 ]
 
 
@@ -58,12 +58,12 @@ def figure(seconds, divisor, unit):
     return f"{value:.3g}"
 
 
-def table(target, native, short):
+def table(target, native):
     head = ["benchmark", "Abbe", "reference in the same run", "time of Abbe over time of the reference"] + ([] if native is None else ["built for this processor"])
     rows = [head, ["---"] * len(head)]
-    for benchmark, name, divisor, unit, reference, other, other_divisor, in_readme in LINES:
+    for benchmark, name, divisor, unit, reference, other, other_divisor in LINES:
         ours = median(target, name)
-        if ours is None or short and not in_readme:
+        if ours is None:
             continue
         row = [benchmark, f"{figure(ours, divisor, unit)} {unit}", "", ""]
         theirs = median(target, other) if other else None
@@ -98,8 +98,7 @@ def main():
         run(arguments.profile, target, None)
         if native:
             run(arguments.profile, native, "-C target-cpu=native")
-    fill(ROOT / "docs" / "development" / "speed.md", table(target, native, False))
-    fill(ROOT / "README.md", table(target, None, True))
+    fill(ROOT / "docs" / "development" / "speed.md", table(target, native))
 
 
 if __name__ == "__main__":
