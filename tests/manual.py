@@ -58,10 +58,34 @@ def printed(record, key):
     """The table of a key of the record, or the list of what misses its target."""
     if key == "missed":
         return "\n".join(f"- {miss}" for table in record.values() for miss in table.get("missed", []))
+    if key == "crates":
+        columns, rows = ["crate", "purpose", "replacement"], crates()
+        return table(columns, rows)
+    if key == "families":
+        return table(["family", "effects in the tables below"], families())
     columns, rows = record[key]["columns"], record[key]["rows"]
     wrong = [row for row in rows if len(row) != len(columns)]
     if wrong:
         raise SystemExit(f"{name(RECORD)}: {key}: {len(columns)} columns, and not so many cells: {wrong[0]}")
+    return table(columns, rows)
+
+
+def crates():
+    """Name, purpose and replacement of each crate, from the comment behind it in a manifest."""
+    comment = re.compile(r"^([\w-]+) = .*# (.+); otherwise: (.+)$", re.MULTILINE)
+    manifests = [ROOT / "Cargo.toml", *sorted(ROOT.glob("*/Cargo.toml"))]
+    found = [line for manifest in manifests for line in comment.findall(manifest.read_text(encoding="utf-8"))]
+    return sorted([f"`{crate}`", purpose, replacement] for crate, purpose, replacement in found)
+
+
+def families():
+    """The families of the library of the search, and the effects that show them, from the comments behind their names."""
+    library = ROOT / "identify" / "src" / "candidates" / "library" / "library.toml"
+    found = re.findall(r'^name = "(.+)" # shown as (.+)$', library.read_text(encoding="utf-8"), re.MULTILINE)
+    return [[family, ", ".join(f"`{effect}`" for effect in effects.split(", "))] for family, effects in found]
+
+
+def table(columns, rows):
     line = lambda cells: "| " + " | ".join(cells) + " |"
     return "\n".join([line(columns), "|" + "---|" * len(columns), *map(line, rows)])
 
