@@ -131,6 +131,21 @@ def faults_of_links(page):
             yield f"{name(page)}: {link}: no heading of {name(target)} has this anchor"
 
 
+def faults_of_tables(page):
+    """Each table has a header with a line below it, and as many cells in every row."""
+    table = []
+    for number, line in enumerate([*page.read_text(encoding="utf-8").splitlines(), ""], 1):
+        line = line.strip()
+        if line.startswith("|"):
+            table.append(line)
+            continue
+        if table and not (len(table) > 1 and re.fullmatch(r"[|:\- ]+", table[1])):
+            yield f"{name(page)}:{number - len(table)}: a table without a header"
+        elif len({len(re.split(r"(?<!\\)\|", re.sub(r"`[^`]*`", "", row))) for row in table}) > 1:
+            yield f"{name(page)}:{number - len(table)}: rows with different numbers of cells"
+        table = []
+
+
 def faults_of_opening(page):
     """A generated page says so in its first lines; any other page opens with what the reader can do, and the command."""
     lines = page.read_text(encoding="utf-8").splitlines()
@@ -202,7 +217,7 @@ def main():
         for page, count in counts.items():
             print(f"{count:6} {name(page)}")
     faults = [fault for page in [*pages(), ROOT / "README.md"] for fault in faults_of_links(page)]
-    faults += [fault for page in pages() for fault in faults_of_opening(page)]
+    faults += [fault for page in pages() for fault in (*faults_of_opening(page), *faults_of_tables(page))]
     faults += faults_of_summary()
     faults += faults_of_record(record)
     if options.site:
