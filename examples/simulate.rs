@@ -4,7 +4,7 @@ use abbe::prelude::*;
 use serde_json::json;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let mut session = Session::new(Machine::from_code("w C A b Y X Z t")?, InstrumentKind::BallBar);
+    let mut session = Session::new(Machine::from_code("w C A b Y X Z t")?, "ballbar".parse()?);
     session.noise_mm = Some(0.3e-3);
     session.unknowns = ["EX0C", "EY0C"].iter().filter_map(|name| ErrorName::parse(name)).collect();
 

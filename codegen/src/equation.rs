@@ -4,7 +4,6 @@ use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::effect::Shape;
-use abbe_model::instrument::Station;
 
 use crate::coefficient::Coefficient;
 use crate::error::CodegenError;
@@ -80,9 +79,9 @@ impl Equation {
             Run::<Symbol<'_>>::new(&machine, source, &parameters, &|variable| arena.variable(variable), &|index| {
                 arena.variable(parameters[index].clone())
             })?;
-        let kind = match run.subject {
-            Subject::Station(Station::BallBar(_)) => Kind::Length,
-            Subject::Station(Station::Probe(_)) => Kind::Distance,
+        let kind = match &run.subject {
+            subject if subject.bar().is_some() => Kind::Length,
+            subject if subject.probe().is_some() => Kind::Distance,
             Subject::Station(_) => Kind::Coordinates,
             Subject::Volumetric { .. } => Kind::Volumetric,
         };
@@ -113,10 +112,7 @@ impl Equation {
             Order::Bilinear => truncation::bilinear(&run, &exact, &mut vectors, &written)?,
             Order::First => truncation::first(&run, &exact, &mut vectors, &written)?,
         };
-        let stated_length = match &run.subject {
-            Subject::Station(Station::BallBar(bar)) => Some(bar.bar.operand()),
-            _ => None,
-        };
+        let stated_length = run.subject.bar().map(|bar| bar.bar.operand());
         let touch = run.probe_geometry().map(|geometry| match vectors.as_slice() {
             [.., stylus, step] if options.order == Order::Bilinear => {
                 let groups: Vec<Symbol<'_>> = [stylus, step]

@@ -14,7 +14,7 @@
 use std::cmp::Reverse;
 
 use abbe_model::frames::Point;
-use abbe_model::instrument::{Station, displaced};
+use abbe_model::instrument::displaced;
 use abbe_model::scalar::Scalar;
 use num_rational::BigRational;
 use num_traits::{One, Signed};
@@ -25,7 +25,6 @@ use crate::form::Arrangement;
 use crate::normal_form::Ring;
 use crate::polynomial::{Atom, Monomial, Polynomial};
 use crate::run::Run;
-use crate::subject::Subject;
 use crate::symbol::{Operand, Symbol};
 use crate::tree::{Tree, product, sum};
 use crate::truncation::{FormContext, operands};
@@ -61,7 +60,7 @@ pub(crate) fn groups<'a>(
 ) -> Result<Vec<Tree>, CodegenError> {
     let &FormContext { arena, inputs, whole, held, .. } = written;
     let form = arrangement.word();
-    let Subject::Station(Station::BallBar(station)) = &run.subject else {
+    let Some(station) = run.subject.bar() else {
         return Err(CodegenError::NoSuchForm {
             form,
             why: "exists for the length of a ball bar only; use the form frames, or the bilinear order".to_string(),

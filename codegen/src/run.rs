@@ -3,8 +3,8 @@
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
 use abbe_model::frames::{Point, SinCos};
+use abbe_model::instrument::ballbar;
 use abbe_model::instrument::probe::ProbeGeometry;
-use abbe_model::instrument::{Station, ballbar};
 use abbe_model::scalar::{Nominal, Scalar};
 
 use crate::constant::ROUNDING;
@@ -130,20 +130,14 @@ impl<'m, S: Scalar> Run<'m, S> {
 
     /// The length error of the bar and the gain error of its sensor, if a bar is read and they are included.
     pub(crate) fn bar_parameters(&self) -> [Option<S>; 2] {
-        match self.subject {
-            Subject::Station(Station::BallBar(_)) => [ballbar::BAR, ballbar::GAIN].map(|slot| self.unknown(slot)),
-            _ => [None; 2],
-        }
+        let is_read = self.subject.bar().is_some();
+        [ballbar::BAR, ballbar::GAIN].map(|slot| self.unknown(slot).filter(|_| is_read))
     }
 
     /// The geometry of a probe's reading; `None` for any other subject.
     pub(crate) fn probe_geometry(&self) -> Option<ProbeGeometry<S>> {
-        match &self.subject {
-            Subject::Station(Station::Probe(probe)) => {
-                Some(probe.geometry(self.machine, &self.state, &self.errors, |slot| self.unknown(slot)))
-            }
-            _ => None,
-        }
+        let probe = self.subject.probe()?;
+        Some(probe.geometry(self.machine, &self.state, &self.errors, |slot| self.unknown(slot)))
     }
 
     /// The coordinates of the reading.
@@ -154,20 +148,18 @@ impl<'m, S: Scalar> Run<'m, S> {
     /// Computes the reading from its coordinate groups: the bar, or the stylus and step of a probe. `None` if the
     /// reading is the groups themselves.
     pub(crate) fn reading_of_groups(&self, groups: &[S]) -> Option<S> {
-        match (self.probe_geometry(), &self.subject) {
-            (Some(geometry), _) => Some(with_groups(&geometry, groups).distance()),
-            (None, Subject::Station(Station::BallBar(_))) => {
-                let [x, y, z] = [groups[0], groups[1], groups[2]];
-                Some(self.length_reading((x * x + y * y + z * z).sqrt()))
-            }
-            (None, _) => None,
+        if let Some(geometry) = self.probe_geometry() {
+            return Some(with_groups(&geometry, groups).distance());
         }
+        self.subject.bar()?;
+        let [x, y, z] = [groups[0], groups[1], groups[2]];
+        Some(self.length_reading((x * x + y * y + z * z).sqrt()))
     }
 
     /// The reading of a ball bar from the distance between its balls, with the parameters of the bar; the distance
     /// itself for any other subject.
     pub(crate) fn length_reading(&self, distance: S) -> S {
-        let Subject::Station(Station::BallBar(bar)) = &self.subject else {
+        let Some(bar) = self.subject.bar() else {
             return distance;
         };
         let [error, gain] = self.bar_parameters();

@@ -2,6 +2,8 @@
 
 use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
 use abbe_model::frames::Point;
+use abbe_model::instrument::ballbar::BallBar;
+use abbe_model::instrument::probe::Probe;
 use abbe_model::instrument::{InstrumentParameter, Station};
 use abbe_model::scalar::{Nominal, Scalar};
 
@@ -73,6 +75,24 @@ pub enum Subject<N> {
 }
 
 impl<N: Nominal> Subject<N> {
+    /// The instrument, if a reading is described.
+    pub fn station(&self) -> Option<&Station<N>> {
+        match self {
+            Subject::Station(station) => Some(station),
+            Subject::Volumetric { .. } => None,
+        }
+    }
+
+    /// The bar, if one is read.
+    pub(crate) fn bar(&self) -> Option<&BallBar<N>> {
+        self.station()?.bar()
+    }
+
+    /// The probe, if one touches.
+    pub(crate) fn probe(&self) -> Option<&Probe<N>> {
+        self.station()?.probe()
+    }
+
     /// The parameters of the instrument.
     pub fn unknowns(&self) -> &'static [InstrumentParameter] {
         match self {

@@ -1,6 +1,5 @@
 //! Truncated forms: built from the normal form, arranged for printing, and put back into the arena for code.
 
-use abbe_model::instrument::Station;
 use abbe_model::scalar::Nominal;
 
 use crate::collect::Collector;
@@ -11,7 +10,6 @@ use crate::normal_form::Ring;
 use crate::polynomial::Polynomial;
 use crate::program::Input;
 use crate::run::Run;
-use crate::subject::Subject;
 use crate::symbol::{Arena, Binary, Operand, Symbol, Unary};
 use crate::tree::{Tree, binary, product, sum};
 use crate::variable::Variable;
@@ -84,12 +82,12 @@ pub(crate) fn first<'a>(
     ring.keep(whole);
     ring.hold(held);
     let read_over = read_over(run, vectors);
-    let form = match (read_over.as_slice(), &run.subject) {
-        ([bar], Subject::Station(Station::BallBar(station))) => {
+    let form = match (read_over.as_slice(), run.subject.bar(), run.subject.probe()) {
+        ([bar], Some(station), _) => {
             let unknowns = run.bar_parameters().map(|unknown| unknown.map(Symbol::operand));
             FirstOrder::of_length(&mut ring, bar.components, station.bar.operand(), unknowns, parameters)?
         }
-        ([stylus, step], Subject::Station(Station::Probe(probe))) => {
+        ([stylus, step], _, Some(probe)) => {
             let nominal = probe.radius.operand();
             let radius = run.probe_geometry().map_or(nominal, |geometry| geometry.radius.operand());
             match probe.direction {
@@ -156,11 +154,7 @@ pub(crate) fn first<'a>(
 
 /// The vectors of which a scalar reading is a function: the bar, or the stylus and the step of a probe.
 fn read_over(run: &Run<'_, Symbol<'_>>, vectors: &[NamedVector]) -> Vec<NamedVector> {
-    let last = match run.subject {
-        Subject::Station(Station::BallBar(_)) => 1,
-        Subject::Station(Station::Probe(_)) => 2,
-        _ => 0,
-    };
+    let last = if run.subject.bar().is_some() { 1 } else { 2 * usize::from(run.subject.probe().is_some()) };
     vectors[vectors.len() - last..].to_vec()
 }
 

@@ -9,7 +9,7 @@ use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
 use abbe_model::frames::Point;
 use abbe_model::instrument::rtest::Setting;
-use abbe_model::instrument::{Station, displaced, probe};
+use abbe_model::instrument::{displaced, probe};
 use abbe_model::scalar::Nominal;
 
 use crate::program::Label;
@@ -52,59 +52,43 @@ pub(crate) fn of_subject<'a>(
     unknown: &impl Fn(usize) -> Option<Symbol<'a>>,
 ) -> Vec<NamedVector> {
     let walk = Walk { machine, state, errors };
-    match subject {
-        Subject::Station(Station::BallBar(bar)) => {
-            let p = displaced(bar.workpiece_ball, 0, unknown);
-            let q = displaced(bar.spindle_ball, 3, unknown);
-            let mut vectors = walk.on_workpiece_side(("p", "workpiece ball"), p);
-            vectors.extend(walk.on_tool_side(("q", "spindle ball"), q));
-            let (p, q) = bar.balls(machine, state, errors, unknown);
-            let meaning = "bar, from the spindle ball to the workpiece ball, in R";
-            vectors.push(named("b", p.minus(q), meaning));
-            vectors
-        }
-        Subject::Station(Station::Tracker(tracker)) => {
-            walk.on_tool_side(("q", "target"), displaced(tracker.target, 6, unknown))
-        }
-        Subject::Station(Station::Socket(socket)) => {
-            walk.on_tool_side(("q", "ball"), displaced(socket.ball, 3, unknown))
-        }
-        Subject::Station(Station::Probe(probe)) => {
-            let stylus = displaced(probe.stylus, probe::STYLUS, unknown);
-            let mut vectors = walk.on_tool_side(("q", "stylus"), stylus);
-            let stylus = machine.tool_point(state, errors, stylus);
-            let (step, _) = probe.step_at(machine, state);
-            let meaning = match probe.direction {
-                Some(_) => "step of the probe in R, 1 mm in the stated direction",
-                None => "step of the probe in R, all the way to the artefact's nominal axis",
-            };
-            vectors.push(named("n", step, meaning));
-            vectors.extend(walk.through_the_table(("q", "stylus"), stylus));
-            vectors.extend(walk.through_the_table(("r", "a step ahead"), stylus.plus(step)));
-            let geometry = probe.geometry(machine, state, errors, unknown);
-            let meaning = "position of the stylus perpendicular to the artefact's axis";
-            vectors.push(named("v", geometry.stylus, meaning));
-            vectors.push(named("u", geometry.step, "the step perpendicular to the artefact's axis"));
-            vectors
-        }
-        // The point that does not carry the sensors; the sensors' point is the origin of the difference.
-        Subject::Station(Station::RTest(rtest)) => match rtest.setting {
-            Setting::Table => walk.on_tool_side(("q", "master ball"), displaced(rtest.spindle_ball, 3, unknown)),
-            Setting::Spindle => {
-                walk.on_workpiece_side(("p", "master ball"), displaced(rtest.workpiece_ball, 0, unknown))
-            }
-        },
-        Subject::Station(Station::Laser(laser)) => {
-            let mut vectors = walk.on_workpiece_side(("p", "optic"), displaced(laser.optic, 3, unknown));
-            vectors.extend(walk.on_tool_side(("q", "reflector"), displaced(laser.reflector, 0, unknown)));
-            vectors
-        }
-        Subject::Station(Station::Distance(distance)) => {
-            walk.on_tool_side(("q", "reflector"), displaced(distance.reflector, 3, unknown))
-        }
-        Subject::Station(Station::Angle(_) | Station::Pointing(_)) => Vec::new(),
-        Subject::Volumetric { tool } => walk.on_tool_side(("q", "tool point"), Point::nominal(*tool)),
+    let station = match subject {
+        Subject::Station(station) => station,
+        Subject::Volumetric { tool } => return walk.on_tool_side(("q", "tool point"), Point::nominal(*tool)),
+    };
+    if let Some(probe) = station.probe() {
+        let stylus = displaced(probe.stylus, probe::STYLUS, unknown);
+        let mut vectors = walk.on_tool_side(("q", "stylus"), stylus);
+        let stylus = machine.tool_point(state, errors, stylus);
+        let (step, _) = probe.step_at(machine, state);
+        let meaning = match probe.direction {
+            Some(_) => "step of the probe in R, 1 mm in the stated direction",
+            None => "step of the probe in R, all the way to the artefact's nominal axis",
+        };
+        vectors.push(named("n", step, meaning));
+        vectors.extend(walk.through_the_table(("q", "stylus"), stylus));
+        vectors.extend(walk.through_the_table(("r", "a step ahead"), stylus.plus(step)));
+        let geometry = probe.geometry(machine, state, errors, unknown);
+        let meaning = "position of the stylus perpendicular to the artefact's axis";
+        vectors.push(named("v", geometry.stylus, meaning));
+        vectors.push(named("u", geometry.step, "the step perpendicular to the artefact's axis"));
+        return vectors;
     }
+    let mut vectors = Vec::new();
+    let [on_table, on_tool] = station.points();
+    // The point of an R-test that carries the sensors is the origin of the difference.
+    let carrier = station.rtest().map(|rtest| rtest.setting);
+    if let Some(point) = on_table.filter(|_| carrier != Some(Setting::Table)) {
+        vectors.extend(walk.on_workpiece_side(("p", point.name), displaced(*point.mm, point.first, unknown)));
+    }
+    if let Some(point) = on_tool.filter(|_| carrier != Some(Setting::Spindle)) {
+        vectors.extend(walk.on_tool_side(("q", point.name), displaced(*point.mm, point.first, unknown)));
+    }
+    if let Some(bar) = station.bar() {
+        let (p, q) = bar.balls(machine, state, errors, unknown);
+        vectors.push(named("b", p.minus(q), "bar, from the spindle ball to the workpiece ball, in R"));
+    }
+    vectors
 }
 
 /// A vector that needs no frame.

@@ -13,7 +13,6 @@
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
 use abbe_model::frames::{Point, cross};
-use abbe_model::instrument::Station;
 use abbe_model::instrument::rtest::{Orientation, RTest, SENSOR, Setting};
 use abbe_model::session::{placing, readings::Readings};
 use nalgebra::{Matrix3, Vector3};
@@ -54,7 +53,7 @@ pub fn views(problem: &Problem, fit: &Fit) -> Result<Vec<Vec<DirectionComponents
     let values = problem.slot_values(&fit.beta);
     let mut all = Vec::with_capacity(problem.tests.len());
     for (number, test) in problem.tests.iter().enumerate() {
-        let (Station::RTest(rtest), Some(readings)) = (&test.station, &test.readings) else {
+        let (Some(rtest), Some(readings)) = (test.station.rtest(), &test.readings) else {
             return Err(IdentifyError::Request(format!(
                 "directional components need an r-test; this session's instrument is a {}",
                 problem.session.instrument.word()

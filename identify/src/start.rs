@@ -1,11 +1,8 @@
-//! Start values without user input: poses of trackers, positions of sockets.
+//! Start values without user input: poses of instruments that stand beside the machine, orientations of bodies at the
+//! tool, positions of sockets.
 
-use abbe_model::chain::{BodyErrors, Machine};
-use abbe_model::frames::Point;
-use abbe_model::instrument::Station;
-use abbe_model::session::readings::Readings;
+use abbe_model::instrument::{Group, InstrumentKind, SharedBy, Station};
 use abbe_model::session::{Session, Test};
-use nalgebra::Vector3;
 
 /// The stations of the tests, with start values for free poses and sockets from which the iterations converge.
 pub fn stations(session: &Session, tests: &[Test]) -> Vec<Station<f64>> {
@@ -20,37 +17,35 @@ pub fn stations(session: &Session, tests: &[Test]) -> Vec<Station<f64>> {
             }
         }
     }
-    let places: Vec<Option<&str>> = tests.iter().map(|test| test.free_place()).collect();
-    for index in 0..tests.len() {
-        if places[index].is_none() || places[..index].contains(&places[index]) {
-            continue;
-        }
-        let members: Vec<usize> = (0..tests.len()).filter(|other| places[*other] == places[index]).collect();
-        let (mut points, mut observed) = (Vec::new(), Vec::new());
-        for member in &members {
-            if let Some(readings) = &tests[*member].readings {
-                points.extend(nominal_points(&session.machine, &stations[*member], readings));
-                observed.extend(readings.observed.chunks_exact(3).map(Vector3::from_row_slice));
-            }
-        }
-        for member in members {
-            if let Some(placed) = stations[member].placed(&points, &observed) {
-                stations[member] = placed;
-            }
-        }
-    }
+    // The objects of a place that no session knows first, then those at the tool that refer to them.
+    let place = |test: &Test| Some((test.station.kind(), test.free_place()?.to_string()));
+    found_from_readings(session, tests, &mut stations, place, |station, group| station.placed(group));
+    let mount = |test: &Test| Some((test.station.kind(), test.group(SharedBy::SpindleSetup).to_string()));
+    found_from_readings(session, tests, &mut stations, mount, |station, group| station.mounted(group));
     stations
 }
 
-/// The nominal position of the instrument's tool-frame point in R, at every row.
-pub(crate) fn nominal_points(machine: &Machine, station: &Station<f64>, readings: &Readings) -> Vec<Vector3<f64>> {
-    let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
-    let mut state = Vec::new();
-    (0..readings.rows())
-        .map(|row| {
-            readings.state(machine, row, &mut state);
-            let point = machine.tool_point(&state, &none, Point(station.tool_point_mm()));
-            Vector3::from(point.0)
-        })
-        .collect()
+/// Replaces the stations of each group of tests by those that agree best with the readings of the group.
+fn found_from_readings(
+    session: &Session,
+    tests: &[Test],
+    stations: &mut [Station<f64>],
+    group: impl Fn(&Test) -> Option<(InstrumentKind, String)>,
+    found: impl Fn(&Station<f64>, &Group<'_>) -> Option<Station<f64>>,
+) {
+    let groups: Vec<_> = tests.iter().map(group).collect();
+    for index in 0..tests.len() {
+        if groups[index].is_none() || groups[..index].contains(&groups[index]) {
+            continue;
+        }
+        let members: Vec<usize> = (0..tests.len()).filter(|other| groups[*other] == groups[index]).collect();
+        let read = |member: &usize| Some((&stations[*member], tests[*member].readings.as_deref()?));
+        let group = Group { machine: &session.machine, tests: members.iter().filter_map(read).collect() };
+        let changed: Vec<_> = members.iter().map(|member| found(&stations[*member], &group)).collect();
+        for (member, station) in members.into_iter().zip(changed) {
+            if let Some(station) = station {
+                stations[member] = station;
+            }
+        }
+    }
 }

@@ -14,7 +14,6 @@
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
-use abbe_model::instrument::Station;
 
 use crate::parameters::Role;
 use crate::plausibility::Plausibility;
@@ -104,7 +103,7 @@ pub fn has_candidates(problem: &Problem) -> bool {
     let has_errors = problem.parameters.list.iter().any(|parameter| parameter.role == Role::Error);
     let last = session.tests.last().map(|test| &test.station);
     has_errors
-        && matches!(last, Some(Station::BallBar(_)))
+        && last.is_some_and(|station| station.bar().is_some())
         && session.machine.axes.iter().any(|axis| axis.kind == AxisKind::Rotary)
 }
 

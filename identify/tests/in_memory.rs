@@ -7,7 +7,6 @@ use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::files::read::add_node;
 use abbe_model::files::table::memory::MemoryColumn;
-use abbe_model::instrument::InstrumentKind;
 use abbe_model::session::Session;
 use serde_json::json;
 
@@ -23,7 +22,7 @@ fn length(c: f64) -> f64 {
 
 #[test]
 fn the_offset_of_an_axis_is_found_in_readings_in_memory() {
-    let mut session = Session::new(Machine::from_code("[wCAbYXZt]").unwrap(), InstrumentKind::BallBar);
+    let mut session = Session::new(Machine::from_code("[wCAbYXZt]").unwrap(), "ballbar".parse().unwrap());
     session.noise_mm = Some(0.1e-3);
     session.unknowns = ["EX0C", "EY0C"].iter().filter_map(|name| ErrorName::parse(name)).collect();
     let forward: Vec<f64> = (0..180).map(|k| TAU * f64::from(k) / 180.0).collect();

@@ -44,11 +44,8 @@ fn machine() -> Machine {
 }
 
 fn station() -> Station<f64> {
-    Station::BallBar(BallBar {
-        workpiece_ball: [0.0, LENGTHS[1], LENGTHS[2] - LENGTHS[3]],
-        spindle_ball: [0.0; 3],
-        bar: 150.0,
-    })
+    let workpiece_ball = [0.0, LENGTHS[1], LENGTHS[2] - LENGTHS[3]];
+    BallBar { workpiece_ball, spindle_ball: [0.0; 3], bar: 150.0 }.into()
 }
 
 fn eight(machine: &Machine) -> Vec<usize> {

@@ -35,7 +35,8 @@
 //!
 //! let machine = Machine::from_code("[wCAbYXZt]")?;
 //! // Ball at R = 100 mm on the table, the other on the axis 75 mm above: L₀ = 125 mm.
-//! let bar = Station::BallBar(BallBar { workpiece_ball: [0.0, 100.0, 0.0], spindle_ball: [0.0; 3], bar: 125.0 });
+//! let bar = BallBar { workpiece_ball: [0.0, 100.0, 0.0], spindle_ball: [0.0; 3], bar: 125.0 };
+//! let bar: Station<f64> = bar.into();
 //! let c = 0.7_f64;
 //! assert!((reading(&machine, &bar, c, 0.0_f64) - 125.0).abs() < 1e-12);
 //! let with = reading(&machine, &bar, c, Dual64::from(0.0).derivative());

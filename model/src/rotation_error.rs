@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use schemars::JsonSchema;
 
 use crate::chain::{AxisPosition, BodyErrors, Machine};
-use crate::frames::{Point, Rotation, cross};
+use crate::frames::{Point, Rotation, SmallMotion, cross};
 use crate::scalar::{Nominal, Scalar};
 
 /// The frame whose rotation is read, and its reference.
@@ -38,12 +38,35 @@ impl Machine {
         errors: &[BodyErrors<S>],
         body: Body,
     ) -> Point<S> {
-        let unit = |i: usize| Point(std::array::from_fn(|k| S::constant(if i == k { 1.0 } else { 0.0 })));
-        let [frame, reference] = match body {
-            Body::Relative => [self.turned(state, errors, false), self.turned(state, errors, true)],
-            Body::Tool => [self.turned(state, errors, false), None],
-            Body::Table => [self.turned(state, errors, true), None],
+        let of = |is_table: bool| self.turned(state, errors, is_table, None);
+        match body {
+            Body::Relative => self.rotation_vector(of(false), of(true)),
+            Body::Tool => self.rotation_vector(of(false), None),
+            Body::Table => self.rotation_vector(of(true), None),
+        }
+    }
+
+    /// The rotation vector of the tool frame in R, rad, as [`Machine::rotation_error`], with a small rotation of a body in
+    /// the tool frame before the axes, and of the frame that it is read in after them.
+    pub fn rotation_error_of_body<S: Scalar>(
+        &self,
+        state: &[AxisPosition<S::Nominal>],
+        errors: &[BodyErrors<S>],
+        [in_tool, in_r]: [Option<&SmallMotion<S>>; 2],
+    ) -> Point<S> {
+        let frame = self.turned(state, errors, false, in_tool);
+        let frame = match in_r {
+            Some(motion) => {
+                let directions = frame.unwrap_or_else(|| std::array::from_fn(unit));
+                Some(directions.map(|direction| motion.rotate(direction)))
+            }
+            None => frame,
         };
+        self.rotation_vector(frame, None)
+    }
+
+    /// The rotation vector that turns the directions of a reference into those of a frame; `None` for those of R.
+    fn rotation_vector<S: Scalar>(&self, frame: Option<[Point<S>; 3]>, reference: Option<[Point<S>; 3]>) -> Point<S> {
         let mut sum = Point([S::constant(0.0); 3]);
         if frame.is_none() && reference.is_none() {
             return sum;
@@ -74,30 +97,37 @@ impl Machine {
     }
 
     /// The directions of R as a frame carries them from its commanded to its actual orientation; `None` for a side
-    /// without errors.
+    /// without errors. A small rotation turns them in the frame.
     fn turned<S: Scalar>(
         &self,
         state: &[AxisPosition<S::Nominal>],
         errors: &[BodyErrors<S>],
         of_table: bool,
+        in_frame: Option<&SmallMotion<S>>,
     ) -> Option<[Point<S>; 3]> {
         let side = if of_table { 0..self.workpiece_side } else { self.workpiece_side..self.axes.len() };
-        if errors.get(side.clone()).is_none_or(|errors| errors.iter().all(BodyErrors::turns_nothing)) {
+        let turns = errors.get(side.clone()).is_some_and(|errors| !errors.iter().all(BodyErrors::turns_nothing));
+        if !turns && in_frame.is_none() {
             return None;
         }
         // Outwards from the bed on the way back, inwards on the way to it.
         let outwards: Vec<usize> = if of_table { side.rev().collect() } else { side.collect() };
         Some(std::array::from_fn(|i| {
-            let unit = Point(std::array::from_fn(|k| S::constant(if i == k { 1.0 } else { 0.0 })));
             let commanded = outwards
                 .iter()
-                .fold(unit, |direction, axis| BodyErrors::turn_back(&self.axes[*axis], &state[*axis], direction));
+                .fold(unit(i), |direction, axis| BodyErrors::turn_back(&self.axes[*axis], &state[*axis], direction));
+            let commanded = in_frame.map_or(commanded, |motion| motion.rotate(commanded));
             outwards
                 .iter()
                 .rev()
                 .fold(commanded, |direction, axis| errors[*axis].turn(&self.axes[*axis], &state[*axis], direction))
         }))
     }
+}
+
+/// A direction of R.
+fn unit<S: Scalar>(i: usize) -> Point<S> {
+    Point(std::array::from_fn(|k| S::constant(if i == k { 1.0 } else { 0.0 })))
 }
 
 #[cfg(test)]

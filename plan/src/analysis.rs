@@ -1,6 +1,5 @@
 //! The analysis of a plan: predicted uncertainties, identifiability and efficiency before the measurement.
 
-use abbe_model::instrument::Station;
 use abbe_model::sensitivity::SlotValues;
 use abbe_model::session::Session;
 
@@ -149,13 +148,10 @@ fn summary(problem: &Problem, number: usize) -> TestSummary {
         name: test.name.clone(),
         readings: readings.map_or(0, |readings| readings.rows()),
         moving_min: time.first().zip(time.last()).map(|(first, last)| (last - first) / 60.0),
-        reach_mm: match model.station() {
-            Station::BallBar(bar) => {
-                let nominal = model.readings(&SlotValues::zero(model.slots()));
-                Some(nominal.iter().fold(0.0, |most: f64, reading| most.max((reading - bar.bar).abs())))
-            }
-            _ => None,
-        },
+        reach_mm: model.station().bar().map(|bar| {
+            let nominal = model.readings(&SlotValues::zero(model.slots()));
+            nominal.iter().fold(0.0, |most: f64, reading| most.max((reading - bar.bar).abs()))
+        }),
         setup: mounted(test).to_string(),
     }
 }

@@ -1,6 +1,5 @@
 //! Positions of the carried ball in candidate tests, and positions of the rotary axes that do not sweep.
 
-use abbe_model::instrument::Station;
 use abbe_model::session::Session;
 
 use super::test_variations::TestVariations;
@@ -28,7 +27,7 @@ pub(super) fn ball_positions(
     let machine = &session.machine;
     let mut positions: Vec<BallPosition> = Vec::new();
     for test in &session.tests {
-        let Station::BallBar(bar) = &test.station else {
+        let Some(bar) = test.station.bar() else {
             continue;
         };
         let (ball, setup) = if on_table {
@@ -123,7 +122,6 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use abbe_model::chain::Machine;
-    use abbe_model::instrument::InstrumentKind;
 
     use super::*;
 
@@ -134,7 +132,7 @@ mod tests {
         let mut machine = Machine::from_code("w C A b Y X Z t").unwrap();
         machine.axes[0].origin_mm = [10.0, 20.0, 30.0];
         machine.axes[1].origin_mm = [0.0, 5.0, -40.0];
-        let session = Session::new(machine, InstrumentKind::BallBar);
+        let session = Session::new(machine, "ballbar".parse().unwrap());
         let variations =
             TestVariations { radii_mm: vec![60.0, 90.0], heights_mm: vec![0.0, 25.0], ..TestVariations::default() };
         let balls_about = |about: usize| -> Vec<[f64; 2]> {

@@ -112,18 +112,13 @@ struct Choice<'b> {
 impl Choice<'_> {
     /// The calibrated length of the bar in the session, or its nominal length.
     fn length(&self, nominal: f64) -> f64 {
-        let bars = self.session.tests.iter().filter_map(|test| match &test.station {
-            Station::BallBar(bar) => Some(bar.bar),
-            _ => None,
-        });
-        bars.into_iter().find(|bar| (bar - nominal).abs() <= 1.0).unwrap_or(nominal)
+        let mut bars = self.session.tests.iter().filter_map(|test| Some(test.station.bar()?.bar));
+        bars.find(|bar| (bar - nominal).abs() <= 1.0).unwrap_or(nominal)
     }
 
     fn station(&self, nominal: f64) -> BallBar<f64> {
-        let mut bar = match &self.last.station {
-            Station::BallBar(bar) => bar.clone(),
-            _ => BallBar { workpiece_ball: [0.0; 3], spindle_ball: [0.0; 3], bar: 0.0 },
-        };
+        let none = || BallBar { workpiece_ball: [0.0; 3], spindle_ball: [0.0; 3], bar: 0.0 };
+        let mut bar = self.last.station.bar().cloned().unwrap_or_else(none);
         bar.bar = self.length(nominal);
         if self.on_table {
             bar.workpiece_ball = self.ball.ball;
@@ -164,11 +159,8 @@ impl Choice<'_> {
         if !self.ball.new {
             name.push_str(&format!(" ({ball} as in {})", self.ball.setup));
         }
-        let geometry = Station::BallBar(BallBar {
-            workpiece_ball: station.workpiece_ball.map(Length::Number),
-            spindle_ball: station.spindle_ball.map(Length::Number),
-            bar: Length::Number(station.bar),
-        });
+        let station: Station<f64> = station.into();
+        let geometry = station.map(|length| Length::Number(*length));
         let unique = "proposed".to_string();
         let setup = match (self.on_table, self.ball.new) {
             (true, false) => self.ball.setup.clone(),
@@ -178,7 +170,7 @@ impl Choice<'_> {
         let priors = self.priors(nominal);
         let test = Test {
             name: unique.clone(),
-            station: Station::BallBar(station),
+            station,
             geometry,
             priors,
             setup,
@@ -196,10 +188,8 @@ impl Choice<'_> {
     /// The set-up priors: those of the session's last test, and for the bar those of the same bar.
     fn priors(&self, nominal: f64) -> Vec<Prior> {
         let mut priors = self.last.priors.clone();
-        let same_bar = self.session.tests.iter().find(|test| match &test.station {
-            Station::BallBar(bar) => (bar.bar - nominal).abs() <= 1.0,
-            _ => false,
-        });
+        let is_same = |test: &&Test| test.station.bar().is_some_and(|bar| (bar.bar - nominal).abs() <= 1.0);
+        let same_bar = self.session.tests.iter().find(is_same);
         if let Some(test) = same_bar {
             priors[BAR] = test.priors[BAR];
         }
@@ -313,7 +303,7 @@ mod tests {
         let mut session = files::session(&file, &ReadOptions { read_data: false, ..ReadOptions::default() }).unwrap();
         let bars = [(99.9881, 1e-4), (149.9946, 2e-4), (100.4, 7e-4)];
         for (test, (bar, u)) in session.tests.iter_mut().zip(bars.into_iter().chain([(310.0, 9e-4)])) {
-            let Station::BallBar(station) = &mut test.station else { panic!("a ball bar") };
+            let Some(station) = test.station.bar_mut() else { panic!("a ball bar") };
             station.bar = bar;
             test.priors[BAR] = Prior::Gaussian(u);
         }
@@ -322,7 +312,7 @@ mod tests {
         for nominal in [50.0, 100.0, 150.0] {
             let variations = TestVariations { bars_mm: vec![nominal], ..TestVariations::short() };
             for draft in drafts(&session, &variations, &last) {
-                let Station::BallBar(station) = &draft.test.station else { panic!("a ball bar") };
+                let Some(station) = draft.test.station.bar() else { panic!("a ball bar") };
                 let wanted = match nominal {
                     100.0 => (99.9881, 1e-4),
                     150.0 => (149.9946, 2e-4),

@@ -8,7 +8,6 @@
 
 use std::sync::Arc;
 
-use abbe_model::instrument::Station;
 use abbe_model::session::{Session, Test};
 use abbe_model::words::{counted, number};
 
@@ -37,7 +36,7 @@ pub struct CandidateTest {
 /// # Errors
 /// If the instrument is no ball bar, or no rotary axis can be swept.
 pub fn candidate_tests(session: &Session, variations: &TestVariations) -> Result<Vec<CandidateTest>, PlanError> {
-    let Some(last) = session.tests.last().filter(|test| matches!(test.station, Station::BallBar(_))) else {
+    let Some(last) = session.tests.last().filter(|test| test.station.bar().is_some()) else {
         return Err(PlanError::Request(
             "candidate tests are available for ball bars only; this session uses another instrument".to_string(),
         ));
@@ -70,10 +69,7 @@ pub fn candidate_tests(session: &Session, variations: &TestVariations) -> Result
 /// Plans the states of a candidate test. `None` if the travel forbids them or the bar does not reach.
 fn finished(session: &Session, bodies: &Bodies, variations: &TestVariations, draft: Draft) -> Option<CandidateTest> {
     let Draft { mut test, name, new_setup } = draft;
-    let Station::BallBar(bar) = &test.station else {
-        return None;
-    };
-    let length = bar.bar;
+    let length = test.station.bar()?.bar;
     let mut readings = states::planned(session, &test).ok()?;
     if readings.observed.iter().any(|reading| (reading - length).abs() > variations.reach_mm) {
         return None;

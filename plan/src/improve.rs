@@ -313,10 +313,9 @@ fn step(
         .filter(|j| unidentifiable(&u_before, *j) && !unidentifiable(&u_after, *j))
         .map(|j| shared.ids[first + j].clone())
         .collect();
-    let (workpiece_ball_mm, spindle_ball_mm, bar_mm) = match &candidate.test.station {
-        abbe_model::instrument::Station::BallBar(bar) => (bar.workpiece_ball, bar.spindle_ball, bar.bar),
-        _ => ([0.0; 3], [0.0; 3], 0.0),
-    };
+    let bar = candidate.test.station.bar();
+    let (workpiece_ball_mm, spindle_ball_mm, bar_mm) =
+        bar.map_or(([0.0; 3], [0.0; 3], 0.0), |bar| (bar.workpiece_ball, bar.spindle_ball, bar.bar));
     ProposedTest {
         test: candidate.name.clone(),
         after: outside(&root),

@@ -3,7 +3,6 @@
 use abbe_model::document::of_domain;
 use abbe_model::document::print::Block;
 use abbe_model::document::test::Test as Document;
-use abbe_model::instrument::Station;
 use abbe_model::instrument::ballbar::BAR;
 use abbe_model::session::motion::Motion;
 use abbe_model::session::{Session, Test};
@@ -29,9 +28,7 @@ pub fn proposal(
     variations: &TestVariations,
     taken: &mut Vec<String>,
 ) -> Option<Block<Document>> {
-    let Station::BallBar(bar) = &candidate.station else {
-        return None;
-    };
+    let bar = candidate.station.bar()?;
     let mut test = Test { readings: None, ..candidate.clone() };
     let axis = match test.motion.as_mut()? {
         Motion::Sweep { axis, step, .. } | Motion::Follow { axis, step, .. } => {

@@ -2,7 +2,7 @@
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
-use abbe_model::instrument::Station;
+use abbe_model::instrument::InstrumentPoint;
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::session::placing::{balls, positions_for_bar};
 use abbe_model::session::readings::Readings;
@@ -31,8 +31,8 @@ pub struct TestSheet {
     pub mounts: Vec<String>,
     /// The instrument's point in the table frame, mm, and its standard uncertainty, mm; `None` if it has none.
     pub table_point: Option<PlacedPoint>,
-    /// The instrument's point in the tool frame.
-    pub tool_point: PlacedPoint,
+    /// The instrument's point in the tool frame, if it has one.
+    pub tool_point: Option<PlacedPoint>,
     /// The calibrated length of a ball bar, mm.
     pub bar_mm: Option<f64>,
     /// The axes.
@@ -57,6 +57,8 @@ pub struct TestSheet {
 /// A point of the instrument.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlacedPoint {
+    /// What is there: `spindle ball`, `reflector`.
+    pub name: &'static str,
     /// In its frame, mm.
     pub own_mm: [f64; 3],
     /// In R at the start, mm.
@@ -134,22 +136,21 @@ fn sheet(
     });
     let (mounts, mounted) = mounts(earlier, test);
     let moving_s = readings.time_s.last().zip(readings.time_s.first()).map_or(0.0, |(last, first)| last - first);
-    let point = |own_mm: [f64; 3], start: Option<&[f64; 3]>, first: usize| PlacedPoint {
-        own_mm,
+    let point = |point: InstrumentPoint<'_, f64>, start: Option<&[f64; 3]>| PlacedPoint {
+        name: point.name,
+        own_mm: *point.mm,
         start_mm: start.copied().unwrap_or_default(),
-        u_mm: uncertainty_mm(test, first),
+        u_mm: uncertainty_mm(test, point.first),
     };
-    let table_point = test.station.table_point_mm().map(|own| point(own, path.workpiece_mm.first(), 0));
+    let [on_table, on_tool] = test.station.points();
+    let table_point = on_table.map(|own| point(own, path.workpiece_mm.first()));
     let poses = if path.is_path { Vec::new() } else { poses(machine, readings) };
     TestSheet {
         name: test.name.clone(),
         mounts,
         table_point,
-        tool_point: point(test.station.tool_point_mm(), path.tool_mm.first(), 3),
-        bar_mm: match &test.station {
-            Station::BallBar(bar) => Some(bar.bar),
-            _ => None,
-        },
+        tool_point: on_tool.map(|own| point(own, path.tool_mm.first())),
+        bar_mm: test.station.bar().map(|bar| bar.bar),
         axes: axes.collect(),
         centring: centring(machine, test, &start),
         path,
@@ -161,11 +162,8 @@ fn sheet(
     }
 }
 
-/// The prior of three coordinates, if the instrument has two balls.
+/// The prior of three coordinates.
 fn uncertainty_mm(test: &Test, first: usize) -> Option<[f64; 3]> {
-    let Station::BallBar(_) = &test.station else {
-        return None;
-    };
     let of = |prior: &Prior| match prior {
         Prior::Known => 0.0,
         Prior::Gaussian(u) => *u,
@@ -187,20 +185,17 @@ fn mounts(earlier: &[Test], test: &Test) -> (Vec<String>, usize) {
             words.push(format!("{thing}: mount it"));
         }
     };
-    match &test.station {
-        Station::BallBar(_) => {
-            note("Workpiece ball", shared(|test| &test.setup));
-            note("Spindle ball", shared(|test| &test.spindle_setup));
-            match shared(|test| &test.bar_setup) {
-                Some(other) => words.push(format!("Bar: stays assembled as in test {}", other.name)),
-                None => words.push("Bar: assemble it".to_string()),
-            }
+    let groups: [fn(&Test) -> &str; 2] = [|test| &test.setup, |test| &test.spindle_setup];
+    for (point, group) in test.station.points().iter().zip(groups) {
+        if let Some(point) = point {
+            let (first, rest) = point.name.split_at(1);
+            note(&format!("{}{rest}", first.to_uppercase()), shared(group));
         }
-        _ => {
-            if test.station.table_point_mm().is_some() {
-                note("Device on the table", shared(|test| &test.setup));
-            }
-            note("Device in the tool holder", shared(|test| &test.spindle_setup));
+    }
+    if test.station.bar().is_some() {
+        match shared(|test| &test.bar_setup) {
+            Some(other) => words.push(format!("Bar: stays assembled as in test {}", other.name)),
+            None => words.push("Bar: assemble it".to_string()),
         }
     }
     (words, mounted)
@@ -208,9 +203,7 @@ fn mounts(earlier: &[Test], test: &Test) -> (Vec<String>, usize) {
 
 /// The positions at which the two balls of a bar coincide, mm and degrees.
 fn centring(machine: &Machine, test: &Test, start: &[f64]) -> Option<Vec<f64>> {
-    let Station::BallBar(bar) = &test.station else {
-        return None;
-    };
+    let bar = test.station.bar()?;
     let at = positions_for_bar(machine, bar, start, [0.0; 3])?;
     let inside = machine
         .axes
@@ -254,6 +247,5 @@ mod tests {
             assert!(found.iter().all(|u| (u - wanted).abs() < 1e-15), "{found:?}");
         }
         assert!(uncertainty_mm(&test, test.priors.len() - 2).is_none());
-        assert!(uncertainty_mm(&of("r-test/plan.toml"), 0).is_none());
     }
 }

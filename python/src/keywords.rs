@@ -7,7 +7,6 @@
 use abbe::model::document::node::{Entry, Node, Value};
 use abbe::model::document::schema;
 use abbe::model::files::table::memory::{MemoryColumn, Values};
-use abbe::model::instrument::InstrumentKind;
 use abbe::model::session::Session;
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -46,7 +45,7 @@ impl<'py> Keywords<'py> {
     /// Sorts the keywords of a test.
     pub fn of_test(session: &Session, keywords: &Bound<'py, PyDict>) -> PyResult<Keywords<'py>> {
         let kind = match keywords.get_item("kind")? {
-            Some(word) => InstrumentKind::of_word(&word.extract::<String>()?).unwrap_or(session.instrument),
+            Some(word) => word.extract::<String>()?.parse().unwrap_or(session.instrument),
             None => session.instrument,
         };
         let keys = schema::keys_of_test(kind).into_iter().map(|(key, _)| key);

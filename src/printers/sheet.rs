@@ -136,9 +136,8 @@ fn page_of(session: &Session, sheet: &TestSheet, number: usize, count: usize, ba
 
 /// Coordinates of the instrument's points.
 fn points(sheet: &TestSheet) -> Markup {
-    let is_bar = sheet.bar_mm.is_some();
-    let row = |name: &str, point: &PlacedPoint| {
-        let mut row: Vec<Cell> = vec![name.into()];
+    let row = |frame: &str, point: &PlacedPoint| {
+        let mut row: Vec<Cell> = vec![format!("{}, from the {frame}", point.name).into()];
         row.extend(point.own_mm.map(|mm| Cell::fixed(mm, 3)));
         let u = point.u_mm.map_or(String::new(), |u| {
             let um = |mm: &f64| {
@@ -154,13 +153,11 @@ fn points(sheet: &TestSheet) -> Markup {
         row.push(u.into());
         row
     };
-    let names = if is_bar {
-        ["workpiece ball, from the table", "spindle ball, from the tool"]
-    } else {
-        ["point of the table", "point of the tool"]
-    };
-    let mut rows: Vec<Vec<Cell>> = sheet.table_point.iter().map(|point| row(names[0], point)).collect();
-    rows.push(row(names[1], &sheet.tool_point));
+    let on_table = sheet.table_point.iter().map(|point| row("table", point));
+    let rows: Vec<Vec<Cell>> = on_table.chain(sheet.tool_point.iter().map(|point| row("tool", point))).collect();
+    if rows.is_empty() {
+        return html! {};
+    }
     html! {
         (table(&Table::new(["centre, mm", ">X", ">Y", ">Z", ">u, µm"], rows).without_empty_columns()))
         p class="note" { "Table frame and tool frame are R with all axes at zero." }

@@ -37,7 +37,7 @@ pub fn report(
     let mut report = Report::new(format!("Fit of {}", problem.session.machine.name));
     report.warnings.clone_from(&result.warnings);
     report.method = method(result);
-    let opening = statements::opening(statements, result.degrees_of_freedom, commands);
+    let opening = statements::opening(statements, &problem.session, result.degrees_of_freedom, commands);
     let rank = rank(result.identifiable.len(), result.parameter_count, result.rank);
     let noise = noise(result.noise_um, result.reading_unit, result.noise_source);
     let extent = format!("{}, {noise}; {rank}.", counted(result.readings, "reading"));
@@ -128,7 +128,9 @@ fn next(problem: &Problem, result: &FitResult, step: NextStep, commands: &Comman
     let test = |purpose: &str| format!("propose the test that {purpose}");
     match step {
         NextStep::CorrectSession => add("correct the session".into(), "remove what the readings contradict"),
-        NextStep::StateNoise => add("state `noise_um` or repeat a run".into(), "have χ² judge the model"),
+        NextStep::StateNoise => {
+            add(format!("state {} or repeat a run", problem.session.keys_of_noise()), "have χ² judge the model");
+        }
         NextStep::Improve => add(commands.command("plan", "--improve"), &test(IMPROVES)),
         NextStep::Identify => add(commands.command("plan", "--improve"), &test(IDENTIFIES)),
         _ => {}

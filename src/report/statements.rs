@@ -11,6 +11,7 @@ use abbe::identify::results::{
 use abbe::identify::tolerance::rule::Decision;
 use abbe::identify::validate::ValidationVerdict;
 use abbe::identify::validate::results::MovedParameter;
+use abbe::model::session::Session;
 use abbe::model::words::{counted, first_of};
 use abbe::plan::PlanStatement;
 use abbe::plan::results::{Contribution, ErrorAnalysis, PlanAnalysis};
@@ -34,10 +35,21 @@ const MIN_NOISE_SHARE: f64 = 0.1;
 const DIRECTION_PLACES: usize = 6;
 
 /// The statements as sentences that open a report.
-pub fn opening(statements: &Statements, degrees_of_freedom: usize, commands: &Commands) -> Vec<Sentence> {
+pub fn opening(
+    statements: &Statements,
+    session: &Session,
+    degrees_of_freedom: usize,
+    commands: &Commands,
+) -> Vec<Sentence> {
     let good = good("Goodness of fit", &statements.good, degrees_of_freedom);
     let mut sentences = vec![good.into(), correct(statements).into()];
-    sentences.extend(measure(&statements.measure, commands));
+    if statements.measure.step == NextStep::StateNoise {
+        let keys = session.keys_of_noise();
+        let what = format!("a run once more, or state {keys}: only then can the model be judged");
+        sentences.push(format!("What to measure next: {what}").into());
+    } else {
+        sentences.extend(measure(&statements.measure, commands));
+    }
     sentences
 }
 
@@ -108,7 +120,7 @@ fn measure(statement: &MeasureStatement, commands: &Commands) -> Vec<Sentence> {
     match statement.step {
         NextStep::CorrectSession => one("nothing before the session is corrected: the readings contradict it"),
         NextStep::Trace => one(&format!("nothing before {}", command("trace", ""))),
-        NextStep::StateNoise => one("a run once more, or state `noise_um`: only then can the model be judged"),
+        NextStep::StateNoise => one("a run once more, or state the noise: only then can the model be judged"),
         NextStep::SeparatingTest => {
             let test = statement.description.as_deref().unwrap_or_default();
             with_program(format!("What to measure next: {test}"), "trace", &format!("--write {next} --with-tests"))

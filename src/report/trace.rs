@@ -44,7 +44,7 @@ pub fn report(
     sentences.extend(uniqueness::headline(result).map(|headline| format!("{}.", capitalised(&headline)).into()));
     sentences.extend(plausibility::headline(&result.plausibility).map(Sentence::from));
     sentences.extend(conformity::failed(result.conformity.as_ref()).map(Sentence::from));
-    sentences.extend(statements::opening(statements, result.after.degrees_of_freedom, commands));
+    sentences.extend(statements::opening(statements, &problem.session, result.after.degrees_of_freedom, commands));
     sentences.push(
         format!(
             "{}, {}; {} of {} detectable.",

@@ -1,7 +1,9 @@
 // Predicted uncertainty, rank, null space and confounded errors of a plan.
 
 export interface Analysis {
-  noise_um: number;
+  // Of lengths, or of angles if all readings are angles.
+  noise_um?: number;
+  noise_arcsec?: number;
   readings: number;
   rank: number;
   parameter_count: number;
@@ -25,7 +27,7 @@ export function Identifiability({ analysis }: { analysis: Analysis }) {
       <h2>Identifiability</h2>
       <p>
         Rank {analysis.rank} of {analysis.parameter_count} parameters, {analysis.readings} readings, noise{" "}
-        {analysis.noise_um.toPrecision(3)} µm
+        {analysis.noise_um?.toPrecision(3) ?? analysis.noise_arcsec?.toPrecision(3)} {analysis.noise_um === undefined ? "″" : "µm"}
       </p>
       <div class="scroll">
         <table>

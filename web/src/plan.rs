@@ -4,7 +4,7 @@ use std::cell::OnceCell;
 
 use abbe::codegen::print::{LATEX, Numbering, Style};
 use abbe::codegen::{Equation, Options, Order, SessionTest, Symbols, check};
-use abbe::document::StatedPlan;
+use abbe::document::{StatedPlan, in_reading_units};
 use abbe::equation::EquationParameters;
 use abbe::identify::parameters::Role;
 use abbe::identify::problem::Problem;
@@ -13,7 +13,6 @@ use abbe::model::axis::AxisKind;
 use abbe::model::chain::Machine;
 use abbe::model::document::schema;
 use abbe::model::files::template;
-use abbe::model::instrument::Station;
 use abbe::model::session::Test;
 use abbe::plan::criterion::Goal;
 use abbe::plan::improve::{ImproveOptions, improve};
@@ -72,10 +71,7 @@ impl Plan {
         });
         let paths = paths::set_ups(&self.problem);
         let tests = self.problem.tests.iter().zip(&paths).map(|(test, path)| {
-            let bar_mm = match &test.station {
-                Station::BallBar(_) => Some(test.station.reference_mm()),
-                _ => None,
-            };
+            let bar_mm = test.station.bar().map(|bar| bar.bar);
             let moved = moved_axes(machine, test);
             let readings = test.readings.as_ref().map_or(0, |readings| readings.rows());
             let channels: Vec<&str> = test.station.channels().iter().map(|channel| channel.name).collect();
@@ -170,7 +166,7 @@ impl Plan {
     pub fn analysis(&self) -> Result<String, Failed> {
         let analysis = plan::analyse(&self.read.session, &options())?;
         let stated = StatedPlan::of_plan(&self.problem, &analysis);
-        Ok(serde_json::to_string(&stated).map_err(|fault| fault.to_string())?)
+        Ok(serde_json::to_string(&stated).and_then(in_reading_units).map_err(|fault| fault.to_string())?)
     }
 
     /// The proposal of `abbe plan --improve`, as JSON.
@@ -181,7 +177,7 @@ impl Plan {
         let goal = Goal::WorstUncertainty;
         let variations = TestVariations::default();
         let found = improve(&self.problem, &variations, &ImproveOptions { goal, tests: 1, by_minute: false })?;
-        Ok(serde_json::to_string(&found).map_err(|fault| fault.to_string())?)
+        Ok(serde_json::to_string(&found).and_then(in_reading_units).map_err(|fault| fault.to_string())?)
     }
 
     /// The equation of the readings of a test to first order, in LaTeX.

@@ -11,7 +11,6 @@ use abbe_model::effect::shape::{Harmonic, Polynomial, Shape};
 use abbe_model::effect::{Component, Effect};
 use abbe_model::files::commands::CommandFile;
 use abbe_model::instrument::Station;
-use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::pose::reach;
 use abbe_model::session::readings::Readings;
 use nalgebra::{Matrix3, Matrix4, Rotation3, Unit, Vector3};
@@ -124,7 +123,7 @@ fn a_five_axis_machine_is_corrected_to_a_picometre() {
         effect(id, Driver::Axis((*axis).to_string()), line, &[*coefficient])
     }));
     assert_eq!(count + effects.len(), 33);
-    let station = Station::BallBar(BallBar { workpiece_ball: [0.0; 3], spindle_ball: tool_mm, bar: 1.0 });
+    let station = Station::between([0.0; 3], tool_mm, 1.0);
     let reference = Reference::default();
     let errors =
         EstimatedErrors { machine: Arc::clone(&machine), station, reference, constant: constant.clone(), effects };
@@ -205,7 +204,7 @@ fn a_robot_is_corrected_in_its_whole_pose_and_reaches_poses() {
             effect(&name.to_string(), driver, Shape::Harmonic(Harmonic { order: 17.0 }), &waves[axis])
         })
         .collect();
-    let station = Station::BallBar(BallBar { workpiece_ball: [0.0; 3], spindle_ball: tool_mm, bar: 1.0 });
+    let station = Station::between([0.0; 3], tool_mm, 1.0);
     let reference = Reference::default();
     let errors =
         EstimatedErrors { machine: Arc::clone(&machine), station, reference, constant: constant.clone(), effects };
@@ -254,7 +253,7 @@ fn rows_that_cannot_be_corrected_keep_their_command() {
     let mut constant = vec![0.0; machine.error_slots()];
     constant[3] = 1e-3;
     let tool_mm = [-1184.4, -349.3, 12.2];
-    let station = Station::BallBar(BallBar { workpiece_ball: [0.0; 3], spindle_ball: tool_mm, bar: 1.0 });
+    let station = Station::between([0.0; 3], tool_mm, 1.0);
     let errors = EstimatedErrors {
         machine: Arc::clone(&machine),
         station,
@@ -278,7 +277,7 @@ fn blocks_of_a_file_continue_the_travel() {
     let machine = Arc::new(Machine::from_code("w C A b Y X Z t").unwrap());
     let mut random = rand_pcg::Pcg64::seed_from_u64(11);
     let effects = vec![effect("EXX", Driver::Axis("X".into()), Shape::Backlash, &[0.01])];
-    let station = Station::BallBar(BallBar { workpiece_ball: [0.0; 3], spindle_ball: [0.0; 3], bar: 1.0 });
+    let station = Station::between([0.0; 3], [0.0; 3], 1.0);
     let reference = Reference::default();
     let constant = vec![0.0; machine.error_slots()];
     let errors = EstimatedErrors { machine: Arc::clone(&machine), station, reference, constant, effects };
@@ -315,7 +314,7 @@ fn an_orientation_that_linear_axes_leave_is_stated() {
     let tilt = Shape::Polynomial(Polynomial { degree: 1, scale: 100.0 });
     let effects = vec![effect("EBX", Driver::Axis("X".into()), tilt, &[5e-5])];
     let tool_mm = [0.0, 0.0, -150.0];
-    let station = Station::BallBar(BallBar { workpiece_ball: [0.0; 3], spindle_ball: tool_mm, bar: 1.0 });
+    let station = Station::between([0.0; 3], tool_mm, 1.0);
     let reference = Reference::default();
     let constant = vec![0.0; machine.error_slots()];
     let errors = EstimatedErrors { machine: Arc::clone(&machine), station, reference, constant, effects };

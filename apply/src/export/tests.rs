@@ -2,7 +2,6 @@
 
 use abbe_model::chain::{AxisPosition, Machine};
 use abbe_model::frames::Point;
-use abbe_model::instrument::InstrumentKind;
 use abbe_model::session::Prior;
 use faer::Mat;
 use nalgebra::{Matrix4, Rotation3, Vector3};
@@ -32,7 +31,7 @@ pub(super) fn model(machine: Machine, errors: &[(String, f64)]) -> IdentifiedMod
     let count = parameters.len();
     IdentifiedModel {
         machine,
-        instrument: InstrumentKind::Tracker,
+        instrument: "tracker".parse().unwrap(),
         effects: Vec::new(),
         parameters,
         covariance: Mat::from_fn(count, count, |i, j| if i == j { 1e-6 } else { 0.0 }),

@@ -17,7 +17,6 @@
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{BodyErrors, Machine};
 use abbe_model::frames::Point;
-use abbe_model::instrument::Station;
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::sensitivity::TestModel;
 use num_dual::{Derivative, DualNum, DualSVec64};
@@ -60,7 +59,7 @@ pub struct Centre {
 impl CircleGeometry {
     /// From the nominal machine. The error states why the path is no circle.
     pub fn of(machine: &Machine, model: &TestModel) -> Result<CircleGeometry, String> {
-        let Station::BallBar(bar) = model.station() else {
+        let Some(bar) = model.station().bar() else {
             return Err("it is not a ball-bar test".into());
         };
         let axis = turning(machine, model)?;

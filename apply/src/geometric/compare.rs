@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use abbe_model::instrument::InstrumentKind;
 use abbe_model::session::Session;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -107,7 +106,7 @@ pub struct Comparison {
 /// # Errors
 /// See [`Estimator::new`] and [`fit::prepare`].
 pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Comparison, ApplyError> {
-    if session.instruments() != [InstrumentKind::BallBar] {
+    if session.tests.iter().any(|test| test.station.bar().is_none()) {
         return Err(ApplyError::Request(
             "the methods of circles are those of ball bars, and a test has another instrument".into(),
         ));

@@ -1,6 +1,5 @@
 //! Reference value and derivatives of a form, from the chain over dual numbers.
 
-use abbe_model::instrument::Station;
 use num_dual::{Derivative, Dual64, DualNum, DualSVec64, HyperDual64};
 
 use crate::check::points::CheckPoint;
@@ -8,7 +7,7 @@ use crate::equation::Equation;
 use crate::error::CodegenError;
 use crate::form::Order;
 use crate::run::Run;
-use crate::subject::{Source, Subject};
+use crate::subject::Source;
 use crate::variable::Variable;
 
 /// Number of parameters seeded per dual-number evaluation.
@@ -30,17 +29,14 @@ where
 {
     let nominal = |variable: Variable| point.nominal(&variable);
     let run = Run::<S>::new(&equation.machine, source, &equation.parameters, &nominal, &small)?;
-    let groups = match &run.subject {
-        Subject::Station(Station::BallBar(bar)) => {
+    let groups = match (run.subject.bar(), run.probe_geometry()) {
+        (Some(bar), _) => {
             let unknown = |slot: usize| run.unknown(slot);
             let (p, q) = bar.balls(&equation.machine, &run.state, &run.errors, &unknown);
             p.minus(q).0.to_vec()
         }
-        Subject::Station(Station::Probe(_)) => {
-            let geometry = run.probe_geometry().into_iter();
-            geometry.flat_map(|geometry| [geometry.stylus.0, geometry.step.0].concat()).collect()
-        }
-        _ => run.read(),
+        (None, Some(geometry)) => [geometry.stylus.0, geometry.step.0].concat(),
+        (None, None) => run.read(),
     };
     Ok((run.read(), groups))
 }

@@ -4,7 +4,6 @@ use abbe_model::axis::AxisKind;
 use abbe_model::chain::{BodyErrors, Machine};
 use abbe_model::frames::Point;
 use abbe_model::instrument::ballbar::BallBar;
-use abbe_model::instrument::{InstrumentKind, Station};
 use abbe_model::session::moves::{Mounted, Moves};
 use abbe_model::session::placing::{balls, positions_for_bar};
 use abbe_model::session::{Session, Test};
@@ -178,8 +177,8 @@ impl Writer<'_> {
     /// To the start of the path, by way of the centre of the workpiece ball if it has no place yet.
     fn approach(&self, path: &Path, centred: bool, draft: &mut Draft) {
         let start = path.start();
-        let ball_bar = matches!(self.test.station, Station::BallBar(_));
-        if self.test.station.kind() == InstrumentKind::Probe {
+        let ball_bar = self.test.station.bar().is_some();
+        if self.test.station.probe().is_some() {
             draft.warn(
                 "The stylus stays at the surface: this is for a scanning probe. A touch probe needs the cycle of the \
                  control at each position"
@@ -241,9 +240,9 @@ impl Writer<'_> {
         }
         approach.push(first.clone());
         draft.moves.push(self.moves("approach", Mounted::Nothing, approach));
-        let mount = match self.test.station.kind() {
-            InstrumentKind::BallBar => format!("Mount the bar of {} mm", self.test.station.reference_mm()),
-            _ => "Bring the instrument into its measuring range".to_string(),
+        let mount = match self.test.station.bar() {
+            Some(bar) => format!("Mount the bar of {} mm", bar.bar),
+            None => "Bring the instrument into its measuring range".to_string(),
         };
         draft.blocks.push(Block::Stop(format!("{mount}. Start recording")));
         if first != start {
@@ -283,7 +282,7 @@ impl Writer<'_> {
     /// From where the traversals end: feed-out, and away along the tool.
     fn retreat(&self, path: &Path, start: &[f64], draft: &mut Draft) {
         let end = if path.both_directions { start } else { path.end() };
-        let ball_bar = matches!(self.test.station, Station::BallBar(_));
+        let ball_bar = self.test.station.bar().is_some();
         let last = self.fed_in(end).filter(|_| ball_bar).unwrap_or_else(|| end.to_vec());
         if last != end {
             draft.blocks.push(Block::Comment("Feed-out".into()));

@@ -8,6 +8,7 @@ mod compiled;
 mod effects;
 mod forms;
 mod held;
+mod instruments;
 mod julia;
 mod named;
 mod nc;

@@ -105,6 +105,10 @@ pub fn laid_out(language: &str, layout: Layout) -> Vec<Printed> {
         cases,
         inputs,
     }));
+    // The other languages print the same operations.
+    if ["c", "python"].contains(&language) {
+        printed.extend(crate::instruments::printed(language, layout, CASES, &mut random));
+    }
     printed
 }
 

@@ -13,7 +13,6 @@ use std::sync::Arc;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
-use abbe_model::instrument::Station;
 use abbe_model::session::Test;
 use abbe_model::session::placing::{axis_line, balls};
 use nalgebra::Vector3;
@@ -122,7 +121,7 @@ const RADIAL: f64 = 0.98;
 
 /// Whether the bar lies along the radius of a rotary axis in every reading.
 fn bar_is_radial(machine: &Machine, test: &Test, axis: usize) -> bool {
-    let (Station::BallBar(bar), Some(readings)) = (&test.station, &test.readings) else {
+    let (Some(bar), Some(readings)) = (test.station.bar(), &test.readings) else {
         return false;
     };
     (0..readings.rows()).all(|row| {

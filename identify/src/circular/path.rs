@@ -7,7 +7,6 @@ use std::sync::Arc;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::driver::DriverSample;
-use abbe_model::instrument::{InstrumentKind, Station};
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::Test;
 
@@ -101,10 +100,7 @@ impl Path {
     /// The path of a ball-bar test that is circular.
     pub fn of(machine: &Arc<Machine>, test: &Test) -> Option<Path> {
         let readings = test.readings.as_ref()?;
-        let Station::BallBar(_) = test.station else {
-            return None;
-        };
-        debug_assert_eq!(test.station.kind(), InstrumentKind::BallBar);
+        test.station.bar()?;
         let model = TestModel::new(Arc::clone(machine), test.station.clone(), readings);
         let nominal_mm = model.readings(&SlotValues::zero(model.slots()));
         let moves = moves(machine, &readings.positions, &nominal_mm)?;

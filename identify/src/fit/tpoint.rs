@@ -18,7 +18,7 @@
 //! The column of a parameter is its sensitivity at the nominal machine. A parameter is a term if the two columns are
 //! proportional, whatever the directions of the axes are.
 
-use abbe_model::instrument::{Instrument, InstrumentKind};
+use abbe_model::instrument::Instrument;
 use faer::Mat;
 
 use super::Fit;
@@ -40,9 +40,8 @@ const SEPARABLE: f64 = 1e-6;
 /// If the readings are no directions, or the model cannot be evaluated.
 pub fn report(problem: &Problem, fit: &Fit) -> Result<PointingTerms, IdentifyError> {
     let names = |test: usize| problem.models[test].channels().iter().map(|channel| channel.name);
-    if !(0..problem.tests.len()).all(|test| names(test).eq(["across", "up"])) {
-        let other = |test: &&abbe_model::session::Test| test.station.kind() != InstrumentKind::Pointing;
-        let kind = problem.tests.iter().find(other).map_or("", |test| test.station.kind().word());
+    if let Some(other) = (0..problem.tests.len()).find(|test| !names(*test).eq(["across", "up"])) {
+        let kind = problem.tests[other].station.kind().word();
         let message =
             format!("terms of TPOINT are those of a mount: a test has the instrument `{kind}`, not `pointing`");
         return Err(IdentifyError::Request(message));

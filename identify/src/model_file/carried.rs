@@ -8,9 +8,7 @@ use std::sync::Arc;
 
 use abbe_model::component::ErrorName;
 use abbe_model::effect::{Component, Effect};
-use abbe_model::instrument::InstrumentKind;
 use abbe_model::instrument::Station;
-use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::expression::Length;
 use abbe_model::session::readings::Readings;
@@ -98,15 +96,14 @@ impl IdentifiedModel {
     /// The parameters of the machine over some states, without set-up quantities.
     fn at_states(&self, states: &States) -> Result<Parameters, IdentifyError> {
         // A reading that connects both load points is affected by all errors.
-        let bar = BallBar { workpiece_ball: states.table_mm, spindle_ball: states.tool_mm, bar: 1.0 };
-        let station = Station::BallBar(bar);
+        let station = Station::between(states.table_mm, states.tool_mm, 1.0);
         let machine = Arc::new(self.machine.clone());
         let model = TestModel::new(Arc::clone(&machine), station.clone(), &states.readings);
-        let session = self.session(&Session::new(self.machine.clone(), InstrumentKind::BallBar));
+        let session = self.session(&Session::new(self.machine.clone(), station.kind()));
         let test = Test {
             name: String::new(),
             geometry: station.map(|length| Length::Number(*length)),
-            priors: vec![Prior::Known; InstrumentKind::BallBar.unknowns().len()],
+            priors: vec![Prior::Known; station.kind().unknowns().len()],
             station,
             setup: String::new(),
             spindle_setup: String::new(),

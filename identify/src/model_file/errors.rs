@@ -7,7 +7,6 @@ use abbe_model::component::ErrorName;
 use abbe_model::driver::{DriverInput, DriverSample, Reference};
 use abbe_model::effect::Effect;
 use abbe_model::instrument::Station;
-use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
 
@@ -83,7 +82,7 @@ impl EstimatedErrors {
         });
         let effects = effects.collect();
         // A reading that connects both load points is affected by all errors.
-        let station = Station::BallBar(BallBar { workpiece_ball: table_mm, spindle_ball: tool_mm, bar: 1.0 });
+        let station = Station::between(table_mm, tool_mm, 1.0);
         EstimatedErrors { machine, station, reference: model.reference.clone(), constant, effects }
     }
 

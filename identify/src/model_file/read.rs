@@ -1,5 +1,6 @@
 //! A model from its JSON text, with the checks that a file of a user needs.
 
+use abbe_model::instrument::kinds;
 use std::path::Path;
 
 use abbe_model::ModelError;
@@ -14,7 +15,6 @@ use abbe_model::effect::Effect;
 use abbe_model::error::Location;
 use abbe_model::files;
 use abbe_model::files::read::{effect_of_document, machine_of_document};
-use abbe_model::instrument::InstrumentKind;
 use abbe_model::session::Prior;
 use abbe_model::session::parameters_of;
 use faer::Mat;
@@ -120,9 +120,8 @@ fn model(document: Document) -> Result<IdentifiedModel, Fault> {
     tests.sort_unstable();
     tests.dedup();
     let effects = effects.iter().enumerate();
-    let effects = effects.map(|(k, effect)| {
-        effect_of_document(effect, &machine, &parameters_of(InstrumentKind::ALL), &tests).within_item(k)
-    });
+    let effects =
+        effects.map(|(k, effect)| effect_of_document(effect, &machine, &parameters_of(kinds()), &tests).within_item(k));
     let effects = effects.collect::<Result<Vec<_>, _>>().within("effects")?;
     let parameters = parameters(&document.parameters.0, &effects, &machine).within("parameters")?;
     let covariance = covariance(&document.covariance.0, &parameters).within("covariance")?;

@@ -2,7 +2,6 @@
 //! misread.
 
 use abbe_model::axis::AxisKind;
-use abbe_model::instrument::{Station, channel};
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test};
 use nalgebra::Vector3;
@@ -13,7 +12,6 @@ use super::results::{Suggestion, SuggestionKind};
 use crate::noise::{Noise, NoiseSource};
 use crate::numerics::parallel;
 use crate::problem::Problem;
-use crate::start::nominal_points;
 
 /// Poses that are refitted with each mistake.
 const MAX_POSES: usize = 300;
@@ -36,25 +34,26 @@ pub(super) fn spread_mm2(problem: &Problem) -> Option<f64> {
     groups.dedup();
     for group in groups {
         let mut points: Vec<Vector3<f64>> = Vec::new();
-        for (number, test) in problem.tests.iter().enumerate() {
+        // The tests of the session have the columns as they were read.
+        let tests = problem.session.tests.iter().filter(|test| test.readings.is_some());
+        for (number, test) in tests.enumerate() {
             let Some(readings) = test.readings.as_ref().filter(|_| test.setup == group) else {
                 continue;
             };
-            if !test.station.channels().is_empty() && !channel::are_vector(test.station.channels()) {
-                return None;
-            }
-            let kept = |row: &usize| !problem.rejected[number][*row];
-            if let Station::Socket(_) = test.station {
+            if !test.station.kind().entry().has_readings {
                 let mut mixed = Readings::clone(readings);
                 for (axis, column) in mixed.positions.iter_mut().enumerate() {
                     let by = (axis * 7 + 1) % column.len().max(1);
                     column.rotate_left(by);
                 }
-                points.extend(nominal_points(&problem.session.machine, &test.station, &mixed));
-            } else {
-                let measured = readings.observed.chunks_exact(3).map(Vector3::from_row_slice);
-                let measured: Vec<Vector3<f64>> = measured.collect();
-                points.extend((0..readings.rows()).filter(kept).map(|row| measured[row]));
+                points.extend(mixed.nominal_points(&problem.session.machine, test.station.tool_point_mm()));
+                continue;
+            }
+            for (row, values) in readings.observed.chunks_exact(readings.channels).enumerate() {
+                let measured = test.station.measured_mm(values)?;
+                if !problem.rejected[number][row] && measured.iter().all(|value| value.is_finite()) {
+                    points.push(measured);
+                }
             }
         }
         let mean = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
@@ -102,30 +101,34 @@ pub(super) fn suggestions(problem: &Problem) -> Vec<Suggestion> {
 fn of_poses(session: &Session) -> Vec<Hypothesis> {
     let machine = &session.machine;
     let mut list = Vec::new();
-    let is_tracked = |test: &Test| matches!(test.station, Station::Tracker(_));
-    let tracked = session.tests.iter().any(is_tracked);
-    if tracked {
-        for (factor, unit) in lengths() {
-            let changed = with_readings(session, |test, _, observed| {
-                if is_tracked(test) {
-                    observed.iter_mut().for_each(|value| *value *= factor);
+    let measures = |test: &Test| -> Option<usize> {
+        let readings = test.readings.as_ref()?;
+        test.station.measured_mm(readings.observed.get(..readings.channels)?)?;
+        Some(readings.channels)
+    };
+    let measured = session.tests.iter().find(|test| measures(test).is_some());
+    if let Some(columns) = measured.map(|test| test.station.columns()) {
+        let names = columns[..3].iter().map(|column| column.stem).collect::<Vec<_>>().join(", ");
+        let changed = |change: &dyn Fn(&Test, &mut [f64])| {
+            with_readings(session, |test, _, observed| {
+                if let Some(channels) = measures(test) {
+                    observed.chunks_exact_mut(channels).for_each(|values| change(test, values));
                 }
+            })
+        };
+        for (factor, unit) in lengths() {
+            let scaled = changed(&|test, values| {
+                let read = values.iter_mut().zip(test.station.channels()).filter(|(_, channel)| !channel.is_angle());
+                read.for_each(|(value, _)| *value *= factor);
             });
-            list.push(Hypothesis::new(
-                SuggestionKind::ColumnUnit,
-                "px, py, pz",
-                format!("the measured positions are {unit}"),
-                changed,
-            ));
+            let words = format!("the measured positions are {unit}");
+            list.push(Hypothesis::new(SuggestionKind::ColumnUnit, &names, words, scaled));
         }
-        let mirrored = with_readings(session, |test, _, observed| {
-            if is_tracked(test) {
-                observed.iter_mut().step_by(3).for_each(|value| *value = -*value);
-            }
-        });
-        let words =
-            "the measured positions are left-handed: one of px, py, pz has the opposite sign, or two are exchanged";
-        list.push(Hypothesis::new(SuggestionKind::ColumnSign, "px, py, pz", words.to_string(), mirrored));
+        let mirrored = changed(&|test, values| test.station.mirror(values));
+        let words = format!(
+            "the measured positions are left-handed: one of {names} has the opposite sign, or two are exchanged"
+        );
+        list.push(Hypothesis::new(SuggestionKind::ColumnSign, &names, words, mirrored));
     }
     let scaled = |axes: &[usize], factor: f64| {
         with_readings(session, |_, positions, _| {

@@ -1,6 +1,6 @@
 //! The priors as rows of the least-squares problem: Gaussian priors, and stated distances between sockets.
 
-use abbe_model::instrument::Station;
+use abbe_model::instrument::Contact;
 use abbe_model::session::Prior;
 use faer::Mat;
 use num_dual::DualNum;
@@ -74,7 +74,7 @@ impl Problem {
     /// The parameters of a socket and its nominal position.
     fn socket(&self, name: &str) -> Option<([usize; 3], [f64; 3])> {
         let test = self.tests.iter().position(|test| test.socket.as_deref() == Some(name))?;
-        let Station::Socket(station) = self.models[test].station() else {
+        let Contact::InR(place_mm) = self.models[test].station().contact() else {
             return None;
         };
         let mut indices = [0; 3];
@@ -82,6 +82,6 @@ impl Problem {
             let id = format!("socket.{coordinate}[{name}]");
             *index = self.parameters.list.iter().position(|parameter| parameter.id == id)?;
         }
-        Some((indices, station.socket))
+        Some((indices, place_mm))
     }
 }

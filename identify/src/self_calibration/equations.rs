@@ -7,7 +7,6 @@ use abbe_model::axis::AxisKind;
 use abbe_model::chain::{BodyErrors, ERRORS_PER_AXIS};
 use abbe_model::frames::Point;
 use abbe_model::instrument::probe::{FORM, Probe, RADIUS};
-use abbe_model::instrument::{InstrumentKind, Station};
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::{Prior, Session, Test};
 
@@ -118,10 +117,10 @@ impl Equations {
     /// radial, no readings.
     pub fn of(session: &Session) -> Result<Equations, IdentifyError> {
         let refuse = |message: String| IdentifyError::Request(format!("self-calibration: {message}"));
-        if session.instrument != InstrumentKind::Probe {
+        if let Some(other) = session.tests.iter().find(|test| test.station.probe().is_none()) {
             return Err(refuse(format!(
                 "the session's instrument is a {}; the method takes a probe",
-                session.instrument.word()
+                other.station.kind().word()
             )));
         }
         let tests: Vec<Test> = session.tests.iter().filter(|test| test.readings.is_some()).cloned().collect();
@@ -195,7 +194,7 @@ impl Equations {
 
     /// The probed points of a test, one per reading.
     fn touches(&self, session: &Session, test: &Test) -> Result<Vec<TouchEquation>, String> {
-        let (Station::Probe(probe), Some(readings)) = (&test.station, &test.readings) else {
+        let (Some(probe), Some(readings)) = (test.station.probe(), &test.readings) else {
             return Ok(Vec::new());
         };
         let machine = &session.machine;

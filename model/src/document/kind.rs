@@ -7,7 +7,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::instrument::InstrumentKind;
+use crate::instrument::{InstrumentKind, kinds};
 use crate::words::listed;
 
 /// The kind of an instrument, by its word.
@@ -16,7 +16,7 @@ pub struct Kind(pub InstrumentKind);
 
 impl Kind {
     fn words() -> Vec<&'static str> {
-        InstrumentKind::ALL.iter().map(|kind| kind.word()).collect()
+        kinds().iter().map(|kind| kind.word()).collect()
     }
 }
 
@@ -38,7 +38,7 @@ impl<'de> Deserialize<'de> for Kind {
             }
 
             fn visit_str<E: de::Error>(self, word: &str) -> Result<Kind, E> {
-                let kind = InstrumentKind::of_word(word).map(Kind);
+                let kind = word.parse().ok().map(Kind);
                 kind.ok_or_else(|| E::invalid_value(de::Unexpected::Str(word), &self))
             }
         }

@@ -14,7 +14,6 @@ use crate::driver::DriverUnit;
 use crate::effect::keys::KeyWriter;
 use crate::effect::{CoefficientPrior, Effect};
 use crate::frames::Rotation;
-use crate::instrument::Station;
 use crate::instrument::ballbar::BAR;
 use crate::session::motion::{FollowOffset, Motion};
 use crate::session::{Prior, Test as DomainTest};
@@ -85,11 +84,10 @@ pub fn effect(effect: &Effect, machine: &chain::Machine) -> effect::Effect {
 /// use abbe_model::chain::Machine;
 /// use abbe_model::document::{of_domain, print};
 /// use abbe_model::files::read::add_node;
-/// use abbe_model::instrument::InstrumentKind;
 /// use abbe_model::session::Session;
 /// use serde_json::json;
 ///
-/// let mut session = Session::new(Machine::from_code("wCAbYXZt")?, InstrumentKind::BallBar);
+/// let mut session = Session::new(Machine::from_code("wCAbYXZt")?, "ballbar".parse()?);
 /// let turn = json!({"axis": "C", "from_deg": 0, "to_deg": 360, "step_deg": 1});
 /// let test = json!({"name": "C100", "bar_mm": 125, "workpiece_ball_mm": [0, 100, 0], "spindle_ball_mm": [0, 0, 0],
 ///                   "at": {"z_mm": 75}, "sweep": turn});
@@ -99,9 +97,7 @@ pub fn effect(effect: &Effect, machine: &chain::Machine) -> effect::Effect {
 /// # Ok::<(), abbe_model::ModelError>(())
 /// ```
 pub fn test(test: &DomainTest, machine: &chain::Machine) -> Option<Test> {
-    let Station::BallBar(bar) = &test.station else {
-        return None;
-    };
+    let bar = test.station.bar()?;
     let (moved, sweep, path) = motion(test.motion.as_ref()?, machine)?;
     let point = |mm: [f64; 3]| mm.map(number).into_iter().collect::<Node>();
     let mut set_up = Node::table::<Node>([]);

@@ -13,7 +13,7 @@ use super::test::Test;
 use crate::driver::{Driver, unit_suffixes};
 use crate::effect::keys::{Key, KeyForm};
 use crate::effect::shape::{Entry, SHAPES};
-use crate::instrument::InstrumentKind;
+use crate::instrument::{InstrumentKind, kinds};
 use crate::words::listed;
 
 /// Schema of `machine.toml`.
@@ -173,7 +173,7 @@ pub(crate) fn description<T: JsonSchema>(key: &str) -> Option<String> {
 /// The keys of a test that only some instruments have. A key of several instruments has the meanings of each.
 fn test_properties() -> Map<String, Value> {
     let mut properties: Map<String, Value> = Map::new();
-    for kind in InstrumentKind::ALL {
+    for kind in kinds() {
         for (key, mut schema) in (kind.entry().keys)() {
             let own = schema["description"].as_str().unwrap_or_default();
             // An uncertainty means the same to every instrument.

@@ -4,7 +4,7 @@ use std::fmt;
 
 use crate::chain::Machine;
 use crate::component::ErrorName;
-use crate::instrument::{InstrumentKind, InstrumentParameter, InternalUnit};
+use crate::instrument::{InstrumentParameter, InternalUnit, kinds};
 use crate::session::readings::Readings;
 
 /// The quantity that an effect changes.
@@ -34,7 +34,7 @@ impl Component {
             return Some(Component::TriggerDelay);
         }
         let (thing, coordinate) = text.split_once('.').unwrap_or((text, ""));
-        let known = InstrumentKind::ALL
+        let known = kinds()
             .iter()
             .flat_map(|kind| kind.unknowns())
             .any(|unknown| unknown.thing == thing && unknown.coordinate == coordinate);
@@ -77,7 +77,7 @@ impl Component {
         match self {
             Component::Axis(name) => name.freedom.is_angle(),
             Component::Instrument { .. } => {
-                InstrumentKind::ALL.iter().any(|kind| self.unit(kind.unknowns()) == Some(InternalUnit::Radian))
+                kinds().iter().any(|kind| self.unit(kind.unknowns()) == Some(InternalUnit::Radian))
             }
             Component::TriggerDelay | Component::Reading(_) => false,
         }

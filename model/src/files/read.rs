@@ -248,11 +248,10 @@ fn plan_in(source: &Parsed<'_>) -> Result<Session, ModelError> {
 /// use abbe_model::chain::Machine;
 /// use abbe_model::files::read::add_node;
 /// use abbe_model::files::table::memory::MemoryColumn;
-/// use abbe_model::instrument::InstrumentKind;
 /// use abbe_model::session::Session;
 /// use serde_json::json;
 ///
-/// let mut session = Session::new(Machine::from_code("[wCAbYXZt]")?, InstrumentKind::BallBar);
+/// let mut session = Session::new(Machine::from_code("[wCAbYXZt]")?, "ballbar".parse()?);
 /// let test = json!({"name": "C125", "bar_mm": 125, "workpiece_ball_mm": [0, 100, 0], "spindle_ball_mm": [0, 0, 0],
 ///                   "at": {"z_mm": 75}});
 /// let c_rad: Vec<f64> = (0..360).map(|degree| f64::from(degree).to_radians()).collect();

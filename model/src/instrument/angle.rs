@@ -12,7 +12,7 @@ use super::kind::{self, Checked};
 use super::set_up::{self, SetUp, Written};
 use super::{
     Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
-    default_errors, point,
+    point,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::node::Node;
@@ -30,19 +30,10 @@ pub const PARAMETERS: [InstrumentParameter; 2] = [
 ];
 
 pub(super) const ENTRY: Entry = Entry {
-    kind: InstrumentKind::Angle,
-    word: "angle",
-    parameters: &PARAMETERS,
-    free: None,
     is_two_sided: true,
-    reads_poses: false,
     rows_can_lack_channels: true,
-    has_readings: true,
     needs_every_axis: false,
-    default_errors: default_errors::none,
-    spindle_setup: None,
-    keys: schema::properties::<Keys>,
-    read,
+    ..Entry::new(InstrumentKind::Angle, ["angle", "a sensor of angles"], &PARAMETERS, schema::properties::<Keys>, read)
 };
 
 /// The channels.
@@ -75,8 +66,7 @@ fn read(set_up: &Node, _: &[Constant]) -> Result<SetUp, KeyFault> {
     }
     let about: Vec<[Written; 3]> = keys.about.0.iter().map(|direction| direction.map(Written::number)).collect();
     let priors = (0..2).map(|channel| if channel < about.len() { Prior::Free } else { Prior::Known }).collect();
-    let origin = [0.0; 3].map(Written::number);
-    Ok(SetUp::new(Station::Angle(Angle { about, body: keys.body, origin }), priors))
+    Ok(SetUp::new(Station::Angle(Angle { about, body: keys.body }), priors))
 }
 
 /// A sensor of angles as set up for one test.
@@ -86,8 +76,6 @@ pub struct Angle<N> {
     pub about: Vec<[N; 3]>,
     /// The frame that turns.
     pub body: Body,
-    /// The origin of the tool frame: an angle has no point.
-    pub origin: [N; 3],
 }
 
 impl<N> Geometry<N> for Angle<N> {
@@ -95,7 +83,7 @@ impl<N> Geometry<N> for Angle<N> {
 
     fn map<M>(&self, to: &impl Fn(&N) -> M) -> Angle<M> {
         let about = self.about.iter().map(|direction| point(direction, to)).collect();
-        Angle { about, body: self.body, origin: point(&self.origin, to) }
+        Angle { about, body: self.body }
     }
     /// The rotation about each direction, rad.
     fn reading<S: Scalar<Nominal = N>>(
@@ -113,12 +101,6 @@ impl<N> Geometry<N> for Angle<N> {
             let angle = dot_nominal(rotation, *about);
             unknown(channel).map_or(angle, |zero| angle + zero)
         }))
-    }
-    fn table_point_mm(&self) -> Option<&[N; 3]> {
-        None
-    }
-    fn tool_point_mm(&self) -> &[N; 3] {
-        &self.origin
     }
 }
 

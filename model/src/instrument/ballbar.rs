@@ -8,10 +8,10 @@ use serde::Deserialize;
 
 use super::channel::Channel;
 use super::column::{Column, Quantity};
-use super::kind::{MAX_MM, median};
+use super::kind::{MAX_MM, doubt_on_scatter, median};
 use super::set_up::{self, SetUp};
-use super::{
-    Checked, Entry, Fault, Following, Geometry, Instrument, InstrumentKind, InstrumentParameter, InternalUnit, Reading,
+use super::{Contact, 
+    Checked, Entry, Fault, Following, Geometry, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, InternalUnit, Reading,
     SharedBy, Station, default_errors, displaced, point,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
@@ -40,19 +40,10 @@ pub const BAR: usize = 6;
 pub const GAIN: usize = 7;
 
 pub(super) const ENTRY: Entry = Entry {
-    kind: InstrumentKind::BallBar,
-    word: "ballbar",
-    parameters: &PARAMETERS,
-    free: None,
     is_two_sided: true,
-    reads_poses: false,
-    rows_can_lack_channels: false,
-    has_readings: true,
     needs_every_axis: false,
     default_errors: default_errors::positions_and_orientations,
-    spindle_setup: None,
-    keys: schema::properties::<Keys>,
-    read,
+    ..Entry::new(InstrumentKind::BallBar, ["ballbar", "a double ball bar"], &PARAMETERS, schema::properties::<Keys>, read)
 };
 
 /// The channels.
@@ -172,15 +163,18 @@ impl<N> Geometry<N> for BallBar<N> {
             None => length,
         })
     }
-    fn table_point_mm(&self) -> Option<&[N; 3]> {
-        Some(&self.workpiece_ball)
-    }
-    fn tool_point_mm(&self) -> &[N; 3] {
-        &self.spindle_ball
+    fn points(&self) -> [Option<InstrumentPoint<'_, N>>; 2] {
+        [
+            InstrumentPoint::of("workpiece ball", &self.workpiece_ball, 0),
+            InstrumentPoint::of("spindle ball", &self.spindle_ball, 3),
+        ]
     }
 }
 
 impl Instrument for BallBar<f64> {
+    fn contact(&self) -> Contact {
+        Contact::AtDistance(self.bar)
+    }
     fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
         [Some(&mut self.workpiece_ball), Some(&mut self.spindle_ball)]
     }
@@ -239,6 +233,10 @@ impl Instrument for BallBar<f64> {
              position in `at` or an axis direction that is not as on the machine"
                 .into(),
         ))
+    }
+    fn doubt(&self, checked: &Checked<'_>) -> Option<String> {
+        let deviations = checked.readings.observed.iter().map(|length| length - self.bar);
+        doubt_on_scatter(&mut deviations.collect::<Vec<_>>())
     }
     /// The readings are near the length of the bar.
     fn check_observed(&self, test: &str, observed: &[f64]) -> Result<(), Fault> {

@@ -13,17 +13,35 @@ pub enum Quantity {
     Channel(usize),
     /// The value of a channel less the nominal reading.
     FromNominal(usize),
+    /// A polar coordinate of the position of three channels: range, azimuth, elevation.
+    Polar(usize),
+    /// A component `x`, `y`, `z`, `w` of the unit quaternion that states the rotation of channels 3 to 5; it has no unit.
+    Quaternion(usize),
     /// The name of the socket; it has no unit.
     Socket,
 }
+
+/// The channels of a rotation that a quaternion can state.
+pub(crate) const OF_ROTATION: std::ops::Range<usize> = 3..6;
 
 impl Quantity {
     /// The channel that the column holds, among all that the instrument can have.
     pub(crate) fn channel(self) -> Option<usize> {
         match self {
             Quantity::Length | Quantity::Deviation | Quantity::Outward => Some(0),
-            Quantity::Channel(channel) | Quantity::FromNominal(channel) => Some(channel),
-            Quantity::Socket => None,
+            Quantity::Channel(channel) | Quantity::FromNominal(channel) | Quantity::Polar(channel) => Some(channel),
+            Quantity::Quaternion(_) | Quantity::Socket => None,
+        }
+    }
+
+    /// Whether two columns state the same.
+    pub(crate) fn is_same_as(self, other: Quantity) -> bool {
+        match (self, other) {
+            (Quantity::Quaternion(_), _) | (_, Quantity::Quaternion(_)) if self != other => {
+                let channel = self.channel().or(other.channel());
+                channel.is_some_and(|channel| OF_ROTATION.contains(&channel))
+            }
+            _ => self == other || self.channel().is_some() && self.channel() == other.channel(),
         }
     }
 }

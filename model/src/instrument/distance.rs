@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 
 use super::channel::Channel;
 use super::column::{Column, Quantity};
-use super::set_up::{self, SetUp, Written};
+use super::set_up::{self, SetUp};
 use super::{
-    Checked, Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
+    Checked, Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station,
     default_errors, displaced, point,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
@@ -33,20 +33,12 @@ pub const PARAMETERS: [InstrumentParameter; 7] = [
 const ZERO: usize = 6;
 
 pub(super) const ENTRY: Entry = Entry {
-    kind: InstrumentKind::Distance,
-    word: "distance",
-    parameters: &PARAMETERS,
-    free: None,
     is_two_sided: true,
     reads_poses: true,
-    rows_can_lack_channels: false,
-    has_readings: true,
-    needs_every_axis: true,
     default_errors: default_errors::all_locations,
     // The reflector stays mounted while the station moves.
     spindle_setup: Some("tool"),
-    keys: schema::properties::<Keys>,
-    read,
+    ..Entry::new(InstrumentKind::Distance, ["distance", "distances from a station"], &PARAMETERS, schema::properties::<Keys>, read)
 };
 
 /// The channels.
@@ -97,8 +89,7 @@ fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
     let station = set_up::point("station_mm", &keys.station_mm, constants)?;
     let points = set_up::lengths(&keys.station_u_um).chain(set_up::lengths(&keys.reflector_u_um));
     let priors = points.chain([set_up::length(keys.zero_u_um)]).collect();
-    let origin = [0.0; 3].map(Written::number);
-    Ok(SetUp::new(Station::Distance(Distance { station, reflector, frame: keys.station_frame, origin }), priors))
+    Ok(SetUp::new(Station::Distance(Distance { station, reflector, frame: keys.station_frame }), priors))
 }
 
 /// A station and its reflector, mm.
@@ -110,9 +101,6 @@ pub struct Distance<N> {
     pub reflector: [N; 3],
     /// The frame that carries the station.
     pub frame: StationFrame,
-    /// The origin of the table frame, which stands for the station where a point of the table is asked for and the
-    /// station is on the bed.
-    pub origin: [N; 3],
 }
 
 impl<N> Geometry<N> for Distance<N> {
@@ -123,7 +111,6 @@ impl<N> Geometry<N> for Distance<N> {
             station: point(&self.station, to),
             reflector: point(&self.reflector, to),
             frame: self.frame,
-            origin: point(&self.origin, to),
         }
     }
     /// The distance, mm.
@@ -146,14 +133,10 @@ impl<N> Geometry<N> for Distance<N> {
         let distance = reflector.minus(station).norm();
         Reading::scalar(unknown(ZERO).map_or(distance, |zero| distance + zero))
     }
-    fn table_point_mm(&self) -> Option<&[N; 3]> {
-        match self.frame {
-            StationFrame::Table => Some(&self.station),
-            StationFrame::Bed => None,
-        }
-    }
-    fn tool_point_mm(&self) -> &[N; 3] {
-        &self.reflector
+    fn points(&self) -> [Option<InstrumentPoint<'_, N>>; 2] {
+        let on_table = self.frame == StationFrame::Table;
+        let station = InstrumentPoint::of("station", &self.station, 0).filter(|_| on_table);
+        [station, InstrumentPoint::of("reflector", &self.reflector, 3)]
     }
 }
 

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::channel::Channel;
 use super::column::{Column, Quantity};
+use super::default_errors;
 use super::set_up::SetUp;
 use super::{InstrumentKind, InstrumentParameter, Reading, SharedBy, Station};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
@@ -23,6 +24,8 @@ pub struct Entry {
     pub kind: InstrumentKind,
     /// The word in files.
     pub word: &'static str,
+    /// What it is in a sentence, with its article.
+    pub phrase: &'static str,
     /// Its parameters in the order of its slots.
     pub parameters: &'static [InstrumentParameter],
     /// The object that stands at a place that no session knows: its parameters have no prior by default. All others are
@@ -49,6 +52,35 @@ pub struct Entry {
     pub read: fn(&Node, &[Constant]) -> Result<SetUp, KeyFault>,
 }
 
+impl Entry {
+    /// An instrument that is mounted for each test, has readings in every row, and reads one side of the machine. What
+    /// differs is stated with `..Entry::new(…)`.
+    pub(super) const fn new(
+        kind: InstrumentKind,
+        [word, phrase]: [&'static str; 2],
+        parameters: &'static [InstrumentParameter],
+        keys: fn() -> serde_json::Map<String, serde_json::Value>,
+        read: fn(&Node, &[Constant]) -> Result<SetUp, KeyFault>,
+    ) -> Entry {
+        Entry {
+            kind,
+            word,
+            phrase,
+            parameters,
+            free: None,
+            is_two_sided: false,
+            reads_poses: false,
+            rows_can_lack_channels: false,
+            has_readings: true,
+            needs_every_axis: true,
+            default_errors: default_errors::none,
+            spindle_setup: None,
+            keys,
+            read,
+        }
+    }
+}
+
 /// The nominal geometry of an instrument over an open number.
 pub trait Geometry<N> {
     /// The same over another number.
@@ -69,10 +101,40 @@ pub trait Geometry<N> {
     fn keep_channels(&mut self, has: &dyn Fn(Quantity) -> bool) {
         let _ = has;
     }
-    /// The instrument's point in the table frame, mm, if it has one.
-    fn table_point_mm(&self) -> Option<&[N; 3]>;
-    /// The instrument's point in the tool frame, mm.
-    fn tool_point_mm(&self) -> &[N; 3];
+    /// Its point on the table and its point on the tool, if it has them.
+    fn points(&self) -> [Option<InstrumentPoint<'_, N>>; 2] {
+        [None, None]
+    }
+}
+
+/// A point of an instrument as set up.
+#[derive(Clone, Copy, Debug)]
+pub struct InstrumentPoint<'a, N> {
+    /// What is there, in words.
+    pub name: &'static str,
+    /// In its frame, mm.
+    pub mm: &'a [N; 3],
+    /// The first of its three parameters among those of the instrument.
+    pub first: usize,
+}
+
+impl<'a, N> InstrumentPoint<'a, N> {
+    pub(super) const fn of(name: &'static str, mm: &'a [N; 3], first: usize) -> Option<InstrumentPoint<'a, N>> {
+        Some(InstrumentPoint { name, mm, first })
+    }
+}
+
+/// What a pose that the instrument measures has to meet.
+#[derive(Clone, Copy, Debug)]
+pub enum Contact {
+    /// Nothing: a line of sight or a direction is all that it needs.
+    None,
+    /// The tool's point is at a point of R, mm.
+    InR([f64; 3]),
+    /// The tool's point is at this distance from the point of the table, mm.
+    AtDistance(f64),
+    /// A stylus touches its artefact.
+    Touching,
 }
 
 /// How the tool point follows the instrument's point of the table on a path of kind `follow`.
@@ -98,6 +160,34 @@ pub struct Checked<'a> {
     pub test: &'a str,
     /// Its readings.
     pub readings: &'a Readings,
+}
+
+/// Tests that share an object, with their readings.
+pub struct Group<'a> {
+    /// The machine.
+    pub machine: &'a Machine,
+    /// Set-up and readings of each test.
+    pub tests: Vec<(&'a Station<f64>, &'a Readings)>,
+}
+
+impl Group<'_> {
+    /// The nominal position of the instrument's tool-frame point in R, at every row of all tests.
+    pub(super) fn tool_points(&self) -> Vec<Vector3<f64>> {
+        let of = |(station, readings): &(&Station<f64>, &Readings)| {
+            readings.nominal_points(self.machine, station.tool_point_mm())
+        };
+        self.tests.iter().flat_map(of).collect()
+    }
+
+    /// The nominal position in R and the measured position of every row that has one.
+    pub(super) fn positions(&self) -> Vec<[Vector3<f64>; 2]> {
+        let measured = |(station, readings): &(&Station<f64>, &Readings)| -> Vec<Option<Vector3<f64>>> {
+            readings.observed.chunks_exact(readings.channels).map(|values| station.measured_mm(values)).collect()
+        };
+        let measured = self.tests.iter().flat_map(measured);
+        let pairs = self.tool_points().into_iter().zip(measured).filter_map(|(point, seen)| Some([point, seen?]));
+        pairs.filter(|[_, seen]| seen.iter().all(|value| value.is_finite())).collect()
+    }
 }
 
 impl Checked<'_> {
@@ -148,6 +238,14 @@ pub trait Instrument {
         let _ = stem;
         None
     }
+    /// What a pose that it measures has to meet.
+    fn contact(&self) -> Contact {
+        Contact::None
+    }
+    /// Whether the place of its object is known: stated, or found from readings.
+    fn is_located(&self) -> bool {
+        true
+    }
     /// The length to which deviations refer, mm; 0 without one.
     fn reference_mm(&self) -> f64 {
         0.0
@@ -160,11 +258,26 @@ pub trait Instrument {
     fn following(&self) -> Following {
         Following::Apart
     }
-    /// The same at the place that agrees best with the readings, for an object whose place no session knows: `points`
-    /// are nominal positions of the tool point in R, `observed` the readings there, mm.
-    fn placed(&self, points: &[Vector3<f64>], observed: &[Vector3<f64>]) -> Option<Station<f64>> {
-        let _ = (points, observed);
+    /// The same at the place that agrees best with the readings of a group of tests, for an object whose place no session
+    /// knows.
+    fn placed(&self, group: &Group<'_>) -> Option<Station<f64>> {
+        let _ = group;
         None
+    }
+    /// The same with its object in the tool frame mounted as agrees best with the readings of the tests that share it,
+    /// after all are placed.
+    fn mounted(&self, group: &Group<'_>) -> Option<Station<f64>> {
+        let _ = group;
+        None
+    }
+    /// The measured position in the instrument's frame, from the values of the columns, if it measures positions.
+    fn measured_mm(&self, values: &[f64]) -> Option<Vector3<f64>> {
+        let _ = values;
+        None
+    }
+    /// Mirrors a measured position or pose in the instrument's frame.
+    fn mirror(&self, values: &mut [f64]) {
+        let _ = values;
     }
     /// The same with the point from which its readings count, if that is another than the nominal one.
     fn with_datum(&self, machine: &Machine, readings: &Readings) -> Option<Station<f64>> {
@@ -199,6 +312,11 @@ pub trait Instrument {
     fn check_readings(&self, checked: &Checked<'_>) -> Result<(), Fault> {
         let _ = checked;
         Ok(())
+    }
+    /// What is doubtful about usable readings.
+    fn doubt(&self, checked: &Checked<'_>) -> Option<String> {
+        let _ = checked;
+        None
     }
     /// Checks that the observed values are in the range of the instrument.
     ///
@@ -246,6 +364,22 @@ pub(super) fn check_small(channels: &[Channel], checked: &Checked<'_>, skipped: 
         }
     }
     Ok(())
+}
+
+/// Deviations that scatter by less are below what an interferometer or a ball bar resolves, mm.
+const MIN_SCATTER_MM: f64 = 5e-5;
+
+/// The doubt about deviations whose scatter no instrument resolves, as where a column in mm has a name in µm.
+pub(super) fn doubt_on_scatter(deviations: &mut [f64]) -> Option<String> {
+    let middle = median(deviations);
+    let scatter = median(&mut deviations.iter().map(|value| (value - middle).abs()).collect::<Vec<_>>());
+    (scatter > 0.0 && scatter < MIN_SCATTER_MM).then(|| {
+        format!(
+            "the deviations scatter by {:.2} nm about their median, less than such an instrument resolves: is the column in \
+             mm, and its name in µm?",
+            scatter * 1e6
+        )
+    })
 }
 
 pub(super) fn median(values: &mut [f64]) -> f64 {

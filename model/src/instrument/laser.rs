@@ -21,8 +21,8 @@ use super::column::{Column, Quantity};
 use super::kind::{self, Checked, MAX_MM, median};
 use super::set_up::{self, SetUp, Written};
 use super::{
-    Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
-    default_errors, displaced, point,
+    Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station,
+    displaced, point,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::node::Node;
@@ -57,19 +57,10 @@ const BEAM: usize = 6;
 const ZERO: usize = 8;
 
 pub(super) const ENTRY: Entry = Entry {
-    kind: InstrumentKind::Laser,
-    word: "laser",
-    parameters: &PARAMETERS,
-    free: None,
     is_two_sided: true,
-    reads_poses: false,
     rows_can_lack_channels: true,
-    has_readings: true,
     needs_every_axis: false,
-    default_errors: default_errors::none,
-    spindle_setup: None,
-    keys: schema::properties::<Keys>,
-    read,
+    ..Entry::new(InstrumentKind::Laser, ["laser", "a laser interferometer"], &PARAMETERS, schema::properties::<Keys>, read)
 };
 
 /// The channels in the order of their zeros.
@@ -293,11 +284,8 @@ impl<N> Geometry<N> for Laser<N> {
             unknown(ZERO + channel).map_or(value, |zero| value + zero)
         }))
     }
-    fn table_point_mm(&self) -> Option<&[N; 3]> {
-        Some(&self.optic)
-    }
-    fn tool_point_mm(&self) -> &[N; 3] {
-        &self.reflector
+    fn points(&self) -> [Option<InstrumentPoint<'_, N>>; 2] {
+        [InstrumentPoint::of("optic", &self.optic, OPTIC), InstrumentPoint::of("reflector", &self.reflector, 0)]
     }
 }
 
@@ -380,6 +368,9 @@ impl Instrument for Laser<f64> {
         }
         let skipped = usize::from(places(&self.channels).next() == Some(0));
         kind::check_small(self.channels(), checked, skipped)
+    }
+    fn doubt(&self, checked: &Checked<'_>) -> Option<String> {
+        kind::doubt_on_scatter(&mut self.displacements(checked.machine, checked.readings)?)
     }
     fn absent_channels_known(&self, priors: &mut [Prior]) {
         hold_absent(&places(&self.channels).collect::<Vec<_>>(), self.is_beam_stated, priors);

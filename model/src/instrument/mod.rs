@@ -1,24 +1,29 @@
 //! Instruments: readings as functions of chain and state, over the open scalar. Each file holds one; the registry below
 //! lists them.
 
+mod bearing;
 pub mod channel;
 pub mod column;
 mod default_errors;
 mod kind;
 mod parameter;
 pub mod set_up;
+pub mod stand;
 
-pub use kind::{Checked, Entry, Fault, Following, Geometry, Instrument};
+pub use kind::{Checked, Contact, Entry, Fault, Following, Geometry, Group, Instrument, InstrumentPoint};
 pub use parameter::{InstrumentParameter, InternalUnit, SharedBy};
 
 use std::ops::{Deref, DerefMut};
+use std::str::FromStr;
 
 use column::Quantity;
 
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::component::ErrorName;
-use crate::frames::{Point, Rotation, SmallMotion};
+use crate::error::ModelError;
+use crate::frames::Point;
 use crate::scalar::{Nominal, Scalar};
+use crate::words::listed;
 
 /// Declares the modules, the enumerations and the list of all instruments.
 macro_rules! instruments {
@@ -81,23 +86,10 @@ macro_rules! instruments {
                 }
             }
 
-            /// The instrument's point in the table frame, mm, if it has one.
-            pub fn table_point_mm(&self) -> Option<[N; 3]>
-            where
-                N: Copy,
-            {
+            /// The instrument's point on the table and its point on the tool, if it has them.
+            pub fn points(&self) -> [Option<InstrumentPoint<'_, N>>; 2] {
                 match self {
-                    $(Station::$kind(geometry) => geometry.table_point_mm().copied(),)+
-                }
-            }
-
-            /// The instrument's point in the tool frame, mm.
-            pub fn tool_point_mm(&self) -> [N; 3]
-            where
-                N: Copy,
-            {
-                match self {
-                    $(Station::$kind(geometry) => *geometry.tool_point_mm(),)+
+                    $(Station::$kind(geometry) => geometry.points(),)+
                 }
             }
 
@@ -108,6 +100,12 @@ macro_rules! instruments {
                 }
             }
         }
+
+        $(impl<N> From<$module::$kind<N>> for Station<N> {
+            fn from(geometry: $module::$kind<N>) -> Station<N> {
+                Station::$kind(geometry)
+            }
+        })+
 
         impl Deref for Station<f64> {
             type Target = dyn Instrument;
@@ -138,6 +136,8 @@ instruments! {
     probe: Probe,
     /// A laser tracker.
     tracker: Tracker,
+    /// Position and orientation of a body at the tool: motion capture, hand-eye, portable arm.
+    pose: Pose,
     /// A ball in fixed sockets.
     socket: Socket,
     /// A laser interferometer: displacement, straightness, angles.
@@ -150,12 +150,64 @@ instruments! {
     pointing: Pointing,
 }
 
-impl InstrumentKind {
-    /// The kind of a word in files; `None` if no instrument has it.
-    pub fn of_word(word: &str) -> Option<InstrumentKind> {
-        InstrumentKind::ALL.iter().copied().find(|kind| kind.word() == word)
+/// All kinds of instruments.
+pub fn kinds() -> &'static [InstrumentKind] {
+    InstrumentKind::ALL
+}
+
+/// The kind of a word in files.
+impl FromStr for InstrumentKind {
+    type Err = ModelError;
+
+    fn from_str(word: &str) -> Result<InstrumentKind, ModelError> {
+        kinds().iter().copied().find(|kind| kind.word() == word).ok_or_else(|| ModelError::Session {
+            message: format!("no instrument is called `{word}`"),
+            help: listed(&kinds().iter().map(|kind| kind.word()).collect::<Vec<_>>(), "or"),
+        })
+    }
+}
+
+impl<N> Station<N> {
+    /// The bar, if one is read.
+    pub fn bar(&self) -> Option<&ballbar::BallBar<N>> {
+        if let Station::BallBar(bar) = self { Some(bar) } else { None }
     }
 
+    /// The same, to be changed.
+    pub fn bar_mut(&mut self) -> Option<&mut ballbar::BallBar<N>> {
+        if let Station::BallBar(bar) = self { Some(bar) } else { None }
+    }
+
+    /// The probe, if one touches.
+    pub fn probe(&self) -> Option<&probe::Probe<N>> {
+        if let Station::Probe(probe) = self { Some(probe) } else { None }
+    }
+
+    /// The sensors and the balls of an R-test, if it is one.
+    pub fn rtest(&self) -> Option<&rtest::RTest<N>> {
+        if let Station::RTest(rtest) = self { Some(rtest) } else { None }
+    }
+
+    /// A reading that all errors of the machine affect, from a point of the table to a point of the tool, mm: for what is
+    /// computed without an instrument.
+    pub fn between(table_mm: [N; 3], tool_mm: [N; 3], apart_mm: N) -> Station<N> {
+        Station::BallBar(ballbar::BallBar { workpiece_ball: table_mm, spindle_ball: tool_mm, bar: apart_mm })
+    }
+}
+
+impl<N: Nominal> Station<N> {
+    /// The instrument's point in the table frame, mm, if it has one.
+    pub fn table_point_mm(&self) -> Option<[N; 3]> {
+        self.points()[0].map(|point| *point.mm)
+    }
+
+    /// The instrument's point in the tool frame, mm; its origin without one.
+    pub fn tool_point_mm(&self) -> [N; 3] {
+        self.points()[1].map_or([N::constant(0.0); 3], |point| *point.mm)
+    }
+}
+
+impl InstrumentKind {
     /// The identifier in session files.
     pub fn word(self) -> &'static str {
         self.entry().word
@@ -251,13 +303,4 @@ pub fn displaced<S: Scalar>(nominal: [S::Nominal; 3], first: usize, unknown: &im
         Some(displacement) => displacement + nominal[i],
         None => S::nominal(nominal[i]),
     }))
-}
-
-/// The small motion given by the first six parameters, if one of them is included.
-fn pose_error<S: Scalar>(unknown: &impl Fn(usize) -> Option<S>) -> Option<SmallMotion<S>> {
-    let carried = (0..6).any(|i| unknown(i).is_some());
-    carried.then(|| {
-        let six = std::array::from_fn(|i| unknown(i).unwrap_or_else(|| S::constant(0.0)));
-        SmallMotion::new(six, Rotation::Exact)
-    })
 }

@@ -1,19 +1,14 @@
 //! Pointing: a mount carries a direction, and what it points at is known. Telescope, antenna, gimbal, theodolite.
 //!
-//! The nominal line of sight is `U`, with `A` across and `V` up, three directions that the commanded mount carries. The
-//! actual line of sight `p` reads
-//!
-//! ```text
-//! across = (p · A)/(p · U)        up = (p · V)/(p · U)
-//! ```
-//!
-//! which are the difference of azimuth times the cosine of the elevation, and that of elevation. R has X to the north, Y
+//! The actual line of sight reads its bearings (`bearing.rs`) about the nominal line of sight, with across and up, three
+//! directions that the commanded mount carries. R has X to the north, Y
 //! to the west and Z up; azimuth runs from north through east. The columns are the true azimuth and elevation; the axis
 //! positions are the encoders.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::bearing::{Sight, bearings, direction, observed_bearings};
 use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::kind::{Checked, median};
@@ -25,7 +20,7 @@ use super::{
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
-use crate::frames::{Point, cross, dot};
+use crate::frames::{Point, cross};
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
 use crate::session::expression::Constant;
@@ -37,20 +32,11 @@ pub const PARAMETERS: [InstrumentParameter; 2] = [
 ];
 
 pub(super) const ENTRY: Entry = Entry {
-    kind: InstrumentKind::Pointing,
-    word: "pointing",
-    parameters: &PARAMETERS,
-    free: None,
-    is_two_sided: false,
     reads_poses: true,
-    rows_can_lack_channels: false,
-    has_readings: true,
-    needs_every_axis: true,
     default_errors: default_errors::orientations,
     // The line of sight stays from night to night.
     spindle_setup: Some("tool"),
-    keys: schema::properties::<Keys>,
-    read,
+    ..Entry::new(InstrumentKind::Pointing, ["pointing", "observed directions"], &PARAMETERS, schema::properties::<Keys>, read)
 };
 
 /// The channels.
@@ -87,8 +73,7 @@ fn read(set_up: &Node, _: &[Constant]) -> Result<SetUp, KeyFault> {
         Some(u) => vec![set_up::angle(u); 2],
     };
     let directions = [written(sight), written(across), written(up)];
-    let origin = [0.0; 3].map(Written::number);
-    Ok(SetUp::new(Station::Pointing(Pointing { directions, origin }), priors))
+    Ok(SetUp::new(Station::Pointing(Pointing { directions }), priors))
 }
 
 /// A line of sight as mounted.
@@ -96,13 +81,11 @@ fn read(set_up: &Node, _: &[Constant]) -> Result<SetUp, KeyFault> {
 pub struct Pointing<N> {
     /// Line of sight, across and up in the tool frame, of unit length.
     pub directions: [[N; 3]; 3],
-    /// The origin of the tool frame: a direction has no point.
-    pub origin: [N; 3],
 }
 
 impl<N: Nominal> Pointing<N> {
     /// Line of sight, across and up of the commanded mount, in R.
-    fn nominal<S: Scalar<Nominal = N>>(&self, machine: &Machine, state: &[AxisPosition<N>]) -> [Point<S>; 3] {
+    fn nominal<S: Scalar<Nominal = N>>(&self, machine: &Machine, state: &[AxisPosition<N>]) -> Sight<S> {
         let none = vec![BodyErrors::<S>::NONE; machine.axes.len()];
         self.directions.map(|direction| machine.tool_direction(state, &none, Point::nominal(direction)))
     }
@@ -114,7 +97,6 @@ impl<N> Geometry<N> for Pointing<N> {
     fn map<M>(&self, to: &impl Fn(&N) -> M) -> Pointing<M> {
         Pointing {
             directions: self.directions.each_ref().map(|direction| point(direction, to)),
-            origin: point(&self.origin, to),
         }
     }
     /// Across and up, rad.
@@ -135,15 +117,7 @@ impl<N> Geometry<N> for Pointing<N> {
             }
         }
         let sight = machine.tool_direction(state, errors, sight);
-        let [ahead, across, up] = self.nominal::<S>(machine, state);
-        let along = dot(sight, ahead);
-        Reading::of([dot(sight, across) / along, dot(sight, up) / along])
-    }
-    fn table_point_mm(&self) -> Option<&[N; 3]> {
-        None
-    }
-    fn tool_point_mm(&self) -> &[N; 3] {
-        &self.origin
+        Reading::of(bearings(self.nominal::<S>(machine, state), sight))
     }
 }
 
@@ -161,18 +135,12 @@ impl Instrument for Pointing<f64> {
         if let [azimuth, elevation] = values {
             let ((sin_a, cos_a), (sin_e, cos_e)) = (azimuth.sin_cos(), elevation.sin_cos());
             let observed = Point([cos_e * cos_a, -cos_e * sin_a, sin_e]);
-            let [ahead, across, up] = self.nominal::<f64>(machine, state);
-            let along = dot(observed, ahead);
-            // More than a right angle away is no small difference.
-            let of = |direction| if along > 0.0 { dot(observed, direction) / along } else { f64::INFINITY };
-            (*azimuth, *elevation) = (of(across), of(up));
+            [*azimuth, *elevation] = observed_bearings(self.nominal::<f64>(machine, state), observed);
         }
     }
     fn columns_of_channels(&self, machine: &Machine, state: &[AxisPosition<f64>], values: &mut [f64]) {
         if let [first, second] = values {
-            let [ahead, across, up] = self.nominal::<f64>(machine, state);
-            let [x, y, z]: [f64; 3] =
-                std::array::from_fn(|i| ahead.0[i] + across.0[i] * *first + up.0[i] * *second);
+            let [x, y, z] = direction(self.nominal::<f64>(machine, state), [*first, *second]).0;
             *first = (-y).atan2(x).rem_euclid(std::f64::consts::TAU);
             *second = z.atan2(x.hypot(y));
         }

@@ -19,9 +19,10 @@ use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::kind::MAX_MM;
 use super::set_up::{self, SetUp, Written};
-use super::{
-    Checked, Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
-    default_errors, displaced, point, pose_error,
+use super::stand::pose_error;
+use super::{Contact, 
+    Checked, Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station,
+    default_errors, displaced, point,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::node::Node;
@@ -54,19 +55,9 @@ pub const FORM: usize = 7;
 pub const STYLUS: usize = 8;
 
 pub(super) const ENTRY: Entry = Entry {
-    kind: InstrumentKind::Probe,
-    word: "probe",
-    parameters: &PARAMETERS,
-    free: None,
     is_two_sided: true,
-    reads_poses: false,
-    rows_can_lack_channels: false,
-    has_readings: true,
-    needs_every_axis: true,
     default_errors: default_errors::positions_and_orientations,
-    spindle_setup: None,
-    keys: schema::properties::<Keys>,
-    read,
+    ..Entry::new(InstrumentKind::Probe, ["probe", "a touch probe"], &PARAMETERS, schema::properties::<Keys>, read)
 };
 
 /// The channels.
@@ -248,15 +239,15 @@ impl<N> Geometry<N> for Probe<N> {
     {
         Reading::scalar(self.geometry(machine, state, errors, unknown).distance())
     }
-    fn table_point_mm(&self) -> Option<&[N; 3]> {
-        Some(&self.artefact)
-    }
-    fn tool_point_mm(&self) -> &[N; 3] {
-        &self.stylus
+    fn points(&self) -> [Option<InstrumentPoint<'_, N>>; 2] {
+        [InstrumentPoint::of("artefact", &self.artefact, 0), InstrumentPoint::of("stylus", &self.stylus, STYLUS)]
     }
 }
 
 impl Instrument for Probe<f64> {
+    fn contact(&self) -> Contact {
+        Contact::Touching
+    }
     fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
         [Some(&mut self.artefact), Some(&mut self.stylus)]
     }

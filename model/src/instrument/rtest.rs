@@ -21,8 +21,8 @@ use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::kind::{MAX_MM, median};
 use super::set_up::{self, SetUp, Written};
-use super::{
-    Checked, Entry, Fault, Following, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy,
+use super::{Contact, 
+    Checked, Entry, Fault, Following, Geometry, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy,
     Station, default_errors, displaced, point,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
@@ -49,19 +49,9 @@ pub const PARAMETERS: [InstrumentParameter; 9] = [
 pub const SENSOR: usize = 6;
 
 pub(super) const ENTRY: Entry = Entry {
-    kind: InstrumentKind::RTest,
-    word: "r-test",
-    parameters: &PARAMETERS,
-    free: None,
     is_two_sided: true,
-    reads_poses: false,
-    rows_can_lack_channels: false,
-    has_readings: true,
-    needs_every_axis: true,
     default_errors: default_errors::positions_and_orientations,
-    spindle_setup: None,
-    keys: schema::properties::<Keys>,
-    read,
+    ..Entry::new(InstrumentKind::RTest, ["r-test", "an R-test"], &PARAMETERS, schema::properties::<Keys>, read)
 };
 
 /// The channels.
@@ -298,11 +288,15 @@ impl<N> Geometry<N> for RTest<N> {
         let [x, y, z] = vector.0;
         Reading::of(sensors.map(|[a, b, c]| x * a + y * b + z * c))
     }
-    fn table_point_mm(&self) -> Option<&[N; 3]> {
-        Some(&self.workpiece_ball)
-    }
-    fn tool_point_mm(&self) -> &[N; 3] {
-        &self.spindle_ball
+    fn points(&self) -> [Option<InstrumentPoint<'_, N>>; 2] {
+        let (table, spindle) = match self.setting {
+            Setting::Table => ("nest with the sensors", "master ball"),
+            Setting::Spindle => ("master ball", "nest with the sensors"),
+        };
+        [
+            InstrumentPoint::of(table, &self.workpiece_ball, 0),
+            InstrumentPoint::of(spindle, &self.spindle_ball, 3),
+        ]
     }
 }
 
@@ -319,6 +313,9 @@ impl RTest<f64> {
 }
 
 impl Instrument for RTest<f64> {
+    fn contact(&self) -> Contact {
+        Contact::AtDistance(0.0)
+    }
     fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
         [Some(&mut self.workpiece_ball), Some(&mut self.spindle_ball)]
     }

@@ -9,8 +9,8 @@ use serde::Deserialize;
 use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::set_up::{self, SetUp, Written};
-use super::{
-    Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
+use super::{Contact, 
+    Entry, Fault, Geometry, Group, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station,
     default_errors, displaced, point,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
@@ -31,20 +31,13 @@ pub const PARAMETERS: [InstrumentParameter; 6] = [
 ];
 
 pub(super) const ENTRY: Entry = Entry {
-    kind: InstrumentKind::Socket,
-    word: "socket",
-    parameters: &PARAMETERS,
     free: Some("socket"),
-    is_two_sided: false,
     reads_poses: true,
-    rows_can_lack_channels: false,
     has_readings: false,
-    needs_every_axis: true,
     default_errors: default_errors::all_locations,
     // The ball at a robot's flange stays mounted from socket to socket.
     spindle_setup: Some("tool"),
-    keys: schema::properties::<Keys>,
-    read,
+    ..Entry::new(InstrumentKind::Socket, ["socket", "a ball in fixed sockets"], &PARAMETERS, schema::properties::<Keys>, read)
 };
 
 /// The channels.
@@ -113,15 +106,18 @@ impl<N> Geometry<N> for Socket<N> {
         let ball = machine.tool_point(state, errors, displaced(self.ball, 3, &unknown));
         Reading::of(ball.minus(displaced(self.socket, 0, &unknown)).0)
     }
-    fn table_point_mm(&self) -> Option<&[N; 3]> {
-        None
-    }
-    fn tool_point_mm(&self) -> &[N; 3] {
-        &self.ball
+    fn points(&self) -> [Option<InstrumentPoint<'_, N>>; 2] {
+        [None, InstrumentPoint::of("ball", &self.ball, 3)]
     }
 }
 
 impl Instrument for Socket<f64> {
+    fn contact(&self) -> Contact {
+        Contact::InR(self.socket)
+    }
+    fn is_located(&self) -> bool {
+        self.is_located
+    }
     fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
         [None, Some(&mut self.ball)]
     }
@@ -136,7 +132,8 @@ impl Instrument for Socket<f64> {
         (!has(Quantity::Socket)).then(|| ("`socket`".into(), help.into()))
     }
     /// The mean of the points.
-    fn placed(&self, points: &[Vector3<f64>], _: &[Vector3<f64>]) -> Option<Station<f64>> {
+    fn placed(&self, group: &Group<'_>) -> Option<Station<f64>> {
+        let points = group.tool_points();
         let mean = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
         let socket = Socket { socket: [mean.x, mean.y, mean.z], is_located: true, ..self.clone() };
         (!points.is_empty()).then_some(Station::Socket(socket))

@@ -1,60 +1,87 @@
-//! The laser tracker: three coordinates of a target in the tracker's own frame.
+//! The laser tracker: a target seen in the tracker's own frame, as three coordinates or as range and two angles.
 //!
-//! `m = B · E · P`: `P` is the target in R through the chain, `E` a small motion (the pose parameters) and `B` a fixed
-//! rigid motion. `B` keeps the estimated angles small for any orientation of the tracker.
+//! The target in that frame is `m = B · E · P` (`stand.rs`), with `P` in R through the chain. Azimuth turns about the
+//! tracker's Z from X towards Y, elevation rises from its XY plane:
+//!
+//! ```text
+//! m = range · (cos elevation · cos azimuth, cos elevation · sin azimuth, sin elevation)
+//! ```
+//!
+//! The angles are read as bearings (`bearing.rs`) about the nominal line of sight.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::bearing::{Sight, bearings, direction, observed_bearings};
 use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::set_up::{self, SetUp, Written};
+use super::stand::{self, Stand, pose_error};
 use super::{
-    Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
-    default_errors, displaced, point, pose_error,
+    Checked, Entry, Fault, Geometry, Group, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy,
+    Station, default_errors, displaced, point,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
+use crate::frames::{Point, cross};
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
 use crate::session::expression::Constant;
 
+const POSE: [InstrumentParameter; 6] = stand::parameters("tracker");
+
 /// The pose, then the target in the tool frame.
 pub const PARAMETERS: [InstrumentParameter; 9] = [
-    InstrumentParameter::length("tracker", "x", SharedBy::Setup),
-    InstrumentParameter::length("tracker", "y", SharedBy::Setup),
-    InstrumentParameter::length("tracker", "z", SharedBy::Setup),
-    InstrumentParameter::angle("tracker", "a", SharedBy::Setup),
-    InstrumentParameter::angle("tracker", "b", SharedBy::Setup),
-    InstrumentParameter::angle("tracker", "c", SharedBy::Setup),
+    POSE[0],
+    POSE[1],
+    POSE[2],
+    POSE[3],
+    POSE[4],
+    POSE[5],
     InstrumentParameter::length("target", "x", SharedBy::SpindleSetup),
     InstrumentParameter::length("target", "y", SharedBy::SpindleSetup),
     InstrumentParameter::length("target", "z", SharedBy::SpindleSetup),
 ];
 
+/// The first parameter of the target.
+const TARGET: usize = 6;
+
 pub(super) const ENTRY: Entry = Entry {
-    kind: InstrumentKind::Tracker,
-    word: "tracker",
-    parameters: &PARAMETERS,
     free: Some("tracker"),
-    is_two_sided: false,
     reads_poses: true,
-    rows_can_lack_channels: false,
-    has_readings: true,
-    needs_every_axis: true,
     default_errors: default_errors::all_locations,
-    spindle_setup: None,
-    keys: schema::properties::<Keys>,
-    read,
+    ..Entry::new(InstrumentKind::Tracker, ["tracker", "a laser tracker"], &PARAMETERS, schema::properties::<Keys>, read)
 };
 
-/// The channels.
-const CHANNELS: [Channel; 3] = Channel::vector(["x", "y", "z"]);
+/// The channels of coordinates.
+const CARTESIAN: [Channel; 3] = Channel::vector(["x", "y", "z"]);
 
-/// The columns of a tracker.
-const COLUMNS: [Column; 3] = Column::vector(["px", "py", "pz"], "mm");
+/// The channels of range and angles.
+const POLAR: [Channel; 3] = [Channel::length("range"), Channel::angle("across"), Channel::angle("up")];
+
+/// The columns of range and angles.
+const OF_POLAR: [Column; 3] = [
+    Column::new("range", "mm", Quantity::Polar(0)),
+    Column::new("azimuth", "deg", Quantity::Polar(1)),
+    Column::new("elevation", "deg", Quantity::Polar(2)),
+];
+
+/// The columns of coordinates.
+const OF_CARTESIAN: [Column; 3] = Column::vector(["px", "py", "pz"], "mm");
+
+/// The columns, those of a tracker with coordinates first.
+const CARTESIAN_FIRST: [Column; 6] =
+    [OF_CARTESIAN[0], OF_CARTESIAN[1], OF_CARTESIAN[2], OF_POLAR[0], OF_POLAR[1], OF_POLAR[2]];
+
+/// The columns, those of a tracker with range and angles first.
+const POLAR_FIRST: [Column; 6] =
+    [OF_POLAR[0], OF_POLAR[1], OF_POLAR[2], OF_CARTESIAN[0], OF_CARTESIAN[1], OF_CARTESIAN[2]];
+
+/// Least distance of the line of sight from the tracker's vertical axis at the target: nearer, the azimuth is not
+/// defined, mm.
+const MIN_MM: f64 = 1.0;
 
 /// The keys of a test.
 #[derive(Deserialize, JsonSchema)]
@@ -64,15 +91,21 @@ struct Keys {
     target_mm: document::Point,
     #[serde(default)]
     target_u_um: document::Uncertainties,
+    /// Where the tracker stands in R, upright, for a plan that reads range and angles. Data have columns for them.
+    tracker_mm: Option<document::Point>,
 }
 
 fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
     let keys: Keys = set_up::keys(set_up)?;
     let target = set_up::point("target_mm", &keys.target_mm, constants)?;
     let priors = [Prior::Free; 6].into_iter().chain(set_up::lengths(&keys.target_u_um)).collect();
-    let rotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|row| row.map(Written::number));
-    let origin = [0.0; 3].map(Written::number);
-    Ok(SetUp::new(Station::Tracker(Tracker { target, rotation, origin }), priors))
+    let mut stand = Stand::at_origin();
+    if let Some(place) = &keys.tracker_mm {
+        let place = set_up::point("tracker_mm", place, constants)?;
+        stand.origin = place.map(|coordinate| Written::number(-coordinate.mm));
+    }
+    let is_polar = keys.tracker_mm.is_some();
+    Ok(SetUp::new(Station::Tracker(Tracker { target, stand, is_polar }), priors))
 }
 
 /// A tracker as set up for one test, lengths in mm.
@@ -80,23 +113,37 @@ fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
 pub struct Tracker<N> {
     /// The target in the tool frame.
     pub target: [N; 3],
-    /// `B`: rotation from R to the tracker's frame, row by row.
-    pub rotation: [[N; 3]; 3],
-    /// `B`: R's origin in the tracker's frame.
-    pub origin: [N; 3],
+    /// Where the tracker stands.
+    pub stand: Stand<N>,
+    /// Whether range and angles are read, not coordinates.
+    pub is_polar: bool,
+}
+
+impl<N: Nominal> Tracker<N> {
+    /// The nominal line of sight in the tracker's frame, with across towards increasing azimuth.
+    fn sight<S: Scalar<Nominal = N>>(&self, machine: &Machine, state: &[AxisPosition<N>]) -> Sight<S> {
+        let none = vec![BodyErrors::<S>::NONE; machine.axes.len()];
+        let seen = self.stand.point(machine.tool_point(state, &none, Point::nominal(self.target)));
+        let [x, y, _] = seen.0;
+        let (range, level) = (seen.norm(), (x * x + y * y).sqrt());
+        let ahead = Point(seen.0.map(|x| x / range));
+        let across = Point([-y / level, x / level, S::constant(0.0)]);
+        [ahead, across, cross(ahead.0, across)]
+    }
 }
 
 impl<N> Geometry<N> for Tracker<N> {
     type Over<M> = Tracker<M>;
 
     fn map<M>(&self, to: &impl Fn(&N) -> M) -> Tracker<M> {
-        Tracker {
-            target: point(&self.target, to),
-            rotation: self.rotation.each_ref().map(|row| point(row, to)),
-            origin: point(&self.origin, to),
+        Tracker { target: point(&self.target, to), stand: self.stand.map(to), is_polar: self.is_polar }
+    }
+    fn keep_channels(&mut self, has: &dyn Fn(Quantity) -> bool) {
+        if has(Quantity::Polar(0)) || has(Quantity::Channel(0)) {
+            self.is_polar = has(Quantity::Polar(0));
         }
     }
-    /// The reading: three coordinates in the tracker's frame, mm.
+    /// The coordinates in the tracker's frame, mm, or range and bearings, mm and rad.
     fn reading<S: Scalar<Nominal = N>>(
         &self,
         machine: &Machine,
@@ -107,21 +154,16 @@ impl<N> Geometry<N> for Tracker<N> {
     where
         N: Nominal,
     {
-        let mut point = machine.tool_point(state, errors, displaced(self.target, 6, &unknown));
-        if let Some(pose) = pose_error(&unknown) {
-            point = pose.push(point);
+        let target = machine.tool_point(state, errors, displaced(self.target, TARGET, &unknown));
+        let seen = self.stand.point(pose_error(&unknown).map_or(target, |pose| pose.push(target)));
+        if !self.is_polar {
+            return Reading::of(seen.0);
         }
-        let [x, y, z] = point.0;
-        Reading::of((0..3).map(|i| {
-            let [a, b, c] = self.rotation[i];
-            x * a + y * b + z * c + self.origin[i]
-        }))
+        let [across, up] = bearings(self.sight(machine, state), seen);
+        Reading::of([seen.norm(), across, up])
     }
-    fn table_point_mm(&self) -> Option<&[N; 3]> {
-        None
-    }
-    fn tool_point_mm(&self) -> &[N; 3] {
-        &self.target
+    fn points(&self) -> [Option<InstrumentPoint<'_, N>>; 2] {
+        [None, InstrumentPoint::of("target", &self.target, TARGET)]
     }
 }
 
@@ -130,44 +172,92 @@ impl Instrument for Tracker<f64> {
         [None, Some(&mut self.target)]
     }
     fn channels(&self) -> &[Channel] {
-        &CHANNELS
+        if self.is_polar { &POLAR } else { &CARTESIAN }
     }
     fn columns(&self) -> &'static [Column] {
-        &COLUMNS
+        if self.is_polar { &POLAR_FIRST } else { &CARTESIAN_FIRST }
+    }
+    fn refers_to_nominal(&self) -> bool {
+        self.is_polar
+    }
+    fn channels_of_columns(&self, machine: &Machine, state: &[AxisPosition<f64>], values: &mut [f64]) {
+        if let (true, Some(seen)) = (self.is_polar, self.measured_mm(values)) {
+            let [across, up] = observed_bearings(self.sight::<f64>(machine, state), Point(seen.into()));
+            values[1..].copy_from_slice(&[across, up]);
+        }
+    }
+    fn columns_of_channels(&self, machine: &Machine, state: &[AxisPosition<f64>], values: &mut [f64]) {
+        if let (true, [_, first, second]) = (self.is_polar, values) {
+            let [x, y, z] = direction(self.sight::<f64>(machine, state), [*first, *second]).0;
+            *first = y.atan2(x).rem_euclid(std::f64::consts::TAU);
+            *second = z.atan2(x.hypot(y));
+        }
+    }
+    fn measured_mm(&self, values: &[f64]) -> Option<Vector3<f64>> {
+        let [first, azimuth, elevation] = *values else { return None };
+        if !self.is_polar {
+            return Some(Vector3::new(first, azimuth, elevation));
+        }
+        let ((sin_a, cos_a), (sin_e, cos_e)) = (azimuth.sin_cos(), elevation.sin_cos());
+        Some(first * Vector3::new(cos_e * cos_a, cos_e * sin_a, sin_e))
+    }
+    /// The first coordinate, or the azimuth, has the opposite sign.
+    fn mirror(&self, values: &mut [f64]) {
+        let place = usize::from(self.is_polar);
+        values[place] = -values[place];
     }
     fn missing(&self, has: &dyn Fn(Quantity) -> bool) -> Option<Fault> {
-        let column = COLUMNS.iter().find(|column| !has(column.quantity))?;
-        Some((format!("`{}`", column.name(column.unit)), "a tracker needs px_mm, py_mm and pz_mm".into()))
+        let needed = if OF_POLAR.iter().any(|column| has(column.quantity)) { OF_POLAR } else { OF_CARTESIAN };
+        let column = needed.iter().find(|column| !has(column.quantity))?;
+        let help = "a tracker needs px_mm, py_mm and pz_mm, or range_mm, azimuth_deg and elevation_deg";
+        Some((format!("`{}`", column.name(column.unit)), help.into()))
     }
-    fn placed(&self, points: &[Vector3<f64>], observed: &[Vector3<f64>]) -> Option<Station<f64>> {
-        let (rotation, origin) = rigid_motion(points, observed);
-        Some(Station::Tracker(Tracker {
-            target: self.target,
-            rotation: std::array::from_fn(|i| std::array::from_fn(|j| rotation[(i, j)])),
-            origin: [origin.x, origin.y, origin.z],
-        }))
+    fn placed(&self, group: &Group<'_>) -> Option<Station<f64>> {
+        let pairs = group.positions();
+        let stand = Stand::through(stand::best_rotation(stand::covariance(&pairs).0), &pairs);
+        (!pairs.is_empty()).then(|| Station::Tracker(Tracker { stand, ..self.clone() }))
     }
-}
-
-/// The rotation and translation that map `from` onto `to` with the least sum of squares (Kabsch, Acta Cryst. A32 (1976)
-/// 922).
-fn rigid_motion(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> (Matrix3<f64>, Vector3<f64>) {
-    if from.is_empty() {
-        return (Matrix3::identity(), Vector3::zeros());
+    /// A planned line of sight has an azimuth.
+    fn check_set_up(&self, checked: &Checked<'_>) -> Result<(), Fault> {
+        if !self.is_polar || !checked.readings.observed.is_empty() {
+            return Ok(());
+        }
+        let points = checked.readings.nominal_points(checked.machine, self.target);
+        let level = points.into_iter().map(|point| {
+            let [x, y, _] = self.stand.point::<f64>(Point(point.into())).0;
+            x.hypot(y)
+        });
+        for (row, level) in level.enumerate().filter(|(_, level)| *level < MIN_MM) {
+            return Err((
+                format!(
+                    "test \"{}\", reading {}: the target nominally lies {level:.3} mm from the tracker's vertical axis, \
+                     where no azimuth is defined",
+                    checked.test,
+                    row + 1
+                ),
+                "check `tracker_mm`, `target_mm` and the axis positions".into(),
+            ));
+        }
+        Ok(())
     }
-    let count = from.len() as f64;
-    let centre_from = from.iter().sum::<Vector3<f64>>() / count;
-    let centre_to = to.iter().sum::<Vector3<f64>>() / count;
-    let covariance: Matrix3<f64> =
-        from.iter().zip(to).map(|(a, b)| (b - centre_to) * (a - centre_from).transpose()).sum();
-    let svd = covariance.svd(true, true);
-    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
-        return (Matrix3::identity(), centre_to - centre_from);
-    };
-    // The sign on the smallest singular value makes the result a rotation, not a reflection.
-    let mut signs = Matrix3::identity();
-    let least = svd.singular_values.imin();
-    signs[(least, least)] = (u * v_t).determinant().signum();
-    let rotation = u * signs * v_t;
-    (rotation, centre_to - rotation * centre_from)
+    /// A range is positive, and an elevation within a right angle.
+    fn check_observed(&self, test: &str, observed: &[f64]) -> Result<(), Fault> {
+        if !self.is_polar {
+            return Ok(());
+        }
+        for (row, values) in observed.chunks_exact(POLAR.len()).enumerate() {
+            let place = format!("test \"{test}\", reading {}", row + 1);
+            if values[0] <= 0.0 {
+                let message = format!("{place}: the range is {:.3} mm", values[0]);
+                return Err((message, "a range is positive".into()));
+            }
+            if values[2].abs() > std::f64::consts::FRAC_PI_2 {
+                let message = format!("{place}: the elevation is {:.3}°", values[2].to_degrees());
+                let help = "an elevation is within ±90° of the horizon: are these angles from the vertical, or in another \
+                            unit than the name of the column says?";
+                return Err((message, help.into()));
+            }
+        }
+        Ok(())
+    }
 }

@@ -40,8 +40,10 @@ pub(crate) fn readings(machine: &Machine, test: &Test, readings: &Readings) -> R
     }
     plausibility::check(machine, test, readings)?;
     test.station.check_observed(&test.name, &readings.observed)?;
-    test.station.check_readings(&Checked { machine, test: &test.name, readings })?;
+    let checked = Checked { machine, test: &test.name, readings };
+    test.station.check_readings(&checked)?;
     let doubts = [
+        test.station.doubt(&checked),
         planned::beyond_travel(machine, readings),
         planned::many_turns(machine, readings),
         runs::difference_from_stated(test.motion.as_ref(), readings).or_else(|| runs::missing_numbers(readings)),

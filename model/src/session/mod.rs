@@ -143,6 +143,16 @@ impl Session {
         None
     }
 
+    /// The keys of noise that the session does not state, of the units in which its channels read.
+    pub fn keys_of_noise(&self) -> &'static str {
+        let units = self.units();
+        match (units.lengths && self.noise_mm.is_none(), units.angles && self.noise_rad.is_none()) {
+            (true, true) => "`noise_um` and `noise_arcsec`",
+            (false, true) => "`noise_arcsec`",
+            _ => "`noise_um`",
+        }
+    }
+
     /// The stated standard deviation of a channel, mm; of an angle at [`Session::lever_mm`].
     pub fn stated_noise_mm(&self) -> Option<f64> {
         let lengths = self.noise_mm.filter(|_| !self.units().only_angles());

@@ -3,9 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use nalgebra::Vector3;
+
 use crate::axis::AxisKind;
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::driver::DriverSample;
+use crate::frames::Point;
 use crate::instrument::{Reading, Station};
 
 /// The file of readings, for messages about single readings.
@@ -81,6 +84,17 @@ impl Readings {
         self.state(machine, row, &mut state);
         let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
         station.read::<f64>(machine, &state, &none, |_| None)
+    }
+
+    /// The nominal position in R of a point of the tool frame, mm, at every row.
+    pub fn nominal_points(&self, machine: &Machine, tool_mm: [f64; 3]) -> Vec<Vector3<f64>> {
+        let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
+        let mut state = Vec::new();
+        let point = |row: usize| {
+            self.state(machine, row, &mut state);
+            Vector3::from(machine.tool_point::<f64>(&state, &none, Point(tool_mm)).0)
+        };
+        (0..self.rows()).map(point).collect()
     }
 
     /// Turns the observed values of the columns into those of the channels, for channels that refer to the nominal

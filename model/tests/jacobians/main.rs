@@ -13,8 +13,10 @@ use abbe_model::instrument::column::Quantity;
 use abbe_model::instrument::distance::{Distance, StationFrame};
 use abbe_model::instrument::laser::Laser;
 use abbe_model::instrument::pointing::Pointing;
+use abbe_model::instrument::pose::Pose;
 use abbe_model::instrument::probe::Probe;
 use abbe_model::instrument::rtest::{RTest, Setting};
+use abbe_model::instrument::stand::Stand;
 use abbe_model::instrument::tracker::Tracker;
 use abbe_model::instrument::{Geometry, InstrumentKind, InternalUnit, Station};
 use abbe_model::rotation_error::Body;
@@ -29,12 +31,9 @@ fn ball_bar(workpiece_ball: [f64; 3], spindle_ball: [f64; 3]) -> Station<f64> {
     Station::BallBar(BallBar { workpiece_ball, spindle_ball, bar: 100.0 })
 }
 
-fn tracker(target: [f64; 3]) -> Station<f64> {
-    Station::Tracker(Tracker {
-        target,
-        rotation: [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
-        origin: [1000.0, -500.0, 300.0],
-    })
+/// An instrument beside the machine.
+fn stand() -> Stand<f64> {
+    Stand { rotation: [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], origin: [1000.0, -2500.0, 300.0] }
 }
 
 /// A stylus in a cylinder wide enough to be hit from any position.
@@ -61,13 +60,16 @@ fn laser(optic: [f64; 3], reflector: [f64; 3]) -> Station<f64> {
 }
 
 /// Every instrument between two points.
-fn every_station(table: [f64; 3], tool: [f64; 3]) -> [Station<f64>; 11] {
-    let angle = |body| Station::Angle(Angle { about: vec![[0.0, 0.6, 0.8], [1.0, 0.0, 0.0]], body, origin: [0.0; 3] });
-    let distance = |frame| Station::Distance(Distance { station: table, reflector: tool, frame, origin: [0.0; 3] });
+fn every_station(table: [f64; 3], tool: [f64; 3]) -> [Station<f64>; 13] {
+    let angle = |body| Station::Angle(Angle { about: vec![[0.0, 0.6, 0.8], [1.0, 0.0, 0.0]], body });
+    let distance = |frame| Station::Distance(Distance { station: table, reflector: tool, frame });
     let directions = [[0.6, 0.0, 0.8], [0.0, -1.0, 0.0], [-0.8, 0.0, 0.6]];
+    let tracker = |is_polar| Station::Tracker(Tracker { target: tool, stand: stand(), is_polar });
     [
         ball_bar(table, tool),
-        tracker(tool),
+        tracker(false),
+        tracker(true),
+        Station::Pose(Pose { target: tool, stand: stand(), turn: None }),
         probe(table, tool),
         r_test(Setting::Table, table, tool),
         r_test(Setting::Spindle, table, tool),
@@ -76,7 +78,7 @@ fn every_station(table: [f64; 3], tool: [f64; 3]) -> [Station<f64>; 11] {
         angle(Body::Table),
         distance(StationFrame::Table),
         distance(StationFrame::Bed),
-        Station::Pointing(Pointing { directions, origin: [0.0; 3] }),
+        Station::Pointing(Pointing { directions }),
     ]
 }
 

@@ -6,6 +6,7 @@ use abbe_model::axis::AxisKind;
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::instrument::rtest::{RTest, Setting};
 use abbe_model::instrument::socket::Socket;
+use abbe_model::instrument::stand::Stand;
 use abbe_model::instrument::tracker::Tracker;
 use abbe_model::instrument::{InternalUnit, Station};
 use abbe_model::sensitivity::{SlotValues, TestModel};
@@ -28,7 +29,10 @@ fn station() -> impl Strategy<Value = Station<f64>> {
     let turned = [[0.0, 1.0, 0.0], [-0.6, 0.0, 0.8], [0.8, 0.0, 0.6]];
     (point(), point(), 0_usize..5).prop_map(move |(table, tool, kind)| match kind {
         0 => Station::BallBar(BallBar { workpiece_ball: table, spindle_ball: tool, bar: 100.0 }),
-        1 => Station::Tracker(Tracker { target: tool, rotation: turned, origin: table }),
+        1 => {
+            let stand = Stand { rotation: turned, origin: table };
+            Station::Tracker(Tracker { target: tool, stand, is_polar: false })
+        }
         2 => Station::Socket(Socket { ball: tool, socket: table, is_located: true }),
         kind => Station::RTest(RTest {
             setting: if kind == 3 { Setting::Table } else { Setting::Spindle },

@@ -15,6 +15,7 @@ use abbe_model::files::table::csv;
 use abbe_model::files::{self, ReadOptions};
 use abbe_model::frames::Rotation;
 use abbe_model::instrument::Station;
+use abbe_model::instrument::stand::Stand;
 use abbe_model::instrument::tracker::Tracker;
 use abbe_model::session::Session;
 use abbe_model::session::readings::Readings;
@@ -125,8 +126,8 @@ proptest! {
         fs::write(folder.path().join("session.toml"), &session).unwrap();
         let station = Station::Tracker(Tracker {
             target: [1.0, 2.0, 3.0],
-            rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-            origin: [0.0; 3],
+            stand: Stand { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], origin: [0.0; 3] },
+            is_polar: false,
         });
         let data = folder.path().join("T.csv");
         std::fs::write(&data, csv::text(&machine, &station, &readings)).unwrap();

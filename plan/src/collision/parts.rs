@@ -5,7 +5,6 @@ use std::sync::Arc;
 use abbe_model::axis::AxisKind;
 use abbe_model::body::{ClearanceSizes, Holder};
 use abbe_model::chain::Machine;
-use abbe_model::instrument::Station;
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::session::moves::Mounted;
 use abbe_model::session::{Session, Test};
@@ -99,10 +98,7 @@ impl<'m> Parts<'m> {
         }
         let sizes = session.clearance.unwrap_or_default();
         let mut parts: Vec<Part> = bodies.0.to_vec();
-        let bar = match &test.station {
-            Station::BallBar(bar) => Some(bar.clone()),
-            _ => None,
-        };
+        let bar = test.station.bar().cloned();
         if let Some(bar) = &bar {
             let stem = |name: &str, side: Side, from: [f64; 3], up: f64, Holder { radius_mm, length_mm }: Holder| {
                 let to = [from[0], from[1], from[2] + up * length_mm];

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use abbe_model::axis::{Axis, AxisKind};
 use abbe_model::chain::{BodyErrors, Machine};
 use abbe_model::frames::Point;
-use abbe_model::instrument::Station;
+use abbe_model::instrument::{Contact, Station};
 use abbe_model::session::placing::axis_line;
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test};
@@ -81,9 +81,9 @@ pub(super) fn draw(
     if let (Some(axis), false) = (untravelled, is_placed) {
         return Err(PlanError::NoTravel { axis: axis.name.clone() });
     }
-    let iterates = match station {
-        Station::Tracker(_) => false,
-        Station::Socket(_) => true,
+    let iterates = match station.contact() {
+        Contact::None => false,
+        Contact::InR(_) => true,
         _ => machine.axes.iter().all(|axis| axis.kind == AxisKind::Rotary),
     };
     let most = count * if iterates { SOLVED_DRAWS_PER_CANDIDATE } else { DRAWS_PER_CANDIDATE };

@@ -14,9 +14,9 @@ use std::f64::consts::TAU;
 
 use abbe_model::chain::{BodyErrors, Machine};
 use abbe_model::frames::{Point, cross};
-use abbe_model::instrument::Station;
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::instrument::probe::Probe;
+use abbe_model::instrument::{Contact, Station};
 use abbe_model::session::placing::positions_for_bar;
 use rand_pcg::Pcg64;
 
@@ -43,19 +43,18 @@ pub(super) enum Goal {
 impl Goal {
     /// Draws the goal of one candidate. A probe touches its cylinder between two heights above its point, mm.
     pub fn draw(station: &Station<f64>, height_mm: [f64; 2], random: &mut Pcg64) -> Goal {
-        match station {
-            Station::Socket(socket) => Goal::InR(socket.socket),
-            Station::Probe(probe) => {
+        match (station.contact(), station.probe()) {
+            (Contact::InR(point_mm), _) => Goal::InR(point_mm),
+            (_, Some(probe)) => {
                 let turn = between(random, [0.0, TAU]);
                 let height = between(random, height_mm);
                 Goal::OnTable { point_mm: surface_point(probe, turn, height), apart_mm: [0.0; 3] }
             }
-            Station::BallBar(_) | Station::RTest(_) => {
-                let apart_mm = upward(random).map(|x| x * station.reference_mm());
+            (Contact::AtDistance(distance_mm), _) => {
+                let apart_mm = upward(random).map(|x| x * distance_mm);
                 Goal::OnTable { point_mm: station.table_point_mm().unwrap_or_default(), apart_mm }
             }
-            // A line of sight or a direction is all that the others need.
-            _ => Goal::Free,
+            (Contact::None | Contact::Touching, None) => Goal::Free,
         }
     }
 
@@ -75,23 +74,17 @@ impl Goal {
                 })?
             }
         };
-        match station {
-            Station::Probe(probe) if !touches(machine, probe, &at) => None,
-            _ => Some(at),
-        }
+        station.probe().is_none_or(|probe| touches(machine, probe, &at)).then_some(at)
     }
 
     /// What poses have to do, and what to check if none does it.
     pub fn words(station: &Station<f64>) -> (String, &'static str) {
-        match station {
-            Station::Socket(socket) => {
-                let [x, y, z] = socket.socket;
-                (
-                    format!("brings the ball into the socket at ({x:.1}, {y:.1}, {z:.1}) mm"),
-                    "`socket_mm`, `ball_mm` and the travel of the axes",
-                )
-            }
-            Station::Probe(_) => (
+        match station.contact() {
+            Contact::InR([x, y, z]) => (
+                format!("brings the ball into the socket at ({x:.1}, {y:.1}, {z:.1}) mm"),
+                "`socket_mm`, `ball_mm` and the travel of the axes",
+            ),
+            Contact::Touching => (
                 "makes the probe touch the cylinder from outside".into(),
                 "`artefact_mm`, `radius_mm`, `stylus_mm`, `direction` and the travel of the axes",
             ),

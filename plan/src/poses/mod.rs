@@ -16,7 +16,6 @@ use abbe_identify::IdentifyError;
 use std::sync::Arc;
 
 use abbe_model::axis::AxisKind;
-use abbe_model::instrument::{InstrumentKind, Station};
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test};
@@ -127,7 +126,7 @@ pub struct PoseSelection {
 pub fn measured_by<'s>(session: &'s Session, name: Option<&str>) -> Vec<&'s Test> {
     match name {
         Some(name) => session.tests.iter().filter(|test| test.name == name).collect(),
-        None if session.instrument == InstrumentKind::Socket => session.tests.iter().collect(),
+        None if !session.instrument.entry().has_readings => session.tests.iter().collect(),
         None => session.tests.last().into_iter().collect(),
     }
 }
@@ -135,7 +134,7 @@ pub fn measured_by<'s>(session: &'s Session, name: Option<&str>) -> Vec<&'s Test
 /// The tests whose sockets have no place: neither the session states it, nor do the poses of their readings.
 pub fn without_place<'t>(session: &Session, tests: &[&'t Test]) -> Vec<&'t Test> {
     let located = located(session, tests);
-    let lacking = |(_, test): &(&&Test, Test)| matches!(&test.station, Station::Socket(own) if !own.is_located);
+    let lacking = |(_, test): &(&&Test, Test)| !test.station.is_located();
     tests.iter().zip(located).filter(lacking).map(|(test, _)| *test).collect()
 }
 
@@ -233,7 +232,7 @@ fn located(session: &Session, tests: &[&Test]) -> Vec<Test> {
     let of = |test: &&Test| {
         let place = session.tests.iter().position(|own| own.name == test.name);
         let station = match (&test.station, place.map(|place| &stations[place])) {
-            (Station::Socket(own), Some(found)) if !own.is_located => found.clone(),
+            (own, Some(found)) if !own.is_located() => found.clone(),
             (own, _) => own.clone(),
         };
         Test { station, ..(*test).clone() }

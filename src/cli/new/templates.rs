@@ -20,6 +20,16 @@ macro_rules! files {
 /// The templates.
 pub const TEMPLATES: &[Template] = &[
     Template {
+        name: "angle",
+        about: "rotary table with a polygon, and a level on a carriage; a plan, and simulated readings",
+        files: files!("angle": "machine.toml", "plan.toml", "session.toml", "level.csv", "polygon.csv"),
+    },
+    Template {
+        name: "distance",
+        about: "three-axis machine and a tracking interferometer at four unknown places; simulated readings",
+        files: files!("distance": "machine.toml", "session.toml", "S1.csv", "S2.csv", "S3.csv", "S4.csv"),
+    },
+    Template {
         name: "hermle-c600u",
         about: "five-axis machine with a tilting rotary table; three ball-bar methods as plans",
         files: files!("hermle-c600u": "machine.toml", "chapter4.toml", "chapter5.toml", "chapter6.toml"),
@@ -35,6 +45,16 @@ pub const TEMPLATES: &[Template] = &[
         name: "kuka-iiwa14",
         about: "seven-axis robot with its ball in sockets (public data set, to be downloaded)",
         files: files!("kuka-iiwa14": "machine.toml", "session.toml"),
+    },
+    Template {
+        name: "laser",
+        about: "three-axis machine and a laser interferometer along X: displacement, straightness, pitch; a plan, and simulated readings",
+        files: files!("laser": "machine.toml", "plan.toml", "session.toml", "LX.csv"),
+    },
+    Template {
+        name: "pose",
+        about: "six-axis robot before a camera system that reads poses, and before a tracker with range and angles; simulated readings",
+        files: files!("pose": "machine.toml", "session.toml", "tracker.toml", "body.csv", "target.csv"),
     },
     Template {
         name: "r-test",

@@ -1,6 +1,5 @@
 //! `abbe plan --clearance-mm`: collisions of spindle, table and device.
 
-use abbe::model::instrument::Station;
 use abbe::model::instrument::rtest::Setting;
 use abbe::model::session::Session;
 use abbe::plan::clearance::Clearance;
@@ -17,14 +16,7 @@ pub fn faults(session: &Session, sizes: &str) -> Result<Vec<String>, Failure> {
         )));
     };
     values::SIZE_MM.all("--clearance-mm", &numbers)?;
-    let settings: Vec<Setting> = session
-        .tests
-        .iter()
-        .filter_map(|test| match &test.station {
-            Station::RTest(rtest) => Some(rtest.setting),
-            _ => None,
-        })
-        .collect();
+    let settings: Vec<Setting> = session.tests.iter().filter_map(|test| Some(test.station.rtest()?.setting)).collect();
     let faults = [(Setting::Table, "device on the table"), (Setting::Spindle, "device in the spindle")]
         .into_iter()
         .filter(|(setting, _)| settings.is_empty() || settings.contains(setting))

@@ -2,7 +2,6 @@
 
 use abbe::identify::noise::NoiseSource;
 use abbe::identify::parameters::Role;
-use abbe::model::instrument::InstrumentKind;
 use abbe::model::words::counted;
 
 use super::contents::Study;
@@ -47,17 +46,7 @@ pub fn part(study: &Study) -> Part {
 
 fn machine(study: &Study) -> String {
     let (session, analysis) = (&study.problem.session, &study.analysis);
-    let instrument = match session.instrument {
-        InstrumentKind::BallBar => "a double ball bar",
-        InstrumentKind::RTest => "an R-test",
-        InstrumentKind::Probe => "a touch probe",
-        InstrumentKind::Tracker => "a laser tracker",
-        InstrumentKind::Socket => "a ball in fixed sockets",
-        InstrumentKind::Laser => "a laser interferometer",
-        InstrumentKind::Angle => "a sensor of angles",
-        InstrumentKind::Distance => "distances from a station",
-        InstrumentKind::Pointing => "observed directions",
-    };
+    let instrument = session.instrument.entry().phrase;
     let moving = analysis.moving_min.map_or(String::new(), |min| format!(" and {min:.1} min of movement"));
     format!(
         "The machine {} has the structural code {} (from workpiece to tool, b is the bed). It is measured with {instrument} \

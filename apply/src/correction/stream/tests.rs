@@ -9,7 +9,6 @@ use abbe_model::effect::shape::{ReversalSpike, Shape};
 use abbe_model::effect::{Component, Effect};
 use abbe_model::files::commands::CommandFile;
 use abbe_model::instrument::Station;
-use abbe_model::instrument::ballbar::BallBar;
 
 use super::*;
 use abbe_identify::model_file::errors::EstimatedEffect;
@@ -24,7 +23,7 @@ fn errors() -> EstimatedErrors {
     };
     EstimatedErrors {
         constant: vec![0.0; machine.error_slots()],
-        station: Station::BallBar(BallBar { workpiece_ball: [0.0; 3], spindle_ball: [0.0; 3], bar: 1.0 }),
+        station: Station::between([0.0; 3], [0.0; 3], 1.0),
         reference: Reference::default(),
         effects: vec![
             effect("EXX", Shape::Lag, 1e-3),

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use abbe_model::instrument::Station;
 use abbe_model::session::{Prior, Session, Test};
 
 use super::super::results::SuggestionKind;
@@ -73,7 +72,7 @@ pub(super) fn readings(session: &Session) -> Vec<Hypothesis> {
     ));
     let mut bars_mm: Vec<f64> = Vec::new();
     for test in measured(session) {
-        if let Station::BallBar(bar) = &test.station
+        if let Some(bar) = test.station.bar()
             && !bars_mm.contains(&bar.bar)
         {
             bars_mm.push(bar.bar);
@@ -90,8 +89,7 @@ pub(super) fn readings(session: &Session) -> Vec<Hypothesis> {
     for set in sets {
         let mut changed = session.clone();
         for test in &mut changed.tests {
-            let (Station::BallBar(bar), Some(readings)) =
-                (&mut test.station, test.readings.as_mut().map(Arc::make_mut))
+            let (Some(bar), Some(readings)) = (test.station.bar_mut(), test.readings.as_mut().map(Arc::make_mut))
             else {
                 continue;
             };

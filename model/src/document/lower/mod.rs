@@ -24,7 +24,7 @@ use crate::files::access::ReadOptions;
 use crate::files::stamp::FileStamp;
 use crate::files::table::memory::MemoryColumn;
 use crate::files::table::request::{ColumnMapping, Format};
-use crate::instrument::{InstrumentKind, InstrumentParameter};
+use crate::instrument::{InstrumentKind, InstrumentParameter, kinds};
 use crate::session::expression::Constant;
 use crate::session::{self, Session, Test, check, setups};
 pub(crate) use machine::machine;
@@ -203,7 +203,7 @@ pub(crate) fn effect_of(
         file: Path::new(""),
         machine,
         // No test is read with it.
-        instrument: InstrumentKind::BallBar,
+        instrument: kinds()[0],
         of_instruments: of_instruments.to_vec(),
         constants: &[],
         format: Format::default(),

@@ -14,8 +14,8 @@ use crate::files::access;
 use crate::files::quantity;
 use crate::files::table::fill::Filling;
 use crate::files::table::{self, memory, request::Request};
-use crate::instrument::InstrumentKind;
 use crate::instrument::set_up::SetUp;
+use crate::instrument::{InstrumentKind, kinds};
 use crate::session::expression::Length;
 use crate::session::motion::Motion;
 use crate::session::{Test, check, planned};
@@ -126,7 +126,7 @@ fn set_up(kind: InstrumentKind, keys: &Node, context: &Context<'_>) -> Result<Se
     let own = kind.entry();
     (own.read)(keys, context.constants).map_err(|fault| {
         let Some(key) = fault.unknown().map(str::to_string) else { return fault };
-        match InstrumentKind::ALL.iter().find(|kind| (kind.entry().keys)().contains_key(&key)) {
+        match kinds().iter().find(|kind| (kind.entry().keys)().contains_key(&key)) {
             Some(kind) => {
                 let whose = if own.kind == context.instrument { "session" } else { "test" };
                 let what = format!(

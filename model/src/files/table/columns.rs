@@ -55,8 +55,11 @@ impl Role {
     /// Parses one of our names.
     pub fn of(name: &str, request: &Request<'_>) -> Option<Role> {
         let own = request.test.station.columns();
-        if own.iter().any(|column| column.unit.is_empty() && column.stem == name) {
-            return Some(Role::Socket);
+        if let Some(column) = own.iter().find(|column| column.unit.is_empty() && column.stem == name) {
+            return Some(match column.quantity {
+                Quantity::Socket => Role::Socket,
+                quantity => Role::Reading(quantity, Unit::Times(1.0)),
+            });
         }
         if let Some(role) = Role::of_machine(name, request.machine) {
             return Some(role);
@@ -70,7 +73,7 @@ impl Role {
     pub fn same_as(&self, other: &Role) -> bool {
         match (self, other) {
             (Role::Axis(a, _), Role::Axis(b, _)) => a == b,
-            (Role::Reading(a, _), Role::Reading(b, _)) => a.channel() == b.channel(),
+            (Role::Reading(a, _), Role::Reading(b, _)) => a.is_same_as(*b),
             _ => self == other,
         }
     }

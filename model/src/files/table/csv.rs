@@ -104,7 +104,7 @@ pub fn text(machine: &Machine, station: &Station<f64>, readings: &Readings) -> S
     header.extend(readings.drivers.keys().map(|name| column::in_files(name).into_owned()));
     let of_channel = |channel: usize| {
         station.columns().iter().find(|column| {
-            let holds = matches!(column.quantity, Quantity::Length | Quantity::Channel(_));
+            let holds = matches!(column.quantity, Quantity::Length | Quantity::Channel(_) | Quantity::Polar(_));
             holds && column.quantity.channel().and_then(|of_all| station.kept_channel(of_all)) == Some(channel)
         })
     };

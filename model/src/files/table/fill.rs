@@ -3,6 +3,8 @@
 use std::hash::DefaultHasher;
 use std::path::{Path, PathBuf};
 
+use nalgebra::{Quaternion, UnitQuaternion};
+
 use super::columns::{self, Column, Role};
 use super::format::Rows;
 use super::number::number;
@@ -10,7 +12,7 @@ use super::request::{Format, Request};
 use super::row::Row;
 use super::{duplicates, required};
 use crate::error::{Location, ModelError};
-use crate::instrument::column::Quantity;
+use crate::instrument::column::{OF_ROTATION, Quantity};
 use crate::instrument::{Fault, MAX_CHANNELS};
 use crate::session::check;
 use crate::session::readings::{Origin, Readings};
@@ -228,12 +230,17 @@ impl<'a> Filled<'a> {
         if !self.request.instrument().entry().has_readings {
             observed.fill(0.0);
         }
+        let mut quaternion = [f64::NAN; 4];
+        let mut of_quaternion = None;
         for (column, channel) in self.columns.iter().zip(&self.channel) {
             let fault = |message: String, help: &str| row.error(column, (message, help.to_string()));
             if column.role == Role::Socket {
                 let index = socket_index(&mut self.sockets, row.text(column));
                 self.socket.push(index.map_err(|fault| row.error(column, fault))?);
                 continue;
+            }
+            if let Role::Reading(Quantity::Quaternion(_), _) = column.role {
+                of_quaternion = Some(column);
             }
             if matches!(column.role, Role::Reading(..)) && can_lack && row.lacks(column) {
                 continue;
@@ -263,6 +270,7 @@ impl<'a> Filled<'a> {
                     }
                 }
                 Role::Axis(axis, unit) => readings.positions[*axis].push(unit.to_internal(value)),
+                Role::Reading(Quantity::Quaternion(component), _) => quaternion[*component] = value,
                 Role::Reading(quantity, unit) => {
                     let value = unit.to_internal(value);
                     observed[*channel] = match quantity {
@@ -273,6 +281,10 @@ impl<'a> Filled<'a> {
                 }
                 Role::Socket => {}
             }
+        }
+        if let Some(column) = of_quaternion {
+            let vector = rotation_vector(quaternion).map_err(|fault| row.error(column, fault))?;
+            observed[OF_ROTATION].copy_from_slice(&vector);
         }
         let values = &observed[..readings.channels];
         if !values.is_empty() && values.iter().all(|value| value.is_nan()) {
@@ -339,6 +351,23 @@ impl<'a> Filled<'a> {
         let rows_of = |index: usize| (0..socket.len()).filter(|row| socket[*row] == index).collect::<Vec<_>>();
         sockets.into_iter().enumerate().map(|(index, name)| (Some(name), all.of_rows(&rows_of(index)))).collect()
     }
+}
+
+/// A norm of a quaternion that differs from 1 by more is no rounding.
+const MAX_NORM_ERROR: f64 = 0.01;
+
+/// The rotation vector of a unit quaternion `x`, `y`, `z`, `w`, rad; NaN if a component was not read.
+fn rotation_vector(quaternion: [f64; 4]) -> Result<[f64; 3], Fault> {
+    let [x, y, z, w] = quaternion;
+    let norm = quaternion.iter().map(|component| component * component).sum::<f64>().sqrt();
+    if norm.is_nan() {
+        return Ok([f64::NAN; 3]);
+    }
+    if (norm - 1.0).abs() > MAX_NORM_ERROR {
+        let message = format!("the quaternion has the norm {}", crate::words::number(norm));
+        return Err((message, "a unit quaternion `qx`, `qy`, `qz`, `qw` is expected, `qw` the scalar".into()));
+    }
+    Ok(UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)).scaled_axis().into())
 }
 
 /// The index of a socket among those found so far in the file.

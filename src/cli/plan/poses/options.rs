@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use abbe::model::instrument::InstrumentKind;
 use abbe::model::session::{Session, Test};
 use abbe::plan::poses::candidates::{LineOfSight, PoseLimits};
 use abbe::plan::poses::{PoseOptions, PoseSelection, measured_by, select};
@@ -56,7 +55,7 @@ impl PoseArguments {
                 names.join(", ")
             )));
         }
-        let probed = |test: &&Test| test.station.kind() == InstrumentKind::Probe;
+        let probed = |test: &&Test| test.station.probe().is_some();
         if self.height_mm.is_some() && !tests.iter().all(probed) {
             return Err(Failure::Other(format!(
                 "`--height-mm` is of the cylinder that a probe touches; this session's instrument is a {}",

@@ -1,0 +1,149 @@
+//! Equations of instruments that read distances, directions, rotations and poses: printed code against dual numbers.
+
+use abbe_codegen::print::Layout;
+use abbe_codegen::program::Input;
+use abbe_codegen::{Equation, Options, Source, Subject, Variable};
+use abbe_model::axis::AxisKind;
+use abbe_model::chain::{AxisPosition, Machine};
+use abbe_model::instrument::angle::Angle;
+use abbe_model::instrument::column::Quantity;
+use abbe_model::instrument::distance::{Distance, StationFrame};
+use abbe_model::instrument::laser::Laser;
+use abbe_model::instrument::pointing::Pointing;
+use abbe_model::instrument::pose::Pose;
+use abbe_model::instrument::stand::Stand;
+use abbe_model::instrument::tracker::Tracker;
+use abbe_model::instrument::{Geometry, Station};
+use abbe_model::rotation_error::Body;
+use abbe_model::scalar::Nominal;
+use num_dual::Dual64;
+use rand::RngExt;
+
+use crate::programs::Printed;
+use crate::support;
+use crate::topologies::{Case, all_errors, machine, short};
+
+/// An instrument with its points anywhere.
+#[derive(Clone, Copy, Debug)]
+pub enum Any {
+    Laser,
+    Angle,
+    Distance,
+    Pointing,
+    Polar,
+    Pose,
+}
+
+const ALL: [Any; 6] = [Any::Laser, Any::Angle, Any::Distance, Any::Pointing, Any::Polar, Any::Pose];
+
+impl Source for Any {
+    fn subject<N: Nominal>(&self, length: &impl Fn(&str) -> N) -> Subject<N> {
+        let point = |names: [&str; 3]| names.map(length);
+        let (table, tool) = (["W_x", "W_y", "W_z"], ["S_x", "S_y", "S_z"]);
+        let directions = [[0.6, 0.8, 0.0], [-0.8, 0.6, 0.0], [0.0, 0.0, 1.0]].map(|row| row.map(N::constant));
+        let stand = || Stand { rotation: directions, origin: [250.0, -4000.0, 900.0].map(N::constant) };
+        Subject::Station(match self {
+            Any::Laser => {
+                let mut laser = Laser {
+                    reflector: point(tool),
+                    optic: point(table),
+                    frame: directions,
+                    channels: Vec::new(),
+                    is_beam_stated: false,
+                    datum: N::constant(0.0),
+                };
+                laser.keep_channels(&|quantity| matches!(quantity, Quantity::Channel(_)));
+                laser.into()
+            }
+            Any::Angle => Angle { about: directions[..2].to_vec(), body: Body::Relative }.into(),
+            Any::Distance => {
+                Distance { station: point(table), reflector: point(tool), frame: StationFrame::Table }.into()
+            }
+            Any::Pointing => Pointing { directions }.into(),
+            Any::Polar => Tracker { target: point(tool), stand: stand(), is_polar: true }.into(),
+            Any::Pose => Pose { target: point(tool), stand: stand(), turn: None }.into(),
+        })
+    }
+}
+
+/// Every instrument on two machines, with all errors and all of its parameters at 1 mm and 0.01 rad.
+pub fn printed(language: &str, layout: Layout, count: usize, random: &mut impl rand::Rng) -> Vec<Printed> {
+    let mut printed = Vec::new();
+    for (any, code) in ALL.into_iter().flat_map(|any| ["[wCXYbZBt]", "[wBAXYbZt]"].map(|code| (any, code))) {
+        let machine = machine(code);
+        let unknowns = (0..any.subject::<f64>(&|_| 0.0).unknowns().len()).collect();
+        let options = Options { gradient: true, unknowns, ..Options::default() };
+        let equation = Equation::of(&machine, &any, &all_errors(&machine), &options).expect("an equation");
+        printed.push(Printed {
+            name: format!("{any:?}_{}", short(code)).to_lowercase(),
+            function: "coordinates",
+            inputs: equation.program(false).inputs,
+            cases: (0..count).map(|_| case(any, &machine, &equation, random)).collect(),
+            text: support::laid_out(&equation, &any, language, layout),
+        });
+    }
+    printed
+}
+
+/// Reading and derivatives by dual numbers at one state.
+fn case(any: Any, machine: &Machine, equation: &Equation, random: &mut impl rand::Rng) -> Case {
+    let positions: Vec<f64> = (machine.axes.iter())
+        .map(|axis| if axis.kind == AxisKind::Linear { 300.0 } else { 3.0 })
+        .map(|most| random.random_range(-most..most))
+        .collect();
+    let small: Vec<f64> = (equation.parameters.iter())
+        .map(|parameter| if parameter.is_angle() { 0.01 } else { 1.0 })
+        .map(|most| random.random_range(-most..most))
+        .collect();
+    let mut lengths: Vec<(String, f64)> = Vec::new();
+    let mut arguments = [Vec::new(), Vec::new(), Vec::new()];
+    for input in equation.program(false).inputs {
+        let position = |variable: &Variable| match variable {
+            Variable::Position { axis, .. } => positions[machine.axis_index(axis).expect("an axis")],
+            other => panic!("{other:?} moves"),
+        };
+        match &input {
+            Input::Sine(variable) => arguments[1].push(position(variable).sin()),
+            Input::Cosine(variable) => arguments[1].push(position(variable).cos()),
+            Input::Plain(Variable::Length(name)) => {
+                lengths.push((name.clone(), random.random_range(-200.0..200.0)));
+                arguments[0].extend(lengths.last().map(|(_, length)| *length));
+            }
+            Input::Plain(variable @ Variable::Position { .. }) => arguments[1].push(position(variable)),
+            Input::Plain(variable) => {
+                let index = equation.parameters.iter().position(|known| known == variable);
+                arguments[2].push(small[index.expect("a parameter")]);
+            }
+        }
+    }
+    let length = |name: &str| lengths.iter().find(|(known, _)| known == name).map_or(0.0, |(_, length)| *length);
+    let Subject::Station(station): Subject<f64> = any.subject(&length) else { panic!("a station") };
+    let state: Vec<_> = machine.axes.iter().zip(&positions).map(|(axis, q)| AxisPosition::new(axis.kind, *q)).collect();
+    let read = |seed: usize| {
+        read(&station, machine, &state, equation, &|k| Dual64::new(small[k], if k == seed { 1.0 } else { 0.0 }))
+    };
+    let values: Vec<f64> = read(0).iter().map(|value| value.re).collect();
+    let by_parameter: Vec<Vec<f64>> =
+        (0..small.len()).map(|seed| read(seed).iter().map(|value| value.eps).collect()).collect();
+    let gradient = (0..values.len()).flat_map(|output| by_parameter.iter().map(move |row| row[output])).collect();
+    Case { arguments, values, gradient }
+}
+
+fn read(
+    station: &Station<f64>,
+    machine: &Machine,
+    state: &[AxisPosition<f64>],
+    equation: &Equation,
+    small: &dyn Fn(usize) -> Dual64,
+) -> Vec<Dual64> {
+    let of = |wanted: &dyn Fn(&Variable) -> bool| equation.parameters.iter().position(wanted);
+    let error = |slot: usize| {
+        of(&|parameter| matches!(parameter, Variable::Error(name) if machine.error_slot(name) == Some(slot)))
+    };
+    let bodies = machine.body_errors(|slot| error(slot).is_some(), |slot| error(slot).map_or(Dual64::from(0.0), small));
+    let unknowns = station.kind().unknowns();
+    let unknown = |slot: usize| {
+        of(&|parameter| matches!(parameter, Variable::Instrument(own) if *own == unknowns[slot])).map(small)
+    };
+    station.read(machine, state, &bodies, unknown).channels().to_vec()
+}

@@ -1,0 +1,279 @@
+//! Poses: position and orientation of a body at the tool, read in the frame of an instrument. Motion capture, hand-eye,
+//! portable arm.
+//!
+//! The target `P` of the body is read as `m = B · E · P` (`stand.rs`). The body turns with the tool frame: `H` is its
+//! orientation there, and the reading is the rotation vector, in the instrument's frame, by which the body is turned in
+//! addition to its nominal orientation:
+//!
+//! ```text
+//! φ = log(O · O₀ᵀ)      O = B · E · T · D · H      O₀ = B · T₀ · H
+//! ```
+//!
+//! `T` is the actual and `T₀` the commanded orientation of the tool frame, `D` a small rotation (three parameters). As `B`,
+//! `H` is found from the readings before the fit, so that the rotations are small.
+
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::channel::Channel;
+use super::column::{Column, OF_ROTATION, Quantity};
+use super::set_up::{self, SetUp};
+use super::stand::{self, Stand, pose_error};
+use super::{
+    Entry, Fault, Geometry, Group, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station,
+    default_errors, displaced, point,
+};
+use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::document::node::Node;
+use crate::document::{Fault as KeyFault, schema, value as document};
+use crate::frames::{Point, Rotation, SmallMotion};
+use crate::scalar::{Nominal, Scalar};
+use crate::session::Prior;
+use crate::session::expression::Constant;
+use crate::session::readings::Readings;
+
+const POSE: [InstrumentParameter; 6] = stand::parameters("station");
+
+/// The pose of the instrument, then position and orientation of the target in the tool frame.
+pub const PARAMETERS: [InstrumentParameter; 12] = [
+    POSE[0],
+    POSE[1],
+    POSE[2],
+    POSE[3],
+    POSE[4],
+    POSE[5],
+    InstrumentParameter::length("target", "x", SharedBy::SpindleSetup),
+    InstrumentParameter::length("target", "y", SharedBy::SpindleSetup),
+    InstrumentParameter::length("target", "z", SharedBy::SpindleSetup),
+    InstrumentParameter::angle("target", "a", SharedBy::SpindleSetup),
+    InstrumentParameter::angle("target", "b", SharedBy::SpindleSetup),
+    InstrumentParameter::angle("target", "c", SharedBy::SpindleSetup),
+];
+
+/// The first parameters of position and orientation of the target.
+const TARGET: usize = 6;
+const ORIENTATION: usize = 9;
+
+pub(super) const ENTRY: Entry = Entry {
+    free: Some("station"),
+    reads_poses: true,
+    rows_can_lack_channels: true,
+    default_errors: default_errors::all_locations,
+    ..Entry::new(InstrumentKind::Pose, ["pose", "poses of a body at the tool"], &PARAMETERS, schema::properties::<Keys>, read)
+};
+
+const POSITION: [Channel; 3] = Channel::vector(["x", "y", "z"]);
+
+/// The channels.
+const CHANNELS: [Channel; 6] =
+    [POSITION[0], POSITION[1], POSITION[2], Channel::angle("rx"), Channel::angle("ry"), Channel::angle("rz")];
+
+/// The columns: position, then the rotation vector or the quaternion of the orientation.
+const COLUMNS: [Column; 10] = [
+    Column::new("px", "mm", Quantity::Channel(0)),
+    Column::new("py", "mm", Quantity::Channel(1)),
+    Column::new("pz", "mm", Quantity::Channel(2)),
+    Column::new("rx", "deg", Quantity::Channel(3)),
+    Column::new("ry", "deg", Quantity::Channel(4)),
+    Column::new("rz", "deg", Quantity::Channel(5)),
+    Column::new("qx", "", Quantity::Quaternion(0)),
+    Column::new("qy", "", Quantity::Quaternion(1)),
+    Column::new("qz", "", Quantity::Quaternion(2)),
+    Column::new("qw", "", Quantity::Quaternion(3)),
+];
+
+/// The keys of a test.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Keys {
+    /// Target in the tool frame.
+    target_mm: document::Point,
+    #[serde(default)]
+    target_u_um: document::Uncertainties,
+    /// Standard uncertainty of the target's orientation, which is that of the tool frame, about each axis, arcsec;
+    /// default: inf, any orientation.
+    #[serde(default = "document::Uncertainties::unknown")]
+    target_u_arcsec: document::Uncertainties,
+}
+
+fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
+    let keys: Keys = set_up::keys(set_up)?;
+    let target = set_up::point("target_mm", &keys.target_mm, constants)?;
+    let orientation: Vec<Prior> = set_up::angles(&keys.target_u_arcsec).collect();
+    let is_turned = orientation.iter().all(|prior| *prior == Prior::Free);
+    let position = [Prior::Free; 6].into_iter().chain(set_up::lengths(&keys.target_u_um));
+    let priors = position.chain(orientation).collect();
+    let turn = is_turned.then(UnitQuaternion::identity);
+    Ok(SetUp::new(Station::Pose(Pose { target, stand: Stand::at_origin(), turn }), priors))
+}
+
+/// A body and the instrument that reads its pose, lengths in mm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pose<N> {
+    /// The target in the tool frame.
+    pub target: [N; 3],
+    /// Where the instrument stands.
+    pub stand: Stand<N>,
+    /// `H`, the orientation of the body in the tool frame, if no session knows it; `None` for that of the tool frame.
+    pub turn: Option<UnitQuaternion<f64>>,
+}
+
+impl<N> Geometry<N> for Pose<N> {
+    type Over<M> = Pose<M>;
+
+    fn map<M>(&self, to: &impl Fn(&N) -> M) -> Pose<M> {
+        Pose { target: point(&self.target, to), stand: self.stand.map(to), turn: self.turn }
+    }
+    /// Position, mm, and rotation in addition to the nominal orientation, rad, in the instrument's frame.
+    fn reading<S: Scalar<Nominal = N>>(
+        &self,
+        machine: &Machine,
+        state: &[AxisPosition<N>],
+        errors: &[BodyErrors<S>],
+        unknown: impl Fn(usize) -> Option<S>,
+    ) -> Reading<S>
+    where
+        N: Nominal,
+    {
+        let pose = pose_error(&unknown);
+        let target = machine.tool_point(state, errors, displaced(self.target, TARGET, &unknown));
+        let target = self.stand.point(pose.map_or(target, |pose| pose.push(target)));
+        let turned = |i: usize| unknown(ORIENTATION + i);
+        let in_tool = (0..3).any(|i| turned(i).is_some()).then(|| {
+            let zero = S::constant(0.0);
+            let [a, b, c] = std::array::from_fn(|i| turned(i).unwrap_or(zero));
+            SmallMotion::new([zero, zero, zero, a, b, c], Rotation::Exact)
+        });
+        let rotation = machine.rotation_error_of_body(state, errors, [in_tool.as_ref(), pose.as_ref()]);
+        Reading::of(target.0.into_iter().chain(self.stand.direction(rotation).0))
+    }
+    fn points(&self) -> [Option<InstrumentPoint<'_, N>>; 2] {
+        [None, InstrumentPoint::of("target", &self.target, TARGET)]
+    }
+}
+
+/// The commanded orientation of the tool frame in R.
+fn commanded(machine: &Machine, state: &[AxisPosition<f64>]) -> Matrix3<f64> {
+    let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
+    let column = |k: usize| {
+        let unit = Point(std::array::from_fn(|i| if i == k { 1.0 } else { 0.0 }));
+        Vector3::from(machine.tool_direction::<f64>(state, &none, unit).0)
+    };
+    Matrix3::from_columns(&[column(0), column(1), column(2)])
+}
+
+/// The rotation of a vector in three of the columns.
+fn observed(values: &[f64]) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_scaled_axis(Vector3::from_column_slice(&values[OF_ROTATION]))
+}
+
+fn quaternion(matrix: Matrix3<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix))
+}
+
+/// The part of a rotation that changes its sign with it: `sin θ · n`.
+fn axial(rotation: &Matrix3<f64>) -> Vector3<f64> {
+    let of = |i: usize, j: usize| 0.5 * (rotation[(i, j)] - rotation[(j, i)]);
+    Vector3::new(of(2, 1), of(0, 2), of(1, 0))
+}
+
+impl Pose<f64> {
+    /// The nominal orientation of the body in the instrument's frame.
+    fn nominal(&self, machine: &Machine, state: &[AxisPosition<f64>]) -> UnitQuaternion<f64> {
+        quaternion(self.stand.matrix() * commanded(machine, state)) * self.turn.unwrap_or_default()
+    }
+}
+
+/// The commanded orientation of the tool frame in R and the measured one of the body, in the rows that have both.
+fn orientations(machine: &Machine, readings: &Readings) -> Vec<[Matrix3<f64>; 2]> {
+    let mut state = Vec::new();
+    let mut pairs = Vec::with_capacity(readings.rows());
+    for (row, values) in readings.observed.chunks_exact(CHANNELS.len()).enumerate() {
+        if values[OF_ROTATION].iter().all(|value| value.is_finite()) {
+            readings.state(machine, row, &mut state);
+            pairs.push([commanded(machine, &state), observed(values).to_rotation_matrix().into_inner()]);
+        }
+    }
+    pairs
+}
+
+impl Instrument for Pose<f64> {
+    fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
+        [None, Some(&mut self.target)]
+    }
+    fn channels(&self) -> &[Channel] {
+        &CHANNELS
+    }
+    fn columns(&self) -> &'static [Column] {
+        &COLUMNS
+    }
+    fn refers_to_nominal(&self) -> bool {
+        true
+    }
+    /// The orientation becomes the rotation from the nominal one; without one of its columns none is known.
+    fn channels_of_columns(&self, machine: &Machine, state: &[AxisPosition<f64>], values: &mut [f64]) {
+        if values[OF_ROTATION].iter().any(|value| value.is_nan()) {
+            values[OF_ROTATION].fill(f64::NAN);
+            return;
+        }
+        let rotation = (observed(values) * self.nominal(machine, state).inverse()).scaled_axis();
+        values[OF_ROTATION].copy_from_slice(rotation.as_slice());
+    }
+    fn columns_of_channels(&self, machine: &Machine, state: &[AxisPosition<f64>], values: &mut [f64]) {
+        let orientation = (observed(values) * self.nominal(machine, state)).scaled_axis();
+        values[OF_ROTATION].copy_from_slice(orientation.as_slice());
+    }
+    fn measured_mm(&self, values: &[f64]) -> Option<Vector3<f64>> {
+        (values.len() == CHANNELS.len()).then(|| Vector3::from_column_slice(&values[..3]))
+    }
+    /// X has the opposite sign, and with it the rotations about the others.
+    fn mirror(&self, values: &mut [f64]) {
+        [0, 4, 5].into_iter().for_each(|place| values[place] = -values[place]);
+    }
+    fn missing(&self, has: &dyn Fn(Quantity) -> bool) -> Option<Fault> {
+        let by_quaternion = (0..4).any(|component| has(Quantity::Quaternion(component)));
+        let needed = |column: &&Column| match column.quantity {
+            Quantity::Quaternion(_) => by_quaternion,
+            quantity => !by_quaternion || quantity.channel().is_some_and(|channel| !OF_ROTATION.contains(&channel)),
+        };
+        let column = COLUMNS.iter().filter(needed).find(|column| !has(column.quantity))?;
+        let help = "a pose needs px_mm, py_mm and pz_mm, and qx, qy, qz and qw or rx_deg, ry_deg and rz_deg";
+        Some((format!("`{}`", column.name(column.unit)), help.into()))
+    }
+    /// The rotation from R maps the nominal positions onto the measured ones, and the axis of each turn of the tool onto
+    /// the axis of the turn that is measured, which does not depend on the orientation of the body at the tool
+    /// (Park and Martin, IEEE Trans. Robot. Autom. 10 (1994) 717).
+    fn placed(&self, group: &Group<'_>) -> Option<Station<f64>> {
+        let pairs = group.positions();
+        let (mut sum, spread) = stand::covariance(&pairs);
+        if spread > 0.0 {
+            sum /= spread;
+        }
+        for (station, readings) in &group.tests {
+            let turns = orientations(group.machine, readings);
+            let share = 1.0 / turns.len().max(1) as f64;
+            let of_tool = matches!(station, Station::Pose(pose) if pose.turn.is_none());
+            for [commanded, measured] in &turns {
+                let [first_commanded, first_measured] = turns[0];
+                let from_first = axial(&(measured * first_measured.transpose()))
+                    * axial(&(commanded * first_commanded.transpose())).transpose();
+                let known = if of_tool { measured * commanded.transpose() } else { Matrix3::zeros() };
+                sum += (from_first + known) * share;
+            }
+        }
+        let stand = Stand::through(stand::best_rotation(sum), &pairs);
+        (!pairs.is_empty()).then(|| Station::Pose(Pose { stand, ..self.clone() }))
+    }
+    fn mounted(&self, group: &Group<'_>) -> Option<Station<f64>> {
+        self.turn?;
+        let mut sum = Matrix3::zeros();
+        for (station, readings) in &group.tests {
+            if let Station::Pose(Pose { stand, .. }) = station {
+                let turns = orientations(group.machine, readings);
+                sum += turns.iter().map(|[of, measured]| (stand.matrix() * of).transpose() * measured).sum::<Matrix3<f64>>();
+            }
+        }
+        Some(Station::Pose(Pose { turn: Some(quaternion(stand::best_rotation(sum))), ..self.clone() }))
+    }
+}

@@ -1,0 +1,111 @@
+//! Where an instrument stands that reads in a frame of its own: a tracker, a camera system.
+//!
+//! `m = B · E · P`: `P` is a point in R, `E` a small motion (the six parameters of the pose) and `B` a fixed rigid motion.
+//! `B` keeps the estimated angles small for any orientation of the instrument.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::set_up::Written;
+use super::{InstrumentParameter, SharedBy, point};
+use crate::frames::{Point, Rotation, SmallMotion, dot_nominal};
+use crate::scalar::{Nominal, Scalar};
+
+/// The parameters of the pose: three positions and three angles.
+pub(super) const fn parameters(thing: &'static str) -> [InstrumentParameter; 6] {
+    [
+        InstrumentParameter::length(thing, "x", SharedBy::Setup),
+        InstrumentParameter::length(thing, "y", SharedBy::Setup),
+        InstrumentParameter::length(thing, "z", SharedBy::Setup),
+        InstrumentParameter::angle(thing, "a", SharedBy::Setup),
+        InstrumentParameter::angle(thing, "b", SharedBy::Setup),
+        InstrumentParameter::angle(thing, "c", SharedBy::Setup),
+    ]
+}
+
+/// The small motion given by the first six parameters, if one of them is included.
+pub(super) fn pose_error<S: Scalar>(unknown: &impl Fn(usize) -> Option<S>) -> Option<SmallMotion<S>> {
+    let carried = (0..6).any(|i| unknown(i).is_some());
+    carried.then(|| {
+        let six = std::array::from_fn(|i| unknown(i).unwrap_or_else(|| S::constant(0.0)));
+        SmallMotion::new(six, Rotation::Exact)
+    })
+}
+
+/// The rigid motion `B` from R to the frame of an instrument.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stand<N> {
+    /// The rotation, row by row.
+    pub rotation: [[N; 3]; 3],
+    /// R's origin in the instrument's frame, mm.
+    pub origin: [N; 3],
+}
+
+impl Stand<Written> {
+    /// Upright at the origin of R.
+    pub(super) fn at_origin() -> Stand<Written> {
+        let rotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        Stand { rotation: rotation.map(|row| row.map(Written::number)), origin: [0.0; 3].map(Written::number) }
+    }
+}
+
+impl<N> Stand<N> {
+    /// Converts every coordinate.
+    pub(super) fn map<M>(&self, to: &impl Fn(&N) -> M) -> Stand<M> {
+        Stand { rotation: self.rotation.each_ref().map(|row| point(row, to)), origin: point(&self.origin, to) }
+    }
+}
+
+impl<N: Nominal> Stand<N> {
+    /// A point of R in the instrument's frame.
+    pub(super) fn point<S: Scalar<Nominal = N>>(&self, of_r: Point<S>) -> Point<S> {
+        self.direction(of_r).shifted(self.origin)
+    }
+
+    /// A direction of R in the instrument's frame.
+    pub(super) fn direction<S: Scalar<Nominal = N>>(&self, of_r: Point<S>) -> Point<S> {
+        Point(self.rotation.map(|row| dot_nominal(of_r, row)))
+    }
+}
+
+impl Stand<f64> {
+    /// With this rotation, and the origin that maps the mean of points of R onto that of the same points as measured.
+    pub(super) fn through(rotation: Matrix3<f64>, pairs: &[[Vector3<f64>; 2]]) -> Stand<f64> {
+        let [of_r, measured] = means(pairs);
+        let origin = measured - rotation * of_r;
+        let rotation = std::array::from_fn(|i| std::array::from_fn(|j| rotation[(i, j)]));
+        Stand { rotation, origin: [origin.x, origin.y, origin.z] }
+    }
+
+    /// The rotation as a matrix.
+    pub(super) fn matrix(&self) -> Matrix3<f64> {
+        Matrix3::from_fn(|i, j| self.rotation[i][j])
+    }
+}
+
+/// The means of points of R and of the same points as measured.
+fn means(pairs: &[[Vector3<f64>; 2]]) -> [Vector3<f64>; 2] {
+    let count = pairs.len().max(1) as f64;
+    [0, 1].map(|side| pairs.iter().map(|pair| pair[side]).sum::<Vector3<f64>>() / count)
+}
+
+/// Sum of the products of the measured points and the points of R, each less its mean, and of the squares of the
+/// latter, mm².
+pub(super) fn covariance(pairs: &[[Vector3<f64>; 2]]) -> (Matrix3<f64>, f64) {
+    let [of_r, measured] = means(pairs);
+    let product = |[a, b]: &[Vector3<f64>; 2]| (b - measured) * (a - of_r).transpose();
+    (pairs.iter().map(product).sum(), pairs.iter().map(|[a, _]| (a - of_r).norm_squared()).sum())
+}
+
+/// The rotation that maps vectors onto others with the least sum of squares, from the sum of their products `b · aᵀ`
+/// (Kabsch, Acta Cryst. A32 (1976) 922).
+pub(super) fn best_rotation(covariance: Matrix3<f64>) -> Matrix3<f64> {
+    let svd = covariance.svd(true, true);
+    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
+        return Matrix3::identity();
+    };
+    // The sign on the smallest singular value makes the result a rotation, not a reflection.
+    let mut signs = Matrix3::identity();
+    let least = svd.singular_values.imin();
+    signs[(least, least)] = (u * v_t).determinant().signum();
+    u * signs * v_t
+}

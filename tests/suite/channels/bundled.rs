@@ -1,0 +1,87 @@
+//! The ready sessions of laser, angle, distance, pose and tracker: their data are those of the plant, and a fit finds the
+//! errors from which they were made. `ABBE_UPDATE_PAGES=1` writes the data.
+
+use std::path::{Path, PathBuf};
+
+use super::stands::{polar_data, pose_data};
+use super::*;
+
+fn folder(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("sessions").join(name)
+}
+
+/// The data of a ready session, written if asked for.
+fn assert_data(session: &str, name: &str, text: &str) {
+    let file = folder(session).join(name);
+    if std::env::var_os("ABBE_UPDATE_PAGES").is_some() {
+        std::fs::write(&file, text).unwrap();
+    }
+    assert!(std::fs::read_to_string(&file).unwrap() == text, "{} is not that of the plant", file.display());
+}
+
+/// A fit of a ready session finds these values.
+fn assert_found(session: &str, file: &str, truth: &[(&'static str, f64)]) {
+    let session = files::session(&folder(session).join(file), &ReadOptions::default()).unwrap();
+    assert!(session.warnings.is_empty(), "{:?}", session.warnings);
+    for ((id, _), pull) in truth.iter().zip(pulls(&session, truth)) {
+        println!("{file} {id}: {pull:.2}");
+        assert!(pull.abs() < 3.0, "{id}: {pull}");
+    }
+}
+
+#[test]
+fn the_ready_session_of_a_laser_is_that_of_the_plant() {
+    let carriage = Carriage { pitch_arcsec: [6.0, -4.0], position_um: [5.0, 3.0], straightness_um: 2.5 };
+    let data = laser_data(&carriage, [0.0, 0.0, -120.0], &mut Pcg64::seed_from_u64(1));
+    assert_data("laser", "LX.csv", &data);
+    assert_found("laser", "session.toml", &carriage.truth());
+}
+
+#[test]
+fn the_ready_session_of_angles_is_that_of_the_plant() {
+    let mut random = Pcg64::seed_from_u64(2);
+    let truth = [5.0, -3.0, 4.0, 2.0];
+    assert_data("angle", "level.csv", &level_data(&truth, &mut random));
+    // A positioning error of the table C with one wave a turn: 4″ with its cosine, −2″ with its sine. The tool turns back
+    // against the table.
+    let chain = Chain::from_code("wCbXYZt");
+    let zero = uniform(&mut random, 20.0);
+    let mut data = String::from("run,c_deg,angle_arcsec\n");
+    for run in 1..=4 {
+        for step in 0..=36 {
+            let degrees = f64::from(10 * if run % 2 == 1 { step } else { 36 - step });
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            let motion = [0.0, 0.0, 0.0, 0.0, 0.0, (4.0 * cos - 2.0 * sin) * ARCSECOND];
+            let position = |letter| if letter == 'C' { degrees.to_radians() } else { 0.0 };
+            let errors = |letter| if letter == 'C' { [[0.0; 6], motion] } else { [[0.0; 6]; 2] };
+            let angle = State::of(&chain, &position, &errors).rotation(Body::Relative).z / ARCSECOND;
+            data += &format!("{run},{degrees},{:.6}\n", angle + zero + 0.2 * normal(&mut random));
+        }
+    }
+    assert_data("angle", "polygon.csv", &data);
+    let mut all: Vec<(&'static str, f64)> = OF_LEVEL.iter().copied().zip(truth).collect();
+    // 4 cos C − 2 sin C = √20 cos(C + φ) with tan φ = 1/2.
+    all.extend([("ECC~C:h1.amplitude", 20.0_f64.sqrt()), ("ECC~C:h1.phase", 0.5_f64.atan().to_degrees())]);
+    assert_found("angle", "session.toml", &all);
+}
+
+#[test]
+fn the_ready_session_of_distances_is_that_of_the_plant() {
+    let mut random = Pcg64::seed_from_u64(3);
+    let truth = [8.0, -12.0, 5.0];
+    for (number, stated) in STATIONS.into_iter().enumerate() {
+        assert_data("distance", &format!("S{}.csv", number + 1), &distance_data(stated, &truth, &mut random));
+    }
+    let truth: Vec<(&'static str, f64)> = SQUARENESS.iter().copied().zip(truth).collect();
+    assert_found("distance", "session.toml", &truth);
+}
+
+#[test]
+fn the_ready_sessions_of_poses_are_those_of_the_plant() {
+    let (data, truth) = pose_data(true, &mut Pcg64::seed_from_u64(4));
+    assert_data("pose", "body.csv", &data);
+    assert_found("pose", "session.toml", &truth);
+    let (data, truth) = polar_data(&mut Pcg64::seed_from_u64(5));
+    assert_data("pose", "target.csv", &data);
+    assert_found("pose", "tracker.toml", &truth);
+}
