@@ -16,7 +16,7 @@ use faer::Mat;
 
 use crate::error::IdentifyError;
 use crate::numerics::parallel;
-use crate::numerics::solve::Directions;
+use crate::numerics::solve::Svd;
 use crate::numerics::symmetric::Symmetric;
 use crate::numerics::tolerances::MIN_UPDATE_SHARE;
 use crate::numerics::triangle::Triangle;
@@ -135,7 +135,7 @@ struct WhitenedDirections {
 impl WhitenedDirections {
     fn of(whole: &Triangle, basis: &Mat<f64>) -> Result<WhitenedDirections, IdentifyError> {
         let (r, c, _) = whole.parts();
-        let directions = Directions::of((&r * basis).as_ref())?;
+        let directions = Svd::of((&r * basis).as_ref())?;
         let right = Mat::from_fn(c.len(), 1, |i, _| c[i]);
         Ok(WhitenedDirections {
             scaled_basis: basis * directions.inverse_root(),
@@ -177,7 +177,7 @@ fn step_without(rest: &Triangle, beta: &[f64], basis: &Mat<f64>) -> Result<Vec<f
     let (r, c, _) = rest.parts();
     let n = beta.len();
     let absolute: Vec<f64> = (0..n).map(|i| c[i] + (i..n).map(|j| r[(i, j)] * beta[j]).sum::<f64>()).collect();
-    let solution = Directions::of((&r * basis).as_ref())?.solve(&absolute, 0.0);
+    let solution = Svd::of((&r * basis).as_ref())?.solve(&absolute, 0.0);
     let value = |j: usize| -> f64 { solution.iter().enumerate().map(|(k, z)| basis[(j, k)] * z).sum() };
     Ok((0..n).map(|j| value(j) - beta[j]).collect())
 }

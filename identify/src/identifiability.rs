@@ -10,7 +10,7 @@ use crate::linear::{Linearisation, is_of_interest};
 use crate::numerics::null_space::{combinations, echelon};
 use crate::numerics::rank::Rank;
 use crate::numerics::ranking::smallest_first;
-use crate::numerics::solve::Directions;
+use crate::numerics::solve::Svd;
 use crate::parameters::{Parameter, Role};
 use crate::problem::Problem;
 use crate::results::{Combination, DeterminedByPrior, Unobservable};
@@ -224,7 +224,7 @@ pub fn nearly_collinear(
     let norm: Vec<f64> =
         (0..n).map(|j| (0..n).map(|i| r[(i, j)].powi(2)).sum::<f64>().sqrt().max(f64::MIN_POSITIVE)).collect();
     let unit = Mat::from_fn(n, n, |i, j| r[(i, j)] / norm[j]);
-    let decomposed = Directions::of(unit.as_ref())?;
+    let decomposed = Svd::of(unit.as_ref())?;
     let singular = &decomposed.singular_values;
     // Equal singular values share a subspace, and the decomposition returns an arbitrary basis of it. The reduced basis
     // is unique.

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use abbe_model::files::{ReadOptions, session as read};
 use abbe_model::session::Session;
-use abbe_plan::criterion::Goal;
+use abbe_plan::design::Goal;
 use abbe_plan::improve::{ImproveOptions, improve};
 use abbe_plan::test_variations::TestVariations;
 use abbe_plan::{PlanOptions, analyse, prepared, states};

@@ -1,12 +1,12 @@
 //! The information of every candidate test, evaluated once.
 
 use super::candidate_tests::CandidateTest;
-use super::information::{Root, SharedParameters, sum};
+use super::design::information::{Root, SharedParameters, sum_of};
+use super::design::{Design, Goal};
 use super::test_variations::TestVariations;
 use crate::PlanError;
 use abbe_identify::linear::Linearisation;
 use abbe_identify::numerics::parallel;
-use abbe_identify::numerics::ranking::smallest_first;
 use abbe_identify::numerics::triangle::Triangle;
 use abbe_identify::parameters::{Parameter, Role};
 use abbe_identify::problem::Problem;
@@ -53,29 +53,15 @@ impl PreparedCandidates {
         Ok(PreparedCandidates { shared, base, candidates: ready.into_iter().flatten().collect() })
     }
 
-    /// The plan with some candidate tests added.
-    pub fn with(&self, candidates: &[usize]) -> Root {
-        candidates
-            .iter()
-            .fold(self.base.clone(), |root, candidate| sum(root.as_ref(), self.candidates[*candidate].root.as_ref()))
+    /// The candidate tests as those of a design. A test may be made twice.
+    pub fn design<'d>(&'d self, goal: &'d Goal) -> Design<'d> {
+        let rows = self.candidates.iter().map(|candidate| candidate.root.as_ref()).collect();
+        Design { shared: &self.shared, base: &self.base, rows, goal, repeats: true }
     }
 
     /// The information `root` with a candidate test added.
     pub fn added(&self, root: &Root, candidate: usize) -> Root {
-        sum(root.as_ref(), self.candidates[candidate].root.as_ref())
-    }
-
-    /// A figure of the information with each candidate test added.
-    pub fn figures<T: Send>(&self, root: &Root, figure: &(impl Fn(&Root) -> T + Sync)) -> Vec<T> {
-        parallel::map(self.candidates.len(), &|candidate| figure(&self.added(root, candidate)))
-    }
-
-    /// The candidate test with the smallest figure, and the figures of all. Of equal tests the first counts. Mounted
-    /// balls come before newly mounted ones.
-    pub fn best(&self, root: &Root, figure: &(impl Fn(&Root) -> f64 + Sync)) -> Option<(usize, Vec<f64>)> {
-        let figures = self.figures(root, figure);
-        let best = (0..figures.len()).min_by(|a, b| smallest_first(figures[*a], figures[*b]))?;
-        Some((best, figures))
+        sum_of([root.as_ref(), self.candidates[candidate].root.as_ref()].into_iter())
     }
 }
 

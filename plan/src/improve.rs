@@ -1,8 +1,4 @@
-//! Selects the next tests from the candidate tests by their information, greedily and by exchange. Nothing is refitted.
-//!
-//! Greedy: the candidate test with the best figure is added, repeatedly. Exchange: each proposed test is removed in
-//! turn and replaced by the best candidate test, until no test changes (Fedorov's algorithm: Atkinson, Donev & Tobias,
-//! Optimum Experimental Designs, 2007, ch. 12).
+//! Selects the next tests from the candidate tests by their information ([`design`](super::design)). Nothing is refitted.
 
 use abbe_identify::IdentifyError;
 use abbe_model::document::print::Block;
@@ -11,8 +7,9 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::candidate_information::PreparedCandidates;
-use super::criterion::{Goal, figure, reported, targets};
-use super::information::{Root, SharedParameters};
+use super::design::exchange::is_no_gain;
+use super::design::information::{Root, SharedParameters};
+use super::design::{Design, Goal, bound};
 use super::proposal::{self, proposal};
 use super::test_variations::TestVariations;
 use crate::PlanError;
@@ -44,6 +41,9 @@ pub struct Improvement {
     pub before: f64,
     /// The errors and their standard uncertainties before.
     pub uncertainties_before: Vec<NamedUncertainty>,
+    /// A bound of the criterion: no tests of this number reach a smaller value. Only for several tests.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bound: Option<f64>,
     /// The proposed tests, in the order in which they are added.
     pub steps: Vec<ProposedTest>,
     /// The exchanges of proposed tests, one sentence each.
@@ -109,12 +109,8 @@ pub struct AlternativeTest {
 
 /// Share of the physical size above which the uncertainty of an error means that the error is not identifiable.
 const UNIDENTIFIABLE_SHARE: f64 = 0.1;
-/// Relative gain below which a test is neither added nor exchanged.
-const MIN_GAIN: f64 = 1e-6;
 /// Maximum number of listed alternatives.
 const MAX_ALTERNATIVES: usize = 5;
-/// Maximum number of exchange rounds.
-const MAX_ROUNDS: usize = 10;
 
 /// Proposes a test that separates two effects of the library, named by their identifiers.
 ///
@@ -147,19 +143,18 @@ pub fn improve(
     let list = &problem.parameters.list;
     let tests = super::candidate_tests::candidate_tests(&problem.session, variations)?;
     let nominal = vec![0.0; list.len()];
-    let targets = targets(problem, &options.goal);
+    let targets = options.goal.targets(problem);
     if targets.is_empty() {
         return Err(IdentifyError::NoUnknowns.into());
     }
     let prepared = PreparedCandidates::new(problem, &nominal, tests, variations, &targets)?;
     let shared = &prepared.shared;
-    let figure = |root: &Root| figure(shared, root, &options.goal);
+    let design = prepared.design(&options.goal);
     let mut chosen: Vec<usize> = Vec::new();
     let mut alternatives = Vec::new();
     for place in 0..options.tests {
-        let root = prepared.with(&chosen);
-        let now = figure(&root);
-        let Some((best, figures)) = prepared.best(&root, &figure) else {
+        let now = design.figure(&chosen);
+        let Some((best, figures)) = design.best(&chosen) else {
             break;
         };
         let best = if options.by_minute { best_per_minute(&prepared, now, &figures).unwrap_or(best) } else { best };
@@ -168,20 +163,24 @@ pub fn improve(
                 true => -gain_per_minute(&prepared, now, &figures, candidate),
                 false => figures[candidate],
             };
-            alternatives = listed(&prepared, &figures, &options.goal, score);
+            let value = |candidate: usize| options.goal.value(shared, &prepared.added(&prepared.base, candidate));
+            alternatives = listed(&prepared, figures.len(), score, value);
         }
         if is_no_gain(now, figures[best]) {
             break;
         }
         chosen.push(best);
     }
-    let exchanged = if options.by_minute { Vec::new() } else { exchange(&prepared, &mut chosen, &figure) };
+    let exchanged = if options.by_minute || chosen.len() < 2 { Vec::new() } else { design.exchange(&mut chosen) };
+    let name = |candidate: usize| prepared.candidates[candidate].test.name.as_str();
+    let exchanged = exchanged.into_iter().map(|[gone, come]| format!("{} in place of {}", name(come), name(gone)));
+    let exchanged = exchanged.collect();
     // An uncertainty near the physical size counts as infinite.
     let outside = |root: &Root| match options.goal {
         Goal::WorstUncertainty => {
             named_uncertainties(shared, root).into_iter().fold(0.0, |worst: f64, (_, u)| worst.max(u))
         }
-        Goal::Separation { .. } => reported(figure(root), &options.goal),
+        ref other => other.value(shared, root),
     };
     let with_units = |named: Vec<(String, f64)>| -> Vec<NamedUncertainty> {
         let unit = |id: &str| list.iter().find(|parameter| parameter.id == id);
@@ -198,7 +197,7 @@ pub fn improve(
         .map(|k| {
             let candidate = &prepared.candidates[chosen[k]].test;
             let proposal = proposal(&problem.session, &candidate.test, &candidate.name, variations, &mut taken);
-            let step = step(&prepared, &chosen[..=k], &outside, &with_units);
+            let step = step(&prepared, &design, &chosen[..=k], &outside, &with_units);
             match proposal {
                 Some(proposal) => ProposedTest { name: proposal::name(&proposal), proposal, ..step },
                 None => step,
@@ -206,21 +205,15 @@ pub fn improve(
         })
         .collect();
     Ok(Improvement {
-        criterion: match options.goal {
-            Goal::WorstUncertainty => "worst standard uncertainty, um or arcsec".to_string(),
-            Goal::Separation { .. } => "separation, standard deviations".to_string(),
-        },
+        criterion: options.goal.words().to_string(),
         candidate_tests: prepared.candidates.len(),
         before: outside(&prepared.base),
         uncertainties_before: with_units(named_uncertainties(shared, &prepared.base)),
+        bound: if chosen.len() > 1 { bound::best_value(&design, &chosen) } else { None },
         steps,
         exchanged,
         alternatives,
     })
-}
-
-fn is_no_gain(before: f64, after: f64) -> bool {
-    before - after <= MIN_GAIN * before.abs()
 }
 
 /// The decrease of the logarithm of the figure per minute.
@@ -239,73 +232,38 @@ fn best_per_minute(prepared: &PreparedCandidates, now: f64, figures: &[f64]) -> 
 /// The candidate tests with the smallest scores, each name once.
 fn listed(
     prepared: &PreparedCandidates,
-    figures: &[f64],
-    goal: &Goal,
+    count: usize,
     score: impl Fn(usize) -> f64,
+    value: impl Fn(usize) -> f64,
 ) -> Vec<AlternativeTest> {
-    let mut order: Vec<usize> = (0..figures.len()).collect();
+    let mut order: Vec<usize> = (0..count).collect();
     order.sort_by(|a, b| smallest_first(score(*a), score(*b)));
-    let of = |candidate: usize| AlternativeTest {
-        test: prepared.candidates[candidate].test.name.clone(),
-        after: reported(figures[candidate], goal),
-        duration_min: prepared.candidates[candidate].test.minutes,
-    };
     let mut listed: Vec<AlternativeTest> = Vec::new();
-    for alternative in order.into_iter().map(of) {
+    for candidate in order {
+        let test = &prepared.candidates[candidate].test;
         // Mirror-image tests have equal names and figures.
-        if listed.len() < MAX_ALTERNATIVES && !listed.iter().any(|other| other.test == alternative.test) {
-            listed.push(alternative);
+        if listed.len() < MAX_ALTERNATIVES && !listed.iter().any(|other| other.test == test.name) {
+            listed.push(AlternativeTest {
+                test: test.name.clone(),
+                after: value(candidate),
+                duration_min: test.minutes,
+            });
         }
     }
     listed
 }
 
-/// Removes each proposed test in turn and replaces it by the best candidate test.
-fn exchange(
-    prepared: &PreparedCandidates,
-    chosen: &mut [usize],
-    figure: &(impl Fn(&Root) -> f64 + Sync),
-) -> Vec<String> {
-    let mut words = Vec::new();
-    if chosen.len() < 2 {
-        return words;
-    }
-    for _ in 0..MAX_ROUNDS {
-        let mut changed = false;
-        for place in 0..chosen.len() {
-            let others: Vec<usize> =
-                chosen.iter().enumerate().filter(|(k, _)| *k != place).map(|(_, candidate)| *candidate).collect();
-            let now = figure(&prepared.with(chosen));
-            let Some((best, figures)) = prepared.best(&prepared.with(&others), figure) else {
-                continue;
-            };
-            if is_no_gain(now, figures[best]) {
-                continue;
-            }
-            words.push(format!(
-                "{} in place of {}",
-                prepared.candidates[best].test.name, prepared.candidates[chosen[place]].test.name
-            ));
-            chosen[place] = best;
-            changed = true;
-        }
-        if !changed {
-            break;
-        }
-    }
-    words
-}
-
 fn step(
     prepared: &PreparedCandidates,
+    design: &Design<'_>,
     chosen: &[usize],
     outside: &impl Fn(&Root) -> f64,
     with_units: &impl Fn(Vec<(String, f64)>) -> Vec<NamedUncertainty>,
 ) -> ProposedTest {
     let shared = &prepared.shared;
     let candidate = &prepared.candidates[chosen[chosen.len() - 1]].test;
-    let root = prepared.with(chosen);
-    let before = prepared.with(&chosen[..chosen.len() - 1]);
+    let root = design.with(chosen);
+    let before = design.with(&chosen[..chosen.len() - 1]);
     let first = shared.ids.len() - shared.targets;
     let unidentifiable = |u: &[f64], j: usize| is_unidentifiable(shared, u, j);
     let (u_before, u_after) = (shared.uncertainties(&before), shared.uncertainties(&root));

@@ -13,7 +13,7 @@ use faer::{Mat, MatRef};
 use super::results::Indices;
 use crate::PlanError;
 use abbe_identify::linear::Linearisation;
-use abbe_identify::numerics::solve::Directions;
+use abbe_identify::numerics::solve::Svd;
 
 /// The indices of a plan.
 ///
@@ -41,12 +41,12 @@ pub fn indices(
 fn of_triangle(r: MatRef<'_, f64>, size: &[f64], readings: usize) -> Result<Indices, PlanError> {
     let m = size.len();
     let scaled = Mat::from_fn(m, m, |i, j| r[(i, j)] * size[j]);
-    let sigma = Directions::of(scaled.as_ref())?.singular_values;
+    let sigma = Svd::of(scaled.as_ref())?.singular_values;
     let (first, last) = (sigma[0], sigma[m - 1]);
     let mean_log = sigma.iter().map(|s| s.ln()).sum::<f64>() / m as f64;
     let norm: Vec<f64> = (0..m).map(|j| (0..m).map(|i| r[(i, j)].powi(2)).sum::<f64>().sqrt()).collect();
     let unit = Mat::from_fn(m, m, |i, j| r[(i, j)] / norm[j]);
-    let lambda: Vec<f64> = Directions::of(unit.as_ref())?.singular_values.iter().map(|s| s * s).collect();
+    let lambda: Vec<f64> = Svd::of(unit.as_ref())?.singular_values.iter().map(|s| s * s).collect();
     let count = m as f64;
     Ok(Indices {
         identifiable_count: m,

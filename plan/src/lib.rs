@@ -5,9 +5,10 @@
 //!
 //! - [`analyse`]: uncertainties, budgets, identifiability, indices, and the contribution of each test;
 //! - [`effects`]: detectability and bias of undeclared effects; [`bias`]: the bias by each undeclared effect;
-//! - [`test_variations`], [`candidate_tests`], [`criterion`], [`mod@improve`], [`separate`], [`separating_tests`],
+//! - [`test_variations`], [`candidate_tests`], [`mod@improve`], [`separate`], [`separating_tests`],
 //!   [`mod@proposal`]: the next test; [`mod@range`]: how far a sweep can shrink;
 //! - [`states`], [`sensitivity`], [`budget`], [`indices`], [`structure`]: the parts of the analysis;
+//! - [`design`]: the engine of optimal design behind next test, separating test and poses;
 //! - [`mod@global`]: Sobol' indices of the estimates;
 //! - [`collision`]: clearance of bar, holders and bodies along every test; [`poses`]: poses for a tracker;
 //! - [`sheet`]: what an operator sets up;
@@ -27,14 +28,13 @@ mod candidate_layout;
 pub mod candidate_tests;
 pub mod clearance;
 pub mod collision;
-pub mod criterion;
+pub mod design;
 pub mod detectability;
 pub mod effects;
 pub mod error;
 pub mod global;
 pub mod improve;
 pub mod indices;
-pub(crate) mod information;
 pub mod next_test;
 pub mod poses;
 pub mod proposal;

@@ -12,11 +12,12 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::candidate_information::PreparedCandidates;
-use super::criterion;
-use super::information::{Root, SharedParameters};
+use super::design::goal;
+use super::design::information::{Root, SharedParameters};
 use super::states;
 use super::test_variations::TestVariations;
 use crate::PlanError;
+use abbe_identify::numerics::parallel;
 use abbe_identify::numerics::ranking::{rounded, smallest_first};
 use abbe_identify::numerics::triangle::upper;
 use abbe_identify::parameters::Role;
@@ -229,12 +230,15 @@ impl SeparationComparison {
     fn sigma(&self, root: &Root, alternative: usize) -> f64 {
         let (columns, shared) = &self.pairs[alternative];
         let stays = Mat::from_fn(root.nrows(), columns.len(), |i, j| root[(i, columns[j])]);
-        criterion::separation(shared, &upper(stays), &self.coefficients)
+        goal::separation(shared, &upper(stays), &self.coefficients)
     }
 
     /// The separations with each candidate test added, by test and alternative.
     fn with_each(&self, root: &Root, alternatives: &[usize]) -> Vec<Vec<f64>> {
-        self.prepared.figures(root, &|root: &Root| alternatives.iter().map(|one| self.sigma(root, *one)).collect())
+        parallel::map(self.prepared.candidates.len(), &|candidate| {
+            let root = self.prepared.added(root, candidate);
+            alternatives.iter().map(|one| self.sigma(&root, *one)).collect()
+        })
     }
 
     /// The candidate test that separates the largest number of alternatives by at least `least` standard deviations. Of

@@ -30,7 +30,7 @@ use super::states;
 use crate::PlanError;
 use abbe_identify::linear::{Linearisation, is_of_interest};
 use abbe_identify::numerics::rank::Rank;
-use abbe_identify::numerics::solve::Directions;
+use abbe_identify::numerics::solve::Svd;
 use abbe_identify::numerics::triangle::Triangle;
 use abbe_identify::problem::Problem;
 
@@ -99,7 +99,7 @@ pub fn structure(problem: &Problem) -> Result<Structure, PlanError> {
 /// The rank of noise-free readings.
 fn rank_of(readings: &Triangle, size: &[f64]) -> Result<usize, PlanError> {
     let r = readings.r();
-    Ok(Directions::of(Mat::from_fn(r.nrows(), r.ncols(), |i, j| r[(i, j)] * size[j]).as_ref())?.numerical_rank())
+    Ok(Svd::of(Mat::from_fn(r.nrows(), r.ncols(), |i, j| r[(i, j)] * size[j]).as_ref())?.numerical_rank())
 }
 
 /// The rank at a random geometry; `None` if the model cannot be evaluated there.

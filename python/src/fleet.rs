@@ -44,7 +44,7 @@ pub fn run_session(
     work::run(py, None, move |caller| {
         let store = Store::open(out)?;
         let places = Places { models, allow_outside };
-        let done = unit::run(&file, &options, &places, &store, IfClaimed::Wait, &|| caller.goes_on())?;
+        let done = unit::run(&file, &options, &places, &store, IfClaimed::Wait, &|| caller.should_continue())?;
         let (done, pointer) = done.ok_or_else(|| Failed::new("another process analyses the session"))?;
         Ok((done == Done::Computed, json(&pointer)?))
     })
@@ -62,7 +62,7 @@ pub fn analyse_session(
     let options = options(options_json)?;
     work::run(py, None, move |caller| {
         let places = Places { models, allow_outside };
-        json(&unit::analyse(&file, &options, &places, &|| caller.goes_on())?)
+        json(&unit::analyse(&file, &options, &places, &|| caller.should_continue())?)
     })
 }
 
@@ -120,7 +120,7 @@ pub fn run_draws(py: Python<'_>, file: PathBuf, out: PathBuf, numbers: Vec<usize
         let (study, store) = (study::file::read(&file)?, Store::open(out)?);
         let mut computed = 0;
         for number in numbers {
-            let done = study::run(&study, number, &store, IfClaimed::Wait, &|| caller.goes_on())?;
+            let done = study::run(&study, number, &store, IfClaimed::Wait, &|| caller.should_continue())?;
             computed += usize::from(done.is_some_and(|(done, _)| done == Done::Computed));
         }
         Ok(computed)

@@ -32,7 +32,7 @@ pub struct Trace {
 
 /// Tells the caller about the progress, and returns whether to go on.
 fn reported(caller: &Caller, progress: &Progress) -> bool {
-    progress.words().map_or_else(|| caller.goes_on(), |words| caller.report(words))
+    progress.words().map_or_else(|| caller.should_continue(), |words| caller.report(words))
 }
 
 /// The end of a computation with a limit in seconds. A limit beyond what a clock can hold is none.
@@ -73,10 +73,10 @@ impl Trace {
         let stated = stated.into_iter().filter_map(|(name, value)| Some((name.to_string(), value?)));
         let options = TraceOptions { seed, max_effects, only, exclude, ..TraceOptions::default() };
         let trace = work::run(py, progress, move |caller| {
-            let goes_on = || deadline.is_none_or(|deadline| Instant::now() < deadline);
-            let report = |progress: Progress| reported(caller, &progress) && goes_on();
+            let should_continue = || deadline.is_none_or(|deadline| Instant::now() < deadline);
+            let report = |progress: Progress| reported(caller, &progress) && should_continue();
             let mut trace = trace::trace(&own.session, &options, &report)?;
-            if caller.report("comparing candidate tests".to_string()) && goes_on() {
+            if caller.report("comparing candidate tests".to_string()) && should_continue() {
                 separate_aliases(&mut trace, &TestVariations::short(), &report)?;
             }
             if let Some(seconds) = time_limit_s {

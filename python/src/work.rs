@@ -82,7 +82,7 @@ pub struct Caller {
 
 impl Caller {
     /// Whether to go on.
-    pub fn goes_on(&self) -> bool {
+    pub fn should_continue(&self) -> bool {
         !self.stop.load(Ordering::Relaxed)
     }
 
@@ -90,7 +90,7 @@ impl Caller {
     pub fn report(&self, words: String) -> bool {
         // The caller has left if nobody receives it.
         let _ = self.progress.send(words);
-        self.goes_on()
+        self.should_continue()
     }
 }
 

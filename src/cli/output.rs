@@ -1,4 +1,4 @@
-//! Files that are written whole or not at all.
+//! Atomic file writes.
 
 use std::fs::OpenOptions;
 use std::io::Write;
@@ -15,7 +15,7 @@ use crate::report::table::Table;
 /// Writes a file through a temporary one beside it, so that a reader finds the old file or the whole new one, whatever
 /// happens meanwhile.
 ///
-/// What is no file (a pipe, a terminal, `/dev/stdout`) is written to as it is: nothing may take its place. `-` is
+/// Pipes and devices (a terminal, `/dev/stdout`) are written in place. `-` is
 /// standard output.
 pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), Failure> {
     let fault = |source| Failure::Write { path: path.display().to_string(), source };

@@ -97,7 +97,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         &files,
         arguments.threads as usize,
         &|| !interrupts.came(),
-        |file, if_claimed, goes_on| unit::run(file, &options, &places, &store, if_claimed, goes_on),
+        |file, if_claimed, should_continue| unit::run(file, &options, &places, &store, if_claimed, should_continue),
         &|| bar.inc(1),
     );
     bar.finish_and_clear();

@@ -52,8 +52,8 @@ pub fn run(arguments: &StudyArguments) -> Result<(), Failure> {
         &numbers,
         arguments.threads as usize,
         &|| !interrupts.came(),
-        |number, if_claimed, goes_on| {
-            let draw = study::run(&study, *number, &store, if_claimed, goes_on)?;
+        |number, if_claimed, should_continue| {
+            let draw = study::run(&study, *number, &store, if_claimed, should_continue)?;
             Ok(draw.map(|(_, draw)| draw))
         },
         &|| bar.inc(1),

@@ -91,9 +91,10 @@ impl Quantity {
 pub type Words<T> = &'static [(&'static str, T)];
 
 /// The value of one of these words.
-pub fn words<T: Copy + Send + Sync>(words: Words<T>) -> impl TypedValueParser<Value = T> {
-    let value =
-        move |text: String| words.iter().find(|(word, _)| *word == text).map(|(_, value)| *value).ok_or("no such word");
+pub fn words<T: Clone + Send + Sync>(words: Words<T>) -> impl TypedValueParser<Value = T> {
+    let value = move |text: String| {
+        words.iter().find(|(word, _)| *word == text).map(|(_, value)| value.clone()).ok_or("no such word")
+    };
     PossibleValuesParser::new(words.iter().map(|(word, _)| *word)).try_map(value)
 }
 

@@ -16,24 +16,24 @@ pub struct Pooled<T> {
 }
 
 /// What a unit asks before each of its steps: whether the work goes on.
-pub type GoesOn<'g> = &'g (dyn Fn() -> bool + Sync);
+pub type ShouldContinue<'g> = &'g (dyn Fn() -> bool + Sync);
 
 /// Does all units. The first error ends the work: the next unit would meet it too. A unit on which another process is
 /// at work gives `None`; it is asked for again when the others are done. `did` hears of each unit that is done.
 pub fn all<U: Sync, T: Send>(
     units: &[U],
     threads: usize,
-    goes_on: GoesOn<'_>,
-    unit: impl Fn(&U, IfClaimed, GoesOn<'_>) -> Result<Option<T>, FleetError> + Sync,
+    should_continue: ShouldContinue<'_>,
+    unit: impl Fn(&U, IfClaimed, ShouldContinue<'_>) -> Result<Option<T>, FleetError> + Sync,
     did: &(dyn Fn() + Sync),
 ) -> Pooled<T> {
     let stopped = AtomicBool::new(false);
-    let goes_on = || goes_on() && !stopped.load(Ordering::Relaxed);
+    let should_continue = || should_continue() && !stopped.load(Ordering::Relaxed);
     let one = |own: &U, if_claimed: IfClaimed| {
-        if !goes_on() {
+        if !should_continue() {
             return Err(FleetError::Interrupted);
         }
-        let outcome = unit(own, if_claimed, &goes_on);
+        let outcome = unit(own, if_claimed, &should_continue);
         match outcome {
             Ok(None) => {}
             Ok(Some(_)) => did(),

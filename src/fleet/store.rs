@@ -103,12 +103,12 @@ const WAIT: Duration = Duration::from_millis(100);
 /// Looks for a result, and claims it if it is missing.
 ///
 /// # Errors
-/// Those of the two; [`FleetError::Interrupted`] if `goes_on` returned `false` while another process was at work.
+/// Those of the two; [`FleetError::Interrupted`] if `should_continue` returned `false` while another process was at work.
 pub(crate) fn found_or_claimed<T>(
     found: impl Fn() -> Result<Option<T>, FleetError>,
     claim: impl Fn() -> Result<Option<Claim>, FleetError>,
     if_claimed: IfClaimed,
-    goes_on: &(dyn Fn() -> bool + Sync),
+    should_continue: &(dyn Fn() -> bool + Sync),
 ) -> Result<Search<T>, FleetError> {
     loop {
         if let Some(result) = found()? {
@@ -121,7 +121,7 @@ pub(crate) fn found_or_claimed<T>(
         if if_claimed == IfClaimed::Skip {
             return Ok(Search::Skipped);
         }
-        if !goes_on() {
+        if !should_continue() {
             return Err(FleetError::Interrupted);
         }
         std::thread::sleep(WAIT);

@@ -61,7 +61,7 @@ struct Model {
 /// it and `if_claimed` says to skip it.
 ///
 /// # Errors
-/// If the store cannot be read or written, or `goes_on` returned `false`. A session that cannot be analysed is a record
+/// If the store cannot be read or written, or `should_continue` returned `false`. A session that cannot be analysed is a record
 /// with its error.
 pub fn run(
     file: &Path,
@@ -69,19 +69,20 @@ pub fn run(
     places: &Places,
     store: &Store,
     if_claimed: IfClaimed,
-    goes_on: &(dyn Fn() -> bool + Sync),
+    should_continue: &(dyn Fn() -> bool + Sync),
 ) -> Result<Option<(Done, Pointer)>, FleetError> {
     let inputs = inputs(file, options, places);
     let key = inputs.record.key.clone();
-    let (done, record) = match found_or_claimed(|| store.record(&key), || store.claim(&key), if_claimed, goes_on)? {
-        Search::Skipped => return Ok(None),
-        Search::Found(record) => (Done::Kept, record),
-        Search::Claimed(_claim) => {
-            let record = record(inputs, goes_on)?;
-            store.write(&record)?;
-            (Done::Computed, record)
-        }
-    };
+    let (done, record) =
+        match found_or_claimed(|| store.record(&key), || store.claim(&key), if_claimed, should_continue)? {
+            Search::Skipped => return Ok(None),
+            Search::Found(record) => (Done::Kept, record),
+            Search::Claimed(_claim) => {
+                let record = record(inputs, should_continue)?;
+                store.write(&record)?;
+                (Done::Computed, record)
+            }
+        };
     let pointer = Pointer::new(file, &record);
     store.note(&pointer)?;
     Ok(Some((done, pointer)))
@@ -90,14 +91,14 @@ pub fn run(
 /// The record of a session, without a store.
 ///
 /// # Errors
-/// [`FleetError::Interrupted`] if `goes_on` returned `false`.
+/// [`FleetError::Interrupted`] if `should_continue` returned `false`.
 pub fn analyse(
     file: &Path,
     options: &Options,
     places: &Places,
-    goes_on: &(dyn Fn() -> bool + Sync),
+    should_continue: &(dyn Fn() -> bool + Sync),
 ) -> Result<Record, FleetError> {
-    record(inputs(file, options, places), goes_on)
+    record(inputs(file, options, places), should_continue)
 }
 
 fn hexadecimal(digest: impl AsRef<[u8]>) -> String {
@@ -188,7 +189,7 @@ fn model_of(machine_id: &str, places: &Places) -> Option<Model> {
 }
 
 /// Analyses what was read.
-fn record(inputs: Inputs, goes_on: &(dyn Fn() -> bool + Sync)) -> Result<Record, FleetError> {
+fn record(inputs: Inputs, should_continue: &(dyn Fn() -> bool + Sync)) -> Result<Record, FleetError> {
     let Inputs { read, mut record, model } = inputs;
     let failed = |record: Record, stage: &str, message: String| {
         let error = Some(ErrorRecord { stage: stage.to_string(), message });
@@ -200,9 +201,9 @@ fn record(inputs: Inputs, goes_on: &(dyn Fn() -> bool + Sync)) -> Result<Record,
     };
     let stage = if record.options.no_trace { "fit" } else { "trace" };
     // A fault of the program in one session must not end the others.
-    let analysed = catch_unwind(AssertUnwindSafe(|| identify(&mut record, &session, goes_on)));
+    let analysed = catch_unwind(AssertUnwindSafe(|| identify(&mut record, &session, should_continue)));
     match analysed {
-        _ if !goes_on() => return Err(FleetError::Interrupted),
+        _ if !should_continue() => return Err(FleetError::Interrupted),
         Ok(Ok(())) => {}
         Ok(Err(error)) => return failed(record, stage, error.to_string()),
         Err(_) => return failed(record, stage, FAULT.to_string()),
@@ -236,7 +237,11 @@ fn record(inputs: Inputs, goes_on: &(dyn Fn() -> bool + Sync)) -> Result<Record,
 const FAULT: &str = "a fault of abbe: the computation broke off; please report it with the session";
 
 /// Fit and trace.
-fn identify(record: &mut Record, session: &Session, goes_on: &(dyn Fn() -> bool + Sync)) -> Result<(), IdentifyError> {
+fn identify(
+    record: &mut Record,
+    session: &Session,
+    should_continue: &(dyn Fn() -> bool + Sync),
+) -> Result<(), IdentifyError> {
     if record.options.no_trace {
         let (problem, found) = fit::prepare(session, record.seed)?;
         set_fit(record, &fit::report(&problem, &found)?);
@@ -249,7 +254,7 @@ fn identify(record: &mut Record, session: &Session, goes_on: &(dyn Fn() -> bool 
         exclude: record.options.exclude.clone(),
         ..TraceOptions::default()
     };
-    let found = trace(session, &options, &|_: Progress| goes_on())?;
+    let found = trace(session, &options, &|_: Progress| should_continue())?;
     record.effects = found
         .effects
         .iter()

@@ -12,7 +12,7 @@ use super::block::{Level, Report, Text};
 use super::figure::bars::{Bars, Fill};
 use super::figure::{Chart, Figure, Quantity};
 use super::number::{capitalised, quantity, three_digits, unit};
-use super::quality::noise;
+use super::quality::{efficiency, noise};
 use super::session;
 use super::table::{Cell, Column, Table, cells, numbers};
 
@@ -32,7 +32,11 @@ pub fn report(problem: &Problem, found: &NextTest) -> Report {
         None => format!("Minimum sweep range of {}.", counted(ranges.len(), "test")),
     };
     let noise = noise(found.noise_um, ReadingUnit::Micrometre, found.noise_source);
-    report.opening("", [verdict, format!("{}.", capitalised(&noise))]);
+    let bound = improvement.as_ref().and_then(|found| {
+        let last = found.steps.last()?;
+        Some(efficiency(last.after, found.bound?, "as many of these tests"))
+    });
+    report.opening("", std::iter::once(verdict).chain(bound).chain([format!("{}.", capitalised(&noise))]));
     if let Some(found) = improvement {
         proposed(&mut report, found);
     }

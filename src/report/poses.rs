@@ -7,7 +7,7 @@ use abbe::plan::poses::PoseSelection;
 
 use super::block::Report;
 use super::number::{three_digits, unit};
-use super::quality::noise;
+use super::quality::{efficiency, noise};
 use super::table::{Cell, Table, cells, numbers, words};
 
 /// The report of selected poses.
@@ -16,7 +16,8 @@ pub fn report(session: &Session, found: &PoseSelection) -> Report {
     report.warnings.clone_from(&found.warnings);
     report.method =
         "Poses are exchanged with candidates within the travel of the axes until none lowers the criterion.".into();
-    report.opening("", [format!("{}.", sentence(found))]);
+    let bound = found.bound.map(|bound| efficiency(found.value, bound, "as many candidates"));
+    report.opening("", [format!("{}.", sentence(found))].into_iter().chain(bound));
     report.section("Predicted uncertainty");
     report.key(uncertainties(found));
     report.section("Poses");

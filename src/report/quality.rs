@@ -8,7 +8,7 @@ use abbe::model::words::counted;
 
 use super::block::KeyFigure;
 use super::cross_validation;
-use super::number::{integer, of_readings};
+use super::number::{integer, of_readings, three_digits};
 
 /// The quantities that describe the quality of one model.
 pub struct Quality<'r> {
@@ -124,6 +124,18 @@ pub fn readings(problem: &Problem, readings: usize, outliers: usize) -> KeyFigur
         some => format!("{} excluded", counted(some, "outlier")),
     };
     KeyFigure::new("Readings", integer(readings), format!("{tests}, {excluded}"))
+}
+
+/// How far a chosen design is from the best one, by its bound.
+pub fn efficiency(value: f64, bound: f64, of: &str) -> String {
+    if !value.is_finite() || bound <= 0.0 {
+        return format!("No choice of {of} reaches less than {}.", three_digits(bound));
+    }
+    format!(
+        "No choice of {of} reaches less than {}: the chosen ones are within {:.1} % of it.",
+        three_digits(bound),
+        100.0 * (value / bound - 1.0).max(0.0)
+    )
 }
 
 /// The noise and its source in words. A residual is not called noise.

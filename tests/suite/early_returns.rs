@@ -44,8 +44,8 @@ fn returns(line: &str) -> bool {
 fn decision<'a>(lines: &'a [&'a str], at: usize) -> &'a [&'a str] {
     let indent = |line: &str| line.len() - line.trim_start().len();
     let own = indent(lines[at]);
-    let goes_on = |line: &str| line.is_empty() || line.starts_with('}') || line == "else {";
-    let is_head = |line: &&&str| indent(line) < own && !goes_on(line.trim());
+    let should_continue = |line: &str| line.is_empty() || line.starts_with('}') || line == "else {";
+    let is_head = |line: &&&str| indent(line) < own && !should_continue(line.trim());
     let head = if lines[at].contains("else { return }") {
         at
     } else {

@@ -14,6 +14,7 @@ mod compensation;
 mod conformity;
 mod conformity_set_up;
 mod conformity_shares;
+mod design_bound;
 mod doors;
 mod early_returns;
 mod effect_description;

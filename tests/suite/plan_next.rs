@@ -6,7 +6,7 @@ use abbe::model::effect::{Component, Effect, Shape};
 use abbe::model::instrument::Station;
 use abbe::model::session::{Prior, Session};
 use abbe::plan::candidate_tests::candidate_tests;
-use abbe::plan::criterion::Goal;
+use abbe::plan::design::Goal;
 use abbe::plan::improve::{ImproveOptions, improve};
 use abbe::plan::test_variations::TestVariations;
 use abbe::plan::{PlanOptions, analyse, separation, states};

@@ -5,8 +5,9 @@ use abbe::model::component::ErrorName;
 use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
 use abbe::model::session::readings::Readings;
+use abbe::plan::design::Goal;
 use abbe::plan::poses::candidates::{LineOfSight, PoseLimits};
-use abbe::plan::poses::{PoseCriterion, PoseOptions, PoseSelection, select};
+use abbe::plan::poses::{PoseOptions, PoseSelection, select};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
@@ -21,10 +22,10 @@ fn ur10() -> Session {
     files::session(&ready("ur10/session.toml"), &reading).unwrap()
 }
 
-fn options(criterion: PoseCriterion) -> PoseOptions {
+fn options(goal: Goal) -> PoseOptions {
     PoseOptions {
         poses: 30,
-        criterion,
+        goal,
         candidates: 1000,
         seed: 1,
         limits: PoseLimits {
@@ -42,8 +43,7 @@ fn poses(session: &Session, options: &PoseOptions) -> PoseSelection {
 #[test]
 fn chosen_poses_beat_random_ones_in_every_criterion() {
     let session = ur10();
-    for (criterion, share) in [(PoseCriterion::WorstUncertainty, 0.6), (PoseCriterion::A, 0.8), (PoseCriterion::D, 0.9)]
-    {
+    for (criterion, share) in [(Goal::WorstUncertainty, 0.6), (Goal::A, 0.8), (Goal::D, 0.9)] {
         let found = poses(&session, &options(criterion));
         println!("{}: {:.3}, random {:.3}", found.criterion, found.value, found.random_median);
         assert!(
@@ -67,7 +67,7 @@ fn chosen_poses_beat_random_ones_in_every_criterion() {
 fn predicted_uncertainties_are_those_of_simulated_readings() {
     const DRAWS: usize = 200;
     let mut session = ur10();
-    let found = poses(&session, &options(PoseCriterion::WorstUncertainty));
+    let found = poses(&session, &options(Goal::WorstUncertainty));
     // What no pose separates is not estimated, as the prediction assumes.
     session.unknowns.retain(|name: &ErrorName| found.uncertainties.iter().any(|error| error.id == name.to_string()));
     session.noise_mm = Some(NOISE_MM);
@@ -116,9 +116,9 @@ fn predicted_uncertainties_are_those_of_simulated_readings() {
 fn poses_are_within_their_limits() {
     let session = ur10();
     let sight = LineOfSight { from_mm: [3000.0, 0.0, 800.0], clearance_mm: 150.0 };
-    let limits = PoseLimits { sight: Some(sight), ..options(PoseCriterion::A).limits };
-    let seen = poses(&session, &PoseOptions { limits, candidates: 200, ..options(PoseCriterion::A) });
-    let unseen = poses(&session, &PoseOptions { candidates: 200, ..options(PoseCriterion::A) });
+    let limits = PoseLimits { sight: Some(sight), ..options(Goal::A).limits };
+    let seen = poses(&session, &PoseOptions { limits, candidates: 200, ..options(Goal::A) });
+    let unseen = poses(&session, &PoseOptions { candidates: 200, ..options(Goal::A) });
     assert!(seen.excluded > unseen.excluded, "{} and {}", seen.excluded, unseen.excluded);
     assert!(seen.poses.iter().flatten().all(|q| q.abs() <= 360.0));
 }

@@ -6,8 +6,9 @@ use abbe::model::files::{self, ReadOptions};
 use abbe::model::instrument::Station;
 use abbe::model::session::readings::Readings;
 use abbe::model::session::{Prior, Session, Test};
+use abbe::plan::design::Goal;
 use abbe::plan::poses::candidates::PoseLimits;
-use abbe::plan::poses::{PoseCriterion, PoseOptions, PoseSelection, measured_by, select};
+use abbe::plan::poses::{PoseOptions, PoseSelection, measured_by, select};
 use nalgebra::{DMatrix, DVector, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -29,7 +30,7 @@ fn session(name: &str) -> Session {
 fn options(poses: usize, noise_mm: f64) -> PoseOptions {
     PoseOptions {
         poses,
-        criterion: PoseCriterion::WorstUncertainty,
+        goal: Goal::WorstUncertainty,
         candidates: 1000,
         seed: 1,
         limits: PoseLimits::default(),

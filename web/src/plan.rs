@@ -14,7 +14,7 @@ use abbe::model::chain::Machine;
 use abbe::model::document::schema;
 use abbe::model::files::template;
 use abbe::model::session::Test;
-use abbe::plan::criterion::Goal;
+use abbe::plan::design::Goal;
 use abbe::plan::improve::{ImproveOptions, improve};
 use abbe::plan::test_variations::TestVariations;
 use abbe::plan::{self, PlanOptions, states};

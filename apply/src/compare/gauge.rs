@@ -14,7 +14,7 @@ use faer::Mat;
 use crate::ApplyError;
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_identify::numerics::null_space::{MIN_PIVOT, echelon};
-use abbe_identify::numerics::solve::Directions;
+use abbe_identify::numerics::solve::Svd;
 
 /// Share of the largest singular value below which a direction is one that the others span. The null directions of two
 /// sessions of one plan differ by this little.
@@ -40,7 +40,7 @@ pub(super) fn one_gauge(
         return Ok(Vec::new());
     }
     let scaled = Mat::from_fn(common.len(), directions.len(), |k, n| directions[n][k] / sizes[k]);
-    let space = Directions::of(scaled.as_ref())?;
+    let space = Svd::of(scaled.as_ref())?;
     let least = SAME_DIRECTION * space.singular_values.first().copied().unwrap_or(0.0).max(SAME_DIRECTION);
     let dimension = space.singular_values.iter().filter(|value| **value > least).count();
     if dimension == 0 {

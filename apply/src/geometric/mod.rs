@@ -23,7 +23,7 @@ pub use centre::{Centre, CircleGeometry};
 pub use compare::{CentreResult, Comparison, ComparisonRow, compare};
 
 use crate::ApplyError;
-use abbe_identify::numerics::solve::Directions;
+use abbe_identify::numerics::solve::Svd;
 use abbe_identify::numerics::tolerances::COLLINEAR;
 use abbe_identify::parameters::Role;
 use abbe_identify::problem::{Problem, RowBlock};
@@ -117,7 +117,7 @@ impl Estimator {
             // An angle moves a centre by its lever. The physical sizes make radians times 100 mm comparable with mm.
             sensitivities[(i, errors[k])] * problem.parameters.list[errors[k]].size
         });
-        let directions = Directions::of(of_errors.as_ref())?;
+        let directions = Svd::of(of_errors.as_ref())?;
         let rank = directions.rank(COLLINEAR);
         if rank < errors.len() {
             let confounded: Vec<&str> = (0..errors.len())

@@ -9,8 +9,8 @@ use faer::linalg::solvers::SolveLstsq;
 
 use super::columns::{Columns, EffectColumns};
 use super::gain::TrainedModel;
+use super::gram::{Gram, PriorGram};
 use super::library;
-use super::moments::{Moments, PriorMoments};
 use super::tuned::TunedChannel;
 use crate::fit::prepare;
 use crate::problem::Problem;
@@ -77,8 +77,8 @@ fn gains_are_those_of_least_squares() {
         let (model, residual) = model(&columns, &beta);
         let sets = candidates(&problem, &columns, 97);
         let rank = model.ncols();
-        let prior = PriorMoments { base: Mat::zeros(rank, rank), base_y: vec![0.0; rank] };
-        let moments = Moments::new(&columns, sets.clone(), Arc::new(model.clone()), &residual, prior);
+        let prior = PriorGram { base: Mat::zeros(rank, rank), base_y: vec![0.0; rank] };
+        let gram = Gram::new(&columns, sets.clone(), Arc::new(model.clone()), &residual, prior);
         let all: Vec<usize> = (0..columns.fold_rows.len()).collect();
         let without: Vec<usize> = all.iter().copied().filter(|fold| *fold != 5).collect();
         let few: Vec<usize> = (0..sets.len()).filter(|k| sets[*k].count <= 2).collect();
@@ -86,7 +86,7 @@ fn gains_are_those_of_least_squares() {
         for (folds, chosen) in
             [(&all, vec![]), (&without, vec![]), (&all, vec![few[10], few[30]]), (&without, vec![few[20]])]
         {
-            let trained = TrainedModel::new(&moments, &chosen, folds).unwrap();
+            let trained = TrainedModel::new(&gram, &chosen, folds).unwrap();
             let gains = trained.gains(&|_| true).unwrap();
             let beside: Vec<Mat<f64>> = chosen.iter().map(|k| rows(&columns, &[&sets[*k]])).collect();
             let parts: Vec<&Mat<f64>> = std::iter::once(&model).chain(&beside).collect();

@@ -5,7 +5,7 @@
 //! the library. The tail is computed in logarithms, because it underflows at real effect sizes.
 //!
 //! With the products `d` and `g` of a candidate beside the fitted model, and `V = E⊥ᵀC` with the chosen effects
-//! ([`super::moments`]),
+//! ([`super::gram`]),
 //!
 //! ```text
 //! gain = g'ᵀ D⁻¹ g',   D = d − Vᵀ (EᵀE⊥)⁻¹ V,   g' = g − Vᵀ (EᵀE⊥)⁻¹ Eᵀy⊥
@@ -17,7 +17,7 @@ use std::sync::{Arc, Mutex};
 
 use faer::Mat;
 
-use super::moments::{ChosenEffect, Moments, Projection, SegmentProducts, stored};
+use super::gram::{ChosenEffect, Gram, Projection, SegmentProducts, stored};
 use crate::error::IdentifyError;
 use crate::numerics::gain::{ObservableSubspace, gain_of_few};
 use crate::numerics::parallel;
@@ -28,7 +28,7 @@ pub(super) const AT_ONCE: usize = 128;
 
 /// The fitted model with chosen effects, trained on some folds.
 pub struct TrainedModel<'m> {
-    pub(super) moments: &'m Moments<'m>,
+    pub(super) gram: &'m Gram<'m>,
     pub(super) projection: Arc<Projection>,
     /// The training folds.
     pub folds: Vec<usize>,
@@ -76,41 +76,41 @@ impl<'m> TrainedModel<'m> {
     ///
     /// # Errors
     /// If products are not finite.
-    pub fn new(moments: &'m Moments<'m>, chosen: &[usize], folds: &[usize]) -> Result<Self, IdentifyError> {
-        let projection = moments.projection(folds)?;
+    pub fn new(gram: &'m Gram<'m>, chosen: &[usize], folds: &[usize]) -> Result<Self, IdentifyError> {
+        let projection = gram.projection(folds)?;
         let chosen: Vec<Arc<ChosenEffect>> =
-            chosen.iter().map(|candidate| projection.chosen(moments, *candidate)).collect::<Result<_, _>>()?;
+            chosen.iter().map(|candidate| projection.chosen(gram, *candidate)).collect::<Result<_, _>>()?;
         let along: Vec<f64> = chosen.iter().flat_map(|chosen| chosen.with_residual.iter().copied()).collect();
         let lengths: Vec<f64> = chosen.iter().flat_map(|chosen| chosen.lengths.iter().copied()).collect();
-        let mut gram = Mat::zeros(along.len(), along.len());
+        let mut normal = Mat::zeros(along.len(), along.len());
         let mut row = 0;
         for a in &chosen {
             let mut column = 0;
             for b in &chosen {
-                let part = moments.between(a, b);
-                gram.as_mut().submatrix_mut(row, column, part.nrows(), part.ncols()).copy_from(&part);
+                let part = gram.between(a, b);
+                normal.as_mut().submatrix_mut(row, column, part.nrows(), part.ncols()).copy_from(&part);
                 column += part.ncols();
             }
             row += a.rows.ncols();
         }
         // Columns of unit length make the rank independent of units.
         let scale: Vec<f64> = lengths.iter().map(|length| if *length > 0.0 { 1.0 / length } else { 0.0 }).collect();
-        let scaled = Mat::from_fn(scale.len(), scale.len(), |i, j| gram[(i, j)] * scale[i] * scale[j]);
+        let scaled = Mat::from_fn(scale.len(), scale.len(), |i, j| normal[(i, j)] * scale[i] * scale[j]);
         let inverse = pseudo_inverse(scaled.as_ref())?;
         let inverse = Mat::from_fn(scale.len(), scale.len(), |i, j| inverse[(i, j)] * scale[i] * scale[j]);
         let coefficients =
             (0..along.len()).map(|i| (0..along.len()).map(|j| inverse[(i, j)] * along[j]).sum()).collect();
         let (folds, segments) = (folds.to_vec(), Mutex::default());
-        Ok(TrainedModel { moments, projection, folds, chosen, inverse, along, coefficients, segments })
+        Ok(TrainedModel { gram, projection, folds, chosen, inverse, along, coefficients, segments })
     }
 
     pub(super) fn segment(&self, number: usize) -> Result<Arc<Segment>, IdentifyError> {
         stored(&self.segments, &number, || {
-            let products = self.projection.products(self.moments, number, &|| true)?;
+            let products = self.projection.products(self.gram, number, &|| true)?;
             let mut with_chosen = Mat::zeros(self.along.len(), products.g.len());
             let mut row = 0;
             for chosen in &self.chosen {
-                let part = self.projection.with_segment(self.moments, chosen, number)?;
+                let part = self.projection.with_segment(self.gram, chosen, number)?;
                 with_chosen.as_mut().subrows_mut(row, part.nrows()).copy_from(&*part);
                 row += part.nrows();
             }
@@ -121,8 +121,8 @@ impl<'m> TrainedModel<'m> {
 
     /// A candidate in its segment: the segment, its columns and its square.
     fn place(&self, candidate: usize) -> Result<(Arc<Segment>, Range<usize>, Range<usize>), IdentifyError> {
-        let (segment, local) = self.moments.place(candidate);
-        let (columns, square) = (self.moments.columns_of(segment, local), self.moments.square_of(segment, local));
+        let (segment, local) = self.gram.place(candidate);
+        let (columns, square) = (self.gram.columns_of(segment, local), self.gram.square_of(segment, local));
         Ok((self.segment(segment)?, columns, square))
     }
 
@@ -159,7 +159,7 @@ impl<'m> TrainedModel<'m> {
     /// The degrees of freedom of a candidate's gain: its observable directions and its tuned shape numbers. Without the
     /// latter, tunable candidates would be preferred.
     pub(super) fn freedom(&self, candidate: usize, observable: usize) -> usize {
-        if observable == 0 { 0 } else { observable + self.moments.numbers(candidate) }
+        if observable == 0 { 0 } else { observable + self.gram.numbers(candidate) }
     }
 
     /// The gain of a candidate.
@@ -226,23 +226,23 @@ impl<'m> TrainedModel<'m> {
         mut known: Vec<Gain>,
         usable: &(dyn Fn(usize) -> bool + Sync),
     ) -> Result<Vec<Gain>, IdentifyError> {
-        let (first, total) = (known.len(), self.moments.candidates());
+        let (first, total) = (known.len(), self.gram.candidates());
         let chunks: Vec<Range<usize>> =
             (first..total).step_by(AT_ONCE).map(|start| start..(start + AT_ONCE).min(total)).collect();
         let mut segments: Vec<Option<Arc<Segment>>> = Vec::new();
         for candidate in (first..total).filter(|candidate| usable(*candidate)) {
-            let number = self.moments.place(candidate).0;
+            let number = self.gram.place(candidate).0;
             segments.resize(segments.len().max(number + 1), None);
             if segments[number].is_none() {
                 segments[number] = Some(self.segment(number)?);
             }
         }
         let gain = |candidate: usize| {
-            let (number, local) = self.moments.place(candidate);
+            let (number, local) = self.gram.place(candidate);
             let segment = segments.get(number).and_then(Option::as_ref).filter(|_| usable(candidate));
             segment.map_or_else(Gain::default, |segment| {
-                let columns = self.moments.columns_of(number, local);
-                self.gain_in(candidate, segment, columns, self.moments.square_of(number, local))
+                let columns = self.gram.columns_of(number, local);
+                self.gain_in(candidate, segment, columns, self.gram.square_of(number, local))
             })
         };
         let gains = parallel::map(chunks.len(), &|k| chunks[k].clone().map(gain).collect::<Vec<Gain>>());
@@ -264,27 +264,26 @@ impl<'m> TrainedModel<'m> {
         coefficients: &[f64],
     ) -> Result<f64, IdentifyError> {
         let Projected { d, own, .. } = self.projected(candidate)?;
-        let signature = self.projection.chosen(self.moments, effect)?;
+        let signature = self.projection.chosen(self.gram, effect)?;
         // The signature's products with the chosen effects and with the candidate, the fitted model projected out.
         let along = |products: &Mat<f64>, column: usize| -> f64 {
             coefficients.iter().enumerate().map(|(k, c)| c * products[(k, column)]).sum()
         };
         let with_chosen: Vec<f64> = (self.chosen.iter())
             .flat_map(|chosen| {
-                let products = self.moments.between(&signature, chosen);
+                let products = self.gram.between(&signature, chosen);
                 (0..chosen.rows.ncols()).map(move |l| along(&products, l)).collect::<Vec<_>>()
             })
             .collect();
-        let (number, local) = self.moments.place(candidate);
-        let columns = self.moments.columns_of(number, local);
-        let (segment, products) =
-            (self.segment(number)?, self.projection.with_segment(self.moments, &signature, number)?);
+        let (number, local) = self.gram.place(candidate);
+        let columns = self.gram.columns_of(number, local);
+        let (segment, products) = (self.segment(number)?, self.projection.with_segment(self.gram, &signature, number)?);
         let beside = |solved: &dyn Fn(usize) -> f64| -> f64 {
             with_chosen.iter().enumerate().map(|(i, value)| value * solved(i)).sum()
         };
         let g: Vec<f64> =
             columns.map(|column| along(&products, column) - beside(&|i| segment.solved[(i, column)])).collect();
-        let itself = self.moments.between(&signature, &signature);
+        let itself = self.gram.between(&signature, &signature);
         let length: f64 = coefficients.iter().enumerate().map(|(l, c)| c * along(&itself, l)).sum();
         let m = with_chosen.len();
         let solved = |i: usize| (0..m).map(|j| self.inverse[(i, j)] * with_chosen[j]).sum::<f64>();
@@ -306,7 +305,7 @@ impl<'m> TrainedModel<'m> {
         for (column, c) in columns.zip(&of_candidate) {
             of_chosen.iter_mut().enumerate().for_each(|(i, of)| *of -= segment.solved[(i, column)] * c);
         }
-        let added = self.projection.chosen(self.moments, candidate)?;
+        let added = self.projection.chosen(self.gram, candidate)?;
         let mut of_model = self.of_model(&of_chosen);
         for (i, of) in of_model.iter_mut().enumerate() {
             *of -= of_candidate.iter().enumerate().map(|(k, c)| added.of_model[(i, k)] * c).sum::<f64>();
@@ -347,7 +346,7 @@ impl<'m> TrainedModel<'m> {
             }
         }
         let rows: usize = self.projection.training.blocks.iter().map(|block| block.count()).sum();
-        let parameters = self.moments.rank() + self.along.len();
+        let parameters = self.gram.rank() + self.along.len();
         (residual.squared_norm_l2(), rows.saturating_sub(parameters).max(1))
     }
 }

@@ -4,8 +4,8 @@
 pub(crate) mod candidate;
 pub mod columns;
 pub(crate) mod gain;
+pub(crate) mod gram;
 pub mod library;
-pub(crate) mod moments;
 pub mod named;
 mod null_scores;
 pub(crate) mod sampling;

@@ -14,22 +14,22 @@ impl TrainedModel<'_> {
     /// # Errors
     /// If products are not finite.
     pub fn null_best(&self, chosen: &[usize], costs: &[f64], variance: f64) -> Result<Vec<f64>, IdentifyError> {
-        let draws = self.moments.draws();
+        let draws = self.gram.draws();
         let mut h = Mat::zeros(draws, self.along.len());
         let mut column = 0;
         for candidate in chosen {
-            let (segment, local) = self.moments.place(*candidate);
-            let products = self.moments.null_products(segment)?;
-            for k in self.moments.columns_of(segment, local) {
+            let (segment, local) = self.gram.place(*candidate);
+            let products = self.gram.null_products(segment)?;
+            for k in self.gram.columns_of(segment, local) {
                 h.col_mut(column).copy_from(products.col(k));
                 column += 1;
             }
         }
         let counted: Vec<usize> = (0..costs.len()).filter(|candidate| costs[*candidate].is_finite()).collect();
         for candidate in &counted {
-            let segment = self.moments.place(*candidate).0;
+            let segment = self.gram.place(*candidate).0;
             self.segment(segment)?;
-            self.moments.null_products(segment)?;
+            self.gram.null_products(segment)?;
         }
         let chunks: Vec<&[usize]> = counted.chunks(AT_ONCE).collect();
         let of_chunks = parallel::map(chunks.len(), &|k| self.null_best_of(chunks[k], costs, variance, &h));
@@ -52,9 +52,9 @@ impl TrainedModel<'_> {
         let mut g: Vec<f64> = Vec::new();
         let mut left = Mat::zeros(0, 0);
         for candidate in candidates {
-            let (number, local) = self.moments.place(*candidate);
-            let (columns, square) = (self.moments.columns_of(number, local), self.moments.square_of(number, local));
-            let (segment, null) = (self.segment(number)?, self.moments.null_products(number)?);
+            let (number, local) = self.gram.place(*candidate);
+            let (columns, square) = (self.gram.columns_of(number, local), self.gram.square_of(number, local));
+            let (segment, null) = (self.segment(number)?, self.gram.null_products(number)?);
             let projected = self.projected_in(&segment, columns.clone(), square);
             let subspace = ObservableSubspace::of(&projected.d, &projected.own);
             let freedom = self.freedom(*candidate, subspace.freedom);

@@ -10,13 +10,13 @@ use faer::Mat;
 
 use super::columns::{Channel, Columns, EffectColumns};
 use super::gain::TrainedModel;
-use super::moments::{ChannelProducts, TuningSide};
+use super::gram::{ChannelProducts, TuningSide};
 use crate::numerics::gain::quadratic_gain;
 
 impl TrainedModel<'_> {
     /// What the columns of tuned effects are multiplied with.
     pub fn tuning(&self) -> Tuning<'_> {
-        Tuning { model: self, side: TuningSide::of(self.moments, &self.projection, &self.chosen) }
+        Tuning { model: self, side: TuningSide::of(self.gram, &self.projection, &self.chosen) }
     }
 }
 
@@ -43,7 +43,7 @@ impl<'t> Tuning<'t> {
 
     /// The gain of an effect.
     fn gain(&self, products: &EffectProducts) -> f64 {
-        let rank = self.model.moments.rank();
+        let rank = self.model.gram.rank();
         let (cross, count) = (&products.cross, products.own.ncols());
         let of_model = cross.subrows(0, rank);
         let of_chosen = cross.subrows(rank + 1, self.model.along.len());

@@ -25,7 +25,7 @@ use faer::Mat;
 use super::Fit;
 use super::quantities::{quantities, u_of_undetermined_phase_deg, values_at};
 use crate::error::IdentifyError;
-use crate::numerics::solve::Directions;
+use crate::numerics::solve::Svd;
 use crate::parameters::Role;
 use crate::problem::Problem;
 use crate::results::{EnlargedBy, ParameterResult, phases_follow_amplitudes};
@@ -106,7 +106,7 @@ pub(crate) fn at_solution(problem: &Problem, beta: &[f64]) -> Result<Vec<EffectA
         for (alias, place) in own {
             let columns: Vec<usize> = others.iter().copied().chain(place.clone()).collect();
             let scaled = Mat::from_fn(r.nrows(), columns.len(), |i, k| r[(i, columns[k])] * sizes[columns[k]]);
-            let step = Directions::of(scaled.as_ref())?.solve_identifiable(&without);
+            let step = Svd::of(scaled.as_ref())?.solve_identifiable(&without);
             let mut changes = vec![0.0; count];
             others.iter().zip(&step).for_each(|(j, step)| changes[*j] = step * sizes[*j]);
             let residual: Vec<f64> = (0..r.nrows())

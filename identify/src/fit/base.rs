@@ -25,7 +25,7 @@ use faer::Mat;
 use super::Fit;
 use crate::error::IdentifyError;
 use crate::numerics::null_space::{MIN_PIVOT, echelon};
-use crate::numerics::solve::Directions;
+use crate::numerics::solve::Svd;
 use crate::numerics::triangle::Triangle;
 use crate::parameter_description::parameter_meaning;
 use crate::parameters::{Parameter, Role, natural};
@@ -161,10 +161,10 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<BaseResult, IdentifyError>
 /// The directions of the scaled parameters at a point, the best determined first. Those whose singular value is a
 /// rounding error change no reading at all. A direction that is null at the nominal machine only changes readings at
 /// the solution.
-fn directions_at(problem: &Problem, beta: &[f64], triangles: &[Triangle]) -> Result<Directions, IdentifyError> {
+fn directions_at(problem: &Problem, beta: &[f64], triangles: &[Triangle]) -> Result<Svd, IdentifyError> {
     let sizes = problem.parameters.sizes();
     let r = problem.prior_triangle(beta).merged(triangles).r();
-    Directions::of(Mat::from_fn(r.nrows(), sizes.len(), |i, j| r[(i, j)] * sizes[j]).as_ref())
+    Svd::of(Mat::from_fn(r.nrows(), sizes.len(), |i, j| r[(i, j)] * sizes[j]).as_ref())
 }
 
 /// Moves the parameters that are not held until the predictions are those of the fit. Returns the largest remaining
@@ -190,7 +190,7 @@ fn restore_predictions(problem: &Problem, fit: &Fit, held: &[usize], beta: &mut 
         }
         let (r, c, _) = Triangle::new(sizes.len()).merged(&predicted.triangles(beta)?).parts();
         let scaled = Mat::from_fn(r.nrows(), free.len(), |i, k| r[(i, free[k])] * sizes[free[k]]);
-        let step = Directions::of(scaled.as_ref())?.solve(&c, 0.0);
+        let step = Svd::of(scaled.as_ref())?.solve(&c, 0.0);
         let mut next = beta.to_vec();
         free.iter().zip(&step).for_each(|(j, step)| next[*j] += step * sizes[*j]);
         let after = largest(&next);

@@ -219,13 +219,13 @@ mod tests {
 
     use super::*;
     use crate::fit::prepare;
-    use crate::numerics::solve::Directions;
+    use crate::numerics::solve::Svd;
 
     /// Least squares of least norm over dense rows `[J | r]`, for the chosen columns scaled by their size.
     fn solved(rows: &Mat<f64>, columns: &[usize], size: &[f64]) -> Vec<f64> {
         let scaled = Mat::from_fn(rows.nrows(), columns.len(), |i, k| rows[(i, columns[k])] * size[columns[k]]);
         let right: Vec<f64> = (0..rows.nrows()).map(|i| rows[(i, size.len())]).collect();
-        let solution = Directions::of(scaled.as_ref()).unwrap().solve(&right, 0.0);
+        let solution = Svd::of(scaled.as_ref()).unwrap().solve(&right, 0.0);
         solution.iter().zip(columns).map(|(step, j)| step * size[*j]).collect()
     }
 

@@ -10,7 +10,7 @@
 
 use faer::Mat;
 
-use super::solve::Directions;
+use super::solve::Svd;
 use super::triangle::Triangle;
 use crate::error::IdentifyError;
 
@@ -96,7 +96,7 @@ pub fn minimise(
             }
         }
         let scaled = Mat::from_fn(n, n, |i, j| r[(i, j)] * scale[j]);
-        let directions = Directions::of(scaled.as_ref())?;
+        let directions = Svd::of(scaled.as_ref())?;
         let largest = directions.singular_values.first().copied().unwrap_or(0.0);
         // A step is accepted if the sum of squares falls. Near the minimum the decrease is below rounding and the sizes
         // of the steps decide.

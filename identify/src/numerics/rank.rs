@@ -11,7 +11,7 @@
 use faer::Mat;
 
 use super::null_space::{MIN_PIVOT, combinations};
-use super::solve::Directions;
+use super::solve::Svd;
 use super::triangle::Triangle;
 use crate::error::IdentifyError;
 
@@ -42,7 +42,7 @@ impl Rank {
         let n = size.len();
         let r = triangle.r();
         let scaled = Mat::from_fn(n, n, |i, j| r[(i, j)] * size[j]);
-        let directions = Directions::of(scaled.as_ref())?;
+        let directions = Svd::of(scaled.as_ref())?;
         let rank = directions.identifiable_rank();
         let v = directions.right();
         let null_space = v.subcols(rank, n - rank).to_owned();

@@ -3,7 +3,7 @@
 
 use faer::{Mat, MatRef};
 
-use super::solve::Directions;
+use super::solve::Svd;
 use super::triangle::{Triangle, upper};
 use crate::error::IdentifyError;
 
@@ -26,7 +26,7 @@ impl Triangle {
     /// # Errors
     /// If the factor has entries that are not finite.
     pub fn covariance(&self, basis: &Mat<f64>) -> Result<Mat<f64>, IdentifyError> {
-        let root = basis * Directions::of((self.r() * basis).as_ref())?.inverse_root();
+        let root = basis * Svd::of((self.r() * basis).as_ref())?.inverse_root();
         Ok(&root * root.transpose())
     }
 
@@ -65,7 +65,7 @@ impl Triangle {
 fn without_dropped(r: &Mat<f64>, mut rows: Mat<f64>, kept: &[usize], size: &[f64]) -> Result<Mat<f64>, IdentifyError> {
     let dropped: Vec<usize> = (0..size.len()).filter(|j| !kept.contains(j)).collect();
     let scaled = Mat::from_fn(r.nrows(), dropped.len(), |i, j| r[(i, dropped[j])] * size[dropped[j]]);
-    let directions = Directions::of(scaled.as_ref())?;
+    let directions = Svd::of(scaled.as_ref())?;
     let informed = directions.left().subcols(0, directions.identifiable_rank());
     let along = informed.transpose() * &rows;
     rows -= informed * along;

@@ -3,7 +3,7 @@
 use faer::Mat;
 
 use super::gain::quadratic_gain;
-use super::solve::Directions;
+use super::solve::Svd;
 use super::tolerances::COLLINEAR;
 use super::triangle::Triangle;
 
@@ -30,7 +30,7 @@ impl Regression {
         if norms.iter().any(|norm| *norm <= 0.0) {
             return None;
         }
-        let directions = Directions::of(Mat::from_fn(n, n, |i, j| r[(i, j)] / norms[j]).as_ref()).ok()?;
+        let directions = Svd::of(Mat::from_fn(n, n, |i, j| r[(i, j)] / norms[j]).as_ref()).ok()?;
         if directions.rank(COLLINEAR) < n {
             return None;
         }

@@ -1,6 +1,6 @@
 //! Solutions of linear systems: the singular values of a matrix, and what follows from them.
 
-use faer::linalg::solvers::Svd;
+use faer::linalg::solvers::Svd as Factors;
 use faer::prelude::Solve;
 use faer::{Mat, MatRef};
 
@@ -8,21 +8,21 @@ use super::tolerances::{MIN_IDENTIFIABLE, ROUNDING};
 use crate::error::IdentifyError;
 
 /// A matrix `A = U·S·Vᵀ` with its singular values in descending order.
-pub struct Directions {
-    svd: Svd<f64>,
+pub struct Svd {
+    svd: Factors<f64>,
     /// The singular values.
     pub singular_values: Vec<f64>,
 }
 
-impl Directions {
+impl Svd {
     /// Of a matrix.
     ///
     /// # Errors
     /// If the matrix has entries that are not finite.
-    pub fn of(matrix: MatRef<'_, f64>) -> Result<Directions, IdentifyError> {
+    pub fn of(matrix: MatRef<'_, f64>) -> Result<Svd, IdentifyError> {
         let svd = matrix.thin_svd().map_err(|_| IdentifyError::Decomposition)?;
         let singular_values = svd.S().column_vector().iter().copied().collect();
-        Ok(Directions { svd, singular_values })
+        Ok(Svd { svd, singular_values })
     }
 
     /// The left singular vectors `U`, one column each.
@@ -107,7 +107,7 @@ mod tests {
     fn solution_and_covariance_are_those_of_the_normal_equations() {
         let a = Mat::from_fn(4, 2, |i, j| if j == 0 { 1.0 } else { i as f64 });
         let c = [1.0, 3.0, 2.0, 5.0];
-        let directions = Directions::of(a.as_ref()).unwrap();
+        let directions = Svd::of(a.as_ref()).unwrap();
         let found = directions.solve(&c, 0.0);
         // Mean 2.75 at the mean abscissa 1.5, and the slope 5.5/5.
         assert!((found[1] - 1.1).abs() < 1e-12 && (found[0] - (2.75 - 1.5 * 1.1)).abs() < 1e-12, "{found:?}");
@@ -128,13 +128,13 @@ mod tests {
     #[test]
     fn dependent_columns_have_the_solution_of_least_norm() {
         let a = Mat::from_fn(3, 3, |i, j| [[1.0, 0.0, 1.0], [0.0, 1.0, 1.0], [0.0, 0.0, 0.0]][i][j]);
-        let directions = Directions::of(a.as_ref()).unwrap();
+        let directions = Svd::of(a.as_ref()).unwrap();
         assert_eq!(directions.numerical_rank(), 2);
         let found = directions.solve(&[1.0, 1.0, 7.0], 0.0);
         for (found, expected) in found.iter().zip([1.0 / 3.0, 1.0 / 3.0, 2.0 / 3.0]) {
             assert!((found - expected).abs() < 1e-12, "{found}");
         }
-        let none = Directions::of(Mat::<f64>::zeros(3, 0).as_ref()).unwrap();
+        let none = Svd::of(Mat::<f64>::zeros(3, 0).as_ref()).unwrap();
         assert_eq!((none.numerical_rank(), none.solve(&[1.0; 3], 0.0).len()), (0, 0));
     }
 }

@@ -5,7 +5,7 @@
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Normal, StudentsT};
 use statrs::function::gamma::{gamma_ur, ln_gamma};
 
-/// `P(χ² > x)` for so many degrees of freedom; 1 for none.
+/// `P(χ² > x)` with the given degrees of freedom; 1 for none.
 pub fn chi_square_tail(x: f64, freedom: f64) -> f64 {
     ChiSquared::new(freedom).map_or(1.0, |law| law.sf(x))
 }
@@ -15,7 +15,7 @@ pub fn chi_square_tails(x: f64, freedom: f64) -> Option<[f64; 2]> {
     ChiSquared::new(freedom).ok().map(|law| [law.cdf(x), law.sf(x)])
 }
 
-/// `P(χ² > x)` for so many degrees of freedom; with a noise of so many degrees of freedom, that of the ratio
+/// `P(χ² > x)` with the given degrees of freedom; with those of the noise too, that of the ratio
 /// `F = (χ²/ν)/1`.
 pub fn residual_tail(x: f64, freedom: f64, freedom_of_noise: Option<usize>) -> f64 {
     match freedom_of_noise.map(|of_noise| FisherSnedecor::new(freedom, of_noise.max(1) as f64)) {

@@ -6,7 +6,7 @@ use super::boundary::Reduction;
 use super::equations::{Equations, Reference};
 use crate::error::IdentifyError;
 use crate::numerics::rank::Rank;
-use crate::numerics::solve::Directions;
+use crate::numerics::solve::Svd;
 use crate::numerics::tolerances::COLLINEAR;
 use crate::numerics::triangle::Triangle;
 
@@ -117,5 +117,5 @@ pub fn solve(
 pub fn rank_before(equations: &Equations) -> Result<usize, IdentifyError> {
     let rows = &equations.rows;
     let matrix = Mat::from_fn(rows.len(), equations.columns(), |i, j| rows[i][j]);
-    Ok(Directions::of(matrix.as_ref())?.rank(COLLINEAR))
+    Ok(Svd::of(matrix.as_ref())?.rank(COLLINEAR))
 }

@@ -123,12 +123,12 @@ pub(super) fn aliases(
     let least_unpriced = search.evidence(&of_named, variance) - INDISTINGUISHABLE;
     // A staircase that the found effect approximates in a shorter description is an alias without its penalty.
     let has_positions = search.candidates[selected.candidate].selection_penalty > 0.0;
-    let numbers = |candidate: usize| search.moments.numbers(candidate);
+    let numbers = |candidate: usize| search.gram.numbers(candidate);
     let least_gain = |candidate: usize| {
         let more = numbers(candidate).saturating_sub(numbers(selected.candidate)) as f64;
         of_named.gain / variance + 2.0 * INDISTINGUISHABLE * (more - 1.0)
     };
-    let columns = |candidate: usize| search.moments.count(candidate);
+    let columns = |candidate: usize| search.gram.count(candidate);
     // A harmonic has two columns because its phase is estimated. It still counts as an alias of an effect with one
     // column.
     let no_more_said = |candidate: usize| {

@@ -50,7 +50,7 @@ impl RefittedModel {
             after_fit = fit(&after, Some(&after_fit.beta))?;
         }
         let structure = structure_before
-            .map(|_| remaining_structure(&after, &after_fit, options, &|| search.goes_on()))
+            .map(|_| remaining_structure(&after, &after_fit, options, &|| search.should_continue()))
             .transpose()?;
         Ok(RefittedModel { after, after_fit, effects, structure })
     }
@@ -90,12 +90,12 @@ fn remaining_structure(
     problem: &Problem,
     fit: &Fit,
     options: &TraceOptions,
-    go_on: &(dyn Fn() -> bool + Sync),
+    should_continue: &(dyn Fn() -> bool + Sync),
 ) -> Result<Structure, IdentifyError> {
     let columns = Columns::new(problem, &fit.beta);
     let start = Start::of(problem, &columns, fit)?;
     let (count, seed) = (null_draw_count(options), options.seed.wrapping_add(1));
     let draws = null::draws(problem, &columns, &fit.residuals, &start.residual, count, SINGLE, seed);
     let prior = start.prior();
-    remainder::structure(problem, &columns, start.model, &start.residual, draws, prior, go_on)
+    remainder::structure(problem, &columns, start.model, &start.residual, draws, prior, should_continue)
 }

@@ -18,7 +18,6 @@ mod families;
 mod implausible;
 pub mod interrupt;
 mod judge;
-mod lines;
 mod moves;
 pub(crate) mod noise_model;
 mod null;
@@ -29,6 +28,7 @@ mod remainder;
 pub mod result;
 pub mod screening;
 mod search;
+mod single_effects;
 mod start;
 mod state;
 
@@ -38,7 +38,7 @@ use abbe_model::effect::Effect;
 use abbe_model::session::Session;
 
 use crate::candidates::columns::{Columns, EffectColumns};
-use crate::candidates::moments::Moments;
+use crate::candidates::gram::Gram;
 use crate::circular;
 use crate::error::IdentifyError;
 use crate::fit::{Fit, fit, prepare, prepare_with};
@@ -150,9 +150,9 @@ pub fn trace(
         if asks && stopped.load(Ordering::Relaxed) {
             return false;
         }
-        let goes_on = progress(event);
-        stopped.fetch_or(!goes_on, Ordering::Relaxed);
-        goes_on
+        let should_continue = progress(event);
+        stopped.fetch_or(!should_continue, Ordering::Relaxed);
+        should_continue
     };
     progress(Progress::Fitting);
     let mut found = without_conformity(session, options, progress)?;
@@ -295,32 +295,32 @@ fn trace_or_interrupted(
         let (count, seed) = (null_draw_count(options), options.seed);
         null::draws(problem, &columns, pure, &start.residual, count, block, seed)
     };
-    let go_on = || interrupt.check().is_ok();
+    let should_continue = || interrupt.check().is_ok();
     let structure_before = || {
         let (model, prior) = (start.model.clone(), start.prior());
-        remainder::structure(problem, &columns, model, &start.residual, null(SINGLE), prior, &go_on)
+        remainder::structure(problem, &columns, model, &start.residual, null(SINGLE), prior, &should_continue)
     };
     let searched = screening::searched_candidates(problem, &columns, options)?;
     let candidate_count = searched.len();
     progress(Progress::Screening(candidate_count));
     let (reserve, candidates): (Vec<_>, Vec<_>) = searched.into_iter().partition(|candidate| candidate.last_resort);
     let column_sets: Vec<EffectColumns> = candidates.iter().map(|candidate| candidate.columns.clone()).collect();
-    let moments = || {
-        let mut moments = Moments::new(&columns, column_sets, start.model.clone(), &start.residual, start.prior());
-        moments.prepare(&[], &go_on)?;
-        moments.take_draws(null(BLOCK), true, &go_on)?;
-        Ok::<_, IdentifyError>(moments)
+    let gram = || {
+        let mut gram = Gram::new(&columns, column_sets, start.model.clone(), &start.residual, start.prior());
+        gram.prepare(&[], &should_continue)?;
+        gram.take_draws(null(BLOCK), true, &should_continue)?;
+        Ok::<_, IdentifyError>(gram)
     };
     let structure_before = || policy.tests_structure.then(structure_before).transpose();
-    let (structure_before, moments) = if columns.rows() <= MAX_AT_THE_SAME_TIME {
-        parallel::both(structure_before, moments)
+    let (structure_before, gram) = if columns.rows() <= MAX_AT_THE_SAME_TIME {
+        parallel::both(structure_before, gram)
     } else {
-        (structure_before(), moments())
+        (structure_before(), gram())
     };
-    let (moments, structure_before) = (moments?, structure_before?);
+    let (gram, structure_before) = (gram?, structure_before?);
     interrupt.check()?;
     let unwhitened = start.unwhitened(&columns, &before_fit.beta, problem.noise.sigma_mm)?;
-    let mut search = SearchState::new(&columns, candidates, reserve, moments, unwhitened, policy)?;
+    let mut search = SearchState::new(&columns, candidates, reserve, gram, unwhitened, policy)?;
     search.interrupt = Some(interrupt);
     let gains = search.model_without(None)?.gains(&|candidate| !search.candidates[candidate].last_resort)?;
     let observable = gains.iter().filter(|gain| gain.freedom > 0).count();
@@ -390,7 +390,7 @@ fn with_accepted_families(
         let held_out_um = accepted.heldout_rms_mm * 1e3;
         (interrupt.0)(Progress::SelectedEffect(k + 1, accepted.effect.id(), held_out_um, problem.unit()));
     }
-    let lines = match lines::add((problem, fit), &mut found, options, policy.max_effects, interrupt) {
+    let lines = match single_effects::add((problem, fit), &mut found, options, policy.max_effects, interrupt) {
         Err(IdentifyError::Interrupted) => None,
         ended => Some(ended?),
     };

@@ -18,7 +18,7 @@ use faer::Mat;
 use super::constants::STRUCTURED;
 use crate::candidates::columns::{Columns, EffectColumns};
 use crate::candidates::gain::TrainedModel;
-use crate::candidates::moments::{Moments, PriorMoments};
+use crate::candidates::gram::{Gram, PriorGram};
 use crate::error::IdentifyError;
 use crate::numerics::tails::ln_chi_square_tail;
 use crate::problem::Problem;
@@ -186,15 +186,15 @@ fn curve(from: f64, to: f64, intervals: usize) -> Shape {
 /// Tests a residual for structure that a model, given by its orthonormal columns, does not explain.
 ///
 /// # Errors
-/// If products are not finite, or [`IdentifyError::Interrupted`] if `go_on` returns `false`.
+/// If products are not finite, or [`IdentifyError::Interrupted`] if `should_continue` returns `false`.
 pub fn structure(
     problem: &Problem,
     columns: &Columns<'_>,
     model: Arc<Mat<f64>>,
     residual: &[f64],
     null: impl ExactSizeIterator<Item = Vec<f64>>,
-    prior: PriorMoments,
-    go_on: &(dyn Fn() -> bool + Sync),
+    prior: PriorGram,
+    should_continue: &(dyn Fn() -> bool + Sync),
 ) -> Result<Structure, IdentifyError> {
     let detectors = detectors(problem, columns);
     if detectors.is_empty() {
@@ -206,10 +206,10 @@ pub fn structure(
     }
     let column_sets: Vec<EffectColumns> = detectors.iter().map(|detector| detector.column_set.clone()).collect();
     let count = column_sets.len();
-    let mut moments = Moments::new(columns, column_sets, model, residual, prior);
-    moments.take_draws(null, false, go_on)?;
+    let mut gram = Gram::new(columns, column_sets, model, residual, prior);
+    gram.take_draws(null, false, should_continue)?;
     let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
-    let trained = TrainedModel::new(&moments, &[], &folds)?;
+    let trained = TrainedModel::new(&gram, &[], &folds)?;
     let mut best = (0, f64::NEG_INFINITY, 0.0);
     for (index, gain) in trained.gains(&|_| true)?.iter().enumerate() {
         if gain.freedom == 0 {
@@ -245,10 +245,10 @@ mod tests {
         let (problem, fit) = prepare(&files::session(&file, &ReadOptions::default()).unwrap(), 1).unwrap();
         let columns = Columns::new(&problem, &fit.beta);
         let start = Start::of(&problem, &columns, &fit).unwrap();
-        let tested = |goes_on: bool| {
+        let tested = |should_continue: bool| {
             let draws = std::iter::repeat_n(vec![0.0; start.residual.len()], 3);
             let (model, prior) = (start.model.clone(), start.prior());
-            structure(&problem, &columns, model, &start.residual, draws, prior, &|| goes_on)
+            structure(&problem, &columns, model, &start.residual, draws, prior, &|| should_continue)
         };
         assert!(matches!(tested(false), Err(IdentifyError::Interrupted)));
         // One of four: no draw has structure.

@@ -9,8 +9,8 @@ use super::start::Start;
 use crate::candidates::candidate::Candidate;
 use crate::candidates::columns::{Columns, EffectColumns};
 use crate::candidates::gain::TrainedModel;
+use crate::candidates::gram::Gram;
 use crate::candidates::library::{self, LibraryEffect};
-use crate::candidates::moments::Moments;
 use crate::error::IdentifyError;
 use crate::fit::prepare;
 use crate::numerics::parallel;
@@ -40,9 +40,9 @@ pub fn screened_effects(session: &Session, options: &TraceOptions) -> Result<Vec
     let prior = start.prior();
     let searched = searched_candidates(&problem, &columns, options)?;
     let column_sets: Vec<EffectColumns> = searched.iter().map(|candidate| candidate.columns.clone()).collect();
-    let moments = Moments::new(&columns, column_sets, start.model, &start.residual, prior);
+    let gram = Gram::new(&columns, column_sets, start.model, &start.residual, prior);
     let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
-    let trained = TrainedModel::new(&moments, &[], &folds)?;
+    let trained = TrainedModel::new(&gram, &[], &folds)?;
     Ok(searched
         .iter()
         .zip(trained.gains(&|_| true)?)

@@ -9,7 +9,7 @@ use faer::Mat;
 
 use super::state::UnwhitenedModel;
 use crate::candidates::columns::Columns;
-use crate::candidates::moments::PriorMoments;
+use crate::candidates::gram::PriorGram;
 use crate::error::IdentifyError;
 use crate::fit::Fit;
 use crate::numerics::reduction::inverse_of_upper;
@@ -66,9 +66,9 @@ impl Start {
     }
 
     /// The priors as products with the orthonormal columns.
-    pub fn prior(&self) -> PriorMoments {
+    pub fn prior(&self) -> PriorGram {
         let rank = self.to_parameters.ncols();
-        PriorMoments {
+        PriorGram {
             base: self.prior_rows.transpose() * &self.prior_rows,
             base_y: (0..rank)
                 .map(|k| {

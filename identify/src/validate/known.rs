@@ -275,7 +275,7 @@ impl<'m> KnownErrors<'m> {
         let set_up: Vec<usize> = (0..sizes.len()).filter(|j| !self.columns.contains(j)).collect();
         let r = triangle.r();
         let scaled = faer::Mat::from_fn(r.nrows(), set_up.len(), |i, k| r[(i, set_up[k])] * sizes[set_up[k]]);
-        Ok(crate::numerics::solve::Directions::of(scaled.as_ref())?.identifiable_rank())
+        Ok(crate::numerics::solve::Svd::of(scaled.as_ref())?.identifiable_rank())
     }
 
     /// The estimated set-up in display units.

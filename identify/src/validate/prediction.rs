@@ -15,7 +15,7 @@ use super::known::{KnownErrors, Linearised};
 use crate::error::IdentifyError;
 use crate::noise::{NoiseSource, PureError};
 use crate::numerics::parallel;
-use crate::numerics::solve::{Directions, solve_square};
+use crate::numerics::solve::{Svd, solve_square};
 use crate::numerics::symmetric::Symmetric;
 use crate::numerics::tails::{normal_quantile, residual_tail};
 use crate::numerics::tolerances::MIN_IDENTIFIABLE;
@@ -110,7 +110,7 @@ fn chi_square(at: &Linearised) -> f64 {
 /// If the factor has entries that are not finite.
 pub(super) fn undetermined(at: &Linearised) -> Result<usize, IdentifyError> {
     let signal = at.machine.r() * &at.null_directions;
-    let values = Directions::of(signal.as_ref())?.singular_values;
+    let values = Svd::of(signal.as_ref())?.singular_values;
     Ok(values.iter().filter(|value| **value >= MIN_IDENTIFIABLE).count())
 }
 
@@ -122,7 +122,7 @@ fn predicted(known: &KnownErrors<'_>, at: &Linearised) -> Result<(Vec<Vec<f64>>,
     let r = at.triangle.r();
     let of_set_up = Mat::from_fn(r.nrows(), set_up.len(), |i, k| r[(i, set_up[k])] * sizes[set_up[k]]);
     let of_machine = Mat::from_fn(r.nrows(), known.columns.len(), |i, k| r[(i, known.columns[k])]);
-    let directions = Directions::of(of_set_up.as_ref())?;
+    let directions = Svd::of(of_set_up.as_ref())?;
     let absorbed = directions.pseudo_inverse() * of_machine;
     let root_of_set_up = directions.inverse_root();
     // C = L·Lᵀ.

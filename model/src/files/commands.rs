@@ -33,7 +33,7 @@ enum Meaning {
 /// The columns of a pose: the point, the direction of the tool's Z, the quaternion.
 const POSE: [&str; 10] = ["px", "py", "pz", "i", "j", "k", "qw", "qx", "qy", "qz"];
 
-/// What a file gives of poses.
+/// Pose columns present in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PoseColumns {
     /// No poses: axis positions.
@@ -228,7 +228,7 @@ impl CommandFile {
         }
     }
 
-    /// What the file gives of poses.
+    /// The pose columns present.
     pub fn poses(&self) -> PoseColumns {
         self.poses
     }

@@ -13,7 +13,7 @@ use abbe_model::session::{Session, Test};
 use rand_pcg::Pcg64;
 
 use super::between;
-use super::goal::Goal;
+use super::place::Place;
 use crate::PlanError;
 use crate::collision::{Bodies, Parts, segment_distance};
 use abbe_identify::numerics::parallel;
@@ -95,8 +95,8 @@ pub(super) fn draw(
         if fruitless && (iterates || found.unmet == found.excluded) {
             break;
         }
-        let batch: Vec<(Vec<f64>, Goal)> =
-            (0..BATCH).map(|_| (drawn(machine, random), Goal::draw(station, limits.height_mm, random))).collect();
+        let batch: Vec<(Vec<f64>, Place)> =
+            (0..BATCH).map(|_| (drawn(machine, random), Place::draw(station, limits.height_mm, random))).collect();
         let met = parallel::map(BATCH, &|k| {
             let (drawn, goal) = &batch[k];
             let at = goal.met(machine, station, drawn)?;

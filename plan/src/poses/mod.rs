@@ -2,15 +2,14 @@
 //!
 //! Candidate poses are drawn at random within the travel of the axes and the limits of the user ([`candidates`]), and
 //! brought to where the instrument measures: a tracker anywhere, a socket's ball in the socket. A
-//! first set is built greedily; then poses are exchanged against candidates until no exchange improves the criterion
-//! (Fedorov's algorithm: Atkinson, Donev & Tobias, Optimum Experimental Designs, 2007, ch. 12).
+//! set is chosen greedily and exchanged ([`design`](crate::design)).
 //!
 //! Parameters that as many average candidates do not separate are held at nominal, as in a base parametrisation, so that
 //! the covariance of the others exists. Set-up quantities are estimated within their priors.
 
 pub mod candidates;
-mod goal;
-mod information;
+mod place;
+mod rank;
 
 use abbe_identify::IdentifyError;
 use std::sync::Arc;
@@ -20,6 +19,7 @@ use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test};
 use abbe_model::words::counted;
+use faer::Mat;
 use rand::RngExt;
 use rand::seq::index;
 use rand_pcg::Pcg64;
@@ -27,48 +27,26 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::PlanError;
+use crate::design::information::SharedParameters;
+use crate::design::{Design, Goal, bound};
 use crate::improve::NamedUncertainty;
 use crate::states;
 use abbe_identify::noise::{Noise, NoiseSource};
 use abbe_identify::numerics::median;
 use abbe_identify::numerics::triangle::Triangle;
 use abbe_identify::parameters::Role;
-use abbe_identify::problem::Problem;
+use abbe_identify::problem::{Problem, RowBlock};
 use candidates::{PoseLimits, states_of};
-use goal::Goal;
-use information::Exchange;
-
-/// What the poses are to make small.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PoseCriterion {
-    /// The volume of the confidence ellipsoid of the errors.
-    D,
-    /// The mean variance of the errors, where 1 µm counts as 1″.
-    A,
-    /// The largest standard uncertainty of an error, where 1 µm counts as 1″.
-    WorstUncertainty,
-}
-
-impl PoseCriterion {
-    /// What its value is, with its unit.
-    pub fn words(self) -> &'static str {
-        match self {
-            PoseCriterion::D => {
-                "geometric mean of the standard deviations along the axes of the confidence ellipsoid, um or arcsec"
-            }
-            PoseCriterion::A => "root mean square standard uncertainty, um or arcsec",
-            PoseCriterion::WorstUncertainty => "worst standard uncertainty, um or arcsec",
-        }
-    }
-}
+use place::Place;
+use rank::Readings as Ranked;
 
 /// Options of the selection.
 #[derive(Clone, Debug)]
 pub struct PoseOptions {
     /// Number of poses.
     pub poses: usize,
-    /// The criterion.
-    pub criterion: PoseCriterion,
+    /// What the poses make small.
+    pub goal: Goal,
     /// Number of candidate poses.
     pub candidates: usize,
     /// Seed of the candidates and of the random sets.
@@ -79,6 +57,9 @@ pub struct PoseOptions {
     pub noise_mm: Option<f64>,
 }
 
+/// The prior of every parameter, in physical sizes. It makes the covariance of few poses exist, and has a share of at most
+/// 10⁻⁶ in that of poses of full rank.
+const RIDGE_SIZES: f64 = 1e3;
 /// Number of random sets with which the selection is compared.
 const RANDOM_SETS: usize = 100;
 /// Streams of the generator.
@@ -97,6 +78,9 @@ pub struct PoseSelection {
     pub criterion: String,
     /// Its value for the selected poses.
     pub value: f64,
+    /// A bound of the criterion: no set of as many candidates reaches a smaller value.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bound: Option<f64>,
     /// Median of its values for 100 random sets of as many candidates; infinite (`null` in JSON) if more than half of
     /// them leave an error undetermined.
     #[schemars(with = "Option<f64>")]
@@ -170,9 +154,19 @@ pub fn select(session: &Session, tests: &[&Test], options: &PoseOptions) -> Resu
     if targets.is_empty() {
         return Err(IdentifyError::NoUnknowns.into());
     }
-    let exchange = Exchange::new(&problem, &kept, &targets, options.criterion)?;
-    let chosen = exchange.run(options.poses);
-    let [rank_of_chosen, involved] = exchange.rank(&chosen)?;
+    let of_targets: Vec<usize> = targets.iter().map(|k| kept[*k]).collect();
+    let others: Vec<usize> = kept.iter().filter(|j| !of_targets.contains(j)).copied().collect();
+    let shared = SharedParameters::of(&problem, &others, &of_targets);
+    let columns = [others, of_targets.clone()].concat();
+    let prior = problem.prior_triangle(&nominal).r();
+    let prior = Mat::from_fn(prior.nrows(), columns.len(), |i, k| prior[(i, columns[k])]);
+    let rows = whitened(&problem, &columns)?;
+    let base = shared.regularised(prior.as_ref(), RIDGE_SIZES);
+    let views = rows.iter().map(|rows| rows.as_ref()).collect();
+    let design = Design { shared: &shared, base: &base, rows: views, goal: &options.goal, repeats: false };
+    let ranked = Ranked { shared: &shared, rows: &rows, prior: &prior };
+    let chosen = design.run(options.poses);
+    let [rank_of_chosen, involved] = ranked.rank(&chosen)?;
     if rank_of_chosen < involved {
         let lacking = involved - rank_of_chosen;
         return Err(PlanError::Request(format!(
@@ -183,14 +177,15 @@ pub fn select(session: &Session, tests: &[&Test], options: &PoseOptions) -> Resu
         )));
     }
     let mut random = Pcg64::new(u128::from(options.seed), RANDOM_SET_STREAM);
+    let value = |poses: &[usize]| options.goal.value(&shared, &design.with(poses));
     let mut values = (0..RANDOM_SETS)
         .map(|_| {
             let poses = index::sample(&mut random, candidates.len(), options.poses).into_vec();
-            let [rank, involved] = exchange.rank(&poses)?;
-            Ok(if rank == involved { exchange.value(&poses) } else { f64::INFINITY })
+            let [rank, involved] = ranked.rank(&poses)?;
+            Ok(if rank == involved { value(&poses) } else { f64::INFINITY })
         })
         .collect::<Result<Vec<f64>, PlanError>>()?;
-    let u = exchange.uncertainties(&chosen);
+    let u = shared.uncertainties(&design.with(&chosen));
     let machine = &session.machine;
     let display = |pose: &usize| -> Vec<f64> {
         machine.axes.iter().zip(&candidates[*pose].at).map(|(axis, q)| axis.kind.to_display(*q)).collect()
@@ -199,18 +194,19 @@ pub fn select(session: &Session, tests: &[&Test], options: &PoseOptions) -> Resu
     Ok(PoseSelection {
         tests: chosen.iter().map(|pose| test(pose).name.clone()).collect(),
         sockets: chosen.iter().filter_map(|pose| test(pose).socket.clone()).collect(),
-        criterion: options.criterion.words().to_string(),
-        value: exchange.value(&chosen),
+        criterion: options.goal.words().to_string(),
+        value: value(&chosen),
+        bound: bound::best_value(&design, &chosen),
         random_median: median(&mut values),
         noise_um: problem.noise.sigma_mm * 1e3,
         noise_source: problem.noise.source,
         candidates: candidates.len(),
         excluded,
-        uncertainties: targets
+        uncertainties: of_targets
             .iter()
             .zip(u)
-            .map(|(k, u)| {
-                let parameter = &list[kept[*k]];
+            .map(|(j, u)| {
+                let parameter = &list[*j];
                 NamedUncertainty { id: parameter.id.clone(), u, unit: parameter.unit.name.clone() }
             })
             .collect(),
@@ -266,7 +262,7 @@ fn candidates(session: &Session, tests: &[&Test], options: &PoseOptions) -> Resu
         let drawn = candidates::draw(session, &test, &options.limits, share, &mut random)?;
         found.excluded += drawn.excluded;
         if drawn.states.is_empty() && drawn.unmet > 0 && drawn.unmet == drawn.excluded {
-            let (goal, check) = Goal::words(&test.station);
+            let (goal, check) = Place::words(&test.station);
             found.warnings.push(format!("test `{}`: no drawn pose {goal}; it is left out", test.name));
             unmet.get_or_insert(PlanError::OutOfReach { test: test.name, drawn: drawn.unmet, goal, check });
             continue;
@@ -305,6 +301,21 @@ fn problem(session: &Session, tests: &[Test], candidates: &[Candidate], noise: N
     };
     let tests = tests.iter().enumerate().map(with_readings).collect();
     states::problem_by_test(&Session { tests, ..session.clone() }, noise)
+}
+
+/// The whitened rows of each candidate pose, in the order of the tests.
+fn whitened(problem: &Problem, columns: &[usize]) -> Result<Vec<Mat<f64>>, PlanError> {
+    let values = problem.slot_values(&vec![0.0; problem.parameters.list.len()]);
+    let sigma = problem.noise.sigma_mm;
+    let mut rows = Vec::new();
+    for (test, model) in problem.models.iter().enumerate() {
+        let channels = problem.channels(test);
+        let whole = problem.rows(&values, &RowBlock { test, rows: 0..model.rows() })?;
+        rows.extend((0..model.rows()).map(|pose| {
+            Mat::from_fn(channels, columns.len(), |i, k| whole[(pose * channels + i, columns[k])] / sigma)
+        }));
+    }
+    Ok(rows)
 }
 
 /// The noise of a reading: that of the options, else that of the session, else the assumed one.

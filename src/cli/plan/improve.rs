@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use abbe::identify::problem::Problem;
 use abbe::model::files::SourceMap;
-use abbe::plan::criterion::Goal;
+use abbe::plan::design::Goal;
 use abbe::plan::improve::{self, ImproveOptions, Improvement};
 use clap::Args;
 

@@ -5,7 +5,8 @@ mod options;
 use std::path::PathBuf;
 
 use abbe::model::files::{self, ReadOptions};
-use abbe::plan::poses::{PoseCriterion, without_place};
+use abbe::plan::design::Goal;
+use abbe::plan::poses::without_place;
 use clap::Args;
 
 use super::PlanArguments;
@@ -17,8 +18,7 @@ use crate::cli::values::{self, Words};
 use crate::report::poses as present;
 
 /// Criteria of a selection.
-const CRITERIA: Words<PoseCriterion> =
-    &[("d", PoseCriterion::D), ("a", PoseCriterion::A), ("worst", PoseCriterion::WorstUncertainty)];
+const CRITERIA: Words<Goal> = &[("d", Goal::D), ("a", Goal::A), ("worst", Goal::WorstUncertainty)];
 
 /// The selection of poses.
 #[derive(Args)]
@@ -28,12 +28,12 @@ pub struct PoseArguments {
     /// Example: --poses 30
     #[arg(long, value_name = "N", conflicts_with_all = ["improve", "separate", "range", "patterns", "global"])]
     poses: Option<usize>,
-    /// What the poses are to make small: `d` the volume of the confidence ellipsoid, `a` the mean variance, `worst` the
+    /// Optimality criterion: `d` the volume of the confidence ellipsoid, `a` the mean variance, `worst` the
     /// largest standard uncertainty.
     ///
     /// Example: --poses 30 --criterion d
     #[arg(long, value_parser = values::words(CRITERIA), default_value = "worst", requires = "poses")]
-    criterion: PoseCriterion,
+    criterion: Goal,
     /// The test whose instrument measures the poses [default: the last; of sockets all].
     ///
     /// Example: --poses 30 --pose-test A

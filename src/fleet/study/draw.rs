@@ -84,8 +84,8 @@ impl Study {
         }
     }
 
-    /// Makes a draw. `goes_on` returns whether to continue; a draw that was interrupted is `None`.
-    pub fn draw(&self, number: usize, goes_on: &(dyn Fn() -> bool + Sync)) -> Option<Draw> {
+    /// Makes a draw. `should_continue` returns whether to continue; a draw that was interrupted is `None`.
+    pub fn draw(&self, number: usize, should_continue: &(dyn Fn() -> bool + Sync)) -> Option<Draw> {
         // The digest holds the seed of the study. Streams of one seed are correlated; hashes are not.
         let mut digest = Sha256::new();
         digest.update(&self.digest);
@@ -99,17 +99,17 @@ impl Study {
             noise: self.file.noise[noise].name.clone(),
             ..Draw::default()
         };
-        let made = self.made(&mut draw, [plan, effect, noise], &mut random, goes_on);
-        if !goes_on() {
+        let made = self.simulate(&mut draw, [plan, effect, noise], &mut random, should_continue);
+        if !should_continue() {
             return None;
         }
         draw.error = match made {
             Ok(()) => None,
-            Err(Unmade::NotObserved) => {
+            Err(DrawError::NotObserved) => {
                 draw.not_observed = true;
                 None
             }
-            Err(Unmade::Failed(error)) => Some(error.to_string()),
+            Err(DrawError::Failed(error)) => Some(error.to_string()),
         };
         Some(draw)
     }
@@ -125,13 +125,13 @@ impl Study {
         }
     }
 
-    fn made(
+    fn simulate(
         &self,
         draw: &mut Draw,
         [plan, effect, noise]: [usize; 3],
         random: &mut Pcg64,
-        goes_on: &(dyn Fn() -> bool + Sync),
-    ) -> Result<(), Unmade> {
+        should_continue: &(dyn Fn() -> bool + Sync),
+    ) -> Result<(), DrawError> {
         let session = &self.plans[plan];
         let (stated, noise) = (&self.file.effect[effect], &self.file.noise[noise]);
         let mut given: Vec<Given> = Vec::new();
@@ -159,7 +159,7 @@ impl Study {
             machine.effects = [session.effects.as_slice(), std::slice::from_ref(&truth)].concat();
             match coefficients(session, &machine, (stated.size.0, most), noise, random) {
                 // Another effect of the library, which the plan observes.
-                Err(Unmade::NotObserved) if tries > 0 => {}
+                Err(DrawError::NotObserved) if tries > 0 => {}
                 coefficients => {
                     let own = coefficients?;
                     given.extend(own.iter().cloned());
@@ -177,7 +177,7 @@ impl Study {
         }
         let measured = session.clone().with_readings(simulated.readings);
         let truth = Truth { locations, effect: true_effect };
-        Ok(self.analyse(draw, &measured, &truth, random.random::<u32>().into(), goes_on)?)
+        Ok(self.analyse(draw, &measured, &truth, random.random::<u32>().into(), should_continue)?)
     }
 
     fn analyse(
@@ -186,7 +186,7 @@ impl Study {
         session: &Session,
         truth: &Truth,
         seed: u64,
-        goes_on: &(dyn Fn() -> bool + Sync),
+        should_continue: &(dyn Fn() -> bool + Sync),
     ) -> Result<(), IdentifyError> {
         match self.file.study.analysis {
             Analysis::Fit => {
@@ -197,7 +197,7 @@ impl Study {
             }
             Analysis::Trace => {
                 let options = TraceOptions { seed, ..TraceOptions::default() };
-                let found = trace(session, &options, &|_: Progress| goes_on())?;
+                let found = trace(session, &options, &|_: Progress| should_continue())?;
                 draw.verdict = Some(found.result.verdict);
                 draw.rms_um = found.result.after.rms_um;
                 draw.compare(&found.result.after.parameters, &truth.locations);
@@ -225,14 +225,14 @@ struct Truth {
 }
 
 /// Why a draw has no simulated session.
-enum Unmade {
+enum DrawError {
     NotObserved,
     Failed(IdentifyError),
 }
 
-impl From<IdentifyError> for Unmade {
-    fn from(error: IdentifyError) -> Unmade {
-        Unmade::Failed(error)
+impl From<IdentifyError> for DrawError {
+    fn from(error: IdentifyError) -> DrawError {
+        DrawError::Failed(error)
     }
 }
 
@@ -265,11 +265,11 @@ fn parameters(session: &Session) -> Result<Vec<Parameter>, IdentifyError> {
 }
 
 /// An effect of the library that the plan observes.
-fn of_library(session: &Session, random: &mut impl Rng) -> Result<Effect, Unmade> {
+fn of_library(session: &Session, random: &mut impl Rng) -> Result<Effect, DrawError> {
     let mut effects = screened_effects(session, &TraceOptions::default())?;
     effects.retain(|effect| effect.observable);
     if effects.is_empty() {
-        return Err(Unmade::NotObserved);
+        return Err(DrawError::NotObserved);
     }
     // Families are equally probable, whatever their number of effects.
     let mut families: Vec<usize> = effects.iter().map(|effect| effect.family).collect();
@@ -288,7 +288,7 @@ fn coefficients(
     (size, most): (f64, f64),
     noise: &Noise,
     random: &mut impl Rng,
-) -> Result<Vec<Given>, Unmade> {
+) -> Result<Vec<Given>, DrawError> {
     let own = machine.effects.len() - 1;
     let mut largest = 0.0_f64;
     let mut coefficients: Vec<(String, f64, String)> = Vec::new();
@@ -316,11 +316,11 @@ fn coefficients(
     let inflation = (1.0 + noise.autocorrelation.0) / (1.0 - noise.autocorrelation.0);
     let strength = (chi_square / inflation).sqrt();
     if strength.is_nan() || chi_square <= SURVIVES * change / (noise_mm * noise_mm) || strength <= 0.0 {
-        return Err(Unmade::NotObserved);
+        return Err(DrawError::NotObserved);
     }
     let factor = size * SIGNIFICANT / strength;
     if factor * largest > most {
-        return Err(Unmade::NotObserved);
+        return Err(DrawError::NotObserved);
     }
     Ok(scaled(factor))
 }

@@ -19,22 +19,22 @@ use file::Study;
 /// Makes a draw if the store has none of its number. `None` if another process makes it and `if_claimed` says to skip it.
 ///
 /// # Errors
-/// If the store cannot be read or written, or `goes_on` returned `false`.
+/// If the store cannot be read or written, or `should_continue` returned `false`.
 pub fn run(
     study: &Study,
     number: usize,
     store: &Store,
     if_claimed: IfClaimed,
-    goes_on: &(dyn Fn() -> bool + Sync),
+    should_continue: &(dyn Fn() -> bool + Sync),
 ) -> Result<Option<(Done, Draw)>, FleetError> {
     let found = || store.draw(&study.key, number);
     let claim = || store.claim_draw(&study.key, number);
-    let _claim = match found_or_claimed(found, claim, if_claimed, goes_on)? {
+    let _claim = match found_or_claimed(found, claim, if_claimed, should_continue)? {
         Search::Found(draw) => return Ok(Some((Done::Kept, draw))),
         Search::Skipped => return Ok(None),
         Search::Claimed(claim) => claim,
     };
-    let draw = if goes_on() { study.draw(number, goes_on) } else { None };
+    let draw = if should_continue() { study.draw(number, should_continue) } else { None };
     let draw = draw.ok_or(FleetError::Interrupted)?;
     store.write_draw(&study.key, &draw)?;
     Ok(Some((Done::Computed, draw)))

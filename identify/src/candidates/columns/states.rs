@@ -2,7 +2,7 @@
 //!
 //! A column of an effect is `s(row) · b(state(row))`, with the sensitivity `s` of a component and a basis function `b`.
 //! Axes are swept over the same positions again and again, so that a session has few distinct states. A product of the
-//! column with any vector is a sum over the states ([`crate::candidates::moments`]).
+//! column with any vector is a sum over the states ([`crate::candidates::gram`]).
 
 use std::sync::Arc;
 

@@ -34,7 +34,7 @@ impl Move for Merge {
 
 /// A group of effects merged into the one effect with the largest objective.
 fn merged(search: &mut SearchState<'_>, branch: usize, group: &[usize]) -> Result<Option<Proposal>, IdentifyError> {
-    let columns: usize = group.iter().map(|c| search.moments.count(*c)).sum();
+    let columns: usize = group.iter().map(|c| search.gram.count(*c)).sum();
     let curves = group.len() > 2 || columns > 2 && search.is_composed(group);
     if group.len() < 2 && !curves {
         return Ok(None);

@@ -162,7 +162,7 @@ impl SearchState<'_> {
 
     /// Candidates with their numbers of columns.
     fn with_counts(&self, candidates: &[usize]) -> impl Iterator<Item = (usize, usize)> {
-        candidates.iter().map(|candidate| (*candidate, self.moments.count(*candidate)))
+        candidates.iter().map(|candidate| (*candidate, self.gram.count(*candidate)))
     }
 
     /// The prediction of a branch. For each effect it is averaged over the candidates that explain about as much in its
@@ -178,7 +178,7 @@ impl SearchState<'_> {
             let weights = weights(&explanations);
             for (weight, Explanation { candidate, .. }) in weights.iter().zip(&explanations) {
                 let (of_others, of_candidate) = without.with_candidate(*candidate)?;
-                let (of_model, of_others) = of_others.split_at(self.moments.rank());
+                let (of_model, of_others) = of_others.split_at(self.gram.rank());
                 let mut with = Prediction::of(of_model.to_vec(), self.with_counts(&others), of_others);
                 with.of_candidates.push((*candidate, of_candidate));
                 averaged.add(*weight, &with);
@@ -242,7 +242,7 @@ impl SearchState<'_> {
             |row: usize| predicted.of_model.iter().enumerate().map(|(j, c)| model[(row, j)] * c).sum::<f64>();
         let mut residuals: Vec<f64> = rows.map(|row| residual[row] - by_model(row)).collect();
         for (candidate, coefficients) in &predicted.of_candidates {
-            let columns = self.columns.unwhitened_rows_of_fold(self.moments.set(*candidate), fold);
+            let columns = self.columns.unwhitened_rows_of_fold(self.gram.set(*candidate), fold);
             for (i, residual) in residuals.iter_mut().enumerate() {
                 *residual -= coefficients.iter().enumerate().map(|(j, c)| columns[(i, j)] * c).sum::<f64>() / sigma_mm;
             }

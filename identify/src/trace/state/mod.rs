@@ -19,7 +19,7 @@ use super::interrupt::Interrupt;
 use super::policy::Policy;
 use crate::candidates::candidate::Candidate;
 use crate::candidates::columns::Columns;
-use crate::candidates::moments::Moments;
+use crate::candidates::gram::Gram;
 use crate::error::IdentifyError;
 pub use heldout::{RejectedByHeldOut, Selection, UnwhitenedModel};
 
@@ -61,7 +61,7 @@ pub struct SearchState<'s> {
     /// The candidates.
     pub candidates: Vec<Arc<Candidate>>,
     /// All products.
-    pub moments: Moments<'s>,
+    pub gram: Gram<'s>,
     /// The selected effects.
     pub selection: Selection,
     /// The accepted effects: additions that lowered the held-out error by more than the standard error of the decrease.
@@ -86,7 +86,7 @@ pub struct SearchState<'s> {
 }
 
 impl<'s> SearchState<'s> {
-    /// The state before the first round. `moments` holds the products of the candidates without those of last resort,
+    /// The state before the first round. `gram` holds the products of the candidates without those of last resort,
     /// `reserve`.
     ///
     /// # Errors
@@ -95,7 +95,7 @@ impl<'s> SearchState<'s> {
         columns: &'s Columns<'s>,
         candidates: Vec<Candidate>,
         reserve: Vec<Candidate>,
-        moments: Moments<'s>,
+        gram: Gram<'s>,
         unwhitened: UnwhitenedModel,
         policy: Policy,
     ) -> Result<SearchState<'s>, IdentifyError> {
@@ -104,7 +104,7 @@ impl<'s> SearchState<'s> {
             policy,
             columns,
             candidates: candidates.into_iter().map(Arc::new).collect(),
-            moments,
+            gram,
             selection: none.clone(),
             accepted: none.clone(),
             declared: none,

@@ -8,7 +8,7 @@ impl SearchState<'_> {
     /// The model with some candidates, trained on some folds.
     pub fn model_of(&self, chosen: &[usize], folds: &[usize]) -> Result<TrainedModel<'_>, IdentifyError> {
         self.check()?;
-        TrainedModel::new(&self.moments, chosen, folds)
+        TrainedModel::new(&self.gram, chosen, folds)
     }
 
     /// The gains of the candidates that may be added to a model; those of the others are zero.
@@ -33,22 +33,22 @@ impl SearchState<'_> {
     /// Forms the products of the library for every branch.
     pub fn prepare_branches(&self) -> Result<(), IdentifyError> {
         let folds: Vec<&[usize]> = self.selection.branches.iter().map(|branch| &branch.folds[..]).collect();
-        self.moments.prepare(&folds, &|| self.goes_on())
+        self.gram.prepare(&folds, &|| self.should_continue())
     }
 
     /// Forgets the products of effects that were tried on a branch and are not selected.
     pub fn forget_unselected(&self, branch: usize) {
         let branch = &self.selection.branches[branch];
-        self.moments.keep_chosen(&branch.folds, &branch.chosen());
+        self.gram.keep_chosen(&branch.folds, &branch.chosen());
     }
 
     /// Forgets the products of the selected effects of every branch. They are formed again where they are needed.
     pub fn forget_chosen(&self) {
-        self.selection.branches.iter().for_each(|branch| self.moments.keep_chosen(&branch.folds, &[]));
+        self.selection.branches.iter().for_each(|branch| self.gram.keep_chosen(&branch.folds, &[]));
     }
 
     /// Whether the caller has not stopped the trace.
-    pub fn goes_on(&self) -> bool {
+    pub fn should_continue(&self) -> bool {
         self.check().is_ok()
     }
 

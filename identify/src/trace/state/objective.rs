@@ -90,7 +90,7 @@ impl SearchState<'_> {
         let without = self.model_of(rest, folds)?;
         let gain = Gain {
             gain: explained - without.explained(),
-            freedom: group.iter().map(|c| self.moments.count(*c) + self.moments.numbers(*c)).sum(),
+            freedom: group.iter().map(|c| self.gram.count(*c) + self.gram.numbers(*c)).sum(),
         };
         Ok(self.evidence(&gain, self.variance(&without)))
     }

@@ -47,7 +47,7 @@ impl SearchState<'_> {
 
     /// Whether a candidate has shape numbers or positions that the search tunes.
     pub fn is_tunable(&self, candidate: usize) -> bool {
-        self.moments.numbers(candidate) > 0 || !self.effect(candidate).shape.positions().is_empty()
+        self.gram.numbers(candidate) > 0 || !self.effect(candidate).shape.positions().is_empty()
     }
 
     /// Whether one of some candidates is a table of more than two steps.
@@ -113,7 +113,7 @@ impl SearchState<'_> {
     /// Adds candidates. Their products are formed when they are needed.
     pub(super) fn append(&mut self, fresh: Vec<Candidate>) {
         if !fresh.is_empty() {
-            self.moments.append(fresh.iter().map(|candidate| candidate.columns.clone()).collect());
+            self.gram.append(fresh.iter().map(|candidate| candidate.columns.clone()).collect());
             self.candidates.extend(fresh.into_iter().map(Arc::new));
         }
     }

@@ -31,7 +31,7 @@ impl PoseArguments {
     pub fn select(&self, session: &Session, noise_mm: Option<f64>, seed: u64) -> Result<PoseSelection, Failure> {
         let options = PoseOptions {
             poses: values::count("--poses", "", self.poses.unwrap_or(1), MAX_POSES)?,
-            criterion: self.criterion,
+            goal: self.criterion.clone(),
             candidates: values::count("--candidates", "", self.candidates, MAX_CANDIDATES)?,
             seed,
             limits: self.limits()?,

@@ -17,8 +17,8 @@ use super::{Progress, TraceOptions};
 use crate::candidates::candidate::Candidate;
 use crate::candidates::columns::{Columns, EffectColumns};
 use crate::candidates::gain::TrainedModel;
+use crate::candidates::gram::Gram;
 use crate::candidates::library;
-use crate::candidates::moments::Moments;
 use crate::error::IdentifyError;
 use crate::fit::families::FoldEquations;
 use crate::fit::{Fit, with_families};
@@ -26,7 +26,7 @@ use crate::numerics::tails::ln_chi_square_tail;
 use crate::problem::Problem;
 
 /// How the stage ended.
-pub(super) struct LinesEnded {
+pub(super) struct SingleEffects {
     /// Number of screened candidates.
     pub candidates: usize,
     /// Number of those that are observable beside the declared parameters.
@@ -45,7 +45,7 @@ pub(super) fn add(
     options: &TraceOptions,
     most: usize,
     interrupt: Interrupt<'_>,
-) -> Result<LinesEnded, IdentifyError> {
+) -> Result<SingleEffects, IdentifyError> {
     let columns = Columns::new(problem, &fit.beta);
     let start = Start::of(problem, &columns, fit)?;
     let searched = screening::searched_candidates(problem, &columns, options)?;
@@ -53,7 +53,7 @@ pub(super) fn add(
         searched.into_iter().filter(|candidate| !candidate.last_resort && !candidate.dictionary).collect();
     (interrupt.0)(Progress::Screening(candidates.len()));
     let families = library::families()?;
-    let mut ended = LinesEnded { candidates: candidates.len(), detectable: 0, last_p_value: 1.0 };
+    let mut ended = SingleEffects { candidates: candidates.len(), detectable: 0, last_p_value: 1.0 };
     while found.effects.len() < most {
         interrupt.check()?;
         let ranked = ranked(&columns, &candidates, &start, found, interrupt)?;
@@ -95,11 +95,11 @@ fn ranked(
 ) -> Result<Ranked, IdentifyError> {
     let sets: Vec<EffectColumns> = candidates.iter().map(|candidate| candidate.columns.clone()).collect();
     let residual = columns.whitened_values(&found.fit.residuals);
-    let go_on = || interrupt.check().is_ok();
-    let moments = Moments::new(columns, sets, start.model.clone(), &residual, start.prior());
+    let should_continue = || interrupt.check().is_ok();
+    let gram = Gram::new(columns, sets, start.model.clone(), &residual, start.prior());
     let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
-    moments.prepare(&[], &go_on)?;
-    let trained = TrainedModel::new(&moments, &[], &folds)?;
+    gram.prepare(&[], &should_continue)?;
+    let trained = TrainedModel::new(&gram, &[], &folds)?;
     let square: f64 = residual.iter().map(|value| value * value).sum();
     let variance = (square / columns.rows().max(1) as f64).max(f64::MIN_POSITIVE);
     let gains = trained.gains(&|_| true)?;
@@ -127,7 +127,7 @@ fn ranked(
 fn best_of<'c>(
     found: &AcceptedFamilies,
     tried: &[&'c Candidate],
-    ended: &mut LinesEnded,
+    ended: &mut SingleEffects,
     significance: f64,
     interrupt: Interrupt<'_>,
 ) -> Result<Option<(&'c Candidate, f64, f64)>, IdentifyError> {

@@ -132,13 +132,13 @@ impl Layout {
     }
 
     /// The products of all columns with some vectors and, if `with_own`, of each candidate with itself, over some
-    /// whitened rows. `None` if `go_on` returns `false`.
+    /// whitened rows. `None` if `should_continue` returns `false`.
     pub fn products(
         &self,
         training: &TrainingRows,
         side: &Adjoint,
         with_own: bool,
-        go_on: &(dyn Fn() -> bool + Sync),
+        should_continue: &(dyn Fn() -> bool + Sync),
     ) -> Option<Products> {
         let vectors = side.values.nrows();
         let local =
@@ -157,7 +157,7 @@ impl Layout {
             }
         }
         let results = parallel::map(tasks.len(), &|k| {
-            go_on().then(|| self.products_of(&tasks[k], &local[tasks[k].group], training, side, with_own))
+            should_continue().then(|| self.products_of(&tasks[k], &local[tasks[k].group], training, side, with_own))
         });
         let mut products = Products {
             side: Mat::zeros(vectors, self.total()),

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 
-use super::Moments;
+use super::Gram;
 use super::projection::{ChosenEffect, Projection};
 use super::states::{LocalStates, OwnProducts};
 use crate::candidates::columns::{Adjoint, Channel};
@@ -25,11 +25,11 @@ pub(in crate::candidates) struct ChannelProducts<'m> {
 
 impl TuningSide {
     /// Of a projection and chosen effects.
-    pub fn of(moments: &Moments<'_>, projection: &Projection, chosen: &[Arc<ChosenEffect>]) -> TuningSide {
-        let rank = moments.rank();
+    pub fn of(gram: &Gram<'_>, projection: &Projection, chosen: &[Arc<ChosenEffect>]) -> TuningSide {
+        let rank = gram.rank();
         let width = rank + 1 + chosen.iter().map(|chosen| chosen.rows.ncols()).sum::<usize>();
         let mut vectors = Mat::zeros(projection.residual.nrows(), width);
-        vectors.as_mut().subcols_mut(0, rank).copy_from(moments.model());
+        vectors.as_mut().subcols_mut(0, rank).copy_from(gram.model());
         vectors.as_mut().subcols_mut(rank, 1).copy_from(&projection.residual);
         let mut next = rank + 1;
         for chosen in chosen {

@@ -15,7 +15,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 
-use super::{Moments, stored, transposed_product};
+use super::{Gram, stored, transposed_product};
 use crate::candidates::columns::{Adjoint, EffectColumns, TrainingRows};
 use crate::error::IdentifyError;
 use crate::numerics::symmetric::pseudo_inverse;
@@ -105,30 +105,30 @@ fn restricted(matrix: MatRef<'_, f64>, training: &TrainingRows) -> Mat<f64> {
 
 impl Projection {
     /// Of some training folds.
-    pub fn of(moments: &Moments<'_>, folds: &[usize]) -> Result<Projection, IdentifyError> {
-        let columns = moments.columns;
-        let all = moments.all_folds();
+    pub fn of(gram: &Gram<'_>, folds: &[usize]) -> Result<Projection, IdentifyError> {
+        let columns = gram.columns;
+        let all = gram.all_folds();
         let training = columns.training_rows(folds);
         let part = |fold: usize| {
             let rows = &columns.fold_rows[fold];
-            moments.model().subrows(rows.start, rows.len())
+            gram.model().subrows(rows.start, rows.len())
         };
-        let mut gram = moments.prior.base.clone();
-        let mut with_y = Mat::from_fn(moments.rank(), 1, |i, _| moments.prior.base_y[i]);
+        let mut normal = gram.prior.base.clone();
+        let mut with_y = Mat::from_fn(gram.rank(), 1, |i, _| gram.prior.base_y[i]);
         for fold in folds {
             let (rows, own) = (&columns.fold_rows[*fold], part(*fold));
-            let y = MatRef::from_column_major_slice(&moments.residual[rows.clone()], rows.len(), 1);
-            matmul(gram.as_mut(), Accum::Add, own.transpose(), own, 1.0, Par::Seq);
+            let y = MatRef::from_column_major_slice(&gram.residual[rows.clone()], rows.len(), 1);
+            matmul(normal.as_mut(), Accum::Add, own.transpose(), own, 1.0, Par::Seq);
             matmul(with_y.as_mut(), Accum::Add, own.transpose(), y, 1.0, Par::Seq);
         }
-        let inverse = pseudo_inverse(gram.as_ref())?;
+        let inverse = pseudo_inverse(normal.as_ref())?;
         let coefficients = &inverse * &with_y;
-        let y = MatRef::from_column_major_slice(&moments.residual, moments.residual.len(), 1);
-        let residual = restricted((y - moments.model() * &coefficients).as_ref(), &training);
+        let y = MatRef::from_column_major_slice(&gram.residual, gram.residual.len(), 1);
+        let residual = restricted((y - gram.model() * &coefficients).as_ref(), &training);
         let left_out: Vec<usize> = all.iter().copied().filter(|fold| !folds.contains(fold)).collect();
         let left_out = match left_out.is_empty() {
             true => None,
-            false => Some(LeftOut::of(moments, &left_out)?),
+            false => Some(LeftOut::of(gram, &left_out)?),
         };
         Ok(Projection {
             folds: folds.to_vec(),
@@ -146,17 +146,17 @@ impl Projection {
     /// The products of a segment.
     ///
     /// # Errors
-    /// [`IdentifyError::Interrupted`] if `go_on` returns `false`.
+    /// [`IdentifyError::Interrupted`] if `should_continue` returns `false`.
     pub fn products(
         &self,
-        moments: &Moments<'_>,
+        gram: &Gram<'_>,
         segment: usize,
-        go_on: &(dyn Fn() -> bool + Sync),
+        should_continue: &(dyn Fn() -> bool + Sync),
     ) -> Result<Arc<SegmentProducts>, IdentifyError> {
-        stored(&self.segments, &moments.segments[segment].key, || {
+        stored(&self.segments, &gram.segments[segment].key, || {
             let products = match &self.left_out {
-                None => self.of_all(moments, segment, go_on)?,
-                Some(left_out) => left_out.products(moments, segment, go_on)?,
+                None => self.of_all(gram, segment, should_continue)?,
+                Some(left_out) => left_out.products(gram, segment, should_continue)?,
             };
             Ok(Arc::new(products))
         })
@@ -164,17 +164,18 @@ impl Projection {
 
     fn of_all(
         &self,
-        moments: &Moments<'_>,
+        gram: &Gram<'_>,
         segment: usize,
-        go_on: &(dyn Fn() -> bool + Sync),
+        should_continue: &(dyn Fn() -> bool + Sync),
     ) -> Result<SegmentProducts, IdentifyError> {
-        let layout = &moments.segments[segment].layout;
-        let rank = moments.rank();
-        let mut side = Mat::zeros(moments.residual.len(), rank + 1);
-        side.as_mut().subcols_mut(0, rank).copy_from(moments.model());
+        let layout = &gram.segments[segment].layout;
+        let rank = gram.rank();
+        let mut side = Mat::zeros(gram.residual.len(), rank + 1);
+        side.as_mut().subcols_mut(0, rank).copy_from(gram.model());
         side.as_mut().subcols_mut(rank, 1).copy_from(&self.residual);
         let side = Adjoint::of(&self.training, side.as_ref());
-        let products = layout.products(&self.training, &side, true, go_on).ok_or(IdentifyError::Interrupted)?;
+        let products =
+            layout.products(&self.training, &side, true, should_continue).ok_or(IdentifyError::Interrupted)?;
         let cross = products.side.subrows(0, rank);
         let solved = &self.inverse * cross;
         let mut d = products.own.clone();
@@ -189,27 +190,27 @@ impl Projection {
     }
 
     /// Forgets the products of chosen effects other than some candidates.
-    pub fn keep_chosen(&self, moments: &Moments<'_>, candidates: &[usize]) {
-        let kept: Vec<(usize, usize)> = candidates.iter().map(|k| key(moments.set(*k))).collect();
+    pub fn keep_chosen(&self, gram: &Gram<'_>, candidates: &[usize]) {
+        let kept: Vec<(usize, usize)> = candidates.iter().map(|k| key(gram.set(*k))).collect();
         if let Ok(mut chosen) = self.chosen.lock() {
             chosen.retain(|key, _| kept.contains(key));
         }
     }
 
     /// A chosen effect.
-    pub fn chosen(&self, moments: &Moments<'_>, candidate: usize) -> Result<Arc<ChosenEffect>, IdentifyError> {
-        let set = moments.set(candidate);
+    pub fn chosen(&self, gram: &Gram<'_>, candidate: usize) -> Result<Arc<ChosenEffect>, IdentifyError> {
+        let set = gram.set(candidate);
         stored(&self.chosen, &key(set), || {
-            let mut all = Mat::zeros(moments.columns.rows(), set.count);
-            moments.columns.fill(&[set], all.as_mut());
+            let mut all = Mat::zeros(gram.columns.rows(), set.count);
+            gram.columns.fill(&[set], all.as_mut());
             let lengths = all.col_iter().map(|column| column.norm_l2()).collect();
             let mut rows = restricted(all.as_ref(), &self.training);
-            let of_model = &self.inverse * transposed_product(moments.model(), rows.as_ref());
+            let of_model = &self.inverse * transposed_product(gram.model(), rows.as_ref());
             let with_residual =
                 transposed_product(rows.as_ref(), self.residual.as_ref()).col(0).iter().copied().collect();
             for fold in &self.folds {
-                let of_fold = &moments.columns.fold_rows[*fold];
-                let model = moments.model().subrows(of_fold.start, of_fold.len());
+                let of_fold = &gram.columns.fold_rows[*fold];
+                let model = gram.model().subrows(of_fold.start, of_fold.len());
                 let to = rows.as_mut().subrows_mut(of_fold.start, of_fold.len());
                 matmul(to, Accum::Add, model, of_model.as_ref(), -1.0, Par::Seq);
             }
@@ -228,13 +229,13 @@ impl Projection {
     /// The products of a chosen effect with the columns of a segment: `E⊥ᵀ C`.
     pub fn with_segment(
         &self,
-        moments: &Moments<'_>,
+        gram: &Gram<'_>,
         chosen: &ChosenEffect,
         segment: usize,
     ) -> Result<Arc<Mat<f64>>, IdentifyError> {
-        stored(&chosen.segments, &moments.segments[segment].key, || {
+        stored(&chosen.segments, &gram.segments[segment].key, || {
             let side = chosen.side.get_or_init(|| Adjoint::of(&self.training, chosen.rows.as_ref()));
-            let layout = &moments.segments[segment].layout;
+            let layout = &gram.segments[segment].layout;
             let products = layout.products(&self.training, side, false, &|| true);
             Ok(Arc::new(products.ok_or(IdentifyError::Interrupted)?.side))
         })
@@ -248,13 +249,13 @@ fn pairs(columns: &std::ops::Range<usize>) -> impl Iterator<Item = (usize, usize
 }
 
 impl LeftOut {
-    fn of(moments: &Moments<'_>, folds: &[usize]) -> Result<LeftOut, IdentifyError> {
-        let columns = moments.columns;
-        let whole = moments.projection(&moments.all_folds())?;
+    fn of(gram: &Gram<'_>, folds: &[usize]) -> Result<LeftOut, IdentifyError> {
+        let columns = gram.columns;
+        let whole = gram.projection(&gram.all_folds())?;
         let training = columns.training_rows(folds);
         let rows: Vec<usize> = folds.iter().flat_map(|fold| columns.fold_rows[*fold].clone()).collect();
-        let rank = moments.rank();
-        let model = Mat::from_fn(rows.len(), rank, |i, j| moments.model[(rows[i], j)]);
+        let rank = gram.rank();
+        let model = Mat::from_fn(rows.len(), rank, |i, j| gram.model[(rows[i], j)]);
         let (q, r) = reduced(&model);
         let projected = Mat::from_fn(r.nrows(), r.nrows(), |i, j| if i == j { 1.0 } else { 0.0 })
             - &r * &whole.inverse * r.transpose();
@@ -279,13 +280,14 @@ impl LeftOut {
 
     fn products(
         &self,
-        moments: &Moments<'_>,
+        gram: &Gram<'_>,
         segment: usize,
-        go_on: &(dyn Fn() -> bool + Sync),
+        should_continue: &(dyn Fn() -> bool + Sync),
     ) -> Result<SegmentProducts, IdentifyError> {
-        let layout = &moments.segments[segment].layout;
-        let all = moments.projection(&moments.all_folds())?.products(moments, segment, go_on)?;
-        let fold = layout.products(&self.training, &self.side, true, go_on).ok_or(IdentifyError::Interrupted)?;
+        let layout = &gram.segments[segment].layout;
+        let all = gram.projection(&gram.all_folds())?.products(gram, segment, should_continue)?;
+        let fold =
+            layout.products(&self.training, &self.side, true, should_continue).ok_or(IdentifyError::Interrupted)?;
         let m = self.along.len();
         let of_model =
             all.with_model.as_ref().map(|solved| &self.r * solved).unwrap_or_else(|| Mat::zeros(m, layout.total()));

@@ -40,7 +40,7 @@ const DRAWS_AT_ONCE: usize = 32;
 const MAX_NULL_ENTRIES: usize = 1_000_000;
 
 /// The priors as products with the model columns.
-pub struct PriorMoments {
+pub struct PriorGram {
     /// Model with model.
     pub base: Mat<f64>,
     /// Model with residual.
@@ -59,7 +59,7 @@ struct Segment {
 
 /// The products of the candidates of a session. Clones share all products. Each can have further candidates.
 #[derive(Clone)]
-pub struct Moments<'c> {
+pub struct Gram<'c> {
     columns: &'c Columns<'c>,
     sets: Vec<EffectColumns>,
     segments: Vec<Segment>,
@@ -67,7 +67,7 @@ pub struct Moments<'c> {
     /// Rows × rank.
     model: Arc<Mat<f64>>,
     residual: Arc<Vec<f64>>,
-    prior: Arc<PriorMoments>,
+    prior: Arc<PriorGram>,
     /// Number of null draws.
     draws: usize,
     /// The null draws, for the products of segments that are added later.
@@ -113,16 +113,16 @@ pub(super) fn stored<K: std::hash::Hash + Eq + Clone, V: Clone, E>(
     })
 }
 
-impl<'c> Moments<'c> {
+impl<'c> Gram<'c> {
     /// From the orthonormal model columns (rows × rank) and the residual over all rows, without null draws.
     pub fn new(
         columns: &'c Columns<'c>,
         sets: Vec<EffectColumns>,
         model: Arc<Mat<f64>>,
         residual: &[f64],
-        prior: PriorMoments,
-    ) -> Moments<'c> {
-        let mut moments = Moments {
+        prior: PriorGram,
+    ) -> Gram<'c> {
+        let mut gram = Gram {
             columns,
             sets: Vec::new(),
             segments: Vec::new(),
@@ -135,20 +135,20 @@ impl<'c> Moments<'c> {
             null_products: Arc::default(),
             projections: Arc::default(),
         };
-        moments.append(sets);
-        moments
+        gram.append(sets);
+        gram
     }
 
     /// Forms the products of the candidates with null draws, each over all rows. Draws are taken in parts and forgotten,
     /// unless they are `kept` for candidates that are added later.
     ///
     /// # Errors
-    /// If products are not finite, or [`IdentifyError::Interrupted`] if `go_on` returns `false`.
+    /// If products are not finite, or [`IdentifyError::Interrupted`] if `should_continue` returns `false`.
     pub fn take_draws(
         &mut self,
         mut draws: impl ExactSizeIterator<Item = Vec<f64>>,
         kept: bool,
-        go_on: &(dyn Fn() -> bool + Sync),
+        should_continue: &(dyn Fn() -> bool + Sync),
     ) -> Result<(), IdentifyError> {
         let whole = self.projection(&self.all_folds())?;
         let (count, layout) = (draws.len(), Arc::clone(&self.segments[0].layout));
@@ -160,7 +160,8 @@ impl<'c> Moments<'c> {
             let part: Vec<Vec<f64>> = draws.by_ref().take(at_once).collect();
             let mut side = self.projected(&whole, &part);
             drop(part);
-            let formed = layout.products(&whole.training, &side, false, go_on).ok_or(IdentifyError::Interrupted)?;
+            let formed =
+                layout.products(&whole.training, &side, false, should_continue).ok_or(IdentifyError::Interrupted)?;
             products.as_mut().subrows_mut(first, formed.side.nrows()).copy_from(&formed.side);
             if kept {
                 let values = &side.values;
@@ -267,11 +268,15 @@ impl<'c> Moments<'c> {
     /// Forms the products of the library for several sets of training folds at the same time.
     ///
     /// # Errors
-    /// If products are not finite, or [`IdentifyError::Interrupted`] if `go_on` returns `false`.
-    pub fn prepare(&self, folds: &[&[usize]], go_on: &(dyn Fn() -> bool + Sync)) -> Result<(), IdentifyError> {
-        self.projection(&self.all_folds())?.products(self, 0, go_on)?;
+    /// If products are not finite, or [`IdentifyError::Interrupted`] if `should_continue` returns `false`.
+    pub fn prepare(
+        &self,
+        folds: &[&[usize]],
+        should_continue: &(dyn Fn() -> bool + Sync),
+    ) -> Result<(), IdentifyError> {
+        self.projection(&self.all_folds())?.products(self, 0, should_continue)?;
         let prepared = parallel::map(folds.len(), &|k| {
-            self.projection(folds[k])?.products(self, 0, go_on)?;
+            self.projection(folds[k])?.products(self, 0, should_continue)?;
             Ok(())
         });
         prepared.into_iter().collect()

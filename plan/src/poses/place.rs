@@ -31,7 +31,7 @@ const LEAST_COSINE: f64 = 0.5;
 const TOUCHING_MM: f64 = 1e-6;
 
 /// What a pose has to meet.
-pub(super) enum Goal {
+pub(super) enum Place {
     /// Nothing.
     Free,
     /// The tool's point is apart from a point of the table frame by a vector in R, mm.
@@ -40,21 +40,21 @@ pub(super) enum Goal {
     InR([f64; 3]),
 }
 
-impl Goal {
-    /// Draws the goal of one candidate. A probe touches its cylinder between two heights above its point, mm.
-    pub fn draw(station: &Station<f64>, height_mm: [f64; 2], random: &mut Pcg64) -> Goal {
+impl Place {
+    /// Draws the place of one candidate. A probe touches its cylinder between two heights above its point, mm.
+    pub fn draw(station: &Station<f64>, height_mm: [f64; 2], random: &mut Pcg64) -> Place {
         match (station.contact(), station.probe()) {
-            (Contact::InR(point_mm), _) => Goal::InR(point_mm),
+            (Contact::InR(point_mm), _) => Place::InR(point_mm),
             (_, Some(probe)) => {
                 let turn = between(random, [0.0, TAU]);
                 let height = between(random, height_mm);
-                Goal::OnTable { point_mm: surface_point(probe, turn, height), apart_mm: [0.0; 3] }
+                Place::OnTable { point_mm: surface_point(probe, turn, height), apart_mm: [0.0; 3] }
             }
             (Contact::AtDistance(distance_mm), _) => {
                 let apart_mm = upward(random).map(|x| x * distance_mm);
-                Goal::OnTable { point_mm: station.table_point_mm().unwrap_or_default(), apart_mm }
+                Place::OnTable { point_mm: station.table_point_mm().unwrap_or_default(), apart_mm }
             }
-            (Contact::None | Contact::Touching, None) => Goal::Free,
+            (Contact::None | Contact::Touching, None) => Place::Free,
         }
     }
 
@@ -62,9 +62,9 @@ impl Goal {
     pub fn met(&self, machine: &Machine, station: &Station<f64>, drawn: &[f64]) -> Option<Vec<f64>> {
         let tool_mm = station.tool_point_mm();
         let at = match *self {
-            Goal::Free => drawn.to_vec(),
-            Goal::InR(point_mm) => solved(machine, tool_mm, point_mm, drawn)?,
-            Goal::OnTable { point_mm, apart_mm } => {
+            Place::Free => drawn.to_vec(),
+            Place::InR(point_mm) => solved(machine, tool_mm, point_mm, drawn)?,
+            Place::OnTable { point_mm, apart_mm } => {
                 let bar = BallBar { workpiece_ball: point_mm, spindle_ball: tool_mm, bar: 0.0 };
                 positions_for_bar(machine, &bar, drawn, apart_mm).or_else(|| {
                     let none = vec![BodyErrors::<f64>::NONE; drawn.len()];

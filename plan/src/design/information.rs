@@ -69,15 +69,14 @@ impl SharedParameters {
             .map(|id| index.get(id.as_str()).copied())
             .collect::<Option<Vec<usize>>>()
             .ok_or_else(|| PlanError::Request("a parameter does not belong to this plan".to_string()))?;
-        let root = linear.marginal(&columns)?;
-        Ok(self.regularised(&root))
+        Ok(self.regularised(linear.marginal(&columns)?.as_ref(), 1.0))
     }
 
-    /// Adds a prior of the physical size to every parameter.
-    fn regularised(&self, root: &Root) -> Root {
+    /// Adds a prior of some multiples of the physical size to every parameter.
+    pub fn regularised(&self, root: MatRef<'_, f64>, sizes: f64) -> Root {
         let k = self.ids.len();
-        let priors = Mat::from_fn(k, k, |i, j| if i == j { 1.0 / self.size[i] } else { 0.0 });
-        sum(root.as_ref(), priors.as_ref())
+        let priors = Mat::from_fn(k, k, |i, j| if i == j { 1.0 / (sizes * self.size[i]) } else { 0.0 });
+        sum_of([root, priors.as_ref()].into_iter())
     }
 
     /// The root of the readings of a problem with one test, from their triangular factor `r`. Parameters that are not
@@ -119,6 +118,13 @@ impl SharedParameters {
         root.as_ref().submatrix(first, first, self.targets, self.targets)
     }
 
+    /// The logarithm of the determinant of the targets' covariance, display units.
+    pub fn log_determinant(&self, root: &Root) -> f64 {
+        let first = self.ids.len() - self.targets;
+        let logs = (first..self.ids.len()).map(|j| (self.display_per_internal[j] / root[(j, j)].abs()).ln());
+        2.0 * logs.sum::<f64>()
+    }
+
     /// Standard uncertainties of the target parameters, display units.
     pub fn uncertainties(&self, root: &Root) -> Vec<f64> {
         let block = self.criterion_block(root);
@@ -133,11 +139,16 @@ impl SharedParameters {
     }
 }
 
-/// The root of the sum of two information matrices.
-pub fn sum(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Root {
-    let k = a.ncols();
-    let stacked =
-        Mat::from_fn(a.nrows() + b.nrows(), k, |i, j| if i < a.nrows() { a[(i, j)] } else { b[(i - a.nrows(), j)] });
+/// The root of a sum of information, from rows or roots of its parts.
+pub fn sum_of<'m>(parts: impl Iterator<Item = MatRef<'m, f64>>) -> Root {
+    let parts: Vec<MatRef<'_, f64>> = parts.collect();
+    let columns = parts.first().map_or(0, |part| part.ncols());
+    let mut stacked = Mat::zeros(parts.iter().map(|part| part.nrows()).sum::<usize>().max(columns), columns);
+    let mut row = 0;
+    for part in parts {
+        stacked.as_mut().subrows_mut(row, part.nrows()).copy_from(part);
+        row += part.nrows();
+    }
     upper(stacked)
 }
 
