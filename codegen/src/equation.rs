@@ -4,6 +4,7 @@ use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::effect::Shape;
+use abbe_model::instrument::channel;
 
 use crate::coefficient::Coefficient;
 use crate::error::CodegenError;
@@ -36,6 +37,8 @@ pub struct Equation {
     pub exact: Vec<Operand>,
     /// The coordinates of the reading in the requested form.
     pub outputs: Vec<Operand>,
+    /// The name of each: x, y, z of a vector, or the channel.
+    pub names: Vec<&'static str>,
     /// The requested form.
     pub form: Form,
     /// The name of the test, if it has one.
@@ -113,6 +116,12 @@ impl Equation {
             Order::First => truncation::first(&run, &exact, &mut vectors, &written)?,
         };
         let stated_length = run.subject.bar().map(|bar| bar.bar.operand());
+        let names = match run.subject.station().map(|station| station.map(|_| 0.0_f64)) {
+            Some(station) if !channel::are_vector(station.channels()) => {
+                station.channels().iter().map(|channel| channel.name).collect()
+            }
+            _ => vec!["x", "y", "z"],
+        };
         let touch = run.probe_geometry().map(|geometry| match vectors.as_slice() {
             [.., stylus, step] if options.order == Order::Bilinear => {
                 let groups: Vec<Symbol<'_>> = [stylus, step]
@@ -141,6 +150,7 @@ impl Equation {
             vectors,
             driven_errors,
             stated_length,
+            names,
             bar_parameters,
             touch,
             whole,

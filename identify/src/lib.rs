@@ -79,6 +79,7 @@ pub mod series;
 pub mod simulate;
 pub mod start;
 pub mod statements;
+pub mod straightness;
 pub mod tolerance;
 pub mod trace;
 pub mod unit;

@@ -8,6 +8,7 @@
 //! E = max(x̄ᵢ↑; x̄ᵢ↓) − min(x̄ᵢ↑; x̄ᵢ↓)     A = max(x̄ᵢ↑ + 2sᵢ↑; x̄ᵢ↓ + 2sᵢ↓) − min(x̄ᵢ↑ − 2sᵢ↑; x̄ᵢ↓ − 2sᵢ↓)
 //! ```
 
+use abbe_model::chain::Machine;
 use abbe_model::rotation_error::Body;
 use abbe_model::session::{Session, Test};
 use schemars::JsonSchema;
@@ -130,12 +131,7 @@ pub fn of_session(session: &Session, left_out: &[Vec<bool>]) -> Vec<PositioningT
 fn of_test(session: &Session, test: &Test, left_out: &[bool]) -> Option<PositioningTest> {
     let machine = &session.machine;
     let readings = test.readings.as_ref()?;
-    let moves = |axis: &usize| {
-        let column = &readings.positions[*axis];
-        column.iter().any(|position| (position - column[0]).abs() > SAME)
-    };
-    let mut moved = (0..machine.axes.len()).filter(moves);
-    let (Some(axis), None) = (moved.next(), moved.next()) else { return None };
+    let axis = moved_axis(machine, test)?;
     let (direction, body) = test.station.positioning()?;
     let station = test.station.with_datum(machine, readings).unwrap_or_else(|| test.station.clone());
     let of_table = axis < machine.workpiece_side;
@@ -160,36 +156,61 @@ fn of_test(session: &Session, test: &Test, left_out: &[bool]) -> Option<Position
         return None;
     }
     let unit = Unit::of(channel.unit);
-    let mut found: Vec<(f64, bool, f64)> = Vec::new();
-    let samples = readings.axis_samples(axis, machine.axes[axis].kind);
-    for row in (0..readings.rows()).filter(|row| !left_out[*row] && readings.was_read(*row, 0)) {
-        let nominal = readings.nominal(machine, &station, row).channels()[0];
-        let observed = readings.observed[row * readings.channels];
-        let deviation = (observed - nominal) * sign * cosine.signum() * unit.display_per_internal;
-        // At rest where the axis has turned, the next movement tells the direction of the approach to come.
-        let at = readings.positions[axis][row];
-        let stands = row > 0 && (at - readings.positions[axis][row - 1]).abs() <= SAME;
-        let next = samples.get(row + 1).filter(|_| stands);
-        found.push((at, next.unwrap_or(&samples[row]).direction < 0.0, deviation));
-    }
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
     let kind = machine.axes[axis].kind;
-    let positions: Vec<Position> = found
-        .chunk_by(|a, b| b.0 - a.0 <= SAME)
-        .map(|here| {
-            let towards = |backward: bool| {
-                let own = here.iter().filter(|one| one.1 == backward);
-                Approach::of(&own.map(|one| one.2).collect::<Vec<_>>())
-            };
-            Position { at: kind.to_display(here[0].0), forward: towards(false), backward: towards(true) }
-        })
-        .collect();
+    let factor = sign * cosine.signum() * unit.display_per_internal;
+    let deviation =
+        |row: usize, values: &[f64]| (values[0] - readings.nominal(machine, &station, row).channels()[0]) * factor;
+    let positions = approaches(machine, test, left_out, (axis, 0), deviation)?;
     // A sweep whose positions do not return is no test of positioning.
     let repeated = |approach: Option<Approach>| approach.is_some_and(|one| one.count > 1);
     if !positions.iter().any(|position| repeated(position.forward) || repeated(position.backward)) {
         return None;
     }
     Some(figures(test.name.clone(), machine.axes[axis].name.clone(), [unit.name, kind.unit().to_string()], positions))
+}
+
+/// The only axis that moves in a test.
+pub(crate) fn moved_axis(machine: &Machine, test: &Test) -> Option<usize> {
+    let readings = test.readings.as_ref()?;
+    let moves = |axis: &usize| {
+        let column = &readings.positions[*axis];
+        column.iter().any(|position| (position - column[0]).abs() > SAME)
+    };
+    let mut moved = (0..machine.axes.len()).filter(moves);
+    let axis = moved.next()?;
+    moved.next().is_none().then_some(axis)
+}
+
+/// The values that a channel reads at each position of an axis, ascending, by the direction of the approach. `value` is
+/// that of a row, from the observed values.
+pub(crate) fn approaches(
+    machine: &Machine,
+    test: &Test,
+    left_out: &[bool],
+    (axis, channel): (usize, usize),
+    value: impl Fn(usize, &[f64]) -> f64,
+) -> Option<Vec<Position>> {
+    let readings = test.readings.as_ref()?;
+    let kind = machine.axes[axis].kind;
+    let mut found: Vec<(f64, bool, f64)> = Vec::new();
+    let samples = readings.axis_samples(axis, kind);
+    for row in (0..readings.rows()).filter(|row| !left_out[*row] && readings.was_read(*row, channel)) {
+        let observed = &readings.observed[row * readings.channels..(row + 1) * readings.channels];
+        // At rest where the axis has turned, the next movement tells the direction of the approach to come.
+        let at = readings.positions[axis][row];
+        let stands = row > 0 && (at - readings.positions[axis][row - 1]).abs() <= SAME;
+        let next = samples.get(row + 1).filter(|_| stands);
+        found.push((at, next.unwrap_or(&samples[row]).direction < 0.0, value(row, observed)));
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let position = |here: &[(f64, bool, f64)]| {
+        let towards = |backward: bool| {
+            let own = here.iter().filter(|one| one.1 == backward);
+            Approach::of(&own.map(|one| one.2).collect::<Vec<_>>())
+        };
+        Position { at: kind.to_display(here[0].0), forward: towards(false), backward: towards(true) }
+    };
+    Some(found.chunk_by(|a, b| b.0 - a.0 <= SAME).map(position).collect())
 }
 
 /// The figures of deviations at positions.

@@ -18,6 +18,7 @@ use crate::circular::CircularTest;
 use crate::noise::NoiseSource;
 use crate::plausibility::Plausibility;
 use crate::positioning::PositioningTest;
+use crate::straightness::StraightnessTest;
 use crate::tolerance::Conformity;
 use crate::unit::ReadingUnit;
 pub use base::BaseResult;
@@ -130,6 +131,9 @@ pub struct FitResult {
     /// Figures of ISO 230-2 of the tests in which a laser or a sensor of angles reads the axis that moves.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub positioning: Vec<PositioningTest>,
+    /// Straightness of axes by ISO 230-1, from tests in which one linear axis moves under a laser.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub straightness: Vec<StraightnessTest>,
     /// Decisions of conformity, if the session states limits.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub conformity: Option<Conformity>,

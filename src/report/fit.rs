@@ -20,7 +20,9 @@ use super::session::plots::SessionPlots;
 use super::session::{self, residuals};
 use super::statements::{self, IDENTIFIES, IMPROVES};
 use super::table::{Cell, Column, Table, cells, numbers, words};
-use super::{base, circular, conformity, confounded, cross_validation, plausibility, pointing, positioning};
+use super::{
+    base, circular, conformity, confounded, cross_validation, plausibility, pointing, positioning, straightness,
+};
 
 /// The report of a fit; with `figures`, for a page.
 ///
@@ -73,6 +75,7 @@ pub fn report(
     confounded::section(&mut report, &result.unobservable, by_prior, &result.outliers);
     circular::section(&mut report, &result.circular);
     positioning::section(&mut report, &result.positioning);
+    straightness::section(&mut report, &result.straightness);
     report.section("Next");
     let steps = next(problem, result, statements.measure.step, commands);
     report.steps(steps, (commands.command("fit", "--report fit.html"), "write residuals, plots and sliders as a page"));

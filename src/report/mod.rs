@@ -48,6 +48,7 @@ pub mod self_calibration;
 pub mod session;
 pub mod simulation;
 pub mod statements;
+pub mod straightness;
 #[cfg(feature = "fleet")]
 pub mod study;
 pub mod table;

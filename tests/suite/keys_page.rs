@@ -82,7 +82,7 @@ fn definition(page: &mut String, name: &str, schema: &Value) {
         table(page, schema);
     }
     let forms = ["anyOf", "oneOf"].into_iter().filter_map(|list| schema[list].as_array()).flatten();
-    for form in forms.filter(|form| form["properties"].is_object()) {
+    for form in forms.filter(|form| form["properties"]["kind"]["const"].is_string()) {
         let word = form["properties"]["kind"]["const"].as_str().unwrap();
         writeln!(page, "With `kind = \"{word}\"`:\n").unwrap();
         table(page, form);

@@ -247,10 +247,11 @@ impl<'e> Code<'e> {
             }
         }
         let what = match equation.kind {
-            Kind::Length => "the length read, mm",
-            Kind::Distance => "the distance to the surface along the probing direction, mm",
-            Kind::Coordinates => "the three coordinates read, mm",
-            Kind::Volumetric => "the error vector x, y, z, mm",
+            Kind::Length => "the length read, mm".to_string(),
+            Kind::Distance => "the distance to the surface along the probing direction, mm".to_string(),
+            Kind::Coordinates if equation.names == ["x", "y", "z"] => "the three coordinates read, mm".to_string(),
+            Kind::Coordinates => format!("{}; lengths in mm, angles in rad", equation.names.join(", ")),
+            Kind::Volumetric => "the error vector x, y, z, mm".to_string(),
         };
         lines.push(if self.arguments.is_empty() {
             let (first, second) = (at("errors", 0), at("errors", 1));

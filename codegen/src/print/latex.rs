@@ -116,6 +116,7 @@ impl Notation for Latex {
     fn coordinate(&self, vector: &str, prime: bool, frame: &str, coordinate: &str) -> String {
         let prime = if prime { "'" } else { "" };
         match frame {
+            "" if coordinate.len() > 1 => format!("{vector}{prime}_{{\\mathrm{{{coordinate}}}}}"),
             "" => format!("{vector}{prime}_{coordinate}"),
             frame => format!("{vector}{prime}_{{\\mathrm{{{frame}}},{coordinate}}}"),
         }

@@ -163,7 +163,7 @@ fn refuse_unreadable(equation: &Equation) -> Result<(), CodegenError> {
         (Kind::Length, Order::Exact) | (_, Order::First) => return Ok(()),
         (Kind::Length, Order::Bilinear) => "a bilinear form",
         (Kind::Distance, _) => "a probed distance",
-        (Kind::Coordinates, _) => "three coordinates",
+        (Kind::Coordinates, _) => "several coordinates",
         (Kind::Volumetric, _) => "the error vector",
     };
     Err(CodegenError::GradientForReaders { what, languages: languages() })

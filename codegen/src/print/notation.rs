@@ -73,16 +73,18 @@ pub(crate) struct Spelling<'a, N> {
     pub(crate) program: &'a Program,
     pub(crate) symbols: Symbols,
     pub(crate) kind: Kind,
+    /// The names of the coordinates or channels.
+    pub(crate) names: &'a [&'static str],
     /// Whether sine and cosine of an axis are `sθ_a` and `cθ_a`, as in single equations of the literature.
     pub(crate) angles: bool,
 }
 
 impl<'a, N: Notation> Spelling<'a, N> {
     /// The names of an equation.
-    pub(crate) fn new(notation: &'a N, program: &'a Program, equation: &Equation) -> Self {
+    pub(crate) fn new(notation: &'a N, program: &'a Program, equation: &'a Equation) -> Self {
         let Options { symbols, arrangement, .. } = equation.options;
         let angles = arrangement != Arrangement::Frames;
-        Spelling { notation, program, symbols, kind: equation.kind, angles }
+        Spelling { notation, program, symbols, kind: equation.kind, names: &equation.names, angles }
     }
 
     /// A variable.
@@ -144,7 +146,7 @@ impl<'a, N: Notation> Spelling<'a, N> {
     pub(crate) fn output(&self, index: usize) -> String {
         let coordinate = |letter: &str| {
             let letter = self.notation.letter(letter);
-            self.notation.coordinate(&letter, false, "", ["x", "y", "z"][index])
+            self.notation.coordinate(&letter, false, "", self.names[index])
         };
         match self.kind {
             Kind::Length => "L".to_string(),

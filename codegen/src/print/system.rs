@@ -72,7 +72,7 @@ pub(crate) fn blocks<N: Notation>(
             let name = equation.name.clone().unwrap_or_default();
             let header = match equation.kind {
                 Kind::Length | Kind::Distance => name,
-                Kind::Coordinates | Kind::Volumetric => format!("{name} {}", ["x", "y", "z"][coordinate]),
+                Kind::Coordinates | Kind::Volumetric => format!("{name} {}", equation.names[coordinate]),
             };
             let widest = cells.iter().flatten().map(|line| measure(line)).chain([measure(&header)]).max();
             let taken = widest.unwrap_or(0) + width / GAP;

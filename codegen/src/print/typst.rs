@@ -98,6 +98,7 @@ impl Notation for Typst {
     fn coordinate(&self, vector: &str, prime: bool, frame: &str, coordinate: &str) -> String {
         let prime = if prime { "'" } else { "" };
         match frame {
+            "" if coordinate.len() > 1 => format!("{vector}{prime}_\"{coordinate}\""),
             "" => format!("{vector}{prime}_{coordinate}"),
             frame => format!("{vector}{prime}_(\"{frame}\",{coordinate})"),
         }

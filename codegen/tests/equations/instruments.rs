@@ -1,10 +1,11 @@
 //! Equations of instruments that read distances, directions, rotations and poses: printed code against dual numbers.
 
-use abbe_codegen::print::Layout;
+use abbe_codegen::print::{LANGUAGES, Layout, Style};
 use abbe_codegen::program::Input;
-use abbe_codegen::{Equation, Options, Source, Subject, Variable};
+use abbe_codegen::{CodegenError, Equation, Options, Order, Source, Subject, Variable, check};
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, Machine};
+use abbe_model::component::ErrorName;
 use abbe_model::instrument::angle::Angle;
 use abbe_model::instrument::column::Quantity;
 use abbe_model::instrument::distance::{Distance, StationFrame};
@@ -146,4 +147,32 @@ fn read(
         of(&|parameter| matches!(parameter, Variable::Instrument(own) if *own == unknowns[slot])).map(small)
     };
     station.read(machine, state, &bodies, unknown).channels().to_vec()
+}
+
+/// Every language prints every instrument, exact and in first order where there is one, with one output for each channel under its name.
+#[test]
+fn every_language_prints_one_output_for_each_channel() {
+    let machine = Machine::from_code("w C b X Z t").expect("a code");
+    let errors: Vec<_> = ["EX0C", "ECC", "EBX"].iter().filter_map(|name| ErrorName::parse(name)).collect();
+    for any in ALL {
+        for order in [Order::Exact, Order::First] {
+            let options = Options { order, ..Options::default() };
+            let equation = match Equation::of(&machine, &any, &errors, &options) {
+                // The printer has the first order of polynomials; a distance is a root, a bearing a quotient.
+                Err(CodegenError::NoPolynomial { .. }) if order == Order::First => continue,
+                equation => equation.expect("an equation"),
+            };
+            let checked = check(&equation, &any).expect("agreement with dual numbers");
+            for language in LANGUAGES {
+                let text =
+                    language.print(&checked, &Style::default()).unwrap_or_else(|fault| panic!("{any:?}: {fault}"));
+                assert!(!text.is_empty());
+            }
+            let text = abbe_codegen::language("text").expect("a language").print(&checked, &Style::default()).unwrap();
+            let Subject::Station(station): Subject<f64> = any.subject(&|_| 1.0) else { panic!("a station") };
+            for channel in station.channels() {
+                assert!(text.contains(&format!("m.{}", channel.name)), "{any:?}, {}: {text}", channel.name);
+            }
+        }
+    }
 }

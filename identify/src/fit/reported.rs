@@ -14,11 +14,11 @@ use crate::noise;
 use crate::numerics::rank::Rank;
 use crate::parameter_description::parameter_meaning;
 use crate::plausibility;
-use crate::positioning;
 use crate::problem::Problem;
 use crate::results::{FitResult, OfAngles, Outlier, ParameterResult, Unobservable, phases_follow_amplitudes};
 use crate::tolerance::conformity;
 use crate::unit::ARCSEC;
+use crate::{positioning, straightness};
 
 /// The fit in its reported form.
 ///
@@ -69,6 +69,7 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> 
         outcome: outcome::outcome(problem, fit, goodness, &determined),
         circular,
         positioning: positioning::of_session(&problem.session, &problem.rejected),
+        straightness: straightness::of_session(&problem.session, &problem.rejected),
         parameters,
         plausibility,
         warnings,

@@ -77,8 +77,22 @@ pub fn spectra(problem: &Problem, views: &SessionSeries) -> Vec<Spectrum> {
         let angular = views.tests.iter().filter(|test| test.way.is_angle);
         return angular
             .map(|test| {
-                let values = [test.before_um.as_slice(), &test.after_um];
-                of(&test.name, &test.way.name, &test.way.values, test.channels, values)
+                // A row that lacks a channel is no point of a spectrum.
+                let readings =
+                    problem.tests.iter().find(|own| own.name == test.name).and_then(|own| own.readings.as_ref());
+                let is_whole = |row: &usize| {
+                    readings.is_none_or(|readings| (0..test.channels).all(|channel| readings.was_read(*row, channel)))
+                };
+                let rows: Vec<usize> = (0..test.way.values.len()).filter(is_whole).collect();
+                let whole = |values: &[f64]| -> Vec<f64> {
+                    rows.iter()
+                        .flat_map(|row| &values[row * test.channels..(row + 1) * test.channels])
+                        .copied()
+                        .collect()
+                };
+                let angles: Vec<f64> = rows.iter().map(|row| test.way.values[*row]).collect();
+                let values = [whole(&test.before_um), whole(&test.after_um)];
+                of(&test.name, &test.way.name, &angles, test.channels, [&values[0], &values[1]])
             })
             .collect();
     }

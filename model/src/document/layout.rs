@@ -3,7 +3,8 @@
 use std::fmt;
 
 use schemars::JsonSchema;
-use serde::de::{self, Visitor};
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
+use serde::de::{self, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::node::{Named, Node};
@@ -60,6 +61,54 @@ pub enum ForeignColumn {
     Name(String),
     /// The number from 1.
     Number(Count<1, MANY>),
+    /// One column for each traversal: { forward = ["F1", "F2"], backward = ["B1", "B2"] }. The rows are the positions in
+    /// the order of a forward traversal.
+    Traversals(Traversals),
+}
+
+/// The columns of readings that stand side by side, one for each traversal: forward and backward in turn.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(inline)]
+pub struct Traversals {
+    /// Those in the order of the rows: names or numbers.
+    #[serde(default)]
+    pub forward: Several,
+    /// Those against the order of the rows.
+    #[serde(default)]
+    pub backward: Several,
+}
+
+/// One column or several: a name or a number, or a list of them.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(transparent)]
+#[schemars(inline, extend("type" = ["string", "integer", "array"]))]
+pub struct Several(pub Vec<ForeignColumn>);
+
+impl<'de> Deserialize<'de> for Several {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Of;
+        impl<'de> Visitor<'de> for Of {
+            type Value = Several;
+
+            fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+                formatter.write_str("the name of a column in quotes, its number from 1, or a list of them")
+            }
+
+            fn visit_f64<E: de::Error>(self, number: f64) -> Result<Several, E> {
+                Count::try_from(number).map(|number| Several(vec![ForeignColumn::Number(number)])).map_err(E::custom)
+            }
+
+            fn visit_str<E>(self, name: &str) -> Result<Several, E> {
+                Ok(Several(vec![ForeignColumn::Name(name.trim().to_string())]))
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, items: A) -> Result<Several, A::Error> {
+                Vec::deserialize(SeqAccessDeserializer::new(items)).map(Several)
+            }
+        }
+        deserializer.deserialize_any(Of)
+    }
 }
 
 impl<'de> Deserialize<'de> for ForeignColumn {
@@ -82,6 +131,10 @@ impl<'de> Deserialize<'de> for ForeignColumn {
 
             fn visit_str<E>(self, name: &str) -> Result<ForeignColumn, E> {
                 Ok(ForeignColumn::Name(name.trim().to_string()))
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, keys: A) -> Result<ForeignColumn, A::Error> {
+                Traversals::deserialize(MapAccessDeserializer::new(keys)).map(ForeignColumn::Traversals)
             }
         }
         deserializer.deserialize_newtype_struct(super::de::LINES, OfColumn)

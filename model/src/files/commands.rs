@@ -327,7 +327,7 @@ impl CommandFile {
                     row.drivers[place] = value;
                 }
                 Meaning::Pose(part, unit) => row.pose[*part] = unit.to_internal(value),
-                Meaning::Of(Role::Reading(..) | Role::Socket) | Meaning::Other => {}
+                Meaning::Of(Role::Reading(..) | Role::Socket | Role::Polar(_)) | Meaning::Other => {}
             }
         }
         Ok(row)

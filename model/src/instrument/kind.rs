@@ -293,6 +293,11 @@ pub trait Instrument {
     fn positioning(&self) -> Option<([f64; 3], Body)> {
         None
     }
+    /// Whether one of its channels reads straightness: across the beam, as a deviation.
+    fn is_straightness(&self, channel: usize) -> bool {
+        let _ = channel;
+        false
+    }
     /// Its point on the table and its point on the tool, if they are its own.
     fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
         [None, None]

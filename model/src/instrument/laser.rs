@@ -330,6 +330,9 @@ impl Instrument for Laser<f64> {
     fn positioning(&self) -> Option<([f64; 3], Body)> {
         (places(&self.channels).next() == Some(0)).then_some((self.frame[0], Body::Relative))
     }
+    fn is_straightness(&self, channel: usize) -> bool {
+        places(&self.channels).nth(channel).is_some_and(|place| STRAIGHTNESS.contains(&place))
+    }
     fn kept_channel(&self, of_all: usize) -> Option<usize> {
         places(&self.channels).position(|place| place == of_all)
     }

@@ -30,7 +30,7 @@ class Session(Predicting):
         keys of a session file, whose tests may have arrays, gives the whole session.
     instrument : str
         ``"ballbar"`` (the default), ``"r-test"``, ``"probe"``, ``"distance"``, ``"laser"``, ``"angle"``, ``"tracker"``,
-        ``"socket"`` or ``"pointing"``.
+        ``"pose"``, ``"socket"`` or ``"pointing"``.
     noise_um : float, optional
         Standard deviation of one scalar reading of a length; estimated from the readings by default.
     resolution_um : float, optional

@@ -126,7 +126,11 @@ pub fn readings(session: &SessionPlots<'_>) -> Table {
             cells.extend(at.map(|(axis, column)| Cell::fixed(axis.kind.to_display(column[row]), 5)));
             let own = row * series.channels..(row + 1) * series.channels;
             for column in [Column::Deviation, Column::Before, Column::After] {
-                cells.extend(column.of(series)[own.clone()].iter().map(|um| Cell::fixed(*um, 3)));
+                let read = |(channel, um): (usize, &f64)| match readings.was_read(row, channel) {
+                    true => Cell::fixed(*um, 3),
+                    false => "".into(),
+                };
+                cells.extend(column.of(series)[own.clone()].iter().enumerate().map(read));
                 cells.extend((series.channels..labels.len()).map(|_| "".into()));
             }
             rows.push(cells);

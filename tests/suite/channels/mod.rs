@@ -2,6 +2,7 @@
 //! many simulated sessions, and sessions of several instruments.
 
 mod bundled;
+mod layouts;
 mod stands;
 
 use abbe::identify::fit::{self, prepare};

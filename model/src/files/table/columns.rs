@@ -7,11 +7,13 @@ use super::number::number;
 use super::request::{ColumnMapping, ForeignColumn, Request};
 use super::row::Row;
 use crate::chain::Machine;
+use crate::document::layout::Traversals;
 use crate::document::value::Count;
 use crate::driver::column;
 use crate::error::{Location, ModelError};
 use crate::files::quantity::{self, Unit};
 use crate::files::spelling::suggestion;
+use crate::instrument::Fault;
 use crate::instrument::Station;
 use crate::instrument::column::Quantity;
 
@@ -26,6 +28,8 @@ pub(in crate::files) enum Role {
     /// A column of the instrument's readings.
     Reading(Quantity, Unit),
     Socket,
+    /// The polar angle of a test whose path is a circle, in place of the positions of both axes.
+    Polar(Unit),
 }
 
 /// A column that is read.
@@ -36,6 +40,9 @@ pub(super) struct Column {
     pub index: usize,
     /// Its name in messages.
     pub name: String,
+    /// The columns of traversals: their indices, and whether they are against the order of the rows; empty for a column
+    /// with one value in a row.
+    pub traversals: Vec<(usize, bool)>,
 }
 
 impl Role {
@@ -61,6 +68,11 @@ impl Role {
                 quantity => Role::Reading(quantity, Unit::Times(1.0)),
             });
         }
+        match name {
+            "polar_deg" => return Some(Role::Polar(Unit::Degrees)),
+            "polar_rad" => return Some(Role::Polar(Unit::Times(1.0))),
+            _ => {}
+        }
         if let Some(role) = Role::of_machine(name, request.machine) {
             return Some(role);
         }
@@ -73,6 +85,7 @@ impl Role {
     pub fn same_as(&self, other: &Role) -> bool {
         match (self, other) {
             (Role::Axis(a, _), Role::Axis(b, _)) => a == b,
+            (Role::Polar(_), Role::Polar(_)) => true,
             (Role::Reading(a, _), Role::Reading(b, _)) => a.is_same_as(*b),
             _ => self == other,
         }
@@ -164,7 +177,7 @@ fn own_columns(request: &Request<'_>, file: &Path, header: Option<&Row>) -> Resu
                 help: Some(unknown_column_help(request, name, header, &known)),
             });
         };
-        columns.push(Column { role, index, name: name.clone() });
+        columns.push(Column { role, index, name: name.clone(), traversals: Vec::new() });
     }
     Ok(columns)
 }
@@ -219,12 +232,26 @@ fn mapped_columns(
             };
             return Err(fault(format!("[columns] has the unknown column `{}`", entry.own), help));
         };
-        let index = match &entry.foreign {
+        let of_one = |foreign: &ForeignColumn| match foreign {
             ForeignColumn::Number(Count(number)) => number_in(*number, file, first.cells.len()),
             ForeignColumn::Name(name) => name_in(name, request, file, header),
+            ForeignColumn::Traversals(_) => {
+                Err(("a traversal has one column".to_string(), "name it, or state its number".to_string()))
+            }
+        };
+        let traversals = match &entry.foreign {
+            ForeignColumn::Traversals(traversals) => traversals_in(traversals, &role, of_one),
+            _ => Ok(Vec::new()),
         }
         .map_err(|(message, help)| fault(message, help))?;
-        if let Some(other) = columns.iter().position(|column| column.index == index) {
+        let index = match traversals.first() {
+            Some((index, _)) => Ok(*index),
+            None => of_one(&entry.foreign),
+        }
+        .map_err(|(message, help)| fault(message, help))?;
+        let is_read =
+            |column: &Column| column.index == index || column.traversals.iter().any(|(other, _)| *other == index);
+        if let Some(other) = columns.iter().position(is_read) {
             return Err(fault(
                 format!(
                     "[columns] reads column {} of {} twice: as `{}` and as `{}`",
@@ -238,9 +265,9 @@ fn mapped_columns(
         }
         let name = match &entry.foreign {
             ForeignColumn::Name(name) => name.clone(),
-            ForeignColumn::Number(_) => entry.own.clone(),
+            ForeignColumn::Number(_) | ForeignColumn::Traversals(_) => entry.own.clone(),
         };
-        columns.push(Column { role, index, name });
+        columns.push(Column { role, index, name, traversals });
     }
     match header {
         Some(header) if are_readings(request, mapped, &columns, header) => Err(ModelError::Input {
@@ -253,6 +280,34 @@ fn mapped_columns(
         }),
         _ => Ok(columns),
     }
+}
+
+/// The columns of traversals, forward and backward in turn, and whether they are against the order of the rows.
+fn traversals_in(
+    traversals: &Traversals,
+    role: &Role,
+    of_one: impl Fn(&ForeignColumn) -> Result<usize, Fault>,
+) -> Result<Vec<(usize, bool)>, Fault> {
+    if !matches!(role, Role::Reading(..)) {
+        let help = "positions, times and runs have one column; only readings stand side by side";
+        return Err(("`forward` and `backward` belong to a column of readings".into(), help.into()));
+    }
+    let (forward, backward) = (&traversals.forward.0, &traversals.backward.0);
+    let mut found = Vec::new();
+    for number in 0..forward.len().max(backward.len()) {
+        for (columns, is_backward) in [(forward, false), (backward, true)] {
+            if let Some(column) = columns.get(number) {
+                found.push((of_one(column)?, is_backward));
+            }
+        }
+    }
+    if found.is_empty() {
+        return Err((
+            "neither `forward` nor `backward` names a column".into(),
+            "name the columns of the traversals".into(),
+        ));
+    }
+    Ok(found)
 }
 
 /// Whether the first row is a row of readings instead of a header: columns are given by number only, and all of them

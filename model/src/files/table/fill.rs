@@ -14,8 +14,8 @@ use super::{duplicates, required};
 use crate::error::{Location, ModelError};
 use crate::instrument::column::{OF_ROTATION, Quantity};
 use crate::instrument::{Fault, MAX_CHANNELS};
-use crate::session::check;
 use crate::session::readings::{Origin, Readings};
+use crate::session::{check, trajectory};
 
 /// Largest number of sockets in a file.
 const MAX_SOCKETS: usize = 1000;
@@ -119,16 +119,27 @@ pub(super) fn read(
         }
         Ok::<(), ModelError>(())
     };
-    if header.is_none() {
-        push(&mut filled, &first)?;
-    }
-    while let Some(row) = rows.next_row()? {
+    let traversals = filled.traversals(file)?;
+    let mut all = Vec::new();
+    let mut next = header.is_none().then_some(first);
+    while let Some(row) = next.take().map_or_else(|| rows.next_row(), |row| Ok(Some(row)))? {
         if row.cells.len() != width {
             return Err(wrong_width(file, &row, width, &request.format));
         }
-        push(&mut filled, &row)?;
+        if traversals == 0 { push(&mut filled, &row)? } else { all.push(row) }
     }
-    filled.complete(filled.line.len());
+    for traversal in 0..traversals {
+        let is_backward = filled.begin(traversal);
+        for place in 0..all.len() {
+            let row = &all[if is_backward { all.len() - 1 - place } else { place }];
+            // An empty cell is a position that this traversal did not read.
+            if !filled.reads_nothing(&FileRow { file, row, format: &request.format }) {
+                push(&mut filled, row)?;
+                filled.readings.run.push(traversal as i64 + 1);
+            }
+        }
+    }
+    filled.complete(filled.line.len())?;
     let warning = filled.remove_duplicates(file);
     match filled.line[..] {
         [] => Err(empty("a header without readings")),
@@ -178,6 +189,8 @@ pub(super) struct Filled<'a> {
     /// The socket of each row, as an index into `sockets`.
     socket: Vec<usize>,
     sockets: Vec<String>,
+    /// The polar angle of each row on a circle, rad; empty without such a column.
+    polar: Vec<f64>,
     /// A hash of the cells of each row, over all columns; empty if there can be no copies.
     pub cells: Vec<u64>,
 }
@@ -207,11 +220,55 @@ impl<'a> Filled<'a> {
                 Role::Run => readings.run.reserve_exact(rows),
                 Role::Driver(name) => _ = readings.drivers.insert(name.clone(), Vec::with_capacity(rows)),
                 Role::Axis(axis, _) => readings.positions[*axis].reserve_exact(rows),
-                Role::Reading(..) | Role::Socket => {}
+                Role::Reading(..) | Role::Socket | Role::Polar(_) => {}
             }
         }
         let (line, socket, sockets, cells) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Filled { request, columns, channel, from_nominal, readings, line, socket, sockets, cells }
+        let polar = Vec::new();
+        Filled { request, columns, channel, from_nominal, readings, line, socket, sockets, polar, cells }
+    }
+
+    /// The number of traversals whose readings stand side by side; 0 if each row is a reading.
+    fn traversals(&self, file: &Path) -> Result<usize, ModelError> {
+        let counts = self.columns.iter().filter(|column| !column.traversals.is_empty());
+        let counts: Vec<usize> = counts.map(|column| column.traversals.len()).collect();
+        let Some(first) = counts.first() else { return Ok(0) };
+        let fault = |message: &str, help: &str| ModelError::Input {
+            location: Location::file(file),
+            message: message.to_string(),
+            help: Some(help.to_string()),
+        };
+        if self.columns.iter().any(|column| matches!(column.role, Role::Time | Role::Run)) {
+            return Err(fault(
+                "a time or a run for readings of several traversals in a row",
+                "remove `time_s` and `run` from [columns]: `forward` and `backward` number the runs",
+            ));
+        }
+        let is_reading = |column: &&Column| matches!(column.role, Role::Reading(..));
+        if self.columns.iter().filter(is_reading).any(|column| column.traversals.len() != *first) {
+            return Err(fault(
+                "columns of readings with different numbers of traversals",
+                "name a column of each reading for every traversal in `forward` and `backward`",
+            ));
+        }
+        Ok(*first)
+    }
+
+    /// Reads the columns of a traversal from now on; whether it is against the order of the rows.
+    fn begin(&mut self, traversal: usize) -> bool {
+        let mut is_backward = false;
+        for column in &mut self.columns {
+            if let Some((index, backward)) = column.traversals.get(traversal) {
+                (column.index, is_backward) = (*index, *backward);
+            }
+        }
+        is_backward
+    }
+
+    /// Whether the cells of all readings are empty.
+    fn reads_nothing(&self, row: &impl Cells) -> bool {
+        let mut readings = self.columns.iter().filter(|column| matches!(column.role, Role::Reading(..)));
+        readings.all(|column| row.lacks(column))
     }
 
     /// Whether a row may lack a channel.
@@ -270,6 +327,7 @@ impl<'a> Filled<'a> {
                     }
                 }
                 Role::Axis(axis, unit) => readings.positions[*axis].push(unit.to_internal(value)),
+                Role::Polar(unit) => self.polar.push(unit.to_internal(value)),
                 Role::Reading(Quantity::Quaternion(component), _) => quaternion[*component] = value,
                 Role::Reading(quantity, unit) => {
                     let value = unit.to_internal(value);
@@ -303,8 +361,21 @@ impl<'a> Filled<'a> {
         &self.columns
     }
 
-    /// Completes the columns: the axes without one stay where the test holds them.
-    pub fn complete(&mut self, rows: usize) {
+    /// Completes the columns: the axes without one stay where the test holds them, or follow the angle on a circle.
+    ///
+    /// # Errors
+    /// If the axes of the circle are not at right angles.
+    pub fn complete(&mut self, rows: usize) -> Result<(), ModelError> {
+        if !self.polar.is_empty()
+            && let Some(states) = trajectory::on_circle(self.request.machine, self.request.test, &self.polar)
+        {
+            let states = states.map_err(|(message, help)| ModelError::Session { message, help })?;
+            for (axis, positions) in self.readings.positions.iter_mut().enumerate() {
+                if positions.is_empty() {
+                    *positions = states.iter().map(|state| state[axis]).collect();
+                }
+            }
+        }
         for (positions, at) in self.readings.positions.iter_mut().zip(&self.request.test.at) {
             if positions.is_empty() {
                 *positions = vec![*at; rows];
@@ -321,6 +392,7 @@ impl<'a> Filled<'a> {
             }
             self.readings.observed = observed;
         }
+        Ok(())
     }
 
     /// Whether a column tells copies of rows from repeats.

@@ -45,7 +45,7 @@ fn socket_key(request: &Request<'_>) -> String {
     let foreign =
         mapped.filter(|entry| entry.own.eq_ignore_ascii_case("socket")).find_map(|entry| match &entry.foreign {
             ForeignColumn::Name(name) => Some(name.clone()),
-            ForeignColumn::Number(_) => None,
+            ForeignColumn::Number(_) | ForeignColumn::Traversals(_) => None,
         });
     foreign.unwrap_or("socket".into())
 }

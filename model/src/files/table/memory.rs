@@ -120,7 +120,7 @@ pub(crate) fn read(given: &[MemoryColumn<'_>], request: &Request<'_>) -> Result<
     for row in 0..found {
         filled.push(&item(row))?;
     }
-    filled.complete(found);
+    filled.complete(found)?;
     let mut warnings = Vec::new();
     if found < rows {
         warnings.push(missing::warning(&marks, rows, found));
@@ -161,7 +161,7 @@ fn roles(given: &[MemoryColumn<'_>], request: &Request<'_>) -> Result<Vec<Column
             let message = format!("`{name}` has {} values, `{first}` has {count}", values.len());
             return Err((message, "all columns have one value for each reading".into()));
         }
-        columns.push(Column { role, index, name: (*name).to_string() });
+        columns.push(Column { role, index, name: (*name).to_string(), traversals: Vec::new() });
     }
     Ok(columns)
 }

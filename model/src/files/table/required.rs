@@ -4,6 +4,7 @@ use super::columns::{Column, Role, known, listed};
 use super::request::Request;
 use crate::instrument::Fault;
 use crate::instrument::column::Quantity;
+use crate::session::motion::Motion;
 
 /// Returns a fault if one of them is missing.
 pub(super) fn required(request: &Request<'_>, columns: &[Column], header: Option<&[String]>) -> Result<(), Fault> {
@@ -21,7 +22,19 @@ pub(super) fn required(request: &Request<'_>, columns: &[Column], header: Option
         return missing(what, help);
     }
     let moved = request.moved();
-    let is_read = |index: usize| has(&|role| matches!(role, Role::Axis(own, _) if *own == index));
+    let on_circle = match &request.test.motion {
+        Some(Motion::Circle { first, second, .. }) => Some([*first, *second]),
+        _ => None,
+    };
+    let by_angle = has(&|role| matches!(role, Role::Polar(_)));
+    if by_angle && on_circle.is_none() {
+        let help = "state the circle: `path = { kind = \"circle\", plane = \"XY\", radius_mm = 100, … }`";
+        return Err(("a polar angle, but the test states no circle".into(), help.into()));
+    }
+    let is_read = |index: usize| {
+        by_angle && on_circle.is_some_and(|axes| axes.contains(&index))
+            || has(&|role| matches!(role, Role::Axis(own, _) if *own == index))
+    };
     for (index, axis) in request.machine.axes.iter().enumerate() {
         if request.at_listed.get(index) == Some(&true) || is_read(index) {
             continue;
