@@ -3,12 +3,15 @@
 use abbe_apply::ApplyError;
 use abbe_apply::compensation::{self, Compensation};
 use abbe_apply::export::control::{self, ENTRIES, EntryChoice, KinematicTable};
-use abbe_apply::export::dh::{self, DhTable};
+use abbe_apply::export::dh::{self, DhTable, DhUncertainty};
+use abbe_apply::export::neutral::{self, AxisPlace};
 use abbe_apply::export::travel::Travel;
-use abbe_apply::export::{left_out, urdf};
+use abbe_apply::export::{left_out, urdf, urdf_patch};
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_identify::parameters::Role;
 use abbe_model::component::{ErrorKind, ErrorName};
+use abbe_model::files::Source;
+use abbe_model::files::robot::dh::{self as table, Convention};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -49,17 +52,31 @@ pub struct ExportOptions {
     pub entries: EntryChoice,
     /// The travel over which the error of the entries counts.
     pub travel: Travel,
+    /// The URDF file whose origins are changed, and the link at which its chain ends.
+    pub patch: Option<(Source, Option<String>)>,
+    /// The convention of Denavit-Hartenberg parameters.
+    pub convention: Convention,
+    /// The maker's table, near whose frames the calibrated ones lie.
+    pub dh: Option<Source>,
 }
 
 impl ExportOptions {
     /// The tool point of the model, and the entries that leave the least error over the measured range.
     pub fn of(model: &IdentifiedModel) -> ExportOptions {
-        ExportOptions { tool_mm: model.tool_mm, entries: EntryChoice::Best, travel: Travel::measured(model) }
+        ExportOptions {
+            tool_mm: model.tool_mm,
+            entries: EntryChoice::Best,
+            travel: Travel::measured(model),
+            patch: None,
+            convention: Convention::Modified,
+            dh: None,
+        }
     }
 }
 
 /// The formats.
-pub const FORMATS: [ExportFormat; 7] = [
+pub const FORMATS: [ExportFormat; 8] = [
+    ExportFormat::new("table", "where each axis is: point and direction, for any control", of_table),
     ExportFormat::new("urdf", "URDF of the calibrated chain", of_urdf),
     ExportFormat::new("dh", "Denavit-Hartenberg parameters, calibrated and nominal", of_dh),
     ExportFormat::new("linuxcnc", "LinuxCNC, xyzac-trt-kins and xyzbc-trt-kins", |model, options| {
@@ -93,6 +110,18 @@ pub struct ExportResult {
     /// Those of the machine without errors.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nominal: Option<DhTable>,
+    /// Standard uncertainties of the Denavit-Hartenberg parameters.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub dh_u: Vec<DhUncertainty>,
+    /// The order of their covariance, such as `J2.a_mm`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub dh_parameters: Vec<String>,
+    /// Their covariance, mm and degrees.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub dh_covariance: Vec<Vec<f64>>,
+    /// Where each axis is.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub axes: Vec<AxisPlace>,
     /// Changes of a control's kinematic parameters.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kinematics: Option<KinematicTable>,
@@ -126,6 +155,9 @@ impl ExportFormat {
     /// An option that is stated and that this format does not take.
     pub fn ignored(&self, options: &ExportOptions) -> Option<&'static str> {
         match options {
+            ExportOptions { patch: Some(_), .. } if self.word != "urdf" => Some("patch"),
+            ExportOptions { dh: Some(_), .. } if self.word != "dh" => Some("dh"),
+            ExportOptions { convention: Convention::Standard, .. } if self.word != "dh" => Some("convention"),
             _ if self.takes_entries => None,
             ExportOptions { entries: EntryChoice::Plain, .. } => Some("entries"),
             ExportOptions { travel: Travel { is_measured: false, .. }, .. } => Some("travel"),
@@ -150,15 +182,30 @@ fn tabled(header: String, table: Table, result: ExportResult) -> Result<Exported
 
 fn of_urdf(model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, ApplyError> {
     let result = ExportResult { left_out: left_out(model), ..ExportResult::default() };
-    Ok(Exported { text: urdf::urdf(model, options.tool_mm)?.into_bytes(), table: None, result })
+    let text = match &options.patch {
+        Some((source, tip)) => urdf_patch::patched(model, source, tip.as_deref())?,
+        None => urdf::urdf(model, options.tool_mm)?,
+    };
+    Ok(Exported { text: text.into_bytes(), table: None, result })
+}
+
+fn of_table(model: &IdentifiedModel, _: &ExportOptions) -> Result<Exported, ApplyError> {
+    let axes = neutral::places(model)?;
+    let table = present::places(&axes);
+    let result = ExportResult { axes, left_out: left_out(model), ..ExportResult::default() };
+    tabled(present::places_header(), table, result)
 }
 
 fn of_dh(model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, ApplyError> {
-    let [calibrated, nominal] = dh::tables(model, options.tool_mm)?;
-    let table = present::dh(&calibrated, &nominal);
+    let own = options.dh.as_ref().map(|source| table::read(source, options.convention)).transpose()?;
+    let found = dh::tables(model, options.tool_mm, options.convention, own.as_ref())?;
+    let table = present::dh(&found);
     let result = ExportResult {
-        calibrated: Some(calibrated),
-        nominal: Some(nominal),
+        dh_parameters: found.ids(),
+        calibrated: Some(found.calibrated),
+        nominal: Some(found.nominal),
+        dh_u: found.u,
+        dh_covariance: found.covariance,
         left_out: left_out(model),
         ..ExportResult::default()
     };

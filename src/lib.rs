@@ -12,6 +12,7 @@
 //! | closed forms and their languages | [`codegen`] |
 //! | results as JSON documents, parameters of equations by name | [`document`], [`equation`] |
 //! | exports of a model | [`exports`] |
+//! | foreign files of readings as a session | [`import`] |
 //! | many sessions of many machines | [`fleet`] |
 //!
 //! The change that a simulated error of 10 µm makes is what the equation of the same test says, −R·sin C/L₀:
@@ -58,6 +59,7 @@ pub mod equation;
 pub mod exports;
 #[cfg(feature = "fleet")]
 pub mod fleet;
+pub mod import;
 #[doc(hidden)]
 pub mod printers;
 #[doc(hidden)]

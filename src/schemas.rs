@@ -24,6 +24,7 @@ use crate::fleet::record::Record;
 use crate::fleet::run::RunResult;
 use crate::fleet::study::file::StudyFile;
 use crate::fleet::study::summary::StudyResult;
+use crate::import::ImportResult;
 
 /// A file.
 pub struct FileSchema {
@@ -58,6 +59,7 @@ pub const SCHEMAS: &[FileSchema] = &[
     file("simulate", "`abbe simulate --json`", of::<SimulationResult>),
     file("map", "`abbe volumetric --map --json`", of::<Summary>),
     file("compare", "`abbe compare --json`", of::<StatedComparison>),
+    file("import", "`abbe import --json`", of::<ImportResult>),
     file("export", "`abbe export --json`", of::<ExportResult>),
     file("compensate", "`abbe compensate --json`", of::<stream::Summary>),
     file("run", "`abbe run --json`", of::<RunResult>),

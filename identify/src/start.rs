@@ -1,8 +1,12 @@
 //! Start values without user input: poses of instruments that stand beside the machine, orientations of bodies at the
-//! tool, positions of sockets.
+//! tool, positions of sockets, targets and balls.
+
+mod target;
 
 use abbe_model::instrument::{Group, InstrumentKind, SharedBy, Station};
 use abbe_model::session::{Session, Test};
+
+pub use target::with_targets;
 
 /// The stations of the tests, with start values for free poses and sockets from which the iterations converge.
 pub fn stations(session: &Session, tests: &[Test]) -> Vec<Station<f64>> {

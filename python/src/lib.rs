@@ -4,7 +4,7 @@
 //! - [`machine`], [`session`], [`fit`], [`trace`], [`plan`], [`equation`], [`model`]: one file per handle;
 //! - [`keywords`]: keywords as the keys of a session file; [`pickle`]: the state of a session;
 //! - [`work`]: computations without the GIL, with Ctrl-C, progress and a bound on the threads;
-//! - [`fleet`]: units of work of many sessions;
+//! - [`import`]: foreign files of readings; [`fleet`]: units of work of many sessions;
 //! - [`show`]: tables, figures and reports; [`failed`]: errors as exceptions.
 
 #![cfg_attr(
@@ -17,6 +17,7 @@ mod equation;
 mod failed;
 mod fit;
 mod fleet;
+mod import;
 mod keywords;
 mod machine;
 mod model;
@@ -44,6 +45,7 @@ fn _abbe(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<show::Table>()?;
     module.add_class::<show::Figure>()?;
     module.add_function(wrap_pyfunction!(equation::equation, module)?)?;
+    module.add_function(wrap_pyfunction!(import::import_readings, module)?)?;
     module.add_function(wrap_pyfunction!(pickle::pickled, module)?)?;
     module.add_function(wrap_pyfunction!(pickle::unpickled, module)?)?;
     module.add_function(wrap_pyfunction!(fleet::run_session, module)?)?;

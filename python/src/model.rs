@@ -12,6 +12,7 @@ use abbe::identify::model_file::{self, IdentifiedModel};
 use abbe::identify::unit::ARCSEC;
 use abbe::identify::validate::{self, validate};
 use abbe::model::files;
+use abbe::model::files::robot::dh::Convention;
 use abbe::model::pose::Aim;
 use abbe::model::session::readings::Readings;
 use abbe::report::block::Report;
@@ -88,22 +89,37 @@ impl Model {
     }
 
     /// The file of `abbe export`; `travel` has axes with their ranges, mm or degrees.
+    #[pyo3(signature = (format, tool_mm, entries, travel, patch=None, tip=None, convention="modified", dh=None))]
     fn export(
         &self,
         format: &str,
         tool_mm: Option<[f64; 3]>,
         entries: &str,
         travel: Vec<(String, [f64; 2])>,
+        patch: Option<PathBuf>,
+        tip: Option<String>,
+        convention: &str,
+        dh: Option<PathBuf>,
     ) -> Result<Vec<u8>, Failed> {
         let format = exports::format(format)?;
         let measured = Travel::measured(&self.model);
         let options = ExportOptions {
             tool_mm: tool_mm.unwrap_or(self.model.tool_mm),
             entries: exports::entries(entries)?,
+            convention: Convention::of_word(convention).ok_or_else(|| {
+                Failed::argument(format!("there is no convention `{convention}`"), "standard or modified")
+            })?,
+            dh: dh.map(|file| files::text(&file, "the table")).transpose()?,
+            patch: patch.map(|file| files::text(&file, "the URDF file").map(|source| (source, tip))).transpose()?,
             travel: travel.iter().try_fold(measured, |all, (axis, range)| all.with(&self.model, axis, *range))?,
         };
         if let Some(option) = format.ignored(&options) {
-            return Err(Failed::argument(format!("`{option}` belongs to \"linuxcnc\" and \"fanuc\""), ""));
+            let owner = match option {
+                "patch" => "\"urdf\"",
+                "dh" | "convention" => "\"dh\"",
+                _ => "\"linuxcnc\" and \"fanuc\"",
+            };
+            return Err(Failed::argument(format!("`{option}` belongs to {owner}"), ""));
         }
         Ok(format.export(&self.model, &options)?.text)
     }

@@ -8,6 +8,7 @@ use abbe::apply::export::control::ENTRIES;
 use abbe::exports::{self, ExportOptions, FORMATS};
 use abbe::identify::model_file;
 use abbe::model::files;
+use abbe::model::files::robot::dh::Convention;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 
@@ -55,6 +56,26 @@ pub struct ExportArguments {
     /// Example: --travel A=-30..110 --travel C=-180..180
     #[arg(long, value_name = "AXIS=FROM..TO", allow_hyphen_values = true)]
     travel: Vec<String>,
+    /// With urdf: the URDF file of the robot. The origins of its joints are changed and nothing else.
+    ///
+    /// Example: --as urdf --patch robot.urdf
+    #[arg(long, value_name = "FILE")]
+    patch: Option<PathBuf>,
+    /// The link at which the chain of --patch ends [default: the end of the arm].
+    ///
+    /// Example: --as urdf --patch robot.urdf --tip tool0
+    #[arg(long, value_name = "LINK", requires = "patch", allow_hyphen_values = true)]
+    tip: Option<String>,
+    /// With dh: the convention of the parameters.
+    ///
+    /// Example: --as dh --convention standard
+    #[arg(long, value_parser = values::words(&Convention::WORDS), default_value = "modified")]
+    convention: Convention,
+    /// With dh: the maker's table (CSV, as for `abbe new --from-dh`). The calibrated frames are the nearest to its own.
+    ///
+    /// Example: --as dh --convention standard --dh robot.csv
+    #[arg(long, value_name = "FILE")]
+    dh: Option<PathBuf>,
     #[command(flatten)]
     output: OutputArguments,
 }
@@ -66,13 +87,24 @@ pub fn run(arguments: &ExportArguments) -> Result<(), Failure> {
     let source = files::text(&arguments.model, "the model file")?;
     let model = model_file::of_source(&source)?;
     let format = exports::format(&arguments.format)?;
+    let patch = arguments.patch.as_ref().map(|file| files::text(file, "the URDF file")).transpose()?;
+    outputs.refuse_overwrite(arguments.patch.iter().chain(&arguments.dh).map(PathBuf::as_path))?;
+    let dh = arguments.dh.as_ref().map(|file| files::text(file, "the table")).transpose()?;
     let options = ExportOptions {
+        convention: arguments.convention,
+        dh,
+        patch: patch.map(|source| (source, arguments.tip.clone())),
         tool_mm: values::point_mm("--tool-mm", &arguments.tool_mm, model.tool_mm)?,
         entries: exports::entries(&arguments.entries)?,
         travel: travel::stated(&arguments.travel, &model)?,
     };
     if let Some(option) = format.ignored(&options) {
-        return Err(Failure::CommandLine(format!("`--{option}` belongs to `--as linuxcnc` and `--as fanuc`")));
+        let owner = match option {
+            "patch" => "`--as urdf`",
+            "dh" | "convention" => "`--as dh`",
+            _ => "`--as linuxcnc` and `--as fanuc`",
+        };
+        return Err(Failure::CommandLine(format!("`--{option}` belongs to {owner}")));
     }
     let exported = format.export(&model, &options)?;
     output::write_whole(&arguments.out, &exported.text)?;

@@ -104,6 +104,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
         output::write_whole(path, &output::csv(&readings::residuals(&problem, &found))?)?;
     }
     let mut result = fit::report(&problem, &found)?;
+    arguments.session.refuse_implausible(&result.plausibility)?;
     if let Some(draws) = &draws {
         propagation::add_monte_carlo(&problem, &found, draws, &mut result)?;
     }

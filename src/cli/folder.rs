@@ -1,10 +1,11 @@
 //! Folders of files, written completely or not at all.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use abbe::temporary::{self, TemporaryFolder};
 
 use super::failure::Failure;
+use super::output;
 
 /// A file to write: its name in the folder, with the names of folders within it, and its contents.
 pub type NewFile = (String, String);
@@ -36,7 +37,7 @@ pub fn write(
     for (name, contents) in files {
         make_folder_of(&whole.join(name))?;
         // An error names the final path, not the temporary one.
-        super::output::write_whole(&whole.join(name), contents.as_ref()).map_err(|failure| match failure {
+        output::write_whole(&whole.join(name), contents.as_ref()).map_err(|failure| match failure {
             Failure::Write { source, .. } => self::fault(&folder.join(name), source),
             other => other,
         })?;
@@ -49,6 +50,17 @@ pub fn write(
         }
     } else {
         std::fs::rename(&whole, folder).map_err(fault)?;
+    }
+    Ok(())
+}
+
+/// Writes files into an existing folder in their order, except those that are named as `present` already.
+pub fn add(folder: &Path, files: &[(String, Vec<u8>)], present: &[PathBuf]) -> Result<(), Failure> {
+    for (name, contents) in files {
+        let path = folder.join(name);
+        if !present.iter().any(|file| output::is_same(file, &path)) {
+            output::write_whole(&path, contents)?;
+        }
     }
     Ok(())
 }

@@ -16,6 +16,7 @@ mod fit;
 mod folder;
 mod forms;
 mod history;
+mod import;
 mod interrupt;
 mod json;
 mod map;
@@ -45,12 +46,14 @@ mod volumetric;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use abbe::identify::plausibility::{self, ConflictKind, Plausibility};
 use abbe::model::files::{self, ReadOptions, SourceMap};
 use abbe::model::session::Session;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use crate::report::commands::Commands;
 use failure::Failure;
+use message::{Kind, tell};
 use output::Outputs;
 use results::OutputArguments;
 
@@ -135,6 +138,9 @@ enum Command {
     /// Analyse many sessions and keep the results: a second run computes only what is missing or changed.
     #[command(after_help = run::HELP)]
     Run(run::RunArguments),
+    /// Read foreign files of readings: guess their layout, columns and units, and write a session.
+    #[command(after_help = import::HELP)]
+    Import(import::ImportArguments),
     /// Show the parameters of machines over time: drifts, steps, control charts, the next check.
     #[command(after_help = history::HELP)]
     History(history::HistoryArguments),
@@ -168,7 +174,8 @@ pub struct SessionArguments {
     /// Example: --data measurements
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Allow the session to read files outside its own folder and the folder of --data.
+    /// Allow the session to read files outside its own folder and the folder of --data; in fit, also location errors of a
+    /// robot above 5 % of a link.
     #[arg(long)]
     allow_outside: bool,
 }
@@ -177,6 +184,16 @@ impl SessionArguments {
     /// Options of the reader.
     fn options(&self) -> ReadOptions {
         ReadOptions { data_directory: self.data.clone(), allow_outside: self.allow_outside, ..ReadOptions::default() }
+    }
+
+    /// Refuses estimates that mean nothing: location errors of a robot that are a large share of its links.
+    fn refuse_implausible(&self, found: &Plausibility) -> Result<(), Failure> {
+        let conflict = found.conflicts.iter().find(|conflict| conflict.kind == ConflictKind::LocationError);
+        let Some(conflict) = conflict.filter(|_| !self.allow_outside) else { return Ok(()) };
+        let why = plausibility::explained(found);
+        let why = why.unwrap_or_else(|| "check the units, signs and order of the columns".to_string());
+        tell(Kind::Note, "--allow-outside accepts it");
+        Err(Failure::Other(format!("{}; {why}", conflict.words)))
     }
 
     /// How command lines name the session.
@@ -209,7 +226,26 @@ pub fn run() -> ExitCode {
             return ExitCode::from(2);
         }
     };
-    let outcome = match command {
+    match execute(command, quiet) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(_) if interrupt::is_terminated() => ExitCode::from(interrupt::status()),
+        Err(failure) => {
+            failure.show();
+            ExitCode::from(failure.status())
+        }
+    }
+}
+
+/// Runs another command line as a part of a command.
+fn again(arguments: &[&str], quiet: bool) -> Result<(), Failure> {
+    let words = std::iter::once("abbe").chain(arguments.iter().copied());
+    let parsed = Arguments::try_parse_from(words).map_err(|wrong| Failure::CommandLine(wrong.to_string()))?;
+    execute(parsed.command, quiet)
+}
+
+/// Runs a command.
+fn execute(command: Command, quiet: bool) -> Result<(), Failure> {
+    match command {
         Command::Equation(arguments) => equation::run(&arguments),
         Command::Volumetric(arguments) => volumetric::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
@@ -227,6 +263,7 @@ pub fn run() -> ExitCode {
             Ok(())
         }
         Command::History(arguments) => history::run(&arguments),
+        Command::Import(arguments) => import::run(&arguments),
         Command::Run(arguments) => run::run(&arguments),
         Command::Schema(arguments) => schema::run(&arguments),
         Command::Sheet(arguments) => sheet::run(&arguments, quiet),
@@ -234,14 +271,6 @@ pub fn run() -> ExitCode {
         Command::Study(arguments) => study::run(&arguments),
         Command::Trace(arguments) => trace::run(&arguments),
         Command::Validate(arguments) => validate::run(&arguments),
-    };
-    match outcome {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(_) if interrupt::is_terminated() => ExitCode::from(interrupt::status()),
-        Err(failure) => {
-            failure.show();
-            ExitCode::from(failure.status())
-        }
     }
 }
 
@@ -337,6 +366,10 @@ mod tests {
                     "export" => &["MODEL", "--as", "urdf", "--out", "OUT"],
                     "nc" if example.contains("--control") => &["SESSION", "--out", "OUT"],
                     "nc" => &["SESSION", "--control", "linuxcnc", "--out", "OUT"],
+                    "import" if example.contains("--out") || example.contains("--machine") => {
+                        &["FILE", "--machine", "M", "--out", "OUT"]
+                    }
+                    "import" => &["FILE", "--session", "S"],
                     "compare" => &["A", "B"],
                     "compensate" => &["MODEL", "FILE", "--out", "OUT"],
                     "validate" => &["MODEL", "SESSION"],

@@ -1,5 +1,6 @@
-//! `abbe new`: create a machine and a session from a template or from a structural code.
+//! `abbe new`: create a machine and a session from a template, a structural code, or the file of a robot.
 
+mod robot;
 mod templates;
 
 use std::path::PathBuf;
@@ -17,12 +18,14 @@ pub const HELP: &str = "Examples:
   abbe new
   abbe new mymachine --template hermle-c600u
   abbe new mine --from-code \"[wCXbYZAt]\"
+  abbe new arm --from-urdf robot.urdf --tip tool0 --target-mm 0,0,60
+  abbe new arm2 --from-dh robot.csv --convention standard --measured-by sockets
 
-The first lists the templates. The last creates machine.toml and plan.toml with a comment on each line; `abbe plan mine/plan.toml` analyses them.";
+The first lists the templates. --from-code creates machine.toml and plan.toml with a comment on each line; `abbe plan mine/plan.toml` analyses them. --from-urdf reads links, joints and limits; --from-dh a table with the columns a, alpha, d, theta, one row for each joint. A plan for a tracker turns each joint alone; one for sockets has three of them.";
 
 /// `abbe new [DIR --template NAME | DIR --from-code CODE]`
 #[derive(Args)]
-#[command(group = clap::ArgGroup::new("start").args(["template", "from_code"]))]
+#[command(group = clap::ArgGroup::new("start").args(["template", "from_code", "from_urdf", "from_dh"]))]
 pub struct NewArguments {
     /// The new folder. Without it, the templates are listed.
     #[arg(requires = "start")]
@@ -37,6 +40,8 @@ pub struct NewArguments {
     /// Example: --from-code [wCXbYZAt]
     #[arg(long, value_name = "CODE", requires = "folder")]
     from_code: Option<String>,
+    #[command(flatten)]
+    robot: robot::RobotArguments,
     /// List the templates.
     #[arg(long)]
     list: bool,
@@ -54,7 +59,7 @@ pub fn run(arguments: &NewArguments, quiet: bool) -> Result<(), Failure> {
     let files = match (&arguments.template, &arguments.from_code) {
         (Some(name), _) => copied(name)?,
         (None, Some(code)) => of_code(code)?,
-        (None, None) => return Ok(()),
+        (None, None) => arguments.robot.files()?,
     };
     folder::write(folder, &files, arguments.force, |_| Ok(()))?;
     if quiet {

@@ -4,7 +4,10 @@ use std::path::Path;
 
 use abbe::apply::compare::workspace::AxisRange;
 use abbe::apply::export::control::{EntryChoice, KinematicTable};
-use abbe::apply::export::dh::{DhTable, FixedPose};
+use abbe::apply::export::dh::{DhTables, FixedPose, PARAMETERS};
+use abbe::apply::export::neutral::AxisPlace;
+
+use abbe::model::files::robot::dh::Convention;
 
 use super::block::Report;
 use super::table::{Cell, Column, Table, cells, numbers};
@@ -19,28 +22,62 @@ pub fn report(machine: &str, file: &Path, table: Option<Table>, left_out: &[Stri
     report
 }
 
-/// The parameters of each joint, calibrated and nominal, between the poses of base and tool.
-pub fn dh(calibrated: &DhTable, nominal: &DhTable) -> Table {
-    let names = ["a_mm", "alpha_deg", "beta_deg", "theta_deg", "d_mm"];
+/// Where each axis is, one row for each coordinate.
+pub fn places(axes: &[AxisPlace]) -> Table {
+    let columns = ["axis", "kind", "entry", "unit"].map(Column::from).into_iter();
+    let columns = columns.chain(["nominal", "identified", "change", "u"].map(numbers));
+    let mut rows: Vec<Vec<Cell>> = Vec::new();
+    for axis in axes {
+        let points = axis.point_mm.iter().map(|place| ("point", "mm", 6, place));
+        let directions = axis.direction.iter().map(|place| ("direction", "1", 9, place));
+        for (number, (entry, unit, places, place)) in points.chain(directions).enumerate() {
+            let coordinate = ["x", "y", "z"][number % 3];
+            let value = |value: Option<f64>| Cell::or_dash(value.map(|value| Cell::fixed(value, places)));
+            let mut row = cells![&axis.axis, axis.kind.to_string(), format!("{entry} {coordinate}"), unit];
+            row.extend([value(Some(place.nominal)), value(place.identified), value(place.change), value(place.u)]);
+            rows.push(row);
+        }
+    }
+    Table::new(columns, rows)
+}
+
+/// What the file of the places states about itself, as comments.
+pub fn places_header() -> String {
+    "# Where each axis is, in the frame R of the bed with all axes at zero. A rotary axis has a point and a direction, a linear\n\
+     # axis a direction. The point is the one nearest to the nominal point. u is one standard uncertainty of the change.\n\
+     # A dash: the readings do not determine the coordinate.\n"
+        .into()
+}
+
+/// The parameters of each joint, calibrated, with u, and nominal, between the poses of base and tool.
+pub fn dh(found: &DhTables) -> Table {
     let columns = std::iter::once(Column::from("axis"))
-        .chain(names.map(numbers))
-        .chain(names.iter().map(|name| numbers(format!("nominal_{name}"))));
-    let joints = calibrated.joints.iter().zip(&nominal.joints).map(|(own, design)| {
-        let five = |row: &abbe::apply::export::dh::DhRow| {
-            [row.a_mm, row.alpha_deg, row.beta_deg, row.theta_deg, row.d_mm].map(|value| Cell::fixed(value, 9))
-        };
-        std::iter::once(Cell::from(own.axis.clone())).chain(five(own)).chain(five(design)).collect()
+        .chain(PARAMETERS.map(numbers))
+        .chain(PARAMETERS.map(|name| numbers(format!("u_{name}"))))
+        .chain(PARAMETERS.map(|name| numbers(format!("nominal_{name}"))));
+    let joints = found.calibrated.joints.iter().zip(&found.u).zip(&found.nominal.joints).map(|((own, u), design)| {
+        let five = |values: [f64; 5]| values.map(|value| Cell::fixed(value, 9));
+        let u = [u.a_mm, u.alpha_deg, u.beta_deg, u.theta_deg, u.d_mm];
+        let u = u.map(|u| Cell::or_dash(u.map(|u| Cell::fixed(u, 9))));
+        std::iter::once(Cell::from(&own.axis)).chain(five(own.five())).chain(u).chain(five(design.five())).collect()
     });
     let mut table = Table::new(columns, joints);
-    table.notes.push("T = B · Π Tx(a)·Rx(alpha)·Ry(beta)·Rz(theta + q)·Tz(d) · F".into());
+    table.notes.push(
+        match found.convention {
+            Convention::Modified => "T = B · Π Tx(a)·Rx(alpha)·Ry(beta)·Rz(theta + q)·Tz(d) · F",
+            Convention::Standard => "T = B · Π Rz(theta + q)·Tz(d)·Tx(a)·Rx(alpha)·Ry(beta) · F",
+        }
+        .into(),
+    );
     let pose = |name: &str, pose: &FixedPose| {
         let list = |values: [f64; 3]| values.map(|value| format!("{value:.9}")).join(" ");
         format!("{name}: xyz {} mm, rpy {} deg (Rz(yaw)·Ry(pitch)·Rx(roll))", list(pose.xyz_mm), list(pose.rpy_deg))
     };
-    table.notes.push(pose("B", &calibrated.base));
-    table.notes.push(pose("F", &calibrated.tool));
-    table.notes.push(pose("nominal B", &nominal.base));
-    table.notes.push(pose("nominal F", &nominal.tool));
+    table.notes.push(pose("B", &found.calibrated.base));
+    table.notes.push(pose("F", &found.calibrated.tool));
+    table.notes.push(pose("nominal B", &found.nominal.base));
+    table.notes.push(pose("nominal F", &found.nominal.tool));
+    table.notes.push("u is one standard uncertainty; a dash: the readings do not determine the parameter".into());
     table
 }
 
@@ -128,13 +165,18 @@ pub fn kinematics(table: &KinematicTable) -> Table {
 
 #[cfg(test)]
 mod tests {
+    use abbe::apply::export::dh::DhTable;
+
     use super::*;
 
     /// Without the poses at the ends of the product the joints give no position of the tool.
     #[test]
     fn the_file_of_a_robot_holds_the_poses_of_base_and_tool() {
         let base = FixedPose { xyz_mm: [0.0, 0.0, 127.3], ..FixedPose::default() };
-        let header = dh_header(&dh(&DhTable { base, ..DhTable::default() }, &DhTable::default()));
+        let calibrated = DhTable { base, ..DhTable::default() };
+        let (nominal, u, covariance) = (DhTable::default(), Vec::new(), Vec::new());
+        let found = DhTables { convention: Convention::Modified, calibrated, nominal, u, covariance };
+        let header = dh_header(&dh(&found));
         assert!(header.contains("# B: xyz 0.000000000 0.000000000 127.300000000 mm"), "{header}");
         assert!(header.contains("# nominal F: xyz"), "{header}");
         assert!(header.lines().all(|line| line.starts_with("# ")), "{header}");

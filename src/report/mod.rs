@@ -3,7 +3,7 @@
 //! - [`block`]: a report as blocks; [`table`]: a table as data; [`number`]: digits and units; [`figure`]: plots;
 //! - one file per result: [`fit`], [`base`], [`trace`], [`validate`], [`plan`], [`next_test`], [`mod@poses`], [`method`],
 //!   [`repeated`], [`self_calibration`], [`simulation`], [`patterns`], [`volumetric`], [`compare`], [`compensate`],
-//!   [`compensation`], [`export`], [`nc`], `history`, `run`, `study`;
+//!   [`compensation`], [`export`], [`import`], [`nc`], `history`, `run`, `study`;
 //! - parts of several results: [`statements`], [`quality`], [`parameters`], [`effects`], [`confounded`],
 //!   [`cross_validation`], [`circular`], [`conformity`], [`plausibility`], [`mod@pointing`], [`effect`], [`uniqueness`], [`readings`],
 //!   [`session`], [`commands`], [`provenance`];
@@ -26,6 +26,7 @@ pub mod figure;
 pub mod fit;
 #[cfg(feature = "fleet")]
 pub mod history;
+pub mod import;
 pub mod method;
 pub mod nc;
 pub mod next_test;

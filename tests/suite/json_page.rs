@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 use super::{abbe, workspace};
 
 /// The commands, and the subject of `abbe schema` for each.
-const COMMANDS: [(&str, &str); 21] = [
+const COMMANDS: [(&str, &str); 22] = [
     ("abbe fit", "fit"),
     ("abbe fit --repeat", "repeat"),
     ("abbe fit --method circle, cone or two-plane", "geometric"),
@@ -19,6 +19,7 @@ const COMMANDS: [(&str, &str); 21] = [
     ("abbe compare", "compare"),
     ("abbe compensate", "compensate"),
     ("abbe export", "export"),
+    ("abbe import", "import"),
     ("abbe plan", "plan"),
     ("abbe plan --improve, --separate or --range", "next-test"),
     ("abbe plan --global", "global"),

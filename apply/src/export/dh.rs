@@ -1,42 +1,76 @@
-//! Denavit–Hartenberg parameters of a calibrated chain of rotary axes.
-//!
-//! The modified form of Craig (Introduction to Robotics, 1989, ch. 3), with Hayati's angle β where consecutive axes are
-//! nearly parallel (Hayati & Mirmirani, J. Robotic Systems 2 (1985) 397), in which the common normal is ill-defined:
+//! Denavit–Hartenberg parameters of a calibrated chain of rotary axes, nominal and with the standard uncertainty of each.
 //!
 //! ```text
-//! T = B · Π_k Tx(a_k)·Rx(α_k)·Ry(β_k)·Rz(θ_k + q_k)·Tz(d_k) · F
+//! standard:  T = B · Π_k Rz(θ_k + q_k)·Tz(d_k)·Tx(a_k)·Rx(α_k)·Ry(β_k) · F
+//! modified:  T = B · Π_k Tx(a_k)·Rx(α_k)·Ry(β_k)·Rz(θ_k + q_k)·Tz(d_k) · F
 //! ```
 //!
-//! `β_k` is 0 unless axis `k` is nearly parallel to the one before; `Tx` and `Rx` commute, so that this is Craig's order
-//! then. `B` is the pose of the first frame in R, `F` that of the tool frame in the last one.
+//! The modified form is that of Craig (Introduction to Robotics, 1989, ch. 3). `β_k` is Hayati's angle (Hayati & Mirmirani,
+//! J. Robotic Systems 2 (1985) 397): it is 0 unless two consecutive axes are nearly parallel, where the common normal is
+//! ill-defined. `B` is the pose of the first frame in R, `F` that of the tool frame in the last one.
+//!
+//! The nominal table is the maker's own, or one that follows from the nominal machine ([`super::dh_nominal`]). The frames of
+//! the calibrated table are those of its lines that lie nearest to the nominal ones ([`super::dh_frames`]).
 
+use abbe_identify::model_file::IdentifiedModel;
 use abbe_model::axis::AxisKind;
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use abbe_model::component::{ErrorKind, ErrorName};
+use abbe_model::files::robot::dh::{Convention, Table};
+use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::frames::{Branch, location_errors, roll_pitch_yaw, tool_side};
+use super::dh_frames::{self, Frames};
+use super::dh_nominal;
+use super::frames::{location_errors, roll_pitch_yaw, tool_side};
 use crate::ApplyError;
-use abbe_identify::model_file::IdentifiedModel;
 
-/// Sine of the angle between two axes below which they count as parallel.
-const PARALLEL: f64 = 0.02;
-
-/// One joint: `Tx(a)·Rx(α)·Ry(β)·Rz(θ + q)·Tz(d)`.
+/// One joint.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct DhRow {
     /// The axis.
     pub axis: String,
-    /// Length along X of the frame before, mm.
+    /// Length along X, mm.
     pub a_mm: f64,
     /// Angle about X, degrees.
     pub alpha_deg: f64,
-    /// Hayati's angle about Y, degrees; 0 unless the axis is nearly parallel to the one before.
+    /// Hayati's angle about Y, degrees; 0 unless two consecutive axes are nearly parallel.
     pub beta_deg: f64,
     /// Offset of the joint angle, degrees.
     pub theta_deg: f64,
     /// Length along the axis, mm.
     pub d_mm: f64,
+}
+
+impl DhRow {
+    /// The parameters in the order a, α, β, θ, d.
+    pub fn five(&self) -> [f64; 5] {
+        [self.a_mm, self.alpha_deg, self.beta_deg, self.theta_deg, self.d_mm]
+    }
+
+    fn of(axis: &str, [a_mm, alpha_deg, beta_deg, theta_deg, d_mm]: [f64; 5]) -> DhRow {
+        DhRow { axis: axis.to_string(), a_mm, alpha_deg, beta_deg, theta_deg, d_mm }
+    }
+}
+
+/// The names of the parameters in their order.
+pub const PARAMETERS: [&str; 5] = ["a_mm", "alpha_deg", "beta_deg", "theta_deg", "d_mm"];
+
+/// The standard uncertainties of one joint; absent where the readings do not determine the parameter.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct DhUncertainty {
+    /// The axis.
+    pub axis: String,
+    /// Of the length along X, mm.
+    pub a_mm: Option<f64>,
+    /// Of the angle about X, degrees.
+    pub alpha_deg: Option<f64>,
+    /// Of Hayati's angle, degrees.
+    pub beta_deg: Option<f64>,
+    /// Of the offset of the joint angle, degrees.
+    pub theta_deg: Option<f64>,
+    /// Of the length along the axis, mm.
+    pub d_mm: Option<f64>,
 }
 
 /// A fixed pose: `Trans(x, y, z)·Rz(yaw)·Ry(pitch)·Rx(roll)`.
@@ -46,6 +80,15 @@ pub struct FixedPose {
     pub xyz_mm: [f64; 3],
     /// Roll, pitch and yaw, degrees.
     pub rpy_deg: [f64; 3],
+}
+
+impl FixedPose {
+    pub(super) fn of(pose: &Isometry3<f64>) -> FixedPose {
+        FixedPose {
+            xyz_mm: pose.translation.vector.into(),
+            rpy_deg: roll_pitch_yaw(&pose.rotation).map(f64::to_degrees),
+        }
+    }
 }
 
 /// The parameters of a chain.
@@ -59,11 +102,49 @@ pub struct DhTable {
     pub tool: FixedPose,
 }
 
-/// The calibrated table of a model, and the nominal one, with the tool point in the tool frame, mm.
+/// The calibrated and the nominal table of a model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DhTables {
+    /// The convention of both.
+    pub convention: Convention,
+    /// With the identified location errors.
+    pub calibrated: DhTable,
+    /// Of the machine without errors.
+    pub nominal: DhTable,
+    /// The standard uncertainties of the calibrated parameters.
+    pub u: Vec<DhUncertainty>,
+    /// Their covariance, row by row in the order of [`DhTables::ids`]; mm and degrees.
+    pub covariance: Vec<Vec<f64>>,
+}
+
+impl DhTables {
+    /// The parameters of the covariance: `J2.a_mm`, ….
+    pub fn ids(&self) -> Vec<String> {
+        let of_row = |row: &DhRow| PARAMETERS.map(|name| format!("{}.{name}", row.axis));
+        self.calibrated.joints.iter().flat_map(of_row).collect()
+    }
+}
+
+/// Step of a difference, mm and rad.
+const STEP: f64 = 1e-5;
+/// Change along a direction that the readings do not determine, mm and degrees, above which a parameter is not determined.
+const UNDETERMINED: f64 = 1e-6;
+/// Largest distance between an axis of the maker's table and of the machine, mm; and of their directions.
+const SAME_MM: f64 = 1e-3;
+const SAME_DIRECTION: f64 = 1e-6;
+
+/// The tables of a model with its tool point in the tool frame, mm, in a convention: near the maker's `own` table, if it is
+/// given.
 ///
 /// # Errors
-/// If the chain has linear axes or axes on the workpiece side, or its error angles are small-angle matrices.
-pub fn tables(model: &IdentifiedModel, tool_mm: [f64; 3]) -> Result<[DhTable; 2], ApplyError> {
+/// If the chain has linear axes or axes on the workpiece side, its error angles are small-angle matrices, or the maker's
+/// table is not that of its machine.
+pub fn tables(
+    model: &IdentifiedModel,
+    tool_mm: [f64; 3],
+    convention: Convention,
+    own: Option<&Table>,
+) -> Result<DhTables, ApplyError> {
     let machine = &model.machine;
     let rotary = machine.axes.iter().all(|axis| axis.kind == AxisKind::Rotary);
     if !rotary || machine.workpiece_side > 0 || machine.axes.is_empty() {
@@ -74,106 +155,82 @@ pub fn tables(model: &IdentifiedModel, tool_mm: [f64; 3]) -> Result<[DhTable; 2]
         )));
     }
     let names: Vec<String> = machine.axes.iter().map(|axis| axis.name.clone()).collect();
-    let nominal = vec![0.0; machine.error_slots()];
-    let table =
-        |errors: &[f64]| -> Result<DhTable, ApplyError> { Ok(table(&tool_side(machine, errors, tool_mm)?, &names)) };
-    Ok([table(&location_errors(model))?, table(&nominal)?])
-}
-
-/// The frame on an axis: `z` along it, `x` along the normal to the next axis.
-fn table(branch: &Branch, names: &[String]) -> DhTable {
-    let (lines, end) = branch.at_zero();
-    let count = lines.len();
-    // The origin of each frame, and its X.
-    let mut frames: Vec<(Vector3<f64>, Vector3<f64>)> = Vec::with_capacity(count);
-    for k in 0..count {
-        let (point, z) = lines[k];
-        // Where the frame lies along its axis if nothing else decides: where the frame before meets it.
-        let met = match (k, frames.last()) {
-            (1.., Some((origin, _))) => meets(*origin, lines[k - 1].1, point, z),
-            _ => point,
+    let zero = vec![0.0; machine.error_slots()];
+    let design = tool_side(machine, &zero, tool_mm)?;
+    let nominal = match own {
+        Some(table) => of_maker(model, table, convention, design.at_zero().1)?,
+        None => dh_nominal::frames(&design),
+    };
+    let of_errors = |errors: &[f64]| -> Result<(DhTable, Vec<f64>), ApplyError> {
+        let branch = tool_side(machine, errors, tool_mm)?;
+        let (lines, end) = branch.at_zero();
+        let found = dh_frames::near(&nominal, &lines, &end);
+        let rows = found.rows(convention);
+        let joints: Vec<DhRow> = names.iter().zip(&rows).map(|(name, row)| DhRow::of(name, *row)).collect();
+        let table = DhTable { base: FixedPose::of(&found.base), joints, tool: FixedPose::of(&found.tool) };
+        Ok((table, rows.into_iter().flatten().collect()))
+    };
+    let errors = location_errors(model);
+    let (calibrated, _) = of_errors(&errors)?;
+    let (nominal_table, _) = of_errors(&zero)?;
+    let mut columns: Vec<(usize, DVector<f64>)> = Vec::new();
+    for (index, parameter) in model.parameters.iter().enumerate() {
+        let name = ErrorName::parse(&parameter.id).filter(|name| name.kind == ErrorKind::Location);
+        let Some(slot) = name.and_then(|name| machine.error_slot(&name)) else { continue };
+        let moved = |by: f64| {
+            let mut errors = errors.clone();
+            errors[slot] += by;
+            of_errors(&errors).map(|(_, values)| DVector::from_vec(values))
         };
-        frames.push(match lines.get(k + 1) {
-            None => (met, any_normal(&z)),
-            Some((next, next_z)) => {
-                let across = z.cross(next_z);
-                if across.norm() >= PARALLEL {
-                    (foot(point, z, *next, *next_z), across.normalize())
-                } else {
-                    let to = meets(met, z, *next, *next_z) - met;
-                    let normal = to - z * z.dot(&to);
-                    (met, normal.try_normalize(1e-9).unwrap_or_else(|| any_normal(&z)))
-                }
-            }
-        });
+        columns.push((index, (moved(STEP)? - moved(-STEP)?) / (2.0 * STEP)));
     }
-    let frame = |k: usize| pose(frames[k].0, frames[k].1, lines[k].1);
-    // The first frame before its joint: the same axis, its own X.
-    let base = frame(0);
-    let mut joints = vec![DhRow { axis: names[0].clone(), ..DhRow::default() }];
-    for k in 1..count {
-        let before = frame(k - 1);
-        let own = before.inverse() * frame(k);
-        let z = own.rotation * Vector3::z();
-        let (alpha, beta, meeting) = if lines[k - 1].1.cross(&lines[k].1).norm() >= PARALLEL {
-            // The common normal lies on X of the frame before.
-            ((-z.y).atan2(z.z), 0.0, foot_on_x(own.translation.vector, z))
-        } else {
-            let beta = z.x.clamp(-1.0, 1.0).asin();
-            ((-z.y).atan2(z.z), beta, own.translation.vector - z * (own.translation.vector.z / z.z))
-        };
-        let turned = UnitQuaternion::from_scaled_axis(Vector3::x() * alpha)
-            * UnitQuaternion::from_scaled_axis(Vector3::y() * beta);
-        let x = turned.inverse() * (own.rotation * Vector3::x());
-        joints.push(DhRow {
-            axis: names[k].clone(),
-            a_mm: meeting.x,
-            alpha_deg: alpha.to_degrees(),
-            beta_deg: beta.to_degrees(),
-            theta_deg: x.y.atan2(x.x).to_degrees(),
-            d_mm: (own.translation.vector - meeting).dot(&z),
-        });
+    let count = 5 * names.len();
+    let jacobian = DMatrix::from_fn(count, columns.len(), |i, j| columns[j].1[i]);
+    let own = DMatrix::from_fn(columns.len(), columns.len(), |i, j| model.covariance[(columns[i].0, columns[j].0)]);
+    let covariance = &jacobian * own * jacobian.transpose();
+    let is_determined = |i: usize| {
+        let along = |null: &Vec<f64>| columns.iter().map(|(index, column)| column[i] * null[*index]).sum::<f64>();
+        model.null_directions.iter().all(|null| along(null).abs() < UNDETERMINED)
+    };
+    let u = |i: usize| is_determined(i).then(|| covariance[(i, i)].max(0.0).sqrt());
+    let uncertainty = |(joint, name): (usize, &String)| {
+        let [a_mm, alpha_deg, beta_deg, theta_deg, d_mm] = std::array::from_fn(|k| u(5 * joint + k));
+        DhUncertainty { axis: name.clone(), a_mm, alpha_deg, beta_deg, theta_deg, d_mm }
+    };
+    Ok(DhTables {
+        convention,
+        calibrated,
+        nominal: nominal_table,
+        u: names.iter().enumerate().map(uncertainty).collect(),
+        covariance: (0..count).map(|i| (0..count).map(|j| covariance[(i, j)]).collect()).collect(),
+    })
+}
+
+/// The nominal frames of the maker's table.
+fn of_maker(
+    model: &IdentifiedModel,
+    table: &Table,
+    convention: Convention,
+    end: Isometry3<f64>,
+) -> Result<Frames, ApplyError> {
+    let refused =
+        |why: String| Err(ApplyError::Request(format!("the table is not that of the model's machine: {why}")));
+    if table.convention != convention {
+        return refused("its convention is another".into());
     }
-    let tool = frame(count - 1).inverse() * end;
-    DhTable { base: fixed(&base), joints, tool: fixed(&tool) }
-}
-
-/// The point of a line nearest to the X axis: origin and direction in the frame.
-fn foot_on_x(point: Vector3<f64>, z: Vector3<f64>) -> Vector3<f64> {
-    let across = z - Vector3::x() * z.x;
-    let offset = point - Vector3::x() * point.x;
-    let square = across.norm_squared();
-    if square > 0.0 { point - z * (offset.dot(&across) / square) } else { point }
-}
-
-/// The point of a line in the plane through `origin` across `z`.
-fn meets(origin: Vector3<f64>, z: Vector3<f64>, point: Vector3<f64>, direction: Vector3<f64>) -> Vector3<f64> {
-    let along = direction.dot(&z);
-    if along.abs() < PARALLEL {
-        return point;
+    let (frames, _) = table.frames();
+    let joints = table.rows.iter().take_while(|row| row.kind.is_some()).count();
+    let axes = &model.machine.axes;
+    if joints != axes.len() || table.rows[joints..].iter().any(|row| row.kind.is_some()) {
+        return refused(format!("it has {joints} joints before a fixed row, the machine {}", axes.len()));
     }
-    point + direction * ((origin - point).dot(&z) / along)
-}
-
-/// The foot of the common normal with the line `b + t·v` on the line `a + s·u`; the lines are not parallel.
-fn foot(a: Vector3<f64>, u: Vector3<f64>, b: Vector3<f64>, v: Vector3<f64>) -> Vector3<f64> {
-    let (between, cosine) = (b - a, u.dot(&v));
-    a + u * ((between.dot(&u) - cosine * between.dot(&v)) / (1.0 - cosine * cosine))
-}
-
-/// A unit vector across `z`.
-fn any_normal(z: &Vector3<f64>) -> Vector3<f64> {
-    let least = if z.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
-    (least - z * z.dot(&least)).normalize()
-}
-
-fn pose(origin: Vector3<f64>, x: Vector3<f64>, z: Vector3<f64>) -> Isometry3<f64> {
-    let z = z.normalize();
-    let x = (x - z * z.dot(&x)).normalize();
-    let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, z.cross(&x), z]));
-    Isometry3::from_parts(Translation3::from(origin), UnitQuaternion::from_rotation_matrix(&rotation))
-}
-
-fn fixed(pose: &Isometry3<f64>) -> FixedPose {
-    FixedPose { xyz_mm: pose.translation.vector.into(), rpy_deg: roll_pitch_yaw(&pose.rotation).map(f64::to_degrees) }
+    for ((axis, row), frame) in axes.iter().zip(&table.rows).zip(&frames) {
+        let (point, direction) = (frame.translation.vector, frame.rotation * Vector3::z());
+        let off = Vector3::from(axis.origin_mm) - point;
+        let across = (off - direction * off.dot(&direction)).norm();
+        if across > SAME_MM || (Vector3::from(axis.direction) - direction).norm() > SAME_DIRECTION {
+            return refused(format!("joint `{}` is not the axis {}", row.name, axis.name));
+        }
+    }
+    Ok(Frames::of_table(table, joints, &end))
 }

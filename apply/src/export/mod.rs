@@ -1,7 +1,8 @@
 //! The identified location errors as a description of the machine for other programs and for controls.
 //!
 //! - [`frames`]: the chain at its zero position with location errors;
-//! - [`urdf`]: the calibrated chain as URDF; [`dh`]: Denavit–Hartenberg parameters, modified form of Craig with Hayati's
+//! - [`neutral`]: the place of each axis, for any control;
+//! - [`urdf`]: the calibrated chain as URDF; [`urdf_patch`]: the calibrated origins in the URDF file of a robot; [`dh`]: Denavit–Hartenberg parameters, modified form of Craig with Hayati's
 //!   angle for parallel axes;
 //! - [`control`]: kinematic parameters of controls, as far as their models are publicly documented; [`entries`]: those
 //!   that leave the least error over a [`travel`].
@@ -11,10 +12,14 @@
 
 pub mod control;
 pub mod dh;
+mod dh_frames;
+mod dh_nominal;
 pub mod entries;
 pub mod frames;
+pub mod neutral;
 pub mod travel;
 pub mod urdf;
+pub mod urdf_patch;
 
 use abbe_model::component::{ErrorKind, ErrorName};
 

@@ -1,13 +1,14 @@
 //! Exported descriptions, read by kinematics that know the format and not its writer.
 
 use abbe_model::chain::{AxisPosition, Machine};
+use abbe_model::files::robot::dh::Convention;
 use abbe_model::frames::Point;
 use abbe_model::session::Prior;
 use faer::Mat;
 use nalgebra::{Matrix4, Rotation3, Vector3};
 use rand::{Rng, RngExt, SeedableRng};
 
-use super::dh::{DhTable, FixedPose};
+use super::dh::{DhTable, DhTables, FixedPose};
 use super::frames::location_errors;
 use super::{dh, urdf};
 use abbe_identify::model_file::{IdentifiedModel, ModelParameter, Provenance, Quality};
@@ -109,7 +110,8 @@ fn denavit_hartenberg_parameters_give_the_tool_positions_of_the_model() {
     let model = model(machine, &errors);
     let nominal = self::model(robot(), &[]);
     let tool_mm = [-1184.4, -349.3, 12.2];
-    let [calibrated, as_designed] = dh::tables(&model, tool_mm).unwrap();
+    let DhTables { calibrated, nominal: as_designed, .. } =
+        dh::tables(&model, tool_mm, Convention::Modified, None).unwrap();
     for _ in 0..200 {
         let q: Vec<f64> = (0..6).map(|_| 6.0 * random.random::<f64>() - 3.0).collect();
         let off = (of_table(&calibrated, &q) - of_chain(&model, &q, tool_mm)).norm();

@@ -5,11 +5,13 @@
 //!
 //! - set-up parameters far from their stated values, each (`pulls`) and all together;
 //! - a residual of a hundred times the noise in every test;
-//! - poses of which the model explains less than 99 % of the variance (`poses`).
+//! - poses of which the model explains less than 99 % of the variance (`poses`);
+//! - location errors above 5 % of the link, of poses (`locations`).
 //!
 //! Mistakes are found by refits of the session with one statement changed at a time (`hypotheses`, `suggest`).
 
 mod hypotheses;
+mod locations;
 mod poses;
 mod pulls;
 mod quick_fit;
@@ -17,7 +19,7 @@ mod results;
 mod suggest;
 mod tracing;
 
-use abbe_model::session::Prior;
+use abbe_model::session::{Prior, Session};
 
 use abbe_model::words::first_of;
 pub use pulls::{Pull, Pulls};
@@ -128,6 +130,11 @@ pub fn warnings(plausibility: &Plausibility) -> Vec<String> {
         *last = format!("{last}; {words}");
     }
     told
+}
+
+/// The mistakes that may explain what was found, in one sentence.
+pub fn explained(plausibility: &Plausibility) -> Option<String> {
+    in_words(&plausibility.suggestions)
 }
 
 /// The mistakes that may explain the conflicts, in one sentence; those of one kind share a clause.
@@ -254,7 +261,7 @@ fn of_poses(problem: &Problem, fit: &Fit) -> Plausibility {
     let explained = 1.0 - left / spread;
     let suggestions = if explained < WELL_EXPLAINED { poses::suggestions(problem) } else { Vec::new() };
     let little = explained < MIN_EXPLAINED;
-    let conflicts = if little || !suggestions.is_empty() {
+    let mut conflicts = if little || !suggestions.is_empty() {
         vec![Conflict {
             kind: ConflictKind::ExplainedVariance,
             subject: "session".to_string(),
@@ -272,7 +279,14 @@ fn of_poses(problem: &Problem, fit: &Fit) -> Plausibility {
     } else {
         Vec::new()
     };
+    conflicts.extend(locations::conflicts(problem, &fit.beta));
     Plausibility { conflicts, suggestions, explained_variance: Some(explained) }
+}
+
+/// What the nominal machine leaves of the readings with the set-up alone estimated: for poses the share of their spread, for
+/// others the residual, mm. Ways to read one file are compared by it. `None` if the set-up cannot be estimated.
+pub fn nominal_misfit(session: &Session) -> Option<f64> {
+    poses::nominal_misfit(session)
 }
 
 /// Whether any set-up parameter has a stated uncertainty.

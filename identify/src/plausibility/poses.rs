@@ -12,6 +12,7 @@ use super::results::{Suggestion, SuggestionKind};
 use crate::noise::{Noise, NoiseSource};
 use crate::numerics::parallel;
 use crate::problem::Problem;
+use crate::start::with_targets;
 
 /// Poses that are refitted with each mistake.
 const MAX_POSES: usize = 300;
@@ -64,15 +65,27 @@ pub(super) fn spread_mm2(problem: &Problem) -> Option<f64> {
     (spread > 0.0 && spread.is_finite()).then_some(spread)
 }
 
+/// The misfit of the nominal machine: see [`super::nominal_misfit`].
+pub(super) fn nominal_misfit(session: &Session) -> Option<f64> {
+    let noise = Noise::white(NOISE_MM, NoiseSource::Stated);
+    let mut nominal = thinned(&Problem::new(session, noise.clone(), 1).ok()?, MAX_POSES);
+    nominal.unknowns.clear();
+    nominal.effects.clear();
+    let nominal = with_targets(&nominal);
+    let problem = Problem::new(&nominal, noise.clone(), 1).ok()?;
+    Some(trial(&nominal, &noise)?.rms_mm / spread_mm2(&problem).map_or(1.0, f64::sqrt))
+}
+
 /// The mistakes with which the nominal machine fits poses far better, the best first.
 pub(super) fn suggestions(problem: &Problem) -> Vec<Suggestion> {
     let noise = Noise::white(NOISE_MM, NoiseSource::Stated);
     let mut nominal = thinned(problem, MAX_POSES);
     nominal.unknowns.clear();
     nominal.effects.clear();
-    let base_mm = trial(&nominal, &noise).map_or(f64::INFINITY, |found| found.rms_mm);
+    let base_mm = trial(&with_targets(&nominal), &noise).map_or(f64::INFINITY, |found| found.rms_mm);
     let hypotheses = of_poses(&nominal);
-    let found = parallel::map(hypotheses.len(), &|k| trial(&hypotheses[k].session, &noise));
+    // A target without a prior is looked for with each mistake.
+    let found = parallel::map(hypotheses.len(), &|k| trial(&with_targets(&hypotheses[k].session), &noise));
     let mut tried: Vec<(f64, Hypothesis)> =
         found.into_iter().zip(hypotheses).filter_map(|(found, hypothesis)| Some((found?.rms_mm, hypothesis))).collect();
     // Readings that are scaled leave a residual that is scaled with them: compare shares of the spread.
@@ -91,7 +104,7 @@ pub(super) fn suggestions(problem: &Problem) -> Vec<Suggestion> {
         .map(|(_, hypothesis)| Suggestion {
             kind: hypothesis.kind,
             subject: hypothesis.subject,
-            rms_um: trial(&hypothesis.session, &noise).map_or(0.0, |found| found.rms_mm * 1e3),
+            rms_um: trial(&with_targets(&hypothesis.session), &noise).map_or(0.0, |found| found.rms_mm * 1e3),
             words: hypothesis.words,
         })
         .collect()

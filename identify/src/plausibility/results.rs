@@ -29,6 +29,8 @@ pub enum ConflictKind {
     Residual,
     /// The model explains too little of the variance of the measured positions.
     ExplainedVariance,
+    /// A location error is more than 5 % of its link.
+    LocationError,
     /// The session with one of the suggestions fits far better.
     Statement,
 }
@@ -40,11 +42,11 @@ pub struct Conflict {
     pub kind: ConflictKind,
     /// The set-up parameter, or `session`.
     pub subject: String,
-    /// What was found: the estimate of the set-up parameter, χ² of all of them, the residual, or the share of the
-    /// variance; in `unit`.
+    /// What was found: the estimate of the set-up parameter, χ² of all of them, the residual, the share of the variance, or
+    /// the location error; in `unit`.
     pub value: f64,
-    /// What it is compared with, in `unit`: the stated standard uncertainty, the degrees of freedom, the noise, or the
-    /// least share.
+    /// What it is compared with, in `unit`: the stated standard uncertainty, the degrees of freedom, the noise, the least
+    /// share, or 5 % of the link.
     pub stated: f64,
     /// Unit of `value` and `stated`; `1` for none.
     pub unit: String,

@@ -21,7 +21,7 @@ pub(crate) fn is_another_session(plausibility: &Plausibility) -> bool {
         ConflictKind::Residual => true,
         ConflictKind::ExplainedVariance => conflict.value < conflict.stated,
         ConflictKind::Statement => conflict.value > STATEMENT_EXPLAINS * conflict.stated,
-        ConflictKind::SetupParameter | ConflictKind::Setups => false,
+        ConflictKind::SetupParameter | ConflictKind::Setups | ConflictKind::LocationError => false,
     })
 }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use toml_edit::{DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
 use super::of_domain;
-use super::print::{Block, document_of, number_of, table_of};
+use super::print::{Block, document_of, number_of, table_of, value_of};
 use crate::chain::Machine;
 use crate::effect::Effect;
 use crate::error::{Location, ModelError};
@@ -123,6 +123,43 @@ impl SessionText {
                 None => test.insert_after("name", "data", file.as_str().into()),
             }
         }
+    }
+
+    /// States a key of the named test.
+    ///
+    /// # Errors
+    /// If the value has no form in TOML.
+    pub fn set_of_test(&mut self, name: &str, key: &str, value: &impl serde::Serialize) -> Result<(), ModelError> {
+        let value = value_of(value)?;
+        for mut test in tables(&mut self.document, "test") {
+            if test.table().get("name").and_then(Item::as_str) == Some(name) {
+                match test.table().get_mut(key).and_then(Item::as_value_mut) {
+                    Some(old) => replace(old, value.clone()),
+                    None => {
+                        // A table of its own, `[test.columns]`, gives way to one in a line.
+                        test.table().remove(key);
+                        test.insert_after("data", key, value.clone());
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Removes keys of all tests.
+    pub fn remove_of_tests(&mut self, keys: &[&str]) {
+        for mut test in tables(&mut self.document, "test") {
+            keys.iter().for_each(|key| _ = test.table().remove(key));
+        }
+    }
+
+    /// States a table of the session, such as `[columns]`.
+    ///
+    /// # Errors
+    /// If the value has no form in TOML.
+    pub fn set_table(&mut self, name: &str, value: &impl serde::Serialize) -> Result<(), ModelError> {
+        self.document.insert(name, Item::Table(table_of(value)?));
+        Ok(())
     }
 
     /// Removes tables and lists of tables of these names, of the session and of its tests. Comments above a table stay.

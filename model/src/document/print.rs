@@ -103,7 +103,7 @@ pub(super) fn table_of(entry: &impl Serialize) -> Result<Table, ModelError> {
 }
 
 /// A value whose tables stand in lines.
-fn value_of(document: &impl Serialize) -> Result<Value, ModelError> {
+pub(super) fn value_of(document: &impl Serialize) -> Result<Value, ModelError> {
     let value = document.serialize(ValueSerializer::new()).map_err(|cause| ModelError::Session {
         message: format!("it cannot be written as TOML: {cause}"),
         help: "every value is a text, a number, a list or a table".into(),

@@ -2,6 +2,8 @@
 //!
 //! - [`mod@read`]: machine and session files; [`table`]: data files, one module per data format;
 //! - [`with_readings()`]: a copy of a session with other readings;
+//! - [`import`]: the layout of foreign tables, and sessions that read them;
+//! - [`robot`]: machines and sessions from the files of robots: URDF, Denavit–Hartenberg parameters;
 //! - [`template`]: files of a new machine from its structural code;
 //! - [`store`]: files on the disk or in memory; `stl`: surfaces of bodies;
 //! - [`SourceMap`]: the files and texts of a session that was read; [`stamp`]: the bytes of the files that were read.
@@ -10,8 +12,10 @@
 
 pub(crate) mod access;
 pub mod commands;
+pub mod import;
 pub(crate) mod quantity;
 pub mod read;
+pub mod robot;
 pub mod source_map;
 pub(crate) mod spelling;
 pub mod stamp;

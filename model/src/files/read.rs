@@ -69,6 +69,27 @@ fn machine_in(parsed: &Parsed<'_>, files: &mut BodyFiles<'_>) -> Result<Machine,
     lower::machine(&document, files).map_err(|fault| parsed.error_of(fault))
 }
 
+/// A machine with its text and the files of its bodies.
+pub struct MachineRead {
+    /// The machine.
+    pub machine: Machine,
+    /// Its text.
+    pub source: Source,
+    /// The files of its bodies.
+    pub bodies: Vec<BodyFile>,
+}
+
+/// As [`machine()`], with the text and the files of its bodies.
+///
+/// # Errors
+/// As [`machine()`].
+pub fn machine_with_bodies(path: &Path, options: &ReadOptions) -> Result<MachineRead, ModelError> {
+    let source = machine_source(&options.store, path)?;
+    let mut files = BodyFiles { from: Some((path, path, options)), ..BodyFiles::default() };
+    let machine = machine_in(&source.parse()?, &mut files)?;
+    Ok(MachineRead { machine, bodies: files.read, source })
+}
+
 fn machine_source(store: &Store, path: &Path) -> Result<Source, ModelError> {
     Source::read(store, path, "the machine file")
 }

@@ -189,6 +189,15 @@ impl Circle {
     }
 }
 
+/// The circle of a test: its two axes, their positions at the centre, and the amplitude of each, mm.
+pub(crate) fn circle_of(machine: &Machine, test: &Test) -> Option<([usize; 2], [f64; 2], [f64; 2])> {
+    let Some(Motion::Circle { first, second, radius, centre, .. }) = &test.motion else { return None };
+    let none = BallBar { workpiece_ball: [0.0; 3], spindle_ball: [0.0; 3], bar: 0.0 };
+    let bar = bar_between_points(&test.station).unwrap_or(none);
+    let circle = Circle::new(machine, &bar, &test.at, [*first, *second], *centre).ok()?;
+    Some((circle.axes, circle.centre, circle.scale.map(|scale| scale * radius)))
+}
+
 /// The linear axes of a machine, by index.
 pub(crate) fn linear_axes(machine: &Machine) -> Vec<usize> {
     (0..machine.axes.len()).filter(|&index| machine.axes[index].kind == AxisKind::Linear).collect()

@@ -5,6 +5,7 @@ A session is a machine, its tests and their readings:
 - :class:`Machine`: a kinematic chain; :class:`Session`: tests and readings, from files or from arrays;
 - :class:`Fit`, :class:`Trace`, :class:`Plan`: results of a session; :class:`Model`: an identified machine, with
   :class:`Validation` and :class:`Compensated`; :class:`Equation`: a closed form; :func:`compare`: differences;
+- :func:`import_readings`: foreign files of readings as a session;
 - :class:`Table`, :class:`Figure`: what results show;
 - :class:`Error` and its subclasses.
 
@@ -17,6 +18,7 @@ from ._compare import Comparison, compare
 from ._equation import Equation
 from ._errors import EquationError, Error, IdentificationError, SessionError
 from ._fit import ByTest, Fit
+from ._import import Imported, import_readings
 from ._machine import Machine
 from ._model import Compensated, Model, ModelParameter, Validation
 from ._plan import Plan
@@ -36,6 +38,7 @@ __all__ = [
     "Figures",
     "Fit",
     "IdentificationError",
+    "Imported",
     "Machine",
     "Model",
     "ModelParameter",
@@ -48,6 +51,7 @@ __all__ = [
     "Validation",
     "__version__",
     "compare",
+    "import_readings",
     "set_threads",
     "threads",
 ]

@@ -55,6 +55,16 @@ def fleet_history(
 def study_draws(file: _Path) -> int: ...
 def run_draws(file: _Path, out: _Path, numbers: Sequence[int]) -> int: ...
 def study_summary(file: _Path, out: _Path) -> tuple[str, int]: ...
+def import_readings(
+    files: Sequence[_Path],
+    machine: _Path | None,
+    session: _Path | None,
+    kind: str | None,
+    set: Mapping[str, Any],
+    columns: Sequence[str],
+    like: str | None,
+    allow_outside: bool,
+) -> tuple[list[tuple[str, bytes]], str]: ...
 def pickled(session: Session) -> dict[str, Any]: ...
 def unpickled(pickled: Mapping[str, Any]) -> Session: ...
 
@@ -176,6 +186,10 @@ class Model:
         tool_mm: Sequence[float] | None,
         entries: str,
         travel: Sequence[tuple[str, tuple[float, float]]],
+        patch: _Path | None = None,
+        tip: str | None = None,
+        convention: str = "modified",
+        dh: _Path | None = None,
     ) -> bytes: ...
     def validate(self, session: Session) -> Validation: ...
     def correct(

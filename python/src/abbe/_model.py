@@ -128,13 +128,17 @@ class Model:
         tool_mm: tuple[float, float, float] | None = None,
         entries: str = "best",
         travel: Mapping[str, tuple[float, float]] | None = None,
+        patch: str | os.PathLike[str] | None = None,
+        tip: str | None = None,
+        convention: str = "modified",
+        dh: str | os.PathLike[str] | None = None,
     ) -> str:
         """Return the calibrated machine for other programs and for controls, as ``abbe export``.
 
         Parameters
         ----------
         format : str
-            ``"urdf"``, ``"dh"``, ``"linuxcnc"``, ``"fanuc"`` or ``"beckhoff"``.
+            ``"table"``, ``"urdf"``, ``"dh"``, ``"linuxcnc"``, ``"fanuc"`` or ``"beckhoff"``.
         path : path-like, optional
             A file to write it to. It is replaced if it exists.
         tool_mm : tuple of three floats, optional
@@ -144,9 +148,17 @@ class Model:
             over the travel, or ``"plain"``, the displacements of the axis lines themselves.
         travel : mapping of axis to two floats, optional
             Travel of axes over which the error of the entries counts, mm or degrees; the measured range by default.
+        patch : path-like, optional
+            With ``"urdf"``: the URDF file of the robot, of which only the origins are changed.
+        tip : str, optional
+            The link at which the chain of `patch` ends; the end of the arm by default.
+        convention : str
+            With ``"dh"``: ``"standard"`` or ``"modified"``.
+        dh : path-like, optional
+            With ``"dh"``: the maker's table (CSV), near whose frames the calibrated ones lie.
         """
         ranges = [(axis, (float(low), float(high))) for axis, (low, high) in (travel or {}).items()]
-        text = self._handle.export(format, tool_mm, entries, ranges).decode()
+        text = self._handle.export(format, tool_mm, entries, ranges, patch, tip, convention, dh).decode()
         if path is not None:
             write_whole(path, text)
         return text

@@ -121,7 +121,7 @@ pub(super) fn known(request: &Request<'_>) -> Vec<String> {
     known
 }
 
-pub(super) fn listed(names: &[String]) -> String {
+pub(in crate::files) fn listed(names: &[String]) -> String {
     const MAX: usize = 40;
     let mut text = names.iter().take(MAX).cloned().collect::<Vec<_>>().join(", ");
     if names.len() > MAX {

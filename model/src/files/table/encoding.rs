@@ -30,7 +30,10 @@ pub(super) fn name_of(encoding: &'static Encoding) -> &'static str {
 
 /// The encoding by the first bytes of a file, and the length of its byte order mark. A mark overrides a stated
 /// encoding.
-pub(super) fn of_start(bytes: &[u8], stated: Option<&'static Encoding>) -> (Option<&'static Encoding>, usize) {
+pub(in crate::files) fn of_start(
+    bytes: &[u8],
+    stated: Option<&'static Encoding>,
+) -> (Option<&'static Encoding>, usize) {
     if let Some((encoding, mark)) = Encoding::for_bom(bytes) {
         return (Some(encoding), mark);
     }
@@ -48,7 +51,7 @@ pub(super) fn of_start(bytes: &[u8], stated: Option<&'static Encoding>) -> (Opti
 /// Decodes bytes to text and returns the encoding used. The error is the encoding in which the bytes are invalid.
 ///
 /// Without a stated encoding: UTF-8, else Latin-1, in which every byte is a character.
-pub(super) fn decode<'b>(
+pub(in crate::files) fn decode<'b>(
     bytes: &'b [u8],
     encoding: Option<&'static Encoding>,
 ) -> Result<(Cow<'b, str>, &'static Encoding), &'static Encoding> {

@@ -1,0 +1,114 @@
+//! The instrument that the columns of a table belong to, where no session names it.
+
+use super::{Expected, Hint, grid, meaning};
+use crate::chain::Machine;
+use crate::document::node::{Node, Value};
+use crate::files::quantity::Unit;
+use crate::instrument::{Fault, InstrumentKind, Station};
+use crate::words::listed;
+
+/// The columns of an instrument follow from its set-up. These set-ups are never written: they say what columns there are.
+fn any_set_up(kind: InstrumentKind) -> Node {
+    let point = |x: f64, y: f64, z: f64| Node::from_iter([x, y, z]);
+    let zero = || point(0.0, 0.0, 0.0);
+    let keys: Vec<(&str, Node)> = match kind.word() {
+        "ballbar" => {
+            vec![("bar_mm", 100.0.into()), ("workpiece_ball_mm", point(0.0, 100.0, 0.0)), ("spindle_ball_mm", zero())]
+        }
+        "r-test" => vec![("setting", "E".into()), ("workpiece_ball_mm", zero()), ("spindle_ball_mm", zero())],
+        "probe" => vec![("artefact_mm", zero()), ("radius_mm", 10.0.into()), ("stylus_mm", zero())],
+        "socket" => vec![("ball_mm", zero())],
+        "tracker" | "pose" => vec![("target_mm", zero())],
+        "laser" => vec![("beam", point(1.0, 0.0, 0.0))],
+        "angle" => vec![("about", point(0.0, 0.0, 1.0))],
+        "distance" => vec![("reflector_mm", zero()), ("station_mm", zero())],
+        _ => Vec::new(),
+    };
+    Node::table(keys.into_iter().map(|(key, node)| (key.to_string(), node)))
+}
+
+/// A set-up of an instrument, as a session states it.
+pub(super) fn station(kind: InstrumentKind, set_up: &Node) -> Option<Station<f64>> {
+    let read = (kind.entry().read)(set_up, &[]).ok()?;
+    Some(read.station.map(|length| length.mm))
+}
+
+/// The keys of a set-up that can be estimated, for an instrument that stands where no one knows.
+pub(super) fn unknown_set_up(kind: InstrumentKind) -> Option<Vec<(&'static str, Node)>> {
+    let zero = || Node::from_iter([0.0, 0.0, 0.0]);
+    let unknown = || Node::from(Value::Number(f64::INFINITY, "inf".into()));
+    match kind.word() {
+        "tracker" => Some(vec![("target_mm", zero()), ("target_u_um", unknown())]),
+        "socket" => Some(vec![("ball_mm", zero()), ("ball_u_um", unknown())]),
+        _ => None,
+    }
+}
+
+/// The instrument whose columns a table has.
+///
+/// # Errors
+/// If there is none, or more than one: what to do.
+pub fn instrument(name: &str, bytes: &[u8], machine: &Machine, hints: &[Hint]) -> Result<InstrumentKind, Fault> {
+    let grid = grid::of(name, bytes)?;
+    let has_linear = machine.axes.iter().any(|axis| axis.kind == crate::axis::AxisKind::Linear);
+    let mut fitting: Vec<(usize, InstrumentKind)> = Vec::new();
+    let mut of_most: Option<Fault> = None;
+    for &kind in InstrumentKind::ALL {
+        let Some(station) = station(kind, &any_set_up(kind)) else { continue };
+        let expected = Expected { machine, station: &station, circle: None, moved: only_axis(machine), hints };
+        match meaning::of(&grid, &expected) {
+            Ok(found) => {
+                let readings = found.iter().filter(|one| one.is_of(&station)).count();
+                // Three coordinates are those of a tracker if they are large, of an R-test if they are small.
+                let is_large = found
+                    .iter()
+                    .any(|one| one.is_of(&station) && largest_mm(&grid, one, has_linear) > MAX_DEVIATION_MM);
+                let is_other = match kind {
+                    InstrumentKind::RTest => is_large || !has_linear,
+                    InstrumentKind::Tracker => has_linear && !is_large,
+                    _ => false,
+                };
+                if readings > 0 && !is_other {
+                    fitting.push((readings, kind));
+                }
+            }
+            Err(fault)
+                if kind == InstrumentKind::Tracker && !has_linear || kind == InstrumentKind::BallBar && has_linear =>
+            {
+                of_most = Some(fault);
+            }
+            Err(_) => {}
+        }
+    }
+    let most = fitting.iter().map(|(readings, _)| *readings).max().unwrap_or(0);
+    fitting.retain(|(readings, _)| *readings == most);
+    match fitting[..] {
+        [(_, kind)] => Ok(kind),
+        [] => Err(of_most.unwrap_or_else(|| {
+            (format!("{name}: no column holds the readings of an instrument"), "state the instrument".into())
+        })),
+        _ => {
+            let words: Vec<&str> = fitting.iter().map(|(_, kind)| kind.word()).collect();
+            let what = format!("{name}: the columns may be those of {}", listed(&words, "or"));
+            Err((what, "state the instrument".into()))
+        }
+    }
+}
+
+/// Deviations from a position are smaller, mm.
+const MAX_DEVIATION_MM: f64 = 5.0;
+
+/// The largest value of a column; mm if it states no unit.
+fn largest_mm(grid: &grid::Grid, found: &meaning::Found, has_linear: bool) -> f64 {
+    let unit = found.unit.map_or("mm", |unit| unit.own);
+    let to = Unit::of_length(unit).unwrap_or(Unit::Times(1.0));
+    let cells = grid.rows.iter().filter_map(|row| grid::number(&row.cells[found.column], grid.decimal));
+    let largest = cells.map(f64::abs).fold(0.0, f64::max);
+    // Metres without a unit are small numbers, and a robot has no R-test.
+    if found.unit.is_none() && !has_linear { f64::INFINITY } else { to.to_internal(largest) }
+}
+
+/// The axis of a machine that has one.
+pub(super) fn only_axis(machine: &Machine) -> Option<usize> {
+    (machine.axes.len() == 1).then_some(0)
+}

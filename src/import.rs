@@ -1,0 +1,305 @@
+//! Foreign files of readings as a session: the layout and the columns are guessed, a fit decides what the files leave
+//! open, and readings that contradict the machine are refused with the mistakes that explain it.
+//!
+//! ```no_run
+//! use abbe::import::{ImportOptions, Target, import};
+//! use abbe::model::files::import::Foreign;
+//!
+//! let file = Foreign { name: "poses.csv".into(), bytes: std::fs::read("poses.csv")? };
+//! let imported = import(&[file], Target::Machine("robot.toml".as_ref()), &ImportOptions::default())?;
+//! for (name, contents) in &imported.files {
+//!     std::fs::write(std::path::Path::new("run1").join(name), contents)?;
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+use std::path::Path;
+
+use abbe_identify::plausibility::{self, ConflictKind, Plausibility};
+use abbe_identify::start::with_targets;
+use abbe_identify::{IdentifyError, fit};
+use abbe_model::ModelError;
+use abbe_model::document::node::Node;
+use abbe_model::error::Location;
+use abbe_model::files::ReadOptions;
+use abbe_model::files::import::session::{Draft, SESSION_FILE};
+use abbe_model::files::import::{ColumnFound, Foreign, Hint, Reading, Source, Understood, instrument};
+use abbe_model::instrument::{Fault, InstrumentKind};
+use abbe_model::session::Session;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// Where the readings go.
+#[derive(Clone, Copy, Debug)]
+pub enum Target<'t> {
+    /// A new session of this machine file.
+    Machine(&'t Path),
+    /// Tests of this session file.
+    Session(&'t Path),
+}
+
+/// What the user says.
+#[derive(Clone, Default)]
+pub struct ImportOptions {
+    /// The instrument, for a new session.
+    pub kind: Option<InstrumentKind>,
+    /// Keys of the new tests: their set-up and their path.
+    pub set: Node,
+    /// What columns hold.
+    pub hints: Vec<Hint>,
+    /// The test whose set-up new tests of a session have.
+    pub like: Option<String>,
+    /// Accept readings that contradict the machine, and a session that reads files outside its folder.
+    pub allow_outside: bool,
+}
+
+/// A session of foreign files.
+pub struct Imported {
+    /// The files to write, by their names in the folder of the session; the session is the last.
+    pub files: Vec<(String, Vec<u8>)>,
+    /// The session with its readings.
+    pub session: Session,
+    /// How the files were understood.
+    pub result: ImportResult,
+}
+
+/// How foreign files were understood.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct ImportResult {
+    /// The session file.
+    pub session: String,
+    /// The instrument.
+    pub instrument: String,
+    /// The tests, one for each file.
+    pub tests: Vec<ImportedTest>,
+    /// Standard deviation of the residual of the nominal machine with the set-up estimated: for poses the share of their
+    /// spread, for others mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nominal_misfit: Option<f64>,
+    /// Where the target or the ball was found in the tool frame, mm, if no one has stated it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target_mm: Option<[f64; 3]>,
+    /// What contradicts the machine, and what would explain it.
+    pub plausibility: Plausibility,
+    /// Warnings about the readings.
+    pub warnings: Vec<String>,
+}
+
+/// A file as readings of a test.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct ImportedTest {
+    /// The test.
+    pub test: String,
+    /// The foreign file.
+    pub file: String,
+    /// The file that the session reads.
+    pub data: String,
+    /// The encoding, such as `utf-8`.
+    pub encoding: String,
+    /// The separator, in words.
+    pub separator: String,
+    /// The decimal sign.
+    pub decimal: String,
+    /// Lines above the names, or above the first row.
+    pub skipped_lines: usize,
+    /// Number of rows in the file.
+    pub rows: usize,
+    /// The columns.
+    pub columns: Vec<ImportedColumn>,
+    /// The first rows as they stand in the file.
+    pub first_rows: Vec<Vec<String>>,
+    /// Why the session reads a normalised copy; empty if it reads the file as it is.
+    pub normalised: Vec<String>,
+    /// What was assumed or left out.
+    pub remarks: Vec<String>,
+}
+
+/// A column of a foreign file.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct ImportedColumn {
+    /// Its number, from 1.
+    pub number: usize,
+    /// Its name in the file; empty if it has none.
+    pub name: String,
+    /// What it holds, with the unit, such as `c_deg`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub own: Option<String>,
+    /// Whether the file states the unit.
+    pub unit_is_stated: bool,
+    /// `forward` or `backward`, if columns hold one direction each.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub direction: Option<String>,
+}
+
+/// Foreign files as tests of a session: one test each, with the name of the file.
+///
+/// # Errors
+/// If a file cannot be understood, or the readings contradict the machine: what was found, and what to do.
+pub fn import(files: &[Foreign], target: Target<'_>, options: &ImportOptions) -> Result<Imported, IdentifyError> {
+    let names: Vec<String> = files.iter().map(Foreign::stem).collect();
+    for (place, name) in names.iter().enumerate() {
+        if names[..place].iter().any(|other| other.to_lowercase() == name.to_lowercase()) {
+            return Err(IdentifyError::Request(format!("two files are named {name}: each is the test of its name")));
+        }
+    }
+    let read_options = ReadOptions { allow_outside: options.allow_outside, ..ReadOptions::default() };
+    let (mut draft, tests) = match target {
+        Target::Session(file) => Draft::of_session(file, &read_options, &names, options.like.as_deref(), &options.set)?,
+        Target::Machine(file) => {
+            let Some(first) = files.first() else {
+                return Err(IdentifyError::Request("no file is named".into()));
+            };
+            let machine = abbe_model::files::machine(file)?;
+            let kind = match options.kind {
+                Some(kind) => kind,
+                None => instrument(&first.name, &first.bytes, &machine, &options.hints)
+                    .map_err(|fault| of_file(&first.name, fault))?,
+            };
+            (Draft::of_machine(file, &read_options, kind, &names, &options.set)?, names)
+        }
+    };
+    let planned = draft.planned()?;
+    let mut chosen: Vec<(Understood, Reading, String)> = Vec::new();
+    for (file, test) in files.iter().zip(&tests) {
+        let found =
+            draft.understand(&planned, test, file, &options.hints).map_err(|fault| of_file(&file.name, fault))?;
+        let reading = best(&draft, test, file, &found)?;
+        let data = draft.apply(test, file, &reading)?;
+        chosen.push((found, reading, data));
+    }
+    draft.share_layout(&chosen.iter().map(|(_, reading, _)| reading).collect::<Vec<_>>())?;
+    let target_mm = draft.set_targets(&with_targets(&draft.read()?))?;
+    let session = draft.read()?;
+    let nominal_misfit = plausibility::nominal_misfit(&session);
+    let mut warnings = session.warnings.clone();
+    let plausibility = checked(&session, nominal_misfit, options.allow_outside, &mut warnings)?;
+    warnings.extend(plausibility::warnings(&plausibility));
+    let result = ImportResult {
+        session: draft.file.file_name().map_or_else(|| SESSION_FILE.into(), |name| name.to_string_lossy().into_owned()),
+        instrument: session.instrument.word().to_string(),
+        tests: files.iter().zip(&tests).zip(chosen).map(|((file, test), chosen)| told(file, test, chosen)).collect(),
+        nominal_misfit,
+        target_mm,
+        plausibility,
+        warnings,
+    };
+    Ok(Imported { files: draft.files(), session, result })
+}
+
+/// The error of a fault of a file.
+fn of_file(name: &str, (message, help): Fault) -> IdentifyError {
+    let help = Some(help).filter(|help| !help.is_empty());
+    ModelError::Input { location: Location::file(Path::new(name)), message, help }.into()
+}
+
+/// The way to read a file that the nominal machine explains best. Ways of which one cannot be read are none.
+fn best(draft: &Draft, test: &str, file: &Foreign, found: &Understood) -> Result<Reading, IdentifyError> {
+    if let [only] = &found.readings[..] {
+        return Ok(only.clone());
+    }
+    let tried = found.readings.iter().map(|reading| {
+        let mut draft = draft.clone();
+        draft.apply(test, file, reading)?;
+        let mut session = draft.read()?;
+        session
+            .tests
+            .retain(|own| own.name == test || own.name.strip_prefix(test).is_some_and(|rest| rest.starts_with('/')));
+        Ok::<f64, ModelError>(plausibility::nominal_misfit(&session).unwrap_or(f64::INFINITY))
+    });
+    let mut least: Option<(f64, &Reading)> = None;
+    let mut refused: Option<ModelError> = None;
+    for (misfit, reading) in tried.zip(&found.readings) {
+        match misfit {
+            Ok(misfit) if least.is_none_or(|(least, _)| misfit < least) => least = Some((misfit, reading)),
+            Ok(_) => {}
+            Err(error) => refused = refused.or(Some(error)),
+        }
+    }
+    match (least, refused) {
+        (Some((_, reading)), _) => Ok(reading.clone()),
+        (None, Some(error)) => Err(error.into()),
+        (None, None) => Err(IdentifyError::NoReadings),
+    }
+}
+
+/// Misfit of the nominal machine above which a session that cannot be fitted is refused: a share of the spread of poses, or mm.
+const MAX_MISFIT: [f64; 2] = [0.02, 1.0];
+
+/// Noise of a coordinate of poses, mm, if a session states none. The residual of a wrong machine, taken for noise, would hide
+/// its location errors.
+const NOISE_MM: f64 = 0.05;
+
+/// Whether machine and readings belong together. A session that the nominal machine explains can be read, though its
+/// readings may be too few for a fit.
+fn checked(
+    session: &Session,
+    nominal_misfit: Option<f64>,
+    allow_outside: bool,
+    warnings: &mut Vec<String>,
+) -> Result<Plausibility, IdentifyError> {
+    let two_sided = session.instruments().iter().any(|kind| kind.is_two_sided());
+    let explained = nominal_misfit.is_some_and(|misfit| misfit < MAX_MISFIT[usize::from(two_sided)]);
+    let stated = match two_sided {
+        true => session.clone(),
+        false => Session { noise_mm: session.noise_mm.or(Some(NOISE_MM)), ..session.clone() },
+    };
+    let found = match fit::prepare(&stated, 1) {
+        Ok((problem, fit)) => plausibility::examine(&problem, &fit),
+        Err(error @ IdentifyError::Contradicted { .. }) if !allow_outside && !explained => return Err(error),
+        Err(error) => {
+            warnings.push(format!("the session is not fitted yet: {error}"));
+            Plausibility::default()
+        }
+    };
+    let of_readings = |kind: ConflictKind| {
+        matches!(
+            kind,
+            ConflictKind::ExplainedVariance
+                | ConflictKind::LocationError
+                | ConflictKind::Residual
+                | ConflictKind::Statement
+        )
+    };
+    if allow_outside || !found.conflicts.iter().any(|conflict| of_readings(conflict.kind)) {
+        return Ok(found);
+    }
+    let conflicts: Vec<&str> = (found.conflicts.iter())
+        .filter(|conflict| of_readings(conflict.kind))
+        .map(|conflict| conflict.words.as_str())
+        .take(MAX_NAMED)
+        .collect();
+    let diagnosis = plausibility::explained(&found).unwrap_or_else(|| {
+        "check the units, signs and order of the columns, and whether the data belong to this machine".to_string()
+    });
+    Err(IdentifyError::Contradicted { found: conflicts.join("; "), diagnosis })
+}
+
+/// Largest number of contradictions that a refusal names.
+const MAX_NAMED: usize = 2;
+
+fn told(file: &Foreign, test: &str, (found, reading, data): (Understood, Reading, String)) -> ImportedTest {
+    let column = |column: ColumnFound| ImportedColumn {
+        number: column.number,
+        name: column.name,
+        own: column.own,
+        unit_is_stated: column.unit_is_stated,
+        direction: column.direction.map(str::to_string),
+    };
+    ImportedTest {
+        test: test.to_string(),
+        file: file.name.clone(),
+        data,
+        encoding: found.encoding.to_string(),
+        separator: found.separator.to_string(),
+        decimal: found.decimal.to_string(),
+        skipped_lines: found.skipped_lines,
+        rows: found.row_count,
+        columns: reading.columns.into_iter().map(column).collect(),
+        first_rows: found.first_rows,
+        normalised: match reading.source {
+            Source::AsItIs { .. } => Vec::new(),
+            Source::Normalised { because, .. } => because,
+        },
+        remarks: reading.remarks,
+    }
+}

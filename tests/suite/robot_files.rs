@@ -1,0 +1,523 @@
+//! Robots from the files of their makers: `abbe new --from-urdf` and `--from-dh`, and the calibrated origins back in the file.
+//!
+//! The forward kinematics of the written machines are compared with MuJoCo, which reads the URDF itself, and with the product
+//! of the published Denavit–Hartenberg parameters.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use abbe::identify::quantity::Given;
+use abbe::identify::simulate::{Simulation, simulate};
+use abbe::model::axis::AxisKind;
+use abbe::model::chain::{AxisPosition, BodyErrors, Machine};
+use abbe::model::files::{self, Changes, ReadOptions, with_readings};
+use abbe::model::frames::Point;
+use nalgebra::{Matrix4, Rotation3, Vector3};
+use rand::{RngExt, SeedableRng};
+use serde_json::Value;
+
+use super::{abbe, text, workspace};
+
+const ROBOTS: [&str; 6] = ["ur5e", "ur10", "panda", "iiwa14", "irb120", "scara"];
+
+fn urdf(name: &str) -> PathBuf {
+    workspace().join("tests/robots").join(format!("{name}.urdf"))
+}
+
+fn success(output: &std::process::Output) -> String {
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// The machine that the command writes for a robot, and its folder.
+fn created(place: &Path, name: &str, arguments: &[&str]) -> (Machine, PathBuf) {
+    let folder = place.join(name);
+    success(&abbe(&[&["new", text(&folder)], arguments].concat()));
+    (files::machine(&folder.join("machine.toml")).unwrap(), folder)
+}
+
+/// A point of the flange in the tool frame of a machine: the target of its plan.
+fn target_mm(folder: &Path) -> [f64; 3] {
+    let options = ReadOptions { read_data: false, ..ReadOptions::default() };
+    files::session(&folder.join("plan.toml"), &options).unwrap().tests[0].station.tool_point_mm()
+}
+
+fn point_mm(machine: &Machine, q: &[f64], tool_mm: [f64; 3]) -> Vector3<f64> {
+    let state: Vec<AxisPosition<f64>> =
+        machine.axes.iter().zip(q).map(|(axis, q)| AxisPosition::new(axis.kind, *q)).collect();
+    let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
+    Vector3::from(machine.tool_point(&state, &none, Point(tool_mm)).0)
+}
+
+/// Random positions within the travel of the axes, mm and rad.
+fn positions(machine: &Machine, count: usize, seed: u64) -> Vec<Vec<f64>> {
+    let mut random = rand_pcg::Pcg64::seed_from_u64(seed);
+    let mut one = || {
+        let of_axis = |axis: &abbe::model::axis::Axis| {
+            let [low, high] = axis.travel.unwrap_or([-3.0, 3.0]);
+            low + (high - low) * random.random::<f64>()
+        };
+        machine.axes.iter().map(of_axis).collect()
+    };
+    (0..count).map(|_| one()).collect()
+}
+
+const TARGET: [f64; 3] = [12.0, -34.0, 56.0];
+
+/// Where MuJoCo puts the target at the last link, mm, for positions in m and rad.
+fn of_mujoco(python: &Path, file: &Path, tip: &str, positions: &[Vec<f64>], target: [f64; 3]) -> Vec<Vector3<f64>> {
+    let script = r#"
+import json, sys
+import numpy as np, mujoco
+xml = open(sys.argv[1]).read()
+at = xml.index(">", xml.index("<robot")) + 1
+xml = xml[:at] + '<mujoco><compiler fusestatic="false" discardvisual="false"/></mujoco>' + xml[at:]
+m = mujoco.MjModel.from_xml_string(xml); d = mujoco.MjData(m)
+given = json.load(sys.stdin)
+body = mujoco.mj_name2id(m, mujoco.mjtObj.mjOBJ_BODY, sys.argv[2])
+points = []
+for q in given["positions"]:
+    d.qpos[:] = q
+    mujoco.mj_forward(m, d)
+    points.append(list((d.xpos[body] + d.xmat[body].reshape(3, 3) @ (np.array(given["target"]) * 1e-3)) * 1e3))
+print(json.dumps(points))
+"#;
+    let given = serde_json::json!({"positions": positions, "target": target}).to_string();
+    let mut child = std::process::Command::new(python)
+        .args(["-c", script, text(file), tip])
+        .stdin(std::process::Stdio::piped())
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::io::Write::write_all(child.stdin.as_mut().unwrap(), given.as_bytes()).unwrap();
+    drop(child.stdin.take());
+    let points: Vec<[f64; 3]> = serde_json::from_str(&success(&child.wait_with_output().unwrap())).unwrap();
+    points.into_iter().map(Vector3::from).collect()
+}
+
+/// Positions as MuJoCo counts them.
+fn in_metres(machine: &Machine, positions: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let scaled = |q: &Vec<f64>| {
+        let of_axis =
+            |(q, axis): (&f64, &abbe::model::axis::Axis)| if axis.kind == AxisKind::Linear { q * 1e-3 } else { *q };
+        q.iter().zip(&machine.axes).map(of_axis).collect()
+    };
+    positions.iter().map(scaled).collect()
+}
+
+fn tip(name: &str) -> &'static str {
+    match name {
+        "panda" => "panda_link8",
+        "iiwa14" => "iiwa_link_ee",
+        "scara" => "flange",
+        _ => "tool0",
+    }
+}
+
+#[test]
+fn six_robots_from_urdf_move_as_in_mujoco() {
+    let Some(python) = test_needs::python("six_robots_from_urdf_move_as_in_mujoco", "numpy, mujoco") else { return };
+    let place = tempfile::tempdir().unwrap();
+    for name in ROBOTS {
+        let (machine, folder) =
+            created(place.path(), name, &["--from-urdf", text(&urdf(name)), "--target-mm", "12,-34,56"]);
+        let poses = positions(&machine, 100, 5);
+        let expected = of_mujoco(&python, &urdf(name), tip(name), &in_metres(&machine, &poses), TARGET);
+        let tool = target_mm(&folder);
+        let worst =
+            poses.iter().zip(&expected).map(|(q, p)| (point_mm(&machine, q, tool) - p).norm()).fold(0.0, f64::max);
+        println!("{name}: {worst:.1e} mm");
+        // 1e-9 m.
+        assert!(worst < 1e-6, "{name}: {worst:e} mm");
+        success(&abbe(&["plan", text(&folder.join("plan.toml")), "--no-effects", "--quiet"]));
+    }
+}
+
+/// A row of a published table, m and degrees: a, alpha, d, theta, and the kind of the joint.
+type Row = (f64, f64, f64, f64, char);
+
+/// The published tables: whether modified, and the rows.
+fn tables() -> Vec<(&'static str, bool, Vec<Row>)> {
+    vec![
+        (
+            "ur5e",
+            false,
+            vec![
+                (0.0, 90.0, 0.1625, 0.0, 'R'),
+                (-0.425, 0.0, 0.0, 0.0, 'R'),
+                (-0.3922, 0.0, 0.0, 0.0, 'R'),
+                (0.0, 90.0, 0.1333, 0.0, 'R'),
+                (0.0, -90.0, 0.0997, 0.0, 'R'),
+                (0.0, 0.0, 0.0996, 0.0, 'R'),
+            ],
+        ),
+        (
+            "ur10",
+            false,
+            vec![
+                (0.0, 90.0, 0.1273, 0.0, 'R'),
+                (-0.612, 0.0, 0.0, 0.0, 'R'),
+                (-0.5723, 0.0, 0.0, 0.0, 'R'),
+                (0.0, 90.0, 0.163941, 0.0, 'R'),
+                (0.0, -90.0, 0.1157, 0.0, 'R'),
+                (0.0, 0.0, 0.0922, 0.0, 'R'),
+            ],
+        ),
+        (
+            "panda",
+            true,
+            vec![
+                (0.0, 0.0, 0.333, 0.0, 'R'),
+                (0.0, -90.0, 0.0, 0.0, 'R'),
+                (0.0, 90.0, 0.316, 0.0, 'R'),
+                (0.0825, 90.0, 0.0, 0.0, 'R'),
+                (-0.0825, -90.0, 0.384, 0.0, 'R'),
+                (0.0, 90.0, 0.0, 0.0, 'R'),
+                (0.088, 90.0, 0.0, 0.0, 'R'),
+                (0.0, 0.0, 0.107, 0.0, 'F'),
+            ],
+        ),
+        (
+            "iiwa14",
+            false,
+            vec![
+                (0.0, -90.0, 0.36, 0.0, 'R'),
+                (0.0, 90.0, 0.0, 0.0, 'R'),
+                (0.0, 90.0, 0.42, 0.0, 'R'),
+                (0.0, -90.0, 0.0, 0.0, 'R'),
+                (0.0, -90.0, 0.4, 0.0, 'R'),
+                (0.0, 90.0, 0.0, 0.0, 'R'),
+                (0.0, 0.0, 0.126, 0.0, 'R'),
+            ],
+        ),
+        (
+            "irb120",
+            false,
+            vec![
+                (0.0, -90.0, 0.29, 0.0, 'R'),
+                (0.27, 0.0, 0.0, -90.0, 'R'),
+                (0.07, -90.0, 0.0, 0.0, 'R'),
+                (0.0, 90.0, 0.302, 0.0, 'R'),
+                (0.0, -90.0, 0.0, 0.0, 'R'),
+                (0.0, 0.0, 0.072, 180.0, 'R'),
+            ],
+        ),
+        (
+            "scara",
+            false,
+            vec![
+                (0.3, 0.0, 0.1916, 0.0, 'R'),
+                (0.25, 180.0, 0.0, 0.0, 'R'),
+                (0.0, 0.0, 0.0, 0.0, 'P'),
+                (0.0, 0.0, 0.05, 0.0, 'R'),
+            ],
+        ),
+    ]
+}
+
+/// The product of a table at these positions (rad, mm), applied to a point of the flange, mm.
+fn of_table(rows: &[Row], modified: bool, q: &[f64], point: [f64; 3]) -> Vector3<f64> {
+    let turn = |axis: Vector3<f64>, angle: f64| Rotation3::new(axis * angle).to_homogeneous();
+    let shift = |x: f64, z: f64| Matrix4::new_translation(&Vector3::new(x, 0.0, z));
+    let mut frame = Matrix4::identity();
+    let mut moved = q.iter();
+    for (a, alpha, d, theta, kind) in rows {
+        let (mut theta, mut d) = (theta.to_radians(), d * 1e3);
+        match kind {
+            'R' => theta += moved.next().unwrap(),
+            'P' => d += moved.next().unwrap(),
+            _ => {}
+        }
+        let about_z = turn(Vector3::z(), theta) * shift(0.0, d);
+        let about_x = shift(a * 1e3, 0.0) * turn(Vector3::x(), alpha.to_radians());
+        frame *= if modified { about_x * about_z } else { about_z * about_x };
+    }
+    frame.transform_point(&point.into()).coords
+}
+
+/// A file as someone would write it: units and separators vary.
+fn file_of(rows: &[Row], number: usize) -> String {
+    let [in_mm, in_rad, names_joint] = [number.is_multiple_of(2), number % 3 == 1, number.is_multiple_of(3)];
+    let (length, angle) = (if in_mm { "mm" } else { "m" }, if in_rad { "rad" } else { "deg" });
+    let mut file = String::from("# A table\n");
+    if names_joint {
+        file += "joint;";
+    }
+    let _ = writeln!(file, "a_{length};alpha_{angle};d_{length};theta_{angle};type");
+    for (row, (a, alpha, d, theta, kind)) in rows.iter().enumerate() {
+        let scale = if in_mm { 1e3 } else { 1.0 };
+        let angle = |degrees: f64| match (in_rad, degrees) {
+            (false, degrees) => degrees.to_string(),
+            (true, 0.0) => "0".into(),
+            (true, degrees) => format!("{}*pi/180", degrees).replace("90*pi/180", "pi/2").replace("180*pi/180", "pi"),
+        };
+        if names_joint {
+            let _ = write!(file, "axis {row};");
+        }
+        let kind = match kind {
+            'R' => "revolute",
+            'P' => "prismatic",
+            _ => "fixed",
+        };
+        let _ = writeln!(file, "{};{};{};q{} + {};{kind}", a * scale, angle(*alpha), d * scale, row + 1, angle(*theta));
+    }
+    file.replace("+ -", "- ")
+}
+
+#[test]
+fn six_robots_from_dh_move_as_their_published_tables_say() {
+    let place = tempfile::tempdir().unwrap();
+    for (number, (name, modified, rows)) in tables().into_iter().enumerate() {
+        let file = place.path().join(format!("{name}.csv"));
+        std::fs::write(&file, file_of(&rows, number)).unwrap();
+        let convention = if modified { "modified" } else { "standard" };
+        let asked = ["--from-dh", text(&file), "--convention", convention, "--target-mm", "12,-34,56"];
+        let (machine, folder) = created(place.path(), name, &asked);
+        let tool = target_mm(&folder);
+        for q in positions(&machine, 100, 7) {
+            let off = (point_mm(&machine, &q, tool) - of_table(&rows, modified, &q, TARGET)).norm();
+            assert!(off < 1e-6, "{name}: {off:e} mm at {q:?}");
+        }
+    }
+    // What is not stated is never guessed silently.
+    let file = place.path().join("bare.csv");
+    std::fs::write(&file, "a,alpha,d,theta\n0,pi/2,0.1625,q1\n-0.425,0,0,q2\n").unwrap();
+    let (_, folder) = created(place.path(), "bare", &["--from-dh", text(&file), "--convention", "standard"]);
+    let written = std::fs::read_to_string(folder.join("machine.toml")).unwrap();
+    assert!(written.contains("# Assumed: the unit of the lengths is not stated: m."), "{written}");
+    assert!(!abbe(&["new", text(&place.path().join("x")), "--from-dh", text(&file)]).status.success());
+}
+
+/// The model of a robot from simulated tracker readings of its plan: the file, with the machine's location errors by slot.
+fn identified(machine: &Machine, folder: &Path, seed: u64) -> (PathBuf, Machine, Vec<f64>) {
+    let (session, sources) = files::session_with_sources(&folder.join("plan.toml"), &ReadOptions::default()).unwrap();
+    let mut random = rand_pcg::Pcg64::seed_from_u64(seed);
+    let mut given = Vec::new();
+    for error in &session.unknowns {
+        let share = 2.0 * random.random::<f64>() - 1.0;
+        let is_angle = ["EA0", "EB0", "EC0"].iter().any(|start| error.to_string().starts_with(start));
+        // The direction of a linear axis is not scaled to length 1 in the model, as it is in a URDF: q·ω²/2 apart.
+        let is_linear = machine.axes.iter().any(|axis| axis.kind == AxisKind::Linear && error.axis == axis.name);
+        let angle = if is_linear { 10.0 } else { 60.0 };
+        let value = if is_angle { format!("{:.3}arcsec", angle * share) } else { format!("{:.3}um", 300.0 * share) };
+        given.push(Given::parse(&format!("{error}={value}")).unwrap());
+    }
+    let simulation = Simulation { given, noise_mm: Some(2e-4), noise_rad: None, draw_setups: false, seed: 3 };
+    let simulated = simulate(&session, &simulation).unwrap();
+    let measured = folder.join("measured");
+    std::fs::create_dir(&measured).unwrap();
+    for (name, contents) in with_readings((&session, &sources), &simulated.readings, Changes::default()).unwrap() {
+        std::fs::write(measured.join(name), contents).unwrap();
+    }
+    let model = folder.join("model.json");
+    success(&abbe(&["fit", text(&measured.join("session.toml")), "--save", text(&model), "--quiet"]));
+    let source = files::text(&model, "the model file").unwrap();
+    let identified = abbe::identify::model_file::of_source(&source).unwrap();
+    let slots = abbe::apply::export::frames::location_errors(&identified);
+    (model, identified.machine, slots)
+}
+
+/// The target with errors of the machine, mm.
+fn with_errors(machine: &Machine, slots: &[f64], q: &[f64], tool_mm: [f64; 3]) -> Vector3<f64> {
+    let errors = machine.body_errors(|slot| slots[slot] != 0.0, |slot| slots[slot]);
+    let state: Vec<AxisPosition<f64>> =
+        machine.axes.iter().zip(q).map(|(axis, q)| AxisPosition::new(axis.kind, *q)).collect();
+    Vector3::from(machine.tool_point(&state, &errors, Point(tool_mm)).0)
+}
+
+/// Tracker readings of a robot with errors; fit; the origins in its own file: MuJoCo moves the target as the model does.
+#[test]
+fn calibrated_origins_go_back_into_the_file_of_the_robot() {
+    let test = "calibrated_origins_go_back_into_the_file_of_the_robot";
+    let Some(python) = test_needs::python(test, "numpy, mujoco") else { return };
+    let place = tempfile::tempdir().unwrap();
+    for (number, name) in ROBOTS.into_iter().enumerate() {
+        let (machine, folder) =
+            created(place.path(), name, &["--from-urdf", text(&urdf(name)), "--target-mm", "12,-34,56"]);
+        let (model, own_machine, slots) = identified(&machine, &folder, 30 + number as u64);
+        let patched = folder.join("patched.urdf");
+        let own = urdf(name);
+        let asked = ["export", text(&model), "--as", "urdf", "--patch", text(&own), "--out", text(&patched), "--quiet"];
+        success(&abbe(&asked));
+
+        // Only origins have changed.
+        let [before, after] = [urdf(name), patched.clone()].map(|file| std::fs::read_to_string(file).unwrap());
+        let without_origins = |text: &str| {
+            let kept = text.split("<origin ").enumerate();
+            kept.map(|(k, part)| if k == 0 { part } else { part.split_once("/>").unwrap().1 }).collect::<String>()
+        };
+        let plain = |text: &str| without_origins(text).split_whitespace().collect::<String>();
+        assert_eq!(plain(&before), plain(&after), "{name}");
+        assert_ne!(before, after, "{name}");
+
+        // The file moves the target as the model does.
+        let poses = positions(&machine, 100, 9);
+        let found = of_mujoco(&python, &patched, tip(name), &in_metres(&machine, &poses), TARGET);
+        let tool = target_mm(&folder);
+        let worst = poses.iter().zip(&found);
+        let worst =
+            worst.map(|(q, found)| (with_errors(&own_machine, &slots, q, tool) - found).norm()).fold(0.0, f64::max);
+        println!("{name}: {worst:.1e} mm");
+        assert!(worst < 1e-6, "{name}: {worst:e} mm");
+        // Another robot's file is refused.
+        let other = urdf(if name == "ur5e" { "ur10" } else { "ur5e" });
+        let refused = abbe(&["export", text(&model), "--as", "urdf", "--patch", text(&other), "--out", "-"]);
+        assert!(
+            String::from_utf8_lossy(&refused.stderr).contains("the model is not of the robot in the file"),
+            "{name}"
+        );
+    }
+}
+
+/// A fixed pose of the JSON: `Trans(x, y, z)·Rz(yaw)·Ry(pitch)·Rx(roll)`.
+fn fixed(pose: &Value) -> Matrix4<f64> {
+    let three = |key: &str| -> [f64; 3] { serde_json::from_value(pose[key].clone()).unwrap() };
+    let ([x, y, z], [roll, pitch, yaw]) = (three("xyz_mm"), three("rpy_deg"));
+    let turn = |axis: Vector3<f64>, degrees: f64| Rotation3::new(axis * degrees.to_radians()).to_homogeneous();
+    Matrix4::new_translation(&Vector3::new(x, y, z))
+        * turn(Vector3::z(), yaw)
+        * turn(Vector3::y(), pitch)
+        * turn(Vector3::x(), roll)
+}
+
+/// The parameters in the maker's own form: the product of the exported table is the model, its nominal rows are the maker's,
+/// and its calibrated rows lie beside them.
+#[test]
+fn calibrated_parameters_have_the_form_of_the_makers_table() {
+    let place = tempfile::tempdir().unwrap();
+    for (number, (name, modified, rows)) in tables().into_iter().enumerate().filter(|(_, (name, ..))| *name != "scara")
+    {
+        let file = place.path().join(format!("{name}.csv"));
+        std::fs::write(&file, file_of(&rows, number)).unwrap();
+        let convention = if modified { "modified" } else { "standard" };
+        let asked = ["--from-dh", text(&file), "--convention", convention, "--target-mm", "12,-34,56"];
+        let (machine, folder) = created(place.path(), name, &asked);
+        let (model, own, slots) = identified(&machine, &folder, 50 + number as u64);
+        let (out, json) = (folder.join("dh.csv"), folder.join("dh.json"));
+        let asked = ["export", text(&model), "--as", "dh", "--convention", convention, "--dh", text(&file)];
+        success(&abbe(&[&asked[..], &["--out", text(&out), "--json", text(&json), "--quiet"]].concat()));
+        let found: Value = serde_json::from_slice(&std::fs::read(&json).unwrap()).unwrap();
+        let joints = |table: &str| -> Vec<[f64; 5]> {
+            let of = |row: &Value| {
+                ["a_mm", "alpha_deg", "beta_deg", "theta_deg", "d_mm"].map(|key| row[key].as_f64().unwrap())
+            };
+            found[table]["joints"].as_array().unwrap().iter().map(of).collect()
+        };
+        let (calibrated, nominal) = (joints("calibrated"), joints("nominal"));
+        // Angles by their direction: 180 and -180 degrees are one.
+        let apart = |a: f64, b: f64| ((a - b + 540.0).rem_euclid(360.0) - 180.0).abs();
+        for ((own, (a, alpha, d, theta, _)), calibrated) in nominal.iter().zip(&rows).zip(&calibrated) {
+            assert!((own[0] - a * 1e3).abs() < 1e-6 && (own[4] - d * 1e3).abs() < 1e-6, "{name}: {own:?}");
+            assert!(
+                apart(own[1], *alpha) < 1e-6 && own[2].abs() < 1e-6 && apart(own[3], *theta) < 1e-6,
+                "{name}: {own:?}"
+            );
+            assert!(
+                (own[0] - calibrated[0]).abs() < 3.0 && (own[4] - calibrated[4]).abs() < 3.0,
+                "{name}: {calibrated:?}"
+            );
+            assert!((1..4).all(|k| apart(own[k], calibrated[k]) < 0.5), "{name}: {calibrated:?}");
+        }
+        let tool = target_mm(&folder);
+        for q in positions(&machine, 100, 11) {
+            let mut frame = fixed(&found["calibrated"]["base"]);
+            for ([a, alpha, beta, theta, d], q) in calibrated.iter().zip(&q) {
+                let turn =
+                    |axis: Vector3<f64>, degrees: f64| Rotation3::new(axis * degrees.to_radians()).to_homogeneous();
+                let shift = |x: f64, z: f64| Matrix4::new_translation(&Vector3::new(x, 0.0, z));
+                let about_x = shift(*a, 0.0) * turn(Vector3::x(), *alpha) * turn(Vector3::y(), *beta);
+                let about_z = turn(Vector3::z(), theta + q.to_degrees()) * shift(0.0, *d);
+                frame *= if modified { about_x * about_z } else { about_z * about_x };
+            }
+            let point = (frame * fixed(&found["calibrated"]["tool"])).fixed_view::<3, 1>(0, 3).into_owned();
+            let off = (point - with_errors(&own, &slots, &q, tool)).norm();
+            assert!(off < 1e-6, "{name}: {off:e} mm");
+        }
+        // The uncertainties are those of the covariance.
+        let ids: Vec<String> = serde_json::from_value(found["dh_parameters"].clone()).unwrap();
+        let covariance: Vec<Vec<f64>> = serde_json::from_value(found["dh_covariance"].clone()).unwrap();
+        assert_eq!((ids.len(), covariance.len()), (5 * machine.axes.len(), 5 * machine.axes.len()));
+        let second = &found["dh_u"][2];
+        let place = ids.iter().position(|id| *id == "J3.a_mm").unwrap();
+        if let Some(u) = second["a_mm"].as_f64() {
+            assert!((u * u - covariance[place][place]).abs() < 1e-12 && u > 0.0, "{name}: {u}");
+        }
+    }
+}
+
+/// Where each axis is, for any control: the identified change agrees with what was simulated, within its uncertainty.
+#[test]
+fn the_neutral_table_says_where_each_axis_is() {
+    let place = tempfile::tempdir().unwrap();
+    let session = super::ready("hermle-c600u/measured/session.toml");
+    let [model, out, json] = ["model.json", "table.csv", "table.json"].map(|name| place.path().join(name));
+    success(&abbe(&["fit", text(&session), "--save", text(&model), "--quiet"]));
+    success(&abbe(&["export", text(&model), "--as", "table", "--out", text(&out), "--json", text(&json), "--quiet"]));
+    let found: Value = serde_json::from_slice(&std::fs::read(&json).unwrap()).unwrap();
+    let parameters: Value = serde_json::from_slice(&std::fs::read(&model).unwrap()).unwrap();
+    let value = |id: &str| {
+        let all = parameters["parameters"].as_array().unwrap();
+        all.iter().find(|p| p["id"] == id).unwrap()["internal"].as_f64().unwrap()
+    };
+    let axes = found["axes"].as_array().unwrap();
+    let names: Vec<&str> = axes.iter().map(|axis| axis["axis"].as_str().unwrap()).collect();
+    assert_eq!(names, ["C", "A", "Y", "X", "Z"]);
+    let of = |axis: usize, entry: &str, k: usize, key: &str| axes[axis][entry][k][key].as_f64();
+    // A turns next to the bed: its line moves by its own errors. C lies on it.
+    assert!((of(1, "point_mm", 1, "change").unwrap() - value("EY0A")).abs() < 1e-6);
+    assert!((of(1, "direction", 2, "change").unwrap() + value("EB0A")).abs() < 1e-8);
+    // Its point at the origin moves with the errors of A too; EX0A is not estimated.
+    assert!((of(0, "point_mm", 0, "change").unwrap() - value("EX0C")).abs() < 1e-5);
+    assert!(of(0, "point_mm", 0, "u").unwrap() > 0.0);
+    assert_eq!(of(2, "direction", 1, "nominal"), Some(1.0));
+    assert!(axes[2]["point_mm"].as_array().unwrap().is_empty(), "a linear axis is nowhere in particular");
+    let table = std::fs::read_to_string(&out).unwrap();
+    assert!(table.starts_with("# Where each axis is") && table.contains("C,rotary,point x,mm,"), "{table}");
+}
+
+#[test]
+fn a_urdf_that_is_no_serial_chain_is_refused_with_the_reason() {
+    let place = tempfile::tempdir().unwrap();
+    let check = |name: &str, contents: &str, more: &[&str], expected: &str| {
+        let file = place.path().join(name);
+        std::fs::write(&file, contents).unwrap();
+        let output = abbe(&[&["new", text(&place.path().join("out")), "--from-urdf", text(&file)], more].concat());
+        let found = String::from_utf8_lossy(&output.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(!output.status.success() && found.contains(expected), "{name}: {found}");
+    };
+    let own = std::fs::read_to_string(urdf("ur5e")).unwrap();
+    check("tip.urdf", &own, &["--tip", "tcp"], "there is no link `tcp`");
+    check("x.xacro", "<robot xmlns:xacro=\"x\"><xacro:arg name=\"a\"/></robot>", &[], "this is a xacro file");
+    check(
+        "floating.urdf",
+        &own.replacen("type=\"revolute\"", "type=\"floating\"", 1),
+        &[],
+        "joint `shoulder_pan_joint` is `floating`",
+    );
+    check("number.urdf", &own.replacen("0 0 0.1625", "0 zero 0.1625", 1), &[], "is not three numbers");
+    check("cut.urdf", &own[..own.len() - 12], &[], "not valid XML");
+    check("other.xml", "<sdf><model/></sdf>", &[], "the first element is <sdf>, not <robot>");
+}
+
+/// The same displacement in the frame of the flange, whatever the pose: the target of the plan.
+#[test]
+fn the_target_of_the_plan_is_at_the_flange() {
+    let place = tempfile::tempdir().unwrap();
+    let (machine, folder) =
+        created(place.path(), "ur10", &["--from-urdf", text(&urdf("ur10")), "--target-mm", "0,0,80"]);
+    let tool = target_mm(&folder);
+    let flange = created(place.path(), "flange", &["--from-urdf", text(&urdf("ur10"))]).1;
+    let flange = target_mm(&flange);
+    for q in positions(&machine, 20, 3) {
+        let apart = (point_mm(&machine, &q, tool) - point_mm(&machine, &q, flange)).norm();
+        assert!((apart - 80.0).abs() < 1e-9, "{apart}");
+    }
+    // Sockets: a plan that `--poses` takes.
+    let (_, folder) =
+        created(place.path(), "sockets", &["--from-urdf", text(&urdf("panda")), "--measured-by", "sockets"]);
+    let plan = std::fs::read_to_string(folder.join("plan.toml")).unwrap();
+    assert_eq!(plan.matches("[[test]]").count(), 3, "{plan}");
+    let options = ReadOptions { read_data: false, ..ReadOptions::default() };
+    files::session(&folder.join("plan.toml"), &options).unwrap();
+}
