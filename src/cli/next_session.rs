@@ -57,7 +57,7 @@ pub fn add_trace(
 }
 
 /// The proposed tests, each once.
-fn proposals(result: &TraceResult) -> Vec<&Block<Test>> {
+pub fn proposals(result: &TraceResult) -> Vec<&Block<Test>> {
     let mut seen: Vec<&str> = Vec::new();
     let mut proposals = Vec::new();
     for test in result.effects.iter().flat_map(|effect| &effect.separating_tests) {

@@ -1,6 +1,7 @@
 //! `abbe trace`: find the unmodelled effect behind the residual.
 
 mod clock;
+mod next;
 mod progress;
 
 use std::path::PathBuf;
@@ -64,12 +65,15 @@ pub struct TraceArguments {
     #[arg(long, value_name = "FILE.csv")]
     residuals: Option<PathBuf>,
     #[command(flatten)]
+    next: next::NextArguments,
+    #[command(flatten)]
     compensation: compensation::CompensationArguments,
 }
 
 /// Runs `abbe trace`.
 pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     arguments.compensation.check()?;
+    arguments.next.check()?;
     let common = &arguments.common;
     let others = [arguments.write.as_ref(), arguments.residuals.as_ref(), arguments.save.file()];
     let outputs = common.output.prepared(&others)?;
@@ -109,6 +113,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
             None => Err(Failure::Interrupted(trace.result.interruption())),
         };
     }
+    arguments.next.run(&session, &sources, &trace, common.output.quiet)?;
     arguments.save.run(&trace.after, &trace.after_fit, &sources, common.seed)?;
     arguments.compensation.run(&trace.after, &trace.after_fit, outputs.tables())
 }

@@ -123,7 +123,9 @@ fn measure(statement: &MeasureStatement, commands: &Commands) -> Vec<Sentence> {
         NextStep::StateNoise => one("a run once more, or state the noise: only then can the model be judged"),
         NextStep::SeparatingTest => {
             let test = statement.description.as_deref().unwrap_or_default();
-            with_program(format!("What to measure next: {test}"), "trace", &format!("--write {next} --with-tests"))
+            let written = command("trace", "--next next --control CONTROL");
+            let what = "writes the test, its program and its sheet".into();
+            vec![format!("What to measure next: {test}").into(), Sentence::Command(written, what)]
         }
         NextStep::Identify => plan(IDENTIFIES),
         NextStep::Improve => plan(IMPROVES),

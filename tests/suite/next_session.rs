@@ -52,6 +52,29 @@ fn a_written_plan_has_the_predicted_uncertainty_and_keeps_the_text() {
     assert!((value - 20.0).abs() < 4.0 * u, "{parameter}");
 }
 
+/// One command writes what to measure next: the test, its program and its sheet, and nothing of what was measured.
+#[test]
+fn a_trace_writes_the_next_measurement_as_a_session_of_its_own() {
+    let place = tempfile::tempdir().unwrap();
+    let measured = ready("hermle-c600u/measured/session.toml");
+    let [next, found] = ["next", "trace.json"].map(|name| place.path().join(name));
+    let only = ["--only", "EZC~C:h", "--only", "EAC~C:h"];
+    let asked =
+        ["trace", text(&measured), "--next", text(&next), "--control", "linuxcnc", "--json", text(&found), "--quiet"];
+    run(&[&asked[..], &only].concat());
+    let tests = parsed(&found)["effects"][0]["separating_tests"].as_array().unwrap().clone();
+    let session = next.join("session.toml");
+    let written = std::fs::read_to_string(&session).unwrap();
+    assert_eq!(written.matches("[[test]]").count(), tests.len(), "{written}");
+    assert!(!written.contains("data = ") && written.contains("component = \"EZC\""), "{written}");
+    assert!(next.join("machine.toml").exists() && next.join("sheets.html").exists());
+    // A program for each test, and the one that calls them.
+    assert_eq!(std::fs::read_dir(next.join("programs")).unwrap().count(), tests.len() + 1);
+    run(&["plan", text(&session), "--no-effects", "--quiet"]);
+    // The folder is not written twice.
+    assert!(!abbe(&asked).status.success());
+}
+
 #[test]
 fn a_trace_appends_the_tests_that_separate() {
     let place = tempfile::tempdir().unwrap();

@@ -1,0 +1,95 @@
+//! `abbe trace --next FOLDER`: what the search proposes to measure next, as a session of its own with programs and sheet.
+
+use std::path::{Path, PathBuf};
+
+use abbe::identify::trace::TraceOutcome;
+use abbe::model::ModelError;
+use abbe::model::document::edit::SessionText;
+use abbe::model::effect::Effect;
+use abbe::model::files::{self, ReadOptions, SourceMap};
+use abbe::model::session::Session;
+use clap::Args;
+
+use crate::cli::failure::Failure;
+use crate::cli::message::{Kind, tell};
+use crate::cli::next_session::proposals;
+use crate::cli::{again, folder};
+
+/// The next measurement.
+#[derive(Args)]
+pub struct NextArguments {
+    /// Write what to measure next into a new folder: a session that holds only the tests that separate the found effects
+    /// from their aliases, their NC programs and their set-up sheets.
+    ///
+    /// Example: --next next --control siemens
+    #[arg(long, value_name = "FOLDER")]
+    next: Option<PathBuf>,
+    /// The control of the programs of --next: linuxcnc, fanuc, siemens, heidenhain.
+    ///
+    /// Example: --next next --control fanuc
+    #[arg(long, value_name = "CONTROL", requires = "next")]
+    control: Option<String>,
+}
+
+/// The name of the session in the folder.
+const SESSION: &str = "session.toml";
+
+impl NextArguments {
+    /// Refuses a folder that cannot be written before the search.
+    pub fn check(&self) -> Result<(), Failure> {
+        self.next.as_ref().map_or(Ok(()), |folder| folder::check(folder, None).map(|_| ()))
+    }
+
+    /// Writes the folder, if it is asked for.
+    pub fn run(
+        &self,
+        session: &Session,
+        sources: &SourceMap,
+        trace: &TraceOutcome,
+        quiet: bool,
+    ) -> Result<(), Failure> {
+        let Some(out) = &self.next else { return Ok(()) };
+        let proposed = proposals(&trace.result);
+        if proposed.is_empty() {
+            tell(Kind::Note, "the search proposes no further test: nothing is written");
+            return Ok(());
+        }
+        let mut text = sources.text.clone();
+        // What was measured stays where it is.
+        text.remove(&["test", "socket_distance", "format", "columns", "effect"]);
+        let of_all = |effect: &&Effect| effect.tests.is_empty();
+        let effects: Vec<Effect> = session.effects.iter().chain(&trace.effects).filter(of_all).cloned().collect();
+        text.add_effects(&effects, &session.machine)?;
+        proposed.into_iter().try_for_each(|block| text.add_block(block))?;
+        folder::write(out, &files_of(text, sources)?, false, |made| {
+            files::session(&made.join(SESSION), &ReadOptions { read_data: false, ..ReadOptions::default() })?;
+            Ok(())
+        })?;
+        self.documents(out, quiet)
+    }
+
+    /// The programs and the sheets of the session in the folder.
+    fn documents(&self, out: &Path, quiet: bool) -> Result<(), Failure> {
+        let [session, programs, sheets] =
+            [SESSION, "programs", "sheets.html"].map(|name| out.join(name).display().to_string());
+        if !quiet {
+            say!("{session}: the tests to measure next");
+        }
+        if let Some(control) = &self.control {
+            again(&["nc", &session, "--control", control, "--out", &programs], quiet)?;
+        }
+        again(&["sheet", &session, "--out", &sheets], quiet)
+    }
+}
+
+/// The session with its machine and the bodies of it.
+fn files_of(mut text: SessionText, sources: &SourceMap) -> Result<Vec<(String, Vec<u8>)>, ModelError> {
+    let mut files = Vec::new();
+    if let Some(machine) = &sources.machine_text {
+        files.push(("machine.toml".to_string(), machine.clone().into_bytes()));
+        text.set_machine_file("machine.toml");
+    }
+    files.extend(sources.bodies.iter().map(|body| (body.name.clone(), body.contents.to_vec())));
+    files.push((SESSION.to_string(), text.to_string().into_bytes()));
+    Ok(files)
+}
