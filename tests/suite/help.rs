@@ -83,6 +83,9 @@ fn every_example_of_the_help_runs() {
     // Files of the user that examples read.
     std::fs::write(folder.path().join("program.csv"), "x_mm,y_mm,z_mm,a_deg,c_deg\n10,20,30,40,50\n").unwrap();
     std::fs::write(folder.path().join("poses.csv"), "px_mm,py_mm,pz_mm,i,j,k\n10,20,30,0,0.6,0.8\n").unwrap();
+    std::fs::copy(workspace().join("tests/robots/ur5e.urdf"), folder.path().join("robot.urdf")).unwrap();
+    std::fs::write(folder.path().join("robot.csv"), "a_mm,alpha_deg,d_mm,theta_deg\n0,90,162.5,0\n-425,0,0,0\n")
+        .unwrap();
     for line in lines {
         let run = Command::new(env!("CARGO_BIN_EXE_abbe"))
             .args(&words(&line)[1..])

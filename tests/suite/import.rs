@@ -106,7 +106,10 @@ fn difference(session: &Session, name: &str) -> Option<String> {
         if found.len() != expected.len() {
             return Some(format!("{own}: {} rows, {} expected", found.len(), expected.len()));
         }
-        let off = found.iter().zip(&expected).position(|(found, expected)| !((found - expected).abs() < 2e-6));
+        let off = found
+            .iter()
+            .zip(&expected)
+            .position(|(found, expected)| (found - expected).abs() >= 2e-6 || found.is_nan());
         if let Some(row) = off {
             return Some(format!("{own}, row {row}: {}, {} expected", found[row], expected[row]));
         }

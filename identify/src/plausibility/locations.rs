@@ -28,7 +28,7 @@ pub(super) fn conflicts(problem: &Problem, beta: &[f64]) -> Vec<Conflict> {
         let is_length = slot % ERRORS_PER_AXIS < 3;
         let Some(link) = links.get(slot / ERRORS_PER_AXIS).copied() else { continue };
         let share = if is_length { value.abs() / link } else { value.abs() };
-        if !(share > MAX_SHARE) {
+        if share <= MAX_SHARE || share.is_nan() {
             continue;
         }
         let shown = |value: f64| value * parameter.unit.display_per_internal;

@@ -259,7 +259,10 @@ fn of_poses(problem: &Problem, fit: &Fit) -> Plausibility {
     };
     let left = channels * rms_mm(problem, &fit.residuals).powi(2);
     let explained = 1.0 - left / spread;
-    let suggestions = if explained < WELL_EXPLAINED { poses::suggestions(problem) } else { Vec::new() };
+    // Links that shrink to nothing explain positions in another unit, too.
+    let locations = locations::conflicts(problem, &fit.beta);
+    let is_searched = explained < WELL_EXPLAINED || !locations.is_empty();
+    let suggestions = if is_searched { poses::suggestions(problem) } else { Vec::new() };
     let little = explained < MIN_EXPLAINED;
     let mut conflicts = if little || !suggestions.is_empty() {
         vec![Conflict {
@@ -279,7 +282,7 @@ fn of_poses(problem: &Problem, fit: &Fit) -> Plausibility {
     } else {
         Vec::new()
     };
-    conflicts.extend(locations::conflicts(problem, &fit.beta));
+    conflicts.extend(locations);
     Plausibility { conflicts, suggestions, explained_variance: Some(explained) }
 }
 

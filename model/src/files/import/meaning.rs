@@ -167,7 +167,7 @@ fn by_name(grid: &Grid, column: usize, expected: &Expected<'_>, joints_from: usi
                 if let Some(meaning) = meaning(words, unit, grid, column, expected, joints_from) {
                     let is_zenith =
                         meaning == Meaning::Reading(ELEVATION, true) && words::is_one_of(words, &words::ZENITH);
-                    let unit = if is_zenith { Some(unit.unwrap_or(Unit::of_own("deg")).from_zenith()) } else { unit };
+                    let unit = if is_zenith { Some(unit.unwrap_or(Unit::of_own("deg")).above_horizon()) } else { unit };
                     return Some(Found { column, meaning, unit, direction });
                 }
             }

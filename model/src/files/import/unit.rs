@@ -25,7 +25,7 @@ impl Unit {
     }
 
     /// The same of an angle from the zenith, as an elevation.
-    pub fn from_zenith(self) -> Unit {
+    pub fn above_horizon(self) -> Unit {
         let quarter = match self.own {
             "rad" => std::f64::consts::FRAC_PI_2,
             _ => 90.0,
