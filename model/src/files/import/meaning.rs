@@ -103,6 +103,8 @@ fn is_of(grid: &Grid, hint: &Hint, column: usize) -> bool {
     match &hint.foreign {
         ForeignColumn::Number(number) => number.0 == column + 1,
         ForeignColumn::Name(name) => names_of(grid, column).iter().any(|own| own == name),
+        // A hint names one column.
+        ForeignColumn::Traversals(_) => false,
     }
 }
 
@@ -123,6 +125,7 @@ fn hinted(grid: &Grid, hint: &Hint) -> Result<Found, Fault> {
     let named = match &hint.foreign {
         ForeignColumn::Number(number) => format!("column {}", number.0),
         ForeignColumn::Name(name) => format!("column `{name}`"),
+        ForeignColumn::Traversals(_) => "several columns".to_string(),
     };
     match columns[..] {
         [column] => Ok(Found { column, meaning: Meaning::Hinted(hint.own.clone()), unit: None, direction: None }),
