@@ -47,7 +47,8 @@ impl Plan {
         let noise_mm = noise_um.map(|um| um * 1e-3);
         let options = PlanOptions { noise_mm, planned_only: planned, effects, ..PlanOptions::default() };
         let (problem, analysis) = work::run(py, None, move |_| {
-            let analysis = plan::analyse(&own.session, &options)?;
+            let mut analysis = plan::analyse(&own.session, &options)?;
+            analysis.warnings.extend(plan::collision::unchecked(&own.session, options.planned_only));
             let (complete, noise) = plan::prepared(&own.session, &options)?;
             Ok((plan::states::problem_by_test(&complete, noise)?, analysis))
         })?;

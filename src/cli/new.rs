@@ -1,6 +1,7 @@
 //! `abbe new`: create a machine and a session from a template, a structural code, or the file of a robot.
 
 mod robot;
+mod sizes;
 mod templates;
 
 use std::path::PathBuf;
@@ -9,6 +10,7 @@ use abbe::model::ModelError;
 use abbe::model::files::template;
 use clap::Args;
 
+use self::sizes::SizeArguments;
 use self::templates::TEMPLATES;
 use super::failure::Failure;
 use super::folder::{self, NewFile};
@@ -18,6 +20,7 @@ pub const HELP: &str = "Examples:
   abbe new
   abbe new mymachine --template hermle-c600u
   abbe new mine --from-code \"[wCXbYZAt]\"
+  abbe new ours --from-code \"[wCXbYZAt]\" --pivot-mm 180 --gauge-mm 120 --table-mm=-80
   abbe new arm --from-urdf robot.urdf --tip tool0 --target-mm 0,0,60
   abbe new arm2 --from-dh robot.csv --convention standard --measured-by sockets
 
@@ -42,6 +45,8 @@ pub struct NewArguments {
     from_code: Option<String>,
     #[command(flatten)]
     robot: robot::RobotArguments,
+    #[command(flatten)]
+    sizes: SizeArguments,
     /// List the templates.
     #[arg(long)]
     list: bool,
@@ -58,7 +63,7 @@ pub fn run(arguments: &NewArguments, quiet: bool) -> Result<(), Failure> {
     };
     let files = match (&arguments.template, &arguments.from_code) {
         (Some(name), _) => copied(name)?,
-        (None, Some(code)) => of_code(code)?,
+        (None, Some(code)) => of_code(code, &arguments.sizes)?,
         (None, None) => arguments.robot.files()?,
     };
     folder::write(folder, &files, arguments.force, |_| Ok(()))?;
@@ -90,8 +95,8 @@ const PLAN_HEAD: &str = "# A plan. `abbe plan plan.toml` analyses which errors t
     # `abbe simulate plan.toml --out run1 --error …` simulates readings. A measured test has a line `data = \"….csv\"`.\n\n";
 
 /// The files of a structural code.
-fn of_code(code: &str) -> Result<Vec<NewFile>, Failure> {
-    let [machine, plan] = template::of_code(code).map_err(|fault| match fault {
+fn of_code(code: &str, sizes: &SizeArguments) -> Result<Vec<NewFile>, Failure> {
+    let [machine, plan] = template::of_code(code, sizes.stated()).map_err(|fault| match fault {
         ModelError::UnknownAxisKind { .. } => Failure::Other(format!(
             "{fault}; `abbe new DIR --template ur10` shows a machine whose axes state their kind and direction"
         )),

@@ -115,6 +115,7 @@ fn any_structural_code_gives_a_plan_that_runs() {
         ("[wCAYXZt]", "it contains 0 beds"),
         ("w b J1 J2 t", "axis `J1` is not an ISO 841 letter"),
         ("wbt", "it has no axis"),
+        ("w b Z B t", "a bar cannot be set up for any test"),
     ] {
         let output = abbe(&["new", text(&folder.path().join("no")), "--from-code", code]);
         assert_eq!(output.status.code(), Some(1));
@@ -122,6 +123,33 @@ fn any_structural_code_gives_a_plan_that_runs() {
         assert!(stderr.contains(message), "{code}: {stderr}");
     }
     assert!(!folder.path().join("no").exists());
+}
+
+/// Sizes are stated, or the files call them guesses.
+#[test]
+fn sizes_are_stated_or_guessed() {
+    let folder = tempfile::tempdir().unwrap();
+    let made = |name: &str, more: &[&str]| {
+        let place = folder.path().join(name);
+        let run = abbe(&[&["new", text(&place), "--from-code", "[wCXbYZAt]"][..], more].concat());
+        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+        std::fs::read_to_string(place.join("machine.toml")).unwrap()
+    };
+    let guessed = made("guessed", &[]);
+    assert_eq!(guessed.matches("A guess.").count(), 3, "{guessed}");
+    assert!(guessed.contains("origin_mm = [0, 0, 250]"), "{guessed}");
+    let stated = made("stated", &["--pivot-mm", "180", "--gauge-mm", "120", "--table-mm=-80"]);
+    assert_eq!((stated.matches("A guess.").count(), stated.matches("As stated").count()), (0, 3), "{stated}");
+    assert!(stated.contains("origin_mm = [0, 0, 300]"), "{stated}");
+    assert!(stated.contains("[150.0, 150.0, -80.0]") && stated.contains("[-60.0, -60.0, 120.0]"), "{stated}");
+    for (code, size, expected) in [
+        ("[wCAbYXZt]", "--pivot-mm=100", "the head of this machine has no rotary axis"),
+        ("[wCXbYZAt]", "--gauge-mm=5", "the gauge length is 5 mm"),
+    ] {
+        let run = abbe(&["new", text(&folder.path().join("no")), "--from-code", code, size]);
+        let message = String::from_utf8_lossy(&run.stderr).into_owned();
+        assert!(run.status.code() == Some(1) && message.contains(expected), "{message}");
+    }
 }
 
 #[test]

@@ -44,7 +44,7 @@ fn options() -> PlanOptions {
 /// If the code is not valid.
 #[wasm_bindgen(js_name = filesOfCode)]
 pub fn files_of_code(code: &str) -> Result<String, Failed> {
-    let [machine, plan] = template::of_code(code)?;
+    let [machine, plan] = template::of_code(code, template::Sizes::default())?;
     Ok(json!({ "machine.toml": machine, "plan.toml": plan }).to_string())
 }
 

@@ -17,6 +17,7 @@ mod shape;
 
 use std::collections::BTreeMap;
 
+use abbe_model::session::motion::Motion;
 use abbe_model::session::moves::Moves;
 use abbe_model::session::{Session, Test};
 use schemars::JsonSchema;
@@ -50,13 +51,26 @@ pub fn clearances(session: &Session) -> Vec<TestClearance> {
     session.tests.iter().filter_map(of).collect()
 }
 
+/// The sentence that nothing is compared with spindle and table, although a test moves; `None` if the machine states bodies.
+/// With `measured`, tests with data count, too.
+pub fn unchecked(session: &Session, measured: bool) -> Option<String> {
+    let moves = |test: &Test| {
+        let is_motion = !matches!(test.motion, None | Some(Motion::List));
+        is_motion && test.station.table_point_mm().is_some() && (measured || test.readings.is_none())
+    };
+    (session.machine.bodies.is_empty() && session.tests.iter().any(moves)).then(|| {
+        "clearance is not checked: the machine states no `[[body]]`, such as its table and its spindle".to_string()
+    })
+}
+
 /// The sentences about tests, and moves of their programs, with less clearance than the session asks for.
 ///
 /// # Errors
 /// If the states of a test cannot be planned.
 pub fn warnings_of_programs(session: &Session, moves: &[Moves]) -> Result<Vec<String>, PlanError> {
     let complete = states::complete(session, true)?;
-    let mut found = warnings(&complete, &clearances(&complete));
+    let mut found: Vec<String> = unchecked(session, true).into_iter().collect();
+    found.extend(warnings(&complete, &clearances(&complete)));
     found.extend(warnings_of_moves(session, moves));
     Ok(found)
 }

@@ -119,7 +119,9 @@ impl<'m> Parts<'m> {
         let of_bar = (0..parts.len()).filter(|_| bar.is_some()).map(|other| Pair { one: None, other });
         let mut pairs: Vec<Pair> = of_bar.collect();
         for one in 0..parts.len() {
-            let others = (one + 1..parts.len()).filter(|other| parts[one].side != parts[*other].side);
+            // A holder on a side without axes stands on the bed, as bodies of the bed do.
+            let moves = |other: &usize| parts[one].axis.is_some() || parts[*other].axis.is_some();
+            let others = (one + 1..parts.len()).filter(|other| parts[one].side != parts[*other].side && moves(other));
             pairs.extend(others.map(|other| Pair { one: Some(one), other }));
         }
         Some(Parts { machine, parts, pairs, sizes, bar })

@@ -8,6 +8,7 @@ mod patterns;
 mod poses;
 
 use abbe::document::StatedPlan;
+use abbe::plan::collision;
 use abbe::plan::next_test::NextTest;
 use abbe::plan::range::shrinkages;
 use abbe::plan::{self, PlanOptions};
@@ -107,6 +108,7 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
         return common.output.put(&outputs, &report::next_test::report(&problem, &found), &found, &read);
     }
     let mut analysis = plan::analyse(&session, &options)?;
+    analysis.warnings.extend(collision::unchecked(&session, options.planned_only));
     if let Some(sizes) = &arguments.clearance_mm {
         analysis.warnings.extend(clearance::faults(&session, sizes)?);
     }

@@ -9,7 +9,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
 use super::bar;
-use crate::plant::chain::{Chain, ChainErrors};
+use crate::plant::chain::ChainErrors;
 
 /// Standard deviation of drawn errors, µm and arcsec.
 const ERRORS: f64 = 20.0;
@@ -65,7 +65,7 @@ pub fn draw(code: &str, plan: &Session, seed: u64, noise_um: f64) -> DrawnSessio
             }
         }
     }
-    let chain = Chain::from_code(code);
+    let chain = super::chain(code, plan);
     let mut measured = plan.clone();
     for (test, mut readings) in measured.tests.iter_mut().zip(planned_session(plan).unwrap()) {
         let out = out_of_place(plan, test, &values);

@@ -1,10 +1,13 @@
 //! Files of a new machine: `machine.toml` and a plan for any structural code, with a comment on each line.
 //!
-//! A code states neither lengths nor travels. The files hold usual ones, and each comment says what to enter.
+//! A code states neither lengths nor travels. The files hold usual ones, and each comment says what to enter. Table surface
+//! and spindle are bodies, so that the clearance of every test and every program is checked.
 
 mod body;
+mod geometry;
 mod mounts;
 mod plan;
+mod rotary;
 
 use std::fmt::Write;
 
@@ -12,14 +15,17 @@ use crate::axis::{Axis, AxisKind};
 use crate::code::StructuralCode;
 use crate::error::ModelError;
 
-use self::body::Body;
+use self::body::{Body, Side};
+use self::geometry::Geometry;
+pub use self::geometry::Sizes;
 
 /// The texts of `machine.toml` and of a plan that refers to it: two tests of each rotary axis, a circle of each pair of
-/// linear axes.
+/// linear axes. Spindle and holders stay clear of the table in all of them, with these sizes.
 ///
 /// # Errors
-/// If the code is invalid, has no axis, or has an axis that is no letter of ISO 841, so that its kind is not known.
-pub fn of_code(code: &str) -> Result<[String; 2], ModelError> {
+/// If the code is invalid, has no axis, or has an axis that is no letter of ISO 841, so that its kind is not known; if a
+/// size is out of its range; if no test is possible.
+pub fn of_code(code: &str, sizes: Sizes) -> Result<[String; 2], ModelError> {
     let parsed = StructuralCode::parse(code)?;
     let mut bodies = Vec::new();
     for (index, name) in parsed.axes().enumerate() {
@@ -36,10 +42,19 @@ pub fn of_code(code: &str) -> Result<[String; 2], ModelError> {
     if bodies.is_empty() {
         return Err(ModelError::StructuralCode { code: code.to_string(), found: "it has no axis".into() });
     }
-    Ok([machine(&parsed, &bodies), plan::text(&bodies)])
+    let geometry = Geometry::of(&bodies, sizes)?;
+    let plan = plan::text(&bodies, &geometry).ok_or_else(|| ModelError::Plan {
+        message: format!(
+            "a bar cannot be set up for any test of {}: linear axes along X, Y and Z have to follow an axis of the head, \
+             because a ball on it would be in the head",
+            parsed.spaced()
+        ),
+        help: "use the code of a machine with more axes".into(),
+    })?;
+    Ok([machine(&parsed, &bodies, &geometry), plan])
 }
 
-fn machine(code: &StructuralCode, bodies: &[Body]) -> String {
+fn machine(code: &StructuralCode, bodies: &[Body], geometry: &Geometry) -> String {
     let mut text = format!(
         "# Name of the machine in results.\n\
          name = \"Machine {spaced}\"\n\
@@ -60,19 +75,28 @@ fn machine(code: &StructuralCode, bodies: &[Body]) -> String {
                 "direction of motion",
                 "moves",
                 "",
-                "# Smallest and largest position, mm. Enter the travel of the machine.\ntravel_mm = [-300, 300]"
-                    .to_string(),
+                format!(
+                    "# Smallest and largest position, mm. Enter the travel of the machine.\ntravel_mm = {:?}",
+                    geometry.travel(body.along)
+                ),
             ),
             AxisKind::Rotary => (
                 "axis of rotation",
                 "turns",
                 " (right-hand rule)",
                 format!(
-                    "# A point on the axis of rotation in R, mm. Choose the origin of R where the rotary axes meet, and enter the \
-                     offset of others.\n\
-                     origin_mm = [0, 0, 0]\n\
+                    "# A point on the axis of rotation in R, mm. {}\n\
+                     origin_mm = [0, 0, {}]\n\
                      # Smallest and largest position, degrees. Enter the travel of the machine.\n\
                      travel_deg = {}",
+                    match body.side() {
+                        Side::Workpiece => "Choose the origin of R where the rotary axes of the table meet, and enter the offset of others.".to_string(),
+                        Side::Tool => format!(
+                            "{}: pivot length and gauge length above the spindle ball, which is at the origin of R with all axes at zero.",
+                            Geometry::origin(geometry.stated.pivot_mm)
+                        ),
+                    },
+                    if body.on_table { 0.0 } else { geometry.lever },
                     if body.along == 2 { "[-360, 360]" } else { "[-120, 120]" }
                 ),
             ),
@@ -90,7 +114,28 @@ fn machine(code: &StructuralCode, bodies: &[Body]) -> String {
         }
         let _ = writeln!(text, "direction = {direction}\n{rest}");
     }
+    shapes(&mut text, bodies, geometry);
     text
+}
+
+/// The bodies that clearance is checked against.
+fn shapes(text: &mut String, bodies: &[Body], geometry: &Geometry) {
+    let table = bodies.first().filter(|body| body.on_table);
+    let spindle = bodies.last().filter(|body| !body.on_table);
+    for (name, about, stated, carrier, corners) in [
+        ("table", "Table, up to its surface", geometry.stated.table_mm, table, geometry.table_box()),
+        ("spindle", "Spindle, from its nose upwards", geometry.stated.gauge_mm, spindle, geometry.spindle_box()),
+    ] {
+        let _ = write!(text, "\n# {about}.\n[[body]]\nname = \"{name}\"\n");
+        if let Some(carrier) = carrier {
+            let _ = writeln!(text, "# The axis that carries it.\naxis = \"{}\"", carrier.name);
+        }
+        let _ = writeln!(
+            text,
+            "# {}: least and greatest corner in R with all axes at zero, mm.\nbox_mm = {corners:?}",
+            Geometry::origin(stated)
+        );
+    }
 }
 
 /// The unit vector along a direction of R.

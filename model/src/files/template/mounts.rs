@@ -3,50 +3,85 @@
 //! A ball is mounted once. Linear axes move the spindle ball to the position relative to the workpiece ball that a test
 //! needs. If no axis moves along a required direction, the ball that does not move in the test is mounted again.
 
+use super::body::{Body, Side};
+use super::geometry::{EXTENDED_MM, Geometry, RADIUS_MM};
 use crate::axis::AxisKind;
 
-use super::body::{Body, Side};
+/// Lengths that differ by no more are equal, mm.
+const SAME_MM: f64 = 1e-9;
 
-/// A length over the constants of the plan: `radius` times `R` plus `lift` times `sqrt(R_e^2 - R^2)`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// A length over the constants of the plan: `radius` times `R`, plus `lift` times `sqrt(R_e^2 - R^2)`, plus `mm`.
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Length {
     pub radius: i32,
     pub lift: i32,
+    pub mm: f64,
 }
 
 /// A point or a distance, along X, Y and Z of R.
 pub(super) type Vector = [Length; 3];
 
 impl Length {
-    const ZERO: Length = Length { radius: 0, lift: 0 };
+    pub const ZERO: Length = Length { radius: 0, lift: 0, mm: 0.0 };
+    pub const RADIUS: Length = Length { radius: 1, ..Length::ZERO };
+    pub const LIFT: Length = Length { lift: 1, ..Length::ZERO };
 
-    /// `0`, `"R"`, `"-R"`, `"R + sqrt(R_e^2 - R^2)"`: as in a session file.
+    /// A length; the radius where it is that.
+    pub fn of(mm: f64) -> Length {
+        if (mm - RADIUS_MM).abs() < SAME_MM { Length::RADIUS } else { Length { mm, ..Length::ZERO } }
+    }
+
+    /// `0`, `12.5`, `"R"`, `"-R"`, `"R + sqrt(R_e^2 - R^2)"`: as in a session file.
     pub fn text(self) -> String {
         let mut text = String::new();
         for (count, name) in [(self.radius, "R"), (self.lift, "sqrt(R_e^2 - R^2)")] {
             if count == 0 {
                 continue;
             }
-            text.push_str(match (text.is_empty(), count < 0) {
-                (true, false) => "",
-                (true, true) => "-",
-                (false, false) => " + ",
-                (false, true) => " - ",
-            });
+            text.push_str(sign(text.is_empty(), count < 0));
             if count.abs() > 1 {
                 text.push_str(&format!("{} * ", count.abs()));
             }
             text.push_str(name);
         }
-        if text.is_empty() { "0".to_string() } else { format!("\"{text}\"") }
+        if self.mm.abs() < SAME_MM {
+            return if text.is_empty() { "0".into() } else { format!("\"{text}\"") };
+        }
+        if text.is_empty() {
+            return format!("{}", self.mm);
+        }
+        format!("\"{text}{}{}\"", sign(false, self.mm < 0.0), self.mm.abs())
+    }
+
+    pub fn is_zero(self) -> bool {
+        self.value().abs() < SAME_MM
+    }
+
+    fn value(self) -> f64 {
+        f64::from(self.radius) * RADIUS_MM
+            + f64::from(self.lift) * (EXTENDED_MM.powi(2) - RADIUS_MM.powi(2)).sqrt()
+            + self.mm
+    }
+
+    pub fn plus(self, other: Length) -> Length {
+        Length { radius: self.radius + other.radius, lift: self.lift + other.lift, mm: self.mm + other.mm }
+    }
+
+    pub fn negative(self) -> Length {
+        Length { radius: -self.radius, lift: -self.lift, mm: -self.mm }
     }
 
     fn less(self, other: Length) -> Length {
-        Length { radius: self.radius - other.radius, lift: self.lift - other.lift }
+        self.plus(other.negative())
     }
+}
 
-    fn negative(self) -> Length {
-        Length::ZERO.less(self)
+fn sign(is_first: bool, is_negative: bool) -> &'static str {
+    match (is_first, is_negative) {
+        (true, false) => "",
+        (true, true) => "-",
+        (false, false) => " + ",
+        (false, true) => " - ",
     }
 }
 
@@ -73,42 +108,36 @@ pub(super) struct Setting {
 }
 
 impl Mounts {
-    /// The mounting points that all tests share: a workpiece ball beside the rotary axes of the table, a spindle ball
-    /// beside those of the head. Axes along three directions need two mounting points.
-    pub fn of(bodies: &[Body]) -> Mounts {
-        Mounts { workpiece: beside(bodies, Side::Workpiece), spindle: beside(bodies, Side::Tool) }
+    /// The mounting points that all tests share: a workpiece ball beside the rotary axes of the table, a spindle ball in
+    /// place of a tool, or on an arm if the head can turn and not tilt. Axes of the table along three directions need two
+    /// workpiece balls.
+    pub fn of(bodies: &[Body], geometry: &Geometry) -> Mounts {
+        let turns = |tilts: bool| {
+            let of_head = |own: &&Body| own.kind == AxisKind::Rotary && own.side() == Side::Tool;
+            bodies.iter().filter(of_head).any(|own| (own.along != 2) == tilts)
+        };
+        let mut mounts = Mounts { workpiece: beside(bodies, geometry), spindle: Vec::new() };
+        if turns(true) || !turns(false) {
+            mounts.spindle.push([Length::ZERO; 3]);
+        } else {
+            mounts.on_arm();
+        }
+        mounts
     }
 
-    /// A test in which rotary axis `turning` moves its ball about the other ball, which is on the axis (`lift` 0) or
-    /// raised along it (`lift` 1).
-    pub fn sweep(&mut self, bodies: &[Body], turning: usize, lift: i32) -> Setting {
-        let axis = &bodies[turning];
-        let carried_on = axis.side();
-        let (mut workpiece, mut spindle) = (0, 0);
-        let (own, mounts) = match carried_on {
-            Side::Workpiece => (&mut workpiece, &self.workpiece),
-            Side::Tool => (&mut spindle, &self.spindle),
+    /// The number of the spindle ball on an arm, at the radius from the axis of the spindle.
+    pub fn on_arm(&mut self) -> usize {
+        index_of(&mut self.spindle, [Length::RADIUS, Length::ZERO, Length::ZERO])
+    }
+
+    /// The number of the workpiece ball beside an axis of the table.
+    pub fn beside(&self, axis: &Body) -> usize {
+        let is_beside = |ball: &Vector| match axis.along {
+            0 => !ball[1].is_zero(),
+            1 => !ball[0].is_zero(),
+            _ => ball[0].is_zero() != ball[1].is_zero(),
         };
-        *own = (0..mounts.len()).find(|mount| is_off_axis(&mounts[*mount], axis.along)).unwrap_or(0);
-        let ball = mounts[*own];
-        // The vector from workpiece ball to spindle ball: from the moved ball to the axis, and along the axis.
-        let mut wanted = match carried_on {
-            Side::Workpiece => ball.map(Length::negative),
-            Side::Tool => ball,
-        };
-        wanted[axis.along].lift += lift;
-        // An axis that the turning axis carries changes the radius.
-        let carried = |index: usize| match carried_on {
-            Side::Workpiece => index < turning,
-            Side::Tool => index > turning,
-        };
-        let usable: Vec<usize> =
-            (0..bodies.len()).filter(|index| bodies[*index].side() != carried_on || !carried(*index)).collect();
-        let standing = match carried_on {
-            Side::Workpiece => Side::Tool,
-            Side::Tool => Side::Workpiece,
-        };
-        self.placed(bodies, [workpiece, spindle], wanted, &usable, standing)
+        self.workpiece.iter().position(is_beside).unwrap_or(0)
     }
 
     /// A test in which two linear axes move the spindle ball on a circle about the workpiece ball. The other axes move
@@ -129,7 +158,7 @@ impl Mounts {
 
     /// Moves the first usable linear axis along each direction until the spindle ball is at `wanted` from the workpiece
     /// ball, with all rotary axes at zero. Without such an axis the ball of the `standing` side is mounted again.
-    fn placed(
+    pub fn placed(
         &mut self,
         bodies: &[Body],
         mounts: [usize; 2],
@@ -144,7 +173,7 @@ impl Mounts {
         let mut remounted_along = Vec::new();
         for along in 0..3 {
             let missing = wanted[along].less(spindle[along].less(workpiece[along]));
-            if missing == Length::ZERO {
+            if missing.is_zero() {
                 continue;
             }
             let moves = |axis: usize| usable.contains(&axis) && bodies[axis].along == along;
@@ -158,7 +187,7 @@ impl Mounts {
             }
             remounted_along.push(along);
             match standing {
-                Side::Tool => spindle[along] = spindle[along].less(missing.negative()),
+                Side::Tool => spindle[along] = spindle[along].plus(missing),
                 Side::Workpiece => workpiece[along] = workpiece[along].less(missing),
             }
         }
@@ -173,41 +202,27 @@ impl Mounts {
 
 /// The index of a point in a list. A new point is added at the end.
 fn index_of(list: &mut Vec<Vector>, point: Vector) -> usize {
-    list.iter().position(|other| *other == point).unwrap_or_else(|| {
+    let is_same = |other: &Vector| (0..3).all(|along| other[along].less(point[along]).is_zero());
+    list.iter().position(is_same).unwrap_or_else(|| {
         list.push(point);
         list.len() - 1
     })
 }
 
-/// Whether an axis along this direction moves the ball on a circle of radius R.
-fn is_off_axis(ball: &Vector, along: usize) -> bool {
-    let beside: i32 =
-        (0..3).filter(|direction| *direction != along).map(|direction| ball[direction].radius.abs()).sum();
-    beside == 1
-}
-
-/// Balls at the distance R from the rotary axes of a side, one ball per two directions of axes; a ball at the origin of
-/// R if the side has no rotary axis.
-fn beside(bodies: &[Body], side: Side) -> Vec<Vector> {
-    let mut directions: Vec<usize> = Vec::new();
-    for body in bodies {
-        if body.kind == AxisKind::Rotary && body.side() == side && !directions.contains(&body.along) {
-            directions.push(body.along);
-        }
-    }
-    if directions.is_empty() {
-        return vec![[Length::ZERO; 3]];
-    }
-    let ball = |directions: &[usize]| -> Vector {
-        // Below the head, in place of a tool; on the table beside the axis.
-        let (order, sign) = match side {
-            Side::Tool => ([2, 0, 1], -1),
-            Side::Workpiece => ([1, 0, 2], 1),
-        };
-        let across = order.into_iter().find(|direction| !directions.contains(direction)).unwrap_or(2);
-        let mut ball = [Length::ZERO; 3];
-        ball[across].radius = if across == 2 { sign } else { 1 };
-        ball
+/// Workpiece balls beside the rotary axes of the table, at the height that the geometry gives; one on the axis of the
+/// spindle if there are none.
+fn beside(bodies: &[Body], geometry: &Geometry) -> Vec<Vector> {
+    let turns = |along: usize| {
+        bodies.iter().any(|own| own.kind == AxisKind::Rotary && own.side() == Side::Workpiece && own.along == along)
     };
-    directions.chunks(2).map(ball).collect()
+    let [about_x, about_y, about_z] = [0, 1, 2].map(turns);
+    let beside = Length::of(geometry.beside(about_x || about_y));
+    let height = Length { mm: geometry.ball_height, ..Length::ZERO };
+    match (about_x, about_y, about_z) {
+        (false, false, false) => vec![[Length::ZERO, Length::ZERO, height]],
+        (true, true, false) => vec![[beside, beside, height]],
+        (true, true, true) => vec![[beside, Length::ZERO, height], [Length::ZERO, beside, height]],
+        (false, true, _) => vec![[beside, Length::ZERO, height]],
+        _ => vec![[Length::ZERO, beside, height]],
+    }
 }

@@ -1,14 +1,17 @@
 //! The plan of a structural code: two tests of each rotary axis, a circle of each pair of linear axes.
 //!
 //! The balls are mounted once. Each test states the positions of the axes that it does not move. These are the
-//! coordinates that the operator enters and that the data contain.
+//! coordinates that the operator enters and that the data contain. Tests with the same bar and the same balls follow each
+//! other.
 
 use std::fmt::Write;
 
 use crate::axis::AxisKind;
 
 use super::body::{Body, Side};
+use super::geometry::{Geometry, STEM_MM};
 use super::mounts::{Mounts, Setting, point_text};
+use super::rotary::{self, RotaryMotion, RotaryTest};
 
 /// Names of the directions of R, and of the angles about them.
 const LETTERS: [&str; 3] = ["X", "Y", "Z"];
@@ -38,29 +41,72 @@ const PRIORS: &str = "# Set-up priors: standard uncertainty of the ball position
     spindle_ball_u_um = [1, 1, 1]\n\
     bar_u_um = 0.5\n";
 
-/// The text of the plan.
-pub(super) fn text(bodies: &[Body]) -> String {
-    let pairs = pairs(bodies);
-    let mut text = HEAD.to_string();
-    unknowns(&mut text, bodies, &pairs);
-    let mut mounts = Mounts::of(bodies);
-    for turning in 0..bodies.len() {
-        if bodies[turning].kind == AxisKind::Rotary {
-            for lift in [0, 1] {
-                let setting = mounts.sweep(bodies, turning, lift);
-                sweep(&mut text, bodies, turning, lift == 1, &mounts, &setting);
-            }
+/// A test as text, with what decides its place in the plan.
+struct Planned {
+    extended: bool,
+    spindle: usize,
+    workpiece: usize,
+    text: String,
+}
+
+/// The text of the plan; `None` if it would have no test.
+pub(super) fn text(bodies: &[Body], geometry: &Geometry) -> Option<String> {
+    let mut mounts = Mounts::of(bodies, geometry);
+    let (mut planned, mut untested): (Vec<Planned>, Vec<usize>) = (Vec::new(), Vec::new());
+    for turning in (0..bodies.len()).filter(|index| bodies[*index].kind == AxisKind::Rotary) {
+        let tests = rotary::tests(&mut mounts, bodies, turning, geometry);
+        if tests.is_empty() {
+            untested.push(turning);
         }
+        planned.extend(tests.iter().map(|test| Planned {
+            extended: test.extended,
+            spindle: test.setting.spindle,
+            workpiece: test.setting.workpiece,
+            text: of_rotary(bodies, turning, &mounts, test),
+        }));
     }
-    for pair in pairs {
-        let setting = mounts.circle(bodies, pair);
-        circle(&mut text, bodies, pair, &mounts, &setting);
+    let pairs = pairs(bodies);
+    for pair in &pairs {
+        let setting = mounts.circle(bodies, *pair);
+        planned.push(Planned {
+            extended: false,
+            spindle: setting.spindle,
+            workpiece: setting.workpiece,
+            text: circle(bodies, *pair, &mounts, &setting),
+        });
     }
-    text
+    if planned.is_empty() {
+        return None;
+    }
+    // The bar gets its extension once, and a ball is mounted again as seldom as possible.
+    planned.sort_by_key(|test| (test.extended, test.spindle, test.workpiece));
+    let mut text = HEAD.to_string();
+    clearance(&mut text, geometry);
+    unknowns(&mut text, bodies, &pairs, &untested);
+    text.extend(planned.into_iter().map(|test| test.text));
+    Some(text)
+}
+
+/// The sizes of bar and holders.
+fn clearance(text: &mut String, geometry: &Geometry) {
+    let _ = write!(
+        text,
+        "[clearance]\n\
+         # Radius of the bar, mm. With the bodies of the machine these sizes decide what can collide.\n\
+         bar_radius_mm = {STEM_MM}\n\
+         # The stem from the table to the workpiece ball.\n\
+         workpiece_holder = {{ radius_mm = {STEM_MM}, length_mm = {stand} }}\n\
+         # The stem from the spindle nose to the spindle ball.\n\
+         spindle_holder = {{ radius_mm = {STEM_MM}, length_mm = {gauge} }}\n\
+         # Less clearance causes a warning.\n\
+         least_mm = 5\n\n",
+        stand = geometry.stand(),
+        gauge = geometry.gauge,
+    );
 }
 
 /// The errors to estimate.
-fn unknowns(text: &mut String, bodies: &[Body], pairs: &[[usize; 2]]) {
+fn unknowns(text: &mut String, bodies: &[Body], pairs: &[[usize; 2]], untested: &[usize]) {
     text.push_str(
         "[unknowns]\n# The errors to estimate, by ISO 230-1: EX0C is the position error of C along X, EA0C its orientation error about X.\n\
          errors = [\n",
@@ -68,6 +114,14 @@ fn unknowns(text: &mut String, bodies: &[Body], pairs: &[[usize; 2]]) {
     let given = given(bodies);
     for (index, body) in bodies.iter().enumerate() {
         if body.kind != AxisKind::Rotary {
+            continue;
+        }
+        if untested.contains(&index) {
+            let _ = writeln!(
+                text,
+                "  # {}: no linear axes follow it with a bar that stays clear of the head; its errors are not estimated.",
+                body.name
+            );
             continue;
         }
         let across = || (0..3).filter(|k| *k != body.along);
@@ -142,42 +196,50 @@ fn pairs(bodies: &[Body]) -> Vec<[usize; 2]> {
     pairs
 }
 
-fn sweep(text: &mut String, bodies: &[Body], turning: usize, extended: bool, mounts: &Mounts, setting: &Setting) {
+fn of_rotary(bodies: &[Body], turning: usize, mounts: &Mounts, test: &RotaryTest) -> String {
     let axis = &bodies[turning];
-    let name = &axis.name;
-    let (bar, length) = if extended { ("R_e", 150) } else { ("R_c", 100) };
-    let (carried, standing) = match axis.side() {
-        Side::Workpiece => ("workpiece", "spindle"),
-        Side::Tool => ("spindle", "workpiece"),
+    let (name, setting) = (&axis.name, &test.setting);
+    let standing = if axis.side() == Side::Workpiece { "spindle" } else { "workpiece" };
+    let mut text = format!("\n# {}\n", test.about);
+    remounted(&mut text, setting, standing);
+    let _ = write!(text, "[[test]]\nname = \"{}\"\n", test.name);
+    let tilted = test.tilted.map(|(other, deg)| (other, format!("{deg}")));
+    common(&mut text, bodies, test.extended, mounts, setting, &[turning], tilted.as_ref());
+    text.push_str("# The axis moves there and back. Adapt the ends to its travel. `runs` repeats both directions.\n");
+    let _ = match test.motion {
+        RotaryMotion::Sweep { from, to } => {
+            let step = if axis.along == 2 { 2 } else { 1 };
+            writeln!(
+                text,
+                "sweep = {{ axis = \"{name}\", from_deg = {from}, to_deg = {to}, step_deg = {step}, feed_deg_min = 500, runs = 1, both_directions = true }}"
+            )
+        }
+        RotaryMotion::Follow { offset, to } => writeln!(
+            text,
+            "path = {{ kind = \"follow\", axis = \"{name}\", offset = \"{offset}\", from_deg = -{to}, to_deg = {to}, step_deg = 1, feed_deg_min = 300, runs = 1, both_directions = true }}"
+        ),
     };
-    let place = if extended {
-        "on the axis outside the plane of the circle, at the reach of the extended bar, so that the orientation of the axis changes the readings"
-    } else {
-        "on the axis in the plane of the circle, so that the position of the axis changes the readings"
-    };
-    let _ = write!(text, "\n# {name} turns the {carried} ball about the {standing} ball, which is {place}.\n");
-    remounted(text, setting, standing);
-    let _ = write!(text, "[[test]]\nname = \"{name}{length}\"\n");
-    common(text, bodies, bar, mounts, setting, &[turning]);
-    let (from, to, step) = if axis.along == 2 { (0, 360, 2) } else { (-90, 90, 1) };
-    let _ = write!(
-        text,
-        "# The axis moves there and back. Adapt the ends to its travel. `runs` repeats both directions.\n\
-         sweep = {{ axis = \"{name}\", from_deg = {from}, to_deg = {to}, step_deg = {step}, feed_deg_min = 500, runs = 1, both_directions = true }}\n"
-    );
+    text
 }
 
-fn circle(text: &mut String, bodies: &[Body], pair: [usize; 2], mounts: &Mounts, setting: &Setting) {
+fn circle(bodies: &[Body], pair: [usize; 2], mounts: &Mounts, setting: &Setting) -> String {
     let [a, b] = pair.map(|axis| bodies[axis].name.as_str());
-    let _ = write!(text, "\n# {a} and {b} move the spindle ball on a circle about the workpiece ball.\n");
-    remounted(text, setting, "spindle");
+    let mut text = format!("\n# {a} and {b} move the spindle ball on a circle about the workpiece ball.\n");
+    remounted(&mut text, setting, "spindle");
     let _ = write!(text, "[[test]]\nname = \"{a}{b}\"\n");
-    common(text, bodies, "R_c", mounts, setting, &pair);
+    common(&mut text, bodies, false, mounts, setting, &pair, None);
+    // Z is the second axis. A table goes down where the spindle ball is above the workpiece ball.
+    let (what, ends) = match (bodies[pair[1]].along, bodies[pair[1]].on_table) {
+        (2, false) => ("an arc of 220° above the table", "from_deg = -20, to_deg = 200, "),
+        (2, true) => ("an arc of 220° with the spindle ball above", "from_deg = -200, to_deg = 20, "),
+        _ => ("a full circle from the first towards the second", ""),
+    };
     let _ = write!(
         text,
-        "# Two linear axes, a full circle from the first towards the second and back. `runs` repeats both directions.\n\
-         path = {{ kind = \"circle\", plane = \"{a}{b}\", radius_mm = \"R_c\", step_deg = 2, feed_mm_min = 1000, runs = 1, both_directions = true }}\n"
+        "# Two linear axes, {what} and back. `runs` repeats both directions.\n\
+         path = {{ kind = \"circle\", plane = \"{a}{b}\", radius_mm = \"R_c\", {ends}step_deg = 2, feed_mm_min = 1000, runs = 1, both_directions = true }}\n"
     );
+    text
 }
 
 /// States that no axis can bring the balls together, so that one is mounted again.
@@ -194,7 +256,16 @@ fn remounted(text: &mut String, setting: &Setting, ball: &str) {
 }
 
 /// The entries that all tests have: bar, balls, set-ups, priors, and positions of the axes that the test does not move.
-fn common(text: &mut String, bodies: &[Body], bar: &str, mounts: &Mounts, setting: &Setting, moving: &[usize]) {
+fn common(
+    text: &mut String,
+    bodies: &[Body],
+    extended: bool,
+    mounts: &Mounts,
+    setting: &Setting,
+    moving: &[usize],
+    tilted: Option<&(usize, String)>,
+) {
+    let bar = if extended { "R_e" } else { "R_c" };
     let _ = write!(
         text,
         "# Calibrated length.\n\
@@ -214,11 +285,13 @@ fn common(text: &mut String, bodies: &[Body], bar: &str, mounts: &Mounts, settin
         s = setting.spindle + 1,
     );
     let linear = setting.at.iter().map(|(name, position)| format!("{}_mm = {}", name.to_lowercase(), position.text()));
-    let rotary = bodies
-        .iter()
-        .enumerate()
-        .filter(|(index, body)| body.kind == AxisKind::Rotary && !moving.contains(index))
-        .map(|(_, body)| format!("{}_deg = 0", body.name.to_lowercase()));
+    let rotary =
+        bodies.iter().enumerate().filter(|(index, body)| body.kind == AxisKind::Rotary && !moving.contains(index)).map(
+            |(index, body)| {
+                let deg = tilted.filter(|(other, _)| *other == index).map_or("0", |(_, deg)| deg);
+                format!("{}_deg = {deg}", body.name.to_lowercase())
+            },
+        );
     let at: Vec<String> = linear.chain(rotary).collect();
     if !at.is_empty() {
         let _ = writeln!(
