@@ -158,7 +158,13 @@ fn a_bar_that_cannot_reach() {
     with_session(
         "[0, 100, 0]",
         "[0, 100, 60]",
-        &["session.toml:8", "a bar of 100.0000 mm cannot reach", "116.619 mm apart", "degrees read as radians"],
+        &[
+            "session.toml:8",
+            "test \"C100\": a bar of 100.0000 mm cannot reach",
+            "116.619 mm apart",
+            "farthest from it at c_deg = 0",
+            "degrees read as radians",
+        ],
     );
     // Degrees in a column of radians: the balls keep their distance at 0 only.
     let session = SESSION.replace("spindle_ball_mm = [0, 0, 0]", "spindle_ball_mm = [0, 100, 100]");

@@ -105,3 +105,26 @@ fn numbers_and_increments_of_a_fanuc() {
         assert_eq!(longest, Some(decimals), "{program}");
     }
 }
+
+/// A plan may be eccentric; a program that pulls the bar apart at some position is not written.
+#[test]
+fn a_position_that_the_bar_cannot_reach_is_named() {
+    let place = tempfile::tempdir().unwrap();
+    let machine = "name = \"tilting\"\nchain = \"w C A b Y X Z t\"\n[axis.C]\n[axis.A]\n[axis.X]\n[axis.Y]\n[axis.Z]\n";
+    let session = "[machine]\nfile = \"machine.toml\"\n[instrument]\nkind = \"ballbar\"\n[[test]]\nname = \"A\"\n\
+                   bar_mm = 100\nworkpiece_ball_mm = [0, 110, 0]\nspindle_ball_mm = [0, 10, 0]\n\
+                   sweep = { axis = \"A\", from_deg = 0, to_deg = 60, step_deg = 5 }\n";
+    std::fs::write(place.path().join("machine.toml"), machine).unwrap();
+    let plan = place.path().join("plan.toml");
+    std::fs::write(&plan, session).unwrap();
+    let out = place.path().join("programs");
+    let output = abbe(&["nc", text(&plan), "--control", "fanuc", "--out", text(&out)]);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    for expected in
+        ["test \"A\": a bar of 100.0000 mm cannot reach between its balls at a_deg = 60,", "105.357 mm apart"]
+    {
+        assert!(message.contains(expected), "{message}");
+    }
+    assert!(!out.exists());
+}

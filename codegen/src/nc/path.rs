@@ -1,7 +1,10 @@
 //! The path of a test in legs: overshoot, measured path, overshoot.
 
+mod duration;
+
 use std::f64::consts::{PI, TAU};
 
+use abbe_model::ModelError;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{BodyErrors, Machine};
 use abbe_model::frames::Point;
@@ -9,7 +12,7 @@ use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::session::Test;
 use abbe_model::session::motion::Motion;
 use abbe_model::session::placing::balls;
-use abbe_model::session::planned::planned;
+use abbe_model::session::planned::{planned, reaches};
 
 use super::block::Block;
 use super::{Control, NcOptions, Plane};
@@ -31,6 +34,8 @@ pub(super) struct Path {
     pub overshoots: Vec<Vec<Vec<f64>>>,
     pub runs: usize,
     pub both_directions: bool,
+    /// The feed of the measured path and its unit.
+    pub feed: (f64, &'static str),
     /// What the operator must know of it.
     pub remarks: Vec<String>,
     /// Where it is less than is usual.
@@ -75,6 +80,15 @@ impl Path {
                 });
             }
         };
+        reaches(machine, test).map_err(of_plan)?;
+        let feed = match &test.motion {
+            Some(Motion::Sweep { axis, speed, .. } | Motion::Follow { axis, speed, .. }) => {
+                let kind = machine.axes[*axis].kind;
+                (60.0 * kind.to_display(*speed), if kind == AxisKind::Rotary { "°/min" } else { "mm/min" })
+            }
+            Some(Motion::Circle { speed, .. }) => (60.0 * speed, "mm/min"),
+            _ => (0.0, ""),
+        };
         let (mut remarks, mut warnings) = (Vec::new(), Vec::new());
         let ends = overshot(machine, test, range, options, &mut warnings)?;
         let [from, to] = range;
@@ -90,7 +104,7 @@ impl Path {
         if legs.iter().any(|leg| matches!(leg.shape, Shape::Segments { .. })) {
             remarks.push(format!("Segments with a chord error of at most {} um", options.chord_error_mm * 1e3));
         }
-        Ok(Path { legs, overshoots, runs, both_directions, remarks, warnings })
+        Ok(Path { legs, overshoots, runs, both_directions, feed, remarks, warnings })
     }
 
     /// The first state, with overshoot.
@@ -120,12 +134,14 @@ fn with_range(test: &Test, range: [f64; 2], steps: usize) -> Test {
     test
 }
 
+fn of_plan(error: ModelError) -> CodegenError {
+    let help = error.help().unwrap_or("plan within the travel of the machine").to_string();
+    CodegenError::Nc { message: error.to_string(), help }
+}
+
 /// The states of a range in equal steps.
 fn states(machine: &Machine, test: &Test, range: [f64; 2], steps: usize) -> Result<Vec<Vec<f64>>, CodegenError> {
-    let readings = planned(machine, &with_range(test, range, steps)).map_err(|error| CodegenError::Nc {
-        message: error.to_string(),
-        help: error.help().unwrap_or("plan within the travel of the machine").to_string(),
-    })?;
+    let readings = planned(machine, &with_range(test, range, steps)).map_err(of_plan)?;
     Ok((0..readings.rows()).map(|row| readings.positions.iter().map(|column| column[row]).collect()).collect())
 }
 

@@ -201,6 +201,7 @@ impl Instrument for BallBar<f64> {
     /// The distance between the balls is the length of the bar.
     fn check_set_up(&self, checked: &Checked<'_>) -> Result<(), Fault> {
         let mut deviations: Vec<f64> = Vec::with_capacity(checked.readings.rows());
+        let mut farthest = (0, 0.0_f64);
         for (row, reading) in checked.nominal(self).enumerate() {
             let length = reading.channels()[0];
             // A length of zero has no direction, so that no error changes it to first order.
@@ -216,6 +217,9 @@ impl Instrument for BallBar<f64> {
                 ));
             }
             deviations.push(length - self.bar);
+            if (length - self.bar).abs() > farthest.1 {
+                farthest = (row, (length - self.bar).abs());
+            }
         }
         let nominal = self.bar + median(&mut deviations);
         if (nominal - self.bar).abs() <= MAX_MM {
@@ -224,10 +228,11 @@ impl Instrument for BallBar<f64> {
         Err((
             format!(
                 "test \"{}\": a bar of {:.4} mm cannot reach between its balls, which nominally lie {nominal:.3} mm \
-                 apart (median of {} positions)",
+                 apart (median of {} positions; farthest from it at {})",
                 checked.test,
                 self.bar,
-                deviations.len()
+                deviations.len(),
+                checked.place(farthest.0)
             ),
             "possible causes are degrees read as radians (or radians as degrees), and a ball position, an axis \
              position in `at` or an axis direction that is not as on the machine"
@@ -237,6 +242,26 @@ impl Instrument for BallBar<f64> {
     fn doubt(&self, checked: &Checked<'_>) -> Option<String> {
         let deviations = checked.readings.observed.iter().map(|length| length - self.bar);
         doubt_on_scatter(&mut deviations.collect::<Vec<_>>())
+    }
+    /// The bar reaches at every position of a plan.
+    fn check_planned(&self, checked: &Checked<'_>) -> Result<(), Fault> {
+        let apart = |reading: Reading<f64>| reading.channels()[0];
+        let off = checked.nominal(self).map(apart).enumerate();
+        let farthest = off.max_by(|(_, a), (_, b)| (a - self.bar).abs().total_cmp(&(b - self.bar).abs()));
+        let Some((row, apart)) = farthest.filter(|(_, apart)| (apart - self.bar).abs() > MAX_MM) else {
+            return Ok(());
+        };
+        Err((
+            format!(
+                "test \"{}\": a bar of {:.4} mm cannot reach between its balls at {}, where they nominally lie {apart:.3} mm apart",
+                checked.test,
+                self.bar,
+                checked.place(row)
+            ),
+            "keep the balls at one distance over the whole motion: one of them on the axis of a sweep, or a path of kind \
+             \"follow\""
+                .into(),
+        ))
     }
     /// The readings are near the length of the bar.
     fn check_observed(&self, test: &str, observed: &[f64]) -> Result<(), Fault> {

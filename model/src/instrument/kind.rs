@@ -17,6 +17,7 @@ use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
 use crate::session::expression::Constant;
 use crate::session::readings::Readings;
+use crate::words::number;
 
 /// An instrument in the registry: what is known of it without a set-up.
 pub struct Entry {
@@ -200,6 +201,17 @@ impl Checked<'_> {
             geometry.reading::<f64>(self.machine, &state, &none, |_| None)
         })
     }
+
+    /// Where the axes are at a row that move during the test, or all if none does: `c_deg = 30`.
+    pub(super) fn place(&self, row: usize) -> String {
+        let moves = |column: &[f64]| column.iter().any(|q| *q != column[0]);
+        let any = self.readings.positions.iter().any(|column| moves(column));
+        let axes = self.machine.axes.iter().zip(&self.readings.positions);
+        let named = axes.filter(|(_, column)| !any || moves(column)).map(|(axis, column)| {
+            format!("{} = {}", axis.column(""), number((axis.kind.to_display(column[row]) * 1e3).round() / 1e3))
+        });
+        named.collect::<Vec<_>>().join(", ")
+    }
 }
 
 /// Everything that is particular to one instrument as set up for a test, except its reading: see [`Geometry`].
@@ -307,6 +319,14 @@ pub trait Instrument {
     /// # Errors
     /// If it does not.
     fn check_set_up(&self, checked: &Checked<'_>) -> Result<(), Fault> {
+        let _ = checked;
+        Ok(())
+    }
+    /// Checks that the instrument nominally fits at every position of a planned motion.
+    ///
+    /// # Errors
+    /// If it does not.
+    fn check_planned(&self, checked: &Checked<'_>) -> Result<(), Fault> {
         let _ = checked;
         Ok(())
     }

@@ -6,7 +6,7 @@ use super::{Session, Test, trajectory};
 use crate::axis::AxisKind;
 use crate::chain::Machine;
 use crate::error::ModelError;
-use crate::instrument::Station;
+use crate::instrument::{Checked, Station};
 
 /// Pause between the tests of a planned session, s.
 const BETWEEN_TESTS_S: f64 = 120.0;
@@ -19,6 +19,16 @@ const BETWEEN_TESTS_S: f64 = 120.0;
 /// If an axis would exceed its travel, if the balls cannot be placed on the path, or if there is no plan.
 pub fn planned(machine: &Machine, test: &Test) -> Result<Readings, ModelError> {
     checked_plan(machine, test).map_err(|(message, help)| ModelError::Plan { message, help })
+}
+
+/// Checks that the instrument reaches at every position of a planned motion, as a program needs it.
+///
+/// # Errors
+/// As [`planned`], and if it does not reach; the message names the position.
+pub fn reaches(machine: &Machine, test: &Test) -> Result<(), ModelError> {
+    let readings = planned(machine, test)?;
+    let found = test.station.check_planned(&Checked { machine, test: &test.name, readings: &readings });
+    found.map_err(|(message, help)| ModelError::Plan { message, help })
 }
 
 /// The planned states of every test of a session, consecutive in time.

@@ -1,0 +1,42 @@
+//! How long a path takes.
+
+use std::f64::consts::{PI, TAU};
+
+use abbe_model::chain::Machine;
+
+use super::{Leg, Path, Shape};
+
+impl Path {
+    /// Duration of all traversals with pauses of `dwell_s` between them, min.
+    pub fn minutes(&self, machine: &Machine, dwell_s: f64) -> f64 {
+        let once: f64 = self.legs.iter().map(|leg| leg.minutes(machine)).sum();
+        let traversals = self.runs * if self.both_directions { 2 } else { 1 };
+        // In one direction alone the axes go back between two runs.
+        let ways = if self.both_directions { traversals } else { 2 * traversals - 1 };
+        once * ways as f64 + dwell_s / 60.0 * (traversals - 1) as f64
+    }
+}
+
+impl Leg {
+    /// Its duration, min.
+    fn minutes(&self, machine: &Machine) -> f64 {
+        let pairs = self.vertices.windows(2);
+        match &self.shape {
+            Shape::Line(feed) => {
+                let longest = |pair: &[Vec<f64>]| {
+                    let moved = machine.axes.iter().zip(pair[0].iter().zip(&pair[1]));
+                    moved.map(|(axis, (a, b))| axis.kind.to_display(b - a).abs()).fold(0.0, f64::max)
+                };
+                pairs.map(longest).sum::<f64>() / feed
+            }
+            Shape::Arc { axes, centre, feed, .. } => {
+                let angle = |state: &[f64]| (state[axes[1]] - centre[1]).atan2(state[axes[0]] - centre[0]);
+                let radius = |state: &[f64]| (state[axes[0]] - centre[0]).hypot(state[axes[1]] - centre[1]);
+                // No arc is longer than half a turn.
+                let turn = |a: f64, b: f64| ((b - a + PI).rem_euclid(TAU) - PI).abs();
+                pairs.map(|pair| radius(&pair[0]) * turn(angle(&pair[0]), angle(&pair[1]))).sum::<f64>() / feed
+            }
+            Shape::Segments { seconds, .. } => seconds / 60.0 * pairs.len() as f64,
+        }
+    }
+}
