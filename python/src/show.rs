@@ -88,6 +88,7 @@ impl Figure {
             figure::Chart::Matrix(_) => "matrix",
             figure::Chart::Polar(_) | figure::Chart::Panels(_) => "polar",
             figure::Chart::Chain(_) => "chain",
+            figure::Chart::Machine(_) => "machine",
             figure::Chart::SetUps(_) => "set-ups",
         }
     }

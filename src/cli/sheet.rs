@@ -1,18 +1,18 @@
 //! `abbe sheet`: set-up sheets of the planned tests.
 
+mod order;
+
 use std::path::PathBuf;
 
-use abbe::codegen::nc::{self, NcOptions};
 use abbe::model::files::{self, ReadOptions};
-use abbe::model::session::Session;
 use abbe::model::session::motion::Motion;
 use abbe::model::words::counted;
-use abbe::plan::collision;
 use abbe::plan::sheet::{SetUpTimes, sheets};
 use clap::Args;
 
 use super::failure::Failure;
 use super::message::print_warnings;
+use super::nc::motion::MotionArguments;
 use super::{SessionArguments, output, values};
 use crate::printers::sheet as present;
 
@@ -44,18 +44,37 @@ pub struct SheetArguments {
     /// Example: --test-min 2
     #[arg(long, value_name = "MIN", default_value_t = 1.0)]
     test_min: f64,
+    /// Time to assemble the bar, or to change its extension, and to calibrate it.
+    ///
+    /// Example: --bar-min 3
+    #[arg(long, value_name = "MIN", default_value_t = 5.0)]
+    bar_min: f64,
+    /// The control whose programs the sheets name: linuxcnc, fanuc, siemens, heidenhain.
+    ///
+    /// Example: --control fanuc
+    #[arg(long, value_name = "CONTROL")]
+    control: Option<String>,
+    #[command(flatten)]
+    motion: MotionArguments,
+    /// Replace an existing file.
+    #[arg(long)]
+    force: bool,
 }
 
-/// Moves of NC programs with less clearance than the session asks for; none where no program can be written. The page has
-/// the clearances of the tests.
-fn collisions(session: &Session) -> Vec<String> {
-    let programs = nc::control("linuxcnc").and_then(|control| nc::files(session, control, &NcOptions::default()));
-    programs.map_or(Vec::new(), |programs| collision::warnings_of_moves(session, &programs.moves))
+/// Refuses to replace a file, unless `--force` asks for it.
+fn refuse_existing(arguments: &SheetArguments) -> Result<(), Failure> {
+    if arguments.force || !arguments.out.is_file() {
+        return Ok(());
+    }
+    let file = arguments.out.display();
+    Err(Failure::Other(format!("{file}: the file exists; name another, or use --force to replace it")))
 }
 
 /// Runs `abbe sheet`.
 pub fn run(arguments: &SheetArguments, quiet: bool) -> Result<(), Failure> {
-    for (flag, value) in [("--setup-min", arguments.setup_min), ("--test-min", arguments.test_min)] {
+    for (flag, value) in
+        [("--setup-min", arguments.setup_min), ("--test-min", arguments.test_min), ("--bar-min", arguments.bar_min)]
+    {
         values::MINUTES.check(flag, value)?;
     }
     arguments.bar_mm.map(|mm| values::BAR_MM.check("--bar-mm", mm)).transpose()?;
@@ -68,13 +87,15 @@ pub fn run(arguments: &SheetArguments, quiet: bool) -> Result<(), Failure> {
         (session, sources) = files::session_of(&source, &arguments.session.options())?;
     }
     outputs.refuse_overwrite_of_sources(&sources)?;
-    let times = SetUpTimes { setup_min: arguments.setup_min, test_min: arguments.test_min };
-    let sheets = sheets(&session, times)?;
-    let shortest = sheets.iter().filter_map(|sheet| sheet.bar_mm).reduce(f64::min);
-    let name = sources.file.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    let warnings: Vec<String> = session.warnings.iter().cloned().chain(collisions(&session)).collect();
-    let page = present::html(&session, &sheets, arguments.bar_mm.or(shortest), &name, &warnings);
-    print_warnings(&warnings);
+    refuse_existing(arguments)?;
+    let times = SetUpTimes { setup_min: arguments.setup_min, test_min: arguments.test_min, bar_min: arguments.bar_min };
+    let bars = session.tests.iter().filter_map(|test| Some(test.station.bar()?.bar));
+    let basic_bar_mm = arguments.bar_mm.or(bars.reduce(f64::min));
+    let sheets = sheets(&session, times, basic_bar_mm)?;
+    let source = sources.file.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let order = order::order(&session, &sheets, arguments, source, basic_bar_mm)?;
+    let page = present::html(&session, &sheets, &order);
+    print_warnings(&order.warnings);
     output::write_whole(&arguments.out, page.as_bytes())?;
     if outputs.tables() {
         say!("{}: {}, one page each, and an overview", arguments.out.display(), counted(sheets.len(), "test"));

@@ -78,6 +78,7 @@ mod robots;
 mod rtest;
 mod rtest_command;
 mod rtest_findings;
+mod safe_plans;
 mod schema;
 mod schema_limits;
 mod self_calibration;

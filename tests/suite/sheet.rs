@@ -22,11 +22,85 @@ fn a_sheet_states_what_the_operator_sets_up() {
         "with an extension of 50 mm",
         "Workpiece ball: stays as in test",
         "Both balls coincide at",
+        "The origin of R is on the axes of C and A.",
+        "Set the work offset that is active",
+        "Tool length: from the spindle nose to the centre of the spindle ball",
+        "Mount the bar at",
+        "286 °/min",
     ] {
         assert!(page.contains(expected), "{expected}");
     }
     let bad = abbe(&["sheet", text(&ready("hermle-c600u/chapter5.toml")), "--out", "-", "--setup-min=-1"]);
     assert_eq!(bad.status.code(), Some(1));
+}
+
+/// The bar of Chapter 5 has 100, 150, 100, 150 mm: its extension goes on, off and on again.
+#[test]
+fn the_extension_goes_on_and_off_as_the_bars_ask() {
+    let page = page("hermle-c600u/chapter5.toml", &[]);
+    let tests: Vec<&str> = page.split("<section class=\"sheet\">").skip(2).collect();
+    for (test, expected) in tests.iter().zip([
+        "Bar: assemble it without an extension",
+        "Bar: put the extension of 50 mm on<",
+        "Bar: take the extension of 50 mm off<",
+        "Bar: put the extension of 50 mm on<",
+    ]) {
+        assert!(test.contains(expected), "{expected}: {test}");
+        assert_eq!(test.matches("Bar: ").count(), 1, "{test}");
+    }
+    // Four assemblies of the bar, 5 min each, two balls, a minute for each test.
+    let minutes = |more: &[&str]| {
+        let page = super::sheet::page("hermle-c600u/chapter5.toml", more);
+        let before = page.split("min of them before the motion").next().unwrap();
+        before.rsplit(", ").next().unwrap().trim().parse::<f64>().unwrap()
+    };
+    assert_eq!((minutes(&[]), minutes(&["--bar-min", "12"])), (16.0, 23.0));
+}
+
+/// The sheets name the programs that `abbe nc` writes with the same options, and the start that they have.
+#[test]
+fn sheets_name_programs_and_where_they_start() {
+    let page = page("hermle-c600u/chapter5.toml", &["--control", "fanuc", "--number", "7000", "--feed-in-mm", "2"]);
+    for expected in ["main.nc, O7000", "A150.nc, O7002", "C100.nc, O7003", "Set G54, and leave it active"] {
+        assert!(page.contains(expected), "{expected}");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("programs");
+    let plan = ready("hermle-c600u/chapter5.toml");
+    let fixed = ["nc", text(&plan), "--control", "fanuc", "--number", "7000", "--feed-in-mm", "2", "--quiet"];
+    assert!(abbe(&[&fixed[..], &["--out", text(&out)]].concat()).status.success());
+    // The positions before the stop for the bar, in the order of the axes.
+    let program = std::fs::read_to_string(out.join("C100.nc")).unwrap();
+    let (before, _) = program.split_once("M0 (MOUNT THE BAR").unwrap();
+    let mut at = std::collections::BTreeMap::new();
+    for word in before.lines().filter(|line| line.starts_with("G1 ")).flat_map(|line| line.split(' ').skip(1)) {
+        let (letter, value) = word.split_at(1);
+        at.insert(letter.to_string(), value.parse::<f64>().unwrap_or(0.0));
+    }
+    let of_test = page.split("<h1>Test C100</h1>").nth(1).unwrap();
+    let unit = |letter: &str| if "AC".contains(letter) { "°" } else { "\u{a0}mm" };
+    for letter in ["C", "A", "Y", "X", "Z"] {
+        let value = format!("{:.3}", at[letter]).replace('-', "−");
+        let expected = format!("{letter}\u{a0}{value}{}", unit(letter));
+        assert!(of_test.contains(&expected), "{expected}\n{of_test}");
+    }
+}
+
+/// A travel of 10⁹ degrees is none, and a file is not replaced unasked.
+#[test]
+fn no_travel_is_not_stated_and_files_stay() {
+    let page = page("r-test/plan.toml", &[]);
+    assert!(page.contains("not stated") && !page.contains("1000000000"));
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("sheets.html");
+    std::fs::write(&out, "mine").unwrap();
+    let plan = ready("r-test/plan.toml");
+    let refused = abbe(&["sheet", text(&plan), "--out", text(&out)]);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("use --force"));
+    assert_eq!(std::fs::read_to_string(&out).unwrap(), "mine");
+    assert!(abbe(&["sheet", text(&plan), "--out", text(&out), "--force"]).status.success());
+    assert!(std::fs::read_to_string(&out).unwrap().contains("<section"));
 }
 
 /// Robots and other instruments have sheets too.

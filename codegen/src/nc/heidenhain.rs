@@ -139,6 +139,9 @@ impl Control for Heidenhain {
     fn is_run(&self) -> bool {
         false
     }
+    fn work_offset(&self) -> &'static str {
+        "the active row of the preset table"
+    }
     fn has_numbers(&self) -> bool {
         false
     }

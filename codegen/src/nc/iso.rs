@@ -271,6 +271,9 @@ impl Control for Iso {
     fn is_run(&self) -> bool {
         self.is_run
     }
+    fn work_offset(&self) -> &'static str {
+        "G54"
+    }
     fn has_numbers(&self) -> bool {
         self.has_numbers
     }

@@ -39,6 +39,8 @@ pub trait Control: Sync {
     fn decimals(&self) -> usize;
     /// Whether an interpreter of this control has run its programs in the project's tests.
     fn is_run(&self) -> bool;
+    /// The work offset that gives its programs their positions, in the words of its operators.
+    fn work_offset(&self) -> &'static str;
     /// Whether its programs have numbers.
     fn has_numbers(&self) -> bool;
     /// Whether circles are possible in a plane of these two axes.
@@ -84,6 +86,25 @@ pub fn control(word: &str) -> Result<&'static dyn Control, CodegenError> {
 /// A file of a program: its name and its text.
 pub type NcFile = (String, String);
 
+/// What an operator has to know of the program of a test.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Run {
+    /// The test.
+    pub test: String,
+    /// The file of its program.
+    pub file: String,
+    /// The number of its program, on a control whose programs have numbers.
+    pub number: Option<u32>,
+    /// Positions of all axes where the instrument is mounted, with overshoot and feed-in, mm and degrees.
+    pub mounted_at: Vec<f64>,
+    /// Positions of all axes where the motion begins, with overshoot, mm and degrees.
+    pub start: Vec<f64>,
+    /// The feed of the measured path and its unit.
+    pub feed: (f64, &'static str),
+    /// Duration of all traversals with overshoot and pauses, min.
+    pub minutes: f64,
+}
+
 /// The programs of a session.
 #[derive(Clone, Debug)]
 pub struct NcFiles {
@@ -93,6 +114,8 @@ pub struct NcFiles {
     pub warnings: Vec<String>,
     /// The moves of the programs beside the measured paths.
     pub moves: Vec<Moves>,
+    /// What the operator has to know of the program of each test, in their order.
+    pub runs: Vec<Run>,
 }
 
 /// The programs of every test of a session, and `main`, which calls them.
@@ -102,7 +125,7 @@ pub struct NcFiles {
 /// options ask for.
 pub fn files(session: &Session, control: &dyn Control, options: &NcOptions) -> Result<NcFiles, CodegenError> {
     options.check(control, session.tests.len())?;
-    let (mut files, mut warnings, mut moves) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut files, mut warnings, mut moves, mut runs) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let mut calls: Vec<(String, String)> = Vec::new();
     let mut seen: Vec<&str> = Vec::new();
     for (number, test) in session.tests.iter().enumerate() {
@@ -116,12 +139,19 @@ pub fn files(session: &Session, control: &dyn Control, options: &NcOptions) -> R
         if name == "main" || calls.iter().any(|(other, _)| *other == name) {
             name = format!("{name}{}", number + 1);
         }
-        files.push((
-            format!("{name}.{}", control.extension()),
-            control.text(number + 1, &Program { name: name.clone(), ..program }, options),
-        ));
+        let file = format!("{name}.{}", control.extension());
+        runs.push(Run {
+            test: test.name.clone(),
+            file: file.clone(),
+            number: control.has_numbers().then(|| options.number() + number as u32 + 1),
+            mounted_at: program.mounted_at.clone(),
+            start: program.start.clone(),
+            feed: program.feed,
+            minutes: program.minutes,
+        });
+        files.push((file, control.text(number + 1, &Program { name: name.clone(), ..program }, options)));
         calls.push((name, test.name.clone()));
     }
     files.insert(0, (format!("main.{}", control.extension()), control.main(&calls, options)));
-    Ok(NcFiles { files, warnings, moves })
+    Ok(NcFiles { files, warnings, moves, runs })
 }

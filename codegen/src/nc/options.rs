@@ -55,8 +55,8 @@ impl Default for NcOptions {
 }
 
 impl NcOptions {
-    /// The number of `main`.
-    pub(super) fn number(&self) -> u32 {
+    /// The number of `main` on a control whose programs have numbers.
+    pub fn number(&self) -> u32 {
         self.number.unwrap_or(FIRST_NUMBER)
     }
 

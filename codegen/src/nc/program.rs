@@ -26,6 +26,14 @@ pub struct Program {
     pub warnings: Vec<String>,
     /// Its moves beside the measured path, as far as both their ends are known.
     pub moves: Vec<Moves>,
+    /// Positions of all axes where the instrument is mounted, with overshoot and feed-in, mm and degrees.
+    pub mounted_at: Vec<f64>,
+    /// Positions of all axes where the motion begins, with overshoot, mm and degrees.
+    pub start: Vec<f64>,
+    /// The feed of the measured path and its unit.
+    pub feed: (f64, &'static str),
+    /// Duration of all traversals with overshoot and pauses, min.
+    pub minutes: f64,
 }
 
 impl Program {
@@ -44,7 +52,7 @@ impl Program {
         let writer = Writer { machine, test, letters: letters(machine)?, options };
         let path = Path::of(machine, test, control, options)?;
         let mut draft = Draft { warnings: path.warnings.clone(), ..Draft::default() };
-        writer.approach(&path, centred, &mut draft);
+        let mounted_at = writer.approach(&path, centred, &mut draft);
         let start = path.start().to_vec();
         writer.traversals(&path, &mut draft.blocks);
         let overshoots = path.overshoots.iter();
@@ -61,7 +69,18 @@ impl Program {
         if !control.is_run() {
             title.push(format!("This form has not been run on a control. Syntax: {}", control.source()));
         }
-        Ok(Program { name: test.name.clone(), title, blocks, warnings, moves })
+        let display = |at: &[f64]| machine.axes.iter().zip(at).map(|(axis, q)| axis.kind.to_display(*q)).collect();
+        Ok(Program {
+            name: test.name.clone(),
+            title,
+            blocks,
+            warnings,
+            moves,
+            mounted_at: display(&mounted_at),
+            start: display(&start),
+            feed: path.feed,
+            minutes: path.minutes(machine, options.dwell_s),
+        })
     }
 }
 
@@ -174,8 +193,9 @@ impl Writer<'_> {
         inside.then_some(at)
     }
 
-    /// To the start of the path, by way of the centre of the workpiece ball if it has no place yet.
-    fn approach(&self, path: &Path, centred: bool, draft: &mut Draft) {
+    /// To the start of the path, by way of the centre of the workpiece ball if it has no place yet. Returns where the
+    /// instrument is mounted.
+    fn approach(&self, path: &Path, centred: bool, draft: &mut Draft) -> Vec<f64> {
         let start = path.start();
         let ball_bar = self.test.station.bar().is_some();
         if self.test.station.probe().is_some() {
@@ -248,8 +268,9 @@ impl Writer<'_> {
         if first != start {
             draft.blocks.push(Block::Comment("Feed-in".into()));
             self.line(self.moved(&first, start, AxisKind::Linear), &mut draft.blocks);
-            draft.moves.push(self.moves("feed-in", Mounted::Bar, vec![first, start.to_vec()]));
+            draft.moves.push(self.moves("feed-in", Mounted::Bar, vec![first.clone(), start.to_vec()]));
         }
+        first
     }
 
     fn traversals(&self, path: &Path, blocks: &mut Vec<Block>) {

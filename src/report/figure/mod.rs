@@ -1,6 +1,6 @@
 //! Figures as data: what a chart shows, with its title, caption and units. Nothing here draws.
 //!
-//! One file per kind of chart ([`lines`], [`bars`], [`matrix`], [`polar`], [`chain`],
+//! One file per kind of chart ([`lines`], [`bars`], [`matrix`], [`polar`], [`chain`], [`machine`],
 //! [`set_up`]) holds the data of the kind, its
 //! table and its drawing. Printers: [`svg`] draws a figure inside the report or as a file; `png` (feature `png`) draws
 //! that file as pixels; [`pdf`] draws it for LaTeX; [`Figure::table`] gives the data as one tidy table, which
@@ -9,6 +9,7 @@
 pub mod bars;
 pub mod chain;
 pub mod lines;
+pub mod machine;
 pub mod matrix;
 pub mod pdf;
 #[cfg(feature = "png")]
@@ -54,6 +55,8 @@ pub enum Chart {
     Panels(polar::Panels),
     /// The kinematic chain of a machine.
     Chain(chain::Chain),
+    /// A machine with its axes and bodies.
+    Machine(machine::MachineAxes),
     /// The set-ups of tests in space.
     SetUps(set_up::SetUps),
 }
@@ -81,6 +84,7 @@ impl Figure {
             Chart::Polar(kind) => kind,
             Chart::Panels(kind) => kind,
             Chart::Chain(kind) => kind,
+            Chart::Machine(kind) => kind,
             Chart::SetUps(kind) => kind,
         }
     }

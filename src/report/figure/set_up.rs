@@ -5,7 +5,7 @@ use maud::{Markup, html};
 
 use super::Kind;
 use super::scale::{coordinate, dots, polyline, span};
-use super::svg::{Drawing, WIDTH, legend, shortened};
+use super::svg::{Drawing, legend, shortened};
 use crate::report::table::{Cell, Table, cells, numbers, words};
 
 /// Space around the drawing of a panel, SVG units.
@@ -22,15 +22,17 @@ pub struct SetUps {
     pub panels: Vec<SetUpPath>,
     /// Panels in a row.
     pub per_row: usize,
+    /// Width of the drawing, SVG units. Letters have one size: the narrower the drawing, the larger they are in print.
+    pub width: f64,
 }
 
 /// Right and down on the paper, for a point in R. Z points up.
-fn projected([x, y, z]: [f64; 3]) -> [f64; 2] {
+pub(super) fn projected([x, y, z]: [f64; 3]) -> [f64; 2] {
     let (sin, cos) = std::f64::consts::FRAC_PI_6.sin_cos();
     [(y - x) * cos, (x + y) * sin - z]
 }
 
-fn along([x, y, z]: [f64; 3], [dx, dy, dz]: [f64; 3], by: f64) -> [f64; 3] {
+pub(super) fn along([x, y, z]: [f64; 3], [dx, dy, dz]: [f64; 3], by: f64) -> [f64; 3] {
     [x + by * dx, y + by * dy, z + by * dz]
 }
 
@@ -114,7 +116,7 @@ fn panel(path: &SetUpPath, side: f64) -> Markup {
 impl Kind for SetUps {
     fn drawing(&self) -> Drawing {
         let per_row = self.per_row.max(1);
-        let side = WIDTH / per_row as f64;
+        let side = self.width / per_row as f64;
         let row_height = side + 16.0;
         let rows = self.panels.len().div_ceil(per_row).max(1);
         let entries = [
@@ -125,7 +127,7 @@ impl Kind for SetUps {
             ("motion", "frame R"),
         ];
         let entries = entries.map(|(class, label)| (class, label.to_string()));
-        let (keys, bottom) = legend(&entries, 10.0, row_height * rows as f64 + 16.0, WIDTH - 20.0);
+        let (keys, bottom) = legend(&entries, 10.0, row_height * rows as f64 + 16.0, self.width - 20.0);
         let inner = html! {
             @for (number, path) in self.panels.iter().enumerate() {
                 @let (x, y) = ((number % per_row) as f64 * side, (number / per_row) as f64 * row_height);
@@ -133,7 +135,7 @@ impl Kind for SetUps {
             }
             (keys)
         };
-        Drawing::new([WIDTH, bottom + 10.0], inner)
+        Drawing::new([self.width, bottom + 10.0], inner)
     }
 
     /// One row per point.

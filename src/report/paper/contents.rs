@@ -12,7 +12,7 @@ use abbe::plan::structure::Structure;
 use super::{Part, Subject};
 use crate::report::block::{Formula, Report};
 use crate::report::figure::bars::{Bars, Fill};
-use crate::report::figure::{Chart, Figure, Quantity, set_up};
+use crate::report::figure::{Chart, Figure, Quantity, set_up, svg};
 use crate::report::number::{three_digits, unit, with_symbols};
 use crate::report::parameters;
 use crate::report::plan::{analysis as plan, indices};
@@ -53,7 +53,7 @@ pub fn set_up(study: &Study) -> Part {
     if all > MAX_SET_UPS {
         caption.push_str(&format!(" The first {MAX_SET_UPS} of {all} tests."));
     }
-    let panels = set_up::SetUps { panels: set_ups, per_row: 2 };
+    let panels = set_up::SetUps { panels: set_ups, per_row: 2, width: svg::WIDTH };
     report.figures([
         session::chain(problem),
         Figure::new("set-up", "Set-up of each test", caption, Chart::SetUps(panels)),

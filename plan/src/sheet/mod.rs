@@ -1,4 +1,7 @@
-//! What an operator sets up for each test of a plan: balls, bar, axis positions, order and time.
+//! What an operator sets up for each test of a plan: datum, balls, bar, axis positions, order and time.
+
+mod datum;
+mod mounts;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
@@ -8,19 +11,25 @@ use abbe_model::session::placing::{balls, positions_for_bar};
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Prior, Session, Test};
 
-use super::collision::{self, TestClearance};
-use super::states;
 use crate::PlanError;
+use crate::collision::{self, TestClearance};
+use crate::states;
 use abbe_identify::series::paths::{SetUpPath, set_up};
+pub use datum::{Datum, datum};
 
 /// Times that the plan of a day needs, min.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SetUpTimes {
     /// To mount a ball.
     pub setup_min: f64,
-    /// To prepare a test: bar, positions, feed-in.
+    /// To prepare a test: positions, feed-in.
     pub test_min: f64,
+    /// To assemble the bar, to change its extension and to calibrate it.
+    pub bar_min: f64,
 }
+
+/// Farther travels are none: a file that states 10⁹ means that the axis has no ends, mm or rad.
+const NO_TRAVEL: f64 = 1e6;
 
 /// The set-up of one test.
 #[derive(Clone, Debug)]
@@ -48,8 +57,10 @@ pub struct TestSheet {
     pub traversals: usize,
     /// Number of readings.
     pub readings: usize,
-    /// Duration with set-up, min.
-    pub minutes: f64,
+    /// Duration of what precedes the motion, min.
+    pub set_up_min: f64,
+    /// Duration of the motion, min.
+    pub moving_min: f64,
     /// The least clearance, if machine or session state what can collide.
     pub clearance: Option<TestClearance>,
 }
@@ -96,11 +107,11 @@ impl AxisRange {
     }
 }
 
-/// The sheets of all tests, in their order.
+/// The sheets of all tests, in their order. `basic_bar_mm` is the length of the bar without an extension.
 ///
 /// # Errors
 /// If a test has neither a motion nor data, or an axis would leave its travel.
-pub fn sheets(session: &Session, times: SetUpTimes) -> Result<Vec<TestSheet>, PlanError> {
+pub fn sheets(session: &Session, times: SetUpTimes, basic_bar_mm: Option<f64>) -> Result<Vec<TestSheet>, PlanError> {
     let complete = states::complete(session, true)?;
     let clearances = collision::clearances(&complete);
     let mut sheets: Vec<TestSheet> = Vec::with_capacity(complete.tests.len());
@@ -108,7 +119,8 @@ pub fn sheets(session: &Session, times: SetUpTimes) -> Result<Vec<TestSheet>, Pl
         let Some(readings) = &test.readings else { continue };
         let Some(path) = set_up(&complete.machine, &test.name, &test.station, readings) else { continue };
         let clearance = clearances.iter().find(|found| found.test == test.name).cloned();
-        let own = sheet(&complete.machine, &complete.tests[..number], test, readings, path, times);
+        let before = mounts::mounting(&complete.tests[..number], test, basic_bar_mm);
+        let own = sheet(&complete.machine, before, test, readings, path, times);
         sheets.push(TestSheet { clearance, ..own });
     }
     Ok(sheets)
@@ -116,7 +128,7 @@ pub fn sheets(session: &Session, times: SetUpTimes) -> Result<Vec<TestSheet>, Pl
 
 fn sheet(
     machine: &Machine,
-    earlier: &[Test],
+    before: mounts::Mounting,
     test: &Test,
     readings: &Readings,
     path: SetUpPath,
@@ -131,10 +143,12 @@ fn sheet(
             start: display(column[0]),
             least: display(column.iter().copied().fold(f64::INFINITY, f64::min)),
             greatest: display(column.iter().copied().fold(f64::NEG_INFINITY, f64::max)),
-            travel: axis.travel.map(|travel| travel.map(display)),
+            travel: axis
+                .travel
+                .filter(|travel| travel.iter().all(|end| end.abs() < NO_TRAVEL))
+                .map(|travel| travel.map(display)),
         }
     });
-    let (mounts, mounted) = mounts(earlier, test);
     let moving_s = readings.time_s.last().zip(readings.time_s.first()).map_or(0.0, |(last, first)| last - first);
     let point = |point: InstrumentPoint<'_, f64>, start: Option<&[f64; 3]>| PlacedPoint {
         name: point.name,
@@ -147,7 +161,11 @@ fn sheet(
     let poses = if path.is_path { Vec::new() } else { poses(machine, readings) };
     TestSheet {
         name: test.name.clone(),
-        mounts,
+        set_up_min: times.test_min
+            + times.setup_min * before.mounted as f64
+            + if before.bar_changes { times.bar_min } else { 0.0 },
+        moving_min: moving_s / 60.0,
+        mounts: before.words,
         table_point,
         tool_point: on_tool.map(|own| point(own, path.tool_mm.first())),
         bar_mm: test.station.bar().map(|bar| bar.bar),
@@ -157,7 +175,6 @@ fn sheet(
         poses,
         traversals: readings.runs().len(),
         readings: readings.rows(),
-        minutes: times.test_min + times.setup_min * mounted as f64 + moving_s / 60.0,
         clearance: None,
     }
 }
@@ -171,34 +188,6 @@ fn uncertainty_mm(test: &Test, first: usize) -> Option<[f64; 3]> {
     };
     let own: Vec<f64> = test.priors.get(first..first + 3)?.iter().map(of).collect();
     own.try_into().ok()
-}
-
-/// What has to be mounted, in words, and the number of balls among it.
-fn mounts(earlier: &[Test], test: &Test) -> (Vec<String>, usize) {
-    let mut words = Vec::new();
-    let mut mounted = 0;
-    let shared = |of: fn(&Test) -> &str| earlier.iter().rev().find(|other| of(other) == of(test));
-    let mut note = |thing: &str, other: Option<&Test>| match other {
-        Some(other) => words.push(format!("{thing}: stays as in test {}", other.name)),
-        None => {
-            mounted += 1;
-            words.push(format!("{thing}: mount it"));
-        }
-    };
-    let groups: [fn(&Test) -> &str; 2] = [|test| &test.setup, |test| &test.spindle_setup];
-    for (point, group) in test.station.points().iter().zip(groups) {
-        if let Some(point) = point {
-            let (first, rest) = point.name.split_at(1);
-            note(&format!("{}{rest}", first.to_uppercase()), shared(group));
-        }
-    }
-    if test.station.bar().is_some() {
-        match shared(|test| &test.bar_setup) {
-            Some(other) => words.push(format!("Bar: stays assembled as in test {}", other.name)),
-            None => words.push("Bar: assemble it".to_string()),
-        }
-    }
-    (words, mounted)
 }
 
 /// The positions at which the two balls of a bar coincide, mm and degrees.

@@ -1,0 +1,49 @@
+//! What sheets order beside the set-up of the tests: programs and warnings.
+
+use abbe::codegen::nc::{self, Control, NcFiles};
+use abbe::model::session::Session;
+use abbe::plan::collision;
+use abbe::plan::sheet::TestSheet;
+
+use super::SheetArguments;
+use crate::cli::failure::Failure;
+use crate::printers::sheet::Order;
+
+/// The programs of the sheets, if the plan has some: poses have none. Without a stated control, the motion is that of one
+/// without an increment, and the names are left out.
+fn programs(session: &Session, arguments: &SheetArguments) -> Result<Option<(&'static dyn Control, NcFiles)>, Failure> {
+    let control = nc::control(arguments.control.as_deref().unwrap_or("linuxcnc"))?;
+    let found = nc::files(session, control, &arguments.motion.options());
+    if arguments.control.is_some() {
+        return Ok(Some((control, found?)));
+    }
+    Ok(found.ok().map(|found| (control, found)))
+}
+
+/// The order of work of these sheets.
+pub fn order(
+    session: &Session,
+    sheets: &[TestSheet],
+    arguments: &SheetArguments,
+    source: String,
+    basic_bar_mm: Option<f64>,
+) -> Result<Order, Failure> {
+    let programs = programs(session, arguments)?;
+    let mut warnings = session.warnings.clone();
+    warnings.extend(collision::unchecked(session, true));
+    let clearances: Vec<_> = sheets.iter().filter_map(|sheet| sheet.clearance.clone()).collect();
+    warnings.extend(collision::warnings(session, &clearances));
+    if let Some((_, programs)) = &programs {
+        warnings.extend(programs.warnings.iter().cloned());
+        warnings.extend(collision::warnings_of_moves(session, &programs.moves));
+    }
+    Ok(Order {
+        source,
+        control: programs.as_ref().map(|(control, _)| *control).filter(|_| arguments.control.is_some()),
+        main: programs.as_ref().and_then(|(_, programs)| programs.files.first()).map(|(name, _)| name.clone()),
+        number: arguments.motion.options().number(),
+        runs: programs.map_or(Vec::new(), |(_, programs)| programs.runs),
+        basic_bar_mm,
+        warnings,
+    })
+}
