@@ -227,8 +227,8 @@ impl Instrument for Tracker<f64> {
             let [x, y, _] = self.stand.point::<f64>(Point(point.into())).0;
             x.hypot(y)
         });
-        for (row, level) in level.enumerate().filter(|(_, level)| *level < MIN_MM) {
-            return Err((
+        match level.enumerate().find(|(_, level)| *level < MIN_MM) {
+            Some((row, level)) => Err((
                 format!(
                     "test \"{}\", reading {}: the target nominally lies {level:.3} mm from the tracker's vertical axis, \
                      where no azimuth is defined",
@@ -236,9 +236,9 @@ impl Instrument for Tracker<f64> {
                     row + 1
                 ),
                 "check `tracker_mm`, `target_mm` and the axis positions".into(),
-            ));
+            )),
+            None => Ok(()),
         }
-        Ok(())
     }
     /// A range is positive, and an elevation within a right angle.
     fn check_observed(&self, test: &str, observed: &[f64]) -> Result<(), Fault> {

@@ -40,12 +40,10 @@ pub fn datum(session: &Session) -> Datum {
              offset so that the control shows its coordinates."
                 .into(),
         );
-    } else if let [only] = through[..] {
-        if let Some(along) = table.iter().find(|axis| axis.name == only).and_then(along) {
-            datum
-                .origin
-                .push(format!("Along {} it is where the coordinate of the workpiece ball says.", LETTERS[along]));
-        }
+    } else if let [only] = through[..]
+        && let Some(along) = table.iter().find(|axis| axis.name == only).and_then(along)
+    {
+        datum.origin.push(format!("Along {} it is where the coordinate of the workpiece ball says.", LETTERS[along]));
     }
     datum.probing.extend(table.iter().filter(rotary).map(probing));
     datum.tool = tool(session, machine, head);

@@ -10,10 +10,19 @@ pub struct Template {
     pub files: &'static [(&'static str, &'static str)],
 }
 
-/// Files of a folder of `sessions/`.
+/// Files of folders of `sessions/`, some under another name.
 macro_rules! files {
-    ($folder:literal: $($file:literal),+ $(,)?) => {
-        &[$(($file, include_str!(concat!("../../../sessions/", $folder, "/", $file)))),+]
+    ($($folder:literal: $($file:literal $(as $name:literal)?),+);+ $(;)?) => {
+        &[$($((name!($file $(, $name)?), include_str!(concat!("../../../sessions/", $folder, "/", $file)))),+),+]
+    };
+}
+
+macro_rules! name {
+    ($file:literal) => {
+        $file
+    };
+    ($file:literal, $name:literal) => {
+        $name
     };
 }
 
@@ -59,28 +68,18 @@ pub const TEMPLATES: &[Template] = &[
     Template {
         name: "r-test",
         about: "R-test on machines with B, C and with A, B tables: plans of BK1 and BK2, and readings with pitch-compensation steps to trace",
-        files: &[
-            ("machine.toml", include_str!("../../../sessions/r-test/machine.toml")),
-            ("plan.toml", include_str!("../../../sessions/r-test/plan.toml")),
-            ("machine-b.toml", include_str!("../../../sessions/r-test/machine-b.toml")),
-            ("session.toml", include_str!("../../../sessions/r-test/measured/session.toml")),
-            ("BK1.csv", include_str!("../../../sessions/r-test/measured/BK1.csv")),
-            ("BK2.csv", include_str!("../../../sessions/r-test/measured/BK2.csv")),
-            ("C-alone.csv", include_str!("../../../sessions/r-test/measured/C-alone.csv")),
-        ],
+        files: files!(
+            "r-test": "machine.toml", "plan.toml", "machine-b.toml";
+            "r-test/measured": "session.toml", "BK1.csv", "BK2.csv", "C-alone.csv"
+        ),
     },
     Template {
         name: "self-calibration",
         about: "rotary table probed on an uncalibrated cylinder; a plan, and readings simulated from it",
-        files: &[
-            ("machine.toml", include_str!("../../../sessions/self-calibration/machine.toml")),
-            ("plan.toml", include_str!("../../../sessions/self-calibration/session.toml")),
-            ("session.toml", include_str!("../../../sessions/self-calibration/measured/session.toml")),
-            ("1a.csv", include_str!("../../../sessions/self-calibration/measured/1a.csv")),
-            ("1b.csv", include_str!("../../../sessions/self-calibration/measured/1b.csv")),
-            ("2.csv", include_str!("../../../sessions/self-calibration/measured/2.csv")),
-            ("3.csv", include_str!("../../../sessions/self-calibration/measured/3.csv")),
-        ],
+        files: files!(
+            "self-calibration": "machine.toml", "session.toml" as "plan.toml";
+            "self-calibration/measured": "session.toml", "1a.csv", "1b.csv", "2.csv", "3.csv"
+        ),
     },
     Template {
         name: "telescope",
@@ -95,28 +94,18 @@ pub const TEMPLATES: &[Template] = &[
     Template {
         name: "table-and-head",
         about: "five-axis machine with a rotary table and a tilting head; ball-bar plan of chapter 7, and simulated readings",
-        files: &[
-            ("machine.toml", include_str!("../../../sessions/table-and-head/machine.toml")),
-            ("plan.toml", include_str!("../../../sessions/table-and-head/session.toml")),
-            ("session.toml", include_str!("../../../sessions/table-and-head/measured/session.toml")),
-            ("A100.csv", include_str!("../../../sessions/table-and-head/measured/A100.csv")),
-            ("A150.csv", include_str!("../../../sessions/table-and-head/measured/A150.csv")),
-            ("C100.csv", include_str!("../../../sessions/table-and-head/measured/C100.csv")),
-            ("C150.csv", include_str!("../../../sessions/table-and-head/measured/C150.csv")),
-        ],
+        files: files!(
+            "table-and-head": "machine.toml", "session.toml" as "plan.toml";
+            "table-and-head/measured": "session.toml", "A100.csv", "A150.csv", "C100.csv", "C150.csv"
+        ),
     },
     Template {
         name: "tilting-head",
         about: "five-axis machine with a tilting head; ball-bar plan of chapter 7, and simulated readings",
-        files: &[
-            ("machine.toml", include_str!("../../../sessions/tilting-head/machine.toml")),
-            ("plan.toml", include_str!("../../../sessions/tilting-head/session.toml")),
-            ("session.toml", include_str!("../../../sessions/tilting-head/measured/session.toml")),
-            ("B100.csv", include_str!("../../../sessions/tilting-head/measured/B100.csv")),
-            ("B150.csv", include_str!("../../../sessions/tilting-head/measured/B150.csv")),
-            ("C100.csv", include_str!("../../../sessions/tilting-head/measured/C100.csv")),
-            ("C150.csv", include_str!("../../../sessions/tilting-head/measured/C150.csv")),
-        ],
+        files: files!(
+            "tilting-head": "machine.toml", "session.toml" as "plan.toml";
+            "tilting-head/measured": "session.toml", "B100.csv", "B150.csv", "C100.csv", "C150.csv"
+        ),
     },
     Template {
         name: "ur10",
