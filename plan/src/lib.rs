@@ -5,7 +5,7 @@
 //!
 //! - [`analyse`]: uncertainties, budgets, identifiability, indices, and the contribution of each test;
 //! - [`effects`]: detectability and bias of undeclared effects; [`bias`]: the bias by each undeclared effect;
-//! - [`test_variations`], [`candidate_tests`], [`mod@improve`], [`separate`], [`separating_tests`],
+//! - [`test_variations`], [`candidate_tests`], [`mod@improve`], [`separate`], [`mod@separating_tests`],
 //!   [`mod@proposal`]: the next test; [`mod@range`]: how far a sweep can shrink;
 //! - [`states`], [`sensitivity`], [`budget`], [`indices`], [`structure`]: the parts of the analysis;
 //! - [`design`]: the engine of optimal design behind next test, separating test and poses;

@@ -9,8 +9,8 @@
 //! J. Robotic Systems 2 (1985) 397): it is 0 unless two consecutive axes are nearly parallel, where the common normal is
 //! ill-defined. `B` is the pose of the first frame in R, `F` that of the tool frame in the last one.
 //!
-//! The nominal table is the maker's own, or one that follows from the nominal machine ([`super::dh_nominal`]). The frames of
-//! the calibrated table are those of its lines that lie nearest to the nominal ones ([`super::dh_frames`]).
+//! The nominal table is the maker's own, or one that follows from the nominal machine (`dh_nominal`). The frames of
+//! the calibrated table are those of its lines that lie nearest to the nominal ones (`dh_frames`).
 
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_model::axis::AxisKind;
