@@ -8,18 +8,18 @@ use clap::Args;
 pub struct SizeArguments {
     /// From the rotary axes of the head to the spindle nose, mm [default: 150, as a guess].
     ///
-    /// Example: --pivot-mm 180
+    /// Example: --from-code wCbXYZAt --pivot-mm 180
     #[arg(long, value_name = "MM", requires = "from_code")]
     pivot_mm: Option<f64>,
     /// Height of the table surface above the origin of R with all axes at zero, mm: where the rotary axes of the table
     /// meet, or the spindle ball of a machine without them [default: -100, as a guess].
     ///
-    /// Example: --table-mm=-60
+    /// Example: --from-code wCAbXYZt --table-mm -60
     #[arg(long, value_name = "MM", requires = "from_code", allow_negative_numbers = true)]
     table_mm: Option<f64>,
     /// From the spindle nose to the centre of the spindle ball, mm [default: 100, as a guess].
     ///
-    /// Example: --gauge-mm 120
+    /// Example: --from-code wCbXYZAt --gauge-mm 120
     #[arg(long, value_name = "MM", requires = "from_code")]
     gauge_mm: Option<f64>,
 }
