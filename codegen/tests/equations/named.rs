@@ -182,18 +182,18 @@ fn c() {
     for printed in &all {
         let (function, names) = (printed.function, names(printed));
         let (nominal, errors) = names.split_at(names.len() - printed.errors());
-        let several = printed.cases[0].values.len() > 1;
+        let outputs = printed.cases[0].values.len();
         let given = |names: &[String], first: usize| -> String {
             let fields = names.iter().enumerate();
             fields.map(|(index, name)| format!(".{name} = x[{}], ", first + index)).collect()
         };
         let shown =
             |of: &str| -> String { errors.iter().map(|name| format!("printf(\"%.17g \", {of}{name});\n")).collect() };
-        let body = if several {
-            let shown: String = (0..3).map(|output| shown(&format!("g[{output}]."))).collect();
+        let body = if outputs > 1 {
+            let shown: String = (0..outputs).map(|output| shown(&format!("g[{output}]."))).collect();
             format!(
-                "double v[3], alone[3]; struct {function}_errors g[3]; {function}_gradient(&n, &e, v, g); {function}(&n, &e, alone);
-                for (int k = 0; k < 3; ++k) {{ printf(\"%.17g \", v[k]); if (v[k] < alone[k] || v[k] > alone[k]) return 2; }}\n{shown}"
+                "double v[{outputs}], alone[{outputs}]; struct {function}_errors g[{outputs}]; {function}_gradient(&n, &e, v, g); {function}(&n, &e, alone);
+                for (int k = 0; k < {outputs}; ++k) {{ printf(\"%.17g \", v[k]); if (v[k] < alone[k] || v[k] > alone[k]) return 2; }}\n{shown}"
             )
         } else {
             format!(
