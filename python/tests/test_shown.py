@@ -107,7 +107,7 @@ def test_compare_and_export(results, tmp_path):
         model.export("linuxcnc", travel={"B": (-90, 90)})
     with pytest.raises(abbe.Error, match="not below the second"):
         model.export("linuxcnc", travel={"A": (90, -90)})
-    with pytest.raises(abbe.Error, match="the formats are urdf"):
+    with pytest.raises(abbe.Error, match="the formats are table"):
         fit.model().export("nothing")
 
 
