@@ -366,10 +366,13 @@ mod tests {
                     "export" => &["MODEL", "--as", "urdf", "--out", "OUT"],
                     "nc" if example.contains("--control") => &["SESSION", "--out", "OUT"],
                     "nc" => &["SESSION", "--control", "linuxcnc", "--out", "OUT"],
-                    "import" if example.contains("--out") || example.contains("--machine") => {
-                        &["FILE", "--machine", "M", "--out", "OUT"]
+                    "import" if example.contains("--machine") && example.contains("--out") => &["FILE"],
+                    "import" if example.contains("--machine") => &["FILE", "--out", "OUT"],
+                    "import" if example.contains("--out") => &["FILE", "--machine", "M"],
+                    "import" if example.contains("--session") || example.contains("--like") => {
+                        &["FILE", "--session", "S"]
                     }
-                    "import" => &["FILE", "--session", "S"],
+                    "import" => &["FILE", "--machine", "M", "--out", "OUT"],
                     "compare" => &["A", "B"],
                     "compensate" => &["MODEL", "FILE", "--out", "OUT"],
                     "validate" => &["MODEL", "SESSION"],

@@ -123,7 +123,7 @@ fn measure(statement: &MeasureStatement, commands: &Commands) -> Vec<Sentence> {
         NextStep::StateNoise => one("a run once more, or state the noise: only then can the model be judged"),
         NextStep::SeparatingTest => {
             let test = statement.description.as_deref().unwrap_or_default();
-            let written = command("trace", "--next next --control CONTROL");
+            let written = command("trace", "--next next --programs CONTROL");
             let what = "writes the test, its program and its sheet".into();
             vec![format!("What to measure next: {test}").into(), Sentence::Command(written, what)]
         }

@@ -182,7 +182,10 @@ fn c() {
     for printed in &all {
         let (function, names) = (printed.function, names(printed));
         let (nominal, errors) = names.split_at(names.len() - printed.errors());
-        let outputs = printed.cases[0].values.len();
+        // The size of the array that the function fills; a function of one value returns it.
+        let outputs = printed.text.split_once("double value[").map_or(1, |(_, after)| {
+            after.split(']').next().and_then(|size| size.parse().ok()).expect("the size of an array")
+        });
         let given = |names: &[String], first: usize| -> String {
             let fields = names.iter().enumerate();
             fields.map(|(index, name)| format!(".{name} = x[{}], ", first + index)).collect()

@@ -21,14 +21,14 @@ pub struct NextArguments {
     /// Write what to measure next into a new folder: a session that holds only the tests that separate the found effects
     /// from their aliases, their NC programs and their set-up sheets.
     ///
-    /// Example: --next next --control siemens
+    /// Example: --next next --programs siemens
     #[arg(long, value_name = "FOLDER")]
     next: Option<PathBuf>,
-    /// The control of the programs of --next: linuxcnc, fanuc, siemens, heidenhain.
+    /// Write the programs for this control beside it: linuxcnc, fanuc, siemens, heidenhain.
     ///
-    /// Example: --next next --control fanuc
+    /// Example: --next next --programs fanuc
     #[arg(long, value_name = "CONTROL", requires = "next")]
-    control: Option<String>,
+    programs: Option<String>,
 }
 
 /// The name of the session in the folder.
@@ -75,7 +75,7 @@ impl NextArguments {
         if !quiet {
             say!("{session}: the tests to measure next");
         }
-        if let Some(control) = &self.control {
+        if let Some(control) = &self.programs {
             again(&["nc", &session, "--control", control, "--out", &programs], quiet)?;
         }
         again(&["sheet", &session, "--out", &sheets], quiet)
