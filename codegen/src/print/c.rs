@@ -65,12 +65,13 @@ fn named(functions: &[Code<'_>], header: &str) -> String {
         fields(true)
     );
     for code in functions {
-        let several = code.outputs() > 1;
-        let result = if several { ", double value[3]" } else { "" };
+        let outputs = code.outputs();
+        let several = outputs > 1;
+        let result = if several { format!(", double value[{outputs}]") } else { String::new() };
         let slopes = match (code.gradient, several) {
             (false, _) => String::new(),
             (true, false) => format!(", struct {name}_errors *gradient"),
-            (true, true) => format!(", struct {name}_errors gradient[3]"),
+            (true, true) => format!(", struct {name}_errors gradient[{outputs}]"),
         };
         let returned = if several { "void" } else { "double" };
         let what = if code.gradient { "Value, and its derivatives by the errors" } else { "Value" };
