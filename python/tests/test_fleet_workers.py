@@ -26,6 +26,8 @@ class Cluster:
         self.address = f"tcp://127.0.0.1:{port}"
         self.port = port
         self.processes = []
+        self.threads = []
+        self.ended = threading.Event()
 
     def start(self, module, *arguments, **variables):
         line = [sys.executable, "-m", "distributed.cli." + module, *map(str, arguments)]
@@ -39,11 +41,34 @@ class Cluster:
         return self.start("dask_scheduler", *arguments, **variables)
 
     def worker(self, *arguments):
-        return self.start("dask_worker", self.address, "--nthreads", 1, "--no-dashboard", *(arguments or ["--no-nanny"]))
+        line = [self.address, "--nthreads", 1, "--no-dashboard", "--no-nanny", *arguments]
+        return self.start("dask_worker", *line)
+
+    def workers(self, *arguments):
+        """Workers one after the other: when one has ended, the next begins. Dask's nanny starts no other worker if one
+        is killed before the nanny has seen that it runs."""
+
+        def follow():
+            while not self.ended.is_set():
+                self.worker(*arguments).wait()
+
+        thread = threading.Thread(target=follow)
+        self.threads.append(thread)
+        thread.start()
 
     def end(self):
-        for process in self.processes:
-            # A nanny ends its worker when it is told to end.
+        self.ended.set()
+        self.stop()
+        for thread in self.threads:
+            thread.join(0.5)
+        # A worker that began while the others were stopped.
+        self.stop()
+        for thread in self.threads:
+            thread.join()
+        self.ended.clear()
+
+    def stop(self):
+        for process in list(self.processes):
             process.terminate()
             try:
                 process.wait(timeout=10)
@@ -194,9 +219,9 @@ def test_a_session_that_ends_its_workers_is_lost_and_the_others_are_not(tmp_path
     count = 8
     sessions, out = make(tmp_path / "fleet", count), tmp_path / "out"
     (tmp_path / "ends.py").write_text(ENDS)
-    # Dask gives a batch up after the first worker; the nanny starts the next one.
+    # Dask gives a batch up after the first worker that ends during it.
     cluster.scheduler(DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES="0")
-    cluster.worker("--nanny", "--preload", tmp_path / "ends.py")
+    cluster.workers("--preload", tmp_path / "ends.py")
     begin = time.monotonic()
     run = abbe.fleet.run(sessions, out, client=cluster.address, batch=4, retries=1, progress=False, trace=False)
     assert time.monotonic() - begin < 90
