@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _abbe
+from ._errors import Error
 from ._model import Model
 from ._shown import Shown, Table, rows_of
 from .results import FitResult, ParameterResult
@@ -94,6 +96,24 @@ class Fit(Shown, FitResult):
         The part of a parameter in a null-space direction is its nominal value: predictions do not depend on it.
         """
         return self._handle.estimates()
+
+    def uncertainties(self) -> dict[str, Any]:
+        """Return the estimates as correlated numbers of the package ``uncertainties``, which it needs.
+
+        Functions of them have the uncertainty that follows from the covariance of the fit, to first order.
+
+        Returns
+        -------
+        dict of str to uncertainties.UFloat
+            The estimates of `parameters` by identifier, each in its unit.
+        """
+        try:
+            package = import_module("uncertainties")
+        except ImportError as cause:
+            raise Error("this needs the package uncertainties", help="pip install abbe[uncertainties]") from cause
+        ids, matrix = self.covariance.ids, np.asarray(self.covariance)
+        values = package.correlated_values([self[id].value for id in ids], matrix, tags=ids)
+        return dict(zip(ids, values))
 
     @property
     def residuals(self) -> ByTest:
