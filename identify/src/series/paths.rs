@@ -24,6 +24,8 @@ pub struct SetUpPath {
     pub workpiece_mm: Vec<[f64; 3]>,
     /// The point that the tool frame carries, state by state.
     pub tool_mm: Vec<[f64; 3]>,
+    /// The readings at these states.
+    pub rows: Vec<usize>,
     /// The rotary axes at the first state: name, a point, direction.
     pub axes: Vec<(String, [f64; 3], [f64; 3])>,
     /// Whether the states follow one another on a path; else they are separate poses.
@@ -47,8 +49,9 @@ pub fn set_up(machine: &Machine, test: &str, station: &Station<f64>, readings: &
     let (mut workpiece_mm, mut tool_mm, mut state) = (Vec::new(), Vec::new(), Vec::new());
     let first: Vec<f64> = readings.positions.iter().map(|positions| positions[run.start]).collect();
     let is_path = !readings.run.is_empty();
-    for row in run.clone().step_by(run.len().div_ceil(MAX_POINTS)).chain([run.end - 1]) {
-        readings.state(machine, row, &mut state);
+    let rows: Vec<usize> = run.clone().step_by(run.len().div_ceil(MAX_POINTS)).chain([run.end - 1]).collect();
+    for row in &rows {
+        readings.state(machine, *row, &mut state);
         let on_table = station.table_point_mm();
         workpiece_mm.extend(on_table.map(|point| machine.workpiece_point(&state, &none, Point(point)).0));
         tool_mm.push(machine.tool_point(&state, &none, Point(station.tool_point_mm())).0);
@@ -58,5 +61,5 @@ pub fn set_up(machine: &Machine, test: &str, station: &Station<f64>, readings: &
         let (point, direction) = placing::axis_line(machine, &first, axis);
         (machine.axes[axis].name.clone(), point, direction)
     };
-    Some(SetUpPath { test: test.to_string(), workpiece_mm, tool_mm, axes: rotary.map(line).collect(), is_path })
+    Some(SetUpPath { test: test.to_string(), workpiece_mm, tool_mm, rows, axes: rotary.map(line).collect(), is_path })
 }
