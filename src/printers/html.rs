@@ -36,11 +36,17 @@ pub fn table(table: &Table) -> Markup {
     let headed = table.columns.iter().any(|column| !column.heading.is_empty());
     html! {
         @if !table.title.is_empty() { p { (table.title) "." } }
-        div class="scroll" {
+        // On a small screen the arrow keys scroll it.
+        div class="scroll" tabindex="0" {
             table class=[(!headed).then_some("pairs")] {
                 @if headed {
                     thead {
-                        tr { @for (column, class) in table.columns.iter().zip(&class) { th class=[*class] { (column.heading) } } }
+                        // A header cell without words would be read aloud as nothing before each cell below it.
+                        tr {
+                            @for (column, class) in table.columns.iter().zip(&class) {
+                                @if column.heading.is_empty() { td class=[*class] {} } @else { th class=[*class] { (column.heading) } }
+                            }
+                        }
                     }
                 }
                 tbody {
