@@ -10,9 +10,10 @@ use abbe::identify::parameters::Role;
 use abbe::identify::problem::Problem;
 use abbe::identify::series::paths;
 use abbe::model::axis::AxisKind;
-use abbe::model::chain::Machine;
+use abbe::model::chain::{AxisPosition, BodyErrors, Machine};
 use abbe::model::document::schema;
 use abbe::model::files::template;
+use abbe::model::frames::Point;
 use abbe::model::session::Test;
 use abbe::plan::design::Goal;
 use abbe::plan::improve::{ImproveOptions, improve};
@@ -87,6 +88,7 @@ impl Plan {
                 "readings": readings,
                 "table_path_mm": path.workpiece_mm,
                 "tool_path_mm": path.tool_mm,
+                "stops": stops(machine, test, &path.rows),
                 "axis_lines": path.axes.iter().map(|(name, point, direction)| json!({
                     "name": name, "point_mm": point, "direction": direction,
                 })).collect::<Vec<_>>(),
@@ -200,6 +202,34 @@ impl Plan {
         let style = Style { numbering: Numbering::None, nomenclature: false, ..Style::default() };
         Ok(LATEX.print(&check(&equation, &source)?, &style)?)
     }
+}
+
+/// Where the axes are at some readings, deg or mm, and how the frames of table and tool lie in R: the images of the
+/// unit vectors.
+fn stops(machine: &Machine, test: &Test, rows: &[usize]) -> Vec<Value> {
+    let Some(readings) = &test.readings else { return Vec::new() };
+    let mut state = Vec::new();
+    let stop = |row: &usize| {
+        readings.state(machine, *row, &mut state);
+        let positions = machine.axes.iter().zip(&readings.positions);
+        let at: Vec<f64> = positions.map(|(axis, column)| axis.kind.to_display(column[*row])).collect();
+        json!({ "at": at, "table": turned(machine, &state, true), "tool": turned(machine, &state, false) })
+    };
+    rows.iter().map(stop).collect()
+}
+
+/// The images of the unit vectors of the table frame or the tool frame in R.
+fn turned(machine: &Machine, state: &[AxisPosition<f64>], table: bool) -> [[f64; 3]; 3] {
+    let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
+    let image = |point: [f64; 3]| {
+        let point = Point(point);
+        if table { machine.workpiece_point(state, &none, point).0 } else { machine.tool_point(state, &none, point).0 }
+    };
+    let origin = image([0.0; 3]);
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|unit| {
+        let end = image(unit);
+        std::array::from_fn(|k| end[k] - origin[k])
+    })
 }
 
 /// The axes that move in a test, rotary axes first.
