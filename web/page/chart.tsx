@@ -85,6 +85,8 @@ export function draw(canvas: HTMLCanvasElement, x: Float64Array, curves: Curve[]
 }
 
 interface Props {
+  /** The number of its test. */
+  test: number;
   title: string;
   x: Float64Array;
   curves: Curve[];
@@ -93,7 +95,7 @@ interface Props {
   drawn: () => void;
 }
 
-export function Chart({ title, x, curves, axis, unit, drawn }: Props) {
+export function Chart({ test, title, x, curves, axis, unit, drawn }: Props) {
   const canvas = useRef<HTMLCanvasElement>(null);
   useEffect(() => {
     const element = canvas.current;
@@ -106,7 +108,7 @@ export function Chart({ title, x, curves, axis, unit, drawn }: Props) {
   }, [x, curves]);
   const largest = curves[0]?.values.reduce((most, value) => Math.max(most, Math.abs(value)), 0) ?? 0;
   return (
-    <figure>
+    <figure data-test={test}>
       <canvas
         ref={canvas}
         role="img"

@@ -2,7 +2,7 @@
 
 import { COLOURS, type Curve } from "./chart";
 import type { CallOptions } from "./engine";
-import type { Description } from "./explore";
+import type { Description } from "./plan";
 
 /** A call of the worker. */
 export type Call = <T>(method: string, args?: unknown[], options?: CallOptions) => Promise<T>;

@@ -12,6 +12,9 @@ export class EngineError extends Error {
 /** Why a call failed that was stopped. */
 export const STOPPED = "stopped";
 
+/** Whether a call ended because it was stopped, which is no fault. */
+export const isStopped = (error: unknown): boolean => error instanceof EngineError && error.fault.message === STOPPED;
+
 interface Waiting {
   resolve: (result: never) => void;
   reject: (fault: EngineError) => void;

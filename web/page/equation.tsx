@@ -2,6 +2,7 @@
 
 import katex from "katex";
 import type { Fault } from "./protocol";
+import { Scroll } from "./scroll";
 
 /** The displayed equations of a LaTeX text, with the sentences above them. */
 function parts(latex: string): { words: string; equation: string }[] {
@@ -22,7 +23,7 @@ export function Equation({ latex }: { latex: string | Fault }) {
           trust: false,
         });
         return (
-          <div class="equation" key={equation}>
+          <div class="equation" key={equation} role="group" aria-label="Equation" tabIndex={0}>
             <p class="note">{words}</p>
             <div dangerouslySetInnerHTML={{ __html: html }} />
           </div>
@@ -31,7 +32,9 @@ export function Equation({ latex }: { latex: string | Fault }) {
       {latex && (
         <details>
           <summary>LaTeX</summary>
-          <pre class="scroll">{latex}</pre>
+          <Scroll label="LaTeX">
+            <pre>{latex}</pre>
+          </Scroll>
         </details>
       )}
     </>

@@ -1,5 +1,6 @@
 // A fault with its place and what to do.
 
+import type { ComponentChildren } from "preact";
 import { EngineError } from "./engine";
 import { FileFault } from "./files";
 import type { Fault } from "./protocol";
@@ -11,7 +12,15 @@ export function faultOf(error: unknown): Fault {
   return { message: error instanceof Error ? error.message : String(error) };
 }
 
-export function FaultBox({ fault, go }: { fault: Fault; go?: (fault: Fault) => void }) {
+interface Props {
+  fault: Fault;
+  /** Goes to the place of the fault. */
+  go?: (fault: Fault) => void;
+  /** What can be done besides. */
+  children?: ComponentChildren;
+}
+
+export function FaultBox({ fault, go, children }: Props) {
   const place = [fault.file, fault.line, fault.column].filter((part) => part != null).join(":");
   return (
     <div class="fault" role="alert">
@@ -19,6 +28,7 @@ export function FaultBox({ fault, go }: { fault: Fault; go?: (fault: Fault) => v
       {place && (go && fault.line ? <button onClick={() => go(fault)}>{place}</button> : <code>{place}</code>)}{" "}
       {fault.message}
       {fault.help && <p>{fault.help}</p>}
+      {children}
     </div>
   );
 }

@@ -169,28 +169,39 @@ function withoutCommonFolder(files: FileMap): FileMap {
   return withoutCommonFolder(new Map([...files].map(([path, bytes]) => [path.slice(first.length + 1), bytes])));
 }
 
-/** The files of an entry of a drop, with those in its folders. */
-async function ofEntry(entry: FileSystemEntry, into: { path: string; file: File }[]): Promise<void> {
-  if (into.length > MOST_FILES) return;
-  if (entry.isFile) {
-    const file = await new Promise<File>((resolve, reject) => (entry as FileSystemFileEntry).file(resolve, reject));
-    into.push({ path: entry.fullPath, file });
-    return;
-  }
-  const reader = (entry as FileSystemDirectoryEntry).createReader();
+/** The files of a folder of a drop, with those in its folders. */
+async function ofFolder(folder: FileSystemEntry, into: { path: string; file: File }[]): Promise<void> {
+  const reader = (folder as FileSystemDirectoryEntry).createReader();
   for (;;) {
     const some = await new Promise<FileSystemEntry[]>((resolve, reject) => reader.readEntries(resolve, reject));
     if (some.length === 0) return;
-    for (const one of some) await ofEntry(one, into);
+    for (const entry of some) {
+      if (into.length > MOST_FILES) return;
+      if (entry.isDirectory) await ofFolder(entry, into);
+      else {
+        const file = await new Promise<File>((resolve, reject) => (entry as FileSystemFileEntry).file(resolve, reject));
+        into.push({ path: entry.fullPath, file });
+      }
+    }
   }
 }
 
 /** The files of a drop. */
 export async function dropped(transfer: DataTransfer): Promise<FileMap> {
-  const entries = [...transfer.items].map((item) => item.webkitGetAsEntry?.()).filter((entry) => entry != null);
-  if (entries.length === 0) return chosen(transfer.files);
+  // All at once: after the first wait the drop is empty. A file is taken itself, since in a page from the disk its entry
+  // cannot be read.
+  const items = [...transfer.items]
+    .filter(({ kind }) => kind === "file")
+    .map((item) => ({ entry: item.webkitGetAsEntry?.(), file: item.getAsFile() }));
+  if (items.length === 0) return chosen(transfer.files);
   const files: { path: string; file: File }[] = [];
-  for (const entry of entries) await ofEntry(entry, files);
+  for (const { entry, file } of items) {
+    if (entry?.isDirectory) {
+      await ofFolder(entry, files).catch(() => {
+        throw new FileFault(`${entry.name}: this browser does not read a dropped folder here; press Choose a folder`);
+      });
+    } else if (file) files.push({ path: file.name, file });
+  }
   return readAll(files);
 }
 

@@ -1,5 +1,7 @@
 // Predicted uncertainty, rank, null space and confounded errors of a plan.
 
+import { Scroll } from "./scroll";
+
 export interface Analysis {
   // Of lengths, or of angles if all readings are angles.
   noise_um?: number;
@@ -27,9 +29,10 @@ export function Identifiability({ analysis }: { analysis: Analysis }) {
       <h2>Identifiability</h2>
       <p>
         Rank {analysis.rank} of {analysis.parameter_count} parameters, {analysis.readings} readings, noise{" "}
-        {analysis.noise_um?.toPrecision(3) ?? analysis.noise_arcsec?.toPrecision(3)} {analysis.noise_um === undefined ? "″" : "µm"}
+        {analysis.noise_um?.toPrecision(3) ?? analysis.noise_arcsec?.toPrecision(3)}{" "}
+        {analysis.noise_um === undefined ? "″" : "µm"}
       </p>
-      <div class="scroll">
+      <Scroll label="Uncertainties">
         <table>
           <thead>
             <tr>
@@ -54,7 +57,7 @@ export function Identifiability({ analysis }: { analysis: Analysis }) {
             ))}
           </tbody>
         </table>
-      </div>
+      </Scroll>
       {analysis.unidentifiable.length > 0 && (
         <>
           <h2>Null space: combinations that leave every reading unchanged</h2>

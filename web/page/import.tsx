@@ -6,10 +6,26 @@ import { ChooseSession } from "./choose-session";
 import { Drop } from "./drop";
 import { Engine } from "./engine";
 import { FaultBox, faultOf } from "./fault";
-import { beside, FileFault, type FileMap, text } from "./files";
+import { beside, FileFault, type FileMap, sessionsIn, text } from "./files";
 import { ENCODINGS, guess, type Layout, type Own, rowsOf, SEPARATORS, written } from "./layout";
 import type { Opened } from "./main";
+import { NumberField } from "./number-field";
+import { Scroll } from "./scroll";
+import { begun, Status, type Work } from "./status";
 import { type Variant, variants } from "./variants";
+import { keptValue, useKeeping, useUnsaved } from "./work";
+
+/** A file of another program. */
+interface Foreign {
+  name: string;
+  bytes: Uint8Array;
+}
+
+/** What another view hands over: a session that has the test, a file of readings, or both. */
+export interface Importable {
+  base?: Opened;
+  file?: Foreign;
+}
 
 interface Found {
   tests: string[];
@@ -44,20 +60,32 @@ export function imported(
   return next.set(session, new TextEncoder().encode(written(text(files, session), test, own, layout)));
 }
 
-export function Wizard({ opened, analyse }: { opened?: Opened; analyse: (opened: Opened) => void }) {
+export function Wizard({ opened, analyse }: { opened?: Importable; analyse: (opened: Opened) => void }) {
   const engine = useRef<Engine | undefined>(undefined);
   engine.current ??= new Engine();
-  const [base, setBase] = useState<Opened | undefined>(opened);
+  const keeping = useKeeping();
+  const [base, setBase] = useState<Opened | undefined>(() => opened?.base ?? keptValue(keeping, "import base"));
   const [found, setFound] = useState<Found>();
   const [test, setTest] = useState(0);
-  const [file, setFile] = useState<{ name: string; bytes: Uint8Array }>();
+  const [file, setFile] = useState<Foreign | undefined>(() => opened?.file ?? keptValue(keeping, "import file"));
   const [layout, setLayout] = useState<Layout>();
   const [tried, setTried] = useState<Tried[]>([]);
-  const [working, setWorking] = useState("");
+  const [work, setWork] = useState<Work>();
+  const [note, setNote] = useState("");
   const [fault, setFault] = useState<unknown>();
-
+  useUnsaved("Import", work !== undefined);
+  useEffect(() => keeping.store.keep("import base", base), [base]);
+  useEffect(() => keeping.store.keep("import file", file), [file]);
   useEffect(() => {
-    if (opened) setBase(opened);
+    if (layout) keeping.store.keep("import layout", { test, layout });
+  }, [test, layout]);
+  /** What was set before a reload, until it is shown. */
+  const kept = useRef(keptValue<{ test: number; layout: Layout }>(keeping, "import layout"));
+  useEffect(() => {
+    if (!opened) return;
+    if (opened.base) setBase(opened.base);
+    if (opened.file) take(opened.file);
+    else setFile(undefined);
   }, [opened]);
   /** Number of what is imported into what: what was begun for another is not told. */
   const trying = useRef(0);
@@ -65,14 +93,14 @@ export function Wizard({ opened, analyse }: { opened?: Opened; analyse: (opened:
     trying.current += 1;
     engine.current?.stop();
     setTried([]);
-    setWorking("");
+    setWork(undefined);
+    setNote("");
     return trying.current;
   };
   useEffect(() => {
     if (!base) return;
     const number = forget();
     setFound(undefined);
-    setFile(undefined);
     setTest(0);
     setFault(undefined);
     const read = engine.current?.call<Found>("columns", [base.session], { files: base.files });
@@ -81,19 +109,38 @@ export function Wizard({ opened, analyse }: { opened?: Opened; analyse: (opened:
       (error) => number === trying.current && setFault(error),
     );
   }, [base]);
-
-  const take = (files: FileMap) => {
-    const [first] = files;
-    if (!first || !found) return;
-    const name = first[0].split("/").pop() ?? "readings.csv";
-    if (/^PK\x03\x04|^\xd0\xcf\x11\xe0/.test(String.fromCharCode(...first[1].subarray(0, 4)))) {
-      setFault(new FileFault(`${name}: this is a spreadsheet; name it as \`data\` of the test, or save it as CSV`));
+  // A file may come before the session whose columns it has.
+  useEffect(() => {
+    if (file && found && kept.current) {
+      setLayout(kept.current.layout);
+      setTest(kept.current.test);
+      kept.current = undefined;
       return;
     }
-    forget();
-    setFile({ name, bytes: first[1] });
-    setLayout(guess(first[1], found.columns));
+    setLayout(file && found ? guess(file.bytes, found.columns) : undefined);
+  }, [file, found]);
+
+  const take = (next: Foreign) => {
+    if (/^PK\x03\x04|^\xd0\xcf\x11\xe0/.test(String.fromCharCode(...next.bytes.subarray(0, 4)))) {
+      setFault(
+        new FileFault(`${next.name}: this is a spreadsheet; name it as \`data\` of the test, or save it as CSV`),
+      );
+      return;
+    }
+    // Before the columns of the session are read, nothing was begun with another file.
+    if (found) forget();
+    kept.current = undefined;
+    setFile(next);
     setFault(undefined);
+  };
+  /** Takes the session that has the test, or the file of readings. */
+  const receive = (files: FileMap) => {
+    const [session] = sessionsIn(files);
+    const [first] = files;
+    if (session !== undefined) {
+      kept.current = undefined;
+      setBase({ files, session });
+    } else if (first) take({ name: first[0].split("/").pop() ?? "readings.csv", bytes: first[1] });
   };
   const set = (next: Partial<Layout>) => {
     if (!layout || !file || !found) return;
@@ -113,8 +160,10 @@ export function Wizard({ opened, analyse }: { opened?: Opened; analyse: (opened:
     if (!layout || !found) return;
     const number = forget();
     const results: Tried[] = [];
-    for (const variant of [{ words: "as guessed", layout }, ...variants(layout, found.columns)] as Variant[]) {
-      setWorking(`fit: ${variant.words}`);
+    const all: Variant[] = [{ words: "as guessed", layout }, ...variants(layout, found.columns)];
+    const { since } = begun("");
+    for (const [k, variant] of all.entries()) {
+      setWork({ words: `fit ${k + 1} of ${all.length}: ${variant.words}`, since });
       try {
         results.push({ words: variant.words, rms_um: await rms(variant.layout) });
       } catch (error) {
@@ -124,49 +173,54 @@ export function Wizard({ opened, analyse }: { opened?: Opened; analyse: (opened:
       if (number !== trying.current) return;
       setTried([...results]);
     }
-    setWorking("");
+    setWork(undefined);
+  };
+  /** What was fitted until then stays. */
+  const stop = () => {
+    trying.current += 1;
+    engine.current?.stop();
+    setWork(undefined);
+    setNote("stopped");
   };
   const use = () => {
     if (!base || !file || !layout) return;
-    analyse({ files: imported(base.files, base.session, test, file.name, file.bytes, layout), session: base.session });
+    const files = imported(base.files, base.session, test, file.name, file.bytes, layout);
+    analyse({ files, session: base.session, base: base.files });
+    // The next file goes into the same session.
+    kept.current = undefined;
+    setBase({ files, session: base.session });
+    setFile(undefined);
   };
   const rows = file && layout ? rowsOf(file.bytes, layout).slice(0, 8) : [];
   return (
     <>
       <p>
-        Readings of another program become those of a test. First the session that has the test, then the file.{" "}
+        Readings of another program become those of a test.{" "}
+        {base ? `They go into ${base.session}.` : "First the session that has the test, then the file."}{" "}
         <ChooseSession label="Session" placeholder={base ? base.session : "choose …"} open={setBase} />
       </p>
+      <Drop words={wanted(base, file)} open={receive} failed={setFault} />
       {fault !== undefined && <FaultBox fault={faultOf(fault)} />}
       {found && (
-        <>
-          <p>
-            <label>
-              Test{" "}
-              <select
-                aria-label="Test"
-                value={test}
-                onChange={(event) => {
-                  setTest(Number(event.currentTarget.value));
-                  forget();
-                }}
-              >
-                {found.tests.map((name, k) => (
-                  <option key={name} value={k}>
-                    {name}
-                  </option>
-                ))}
-              </select>
-            </label>
-          </p>
-          <Drop
-            words={
-              file ? `The file is ${file.name}. Drop another here.` : "Drop the file of readings here (.csv, .txt)."
-            }
-            open={take}
-            failed={setFault}
-          />
-        </>
+        <p>
+          <label>
+            Test{" "}
+            <select
+              aria-label="Test"
+              value={test}
+              onChange={(event) => {
+                setTest(Number(event.currentTarget.value));
+                forget();
+              }}
+            >
+              {found.tests.map((name, k) => (
+                <option key={name} value={k}>
+                  {name}
+                </option>
+              ))}
+            </select>
+          </label>
+        </p>
       )}
       {found && file && layout && (
         <>
@@ -190,12 +244,14 @@ export function Wizard({ opened, analyse }: { opened?: Opened; analyse: (opened:
             <Choice label="Encoding" value={layout.encoding} of={ENCODINGS} set={(encoding) => set({ encoding })} />
             <label>
               Lines above{" "}
-              <input
-                type="number"
+              <NumberField
+                value={layout.skip}
+                of={file}
                 min={0}
                 max={1000}
-                value={layout.skip}
-                onInput={(event) => set({ skip: Math.max(0, Math.round(event.currentTarget.valueAsNumber) || 0) })}
+                step={1}
+                refused={(lines) => (Number.isInteger(lines) && lines >= 0 ? undefined : "lines are counted from 0")}
+                set={(skip) => set({ skip })}
               />
             </label>
             <label>
@@ -207,7 +263,7 @@ export function Wizard({ opened, analyse }: { opened?: Opened; analyse: (opened:
               a header line
             </label>
           </p>
-          <div class="scroll">
+          <Scroll label="First rows and meanings of the columns">
             <table>
               <thead>
                 <tr>
@@ -246,19 +302,19 @@ export function Wizard({ opened, analyse }: { opened?: Opened; analyse: (opened:
                 ))}
               </tbody>
             </table>
-          </div>
+          </Scroll>
           <p class="actions">
-            <button class="main" disabled={working !== ""} onClick={() => void tryAll()}>
+            <button class="main" disabled={work !== undefined} onClick={() => void tryAll()}>
               Fit, and the same with other guesses
             </button>
-            <button disabled={working === ""} onClick={forget}>
+            <button disabled={!work} onClick={stop}>
               Stop
             </button>
             <button onClick={use}>Open in Analyse</button>
-            <span role="status">{working}</span>
+            <Status work={work} note={note} />
           </p>
           {tried.length > 0 && (
-            <div class="scroll">
+            <Scroll label="Residuals of the guesses">
               <table>
                 <thead>
                   <tr>
@@ -275,12 +331,18 @@ export function Wizard({ opened, analyse }: { opened?: Opened; analyse: (opened:
                   ))}
                 </tbody>
               </table>
-            </div>
+            </Scroll>
           )}
         </>
       )}
     </>
   );
+}
+
+/** What is dropped next. */
+function wanted(base?: Opened, file?: Foreign): string {
+  if (!base) return `${file ? `The file is ${file.name}. ` : ""}Drop the files of the session that has the test here.`;
+  return file ? `The file is ${file.name}. Drop another here.` : "Drop the file of readings here (.csv, .txt).";
 }
 
 function Choice<T extends string>({

@@ -92,6 +92,14 @@ export function rowsOf(bytes: Uint8Array, layout: Pick<Layout, "separator" | "en
     .map((line) => cells(line, layout.separator));
 }
 
+/** Whether a file is rows of numbers: readings of another program, whatever their layout. */
+export function isReadings(path: string, bytes: Uint8Array): boolean {
+  if (!/\.(csv|tsv|txt|dat|asc|prn)$/i.test(path)) return false;
+  const lines = linesOf(bytes, guessedEncoding(bytes));
+  const separator = guessedSeparator(lines);
+  return lines.filter((line) => numbers(cells(line, separator)) > 1).length > 1;
+}
+
 const UNITS: [RegExp, string][] = [
   [/µm|μm|\bum\b|_um$|micron/i, "um"],
   [/\bmil\b|_mil$/i, "mil"],

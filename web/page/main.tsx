@@ -4,11 +4,14 @@ import { render } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { keepOffline } from "#assets";
 import { Analyse } from "./analyse";
-import { Explore } from "./explore";
+import { Explore, type KeptPlan } from "./explore";
 import { FaultBox } from "./fault";
 import type { FileMap } from "./files";
-import { Wizard } from "./import";
-import { fromFragment, type Shared } from "./share";
+import { type Importable, Wizard } from "./import";
+import { fromFragment, type Shared, toFragment } from "./share";
+import { Store } from "./store";
+import { Tabs } from "./tabs";
+import { askBeforeLeaving, KeepingProvider, keptValue, useKeeping } from "./work";
 import "./style.css";
 
 const VIEWS = ["Analyse", "Explore", "Import"] as const;
@@ -18,6 +21,8 @@ type View = (typeof VIEWS)[number];
 export interface Opened {
   files: FileMap;
   session: string;
+  /** The files from which these were made, if they are others. */
+  base?: FileMap;
 }
 
 /** The plan that a fragment holds, or that it should hold one and does not. */
@@ -27,9 +32,11 @@ function sharedBy(fragment: string): { plan?: Shared; isBroken: boolean } {
 }
 
 function App() {
-  const [address, setAddress] = useState(() => sharedBy(location.hash));
+  const keeping = useKeeping();
+  const [address, setAddress] = useState(() => firstAddress(keptValue(keeping, "plan")));
   const shared = address.plan;
-  const [view, setView] = useState<View>(shared ? "Explore" : "Analyse");
+  const [view, setView] = useState<View>(() => firstView(keptValue(keeping, "view"), shared));
+  useEffect(() => keeping.store.keep("view", view), [view]);
   // Another address in the same tab loads nothing.
   useEffect(() => {
     const changed = () => {
@@ -41,28 +48,24 @@ function App() {
     return () => removeEventListener("hashchange", changed);
   }, []);
   // What each view was given. A view keeps its work until it is given something else.
-  const [opened, setOpened] = useState<Partial<Record<View, Opened>>>({});
+  const [opened, setOpened] = useState<{ Analyse?: Opened; Explore?: Opened; Import?: Importable }>({});
   const explored = useRef(false);
   explored.current ||= view === "Explore";
   const look = (to: View) => {
     setView(to);
     setAddress((before) => ({ ...before, isBroken: false }));
   };
-  const show = (to: View) => (next: Opened) => {
-    setOpened((all) => ({ ...all, [to]: next }));
-    setView(to);
-  };
+  const show =
+    <To extends View>(to: To) =>
+    (next: To extends "Import" ? Importable : Opened) => {
+      setOpened((all) => ({ ...all, [to]: next }));
+      setView(to);
+    };
   return (
     <>
       <header>
         <h1>Abbe</h1>
-        <nav role="tablist" aria-label="Views">
-          {VIEWS.map((name) => (
-            <button key={name} role="tab" aria-selected={view === name} onClick={() => look(name)}>
-              {name}
-            </button>
-          ))}
-        </nav>
+        <Tabs label="Views" names={VIEWS} shown={view} show={look} />
         <p class="note">Geometric errors of machine tools. The data stay in this page.</p>
       </header>
       <main>
@@ -71,13 +74,13 @@ function App() {
             fault={{ message: "the address holds no plan that can be read; perhaps a part of it is missing" }}
           />
         )}
-        <section hidden={view !== "Analyse"} aria-label="Analyse">
+        <section id="Analyse" role="tabpanel" hidden={view !== "Analyse"} aria-label="Analyse">
           <Analyse opened={opened.Analyse} explore={show("Explore")} imports={show("Import")} />
         </section>
-        <section hidden={view !== "Explore"} aria-label="Explore">
+        <section id="Explore" role="tabpanel" hidden={view !== "Explore"} aria-label="Explore">
           {explored.current && <Explore opened={opened.Explore} shared={shared} analyse={show("Analyse")} />}
         </section>
-        <section hidden={view !== "Import"} aria-label="Import">
+        <section id="Import" role="tabpanel" hidden={view !== "Import"} aria-label="Import">
           <Wizard opened={opened.Import} analyse={show("Analyse")} />
         </section>
       </main>
@@ -85,8 +88,28 @@ function App() {
   );
 }
 
+/** What the address holds besides what this page keeps: after a reload that is the same plan. */
+function firstAddress(kept: KeptPlan | undefined): { plan?: Shared; isBroken: boolean } {
+  const found = sharedBy(location.hash);
+  const isKept = kept !== undefined && toFragment(kept.timeline.present) === location.hash;
+  return isKept ? { isBroken: false } : found;
+}
+
+/** The view of before the page was loaded; a plan in the address is shown. */
+function firstView(kept: string | undefined, shared: Shared | undefined): View {
+  return shared ? "Explore" : (VIEWS.find((view) => view === kept) ?? "Analyse");
+}
+
 // A file that misses the field for it does not take the place of the page.
 for (const name of ["dragover", "drop"]) addEventListener(name, (event) => event.preventDefault());
+askBeforeLeaving();
 const root = document.getElementById("app");
-if (root) render(<App />, root);
+void Store.open().then((keeping) => {
+  const app = (
+    <KeepingProvider value={keeping}>
+      <App />
+    </KeepingProvider>
+  );
+  if (root) render(app, root);
+});
 keepOffline();

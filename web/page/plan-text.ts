@@ -79,6 +79,31 @@ export function withBall(
   });
 }
 
+/** A field of the form of a test: a key, and in an inline table one of its parts. */
+export interface Field {
+  test: number;
+  key?: string;
+  part?: string;
+}
+
+/** The field in which a place of a text lies; line and column from 1. */
+export function fieldAt(text: string, line: number, column = 1): Field | undefined {
+  let start = 0;
+  for (let k = 1; k < line; k++) start = text.indexOf("\n", start) + 1 || text.length;
+  // A heading names its test as a whole.
+  const lineEnd = text.indexOf("\n", start);
+  const heading = /^[ \t]*\[\[/.test(text.slice(start, start + 80));
+  const at = heading ? (lineEnd < 0 ? text.length : lineEnd) : start + column - 1;
+  const test = blocks(text).findIndex(([from, to]) => from <= at && at <= to);
+  if (test < 0) return undefined;
+  const before = text.slice(blocks(text)[test][0], lineEnd < 0 ? text.length : lineEnd);
+  // A value may go on for lines: the last key before.
+  const key = [...before.matchAll(/^[ \t]*([\w-]+)[ \t]*=/gm)].at(-1);
+  if (heading || !key) return { test };
+  const inTable = [...text.slice(start, at + 1).matchAll(/[{,][ \t]*([\w-]+)/g)].at(-1);
+  return { test, key: key[1], part: inTable?.[1] };
+}
+
 /** A number in an inline table: `from_deg` of `sweep = { … }`. */
 export function part(written: string | undefined, key: string): number | undefined {
   const found = new RegExp(`\\b${key}\\s*=\\s*([-+.\\deE]+)`).exec(written ?? "");

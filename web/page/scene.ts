@@ -1,10 +1,12 @@
-// The set-up of a test in three dimensions: paths of the balls in R, rotary axes, and the balls as handles.
+// The set-up of a test in three dimensions: paths of the balls in R, rotary axes, and the balls and the bar at one
+// position of the test. The balls are handles.
 
 import {
   AmbientLight,
   AxesHelper,
   BufferGeometry,
   Color,
+  CylinderGeometry,
   DirectionalLight,
   Line,
   LineBasicMaterial,
@@ -25,24 +27,56 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
 type Point = [number, number, number];
 
+/** A position of a test: of each axis, deg or mm, and the images of the unit vectors of table and tool in R. */
+export interface Stop {
+  at: number[];
+  table: [Point, Point, Point];
+  tool: [Point, Point, Point];
+}
+
 export interface SetUp {
   table_point_mm: Point | null;
   tool_point_mm: Point;
   table_path_mm: Point[];
   tool_path_mm: Point[];
+  /** The positions at the points of the paths. */
+  stops: Stop[];
   axis_lines: { name: string; point_mm: Point; direction: Point }[];
 }
 
 type Ball = "workpiece_ball_mm" | "spindle_ball_mm";
 
-/** Which ball is dragged to where, at zero positions of the axes, mm. */
+/** Which ball is dragged to where in the frame that carries it, mm. */
 export type Dragged = (ball: Ball, to: Point) => void;
+
+/** A frame that lies as R does. */
+const UPRIGHT: Point[] = [
+  [1, 0, 0],
+  [0, 1, 0],
+  [0, 0, 1],
+];
 
 const vector = (point: Point) => new Vector3(...point);
 
 interface Handle {
   mesh: Mesh;
   ball: Ball;
+  /** Where the ball is in its frame, and in R. */
+  own: Point;
+  inR: Point;
+  /** The images of the unit vectors of its frame in R. */
+  turned: Vector3[];
+}
+
+/** Where a ball in R is in its frame, to a tenth of a millimetre. */
+function inFrame({ own, inR, turned }: Handle, to: Vector3): Point {
+  const moved = to.clone().sub(vector(inR));
+  return own.map((mm, k) => Math.round((mm + turned[k].dot(moved)) * 10) / 10) as Point;
+}
+
+/** Where a ball of its frame is in R. */
+function inReference({ own, inR, turned }: Handle, to: Point): Vector3 {
+  return to.reduce((at, mm, k) => at.addScaledVector(turned[k], mm - own[k]), vector(inR));
 }
 
 export class SetUpScene {
@@ -73,8 +107,8 @@ export class SetUpScene {
     canvas.addEventListener("pointercancel", this.up);
   }
 
-  /** Shows a set-up. */
-  show(setUp: SetUp): void {
+  /** Shows a set-up at one of its positions. */
+  show(setUp: SetUp, position: number): void {
     for (const object of this.drawn) {
       this.scene.remove(object);
       if (object instanceof Line || object instanceof Mesh) {
@@ -102,8 +136,15 @@ export class SetUpScene {
       line.computeLineDistances();
       this.add(line);
     }
-    if (setUp.table_point_mm) this.ball("workpiece_ball_mm", setUp.table_point_mm, 0x2a7fba, extent);
-    this.ball("spindle_ball_mm", setUp.tool_point_mm, 0xd1495b, extent);
+    const k = Math.min(position, setUp.stops.length - 1);
+    const stop: Stop | undefined = setUp.stops[k];
+    if (setUp.table_point_mm) {
+      const at = setUp.table_path_mm[k] ?? setUp.table_point_mm;
+      this.ball("workpiece_ball_mm", setUp.table_point_mm, at, stop?.table, 0x2a7fba, extent);
+    }
+    const at = setUp.tool_path_mm[k] ?? setUp.tool_point_mm;
+    this.ball("spindle_ball_mm", setUp.tool_point_mm, at, stop?.tool, 0xd1495b, extent);
+    this.bar(extent);
     const again = this.handles.find((handle) => handle.ball === held);
     if (this.held && again) this.held.handle = again;
     if (!this.framed) {
@@ -133,6 +174,11 @@ export class SetUpScene {
     return { x: ((at.x + 1) / 2) * this.canvas.clientWidth, y: ((1 - at.y) / 2) * this.canvas.clientHeight };
   }
 
+  /** Where a ball is drawn in R, mm. */
+  point(ball: string): Point | undefined {
+    return this.handles.find((one) => one.ball === ball)?.mesh.position.toArray();
+  }
+
   dispose(): void {
     this.controls.dispose();
     this.renderer.dispose();
@@ -149,11 +195,23 @@ export class SetUpScene {
     this.add(new Line(geometry, new LineBasicMaterial({ color: new Color(colour) })));
   }
 
-  private ball(ball: Ball, at: Point, colour: number, extent: number): void {
+  private ball(ball: Ball, own: Point, inR: Point, turned: Point[] = UPRIGHT, colour: number, extent: number): void {
     const mesh = new Mesh(new SphereGeometry(extent * 0.05, 24, 16), new MeshStandardMaterial({ color: colour }));
-    mesh.position.copy(vector(at));
+    mesh.position.copy(vector(inR));
     this.add(mesh);
-    this.handles.push({ mesh, ball });
+    this.handles.push({ mesh, ball, own, inR, turned: turned.map(vector) });
+  }
+
+  /** The bar between the balls. */
+  private bar(extent: number): void {
+    const [one, other] = this.handles.map(({ mesh }) => mesh.position);
+    if (!other || one.distanceTo(other) === 0) return;
+    const along = other.clone().sub(one);
+    const geometry = new CylinderGeometry(extent * 0.012, extent * 0.012, along.length(), 12);
+    const mesh = new Mesh(geometry, new MeshStandardMaterial({ color: 0x9aa5b1 }));
+    mesh.position.copy(one).addScaledVector(along, 0.5);
+    mesh.quaternion.setFromUnitVectors(new Vector3(0, 1, 0), along.normalize());
+    this.add(mesh);
   }
 
   private ray(event: PointerEvent): Raycaster {
@@ -181,10 +239,11 @@ export class SetUpScene {
     if (!this.held) return;
     const to = this.ray(event).ray.intersectPlane(this.held.plane, new Vector3());
     if (!to) return;
-    const rounded = to.toArray().map((mm) => Math.round(mm * 10) / 10) as Point;
-    this.held.handle.mesh.position.copy(vector(rounded));
+    const { handle } = this.held;
+    const own = inFrame(handle, to);
+    handle.mesh.position.copy(inReference(handle, own));
     this.render();
-    this.dragged(this.held.handle.ball, rounded);
+    this.dragged(handle.ball, own);
   };
 
   private up = (): void => {

@@ -1,20 +1,20 @@
 // The set-up and the motion of a test by numbers.
 
-import type { Key, PlannedTest } from "./explore";
-import { part, value } from "./plan-text";
+import { NumberField } from "./number-field";
+import type { Description, Key } from "./plan";
+import { type Field, part, value } from "./plan-text";
 
 type Ball = "workpiece_ball_mm" | "spindle_ball_mm";
 
 interface Props {
-  tests: PlannedTest[];
-  /** The keys of a test and of a motion, as the schema describes them. */
-  keys: Record<string, Key>;
-  motionKeys: Record<string, Key>;
+  description: Description;
   test: number;
   plan: string;
+  /** The field that makes the plan unusable, and why. */
+  fault?: { field: Field; why: string };
   select: (test: number) => void;
   set: (key: string, written: string) => void;
-  place: (ball: Ball, written: string) => void;
+  place: (ball: Ball, written: string, coordinate: string) => void;
   setPart: (key: string, part: string, written: string, number: number) => void;
   copy: () => void;
   remove: () => void;
@@ -36,19 +36,8 @@ function firstValue({ type }: Key): string {
   return first[String(Array.isArray(type) ? type[0] : type)] ?? '""';
 }
 
-export function TestForm({
-  tests,
-  keys,
-  motionKeys,
-  test,
-  plan,
-  select,
-  set,
-  place,
-  setPart,
-  copy,
-  remove,
-}: Props) {
+export function TestForm({ description, test, plan, fault, select, set, place, setPart, copy, remove }: Props) {
+  const { tests, test_keys: keys, motion_keys: motionKeys } = description;
   const shown = tests[test] ?? tests[0];
   const motion = value(plan, test, "sweep") !== undefined ? "sweep" : "path";
   const written = value(plan, test, motion);
@@ -56,23 +45,19 @@ export function TestForm({
   const rows = [0, 3, 6].map((start) => parts.slice(start, start + 3)).filter((row) => row.length > 0);
   const others = Object.keys(keys).filter((key) => !OWN.includes(key));
   const stated = others.filter((key) => value(plan, test, key) !== undefined);
-  const number = (event: { currentTarget: HTMLInputElement }, act: (number: number) => void) => {
-    const found = event.currentTarget.valueAsNumber;
-    if (Number.isFinite(found)) act(found);
-  };
-  const point = (label: string, ball: Ball, at: readonly number[]) => (
+  const at = fault && fault.field.test === test ? shownField(fault.field, motion, parts, stated) : undefined;
+  const why = (field: string) => (at === field ? fault?.why : undefined);
+  const point = (label: string, ball: Ball, from: readonly number[]) => (
     <div class="point">
       <span>{label}</span>
       {["x", "y", "z"].map((coordinate, k) => (
-        <input
+        <NumberField
           key={coordinate}
-          type="number"
-          step="any"
-          aria-label={`${label} ${coordinate}, mm`}
-          value={Number(at[k].toFixed(4))}
-          onInput={(event) =>
-            number(event, (mm) => place(ball, `[${at.map((old, i) => (i === k ? mm : old)).join(", ")}]`))
-          }
+          label={`${label} ${coordinate}, mm`}
+          value={Number(from[k].toFixed(4))}
+          of={description}
+          fault={why(`${ball}.${coordinate}`)}
+          set={(mm) => place(ball, `[${from.map((old, i) => (i === k ? mm : old)).join(", ")}]`, coordinate)}
         />
       ))}
     </div>
@@ -93,17 +78,19 @@ export function TestForm({
           Remove
         </button>
       </p>
+      <Why of={why("")} />
       {shown.table_point_mm && point("table ball, mm", "workpiece_ball_mm", shown.table_point_mm)}
       {shown.bar_mm !== null && point("tool ball, mm", "spindle_ball_mm", shown.tool_point_mm)}
       {shown.bar_mm !== null && (
         <div class="point">
           <label for="bar">bar, mm</label>
-          <input
+          <NumberField
             id="bar"
-            type="number"
-            step="any"
             value={Number(shown.bar_mm.toFixed(4))}
-            onInput={(event) => number(event, (mm) => mm > 0 && set("bar_mm", String(mm)))}
+            of={description}
+            refused={(mm) => (mm > 0 ? undefined : "a bar is longer than 0")}
+            fault={why("bar_mm")}
+            set={(mm) => set("bar_mm", String(mm))}
           />
         </div>
       )}
@@ -111,14 +98,14 @@ export function TestForm({
         <div class="point" key={row[0]}>
           <span>{k === 0 && `motion of ${shown.moves.join(", ")}`}</span>
           {row.map((key) => (
-            <input
+            <NumberField
               key={key}
-              type="number"
-              step="any"
-              aria-label={labelOf(key)}
+              label={labelOf(key)}
               title={`${labelOf(key)}: ${motionKeys[key].description}`}
               value={part(written, key)}
-              onInput={(event) => number(event, (found) => setPart(motion, key, written ?? "", found))}
+              of={description}
+              fault={why(`${motion}.${key}`)}
+              set={(found) => setPart(motion, key, written ?? "", found)}
             />
           ))}
         </div>
@@ -130,9 +117,12 @@ export function TestForm({
           <input
             id={`key-${key}`}
             title={keys[key].description}
+            aria-invalid={why(key) ? true : undefined}
+            aria-describedby={why(key) ? `why-${key}` : undefined}
             defaultValue={value(plan, test, key)}
             onChange={(event) => event.currentTarget.value.trim() && set(key, event.currentTarget.value.trim())}
           />
+          <Why of={why(key)} id={`why-${key}`} />
         </div>
       ))}
       <select
@@ -154,4 +144,19 @@ export function TestForm({
       </select>
     </fieldset>
   );
+}
+
+/** The field of this form that stands for a field of the text; empty for the test as a whole. */
+function shownField({ key, part }: Field, motion: string, parts: string[], stated: string[]): string {
+  if (key === "workpiece_ball_mm" || key === "spindle_ball_mm") return `${key}.${part ?? "x"}`;
+  if (key === motion && parts.length > 0) return `${key}.${part && parts.includes(part) ? part : parts[0]}`;
+  return key !== undefined && (key === "bar_mm" || stated.includes(key)) ? key : "";
+}
+
+function Why({ of, id }: { of?: string; id?: string }) {
+  return of ? (
+    <span class="why" id={id}>
+      {of}
+    </span>
+  ) : null;
 }

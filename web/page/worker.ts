@@ -1,4 +1,4 @@
-// The worker: holds a folder and the last result, and calls the module.
+// The worker: holds a folder and a plan, and calls the module.
 
 import init, { type InitOutput, Fit, Folder, Plan, Trace, filesOfCode } from "../pkg/abbe.js";
 import { BROKEN, type Fault } from "./protocol";
@@ -8,11 +8,10 @@ export type Files = [path: string, contents: Uint8Array][];
 let ready: Promise<InitOutput> | undefined;
 let memory: WebAssembly.Memory | undefined;
 let folder: Folder | undefined;
-let result: Fit | Trace | undefined;
 let plan: Plan | undefined;
 
 function held<T>(value: T | undefined): T {
-  if (value === undefined) throw JSON.stringify({ message: "there is no result yet" });
+  if (value === undefined) throw JSON.stringify({ message: "there is no plan yet" });
   return value;
 }
 
@@ -26,25 +25,24 @@ function open(files: Files): void {
   for (const [path, contents] of files) folder.add(path, contents);
 }
 
+/** Everything of a result as texts, so that it outlives the worker; the result itself is freed. */
+function texts(result: Fit | Trace) {
+  try {
+    const [json, report, csv] = [result.json(), result.report(), result.csv()];
+    return { json, report, csv, residuals: result.residuals(), model: result.model(), ...used() };
+  } finally {
+    result.free();
+  }
+}
+
 const methods: Record<string, (...args: never[]) => unknown> = {
   columns: (session: string) => JSON.parse(held(folder).columns(session)),
   check: (session: string) => JSON.parse(held(folder).check(session)),
-  fit(session: string) {
-    result?.free();
-    result = undefined;
-    result = Fit.of(held(folder), session, 1);
-    return { json: result.json(), report: result.report(), ...used() };
-  },
+  fit: (session: string) => texts(Fit.of(held(folder), session, 1)),
   trace(session: string) {
-    result?.free();
-    result = undefined;
     const trace = Trace.of(held(folder), session, 1);
-    result = trace;
-    return { json: trace.json(), report: trace.report(), session: trace.session(), ...used() };
+    return { session: trace.session(), ...texts(trace) };
   },
-  csv: () => held(result).csv(),
-  residuals: () => held(result).residuals(),
-  model: () => held(result).model(),
   filesOfCode: (code: string) => JSON.parse(filesOfCode(code)),
   /** Reads a plan and returns what it is. */
   plan(session: string) {

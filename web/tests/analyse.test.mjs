@@ -58,18 +58,72 @@ test("the single file does the same from the disk, and the report is that of the
   await page.close();
 });
 
-test("Stop ends a trace, and the next computation works", async () => {
-  const { page } = await opened(own.chromium, own.server.address);
-  await give(page, filesOf(hermle));
+/** Presses Stop while a trace compares candidates; in the page, so that the trace cannot end between the two. */
+async function stoppedTrace(page) {
   await page.getByRole("button", { name: "Trace", exact: true }).click();
-  // In the page, so that the trace cannot end between the two.
   await page.waitForFunction(() => {
     const isSearching = /screening/.test(document.querySelector('[role="status"]')?.textContent ?? "");
     if (isSearching) [...document.querySelectorAll("button")].find((one) => one.textContent === "Stop").click();
     return isSearching;
   });
-  await page.getByRole("alert").getByText("stopped").waitFor();
+}
+
+test("Stop ends a trace without an error, and the next computation works", async () => {
+  const { page } = await opened(own.chromium, own.server.address);
+  await give(page, filesOf(hermle));
+  await stoppedTrace(page);
+  await page.getByText("trace stopped", { exact: true }).waitFor();
+  assert.equal(await page.getByRole("alert").count(), 0);
   assert.ok((await result(page, "Fit")).rms_um > 0.5);
+  await page.close();
+});
+
+test("Stop keeps the fit of before, with all its files", async () => {
+  const { page, wrong } = await opened(own.chromium, own.server.address);
+  await give(page, filesOf(hermle));
+  const fit = await result(page, "Fit");
+  await stoppedTrace(page);
+  await page.getByText("trace stopped; the fit before stays").waitFor();
+  assert.equal(await page.getByRole("alert").count(), 0);
+  await page.frameLocator("iframe").getByText("EX0C").first().waitFor();
+  assert.deepEqual(JSON.parse(await saved(page, "JSON")), fit);
+  assert.equal((await saved(page, "Residuals")).split("\n").filter((line) => /^\w*\d+,/.test(line)).length, 2416);
+  assert.match(await saved(page, "Model"), /"EX0C"/);
+  assert.deepEqual(wrong, []);
+  await page.close();
+});
+
+test("a trace tells what it does with counts, and for how long", async () => {
+  const { page } = await opened(own.chromium, own.server.address);
+  await give(page, filesOf(hermle));
+  await page.getByText("2416 readings").waitFor();
+  await page.evaluate(() => {
+    const [words, bars, times] = [new Set(), new Set(), new Set()];
+    Object.assign(window, { told: { words, bars, times } });
+    const look = () => {
+      words.add(document.querySelector('[role="status"]').textContent);
+      const bar = document.querySelector("progress");
+      if (bar) bars.add(`${bar.value} of ${bar.max}`);
+      times.add(document.querySelector(".time")?.textContent ?? "");
+    };
+    new MutationObserver(look).observe(document.body, {
+      subtree: true,
+      childList: true,
+      characterData: true,
+      attributes: true,
+    });
+  });
+  await result(page, "Trace");
+  const told = await page.evaluate(() => Object.fromEntries(Object.entries(window.told).map(([k, v]) => [k, [...v]])));
+  assert.ok(told.words.includes("reading 2416 readings"), told.words.join("\n"));
+  assert.ok(
+    told.words.some((words) => /^screening \d+ candidates$/.test(words)),
+    told.words.join("\n"),
+  );
+  const folds = told.words.map((words) => /^searching without one fold: (\d+) of (\d+)$/.exec(words)).filter(Boolean);
+  assert.ok(folds.length > 1, told.words.join("\n"));
+  for (const [, ended, all] of folds) assert.ok(told.bars.includes(`${ended} of ${all}`), told.bars.join("\n"));
+  assert.ok(told.times.includes("0 s"), told.times.join("\n"));
   await page.close();
 });
 
@@ -127,10 +181,7 @@ test("what cannot be used is refused with a message", async () => {
     { "session.toml": complete + 'file = "machine.toml"\n' },
     "the machine file `machine.toml` does not exist",
   );
-  await refused(
-    { "session.toml": complete + 'file = "../../etc/passwd"\n', "machine.toml": "" },
-    "does not exist",
-  );
+  await refused({ "session.toml": complete + 'file = "../../etc/passwd"\n', "machine.toml": "" }, "does not exist");
   const broken = filesOf(hermle);
   broken["session.toml"] = broken["session.toml"].toString().replace("A100.csv", "A100.xlsx");
   broken["A100.xlsx"] = Buffer.from("PK\u0003\u0004 no spreadsheet");

@@ -5,7 +5,7 @@ import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { join } from "node:path";
 import { unzipSync } from "fflate";
-import { analysed, command, fragmentAfter, opened, root, shared } from "./page.mjs";
+import { analysed, command, enter, fragmentAfter, opened, root, shared } from "./page.mjs";
 
 const own = shared();
 
@@ -62,7 +62,7 @@ test("rank and uncertainties are those of the command, and follow a dragged ball
       before,
     );
   } else {
-    await page.getByLabel("table ball, mm x, mm").fill("12");
+    await enter(page, "table ball, mm x, mm", 12);
   }
   const seen = (rows) =>
     [...document.querySelectorAll("table tr td:nth-child(2)")].some((cell, k) => cell.textContent !== rows[k]);
@@ -117,7 +117,7 @@ test("the form of a test offers the keys of the schema", async () => {
 test("a plan is shared by its address, saved as a folder, and opened in Analyse", async () => {
   const { page, wrong } = await explorer(own.server.address);
   await fragmentAfter(page, () => slide(page, "EY0C", 7));
-  const address = own.server.address + (await fragmentAfter(page, () => page.getByLabel("bar, mm").fill("101.5")));
+  const address = own.server.address + (await fragmentAfter(page, () => enter(page, "bar, mm", 101.5)));
   const download = page.waitForEvent("download");
   await page.getByRole("button", { name: "Save as a session folder" }).click();
   const files = unzipSync(new Uint8Array(readFileSync(await (await download).path())));
@@ -155,13 +155,8 @@ test("improve proposes a test that the plan takes up", async () => {
   await page.getByRole("button", { name: "Improve" }).click();
   const add = page.getByRole("button", { name: "Add", exact: true });
   await add.waitFor();
-  const [theirs] = command(
-    join(root, "sessions/hermle-c600u"),
-    "plan",
-    "chapter5.toml",
-    "--no-effects",
-    "--improve",
-  ).improvement.steps;
+  const [theirs] = command(join(root, "sessions/hermle-c600u"), "plan", "chapter5.toml", "--no-effects", "--improve")
+    .improvement.steps;
   const words = await page.locator("li", { has: add }).textContent();
   assert.ok(words.startsWith(`${theirs.test}, ${theirs.duration_min.toFixed(1)} min`), words);
   assert.ok(words.includes(`→ ${theirs.after.toPrecision(3)}`), words);

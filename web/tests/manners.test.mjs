@@ -49,7 +49,22 @@ test("the keyboard reaches and operates everything", async () => {
   await press("Fit");
   await page.locator("[data-seconds]").waitFor();
   await page.locator("h1").click();
-  await press("Explore");
+  // The tabs are one stop; the arrow keys go from one to the other.
+  const tab = (name) => page.getByRole("tab", { name });
+  await page.keyboard.press("Tab");
+  for (const [key, name] of [
+    ["ArrowLeft", "Import"],
+    ["Home", "Analyse"],
+    ["End", "Import"],
+    ["ArrowRight", "Analyse"],
+    ["ArrowRight", "Explore"],
+  ]) {
+    await page.keyboard.press(key);
+    assert.equal(await tab(name).getAttribute("aria-selected"), "true", `${key}: ${name}`);
+    assert.ok(await tab(name).evaluate((element) => element === document.activeElement));
+    assert.ok(await page.getByRole("tabpanel", { name, exact: true }).isVisible());
+    assert.equal(await page.locator('[role="tab"][tabindex="0"]').count(), 1);
+  }
   await analysed(page);
   const slider = page.getByLabel("EX0C", { exact: true });
   await slider.focus();

@@ -88,11 +88,18 @@ export async function fragmentAfter(page, change) {
   return page.evaluate(() => location.hash);
 }
 
-/** A page that collects what it should not do: requests to elsewhere, errors, violated policies. */
+/**
+ * A page that collects what it should not do: requests to elsewhere, errors, violated policies. `asked` are the
+ * questions before it is left, which are answered with yes.
+ */
 export async function opened(browser, address, options = {}) {
-  const page = await browser.newPage(options);
+  return opening(await browser.newPage(options), address);
+}
+
+/** The same with a page that exists, such as a second tab. */
+export async function opening(page, address) {
   page.setDefaultTimeout(PATIENCE_MS);
-  const wrong = [];
+  const [wrong, asked] = [[], []];
   page.on("request", (request) => {
     const url = request.url();
     if (!url.startsWith(address.replace(/[^/]*$/, "")) && !/^(data|blob|about):/.test(url))
@@ -104,12 +111,36 @@ export async function opened(browser, address, options = {}) {
       wrong.push(`console: ${message.text()}`);
   });
   page.on("dialog", (dialog) => {
+    if (dialog.type() === "beforeunload") {
+      asked.push(dialog.type());
+      void dialog.accept();
+      return;
+    }
     wrong.push(`dialog: ${dialog.message()}`);
     void dialog.dismiss();
   });
   await page.goto(address);
   await page.getByRole("heading", { name: "Abbe" }).waitFor();
-  return { page, wrong };
+  return { page, wrong, asked };
+}
+
+/** Writes a number into a field and confirms it. */
+export async function enter(page, label, value) {
+  const field = page.getByLabel(label, { exact: true });
+  await field.fill(String(value));
+  await field.press("Enter");
+}
+
+/** Drops files of the disk on an element, as a hand does: the browser makes the entries. */
+export async function drop(page, target, paths) {
+  const box = await target.boundingBox();
+  const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+  const devtools = await page.context().newCDPSession(page);
+  const data = { items: [], files: paths, dragOperationsMask: 1 };
+  for (const type of ["dragEnter", "dragOver", "drop"]) {
+    await devtools.send("Input.dispatchDragEvent", { type, x, y, data });
+  }
+  await devtools.detach();
 }
 
 /** Gives files to the page as if the user chose them: names with contents. */
