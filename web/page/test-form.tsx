@@ -82,7 +82,7 @@ export function TestForm({ description, test, plan, fault, select, set, place, s
       {shown.table_point_mm && point("table ball, mm", "workpiece_ball_mm", shown.table_point_mm)}
       {shown.bar_mm !== null && point("tool ball, mm", "spindle_ball_mm", shown.tool_point_mm)}
       {shown.bar_mm !== null && (
-        <div class="point">
+        <div class="point key">
           <label for="bar">bar, mm</label>
           <NumberField
             id="bar"
@@ -96,7 +96,14 @@ export function TestForm({ description, test, plan, fault, select, set, place, s
       )}
       {rows.map((row, k) => (
         <div class="point" key={row[0]}>
+          {/* Each field has its name for screen readers. */}
           <span>{k === 0 && `motion of ${shown.moves.join(", ")}`}</span>
+          {[0, 1, 2].map((column) => (
+            <span key={column} class="unit" aria-hidden="true">
+              {row[column] && labelOf(row[column])}
+            </span>
+          ))}
+          <span />
           {row.map((key) => (
             <NumberField
               key={key}
