@@ -29,8 +29,11 @@ const VIEWS = {
     }
     await page.waitForFunction(() => Number(document.querySelector("[data-pictures]").dataset.pictures) > 0);
     await page.waitForFunction(() => document.querySelector('canvas[aria-label^="Set-up"]').placeOf);
-    if (page.viewportSize().width < 600)
-      await page.getByText("Show", { exact: false }).first().scrollIntoViewIfNeeded();
+    if (page.viewportSize().width < 600) {
+      // A slider under the charts, which stay in sight.
+      const slider = page.getByLabel("EC0A", { exact: true });
+      await slider.evaluate((element) => element.scrollIntoView({ block: "center" }));
+    }
   },
   async import(page) {
     await page.getByRole("tab", { name: "Import" }).click();
