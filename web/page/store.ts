@@ -69,8 +69,6 @@ export interface Kept {
 export class Store {
   private known: FileMap = new Map();
   private last: Promise<unknown> = Promise.resolve();
-  /** Whether everything until now is kept. */
-  isKept = true;
 
   private constructor(private tab: string) {}
 
@@ -83,9 +81,7 @@ export class Store {
       const late = new Promise<undefined>((resolve) => setTimeout(resolve, LONGEST_WAIT));
       return { store, kept: await Promise.race([store.read(own.isNew), late]) };
     } catch {
-      const store = new Store(own.tab);
-      store.isKept = false;
-      return { store };
+      return { store: new Store(own.tab) };
     }
   }
 
@@ -120,7 +116,7 @@ export class Store {
         values.put(Date.now(), [this.tab, TIME]);
         await ended(transaction);
       } catch {
-        this.isKept = false;
+        // Perhaps the next time, then with all files.
         this.known = new Map();
       }
     };
