@@ -8,7 +8,8 @@
 //! - [`instrument`]: readings from states of the axes;
 //! - [`sensitivity`]: readings and their derivatives by every component; [`replay`]: evaluation over columns of
 //!   readings;
-//! - [`session`]: machine, tests and readings, and their files; [`words`]: counts in messages.
+//! - [`session`]: machine, tests and readings, and their files; [`words`]: counts in messages; [`calendar`]:
+//!   dates and times of day in texts.
 //!
 //! The chain over plain and dual numbers: the reading of a ball bar, and its derivative by a location error of C,
 //! ∂L/∂EX0C = −R·sin C/L₀.
@@ -68,6 +69,7 @@
 
 pub mod axis;
 pub mod body;
+pub mod calendar;
 pub mod chain;
 pub mod code;
 pub mod component;

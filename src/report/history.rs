@@ -5,9 +5,9 @@ use abbe::apply::history::events::Kind;
 use abbe::apply::history::results::{Due, Estimate, MachineHistory, ParameterHistory};
 use abbe::document::StatedHistory;
 use abbe::fleet::conformity::{ItemHistory, MachineConformity};
-use abbe::fleet::date::date;
 use abbe::fleet::history::{FleetHistory, HistoryStatements, NotUsed};
 use abbe::identify::tolerance::rule::Decision;
+use abbe::model::calendar::date;
 use abbe::model::words::{counted, first_of};
 
 use super::block::{KeyFigure, Report};
