@@ -74,6 +74,8 @@ pub struct Axis {
     pub origin_mm: [f64; 3],
     /// Least and greatest position if stated, mm or radians.
     pub travel: Option<[f64; 2]>,
+    /// The name of the joint in the robot's own file, by which files of readings may call the axis.
+    pub joint: Option<String>,
 }
 
 impl Axis {

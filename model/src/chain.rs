@@ -117,7 +117,7 @@ impl Machine {
                 let (Some(kind), Some(direction)) = (kind, direction) else {
                     return Err(ModelError::UnknownAxisKind { axis: name.clone() });
                 };
-                Ok(Axis { name: name.clone(), kind, direction, origin_mm: [0.0; 3], travel: None })
+                Ok(Axis { name: name.clone(), kind, direction, origin_mm: [0.0; 3], travel: None, joint: None })
             })
             .collect::<Result<Vec<_>, _>>()?;
         Ok(Machine {

@@ -44,6 +44,8 @@ pub struct Axis {
     /// Least and greatest position of a rotary axis, degrees.
     #[schemars(length(equal = 2))]
     pub travel_deg: Option<Vec<f64>>,
+    /// Name of the joint in the robot's own file; `abbe import` knows columns by it.
+    pub joint: Option<String>,
 }
 
 /// What can collide. It has one shape.

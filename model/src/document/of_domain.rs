@@ -46,6 +46,7 @@ fn axis(axis: &axis::Axis) -> Axis {
         origin_mm: Some(Three(axis.origin_mm)),
         travel_mm: travel(AxisKind::Linear),
         travel_deg: travel(AxisKind::Rotary).map(|ends| ends.into_iter().map(degrees).collect()),
+        joint: axis.joint.clone(),
     }
 }
 

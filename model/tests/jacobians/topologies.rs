@@ -66,6 +66,7 @@ pub fn robot() -> Machine {
         direction: *direction,
         origin_mm: *origin_mm,
         travel: None,
+        joint: None,
     });
     Machine {
         name: "six axes".into(),

@@ -131,6 +131,7 @@ fn axis() -> impl Strategy<Value = (Axis, f64, Vec<f64>)> {
             direction,
             origin_mm: if turns { origin } else { [0.0; 3] },
             travel: None,
+            joint: None,
         };
         (axis, place, errors)
     })

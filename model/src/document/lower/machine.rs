@@ -72,7 +72,8 @@ fn axis(name: &str, document: &document::Axis) -> Result<Axis, Fault> {
         })?,
     };
     let origin_mm = document.origin_mm.as_ref().map_or([0.0; 3], |origin| origin.0);
-    Ok(Axis { name: name.to_string(), kind, direction, origin_mm, travel: travel(name, kind, document)? })
+    let (travel, joint) = (travel(name, kind, document)?, document.joint.clone());
+    Ok(Axis { name: name.to_string(), kind, direction, origin_mm, travel, joint })
 }
 
 fn travel(name: &str, kind: AxisKind, document: &document::Axis) -> Result<Option<[f64; 2]>, Fault> {
