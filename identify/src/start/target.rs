@@ -76,6 +76,10 @@ impl Member {
         let readings = test.readings.as_deref().cloned().unwrap_or_default();
         let step = readings.rows().div_ceil(MAX_ROWS).max(1);
         let readings = readings.of_rows(&(0..readings.rows()).step_by(step).collect::<Vec<_>>());
+        let (readings, observed) = match test.station.kind() {
+            InstrumentKind::Tracker => complete(&test.station, &readings),
+            _ => (readings, Vec::new()),
+        };
         let points = |at: Vector3<f64>| readings.nominal_points(&session.machine, at.into());
         let origin = points(Vector3::zeros());
         let units = [Vector3::x(), Vector3::y(), Vector3::z()].map(points);
@@ -86,12 +90,20 @@ impl Member {
             station: test.station.clone(),
             origin,
             along,
-            observed: (readings.observed.chunks_exact(readings.channels.max(1)))
-                .filter_map(|values| test.station.measured_mm(values))
-                .collect(),
+            observed,
             readings,
         }
     }
+}
+
+/// The rows with all coordinates, and these. A row without one says nothing of the point.
+fn complete(station: &Station<f64>, readings: &Readings) -> (Readings, Vec<Vector3<f64>>) {
+    let measured = readings.observed.chunks_exact(readings.channels.max(1)).enumerate().filter_map(|(row, values)| {
+        let point = station.measured_mm(values)?;
+        point.iter().all(|coordinate| coordinate.is_finite()).then_some((row, point))
+    });
+    let (rows, points): (Vec<usize>, Vec<Vector3<f64>>) = measured.unzip();
+    (readings.of_rows(&rows), points)
 }
 
 /// The point that all members share.
