@@ -152,8 +152,9 @@ pub fn import(files: &[Foreign], target: Target<'_>, options: &ImportOptions) ->
             let machine = abbe_model::files::machine(file)?;
             let kind = match options.kind {
                 Some(kind) => kind,
-                None => instrument(&first.name, &first.bytes, &machine, &options.hints)
-                    .map_err(|fault| of_file(&first.name, fault))?,
+                None => {
+                    instrument(&first.bytes, &machine, &options.hints).map_err(|fault| of_file(&first.name, fault))?
+                }
             };
             (Draft::of_machine(file, &read_options, kind, &names, &options.set)?, names)
         }
@@ -188,8 +189,7 @@ pub fn import(files: &[Foreign], target: Target<'_>, options: &ImportOptions) ->
 
 /// The error of a fault of a file.
 fn of_file(name: &str, (message, help): Fault) -> IdentifyError {
-    let help = Some(help).filter(|help| !help.is_empty());
-    ModelError::Input { location: Location::file(Path::new(name)), message, help }.into()
+    ModelError::Foreign { location: Location::file(Path::new(name)), message, help }.into()
 }
 
 /// The way to read a file that the nominal machine explains best. Ways of which one cannot be read are none.
@@ -200,10 +200,7 @@ fn best(draft: &Draft, test: &str, file: &Foreign, found: &Understood) -> Result
     let tried = found.readings.iter().map(|reading| {
         let mut draft = draft.clone();
         draft.apply(test, file, reading)?;
-        let mut session = draft.read()?;
-        session
-            .tests
-            .retain(|own| own.name == test || own.name.strip_prefix(test).is_some_and(|rest| rest.starts_with('/')));
+        let session = draft.read_alone(test)?;
         Ok::<f64, ModelError>(plausibility::nominal_misfit(&session).unwrap_or(f64::INFINITY))
     });
     let mut least: Option<(f64, &Reading)> = None;

@@ -90,6 +90,17 @@ pub enum ModelError {
         /// What to do.
         help: String,
     },
+    /// A foreign file of readings that is not understood. What the caller says of its columns or of the instrument may remedy
+    /// it.
+    #[error("{location}: {}", shortened(message))]
+    Foreign {
+        /// The file.
+        location: Location,
+        /// What was found, and the layout in which the file was read.
+        message: String,
+        /// What to do.
+        help: String,
+    },
     /// An invalid part of a session that is built in memory.
     #[error("{}", shortened(message))]
     Session {
@@ -120,7 +131,9 @@ impl ModelError {
     /// The location of the fault in the user's files, if it is in one.
     pub fn location(&self) -> Option<&Location> {
         match self {
-            ModelError::Input { location, .. } | ModelError::FileAccess { location, .. } => Some(location),
+            ModelError::Input { location, .. }
+            | ModelError::FileAccess { location, .. }
+            | ModelError::Foreign { location, .. } => Some(location),
             _ => None,
         }
     }
@@ -129,9 +142,10 @@ impl ModelError {
     pub fn help(&self) -> Option<&str> {
         match self {
             ModelError::Input { help, .. } => help.as_deref(),
-            ModelError::FileAccess { help, .. } | ModelError::Plan { help, .. } | ModelError::Session { help, .. } => {
-                Some(help)
-            }
+            ModelError::FileAccess { help, .. }
+            | ModelError::Foreign { help, .. }
+            | ModelError::Plan { help, .. }
+            | ModelError::Session { help, .. } => Some(help),
             _ => None,
         }
     }

@@ -29,3 +29,16 @@ def test_what_cannot_be_used_is_an_exception(tmp_path):
     with pytest.raises(abbe.SessionError, match="no instrument `theodolite`"):
         abbe.import_readings(FOREIGN / "ros.csv", machine=ROBOT, out=tmp_path / "x", kind="theodolite")
     assert not (tmp_path / "x").exists()
+
+
+def test_no_file_beside_a_session_is_replaced(tmp_path):
+    plan = tmp_path / "plan.toml"
+    plan.write_bytes((FOREIGN / "plan-hermle.toml").read_bytes())
+    other = tmp_path / "gaps-normalised.csv"
+    other.write_text("readings of another day\n")
+    with pytest.raises(FileExistsError, match="rename one of the two"):
+        abbe.import_readings(FOREIGN / "gaps.csv", session=plan)
+    assert other.read_text() == "readings of another day\n"
+    assert plan.read_bytes() == (FOREIGN / "plan-hermle.toml").read_bytes()
+    other.unlink()
+    assert len(abbe.import_readings(FOREIGN / "gaps.csv", session=plan).session.readings("gaps")["c_deg"]) > 60

@@ -123,10 +123,20 @@ impl Failure {
     /// Writes what to do, if the error states it.
     fn help(&self) {
         match self {
-            Failure::Model(ModelError::Input { help: Some(help), .. }) => tell(Kind::Help, help),
+            Failure::Model(
+                ModelError::Input { help: Some(help), .. }
+                | ModelError::Plan { help, .. }
+                | ModelError::Session { help, .. },
+            ) => tell(Kind::Help, help),
             Failure::Model(ModelError::FileAccess { help, .. }) => tell(
                 Kind::Help,
                 &format!("{help} (`--data DIR` names the data folder, `--allow-outside` allows files outside)"),
+            ),
+            Failure::Model(ModelError::Foreign { help, .. }) => tell(
+                Kind::Help,
+                &format!(
+                    "{help} (`--column OWN=THEIRS` says what a column holds and its unit, `--kind` names the instrument)"
+                ),
             ),
             _ => {}
         }

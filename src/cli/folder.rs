@@ -54,15 +54,35 @@ pub fn write(
     Ok(())
 }
 
-/// Writes files into an existing folder in their order, except those that are named as `present` already.
-pub fn add(folder: &Path, files: &[(String, Vec<u8>)], present: &[PathBuf]) -> Result<(), Failure> {
-    for (name, contents) in files {
+/// Adds files to an existing folder in their order, except those that are named as `read` where they lie. The last one is
+/// the file that names the others, and replaces its former state.
+///
+/// # Errors
+/// If another file with one of the names and other contents exists, unless `force` allows to replace it. Nothing is written
+/// then.
+pub fn add(folder: &Path, files: &[(String, Vec<u8>)], read: &[PathBuf], force: bool) -> Result<(), Failure> {
+    let Some((last, others)) = files.split_last() else { return Ok(()) };
+    let mut written: Vec<(PathBuf, &[u8])> = Vec::new();
+    for (name, contents) in others {
         let path = folder.join(name);
-        if !present.iter().any(|file| output::is_same(file, &path)) {
-            output::write_whole(&path, contents)?;
+        if read.iter().any(|file| output::is_same(file, &path)) {
+            continue;
         }
+        match std::fs::read(&path) {
+            Ok(present) if present == *contents => continue,
+            Err(cause) if cause.kind() == std::io::ErrorKind::NotFound => {}
+            _ if force => {}
+            _ => {
+                return Err(Failure::Other(format!(
+                    "{}: a file with this name exists, and its contents are others; rename one of the two, or use --force to replace it",
+                    path.display()
+                )));
+            }
+        }
+        written.push((path, contents));
     }
-    Ok(())
+    written.push((folder.join(&last.0), &last.1));
+    written.into_iter().try_for_each(|(path, contents)| output::write_whole(&path, contents))
 }
 
 fn fault(folder: &Path, source: std::io::Error) -> Failure {

@@ -69,7 +69,7 @@ pub struct ImportArguments {
     /// read files outside its folder.
     #[arg(long)]
     allow_outside: bool,
-    /// Replace files in an existing folder.
+    /// Replace files with the same names: in the new folder, or beside the session.
     #[arg(long)]
     force: bool,
     #[command(flatten)]
@@ -97,7 +97,7 @@ pub fn run(arguments: &ImportArguments) -> Result<(), Failure> {
     let imported = import(&files, target, &options).map_err(refused)?;
     match target {
         Target::Machine(_) => folder::write(into, &imported.files, arguments.force, |_| Ok(()))?,
-        Target::Session(_) => folder::add(into, &imported.files, &arguments.files)?,
+        Target::Session(_) => folder::add(into, &imported.files, &arguments.files, arguments.force)?,
     }
     let session = into.join(&imported.result.session);
     let report = present::report(&imported.result, &session.display().to_string());

@@ -51,9 +51,9 @@ impl From<ModelError> for Failed {
         Failed(Box::new(Fault {
             // The message without the place, which the page shows beside it.
             message: match &error {
-                ModelError::Input { message, .. } | ModelError::FileAccess { message, .. } => {
-                    shortened(message).into_owned()
-                }
+                ModelError::Input { message, .. }
+                | ModelError::FileAccess { message, .. }
+                | ModelError::Foreign { message, .. } => shortened(message).into_owned(),
                 other => other.to_string(),
             },
             help: error.help().filter(|help| !help.is_empty()).map(str::to_string),

@@ -146,6 +146,21 @@ impl SessionText {
         Ok(())
     }
 
+    /// Removes all tests but one, and the distances between sockets, which name others.
+    pub fn keep_test(&mut self, name: &str) {
+        self.document.remove("socket_distance");
+        match self.document.get_mut("test") {
+            Some(Item::ArrayOfTables(tests)) => {
+                tests.retain(|test| test.get("name").and_then(Item::as_str) == Some(name));
+            }
+            Some(Item::Value(Value::Array(tests))) => {
+                let name_of = |test: &Value| test.as_inline_table()?.get("name")?.as_str().map(str::to_string);
+                tests.retain(|test| name_of(test).as_deref() == Some(name));
+            }
+            _ => {}
+        }
+    }
+
     /// Removes keys of all tests.
     pub fn remove_of_tests(&mut self, keys: &[&str]) {
         for mut test in tables(&mut self.document, "test") {

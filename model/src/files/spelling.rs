@@ -18,7 +18,7 @@ pub(crate) fn suggestion(found: &str, known: &[impl AsRef<str>]) -> String {
 }
 
 /// The most similar known name, if any is similar.
-fn most_similar<'k>(found: &str, known: &'k [impl AsRef<str>]) -> Option<&'k str> {
+pub(crate) fn most_similar<'k>(found: &str, known: &'k [impl AsRef<str>]) -> Option<&'k str> {
     // No name is longer; the limit bounds the cost for very long keys.
     let lower: String = found.chars().take(64).collect::<String>().to_lowercase();
     known

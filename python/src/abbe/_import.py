@@ -51,6 +51,7 @@ def import_readings(
         The folder of the new session. It is made; files in it with the same names are replaced.
     session : path-like, optional
         The session file to which the tests are added. A file with the name of a planned test gives it its readings.
+        No other file beside it is replaced.
     kind : str, optional
         The instrument of a new session, such as ``"tracker"``, if the columns do not tell.
     set : mapping, optional
@@ -71,6 +72,8 @@ def import_readings(
     ------
     SessionError
         If a file cannot be understood.
+    FileExistsError
+        If another file beside `session` has the name of one that would be written. Nothing is written then.
     IdentificationError
         If the readings contradict the machine.
     """
@@ -85,6 +88,11 @@ def import_readings(
     folder = Path(session).parent if session is not None else Path(out or ".")
     folder.mkdir(parents=True, exist_ok=True)
     present = [Path(file).resolve() for file in files]
+    if session is not None:
+        for name, contents in written[:-1]:
+            path = folder / name
+            if path.resolve() not in present and path.exists() and path.read_bytes() != contents:
+                raise FileExistsError(f"{path}: a file with this name and other contents exists; rename one of the two")
     for name, contents in written:
         path = folder / name
         # A file that lies beside the session already is read where it is.

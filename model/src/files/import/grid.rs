@@ -59,6 +59,23 @@ impl Grid {
         self.header_line.unwrap_or_else(|| self.rows.first().map_or(0, |row| row.line))
     }
 
+    /// A fault with the layout in which the file was read, which may be its reason.
+    pub fn with_layout(&self, (message, help): Fault) -> Fault {
+        let decimal = if self.decimal == ',' { "comma" } else { "point" };
+        let names = match (self.header_line, self.names.iter().any(|names| !names.is_empty())) {
+            (Some(line), _) => format!("names on line {}", line + 1),
+            (None, true) => "names above the first row".into(),
+            (None, false) => "no names".into(),
+        };
+        let first = self.rows.first().map_or(0, |row| row.line + 1);
+        let layout = format!(
+            "{}, separator {}, decimal {decimal}, {names}, first row on line {first}",
+            self.encoding,
+            self.separator_in_words()
+        );
+        (format!("{message} (read as {layout})"), help)
+    }
+
     /// The name of a column in messages.
     pub fn name(&self, column: usize) -> String {
         let parts: Vec<&str> = self.names.get(column).into_iter().flatten().map(String::as_str).collect();
@@ -67,17 +84,17 @@ impl Grid {
 }
 
 /// The grid of a file.
-pub(super) fn of(name: &str, bytes: &[u8]) -> Result<Grid, Fault> {
+pub(super) fn of(bytes: &[u8]) -> Result<Grid, Fault> {
     let (text, encoding) = decoded(bytes);
     if text.contains('\0') {
         let help = "export the readings as text (CSV); spreadsheets (.xlsx, .ods) are named as `data` of a test";
-        return Err((format!("{name} is no text"), help.into()));
+        return Err(("the file is no text".into(), help.into()));
     }
     let lone_return = text.replace("\r\n", "\n").contains('\r');
     let lines: Vec<&str> = if lone_return { text.split(['\n', '\r']).collect() } else { text.lines().collect() };
     let Some((separator, decimal, width)) = best_split(&lines) else {
         let help = "a table of readings has a row of numbers for each reading, in two columns or more";
-        return Err((format!("{name} has no rows of numbers"), help.into()));
+        return Err((format!("the file, read as {encoding}, has no rows of numbers"), help.into()));
     };
     let mut grid = Grid {
         encoding,
@@ -101,6 +118,7 @@ pub(super) fn of(name: &str, bytes: &[u8]) -> Result<Grid, Fault> {
             grid.lost.push(line);
         }
     }
+    name_columns(&mut grid, &lines);
     if lone_return {
         grid.unreadable.push("its lines end with a carriage return alone".into());
     }
@@ -112,11 +130,11 @@ pub(super) fn of(name: &str, bytes: &[u8]) -> Result<Grid, Fault> {
     let within = grid.lost.len() - footer;
     if within as f64 > MAX_LOST * grid.rows.len() as f64 {
         let found = format!(
-            "{name}: {within} of {} lines below the first row are no rows of {width} columns, line {} the first",
+            "{within} of {} lines below the first row are no rows of {width} columns, line {} the first",
             within + grid.rows.len(),
             grid.lost[0] + 1
         );
-        return Err((found, "export every reading with the same columns".into()));
+        return Err(grid.with_layout((found, "export every reading with the same columns".into())));
     }
     if footer > 0 {
         grid.unreadable.push(format!("lines follow the last row: {}", of_lines(&grid.lost[within..])));
@@ -124,8 +142,7 @@ pub(super) fn of(name: &str, bytes: &[u8]) -> Result<Grid, Fault> {
     if within > 0 {
         grid.unreadable.push(format!("lines between the rows are no rows: {}", of_lines(&grid.lost[..within])));
     }
-    name_columns(&mut grid, &lines);
-    comma_twice(name, &grid, &lines)?;
+    comma_twice(&grid, &lines)?;
     Ok(grid)
 }
 
@@ -353,7 +370,7 @@ fn bare_unit(cell: &str) -> &str {
 }
 
 /// Refuses a table whose decimal comma is also its separator: it has twice as many columns as names.
-fn comma_twice(name: &str, grid: &Grid, lines: &[&str]) -> Result<(), Fault> {
+fn comma_twice(grid: &Grid, lines: &[&str]) -> Result<(), Fault> {
     if grid.separator != Some(',') {
         return Ok(());
     }
@@ -362,7 +379,7 @@ fn comma_twice(name: &str, grid: &Grid, lines: &[&str]) -> Result<(), Fault> {
     let points = grid.rows.iter().take(LOOKED_AT).flat_map(|row| &row.cells).filter(|cell| cell.contains('.')).count();
     if names > 1 && points == 0 && grid.width() > names && grid.width() <= 2 * names {
         let found = format!(
-            "{name}: {} cells in a row under {names} names, line {}: the comma is the decimal sign and the separator, so the \
+            "{} cells in a row under {names} names, line {}: the comma is the decimal sign and the separator, so the \
              numbers run together",
             grid.width(),
             first + 1

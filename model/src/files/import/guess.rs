@@ -3,7 +3,6 @@
 use super::{Expected, Hint, grid, meaning};
 use crate::chain::Machine;
 use crate::document::node::{Node, Value};
-use crate::files::quantity::Unit;
 use crate::instrument::{Fault, InstrumentKind, Station};
 use crate::words::listed;
 
@@ -48,8 +47,8 @@ pub(super) fn unknown_set_up(kind: InstrumentKind) -> Option<Vec<(&'static str, 
 ///
 /// # Errors
 /// If there is none, or more than one: what to do.
-pub fn instrument(name: &str, bytes: &[u8], machine: &Machine, hints: &[Hint]) -> Result<InstrumentKind, Fault> {
-    let grid = grid::of(name, bytes)?;
+pub fn instrument(bytes: &[u8], machine: &Machine, hints: &[Hint]) -> Result<InstrumentKind, Fault> {
+    let grid = grid::of(bytes)?;
     let has_linear = machine.axes.iter().any(|axis| axis.kind == crate::axis::AxisKind::Linear);
     let mut fitting: Vec<(usize, InstrumentKind)> = Vec::new();
     let mut of_most: Option<Fault> = None;
@@ -58,11 +57,10 @@ pub fn instrument(name: &str, bytes: &[u8], machine: &Machine, hints: &[Hint]) -
         let expected = Expected { machine, station: &station, circle: None, moved: only_axis(machine), hints };
         match meaning::of(&grid, &expected) {
             Ok(found) => {
-                let readings = found.iter().filter(|one| one.is_of(&station)).count();
+                let readings = found.iter().filter(|one| one.is_reading()).count();
                 // Three coordinates are those of a tracker if they are large, of an R-test if they are small.
-                let is_large = found
-                    .iter()
-                    .any(|one| one.is_of(&station) && largest_mm(&grid, one, has_linear) > MAX_DEVIATION_MM);
+                let is_large =
+                    found.iter().any(|one| one.is_reading() && largest_mm(&grid, one, has_linear) > MAX_DEVIATION_MM);
                 let is_other = match kind {
                     InstrumentKind::RTest => is_large || !has_linear,
                     InstrumentKind::Tracker => has_linear && !is_large,
@@ -82,15 +80,17 @@ pub fn instrument(name: &str, bytes: &[u8], machine: &Machine, hints: &[Hint]) -
     }
     let most = fitting.iter().map(|(readings, _)| *readings).max().unwrap_or(0);
     fitting.retain(|(readings, _)| *readings == most);
+    let words: Vec<&str> = fitting.iter().map(|(_, kind)| kind.word()).collect();
+    let all = || InstrumentKind::ALL.iter().map(|kind| kind.word()).collect::<Vec<_>>();
     match fitting[..] {
         [(_, kind)] => Ok(kind),
-        [] => Err(of_most.unwrap_or_else(|| {
-            (format!("{name}: no column holds the readings of an instrument"), "state the instrument".into())
-        })),
+        [] => Err(grid.with_layout(of_most.unwrap_or_else(|| {
+            let help = format!("state the instrument: {}", listed(&all(), "or"));
+            ("no column holds the readings of an instrument".into(), help)
+        }))),
         _ => {
-            let words: Vec<&str> = fitting.iter().map(|(_, kind)| kind.word()).collect();
-            let what = format!("{name}: the columns may be those of {}", listed(&words, "or"));
-            Err((what, "state the instrument".into()))
+            let what = format!("the columns may be those of {}", listed(&words, "or"));
+            Err(grid.with_layout((what, format!("state the instrument: {}", listed(&words, "or")))))
         }
     }
 }
@@ -98,14 +98,15 @@ pub fn instrument(name: &str, bytes: &[u8], machine: &Machine, hints: &[Hint]) -
 /// Deviations from a position are smaller, mm.
 const MAX_DEVIATION_MM: f64 = 5.0;
 
-/// The largest value of a column; mm if it states no unit.
+/// The largest value of a column, mm; in mm if it states no unit.
 fn largest_mm(grid: &grid::Grid, found: &meaning::Found, has_linear: bool) -> f64 {
-    let unit = found.unit.map_or("mm", |unit| unit.own);
-    let to = Unit::of_length(unit).unwrap_or(Unit::Times(1.0));
-    let cells = grid.rows.iter().filter_map(|row| grid::number(&row.cells[found.column], grid.decimal));
-    let largest = cells.map(f64::abs).fold(0.0, f64::max);
     // Metres without a unit are small numbers, and a robot has no R-test.
-    if found.unit.is_none() && !has_linear { f64::INFINITY } else { to.to_internal(largest) }
+    if found.unit.is_none() && !has_linear {
+        return f64::INFINITY;
+    }
+    let cells = grid.rows.iter().filter_map(|row| grid::number_with_unit(&row.cells[found.column], grid.decimal));
+    let largest = cells.map(|(value, _)| value.abs()).fold(0.0, f64::max);
+    found.unit.map_or(largest, |unit| unit.to_internal(largest))
 }
 
 /// The axis of a machine that has one.

@@ -1,15 +1,16 @@
 //! What each column of a foreign table holds, by its name, its unit and its values.
 
 use super::Expected;
-use super::clock::clock_s;
 use super::grid::{Grid, number_with_unit};
-use super::hint::Hint;
-use super::unit::{self, Unit};
+use super::hint;
+use super::unit::{self, Dimension, Unit};
 use super::words::{self, AxisWord, Direction};
 use crate::axis::AxisKind;
-use crate::document::layout::ForeignColumn;
+use crate::calendar::{DateOrder, clock};
 use crate::driver::column as driver;
+use crate::files::spelling::most_similar;
 use crate::files::table::columns::listed;
+use crate::instrument::column::{Column, Quantity};
 use crate::instrument::{Fault, InstrumentKind};
 
 /// A column as it is understood.
@@ -34,7 +35,7 @@ const ELEVATION: &str = "elevation";
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Meaning {
     Axis(usize),
-    /// Our column of readings without its unit, and whether it is an angle.
+    /// Our column of readings without its unit, and whether it is an angle. A component of a quaternion has no unit.
     Reading(&'static str, bool),
     Socket,
     Time,
@@ -43,8 +44,8 @@ pub(super) enum Meaning {
     Run,
     Temperature,
     Polar,
-    /// What the user says, with its unit.
-    Hinted(String),
+    /// A driver column by our name, which the user states.
+    Driver(String),
 }
 
 /// A column that is used.
@@ -53,31 +54,31 @@ pub(super) struct Found {
     /// Its index.
     pub column: usize,
     pub meaning: Meaning,
-    /// The unit that the file states.
+    /// The unit that the file or the user states.
     pub unit: Option<Unit>,
+    /// Whether the cells alone state the unit, so that each of them has one.
+    pub has_unit_in_cells: bool,
+    /// Whether it is an angle from the zenith, which is read as an elevation.
+    pub is_from_zenith: bool,
+    /// Whether the user says what it holds.
+    pub is_hinted: bool,
     pub direction: Option<Direction>,
 }
 
 impl Found {
-    /// Whether it holds readings of an instrument as set up.
-    pub fn is_of(&self, station: &crate::instrument::Station<f64>) -> bool {
-        let is_own = |stem: &str| station.columns().iter().any(|column| column.stem == stem);
-        match &self.meaning {
-            Meaning::Reading(..) | Meaning::Socket => true,
-            Meaning::Hinted(own) => is_own(own) || own.rsplit_once('_').is_some_and(|(stem, _)| is_own(stem)),
-            _ => false,
-        }
+    /// Whether it holds readings.
+    pub fn is_reading(&self) -> bool {
+        matches!(self.meaning, Meaning::Reading(..) | Meaning::Socket)
     }
 }
 
-/// The columns that are used, each meaning once in each direction.
+/// The columns that are used, each meaning once in each direction. What the user says of a column stands, whatever the
+/// file calls it.
 pub(super) fn of(grid: &Grid, expected: &Expected<'_>) -> Result<Vec<Found>, Fault> {
-    let mut found: Vec<Found> = Vec::new();
-    for hint in expected.hints {
-        found.push(hinted(grid, hint)?);
-    }
+    let mut found: Vec<Found> = hint::found(grid, expected)?;
+    let hinted: Vec<usize> = found.iter().map(|one| one.column).collect();
     let joints_from = first_joint(grid, expected);
-    for column in (0..grid.width()).filter(|column| !expected.hints.iter().any(|hint| is_of(grid, hint, *column))) {
+    for column in (0..grid.width()).filter(|column| !hinted.contains(column)) {
         if let Some(one) = by_name(grid, column, expected, joints_from) {
             found.push(one);
         }
@@ -87,7 +88,7 @@ pub(super) fn of(grid: &Grid, expected: &Expected<'_>) -> Result<Vec<Found>, Fau
     only_pairs(&mut found);
     let mut kept: Vec<Found> = Vec::new();
     // An actual position stands for a commanded one.
-    found.sort_by_key(|one| (is_command(grid, one.column), one.column));
+    found.sort_by_key(|one| (!one.is_hinted, is_command(grid, one.column), one.column));
     for one in found {
         if !kept.iter().any(|other| other.meaning == one.meaning && other.direction == one.direction) {
             kept.push(one);
@@ -98,18 +99,8 @@ pub(super) fn of(grid: &Grid, expected: &Expected<'_>) -> Result<Vec<Found>, Fau
     Ok(kept)
 }
 
-/// Whether a hint is of a column.
-fn is_of(grid: &Grid, hint: &Hint, column: usize) -> bool {
-    match &hint.foreign {
-        ForeignColumn::Number(number) => number.0 == column + 1,
-        ForeignColumn::Name(name) => names_of(grid, column).iter().any(|own| own == name),
-        // A hint names one column.
-        ForeignColumn::Traversals(_) => false,
-    }
-}
-
 /// The names of a column: the last line, then all lines together.
-fn names_of(grid: &Grid, column: usize) -> Vec<String> {
+pub(super) fn names_of(grid: &Grid, column: usize) -> Vec<String> {
     let lines = &grid.names[column];
     let mut names: Vec<String> = lines.last().cloned().into_iter().collect();
     if lines.len() > 1 {
@@ -117,27 +108,6 @@ fn names_of(grid: &Grid, column: usize) -> Vec<String> {
         names.push(lines[0].clone());
     }
     names
-}
-
-fn hinted(grid: &Grid, hint: &Hint) -> Result<Found, Fault> {
-    let columns: Vec<usize> = (0..grid.width()).filter(|column| is_of(grid, hint, *column)).collect();
-    let known: Vec<String> = (0..grid.width()).map(|column| grid.name(column)).collect();
-    let named = match &hint.foreign {
-        ForeignColumn::Number(number) => format!("column {}", number.0),
-        ForeignColumn::Name(name) => format!("column `{name}`"),
-        ForeignColumn::Traversals(_) => "several columns".to_string(),
-    };
-    match columns[..] {
-        [column] => Ok(Found { column, meaning: Meaning::Hinted(hint.own.clone()), unit: None, direction: None }),
-        [] => Err((
-            format!("`{}` is {named}, which the file does not have", hint.own),
-            format!("it has {}", listed(&known)),
-        )),
-        _ => Err((
-            format!("`{}` is {named}, and {} columns have this name", hint.own, columns.len()),
-            "use the number of one of them, counted from 1".into(),
-        )),
-    }
 }
 
 /// The number of the first joint, 0 or 1.
@@ -157,36 +127,63 @@ fn axis_word(name: &str, expected: &Expected<'_>) -> Option<AxisWord> {
 
 /// What the name of a column says.
 fn by_name(grid: &Grid, column: usize, expected: &Expected<'_>, joints_from: usize) -> Option<Found> {
-    let stated = unit_of(grid, column);
-    for name in names_of(grid, column) {
-        let named = unit::split(&name);
-        // A last letter may be the unit of a name, or a part of it.
-        let bases = if named.weak { [name.as_str(), named.base] } else { [named.base, named.base] };
-        for base in bases {
-            let unit = stated.or(named.unit.filter(|_| base == named.base));
-            let all = words::words(base);
-            let (direction, plain) = words::direction(base, &all);
-            for (words, direction) in [(&plain, direction), (&all, None)] {
-                if let Some(meaning) = meaning(words, unit, grid, column, expected, joints_from) {
-                    let is_zenith =
-                        meaning == Meaning::Reading(ELEVATION, true) && words::is_one_of(words, &words::ZENITH);
-                    let unit = if is_zenith { Some(unit.unwrap_or(Unit::of_own("deg")).above_horizon()) } else { unit };
-                    return Some(Found { column, meaning, unit, direction });
-                }
-            }
+    let of_line = grid.units.get(column).and_then(|unit| unit::of(unit));
+    let of_cells = unit_of_cells(grid, column);
+    let of = |text: &str, unit: Option<Unit>| {
+        let of_name = of_line.or(unit);
+        let unit = of_name.or(of_cells);
+        let all = words::words(text);
+        let (direction, plain) = words::direction(text, &all);
+        [(&plain, direction), (&all, None)].into_iter().find_map(|(words, direction)| {
+            let meaning = meaning(words, unit, grid, column, expected, joints_from)?;
+            let is_from_zenith =
+                meaning == Meaning::Reading(ELEVATION, true) && words::is_one_of(words, &words::ZENITH);
+            let has_unit_in_cells = of_name.is_none() && of_cells.is_some();
+            Some(Found { column, meaning, unit, has_unit_in_cells, is_from_zenith, is_hinted: false, direction })
+        })
+    };
+    names_of(grid, column).iter().find_map(|name| {
+        let named = unit::split(name);
+        let of_base = of(named.base, named.unit);
+        if !named.weak {
+            return of_base;
         }
-    }
-    None
+        // A last letter is a part of the name, unless the name says the same without it: `C` of `pos C`, `K` of `temp K`.
+        match (of(name, None), of_base) {
+            (Some(whole), Some(base)) if whole.meaning == base.meaning => Some(base),
+            (whole, base) => whole.or(base),
+        }
+    })
 }
 
-/// The unit that the file states of a column: on a line of units, or behind the numbers of the first row.
-fn unit_of(grid: &Grid, column: usize) -> Option<Unit> {
-    let of_line = grid.units.get(column).and_then(|unit| unit::of(unit));
-    let of_cell = || {
-        let (_, found) = number_with_unit(grid.rows.first()?.cells.get(column)?, grid.decimal)?;
+/// The unit behind the numbers of a column: that of the first cell with one.
+pub(super) fn unit_of_cells(grid: &Grid, column: usize) -> Option<Unit> {
+    let cells = grid.rows.iter().filter_map(|row| row.cells.get(column));
+    let ends_with_letter = |cell: &&String| cell.chars().next_back().is_some_and(|last| !last.is_ascii_digit());
+    cells.filter(ends_with_letter).find_map(|cell| {
+        let (_, found) = number_with_unit(cell, grid.decimal)?;
         (!found.is_empty()).then(|| unit::of(found)).flatten()
-    };
-    of_line.or_else(of_cell)
+    })
+}
+
+/// Whether the cells of a column are numbers or times of day; `None` if they are neither.
+pub(super) fn time(grid: &Grid, column: usize) -> Option<Meaning> {
+    let cell = grid.rows.iter().map(|row| row.cells[column].as_str()).find(|cell| !cell.is_empty())?;
+    if number_with_unit(cell, grid.decimal).is_some() {
+        return Some(Meaning::Time);
+    }
+    let is_clock = [DateOrder::DayFirst, DateOrder::MonthFirst]
+        .into_iter()
+        .any(|order| clock(cell, order).is_some_and(|moment| moment.second.is_some()));
+    is_clock.then_some(Meaning::Clock)
+}
+
+/// Our column of readings.
+pub(super) fn reading(column: &Column) -> Meaning {
+    match column.quantity {
+        Quantity::Socket => Meaning::Socket,
+        _ => Meaning::Reading(column.stem, column.is_angle()),
+    }
 }
 
 fn meaning(
@@ -201,7 +198,6 @@ fn meaning(
     if words.is_empty() {
         return None;
     }
-    let own = expected.station.columns();
     let is_length = unit.is_none_or(Unit::is_length);
     let is_angle = unit.is_none_or(Unit::is_angle);
     let fits = |axis: usize| match machine.axes[axis].kind {
@@ -221,31 +217,24 @@ fn meaning(
             return Some(Meaning::Axis(axis));
         }
     }
-    let is_time = unit.is_some_and(|unit| unit.own == "s");
-    if words::is_one_of(words, &words::TIME) && unit.is_none_or(|unit| unit.own == "s") || is_time {
-        let is_clock = grid.rows.first().is_some_and(|row| clock_s(&row.cells[column]).is_some());
-        let is_number =
-            grid.rows.first().is_some_and(|row| number_with_unit(&row.cells[column], grid.decimal).is_some());
-        return match (is_number, is_clock) {
-            (true, _) => Some(Meaning::Time),
-            (false, true) => Some(Meaning::Clock),
-            _ => None,
-        };
+    let is_of = |dimension: Dimension| unit.is_some_and(|unit| unit.dimension() == dimension);
+    if words::is_one_of(words, &words::TIME) && unit.is_none() || is_of(Dimension::Time) {
+        return time(grid, column);
     }
-    if words::is_one_of(words, &words::TEMPERATURE) || unit.is_some_and(|unit| unit.own == "c") {
+    if words::is_one_of(words, &words::TEMPERATURE) && unit.is_none() || is_of(Dimension::Temperature) {
         return Some(Meaning::Temperature);
     }
-    if words::is_one_of(words, &words::RUN) && unit.is_none_or(|unit| unit.own == "1") {
+    if words::is_one_of(words, &words::RUN) && (unit.is_none() || is_of(Dimension::Number)) {
         return Some(Meaning::Run);
     }
-    for column in own {
-        let fits = if column.is_angle() { is_angle } else { is_length };
-        match column.unit.is_empty() {
-            true if words::is_reading(words, column.stem) => return Some(Meaning::Socket),
-            false if fits && words::is_reading(words, column.stem) => {
-                return Some(Meaning::Reading(column.stem, column.is_angle()));
-            }
-            _ => {}
+    for column in expected.station.columns() {
+        let fits = match (column.unit.is_empty(), column.is_angle()) {
+            (true, _) => unit.is_none() || is_of(Dimension::Number),
+            (false, true) => is_angle,
+            (false, false) => is_length,
+        };
+        if fits && words::is_reading(words, column.stem) {
+            return Some(reading(column));
         }
     }
     if expected.kind() == InstrumentKind::Tracker && is_angle && words::is_one_of(words, &words::ZENITH) {
@@ -279,7 +268,8 @@ fn measured_coordinates(grid: &Grid, found: &mut [Found], expected: &Expected<'_
         };
         let twice: Vec<usize> = (0..found.len()).filter(|k| found[*k].meaning == Meaning::Axis(axis)).collect();
         if let [first, second] = twice[..] {
-            let measured = if is_command(grid, found[second].column) { first } else { second };
+            let is_position = |place: usize| found[place].is_hinted || is_command(grid, found[place].column);
+            let measured = if is_position(second) { first } else { second };
             found[measured].meaning = Meaning::Reading(own.stem, own.is_angle());
         }
     }
@@ -307,26 +297,23 @@ fn only_pairs(found: &mut [Found]) {
 fn missing(grid: &Grid, found: &[Found], expected: &Expected<'_>) -> Result<(), Fault> {
     let names: Vec<String> = (0..grid.width()).map(|column| grid.name(column)).collect();
     let has_names = grid.names.iter().any(|names| !names.is_empty());
-    let hint = |example: &str| {
+    let hint = |own: &str, words: &[&str], number: usize| {
         let file =
             if has_names { format!("its columns are {}", listed(&names)) } else { "it has no names of columns".into() };
+        let near = misspelt(grid, found, words);
+        let theirs = near.map_or_else(|| number.to_string(), |column| names[column].clone());
+        let near = near.map_or(String::new(), |column| format!("did you mean column `{}`? ", names[column]));
         format!(
-            "{file}; say what a column holds, such as {example} (our name, then the name or the number in the file)"
+            "{near}{file}; say what a column holds, such as {own}={theirs} (our name, then the name or the number in the file)"
         )
     };
     let has = |meaning: &dyn Fn(&Meaning) -> bool| found.iter().any(|one| meaning(&one.meaning));
-    let is_hinted =
-        |meaning: &Meaning, what: &dyn Fn(&str) -> bool| matches!(meaning, Meaning::Hinted(own) if what(own));
-    let is_axis = |own: &str| crate::files::quantity::axis_position(expected.machine, own).is_some();
-    if !has(&|meaning| {
-        matches!(meaning, Meaning::Axis(_) | Meaning::Polar)
-            || is_hinted(meaning, &|own| is_axis(own) || own.starts_with("polar_"))
-    }) {
+    if !has(&|meaning| matches!(meaning, Meaning::Axis(_) | Meaning::Polar)) {
         let axes: Vec<&str> = expected.machine.axes.iter().map(|axis| axis.name.as_str()).collect();
         let what = format!("no column holds the position of an axis ({})", axes.join(", "));
         return Err((
             what,
-            hint(&format!("{}=1", expected.machine.axes.first().map_or(String::new(), |axis| axis.column("")))),
+            hint(&expected.machine.axes.first().map_or(String::new(), |axis| axis.column("")), &axes, 1),
         ));
     }
     let own = expected.station.columns();
@@ -334,18 +321,28 @@ fn missing(grid: &Grid, found: &[Found], expected: &Expected<'_>) -> Result<(), 
         let of_column = |stem: &str| own.iter().any(|column| column.stem == stem && column.quantity == quantity);
         has(&|meaning| match meaning {
             Meaning::Reading(stem, _) => of_column(stem),
-            Meaning::Socket => of_column("socket"),
-            Meaning::Hinted(own) => of_column(own.rsplit_once('_').map_or(own.as_str(), |(stem, _)| stem)),
+            Meaning::Socket => quantity == Quantity::Socket,
             _ => false,
         })
     });
     match lacks {
         Some((what, help)) if expected.kind() != InstrumentKind::Socket => {
-            let example = own.first().map_or(String::new(), |column| format!("{}=2", column.name(column.unit)));
-            Err((format!("no column {what}: {help}"), hint(&example)))
+            let lacking = own.iter().find(|column| !has(&|meaning| *meaning == reading(column)));
+            let example = lacking.map_or(String::new(), |column| column.name(column.unit));
+            let words: Vec<&str> = own.iter().flat_map(|column| words::of_reading(column.stem)).collect();
+            Err((format!("no column {what}: {help}"), hint(&example, &words, 2)))
         }
         _ => Ok(()),
     }
+}
+
+/// The column that is not used whose name is most like one of these words, if one is like it.
+fn misspelt(grid: &Grid, found: &[Found], known: &[&str]) -> Option<usize> {
+    let long: Vec<&str> = known.iter().copied().filter(|word| word.chars().count() > 2).collect();
+    let is_near = |column: &usize| {
+        names_of(grid, *column).iter().any(|name| most_similar(unit::split(name).base, &long).is_some())
+    };
+    (0..grid.width()).filter(|column| !found.iter().any(|one| one.column == *column)).find(is_near)
 }
 
 impl Meaning {
@@ -359,7 +356,7 @@ impl Meaning {
             Meaning::Run => "run",
             Meaning::Temperature => driver::TEMPERATURE,
             Meaning::Polar => "polar",
-            Meaning::Hinted(own) => own,
+            Meaning::Driver(own) => own,
         }
     }
 }

@@ -9,7 +9,6 @@
 //! Nothing here looks at the residual. What the file leaves open, such as the unit of a column without one, is one
 //! [`Reading`] each, and the caller decides by a fit.
 
-mod clock;
 mod foreign;
 mod grid;
 mod guess;
@@ -123,19 +122,20 @@ pub enum Source {
 /// Number of rows that are shown.
 const SHOWN: usize = 5;
 
-/// Reads the layout of a table and what its columns hold. `name` is that of the file, for messages.
+/// Reads the layout of a table and what its columns hold. `name` is that of the file, for the head of a normalised copy.
 ///
 /// # Errors
-/// If the table cannot be used as readings of the test: what was found, and what to do.
+/// If the table cannot be used as readings of the test: what was found with which layout, and what to do. The message does
+/// not name the file.
 pub fn understand(name: &str, bytes: &[u8], expected: &Expected<'_>) -> Result<Understood, Fault> {
     if bytes.len() > MAX_BYTES {
-        let found = format!("{name} has {} bytes; the limit is {MAX_BYTES}", bytes.len());
+        let found = format!("{} bytes; the limit is {MAX_BYTES}", bytes.len());
         return Err((found, "thin out the readings, or split the file".into()));
     }
-    let grid = grid::of(name, bytes)?;
-    let found = meaning::of(&grid, expected)?;
-    let readings = normalise::readings(name, &grid, &found, expected)?;
-    let first = readings.first().ok_or_else(|| (format!("{name} has no rows"), String::new()))?;
+    let grid = grid::of(bytes)?;
+    let found = meaning::of(&grid, expected).map_err(|fault| grid.with_layout(fault))?;
+    let readings = normalise::readings(name, &grid, &found, expected).map_err(|fault| grid.with_layout(fault))?;
+    let first = readings.first().ok_or_else(|| ("the file has no rows".to_string(), String::new()))?;
     Ok(Understood {
         encoding: grid.encoding,
         separator: grid.separator_in_words(),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::grid::{Grid, number};
 use super::meaning::{ColumnFound, Found, Meaning};
-use super::open_units::open;
+use super::open_units::{self, open};
 use super::unit::Unit;
 use super::values::Values;
 use super::words::Direction;
@@ -16,16 +16,19 @@ use crate::driver::column as driver;
 use crate::files::quantity;
 use crate::instrument::Fault;
 
-/// The ways to read a table, the most probable first.
+/// The ways to read a table, the most probable first. `name` is that of the file, for the head of a copy.
+///
+/// # Errors
+/// If numbers are missing or contradict their column, or a unit cannot be told.
 pub(super) fn readings(
     name: &str,
     grid: &Grid,
     found: &[Found],
     expected: &Expected<'_>,
 ) -> Result<Vec<Reading>, Fault> {
-    let values = Values::of(name, grid, found, expected)?;
+    let values = Values::of(grid, found, expected)?;
     let mut choices: Vec<(Vec<String>, BTreeMap<usize, Unit>)> = vec![(Vec::new(), BTreeMap::new())];
-    for options in open(grid, found, expected, &values) {
+    for options in open(grid, found, expected, &values)? {
         let before = std::mem::take(&mut choices);
         for (text, units) in options {
             for (texts, chosen) in &before {
@@ -51,7 +54,11 @@ fn reading(
     assumes: Vec<String>,
     chosen: &BTreeMap<usize, Unit>,
 ) -> Reading {
-    let unit = |one: &Found| one.unit.or(chosen.get(&one.column).copied()).unwrap_or_else(|| default(one, expected));
+    let unit = |one: &Found| {
+        let stated = one.unit.filter(|unit| !unit.is_ambiguous() && !matches!(one.meaning, Meaning::Driver(_)));
+        let unit = stated.or(chosen.get(&one.column).copied()).unwrap_or(Unit::of_own("1"));
+        if one.is_from_zenith { unit.above_horizon() } else { unit }
+    };
     let columns: Vec<ColumnFound> = (0..grid.width())
         .map(|column| {
             let one = found.iter().find(|one| one.column == column);
@@ -59,7 +66,7 @@ fn reading(
                 number: column + 1,
                 name: grid.names[column].join(" "),
                 own: one.map(|one| own_name(one, unit(one), expected)),
-                unit_is_stated: one.is_some_and(|one| one.unit.is_some() || has_no_unit(&one.meaning)),
+                unit_is_stated: one.is_some_and(|one| !chosen.contains_key(&one.column)),
                 direction: one.and_then(|one| one.direction).map(|direction| match direction {
                     Direction::Forward => "forward",
                     Direction::Backward => "backward",
@@ -94,28 +101,13 @@ fn reading(
     Reading { assumes, columns, source, remarks }
 }
 
-fn has_no_unit(meaning: &Meaning) -> bool {
-    matches!(meaning, Meaning::Run | Meaning::Socket | Meaning::Clock | Meaning::Hinted(_))
-}
-
-/// The unit of a column if neither the file nor its values say it.
-fn default(one: &Found, expected: &Expected<'_>) -> Unit {
-    match one.meaning {
-        Meaning::Reading(stem, _) => {
-            let column = expected.station.columns().iter().find(|column| column.stem == stem);
-            Unit::of_own(column.map_or("mm", |column| column.unit))
-        }
-        Meaning::Temperature => Unit::of_own("c"),
-        _ => Unit::of_own("s"),
-    }
-}
-
 /// Our name of a column, with its unit.
 fn own_name(one: &Found, unit: Unit, expected: &Expected<'_>) -> String {
     match &one.meaning {
         Meaning::Axis(axis) => axis_name(*axis, unit.own, expected),
-        Meaning::Socket | Meaning::Run | Meaning::Temperature | Meaning::Hinted(_) => one.meaning.stem().to_string(),
+        Meaning::Socket | Meaning::Run | Meaning::Temperature | Meaning::Driver(_) => one.meaning.stem().to_string(),
         Meaning::Time | Meaning::Clock => "time_s".into(),
+        meaning if open_units::has_no_unit(meaning, expected) => meaning.stem().to_string(),
         meaning => format!("{}_{}", meaning.stem(), unit.own),
     }
 }

@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 use super::Expected;
 use super::grid::Grid;
 use super::meaning::{Found, Meaning};
-use super::unit::Unit;
+use super::unit::{self, Unit};
 use super::values::Values;
 use crate::axis::AxisKind;
-use crate::words::listed;
+use crate::instrument::Fault;
+use crate::words::{listed, number};
 
 /// Positions of a rotary axis beyond this, in radians, are degrees: more than one turn either way.
 const MAX_TURN_RAD: f64 = 6.5;
@@ -16,17 +17,42 @@ const MAX_TURN_RAD: f64 = 6.5;
 const NEAR_REFERENCE: f64 = 0.05;
 /// Positions beyond this are not in m.
 const MAX_M: f64 = 20.0;
-/// Deviations below this are in mm, not µm, where no unit is stated.
-const MAX_DEVIATION_MM: f64 = 0.5;
+/// Deviations whose root mean square is below the first are in mm, those above the second in µm, where no unit is stated.
+/// Between them they may be both.
+const DEVIATIONS: [f64; 2] = [0.05, 5.0];
+/// Times beyond this are in ms: of seconds since 1970 it is the year 5138.
+const MAX_TIME_S: f64 = 1e11;
+/// Temperatures from this on are in kelvins.
+const MIN_KELVIN: f64 = 200.0;
 
 /// The units of columns that state none, with the assumption in words.
 pub(super) type Choice = (String, BTreeMap<usize, Unit>);
 
+/// Whether our column has no unit.
+pub(super) fn has_no_unit(meaning: &Meaning, expected: &Expected<'_>) -> bool {
+    match meaning {
+        Meaning::Reading(stem, _) => {
+            expected.station.columns().iter().any(|column| column.stem == *stem && column.unit.is_empty())
+        }
+        Meaning::Socket | Meaning::Run | Meaning::Clock | Meaning::Driver(_) => true,
+        _ => false,
+    }
+}
+
 /// For each group of columns without a stated unit, the units that their values allow, the most probable first.
-pub(super) fn open(grid: &Grid, found: &[Found], expected: &Expected<'_>, values: &Values) -> Vec<Vec<Choice>> {
+///
+/// # Errors
+/// If the unit of deviations can be told neither from the values nor by a fit: what to state.
+pub(super) fn open(
+    grid: &Grid,
+    found: &[Found],
+    expected: &Expected<'_>,
+    values: &Values,
+) -> Result<Vec<Vec<Choice>>, Fault> {
     let machine = expected.machine;
     let without = |of: &dyn Fn(&Meaning) -> bool| -> Vec<usize> {
-        found.iter().filter(|one| one.unit.is_none() && of(&one.meaning)).map(|one| one.column).collect()
+        let is_open = |one: &&Found| one.unit.is_none() && !has_no_unit(&one.meaning, expected) && of(&one.meaning);
+        found.iter().filter(is_open).map(|one| one.column).collect()
     };
     let of_kind = |kind: AxisKind| {
         move |meaning: &Meaning| match meaning {
@@ -35,12 +61,14 @@ pub(super) fn open(grid: &Grid, found: &[Found], expected: &Expected<'_>, values
             _ => false,
         }
     };
+    let named = |columns: &[usize]| {
+        let names: Vec<String> = columns.iter().map(|column| format!("`{}`", grid.name(*column))).collect();
+        listed(&names, "and")
+    };
     let choices = |columns: &[usize], units: &[&'static str]| -> Vec<Choice> {
-        let names: Vec<String> = columns.iter().map(|column| grid.name(*column)).collect();
-        let names: Vec<&str> = names.iter().map(String::as_str).collect();
         let of_unit = |own: &&'static str| {
-            let text = format!("the unit of {} is not stated: {own} is read", listed(&names, "and"));
-            (text, columns.iter().map(|column| (*column, Unit::of_own(own))).collect())
+            let text = format!("the unit of {} is not stated: {own} is read", named(columns));
+            (text, columns.iter().map(|column| (*column, unit_of(own))).collect())
         };
         units.iter().map(of_unit).collect()
     };
@@ -60,19 +88,19 @@ pub(super) fn open(grid: &Grid, found: &[Found], expected: &Expected<'_>, values
         let units: &[&str] = if values.largest(&linear) < MAX_M { &["mm", "m", "in"] } else { &["mm", "in"] };
         open.push(choices(&linear, units));
     }
-    let is_length = |meaning: &Meaning, deviation: bool| match meaning {
-        Meaning::Reading(stem, false) => {
-            let column = expected.station.columns().iter().find(|column| column.stem == *stem);
-            column.is_some_and(|column| (column.unit == "um") == deviation)
+    let unit_of_reading = |meaning: &Meaning| {
+        match meaning {
+            Meaning::Reading(stem, _) => expected.station.columns().iter().find(|column| column.stem == *stem),
+            _ => None,
         }
-        _ => false,
+        .map(|column| column.unit)
     };
-    let lengths = without(&|meaning| is_length(meaning, false));
+    let lengths = without(&|meaning| unit_of_reading(meaning) == Some("mm"));
     if !lengths.is_empty() {
         let reference = expected.station.reference_mm();
         let median = values.median(lengths[0]);
         let near = |unit: &&&str| {
-            let mm = crate::files::quantity::Unit::of_length(unit).map_or(0.0, |unit| unit.to_internal(median));
+            let mm = unit_of(unit).to_internal(median);
             reference > 0.0 && (mm / reference - 1.0).abs() < NEAR_REFERENCE
         };
         let units: Vec<&'static str> = match ["mm", "um", "m", "in"].iter().find(near) {
@@ -82,10 +110,58 @@ pub(super) fn open(grid: &Grid, found: &[Found], expected: &Expected<'_>, values
         };
         open.push(choices(&lengths, &units));
     }
-    let deviations = without(&|meaning| is_length(meaning, true));
-    if !deviations.is_empty() {
-        let units: &[&str] = if values.largest(&deviations) < MAX_DEVIATION_MM { &["mm"] } else { &["um"] };
-        open.push(choices(&deviations, units));
+    let deviations = without(&|meaning| unit_of_reading(meaning) == Some("um"));
+    if let [first, ..] = deviations[..] {
+        let rms = values.rms(&deviations);
+        if (DEVIATIONS[0]..=DEVIATIONS[1]).contains(&rms) {
+            let what = format!(
+                "the unit of {} is not stated, and deviations of {} rms may be in mm or in µm",
+                named(&deviations),
+                number(rms)
+            );
+            let stem = found.iter().find(|one| one.column == first).map_or("", |one| one.meaning.stem());
+            let help = format!(
+                "state the unit in the name of the column, or say what it holds: {stem}_um={0} or {stem}_mm={0}",
+                grid.name(first)
+            );
+            return Err((what, help));
+        }
+        open.push(choices(&deviations, &[if rms < DEVIATIONS[0] { "mm" } else { "um" }]));
     }
-    open
+    // Directions may be in radians, small rotations are in our unit.
+    let directions = without(&|meaning| unit_of_reading(meaning) == Some("deg"));
+    if !directions.is_empty() {
+        let units: &[&str] = if values.largest(&directions) <= MAX_TURN_RAD { &["rad", "deg"] } else { &["deg"] };
+        open.push(choices(&directions, units));
+    }
+    for (own, is_of) in [
+        ("arcsec", &(|meaning: &Meaning| unit_of_reading(meaning) == Some("arcsec")) as &dyn Fn(&Meaning) -> bool),
+        ("s", &|meaning| *meaning == Meaning::Time),
+        ("c", &|meaning| *meaning == Meaning::Temperature),
+    ] {
+        let columns = without(is_of);
+        let unit = match own {
+            "s" if values.median(columns.first().copied().unwrap_or(0)) > MAX_TIME_S => "ms",
+            "c" if values.largest(&columns) > MIN_KELVIN => "k",
+            own => own,
+        };
+        if !columns.is_empty() {
+            open.push(choices(&columns, &[unit]));
+        }
+    }
+    let ambiguous: Vec<usize> =
+        found.iter().filter(|one| one.unit.is_some_and(Unit::is_ambiguous)).map(|one| one.column).collect();
+    if !ambiguous.is_empty() {
+        let of_unit = |(word, unit): (&str, Unit)| {
+            let text = format!("`grad` of {} may be a degree or a gon: {word} is read", named(&ambiguous));
+            (text, ambiguous.iter().map(|column| (*column, unit)).collect())
+        };
+        open.push(unit::DEGREE_OR_GON.map(of_unit).to_vec());
+    }
+    Ok(open)
+}
+
+/// A unit of these lists.
+fn unit_of(word: &str) -> Unit {
+    unit::of(word).unwrap_or(Unit::of_own("1"))
 }

@@ -1,6 +1,6 @@
 //! The session that reads foreign tables: a new one of a machine, or one to which tests are added.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use super::foreign::Foreign;
@@ -31,6 +31,8 @@ pub struct Draft {
     text: SessionText,
     /// The files that the session reads and that exist: by path, with their content.
     existing: BTreeMap<PathBuf, Vec<u8>>,
+    /// The names of the files that the session names, in lower case, without those of this import.
+    taken: BTreeSet<String>,
     /// The files that are new, by their name beside the session.
     new: Vec<(String, Vec<u8>)>,
     /// Whether the layout of a test must be stated, since the session has one of its own.
@@ -39,6 +41,29 @@ pub struct Draft {
     unknown_target: Option<&'static str>,
     /// Whether the session is new: the layout that all its files share is its own.
     is_new: bool,
+}
+
+/// Keys that an import states itself, with what the caller can say instead.
+const OWN_KEYS: [(&str, &str); 4] = [
+    ("name", "the test has the name of its file: rename the file"),
+    ("data", "the data of the test are the file"),
+    (
+        "format",
+        "separator, decimal sign and lines above are found, and a normalised copy is written where they cannot be stated",
+    ),
+    ("columns", "say what a column holds, such as c_deg=3 (our name, then the name or the number in the file)"),
+];
+
+/// Refuses keys of tests that an import states itself.
+fn check_keys(set: &Node) -> Result<(), ModelError> {
+    let own = |key: &str| OWN_KEYS.iter().find(|(own, _)| *own == key);
+    match set.entries().iter().find_map(|entry| own(&entry.key)) {
+        Some((key, help)) => Err(ModelError::Session {
+            message: format!("`{key}` is no key that a new test can be given: it follows from the file"),
+            help: (*help).into(),
+        }),
+        None => Ok(()),
+    }
 }
 
 /// Keys of a test from texts such as `bar_mm=150`; a value that is no TOML is a text.
@@ -67,7 +92,7 @@ impl Draft {
     /// A new session of a machine file, with a test of each name; `set` has further keys of the tests.
     ///
     /// # Errors
-    /// If the machine cannot be read, or a test lacks a key of its set-up.
+    /// If the machine cannot be read, a test lacks a key of its set-up, or `set` has a key that follows from the file.
     pub fn of_machine(
         file: &Path,
         options: &ReadOptions,
@@ -75,6 +100,7 @@ impl Draft {
         tests: &[String],
         set: &Node,
     ) -> Result<Draft, ModelError> {
+        check_keys(set)?;
         let MachineRead { source, bodies, .. } = read::machine_with_bodies(file, options)?;
         let document = Document {
             machine: SessionMachine::File(MachineFile { file: "machine.toml".into() }),
@@ -103,6 +129,7 @@ impl Draft {
             text: SessionText::of_document(&document, &session)?,
             file: session,
             existing: BTreeMap::new(),
+            taken: BTreeSet::new(),
             new,
             states_layout: false,
             unknown_target: unknown_set_up(kind)
@@ -129,7 +156,8 @@ impl Draft {
     /// of the tests.
     ///
     /// # Errors
-    /// If the session cannot be read, or it is not clear which set-up a new test has.
+    /// If the session cannot be read, it is not clear which set-up a new test has, or `like` or `set` are given for a test
+    /// that the session plans.
     pub fn of_session(
         file: &Path,
         options: &ReadOptions,
@@ -137,6 +165,7 @@ impl Draft {
         like: Option<&str>,
         set: &Node,
     ) -> Result<(Draft, Vec<String>), ModelError> {
+        check_keys(set)?;
         let source = Text::read(&options.store, file, "the session file")?;
         let (_, sources) = read::session_of(&source, options)?;
         let parsed = source.parse()?;
@@ -146,10 +175,15 @@ impl Draft {
             let contents = options.store.read(&stamp.file).map_err(|cause| unreadable(&stamp.file, &cause))?;
             existing.insert(stamp.file.clone(), contents);
         }
+        let of_stamps =
+            existing.keys().filter_map(|path: &PathBuf| Some(path.file_name()?.to_string_lossy().to_lowercase()));
+        let of_tests = document.test.iter().filter_map(|test| Some(test.data.as_ref()?.to_lowercase()));
+        let taken = of_stamps.chain(of_tests).collect();
         let mut draft = Draft {
             file: file.to_path_buf(),
             text: sources.text,
             existing,
+            taken,
             new: Vec::new(),
             states_layout: document.format.is_some() || document.columns.is_some(),
             unknown_target: None,
@@ -160,6 +194,13 @@ impl Draft {
             let same = |test: &&Test| test.name.to_lowercase() == name.to_lowercase();
             match document.test.iter().find(same) {
                 Some(planned) if planned.data.is_none() => {
+                    if like.is_some() || !set.entries().is_empty() {
+                        let message =
+                            format!("test \"{}\" is planned in the session with its own set-up", planned.name);
+                        let help = "state no key and no other test for it: edit its keys in the session, and import the other files by \
+                                    themselves";
+                        return Err(draft.fault(message, help));
+                    }
                     draft.text.set_data(&[(planned.name.clone(), placeholder(name))]);
                     tests.push(planned.name.clone());
                 }
@@ -173,7 +214,7 @@ impl Draft {
                     keys.set("data", placeholder(name).as_str());
                     let kept = parsed.root.get("test").map_or(&[][..], Node::items).get(item);
                     for entry in kept.into_iter().flat_map(Node::entries).chain(set.entries()) {
-                        if !["name", "data", "format", "columns"].contains(&entry.key.as_str()) {
+                        if !OWN_KEYS.iter().any(|(own, _)| *own == entry.key) {
                             keys.set(&entry.key, entry.node.clone());
                         }
                     }
@@ -233,6 +274,16 @@ impl Draft {
         read::session_of(&Text::new(&self.file, &self.text.to_string()), &self.options()).map(|(session, _)| session)
     }
 
+    /// As [`Draft::read`], with one test. The files of the others need not be known yet.
+    ///
+    /// # Errors
+    /// If the readings cannot be used.
+    pub fn read_alone(&self, test: &str) -> Result<Session, ModelError> {
+        let mut text = self.text.clone();
+        text.keep_test(test);
+        read::session_of(&Text::new(&self.file, &text.to_string()), &self.options()).map(|(session, _)| session)
+    }
+
     fn options(&self) -> ReadOptions {
         let beside = self.file.parent().unwrap_or(Path::new(""));
         let new = self.new.iter().map(|(name, contents)| (beside.join(name), contents.clone()));
@@ -271,7 +322,7 @@ impl Draft {
     /// # Errors
     /// If the text of the session cannot be edited.
     pub fn apply(&mut self, test: &str, file: &Foreign, reading: &Reading) -> Result<String, ModelError> {
-        let name = self.data_name(test, file, matches!(reading.source, Source::Normalised { .. }));
+        let name = self.data_name(file, matches!(reading.source, Source::Normalised { .. }));
         let (contents, format, columns) = match &reading.source {
             Source::AsItIs { format, columns } => (file.bytes.clone(), format.clone(), columns.clone()),
             Source::Normalised { csv, .. } => {
@@ -280,7 +331,6 @@ impl Draft {
                 (csv.clone().into_bytes(), format, own)
             }
         };
-        self.new.retain(|(other, _)| *other != name);
         self.new.push((name.clone(), contents));
         self.text.set_data(&[(test.to_string(), name.clone())]);
         // An empty table maps no column: the file has the default names.
@@ -332,22 +382,23 @@ impl Draft {
         self.text.set_table("columns", columns)
     }
 
-    /// A name beside the session that no other file has.
-    fn data_name(&self, test: &str, file: &Foreign, is_changed: bool) -> String {
-        let beside = self.file.parent().unwrap_or(Path::new(""));
+    /// A name beside the session that no file of the session has, planned ones among them, in any case of letters.
+    fn data_name(&self, file: &Foreign, is_changed: bool) -> String {
         let (stem, extension) = match (is_changed, file.name.rsplit_once('.')) {
             (false, Some((stem, extension))) => (stem.to_string(), format!(".{extension}")),
             (false, None) => (file.name.clone(), String::new()),
             (true, _) => (format!("{}-normalised", file.stem()), ".csv".to_string()),
         };
-        let _ = test;
-        let mut name = format!("{stem}{extension}");
-        let mut number = 2;
-        while self.existing.contains_key(&beside.join(&name)) || name == SESSION_FILE || name == "machine.toml" {
-            name = format!("{stem}-{number}{extension}");
-            number += 1;
-        }
-        name
+        let own = self.file.file_name().map(|name| name.to_string_lossy().to_lowercase());
+        let is_taken = |name: &str| {
+            let name = name.to_lowercase();
+            own.as_deref() == Some(name.as_str())
+                || self.taken.contains(&name)
+                || self.new.iter().any(|(new, _)| new.to_lowercase() == name)
+        };
+        let names = std::iter::once(format!("{stem}{extension}"))
+            .chain((2_u32..).map(|number| format!("{stem}-{number}{extension}")));
+        names.into_iter().find(|name| !is_taken(name)).unwrap_or_default()
     }
 
     /// The files to write, by their names beside the session; the session is the last.

@@ -1,5 +1,30 @@
 //! Units in the words of other programs.
 
+use crate::files::quantity;
+
+/// What a unit measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::files) enum Dimension {
+    Length,
+    Angle,
+    Time,
+    Temperature,
+    /// A number without a unit.
+    Number,
+}
+
+impl std::fmt::Display for Dimension {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.write_str(match self {
+            Dimension::Length => "length",
+            Dimension::Angle => "angle",
+            Dimension::Time => "time",
+            Dimension::Temperature => "temperature",
+            Dimension::Number => "number",
+        })
+    }
+}
+
 /// A unit: ours, and how a value is converted to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::files) struct Unit {
@@ -17,6 +42,11 @@ impl Unit {
 
     const fn times(own: &'static str, factor: f64) -> Unit {
         Unit { own, factor, offset: 0.0 }
+    }
+
+    /// Its first word.
+    pub fn word(self) -> &'static str {
+        UNITS.iter().find(|(unit, _)| *unit == self).map_or(self.own, |(_, words)| words[0])
     }
 
     /// Whether the values are ours as they are.
@@ -37,17 +67,57 @@ impl Unit {
         self.factor * value + self.offset
     }
 
+    /// The word is a degree in German and a hundredth of a right angle in English: [`DEGREE_OR_GON`].
+    pub fn is_ambiguous(self) -> bool {
+        self.own == GRAD.own
+    }
+
+    /// Whether values of both units can be converted into each other.
+    pub fn agrees_with(self, other: Unit) -> bool {
+        self == other || self.dimension() == other.dimension() && !self.is_ambiguous() && !other.is_ambiguous()
+    }
+
+    pub fn dimension(self) -> Dimension {
+        match self.own {
+            "s" => Dimension::Time,
+            "c" => Dimension::Temperature,
+            "1" => Dimension::Number,
+            own if quantity::Unit::of_length(own).is_some() => Dimension::Length,
+            _ => Dimension::Angle,
+        }
+    }
+
     pub fn is_length(self) -> bool {
-        matches!(self.own, "mm" | "um" | "m" | "in" | "mil")
+        self.dimension() == Dimension::Length
     }
 
     pub fn is_angle(self) -> bool {
-        matches!(self.own, "deg" | "rad" | "mrad" | "urad" | "arcsec" | "arcmin")
+        self.dimension() == Dimension::Angle
+    }
+
+    /// The conversion of ours to the internal unit.
+    fn internal(self) -> quantity::Unit {
+        quantity::Unit::of_column(self.own, self.is_angle()).unwrap_or(quantity::Unit::Times(1.0))
+    }
+
+    /// The value in the internal unit: mm, rad, s, °C.
+    pub fn to_internal(self, value: f64) -> f64 {
+        self.internal().to_internal(self.converted(value))
+    }
+
+    /// The value in this unit of one in the internal unit.
+    pub fn of_internal(self, value: f64) -> f64 {
+        (self.internal().in_unit(value) - self.offset) / self.factor
     }
 }
 
+/// A degree or a gon.
+const GRAD: Unit = Unit::of_own("grad");
+/// What `grad` may be.
+pub(super) const DEGREE_OR_GON: [(&str, Unit); 2] = [("deg", Unit::of_own("deg")), ("gon", Unit::times("deg", 0.9))];
+
 /// The units with their words, in lower case.
-const UNITS: [(Unit, &[&str]); 22] = [
+const UNITS: [(Unit, &[&str]); 23] = [
     (Unit::of_own("mm"), &["mm", "millimeter", "millimetre", "millimeters", "millimetres"]),
     (Unit::of_own("um"), &["um", "µm", "μm", "micron", "microns", "mikrometer", "micrometer", "micrometre", "mum"]),
     (Unit::of_own("m"), &["m", "meter", "metre", "meters", "metres"]),
@@ -55,13 +125,14 @@ const UNITS: [(Unit, &[&str]); 22] = [
     (Unit::of_own("mil"), &["mil", "thou", "mils"]),
     (Unit::times("mm", 10.0), &["cm"]),
     (Unit::times("um", 1e-3), &["nm"]),
-    (Unit::of_own("deg"), &["deg", "°", "degree", "degrees", "grad", "º", "deg.", "degs"]),
+    (Unit::of_own("deg"), &["deg", "°", "degree", "degrees", "º", "deg.", "degs"]),
     (Unit::of_own("rad"), &["rad", "radian", "radians", "radiant"]),
     (Unit::of_own("mrad"), &["mrad"]),
     (Unit::of_own("urad"), &["urad", "µrad", "μrad"]),
     (Unit::of_own("arcsec"), &["arcsec", "arcseconds", "″", "as", "bogensekunden", "''"]),
     (Unit::of_own("arcmin"), &["arcmin", "′"]),
-    (Unit::times("deg", 0.9), &["gon"]),
+    (Unit::times("deg", 0.9), &["gon", "gons", "grads", "gradian", "gradians", "neugrad"]),
+    (GRAD, &["grad"]),
     (Unit::of_own("s"), &["s", "sec", "second", "seconds", "sek", "sekunden"]),
     (Unit::times("s", 1e-3), &["ms", "msec", "millis"]),
     (Unit::times("s", 60.0), &["min", "minutes", "minuten"]),
@@ -141,7 +212,16 @@ mod tests {
         assert!((of("°F", 68.0) - 20.0).abs() < 1e-12);
         assert!((of("K", 293.15) - 20.0).abs() < 1e-12);
         assert_eq!(of("gon", 100.0), 90.0);
+        assert!(super::of("Grad").unwrap().is_ambiguous());
         assert_eq!(of("ms", 1500.0), 1.5);
         assert_eq!(of("cm", 2.0), 20.0);
+        let internal = |word: &str, value: f64| super::of(word).unwrap().to_internal(value);
+        assert!((internal("mil", 1.0) - 0.0254).abs() < 1e-15);
+        assert!((internal("gon", 200.0) - std::f64::consts::PI).abs() < 1e-12);
+        assert!((internal("mrad", 3.0) - 3e-3).abs() < 1e-15);
+        for word in ["nm", "gon", "°F", "h", "mil", "arcmin"] {
+            let unit = super::of(word).unwrap();
+            assert!((unit.of_internal(unit.to_internal(7.5)) - 7.5).abs() < 1e-12, "{word}");
+        }
     }
 }

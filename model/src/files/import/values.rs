@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 
 use super::Expected;
-use super::clock::clock_s;
 use super::grid::{Grid, number_with_unit};
 use super::meaning::{Found, Meaning};
+use super::unit;
+use crate::calendar::{DAY_S, DateOrder, Moment, clock};
 use crate::instrument::Fault;
-use crate::words::counted;
+use crate::words::{counted, with_article};
 
 /// Largest share of rows without a number in a column that is read.
 const MAX_DROPPED: f64 = 0.1;
@@ -21,30 +22,42 @@ pub(super) struct Values {
     pub unreadable: Vec<String>,
 }
 
+/// What the cells of the columns need besides a reader of tables.
+#[derive(Default)]
+struct Needs {
+    units: bool,
+    mixed_units: bool,
+    signs: bool,
+}
+
 impl Values {
-    pub fn of(name: &str, grid: &Grid, found: &[Found], expected: &Expected<'_>) -> Result<Values, Fault> {
+    /// # Errors
+    /// If too many rows lack a number, or a unit behind a number contradicts its column: with the line.
+    pub fn of(grid: &Grid, found: &[Found], expected: &Expected<'_>) -> Result<Values, Fault> {
         let entry = expected.kind().entry();
-        let is_word =
-            |one: &Found| matches!(&one.meaning, Meaning::Socket) || one.meaning == Meaning::Hinted("socket".into());
+        let numeric: Vec<&Found> = found.iter().filter(|one| one.meaning != Meaning::Socket).collect();
+        let orders: Vec<DateOrder> = numeric.iter().map(|one| date_order(grid, one)).collect();
         let (mut rows, mut by_column) = (Vec::new(), BTreeMap::<usize, Vec<f64>>::new());
-        let (mut with_units, mut grouped, mut first_dropped) = (false, false, None);
+        let (mut needs, mut first_dropped) = (Needs::default(), None);
+        // Seconds that a time of day lies behind the first one, by column: it goes on over midnight.
+        let mut before: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
         for (index, row) in grid.rows.iter().enumerate() {
-            let mut values = Vec::with_capacity(found.len());
-            for one in found.iter().filter(|one| !is_word(one)) {
+            let mut values = Vec::with_capacity(numeric.len());
+            for (one, order) in numeric.iter().zip(&orders) {
                 let cell = &row.cells[one.column];
                 let lacks = cell.is_empty() || cell.eq_ignore_ascii_case("nan");
                 let value = match one.meaning {
-                    Meaning::Clock => clock_s(cell),
-                    Meaning::Reading(..) if lacks && entry.rows_can_lack_channels => Some(f64::NAN),
-                    _ => number_with_unit(cell, grid.decimal).map(|(value, unit)| {
-                        with_units |= !unit.is_empty();
-                        value
+                    Meaning::Clock => clock(cell, *order).filter(|moment| moment.second.is_some()).map(|moment| {
+                        let (last, days) = before.entry(one.column).or_insert((moment.seconds(), 0.0));
+                        going_on(moment, last, days)
                     }),
+                    Meaning::Reading(..) if lacks && entry.rows_can_lack_channels => Some(f64::NAN),
+                    _ => number_of(grid, one, row.line, cell, &mut needs)?,
                 };
-                grouped |= cell.contains('\u{2212}') || grid.decimal == ',' && cell.contains('.');
+                needs.signs |= cell.contains('\u{2212}') || grid.decimal == ',' && cell.contains('.');
                 values.extend(value.map(|value| (one.column, value)));
             }
-            if values.len() < found.iter().filter(|one| !is_word(one)).count() {
+            if values.len() < numeric.len() {
                 first_dropped = first_dropped.or(Some(row.line + 1));
                 continue;
             }
@@ -55,7 +68,7 @@ impl Values {
         if dropped as f64 > MAX_DROPPED * grid.rows.len() as f64 {
             let line = first_dropped.unwrap_or_default();
             let found = format!(
-                "{name}: {dropped} of {} rows lack a number in a column that is read, line {line} the first",
+                "{dropped} of {} rows lack a number in a column that is read, line {line} the first",
                 grid.rows.len()
             );
             return Err((found, "export every reading, or say with a hint which columns to read".into()));
@@ -64,10 +77,13 @@ impl Values {
         if let Some(line) = first_dropped {
             unreadable.push(format!("{} without a number, line {line} the first, left out", counted(dropped, "row")));
         }
-        if with_units {
+        if needs.units {
             unreadable.push("numbers have their units behind them".into());
         }
-        if grouped {
+        if needs.mixed_units {
+            unreadable.push("units differ from row to row, and are converted to that of their column".into());
+        }
+        if needs.signs {
             unreadable.push("numbers have signs between thousands or a sign of their own for minus".into());
         }
         Ok(Values { by_column, rows, unreadable })
@@ -84,4 +100,65 @@ impl Values {
         values.sort_by(f64::total_cmp);
         values.get(values.len() / 2).copied().unwrap_or(0.0)
     }
+
+    /// Root mean square over columns.
+    pub fn rms(&self, columns: &[usize]) -> f64 {
+        let values = columns.iter().filter_map(|column| self.by_column.get(column)).flatten();
+        let (count, squares) = (values.copied().filter(|value| value.is_finite()))
+            .fold((0.0, 0.0), |(count, squares), value| (count + 1.0, squares + value * value));
+        if count > 0.0 { (squares / count).sqrt() } else { 0.0 }
+    }
+}
+
+/// The number of a cell in the unit of its column; `None` if it has none.
+fn number_of(grid: &Grid, one: &Found, line: usize, cell: &str, needs: &mut Needs) -> Result<Option<f64>, Fault> {
+    let Some((value, word)) = number_with_unit(cell, grid.decimal) else { return Ok(None) };
+    let fault = |what: String| {
+        let help = "export the column with one unit, or with the unit of each number behind it";
+        Err((
+            format!("line {}: `{cell}` in column {} ({}) {what}", line + 1, one.column + 1, grid.name(one.column)),
+            help.into(),
+        ))
+    };
+    let Some(unit) = unit::of(word).filter(|_| !word.is_empty()) else {
+        return if one.has_unit_in_cells {
+            fault("has no unit, and other numbers of the column have one".into())
+        } else {
+            Ok(Some(value))
+        };
+    };
+    needs.units = true;
+    match one.unit {
+        Some(own) if own == unit => Ok(Some(value)),
+        Some(own) if own.agrees_with(unit) => {
+            needs.mixed_units = true;
+            Ok(Some(own.of_internal(unit.to_internal(value))))
+        }
+        Some(own) => {
+            let what = with_article(&unit.dimension().to_string());
+            fault(format!("is {what}, and the column is in {}", own.word()))
+        }
+        None => fault("has a unit, and the column holds numbers without one".into()),
+    }
+}
+
+/// The order of the dates of a column: the day first, unless only the other is possible for all of them.
+fn date_order(grid: &Grid, one: &Found) -> DateOrder {
+    let is_possible = |order: DateOrder| {
+        let mut cells = grid.rows.iter().map(|row| row.cells[one.column].as_str()).filter(|cell| !cell.is_empty());
+        cells.all(|cell| clock(cell, order).is_some())
+    };
+    let is_other =
+        one.meaning == Meaning::Clock && !is_possible(DateOrder::DayFirst) && is_possible(DateOrder::MonthFirst);
+    if is_other { DateOrder::MonthFirst } else { DateOrder::DayFirst }
+}
+
+/// Seconds of a moment after the last one: a time of day without a date that falls by more than half a day is past midnight.
+fn going_on(moment: Moment, last: &mut f64, days: &mut f64) -> f64 {
+    let seconds = moment.seconds();
+    if moment.day.is_none() && seconds < *last - 0.5 * DAY_S {
+        *days += 1.0;
+    }
+    *last = seconds;
+    seconds + *days * DAY_S
 }

@@ -1,6 +1,6 @@
 //! Words in the names of columns: of axes, of readings, of directions.
 
-use crate::axis::AxisKind;
+use crate::axis::{Axis, AxisKind};
 use crate::chain::Machine;
 
 /// The words of a name, in lower case: letters and digits apart, umlauts as their letters.
@@ -96,17 +96,29 @@ pub(super) enum AxisWord {
     Unnamed,
 }
 
+/// Words without what programs say of the position of an axis.
+fn bare(words: &[String]) -> Vec<&str> {
+    words.iter().map(String::as_str).filter(|word| !OF_AXIS.contains(word)).collect()
+}
+
 /// The axis of a name.
 pub(super) fn axis(words: &[String], machine: &Machine) -> Option<AxisWord> {
-    let named = |joined: &str| {
-        let mut found = (0..machine.axes.len()).filter(|k| machine.axes[*k].name.to_lowercase() == joined);
+    let only = |is: &dyn Fn(&Axis) -> bool| {
+        let mut found = (0..machine.axes.len()).filter(|k| is(&machine.axes[*k]));
         found.next().filter(|_| found.next().is_none())
     };
-    if let Some(axis) = named(&words.concat()) {
-        return Some(AxisWord::Axis(axis));
+    let rest = bare(words);
+    for joined in [words.concat(), rest.concat()] {
+        if let Some(axis) = only(&|axis| axis.name.to_lowercase() == joined) {
+            return Some(AxisWord::Axis(axis));
+        }
     }
-    let rest: Vec<&str> = words.iter().map(String::as_str).filter(|word| !OF_AXIS.contains(word)).collect();
-    if let Some(axis) = named(&rest.concat()) {
+    // The name that the robot's own file gives the joint, with or without what programs say besides.
+    let joint = |axis: &Axis| axis.joint.as_deref().map(self::words).filter(|joint| !joint.is_empty());
+    let has_letters = rest.iter().any(|word| !word.chars().all(|c| c.is_ascii_digit()));
+    if let Some(axis) = only(&|axis| joint(axis).is_some_and(|joint| joint == words))
+        .or_else(|| only(&|axis| has_letters && joint(axis).is_some_and(|joint| bare(&joint) == rest)))
+    {
         return Some(AxisWord::Axis(axis));
     }
     let rotary = machine.axes.iter().filter(|axis| axis.kind == AxisKind::Rotary).count();
@@ -265,6 +277,12 @@ const OF_READING: [&str; 14] = [
 /// Whether words say that an instrument measured.
 pub(super) fn is_measured(words: &[String]) -> bool {
     words.iter().any(|word| MEASURED.contains(&word.as_str()))
+}
+
+/// The words of our column of readings, without its unit; ours is the first.
+pub(super) fn of_reading(stem: &'static str) -> impl Iterator<Item = &'static str> {
+    let others = READINGS.iter().find(|(own, _)| *own == stem).map_or(&[][..], |(_, others)| others);
+    std::iter::once(stem).chain(others.iter().copied())
 }
 
 /// Whether words name our column of readings, without its unit.

@@ -12,6 +12,10 @@ use abbe::model::session::Session;
 use abbe::model::session::readings::Readings;
 use serde_json::Value;
 
+mod joints;
+mod names;
+mod stated;
+
 use super::{abbe, ready, text, workspace};
 
 fn foreign(name: &str) -> PathBuf {
