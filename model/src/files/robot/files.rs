@@ -24,6 +24,9 @@ impl Measured {
 /// Largest sweep of a joint in a plan, in each direction, rad and mm.
 const SWEEP_RAD: f64 = 1.0;
 const SWEEP_MM: f64 = 100.0;
+/// Number of steps of a sweep, and the least range that has ends at whole degrees or millimetres.
+const STEPS: f64 = 20.0;
+const LEAST_WHOLE: f64 = 2.0;
 /// Position of the joints that a test holds, rad: away from the stretched arm.
 const HELD_RAD: f64 = 0.4;
 /// Places of a written number: a length to 1e-12 mm.
@@ -73,7 +76,11 @@ fn machine(chain: &Chain, source: &str) -> String {
     let _ = write!(text, "name = \"{}\"\nchain = \"w b {} t\"\n", plain(&chain.name), names.join(" "));
     for (number, joint) in chain.joints.iter().enumerate() {
         let (point, direction) = chain.line(number);
-        let _ = write!(text, "\n[axis.{}]  # {}\n", names[number], plain(&joint.name));
+        let _ = write!(text, "\n[axis.{}]\n", names[number]);
+        // A number alone is that of the row.
+        if !joint.name.bytes().all(|byte| byte.is_ascii_digit()) {
+            let _ = writeln!(text, "joint = {}", toml_edit::Value::from(joint.name.as_str()));
+        }
         let (kind, unit) = match joint.kind {
             AxisKind::Rotary => ("rotary", "travel_deg"),
             AxisKind::Linear => ("linear", "travel_mm"),
@@ -157,9 +164,10 @@ fn tracker(chain: &Chain, point: &str, target_mm: [f64; 3], columns: &[String]) 
         };
         let middle = held(chain, number);
         let ends = [-reach, reach].map(|by| joint.kind.to_display(within(middle + by, joint.travel)));
-        // Whole degrees or millimetres within the travel.
-        let [from, to] = [ends[0].ceil(), ends[1].floor()];
-        let step = ((to - from) / 20.0).max(0.1);
+        // Whole degrees or millimetres within the travel, unless it is short.
+        let whole = [ends[0].ceil(), ends[1].floor()];
+        let [from, to] = if whole[1] - whole[0] >= LEAST_WHOLE { whole } else { ends };
+        let step = (to - from) / STEPS;
         let others = (0..chain.joints.len()).filter(|other| *other != number).map(|other| {
             let position = chain.joints[other].kind.to_display(held(chain, other));
             format!("{} = {}", columns[other], (position * 1e3).trunc() / 1e3)
@@ -168,8 +176,10 @@ fn tracker(chain: &Chain, point: &str, target_mm: [f64; 3], columns: &[String]) 
             text,
             "\n[[test]]\nname = \"{name}\"\n# The target in the tool frame, which lies in the frame of the base with all joints at zero.\n\
              target_mm = {point}\ntarget_u_um = inf\nsetup = \"tracker\"\nspindle_setup = \"target\"\nat = {{ {} }}\n\
-             sweep = {{ axis = \"{name}\", from_{unit} = {from}, to_{unit} = {to}, step_{unit} = {}, {feed}, runs = 1 }}\n",
+             sweep = {{ axis = \"{name}\", from_{unit} = {}, to_{unit} = {}, step_{unit} = {}, {feed}, runs = 1 }}\n",
             others.collect::<Vec<_>>().join(", "),
+            self::number(from),
+            self::number(to),
             self::number(step),
         );
     }

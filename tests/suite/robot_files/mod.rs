@@ -16,6 +16,9 @@ use nalgebra::{Matrix4, Rotation3, Vector3};
 use rand::{RngExt, SeedableRng};
 use serde_json::Value;
 
+mod refused;
+mod tables;
+
 use super::{abbe, text, workspace};
 
 const ROBOTS: [&str; 6] = ["ur5e", "ur10", "panda", "iiwa14", "irb120", "scara"];
@@ -260,7 +263,14 @@ fn file_of(rows: &[Row], number: usize) -> String {
             'P' => "prismatic",
             _ => "fixed",
         };
-        let _ = writeln!(file, "{};{};{};q{} + {};{kind}", a * scale, angle(*alpha), d * scale, row + 1, angle(*theta));
+        // The joint variable stands in the column that the joint moves.
+        let (d, theta) = (format!("{}", d * scale), angle(*theta));
+        let (d, theta) = match kind {
+            "revolute" => (d, format!("q{} + {theta}", row + 1)),
+            "prismatic" => (format!("q{} + {d}", row + 1), theta),
+            _ => (d, theta),
+        };
+        let _ = writeln!(file, "{};{};{d};{theta};{kind}", a * scale, angle(*alpha));
     }
     file.replace("+ -", "- ")
 }
@@ -469,35 +479,19 @@ fn the_neutral_table_says_where_each_axis_is() {
     assert!((of(1, "direction", 2, "change").unwrap() + value("EB0A")).abs() < 1e-8);
     // Its point at the origin moves with the errors of A too; EX0A is not estimated.
     assert!((of(0, "point_mm", 0, "change").unwrap() - value("EX0C")).abs() < 1e-5);
-    assert!(of(0, "point_mm", 0, "u").unwrap() > 0.0);
+    // Its uncertainty is that of the one estimated error that moves it.
+    let u = {
+        let all = parameters["parameters"].as_array().unwrap();
+        let own = all.iter().find(|p| p["id"] == "EX0C").unwrap();
+        assert_eq!(own["unit"], "um");
+        own["u"].as_f64().unwrap() * 1e-3
+    };
+    let found = of(0, "point_mm", 0, "u").unwrap();
+    assert!((found / u - 1.0).abs() < 1e-3, "{found} mm, {u} mm expected");
     assert_eq!(of(2, "direction", 1, "nominal"), Some(1.0));
     assert!(axes[2]["point_mm"].as_array().unwrap().is_empty(), "a linear axis is nowhere in particular");
     let table = std::fs::read_to_string(&out).unwrap();
     assert!(table.starts_with("# Where each axis is") && table.contains("C,rotary,point x,mm,"), "{table}");
-}
-
-#[test]
-fn a_urdf_that_is_no_serial_chain_is_refused_with_the_reason() {
-    let place = tempfile::tempdir().unwrap();
-    let check = |name: &str, contents: &str, more: &[&str], expected: &str| {
-        let file = place.path().join(name);
-        std::fs::write(&file, contents).unwrap();
-        let output = abbe(&[&["new", text(&place.path().join("out")), "--from-urdf", text(&file)], more].concat());
-        let found = String::from_utf8_lossy(&output.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(!output.status.success() && found.contains(expected), "{name}: {found}");
-    };
-    let own = std::fs::read_to_string(urdf("ur5e")).unwrap();
-    check("tip.urdf", &own, &["--tip", "tcp"], "there is no link `tcp`");
-    check("x.xacro", "<robot xmlns:xacro=\"x\"><xacro:arg name=\"a\"/></robot>", &[], "this is a xacro file");
-    check(
-        "floating.urdf",
-        &own.replacen("type=\"revolute\"", "type=\"floating\"", 1),
-        &[],
-        "joint `shoulder_pan_joint` is `floating`",
-    );
-    check("number.urdf", &own.replacen("0 0 0.1625", "0 zero 0.1625", 1), &[], "is not three numbers");
-    check("cut.urdf", &own[..own.len() - 12], &[], "not valid XML");
-    check("other.xml", "<sdf><model/></sdf>", &[], "the first element is <sdf>, not <robot>");
 }
 
 /// The same displacement in the frame of the flange, whatever the pose: the target of the plan.
