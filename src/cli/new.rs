@@ -4,10 +4,12 @@ mod robot;
 mod sizes;
 mod templates;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use abbe::model::ModelError;
-use abbe::model::files::template;
+use abbe::model::files::store::Store;
+use abbe::model::files::{ReadOptions, session_with_sources, template};
+use abbe::plan::{PlanOptions, analyse};
 use clap::Args;
 
 use self::sizes::SizeArguments;
@@ -66,6 +68,10 @@ pub fn run(arguments: &NewArguments, quiet: bool) -> Result<(), Failure> {
         (None, Some(code)) => of_code(code, &arguments.sizes)?,
         (None, None) => arguments.robot.files()?,
     };
+    // A template is read and planned by the tests of the project; some need data that are not here.
+    if arguments.template.is_none() {
+        check(folder, &files)?;
+    }
     folder::write(folder, &files, arguments.force, |_| Ok(()))?;
     if quiet {
         return Ok(());
@@ -74,6 +80,24 @@ pub fn run(arguments: &NewArguments, quiet: bool) -> Result<(), Failure> {
         say!("{}", folder.join(name).display());
     }
     Ok(())
+}
+
+/// Refuses files that `abbe plan` would refuse, before they are written. They are in memory, by their final paths. Sockets
+/// have no poses yet: their plan is read alone.
+fn check(folder: &Path, files: &[NewFile]) -> Result<(), Failure> {
+    let in_memory = files.iter().map(|(name, text)| (folder.join(name), text.clone().into_bytes()));
+    let options = ReadOptions { store: Store::in_memory(in_memory), read_data: false, ..ReadOptions::default() };
+    let refused = |error: &dyn std::error::Error, help: Option<&str>| {
+        let help = help.map_or(String::new(), |help| format!("; {help}"));
+        Failure::Other(format!("nothing is written, because `abbe plan` would refuse the session: {error}{help}"))
+    };
+    let (session, _) =
+        session_with_sources(&folder.join("plan.toml"), &options).map_err(|error| refused(&error, error.help()))?;
+    if session.tests.iter().all(|test| test.motion.is_none()) {
+        return Ok(());
+    }
+    let options = PlanOptions { effects: false, ..PlanOptions::default() };
+    analyse(&session, &options).map(|_| ()).map_err(|error| refused(&error, None))
 }
 
 /// Lists the templates, one per line.

@@ -152,6 +152,43 @@ fn sizes_are_stated_or_guessed() {
     }
 }
 
+/// Files that `plan` would refuse are not written, and every size that is accepted has a plan.
+#[test]
+fn what_is_written_can_be_planned() {
+    let folder = tempfile::tempdir().unwrap();
+    let made = folder.path().join("made");
+    for (code, sizes) in [
+        ("wCXbYZAt", ["--pivot-mm", "-5"]),
+        ("wCXbYZAt", ["--gauge-mm", "-5"]),
+        ("wCXbYZAt", ["--table-mm", "nan"]),
+        ("wCXbYZAt", ["--pivot-mm", "1e300"]),
+    ] {
+        let output = abbe(&[&["new", text(&made), "--from-code", code][..], &sizes].concat());
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{sizes:?}: {said}");
+        assert!(said.contains("mm is expected"), "{sizes:?}: {said}");
+        assert!(!made.exists(), "{sizes:?}");
+    }
+    // Z carries the workpiece, and the table is high or low.
+    for (number, code) in ["wCZXbYt", "wCAZbYXt"].into_iter().enumerate() {
+        for height in ["-400", "400"] {
+            let made = folder.path().join(format!("m{number}{height}"));
+            let output = abbe(&["new", text(&made), "--from-code", code, "--table-mm", height]);
+            let said = String::from_utf8_lossy(&output.stderr).into_owned();
+            if output.status.success() {
+                let plan = made.join("plan.toml");
+                let planned = abbe(&["plan", text(&plan), "--no-effects", "--quiet"]);
+                let said = String::from_utf8_lossy(&planned.stderr).into_owned();
+                assert!(planned.status.success(), "{code} {height}: {said}");
+                assert!(!said.contains("travel"), "{code} {height}: {said}");
+            } else {
+                assert!(!made.exists(), "{code} {height}");
+                panic!("{code} {height}: {said}");
+            }
+        }
+    }
+}
+
 #[test]
 fn without_arguments_the_templates_are_listed() {
     let listed = abbe(&["new"]);

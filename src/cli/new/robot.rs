@@ -9,6 +9,7 @@ use clap::Args;
 
 use crate::cli::failure::Failure;
 use crate::cli::folder::NewFile;
+use crate::cli::message::{Kind, tell};
 use crate::cli::values::{self, Words};
 
 /// The conventions of a table.
@@ -62,6 +63,9 @@ impl RobotArguments {
             }
             _ => return Ok(Vec::new()),
         };
+        for assumed in &chain.assumed {
+            tell(Kind::Warning, assumed);
+        }
         let source = self.from_urdf.as_ref().or(self.from_dh.as_ref()).map(|file| name_of(file)).unwrap_or_default();
         let target_mm = values::point_mm("--target-mm", &self.target_mm, [0.0; 3])?;
         Ok(robot::files(&chain, &source, self.measured_by, target_mm))

@@ -143,8 +143,8 @@ impl Geometry {
         (RADIUS_MM / self.lever).min(0.5).asin().to_degrees()
     }
 
-    /// The usual travel of a linear axis along a direction of R, mm, wide enough for the plan.
-    pub fn travel(&self, along: usize) -> [f64; 2] {
+    /// The usual travel of a linear axis, mm, wide enough for the plan.
+    pub fn travel(&self, axis: &Body) -> [f64; 2] {
         let follows = if self.has_head {
             (self.lever + RADIUS_MM) * (HEAD_TILT_DEG + 2.0).to_radians().sin() + RADIUS_MM
         } else if self.ball_height > 0.0 {
@@ -153,7 +153,13 @@ impl Geometry {
             0.0
         };
         let half = HALF_TRAVEL_MM.max(((follows + 40.0) / 50.0).ceil() * 50.0);
-        let middle = if along == 2 { (self.ball_height / 50.0).round() * 50.0 } else { 0.0 };
+        let height = (self.ball_height / 50.0).round() * 50.0;
+        // A table comes down to bring its ball to the spindle.
+        let middle = match (axis.along, axis.on_table) {
+            (2, true) => -height,
+            (2, false) => height,
+            _ => 0.0,
+        };
         [middle - half, middle + half]
     }
 

@@ -77,7 +77,7 @@ fn machine(code: &StructuralCode, bodies: &[Body], geometry: &Geometry) -> Strin
                 "",
                 format!(
                     "# Smallest and largest position, mm. Enter the travel of the machine.\ntravel_mm = {:?}",
-                    geometry.travel(body.along)
+                    geometry.travel(body)
                 ),
             ),
             AxisKind::Rotary => (
