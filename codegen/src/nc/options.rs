@@ -91,18 +91,21 @@ impl NcOptions {
                 });
             }
         }
-        if let Some(number) = self.number {
-            if !control.has_numbers() {
-                return Err(CodegenError::Nc {
-                    message: format!("programs for {} have no numbers", control.word()),
-                    help: "a number is for fanuc".into(),
-                });
-            }
+        if self.number.is_some() && !control.has_numbers() {
+            return Err(CodegenError::Nc {
+                message: format!("programs for {} have no numbers", control.word()),
+                help: "a number is for fanuc".into(),
+            });
+        }
+        if control.has_numbers() {
+            let number = self.number();
             let last = u64::from(number) + tests as u64;
             if number == 0 || last > u64::from(LAST_NUMBER) {
                 return Err(CodegenError::Nc {
                     message: format!("main has the number {number}, and the last test {last}"),
-                    help: format!("numbers from 1 to {LAST_NUMBER} are expected"),
+                    help: format!(
+                        "numbers from 1 to {LAST_NUMBER} are expected: state a lower number, or write fewer tests"
+                    ),
                 });
             }
         }
@@ -113,5 +116,23 @@ impl NcOptions {
             });
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::control;
+    use super::*;
+
+    /// `O1000` and 8999 tests end at `O9999`, also where no number is stated.
+    #[test]
+    fn the_last_number_is_one_of_the_control() {
+        let options = NcOptions::default();
+        let check = |word: &str, tests: usize| options.check(control(word).unwrap(), tests);
+        assert!(check("fanuc", 8999).is_ok());
+        let message = check("fanuc", 9000).unwrap_err().to_string();
+        assert!(message.contains("main has the number 1000, and the last test 10000"), "{message}");
+        // Programs without numbers have no last one.
+        assert!(check("linuxcnc", 9000).is_ok());
     }
 }
