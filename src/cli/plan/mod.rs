@@ -30,12 +30,12 @@ pub struct PlanArguments {
     /// Standard deviation of a reading, instead of the session's.
     ///
     /// Example: --noise-um 0.5
-    #[arg(long, value_name = "UM")]
+    #[arg(long, value_name = "UM", allow_negative_numbers = true)]
     noise_um: Option<f64>,
     /// Standard uncertainty of every set-up length with a prior, instead of the session's.
     ///
     /// Example: --setup-um 1
-    #[arg(long, value_name = "UM")]
+    #[arg(long, value_name = "UM", allow_negative_numbers = true)]
     setup_um: Option<f64>,
     /// Use one mounted spindle ball for all tests.
     #[arg(long)]
@@ -47,7 +47,7 @@ pub struct PlanArguments {
     /// width of the device, length of the shaft from jig to ball, length of the jig.
     ///
     /// Example: --clearance-mm 80,320,60,80,150,50
-    #[arg(long, value_name = "DS,DT,H,W,L,T", conflicts_with_all = ["improve", "separate", "range"])]
+    #[arg(long, value_name = "DS,DT,H,W,L,T", allow_hyphen_values = true, conflicts_with_all = ["improve", "separate", "range"])]
     clearance_mm: Option<String>,
     /// Do not screen undeclared effects.
     #[arg(long)]

@@ -57,7 +57,7 @@ pub struct PoseArguments {
     /// Distance of the line of sight from the links: the lines between the origins of the axes.
     ///
     /// Example: --poses 30 --tracker-mm 3000,0,1000 --sight-mm 150
-    #[arg(long, value_name = "MM", default_value_t = 100.0, requires = "tracker_mm")]
+    #[arg(long, value_name = "MM", default_value_t = 100.0, requires = "tracker_mm", allow_negative_numbers = true)]
     sight_mm: f64,
     /// Part of the cylinder that a probe may touch: least and greatest distance along its axis from `artefact_mm`
     /// [default: 0,0].

@@ -18,28 +18,34 @@ pub struct CandidateArguments {
     /// Lengths of the available bars.
     ///
     /// Example: --improve 1 --bars-mm 50,100,150,300
-    #[arg(long, value_name = "MM,…", value_delimiter = ',', requires = "next_test")]
+    #[arg(long, value_name = "MM,…", value_delimiter = ',', requires = "next_test", allow_hyphen_values = true)]
     bars_mm: Option<Vec<f64>>,
     /// Distances of the ball from the rotary axis that moves it.
     ///
     /// Example: --improve 1 --radii-mm 50,100
-    #[arg(long, value_name = "MM,…", value_delimiter = ',', requires = "next_test")]
+    #[arg(long, value_name = "MM,…", value_delimiter = ',', requires = "next_test", allow_hyphen_values = true)]
     radii_mm: Option<Vec<f64>>,
     /// Heights of the ball along that axis.
     ///
     /// Example: --improve 1 --heights-mm 0,75,150
-    #[arg(long, value_name = "MM,…", value_delimiter = ',', requires = "next_test")]
+    #[arg(long, value_name = "MM,…", value_delimiter = ',', requires = "next_test", allow_hyphen_values = true)]
     heights_mm: Option<Vec<f64>>,
     /// Feeds to try, as multiples of the session's feed
     /// [default: 1, and a second feed if an effect depends on speed or time].
     ///
     /// Example: --improve 1 --feeds 0.5,1,2
-    #[arg(long, value_name = "TIMES,…", value_delimiter = ',', requires = "next_test")]
+    #[arg(long, value_name = "TIMES,…", value_delimiter = ',', requires = "next_test", allow_hyphen_values = true)]
     feeds: Option<Vec<f64>>,
     /// Shares of the range of a sweep to try, about its middle [default: 1; with --setup-min or --test-min 1,0.5].
     ///
     /// Example: --improve 1 --sweep-shares 1,0.5,0.25
-    #[arg(long = "sweep-shares", value_name = "SHARE,…", value_delimiter = ',', requires = "next_test")]
+    #[arg(
+        long = "sweep-shares",
+        value_name = "SHARE,…",
+        value_delimiter = ',',
+        requires = "next_test",
+        allow_hyphen_values = true
+    )]
     ranges: Option<Vec<f64>>,
     /// Directions to try, `both` for there and back [default: both; with --setup-min or --test-min both,one].
     ///
@@ -52,7 +58,7 @@ pub struct CandidateArguments {
     /// Travel of the sensor in the bar, in each direction. No test exceeds it.
     ///
     /// Example: --reach-mm 2
-    #[arg(long, value_name = "MM", default_value_t = 1.0)]
+    #[arg(long, value_name = "MM", default_value_t = 1.0, allow_negative_numbers = true)]
     reach_mm: f64,
     /// Mount a spindle ball for each proposed test.
     #[arg(long, requires = "next_test")]
@@ -60,12 +66,12 @@ pub struct CandidateArguments {
     /// Time to mount a ball. If it is stated, the gain per minute is compared.
     ///
     /// Example: --improve 1 --setup-min 5
-    #[arg(long, value_name = "MIN", requires = "next_test")]
+    #[arg(long, value_name = "MIN", requires = "next_test", allow_negative_numbers = true)]
     setup_min: Option<f64>,
     /// Time to prepare a test. If it is stated, the gain per minute is compared.
     ///
     /// Example: --improve 1 --test-min 1
-    #[arg(long, value_name = "MIN", requires = "next_test")]
+    #[arg(long, value_name = "MIN", requires = "next_test", allow_negative_numbers = true)]
     test_min: Option<f64>,
 }
 
