@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::scatter::{OF_LEVEL, SQUARENESS, STATIONS, distance_data, level_data};
 use super::stands::{polar_data, pose_data};
 use super::*;
 

@@ -5,6 +5,7 @@ use abbe::model::instrument::pose::Pose as PoseStation;
 use abbe::model::instrument::stand::Stand;
 use abbe::model::instrument::tracker::Tracker;
 
+use super::scatter::assert_standard;
 use super::*;
 use crate::plant::pose::turn_about;
 
