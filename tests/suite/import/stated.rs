@@ -209,8 +209,8 @@ fn deviations_that_may_be_in_two_units_are_refused() {
     let deviations = |scale: f64| {
         ballbar("C [deg];Abweichung", move |_, c, length| format!("{c};{:.9}", (length - 99.9881) * 1e3 * scale))
     };
-    // Of about 3 µm: in µm they may be mm.
-    let (session, _, said) = imported(place.path(), "kugelstab.csv", &deviations(1.0), PLAN, &[]);
+    // Of about 2 µm: in µm they may be mm.
+    let (session, _, said) = imported(place.path(), "kugelstab.csv", &deviations(0.3), PLAN, &[]);
     assert!(session.is_none() && said.contains("the unit of `Abweichung` is not stated"), "{said}");
     assert!(said.contains("deviation_um=Abweichung") && said.contains("--column"), "{said}");
     let (session, _, said) =
