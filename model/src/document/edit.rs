@@ -146,16 +146,16 @@ impl SessionText {
         Ok(())
     }
 
-    /// Removes all tests but one, and the distances between sockets, which name others.
-    pub fn keep_test(&mut self, name: &str) {
+    /// Removes the tests that are not among these, and the distances between sockets, which may name others.
+    pub fn keep_tests(&mut self, is_kept: &dyn Fn(&str) -> bool) {
         self.document.remove("socket_distance");
         match self.document.get_mut("test") {
             Some(Item::ArrayOfTables(tests)) => {
-                tests.retain(|test| test.get("name").and_then(Item::as_str) == Some(name));
+                tests.retain(|test| test.get("name").and_then(Item::as_str).is_some_and(is_kept));
             }
             Some(Item::Value(Value::Array(tests))) => {
                 let name_of = |test: &Value| test.as_inline_table()?.get("name")?.as_str().map(str::to_string);
-                tests.retain(|test| name_of(test).as_deref() == Some(name));
+                tests.retain(|test| name_of(test).is_some_and(|name| is_kept(&name)));
             }
             _ => {}
         }

@@ -79,3 +79,43 @@ fn a_target_is_found_from_the_rows_with_all_coordinates() {
     let expected = [-1184.3 + 30.0, -256.141 - 80.0, 11.6 - 20.0];
     assert!((0..3).all(|i| (point[i] - expected[i]).abs() < 0.2), "{point:?}");
 }
+
+/// A plan for sockets names files that are not there yet. Each file gives its own socket its poses, one after the other.
+#[test]
+fn a_plan_for_sockets_takes_its_files_one_by_one() {
+    let place = tempfile::tempdir().unwrap();
+    let urdf = workspace().join("tests/robots/ur5e.urdf");
+    let robot = place.path().join("arm");
+    let output = abbe(&["new", text(&robot), "--from-urdf", text(&urdf), "--measured-by", "sockets"]);
+    assert!(output.status.success(), "{}", message(&output));
+    let (plan, poses) = (robot.join("plan.toml"), place.path().join("poses.csv"));
+    let asked = ["plan", text(&plan), "--poses", "40", "--candidates", "200", "--poses-csv", text(&poses), "--quiet"];
+    let output = abbe(&asked);
+    assert!(output.status.success(), "{}", message(&output));
+    let chosen = std::fs::read_to_string(&poses).unwrap();
+    let measured = place.path().join("measured");
+    std::fs::create_dir(&measured).unwrap();
+    for (number, socket) in ["S1", "S2", "S3"].into_iter().enumerate() {
+        // As a controller writes them: other names, semicolons.
+        let mut file = String::from("A1 [deg];A2 [deg];A3 [deg];A4 [deg];A5 [deg];A6 [deg]\n");
+        for row in chosen.lines().filter(|row| row.ends_with(&format!(",{socket}"))) {
+            file += &(row.rsplit_once(',').unwrap().0.replace(',', ";") + "\n");
+        }
+        let own = measured.join(format!("{socket}.csv"));
+        std::fs::write(&own, &file).unwrap();
+        let output = abbe(&["import", text(&own), "--session", text(&plan)]);
+        assert!(output.status.success(), "{socket}: {}", message(&output));
+        let written = std::fs::read_to_string(&plan).unwrap();
+        assert!(written.contains(&format!("data = \"{socket}.csv\"")), "{written}");
+        assert_eq!(std::fs::read_to_string(robot.join(format!("{socket}.csv"))).unwrap(), file);
+        // Those that are measured are there; the others are still awaited.
+        let read = files::session(&plan, &ReadOptions::default());
+        assert_eq!(read.is_ok(), number == 2);
+    }
+    let session = files::session(&plan, &ReadOptions::default()).unwrap();
+    let rows: usize = session.tests.iter().map(|test| test.readings.as_ref().unwrap().rows()).sum();
+    assert_eq!(rows, 40);
+    // A second file of the same name is refused.
+    let output = abbe(&["import", text(&measured.join("S1.csv")), "--session", text(&plan)]);
+    assert!(message(&output).contains("has data already"), "{}", message(&output));
+}

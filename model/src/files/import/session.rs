@@ -16,7 +16,7 @@ use crate::document::session::{Instrument, MachineFile, Session as Document, Ses
 use crate::document::source::{Parsed, Source as Text};
 use crate::document::test::Test;
 use crate::error::{Location, ModelError};
-use crate::files::access::ReadOptions;
+use crate::files::access::{self, ReadOptions};
 use crate::files::read::{self, MachineRead};
 use crate::files::store::Store;
 use crate::instrument::{Fault, InstrumentKind};
@@ -33,6 +33,8 @@ pub struct Draft {
     existing: BTreeMap<PathBuf, Vec<u8>>,
     /// The names of the files that the session names, in lower case, without those of this import.
     taken: BTreeSet<String>,
+    /// The tests that name a file which is not there yet, and are not of this import.
+    awaited: BTreeSet<String>,
     /// The files that are new, by their name beside the session.
     new: Vec<(String, Vec<u8>)>,
     /// Whether the layout of a test must be stated, since the session has one of its own.
@@ -130,6 +132,7 @@ impl Draft {
             file: session,
             existing: BTreeMap::new(),
             taken: BTreeSet::new(),
+            awaited: BTreeSet::new(),
             new,
             states_layout: false,
             unknown_target: unknown_set_up(kind)
@@ -167,23 +170,44 @@ impl Draft {
     ) -> Result<(Draft, Vec<String>), ModelError> {
         check_keys(set)?;
         let source = Text::read(&options.store, file, "the session file")?;
-        let (_, sources) = read::session_of(&source, options)?;
         let parsed = source.parse()?;
         let document: Document = parsed.document()?;
+        // A test whose file is not there is planned, such as those of sockets.
+        let folders = [options.data_directory.as_deref(), Some(access::folder(file))];
+        let is_there =
+            |data: &str| folders.iter().flatten().any(|folder| options.store.open(&folder.join(data)).is_ok());
+        let lacking: BTreeSet<String> = (document.test.iter())
+            .filter(|test| test.data.as_deref().is_some_and(|data| !is_there(data)))
+            .map(|test| test.name.clone())
+            .collect();
+        let text = SessionText::new(&source.text, file)?;
+        let planned = ReadOptions { read_data: false, ..options.clone() };
+        let mut stamps = read::session_of(&source, &planned)?.1.files;
+        if lacking.is_empty() {
+            stamps.extend(read::session_of(&source, options)?.1.files);
+        } else if lacking.len() < document.test.len() {
+            let mut present = text.clone();
+            present.keep_tests(&|name| !lacking.contains(name));
+            stamps.extend(read::session_of(&Text::new(file, &present.to_string()), options)?.1.files);
+        }
         let mut existing = BTreeMap::new();
-        for stamp in &sources.files {
+        for stamp in &stamps {
             let contents = options.store.read(&stamp.file).map_err(|cause| unreadable(&stamp.file, &cause))?;
             existing.insert(stamp.file.clone(), contents);
         }
+        let is_new = |name: &String| names.iter().any(|own| own.to_lowercase() == name.to_lowercase());
+        let (imported, awaited): (BTreeSet<String>, BTreeSet<String>) = lacking.into_iter().partition(is_new);
         let of_stamps =
             existing.keys().filter_map(|path: &PathBuf| Some(path.file_name()?.to_string_lossy().to_lowercase()));
-        let of_tests = document.test.iter().filter_map(|test| Some(test.data.as_ref()?.to_lowercase()));
+        let others = document.test.iter().filter(|test| !imported.contains(&test.name));
+        let of_tests = others.filter_map(|test| Some(test.data.as_ref()?.to_lowercase()));
         let taken = of_stamps.chain(of_tests).collect();
         let mut draft = Draft {
             file: file.to_path_buf(),
-            text: sources.text,
+            text,
             existing,
             taken,
+            awaited,
             new: Vec::new(),
             states_layout: document.format.is_some() || document.columns.is_some(),
             unknown_target: None,
@@ -193,7 +217,7 @@ impl Draft {
         for name in names {
             let same = |test: &&Test| test.name.to_lowercase() == name.to_lowercase();
             match document.test.iter().find(same) {
-                Some(planned) if planned.data.is_none() => {
+                Some(planned) if planned.data.is_none() || imported.contains(&planned.name) => {
                     if like.is_some() || !set.entries().is_empty() {
                         let message =
                             format!("test \"{}\" is planned in the session with its own set-up", planned.name);
@@ -266,12 +290,16 @@ impl Draft {
         read::session_of(&Text::new(&self.file, &self.text.to_string()), &options).map(|(session, _)| session)
     }
 
-    /// The session with its readings.
+    /// The session with its readings, without the tests whose files are not there yet.
     ///
     /// # Errors
     /// If the readings cannot be used.
     pub fn read(&self) -> Result<Session, ModelError> {
-        read::session_of(&Text::new(&self.file, &self.text.to_string()), &self.options()).map(|(session, _)| session)
+        let mut text = self.text.clone();
+        if !self.awaited.is_empty() {
+            text.keep_tests(&|name| !self.awaited.contains(name));
+        }
+        read::session_of(&Text::new(&self.file, &text.to_string()), &self.options()).map(|(session, _)| session)
     }
 
     /// As [`Draft::read`], with one test. The files of the others need not be known yet.
@@ -280,7 +308,7 @@ impl Draft {
     /// If the readings cannot be used.
     pub fn read_alone(&self, test: &str) -> Result<Session, ModelError> {
         let mut text = self.text.clone();
-        text.keep_test(test);
+        text.keep_tests(&|name| name == test);
         read::session_of(&Text::new(&self.file, &text.to_string()), &self.options()).map(|(session, _)| session)
     }
 
