@@ -1,15 +1,14 @@
 //! `abbe new`: create a machine and a session from a template, a structural code, or the file of a robot.
 
+mod check;
 mod robot;
 mod sizes;
 mod templates;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use abbe::model::ModelError;
-use abbe::model::files::store::Store;
-use abbe::model::files::{ReadOptions, session_with_sources, template};
-use abbe::plan::{PlanOptions, analyse};
+use abbe::model::files::template;
 use clap::Args;
 
 use self::sizes::SizeArguments;
@@ -70,7 +69,7 @@ pub fn run(arguments: &NewArguments, quiet: bool) -> Result<(), Failure> {
     };
     // A template is read and planned by the tests of the project; some need data that are not here.
     if arguments.template.is_none() {
-        check(folder, &files)?;
+        check::planned(folder, &files)?;
     }
     folder::write(folder, &files, arguments.force, |_| Ok(()))?;
     if quiet {
@@ -80,24 +79,6 @@ pub fn run(arguments: &NewArguments, quiet: bool) -> Result<(), Failure> {
         say!("{}", folder.join(name).display());
     }
     Ok(())
-}
-
-/// Refuses files that `abbe plan` would refuse, before they are written. They are in memory, by their final paths. Sockets
-/// have no poses yet: their plan is read alone.
-fn check(folder: &Path, files: &[NewFile]) -> Result<(), Failure> {
-    let in_memory = files.iter().map(|(name, text)| (folder.join(name), text.clone().into_bytes()));
-    let options = ReadOptions { store: Store::in_memory(in_memory), read_data: false, ..ReadOptions::default() };
-    let refused = |error: &dyn std::error::Error, help: Option<&str>| {
-        let help = help.map_or(String::new(), |help| format!("; {help}"));
-        Failure::Other(format!("nothing is written, because `abbe plan` would refuse the session: {error}{help}"))
-    };
-    let (session, _) =
-        session_with_sources(&folder.join("plan.toml"), &options).map_err(|error| refused(&error, error.help()))?;
-    if session.tests.iter().all(|test| test.motion.is_none()) {
-        return Ok(());
-    }
-    let options = PlanOptions { effects: false, ..PlanOptions::default() };
-    analyse(&session, &options).map(|_| ()).map_err(|error| refused(&error, None))
 }
 
 /// Lists the templates, one per line.

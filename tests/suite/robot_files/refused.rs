@@ -89,3 +89,16 @@ fn a_table_that_contradicts_itself_is_refused_by_name_and_line() {
         assert!(!out.exists(), "{table}: nothing is written");
     }
 }
+
+/// Sockets that a robot cannot reach in several poses have no plan.
+#[test]
+fn sockets_beyond_the_reach_of_poses_are_refused() {
+    let place = tempfile::tempdir().unwrap();
+    let (file, out) = (place.path().join("robot.csv"), place.path().join("out"));
+    std::fs::write(&file, "a_mm,alpha_deg,d_mm,theta_deg\n0,90,162.5,0\n-425,0,0,0\n").unwrap();
+    let asked = ["new", text(&out), "--from-dh", text(&file), "--convention", "standard", "--measured-by", "sockets"];
+    let output = abbe(&asked);
+    let found = String::from_utf8_lossy(&output.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(!output.status.success() && found.contains("nothing is written, because `abbe plan` would refuse"), "{found}");
+    assert!(!out.exists());
+}

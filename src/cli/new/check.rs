@@ -1,0 +1,44 @@
+//! What `abbe new` writes can be planned.
+
+use std::path::Path;
+
+use abbe::model::files::store::Store;
+use abbe::model::files::{ReadOptions, session_with_sources};
+use abbe::plan::design::Goal;
+use abbe::plan::poses::candidates::PoseLimits;
+use abbe::plan::poses::{PoseOptions, measured_by, select};
+use abbe::plan::{PlanOptions, analyse};
+
+use crate::cli::failure::Failure;
+use crate::cli::folder::NewFile;
+
+/// Poses in sockets that have to be possible, and the candidates among which they are looked for.
+const CHECKED_POSES: usize = 40;
+const CHECKED_CANDIDATES: usize = 200;
+
+/// Refuses files that `abbe plan` would refuse, before they are written. They are in memory, by their final paths. For sockets,
+/// which have no poses yet, some are chosen.
+pub fn planned(folder: &Path, files: &[NewFile]) -> Result<(), Failure> {
+    let in_memory = files.iter().map(|(name, text)| (folder.join(name), text.clone().into_bytes()));
+    let options = ReadOptions { store: Store::in_memory(in_memory), read_data: false, ..ReadOptions::default() };
+    let refused = |error: &dyn std::error::Error, help: Option<&str>| {
+        let help = help.map_or(String::new(), |help| format!("; {help}"));
+        Failure::Other(format!("nothing is written, because `abbe plan` would refuse the session: {error}{help}"))
+    };
+    let (session, _) =
+        session_with_sources(&folder.join("plan.toml"), &options).map_err(|error| refused(&error, error.help()))?;
+    let planned = if session.tests.iter().any(|test| test.motion.is_none()) {
+        let options = PoseOptions {
+            poses: CHECKED_POSES,
+            goal: Goal::WorstUncertainty,
+            candidates: CHECKED_CANDIDATES,
+            seed: 1,
+            limits: PoseLimits::default(),
+            noise_mm: None,
+        };
+        select(&session, &measured_by(&session, None), &options).map(|_| ())
+    } else {
+        analyse(&session, &PlanOptions { effects: false, ..PlanOptions::default() }).map(|_| ())
+    };
+    planned.map_err(|error| refused(&error, None))
+}
