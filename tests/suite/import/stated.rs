@@ -65,7 +65,7 @@ fn a_hint_stands_whatever_the_header_says() {
     for (hint, expected) in [
         ("lenght_mm=L", "`lenght_mm` is no column of a test with this instrument"),
         ("lenght_mm=L", "did you mean `length_mm`?"),
-        ("length_deg=L", "has a unit of angle, and the column holds a length"),
+        ("length_deg=L", "the unit of `length_deg` is one of angle, and the column holds a length"),
         ("length_mm=Long", "said to be column `Long`, which the file does not have"),
     ] {
         let (session, _, said) = imported(place.path(), "kugelstab.csv", &file, PLAN, &["--column", hint]);

@@ -154,8 +154,8 @@ fn meaning(own: &str, grid: &Grid, column: usize, expected: &Expected<'_>) -> Re
         )),
         Some((meaning, dimension, unit)) if unit.dimension() == dimension => Ok((meaning, Some(unit))),
         Some((_, dimension, unit)) => Err((
-            format!("`{own}` has a unit of {}, and the column holds a {dimension}", unit.dimension()),
-            format!("end our name with a unit of {dimension}"),
+            format!("the unit of `{own}` is one of {}, and the column holds a {dimension}", unit.dimension()),
+            format!("end our name with one of {dimension}"),
         )),
         None => {
             let known = known(expected);
