@@ -66,7 +66,7 @@ fn a_table_that_contradicts_itself_is_refused_by_name_and_line() {
     let place = tempfile::tempdir().unwrap();
     let out = place.path().join("out");
     for (table, expected) in [
-        ("a_deg,alpha_deg,d_mm,theta_deg\n0,90,100,q1\n", "column `a_deg` has a unit of angle"),
+        ("a_deg,alpha_deg,d_mm,theta_deg\n0,90,100,q1\n", "the unit of column `a_deg` is one of angle"),
         ("a_mm,alpha_grad,d_mm,theta_deg\n0,90,100,q1\n", "grad may be a degree or a gon"),
         ("a_mm,alpha_deg,d_mm,theta_deg,a_m\n0,90,100,q1,0\n", "columns `a_mm` and `a_m` are both `a`"),
         ("a_mm,alpha_deg,d_mm,theta_deg\n0,q1,100,0\n", "robot.csv:2: `q1` in column `alpha` moves"),
@@ -99,6 +99,9 @@ fn sockets_beyond_the_reach_of_poses_are_refused() {
     let asked = ["new", text(&out), "--from-dh", text(&file), "--convention", "standard", "--measured-by", "sockets"];
     let output = abbe(&asked);
     let found = String::from_utf8_lossy(&output.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(!output.status.success() && found.contains("nothing is written, because `abbe plan` would refuse"), "{found}");
+    assert!(
+        !output.status.success() && found.contains("nothing is written, because `abbe plan` would refuse"),
+        "{found}"
+    );
     assert!(!out.exists());
 }

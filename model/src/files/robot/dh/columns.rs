@@ -79,8 +79,8 @@ impl Columns {
                 Some(unit) if !expected.is_empty() && !expected.contains(&unit.dimension()) => {
                     let expected: Vec<String> = expected.iter().map(ToString::to_string).collect();
                     return Err((
-                        format!("column `{name}` has a unit of {}", unit.dimension()),
-                        format!("state a unit of {}", expected.join(" or ")),
+                        format!("the unit of column `{name}` is one of {}", unit.dimension()),
+                        format!("state one of {}", expected.join(" or ")),
                     ));
                 }
                 _ => {}

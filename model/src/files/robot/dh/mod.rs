@@ -81,7 +81,7 @@ pub struct Table {
 /// Reads a table.
 ///
 /// # Errors
-/// If a column is missing, stands twice or has a unit of something else; if a cell is no value, or the joint moves a
+/// If a column is missing, stands twice or has the unit of something else; if a cell is no value, or the joint moves a
 /// parameter that no joint moves: with the line and what to do.
 pub fn read(source: &Source, convention: Convention) -> Result<Table, ModelError> {
     let lines: Vec<(usize, &str)> = (source.text.lines().enumerate())
