@@ -39,13 +39,7 @@ pub struct CandidateArguments {
     /// Shares of the range of a sweep to try, about its middle [default: 1; with --setup-min or --test-min 1,0.5].
     ///
     /// Example: --improve 1 --sweep-shares 1,0.5,0.25
-    #[arg(
-        long = "sweep-shares",
-        value_name = "SHARE,…",
-        value_delimiter = ',',
-        requires = "next_test",
-        allow_hyphen_values = true
-    )]
+    #[arg(long = "sweep-shares", value_name = "SHARE,…", value_delimiter = ',', requires = "next_test")]
     ranges: Option<Vec<f64>>,
     /// Directions to try, `both` for there and back [default: both; with --setup-min or --test-min both,one].
     ///
