@@ -13,6 +13,7 @@
 //! | results as JSON documents, parameters of equations by name | [`document`], [`equation`] |
 //! | exports of a model | [`exports`] |
 //! | foreign files of readings as a session | [`import`] |
+//! | a fit as a digital calibration certificate | [`certificate`] |
 //! | many sessions of many machines | [`fleet`] |
 //!
 //! The change that a simulated error of 10 µm makes is what the equation of the same test says, −R·sin C/L₀:
@@ -54,6 +55,7 @@ pub use abbe_identify as identify;
 pub use abbe_model as model;
 pub use abbe_plan as plan;
 
+pub mod certificate;
 pub mod document;
 pub mod equation;
 pub mod exports;

@@ -16,6 +16,7 @@ use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde_json::{Value, json};
 
+use crate::certificate::Certificate;
 use crate::document::{
     Document, StatedComparison, StatedFit, StatedHistory, StatedPlan, StatedTrace, StatedValidation,
 };
@@ -69,6 +70,9 @@ pub const SCHEMAS: &[FileSchema] = &[
         schema::of::<error_functions::File>("Abbe file of error functions")
     }),
     file("study-file", "The study file of `abbe study`, as JSON", || schema::of::<StudyFile>("Abbe study file")),
+    file("certificate", "`certificate.toml` of `abbe fit --dcc`, as JSON", || {
+        schema::of::<Certificate>("Abbe file of a certificate")
+    }),
     file("record", "The result of a session in the folder of `abbe run`", plain::<Record>),
 ];
 

@@ -11,8 +11,10 @@ use super::forms::FormArguments;
 use super::method::{self, Method};
 use super::results::Read;
 use super::save::SaveArguments;
-use super::{CommonArguments, SessionArguments, compensation, monte_carlo, output, read_session, repeated};
-use crate::report::{self, readings};
+use super::{
+    CommonArguments, SessionArguments, certificate, compensation, monte_carlo, read_session, readings, repeated,
+};
+use crate::report;
 
 /// Examples of `abbe fit`.
 pub const HELP: &str = include_str!("help/fit.txt");
@@ -39,18 +41,10 @@ pub struct FitArguments {
     /// Example: --method two-plane
     #[arg(long, value_enum, default_value = "full")]
     method: Method,
-    /// Write readings and residuals of an R-test by direction: of the sensors, along X, Y and Z, radial, tangential and
-    /// axial.
-    ///
-    /// Example: --views views.csv
-    #[arg(long, value_name = "FILE.csv")]
-    views: Option<PathBuf>,
-    /// Write reading and residual of every reading as CSV: test, run, line, axis positions, reading, residual in µm,
-    /// residual over the noise standard deviation, and whether the reading counts or is an outlier (full fit only).
-    ///
-    /// Example: --residuals residuals.csv
-    #[arg(long, value_name = "FILE.csv")]
-    residuals: Option<PathBuf>,
+    #[command(flatten)]
+    readings: readings::ReadingArguments,
+    #[command(flatten)]
+    certificate: certificate::CertificateArguments,
     #[command(flatten)]
     draws: monte_carlo::DrawArguments,
     /// Compare with further sessions of the same plan: standard uncertainty from the scatter of the fits (Type A)
@@ -61,7 +55,7 @@ pub struct FitArguments {
         long,
         value_name = "SESSION",
         num_args = 1..,
-        conflicts_with_all = ["monte_carlo", "views", "residuals", "compensation", "save", "base", "terms"]
+        conflicts_with_all = ["monte_carlo", "views", "residuals", "compensation", "save", "base", "terms", "dcc"]
     )]
     repeat: Vec<PathBuf>,
     #[command(flatten)]
@@ -72,8 +66,10 @@ pub struct FitArguments {
 pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     arguments.compensation.check()?;
     let common = &arguments.common;
-    let others = [arguments.views.as_ref(), arguments.residuals.as_ref(), arguments.save.file()];
+    let [views, residuals] = arguments.readings.files();
+    let others = [views, residuals, arguments.save.file(), arguments.certificate.file()];
     let outputs = common.output.prepared(&others)?;
+    let certificate = arguments.certificate.read(&arguments.session.session)?;
     if !arguments.repeat.is_empty() {
         if arguments.method != Method::Full {
             let message = "`--repeat` compares full fits: leave out `--method` or `--repeat`";
@@ -86,29 +82,28 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     let read = Read::session(&session, &sources, common.seed);
     if arguments.method != Method::Full {
         method::refuse([
-            ("--views", arguments.views.is_some()),
-            ("--residuals", arguments.residuals.is_some()),
+            ("--views", views.is_some()),
+            ("--residuals", residuals.is_some()),
             ("--compensation", arguments.compensation.wanted()),
             ("--base", arguments.forms.base),
             ("--terms", arguments.forms.terms.is_some()),
             ("--save", arguments.save.file().is_some()),
+            ("--dcc", arguments.certificate.file().is_some()),
         ])?;
         return arguments.method.run(&session, &arguments.draws, (common, &outputs), &read);
     }
     let draws = arguments.draws.draws(common.seed)?;
     let (problem, found) = fit::prepare(&session, common.seed)?;
-    if let Some(path) = &arguments.views {
-        output::write_whole(path, &output::csv(&readings::by_direction(&problem, &found)?)?)?;
-    }
-    if let Some(path) = &arguments.residuals {
-        output::write_whole(path, &output::csv(&readings::residuals(&problem, &found))?)?;
-    }
+    arguments.readings.write(&problem, &found)?;
     let mut result = fit::report(&problem, &found)?;
     arguments.session.refuse_implausible(&result.plausibility)?;
     if let Some(draws) = &draws {
         propagation::add_monte_carlo(&problem, &found, draws, &mut result)?;
     }
     arguments.forms.add(&problem, &found, &mut result)?;
+    if let Some(certificate) = &certificate {
+        certificate.write(&problem, &result)?;
+    }
     let commands = arguments.session.commands();
     let stated = StatedFit::of_fit(&problem, &result);
     let report = report::fit::report(&problem, &found, &stated, &commands, common.output.figures())?;

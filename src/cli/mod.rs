@@ -5,6 +5,7 @@ macro_rules! say {
     ($($text:tt)*) => { $crate::cli::output::line(format_args!($($text)*)) };
 }
 
+mod certificate;
 mod compare;
 mod compensate;
 mod compensation;
@@ -29,6 +30,7 @@ mod next_session;
 mod output;
 mod paper;
 mod plan;
+mod readings;
 mod repeated;
 mod results;
 mod run;
@@ -57,10 +59,9 @@ use message::{Kind, tell};
 use output::Outputs;
 use results::OutputArguments;
 
-/// Identify geometric errors of machine tools, robots and other serial chains: identifiability, estimates with
-/// uncertainties, unmodelled effects.
+/// Geometric errors of machine tools, robots and other serial chains
 #[derive(Parser)]
-#[command(name = "abbe", version, max_term_width = 110, after_help = EXAMPLES)]
+#[command(name = "abbe", version, max_term_width = 110, help_template = template(), after_help = EXAMPLES)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -69,7 +70,7 @@ struct Arguments {
     quiet: bool,
 }
 
-const EXAMPLES: &str = "Example, from a template to a found effect:
+const EXAMPLES: &str = "From a template to a found effect (`abbe COMMAND --help` has more):
   abbe new my --template hermle-c600u
   abbe plan my/chapter5.toml
   abbe simulate my/chapter5.toml --out my/run1 --error EY0A=35.3um --error EB0A=-1.29arcsec
@@ -77,19 +78,30 @@ const EXAMPLES: &str = "Example, from a template to a found effect:
   abbe trace my/run1/session.toml --only EZC --only EAC
   abbe equation my/chapter5.toml --test C150 --order first
 
-`abbe new` lists the templates. `abbe new mine --from-code \"[wCAbYXZt]\"` creates any other machine. `abbe COMMAND --help` has \
-examples of each command.
+Results go to standard output, progress and messages to standard error; FILE `-` is standard output.
+Exit status: 0 done; 1 unusable input; 2 wrong command line; 130, 143 ended by a signal.";
 
-Output:
-  Results go to standard output. Progress, warnings and errors go to standard error. FILE `-` is
-  standard output: `--json -` writes JSON there and nothing else. `--quiet` suppresses tables and
-  progress, not warnings. `--all` lists everything that the first screen of a result folds.
+/// The commands by task.
+const TASKS: [(&str, &[&str]); 5] = [
+    ("Prepare", &["new", "import", "plan", "simulate", "sheet", "nc"]),
+    ("Analyse", &["fit", "trace", "validate", "compare"]),
+    ("Correct", &["compensate", "volumetric", "export"]),
+    ("Many machines", &["run", "history", "study"]),
+    ("Write", &["equation", "paper", "schema", "completions"]),
+];
 
-Exit status:
-  0    done, whatever the verdict
-  1    the input cannot be used; the message names the file, the line and what to do
-  2    the command line is wrong
-  130  interrupted (Ctrl-C); 143 by SIGTERM";
+/// The help of `abbe` with the commands by task: clap lists them in one.
+fn template() -> String {
+    let all = Command::augment_subcommands(clap::Command::new("abbe"));
+    let line = |name: &&str| {
+        let about =
+            all.find_subcommand(name).and_then(clap::Command::get_about).map_or(String::new(), ToString::to_string);
+        format!("  {name:<13}{about}\n")
+    };
+    let tasks = TASKS.iter().map(|(task, names)| format!("{task}:\n{}\n", names.iter().map(line).collect::<String>()));
+    let tasks: String = tasks.collect();
+    format!("{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{tasks}Options:\n{{options}}{{after-help}}\n")
+}
 
 const COMPLETIONS: &str = "Example:
   abbe completions bash
@@ -99,61 +111,61 @@ Save the output where the shell finds it: ~/.local/share/bash-completion/complet
 
 #[derive(Subcommand)]
 enum Command {
-    /// Print the closed-form equation of the readings of a test.
+    /// Print the closed-form equation of a test.
     #[command(after_help = equation::HELP)]
     Equation(equation::EquationArguments),
-    /// Print the equation of the volumetric error, or map and compensate it over the workspace.
+    /// Print or map the volumetric error, and compensate it.
     #[command(after_help = volumetric::HELP)]
     Volumetric(volumetric::VolumetricArguments),
-    /// State the differences between sessions or models of one machine, with their significance.
+    /// State what differs between sessions or models of one machine.
     #[command(after_help = compare::HELP)]
     Compare(compare::CompareArguments),
-    /// Correct commanded positions or poses with an identified model.
+    /// Correct commanded positions or poses with a model.
     #[command(after_help = compensate::HELP)]
     Compensate(compensate::CompensateArguments),
-    /// Export the calibrated machine: URDF, Denavit-Hartenberg parameters, kinematic parameters of controls.
+    /// Export the calibrated machine for controls and other programs.
     #[command(after_help = export::HELP)]
     Export(export::ExportArguments),
-    /// Write the NC programs of the planned tests.
+    /// Write the NC programs of planned tests.
     #[command(after_help = nc::HELP)]
     Nc(nc::NcArguments),
     /// Estimate errors from readings, with uncertainties.
     #[command(after_help = fit::HELP)]
     Fit(fit::FitArguments),
-    /// Write text, tables and figures of sessions for LaTeX and Typst.
+    /// Write text, tables and figures for LaTeX and Typst.
     #[command(after_help = paper::HELP)]
     Paper(paper::PaperArguments),
-    /// Analyse identifiability and predicted uncertainty of planned tests.
+    /// State what planned tests identify, how surely, and what improves.
     #[command(after_help = plan::HELP)]
     Plan(Box<plan::PlanArguments>),
-    /// Create a machine and a session, from a template or a structural code.
+    /// Create a machine and a session.
     #[command(after_help = new::HELP)]
     New(new::NewArguments),
-    /// Generate the shell completion script.
+    /// Write the completions of a shell.
     #[command(after_help = COMPLETIONS)]
     Completions {
         /// The shell.
         shell: clap_complete::Shell,
     },
-    /// Analyse many sessions and keep the results: a second run computes only what is missing or changed.
+    /// Analyse many sessions; a second run computes what has changed.
     #[command(after_help = run::HELP)]
     Run(run::RunArguments),
-    /// Read foreign files of readings: guess their layout, columns and units, and write a session.
+    /// Turn foreign files of readings into a session.
     #[command(after_help = import::HELP)]
     Import(import::ImportArguments),
-    /// Show the parameters of machines over time: drifts, steps, control charts, the next check.
+    /// Show machines over time: drifts, steps, the next check.
     #[command(after_help = history::HELP)]
     History(history::HistoryArguments),
     /// Print the JSON Schema of a file or a result.
     #[command(after_help = schema::HELP)]
     Schema(schema::SchemaArguments),
-    /// Write set-up sheets of the planned tests, to be printed.
+    /// Write set-up sheets of planned tests.
     #[command(after_help = sheet::HELP)]
     Sheet(sheet::SheetArguments),
     /// Simulate readings of planned tests with given errors.
     #[command(after_help = simulate::HELP)]
     Simulate(Box<simulate::SimulateArguments>),
-    /// Simulate and analyse many sessions: power, false claims, coverage, ranking of set-ups.
+    /// Simulate many sessions: power, false claims, ranking of set-ups.
     #[command(after_help = study::HELP)]
     Study(study::StudyArguments),
     /// Find the unmodelled effect behind the residual.

@@ -44,20 +44,38 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
+/// The commands that the help of `abbe` lists, each with its line.
+fn listed(whole: &str) -> Vec<(&str, &str)> {
+    let tasks = whole.lines().skip_while(|line| !line.starts_with("Usage:")).skip(1);
+    let tasks = tasks.take_while(|line| !line.starts_with("Options:"));
+    tasks.filter_map(|line| line.strip_prefix("  ")?.split_once(' ')).collect()
+}
+
+#[test]
+fn the_help_lists_every_command_once_on_one_screen() {
+    let whole = String::from_utf8(abbe(&["--help"]).stdout).unwrap();
+    assert!(whole.lines().count() <= 50, "{} lines:\n{whole}", whole.lines().count());
+    assert!(whole.lines().all(|line| line.chars().count() <= 110), "{whole}");
+    let mut known: Vec<&str> = listed(&whole).iter().map(|(command, _)| *command).collect();
+    assert!(listed(&whole).iter().all(|(_, about)| about.trim().len() > 20), "{whole}");
+    // The completions name all commands, by clap itself.
+    let script = String::from_utf8(abbe(&["completions", "fish"]).stdout).unwrap();
+    let mut all: Vec<&str> = script
+        .lines()
+        .filter(|line| line.contains("__fish_abbe_needs_command") && line.contains(" -a \""))
+        .filter_map(|line| line.split(" -a \"").nth(1)?.split('"').next())
+        .filter(|command| *command != "help")
+        .collect();
+    known.sort_unstable();
+    all.sort_unstable();
+    assert_eq!(known, all);
+}
+
 #[test]
 fn every_example_of_the_help_runs() {
     let help = |arguments: &[&str]| String::from_utf8(abbe(arguments).stdout).unwrap();
     let whole = help(&["--help"]);
-    let commands: Vec<&str> = whole
-        .lines()
-        .skip_while(|line| !line.starts_with("Commands:"))
-        .skip(1)
-        .take_while(|line| !line.is_empty())
-        .filter_map(|line| line.strip_prefix("  "))
-        .filter(|line| !line.starts_with(' '))
-        .filter_map(|line| line.split_whitespace().next())
-        .filter(|command| *command != "help")
-        .collect();
+    let commands: Vec<&str> = listed(&whole).into_iter().map(|(command, _)| command).collect();
     assert!(commands.len() >= 9, "{commands:?}");
     let mut lines = examples(&whole);
     assert!(lines.len() >= 6, "{whole}");
@@ -86,6 +104,7 @@ fn every_example_of_the_help_runs() {
     std::fs::copy(workspace().join("tests/robots/ur5e.urdf"), folder.path().join("robot.urdf")).unwrap();
     std::fs::write(folder.path().join("robot.csv"), "a_mm,alpha_deg,d_mm,theta_deg\n0,90,162.5,0\n-425,0,0,0\n")
         .unwrap();
+    std::fs::write(folder.path().join("laboratory.toml"), abbe::certificate::EXAMPLE).unwrap();
     for line in lines {
         let run = Command::new(env!("CARGO_BIN_EXE_abbe"))
             .args(&words(&line)[1..])

@@ -8,10 +8,11 @@ use serde_json::Value;
 use super::json_page::{self, kept_current, kind, one_line, schema, unit};
 
 /// The files, and the subject of `abbe schema` for each.
-const FILES: [(&str, &str); 3] = [
+const FILES: [(&str, &str); 4] = [
     ("Sessions and machines", "session"),
     ("Error functions of abbe volumetric", "functions"),
     ("Studies of abbe study", "study-file"),
+    ("Certificates of abbe fit --dcc", "certificate"),
 ];
 
 const HEAD: &str = "# Keys of files

@@ -3,6 +3,7 @@
 mod another_build;
 mod bad_input;
 mod bodies;
+mod certificate;
 mod channels;
 mod circular;
 mod claims;

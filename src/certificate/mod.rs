@@ -1,0 +1,327 @@
+//! Digital calibration certificates: the estimates of a fit, with what the laboratory states, as the XML of PTB's schema.
+//!
+//! The laboratory, the customer and the persons stand in a file of their own, `certificate.toml` ([`Certificate`]); machine,
+//! dates and figures come from the session and its fit. Schema: DCC 3.1.2 with D-SI 2.1.0 (<https://ptb.de/dcc>).
+
+mod write;
+
+use abbe_identify::IdentifyError;
+use abbe_identify::parameters::Role;
+use abbe_identify::problem::Problem;
+use abbe_identify::results::FitResult;
+use abbe_model::ModelError;
+use abbe_model::document::fault::Fault;
+use abbe_model::files::Source;
+use abbe_model::files::read::lowered;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use toml::value::Datetime;
+
+/// The administrative data of a certificate: what no measurement tells.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Certificate {
+    /// Number, dates and place.
+    pub certificate: Head,
+    /// What is calibrated; by default the machine of the session with the `serial_number` of `[about]`.
+    #[serde(default)]
+    pub item: Item,
+    /// The calibration laboratory.
+    pub laboratory: Organisation,
+    /// The customer.
+    pub customer: Organisation,
+    /// The persons who are responsible for the certificate.
+    pub person: Vec<Person>,
+    /// The measuring equipment.
+    #[serde(default)]
+    pub equipment: Vec<Item>,
+    /// The conditions during the measurement.
+    #[serde(default)]
+    pub conditions: Conditions,
+}
+
+/// Number, dates and place of a certificate.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename = "certificate_head", deny_unknown_fields)]
+pub struct Head {
+    /// The number of the certificate, which no other has.
+    pub id: String,
+    /// Country, two letters of ISO 3166-1: `DE`.
+    pub country: String,
+    /// Language of the texts of the certificate that the laboratory states, two letters of ISO 639-1; default `en`.
+    pub language: Option<String>,
+    /// First day of the measurement, `2026-11-23`; by default the `date` of `[about]` in the session.
+    pub begin: Option<String>,
+    /// Last day of the measurement; by default the first.
+    pub end: Option<String>,
+    /// Day of issue.
+    pub issued: Option<String>,
+    /// Where the measurement was made.
+    #[serde(default)]
+    pub place: Place,
+}
+
+/// Where a measurement is made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename = "certificate_place", rename_all = "kebab-case")]
+pub enum Place {
+    /// At the customer's.
+    #[default]
+    Customer,
+    /// In the laboratory.
+    Laboratory,
+    /// At a branch of the laboratory.
+    LaboratoryBranch,
+    /// At a branch of the customer.
+    CustomerBranch,
+    /// Elsewhere.
+    Other,
+}
+
+/// A device: what is calibrated, or what measures.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename = "certificate_item", deny_unknown_fields)]
+pub struct Item {
+    /// Name.
+    pub name: Option<String>,
+    /// Manufacturer.
+    pub manufacturer: Option<String>,
+    /// Model.
+    pub model: Option<String>,
+    /// Serial number.
+    pub serial_number: Option<String>,
+    /// The certificate of the equipment.
+    pub certificate: Option<String>,
+}
+
+/// An organisation and where it is.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename = "certificate_organisation", deny_unknown_fields)]
+pub struct Organisation {
+    /// Name.
+    pub name: String,
+    /// Street with number.
+    pub street: Option<String>,
+    /// Postal code.
+    pub post_code: Option<String>,
+    /// City.
+    pub city: String,
+    /// Country, two letters of ISO 3166-1.
+    pub country: Option<String>,
+    /// Address for electronic mail.
+    pub email: Option<String>,
+    /// Telephone.
+    pub phone: Option<String>,
+    /// Code of the accreditation, of a laboratory.
+    pub code: Option<String>,
+}
+
+/// A person who is responsible for a certificate.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename = "certificate_person", deny_unknown_fields)]
+pub struct Person {
+    /// Name.
+    pub name: String,
+    /// Task.
+    pub role: Option<String>,
+    /// Whether the person signs.
+    #[serde(default)]
+    pub signs: bool,
+}
+
+/// The conditions during a measurement.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename = "certificate_conditions", deny_unknown_fields)]
+pub struct Conditions {
+    /// Lowest and highest temperature of the air, °C.
+    #[schemars(extend("minItems" = 2, "maxItems" = 2))]
+    pub temperature_c: Option<Vec<f64>>,
+}
+
+/// An example of the file, for messages and the manual.
+pub const EXAMPLE: &str = r#"[certificate]
+id = "2026-0042"
+country = "DE"
+begin = "2026-11-23"
+
+[item]
+manufacturer = "Hermle"
+model = "C 600 U"
+serial_number = "17-331"
+
+[laboratory]
+name = "Example Metrology"
+street = "Main Street 1"
+post_code = "70173"
+city = "Stuttgart"
+country = "DE"
+
+[customer]
+name = "Example Aerospace"
+city = "Ulm"
+
+[[person]]
+name = "A. Example"
+role = "head of the laboratory"
+signs = true
+
+[[equipment]]
+name = "ball bar"
+serial_number = "B 1234"
+certificate = "2026-0007"
+
+[conditions]
+temperature_c = [19.6, 20.3]
+"#;
+
+/// The administrative data of a file.
+///
+/// # Errors
+/// With file, line and key: a key that is unknown or absent, an empty text, a country or language that is no code of two
+/// letters, a day that is none, an end before its begin.
+pub fn read(source: &Source) -> Result<Certificate, ModelError> {
+    lowered(source, |certificate: &Certificate| {
+        check(certificate)?;
+        Ok(certificate.clone())
+    })
+}
+
+/// Refuses what the schema of certificates does not permit.
+fn check(certificate: &Certificate) -> Result<(), Fault> {
+    let head = &certificate.certificate;
+    let of_head = |fault: Fault| fault.at("certificate");
+    texts([("id", Some(&head.id))]).map_err(of_head)?;
+    code("country", &head.country, char::is_ascii_uppercase).map_err(of_head)?;
+    if let Some(language) = &head.language {
+        code("language", language, char::is_ascii_lowercase).map_err(of_head)?;
+    }
+    for (key, day) in [("begin", &head.begin), ("end", &head.end), ("issued", &head.issued)] {
+        if day.as_ref().is_some_and(|day| !is_day(day)) {
+            return Err(of_head(Fault::unexpected("a day: \"2026-11-23\"").at(key)));
+        }
+    }
+    // Days of this form are in the order of their texts.
+    if let (Some(begin), Some(end)) = (&head.begin, &head.end)
+        && end < begin
+    {
+        return Err(of_head(Fault::is("before `begin`").at("end")));
+    }
+    for (key, organisation) in [("laboratory", &certificate.laboratory), ("customer", &certificate.customer)] {
+        let Organisation { name, street, post_code, city, country, email, phone, code: own } = organisation;
+        let stated = [
+            ("name", Some(name)),
+            ("street", street.as_ref()),
+            ("post_code", post_code.as_ref()),
+            ("city", Some(city)),
+            ("email", email.as_ref()),
+            ("phone", phone.as_ref()),
+            ("code", own.as_ref()),
+        ];
+        texts(stated).map_err(|fault| fault.at(key))?;
+        if let Some(country) = country {
+            code("country", country, char::is_ascii_uppercase).map_err(|fault| fault.at(key))?;
+        }
+    }
+    item(&certificate.item).map_err(|fault| fault.at("item"))?;
+    for (number, equipment) in certificate.equipment.iter().enumerate() {
+        let named =
+            if equipment.name.is_some() { Ok(()) } else { Err(Fault::missing("name", "the name of the device")) };
+        named.and_then(|()| item(equipment)).map_err(|fault| fault.at_item(number).at("equipment"))?;
+    }
+    if certificate.person.is_empty() {
+        return Err(Fault::missing("person", "who is responsible for the certificate: `[[person]]` with `name`"));
+    }
+    for (number, person) in certificate.person.iter().enumerate() {
+        texts([("name", Some(&person.name)), ("role", person.role.as_ref())])
+            .map_err(|fault| fault.at_item(number).at("person"))?;
+    }
+    match certificate.conditions.temperature_c.as_deref() {
+        None => Ok(()),
+        Some([low, high]) if low.is_finite() && high.is_finite() && low <= high => Ok(()),
+        Some(_) => Err(Fault::unexpected("the lowest and the highest temperature: [19.6, 20.3]")
+            .at("temperature_c")
+            .at("conditions")),
+    }
+}
+
+fn item(item: &Item) -> Result<(), Fault> {
+    texts([
+        ("name", item.name.as_ref()),
+        ("manufacturer", item.manufacturer.as_ref()),
+        ("model", item.model.as_ref()),
+        ("serial_number", item.serial_number.as_ref()),
+        ("certificate", item.certificate.as_ref()),
+    ])
+}
+
+/// Refuses texts that are empty, have blanks at an end or characters that XML does not permit.
+fn texts<'t>(stated: impl IntoIterator<Item = (&'static str, Option<&'t String>)>) -> Result<(), Fault> {
+    for (key, text) in stated {
+        if let Some(text) = text
+            && (text.trim() != text || text.is_empty() || text.chars().any(|letter| !is_permitted(letter)))
+        {
+            return Err(Fault::unexpected("a text without blanks at its ends and without control characters").at(key));
+        }
+    }
+    Ok(())
+}
+
+/// Whether XML 1.0 permits the character in a line.
+fn is_permitted(letter: char) -> bool {
+    !letter.is_control() && !matches!(letter, '\u{fffe}' | '\u{ffff}')
+}
+
+fn code(key: &'static str, text: &str, is_letter: fn(&char) -> bool) -> Result<(), Fault> {
+    if text.len() == 2 && text.chars().all(|letter| is_letter(&letter)) {
+        return Ok(());
+    }
+    let example =
+        if key == "language" { "two small letters of ISO 639-1: \"en\"" } else { "two capitals of ISO 3166-1: \"DE\"" };
+    Err(Fault::unexpected(example).at(key))
+}
+
+/// Whether this is a day without a time.
+fn is_day(text: &str) -> bool {
+    text.parse::<Datetime>().is_ok_and(|found| found.date.is_some() && found.time.is_none())
+}
+
+/// The certificate of a fit as XML. The errors of the machine and the coefficients of its effects are its quantities, each
+/// with `U = 2u`. Its text names those that hold with the stated uncertainties of the set-up only, and those that the
+/// readings do not determine.
+///
+/// # Errors
+/// If the model lacks an effect, if no error is determined, or if neither the certificate nor the session states a serial
+/// number and a day.
+pub fn xml(problem: &Problem, result: &FitResult, certificate: &Certificate) -> Result<String, IdentifyError> {
+    let session = &problem.session;
+    let about = |name: &str| session.about.iter().find(|(known, _)| known == name).map(|(_, text)| text.as_str());
+    let head = &certificate.certificate;
+    let lacking = |key: &str, table: &str, note: &str| {
+        IdentifyError::Request(format!(
+            "the certificate has no {key}: state it in `[{table}]` of the file of the certificate, or as `{note}` in `[about]` of the session"
+        ))
+    };
+    let begin = match &head.begin {
+        Some(day) => day.clone(),
+        None => {
+            let day = about("date").and_then(|date| date.get(..10)).filter(|day| is_day(day));
+            day.ok_or_else(|| lacking("day of the measurement (`begin`)", "certificate", "date"))?.to_string()
+        }
+    };
+    let serial_number = match &certificate.item.serial_number {
+        Some(number) => number.clone(),
+        None => about("serial_number").ok_or_else(|| lacking("`serial_number`", "item", "serial_number"))?.to_string(),
+    };
+    if !result.outcome.goodness.quotable {
+        let why = "no estimate may be certified, since the model lacks an effect: its uncertainty does not cover that; `abbe trace` looks for the effect";
+        return Err(IdentifyError::Request(why.into()));
+    }
+    let is_setup = |id: &str| problem.parameters.list.iter().any(|known| known.role == Role::Setup && known.id == id);
+    let certified: Vec<_> = result.parameters.iter().filter(|own| !is_setup(&own.id) && own.u > 0.0).collect();
+    if certified.is_empty() {
+        return Err(IdentifyError::Request("the readings determine no error that could be certified".into()));
+    }
+    let contents = write::Contents { session, result, certificate, begin, serial_number, certified };
+    write::document(&contents)
+        .map_err(|cause| IdentifyError::Request(format!("the certificate cannot be written: {cause}")))
+}

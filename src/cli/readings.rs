@@ -1,0 +1,46 @@
+//! Options of the tables of readings of a fit.
+
+use std::path::PathBuf;
+
+use abbe::identify::fit::Fit;
+use abbe::identify::problem::Problem;
+use clap::Args;
+
+use super::failure::Failure;
+use super::output;
+use crate::report::readings;
+
+/// Options of the tables of readings of a fit.
+#[derive(Args)]
+pub struct ReadingArguments {
+    /// Write readings and residuals of an R-test by direction: of the sensors, along X, Y and Z, radial, tangential and
+    /// axial.
+    ///
+    /// Example: --views views.csv
+    #[arg(long, value_name = "FILE.csv")]
+    views: Option<PathBuf>,
+    /// Write reading and residual of every reading as CSV: test, run, line, axis positions, reading, residual in µm,
+    /// residual over the noise standard deviation, and whether the reading counts or is an outlier (full fit only).
+    ///
+    /// Example: --residuals residuals.csv
+    #[arg(long, value_name = "FILE.csv")]
+    residuals: Option<PathBuf>,
+}
+
+impl ReadingArguments {
+    /// The files of both tables, if they are asked for.
+    pub fn files(&self) -> [Option<&PathBuf>; 2] {
+        [self.views.as_ref(), self.residuals.as_ref()]
+    }
+
+    /// Writes the tables that are asked for.
+    pub fn write(&self, problem: &Problem, fit: &Fit) -> Result<(), Failure> {
+        if let Some(path) = &self.views {
+            output::write_whole(path, &output::csv(&readings::by_direction(problem, fit)?)?)?;
+        }
+        if let Some(path) = &self.residuals {
+            output::write_whole(path, &output::csv(&readings::residuals(problem, fit))?)?;
+        }
+        Ok(())
+    }
+}
