@@ -5,7 +5,7 @@
 
 use abbe_model::chain::{AxisPosition, Machine};
 use abbe_model::driver::{Driver, DriverQuantity, DriverSample, SymbolInput};
-use abbe_model::effect::Effect;
+use abbe_model::effect::{Component, Effect};
 use abbe_model::instrument::InstrumentParameter;
 use abbe_model::scalar::Nominal;
 
@@ -48,10 +48,10 @@ impl<N: Nominal> AxisStates<'_, N> {
         })
     }
 
-    /// The slots that an effect changes (machine errors first), with the factor of its basis function in each slot.
+    /// The slots that a component changes (machine errors first), with the factor of a basis function in each slot.
     pub(crate) fn slots(
         &self,
-        effect: &Effect,
+        component: &Component,
         unknowns: &[InstrumentParameter],
         nominal: &impl Fn(Variable) -> N,
     ) -> Vec<(usize, Option<N>)> {
@@ -60,6 +60,6 @@ impl<N: Nominal> AxisStates<'_, N> {
             moves.then(|| nominal(Variable::Driver(DriverQuantity::rate(&self.machine.axes[axis]))))
         };
         let times = |rate: &N, along: f64| *rate * N::constant(along);
-        effect.component.slots(self.machine, unknowns, rate, times)
+        component.slots(self.machine, unknowns, rate, times)
     }
 }

@@ -75,10 +75,14 @@ impl<'m, S: Scalar> Run<'m, S> {
                         basis.clear();
                         effect.shape.basis(&movement.sample(effect, nominal)?, &mut basis);
                     }
-                    for (slot, factor) in movement.slots(effect, unknowns, nominal) {
-                        let own = basis[coefficient.index];
-                        let share = factor.map_or(own, |factor| own * factor);
-                        slots[slot].push((index, Some(share)));
+                    for part in effect.parts(machine) {
+                        let mut of_part = basis.clone();
+                        part.basis(&mut of_part);
+                        let own = of_part[coefficient.index];
+                        for (slot, factor) in movement.slots(&part.component, unknowns, nominal) {
+                            let share = factor.map_or(own, |factor| own * factor);
+                            slots[slot].push((index, Some(share)));
+                        }
                     }
                 }
                 Variable::Length(_) | Variable::Position { .. } | Variable::Driver(_) => {}

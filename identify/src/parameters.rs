@@ -266,7 +266,18 @@ impl Parameters {
                 largest[k] = column.iter().fold(largest[k], |most, value| most.max(value.abs()));
             }
             let parameters = test.station.kind().unknowns();
-            for (slot, factor) in effect.component.slots_in(&session.machine, parameters, readings) {
+            for (slot, factor, columns) in effect.parts(&session.machine).into_iter().flat_map(|part| {
+                let slots = part.component.slots_in(&session.machine, parameters, readings).into_iter();
+                let of_part = match part.quadrature {
+                    None => columns.clone(),
+                    Some(_) => part
+                        .columns(columns.iter().map(|column| column.to_vec()).collect())
+                        .into_iter()
+                        .map(Arc::new)
+                        .collect(),
+                };
+                slots.map(move |(slot, factor)| (slot, factor, of_part.clone()))
+            }) {
                 if !effective.contains(&slot) {
                     continue;
                 }

@@ -140,6 +140,28 @@ impl Machine {
         .spaced()
     }
 
+    /// The axis that carries another: its neighbour towards the bed. `None` for an axis on the bed.
+    pub fn carrier(&self, axis: usize) -> Option<usize> {
+        if axis < self.workpiece_side {
+            Some(axis + 1).filter(|next| *next < self.workpiece_side)
+        } else {
+            axis.checked_sub(1).filter(|next| *next >= self.workpiece_side)
+        }
+    }
+
+    /// Whether an axis is level at every position of the axes that carry it: at right angles to gravity, while the rotary
+    /// axes below it are along gravity. The elevation of a mount is.
+    pub fn stays_level(&self, axis: usize) -> bool {
+        const LEVEL: f64 = 1e-3;
+        let along = |axis: &usize| {
+            let direction = self.axes[*axis].direction;
+            direction.iter().zip(self.gravity).map(|(a, b)| a * b).sum::<f64>()
+        };
+        let below = std::iter::successors(self.carrier(axis), |axis| self.carrier(*axis));
+        let mut turning = below.filter(|axis| self.axes[*axis].kind == AxisKind::Rotary);
+        along(&axis).abs() < LEVEL && turning.all(|axis| along(&axis).abs() > 1.0 - LEVEL)
+    }
+
     /// The index of an axis in [`Machine::axes`].
     pub fn axis_index(&self, name: &str) -> Option<usize> {
         self.axes.iter().position(|axis| axis.name == name)

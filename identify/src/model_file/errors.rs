@@ -5,7 +5,7 @@ use std::sync::Arc;
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::driver::{DriverInput, DriverSample, Reference};
-use abbe_model::effect::Effect;
+use abbe_model::effect::{Effect, EffectPart};
 use abbe_model::instrument::Station;
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
@@ -128,33 +128,37 @@ impl MachineErrors for EstimatedErrors {
             .iter()
             .map(|estimated| self.samples(&estimated.effect, commanded, &model))
             .collect::<Result<_, _>>()?;
-        let slots: Vec<Vec<(usize, Option<Vec<f64>>)>> = self
-            .effects
-            .iter()
-            .map(|estimated| estimated.effect.component.slots_in(&self.machine, parameters, commanded))
+        let slots_of = |part: EffectPart| {
+            let slots = part.component.slots_in(&self.machine, parameters, commanded);
+            (part, slots)
+        };
+        let parts: Vec<Vec<(EffectPart, Vec<(usize, Option<Vec<f64>>)>)>> = (self.effects.iter())
+            .map(|estimated| estimated.effect.parts(&self.machine).into_iter().map(slots_of).collect())
             .collect();
         Ok(Box::new(move |positions: &Readings| {
             let model = self.model(positions);
             let mut values =
                 SlotValues { constant: self.constant.clone(), varying: Vec::with_capacity(self.effects.len()) };
-            for ((estimated, travel), slots) in self.effects.iter().zip(&travel).zip(&slots) {
+            for ((estimated, travel), parts) in self.effects.iter().zip(&travel).zip(&parts) {
                 let mut samples = self.samples(&estimated.effect, positions, &model)?;
                 for (sample, commanded) in samples.iter_mut().zip(travel) {
                     *sample = DriverSample { value: sample.value, ..*commanded };
                 }
-                let mut sum = vec![0.0; positions.rows()];
                 let columns = estimated.effect.shape.columns(&samples);
-                for (coefficient, column) in estimated.coefficients.iter().zip(&columns) {
-                    sum.iter_mut().zip(column).for_each(|(sum, basis)| *sum += coefficient * basis);
-                }
-                for (slot, factor) in slots {
-                    let term: Vec<f64> = match factor {
-                        None => sum.clone(),
-                        Some(factor) => sum.iter().zip(factor).map(|(value, factor)| value * factor).collect(),
-                    };
-                    match values.varying.iter_mut().find(|(own, _)| own == slot) {
-                        Some((_, column)) => column.iter_mut().zip(&term).for_each(|(sum, term)| *sum += term),
-                        None => values.varying.push((*slot, term)),
+                for (part, slots) in parts {
+                    let mut sum = vec![0.0; positions.rows()];
+                    for (coefficient, column) in estimated.coefficients.iter().zip(part.columns(columns.clone())) {
+                        sum.iter_mut().zip(column).for_each(|(sum, basis)| *sum += coefficient * basis);
+                    }
+                    for (slot, factor) in slots {
+                        let term: Vec<f64> = match factor {
+                            None => sum.clone(),
+                            Some(factor) => sum.iter().zip(factor).map(|(value, factor)| value * factor).collect(),
+                        };
+                        match values.varying.iter_mut().find(|(own, _)| own == slot) {
+                            Some((_, column)) => column.iter_mut().zip(&term).for_each(|(sum, term)| *sum += term),
+                            None => values.varying.push((*slot, term)),
+                        }
                     }
                 }
             }

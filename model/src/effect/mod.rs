@@ -9,11 +9,13 @@
 mod component;
 pub mod description;
 pub mod keys;
+mod part;
 pub mod prior;
 pub mod sampled;
 pub mod shape;
 
 pub use component::Component;
+pub use part::EffectPart;
 pub use prior::CoefficientPrior;
 pub use shape::{Shape, ShapeFault};
 

@@ -12,6 +12,9 @@ pub struct Sampled {
     pub ends: Option<[f64; 2]>,
     /// Whether that axis is rotary.
     pub rotary: bool,
+    /// Whether that axis is level at every position of the axes that carry it, and all readings are angles: what it carries
+    /// is a direction, whose height above the horizon follows its position.
+    pub is_elevation: bool,
     /// Median step between readings where the axis moves, mm or rad; 0 without an axis, and for poses.
     pub step: f64,
     /// Whether the rows are independent poses: no axis is swept.

@@ -48,10 +48,59 @@ fn basis_of(shape: &Shape, samples: &[DriverSample<f64>]) -> Arc<Mat<f64>> {
 impl Columns<'_> {
     /// Computes the basis columns of an effect. `None` if the data lack its driver.
     pub fn effect_columns(&self, effect: &Effect) -> Option<EffectColumns> {
+        if effect.shape.turns().is_some() {
+            return self.turning_columns(effect);
+        }
         let channel = self.channel(effect)?;
         let key = (Arc::as_ptr(&channel.states) as usize, format!("{:?}", effect.shape));
         let basis = cached(&self.bases, key, || self.basis(&effect.shape, &channel));
         Some(EffectColumns { count: effect.shape.coefficients(), numbers: effect.shape.numbers(), channel, basis })
+    }
+
+    /// The columns of an effect whose direction turns ([`Effect::parts`]). With the sensitivities `s₁`, `s₂` of its two
+    /// components and the basis functions `b₁`, `b₂` there, a column is `s · b` with `s = √(s₁² + s₂²)`, the sensitivity in
+    /// the most effective direction, and `b = (s₁ b₁ + s₂ b₂)/s`, which differs from channel to channel.
+    fn turning_columns(&self, effect: &Effect) -> Option<EffectColumns> {
+        let machine = &self.problem.session.machine;
+        let parts = effect.parts(machine);
+        let acting: Vec<Acting> =
+            parts.iter().map(|part| self.acting(&part.component, effect)).collect::<Option<_>>()?;
+        let sensitivity =
+            |part: usize, test: usize, scalar: usize| acting[part].0[test].get(scalar).copied().unwrap_or_default();
+        let axis = effect.component.axis(machine);
+        let key = format!("{} turning {:?} {}", effect.component, effect.tests, driver_name(&effect.driver, axis));
+        let channel = cached(&self.channels, key, || {
+            let mut samples = Vec::new();
+            let mut total = Vec::new();
+            for (number, test) in self.problem.tests.iter().enumerate() {
+                let scalars = acting.iter().map(|(of_part, _)| of_part[number].len()).max().unwrap_or(0);
+                let norm = |scalar| (0..parts.len()).fold(0.0, |sum: f64, k| sum.hypot(sensitivity(k, number, scalar)));
+                total.push(Arc::new((0..scalars).map(norm).collect::<Vec<f64>>()));
+                samples.push(match effect.acts_in(&test.name) && scalars > 0 {
+                    true => Some(self.driver_samples(number, &effect.driver, axis, None)?),
+                    false => None,
+                });
+            }
+            let channels: Vec<usize> = (0..samples.len()).map(|test| self.problem.channels(test)).collect();
+            let states = Arc::new(DriverStates::of_scalars(&samples, &channels));
+            Some(Arc::new(Channel { sensitivity: total, states, greatest_factor: 1.0, lagging: None }))
+        })?;
+        let mut basis = Mat::zeros(channel.states.samples.len(), effect.shape.coefficients());
+        let of_parts: Vec<Vec<Vec<f64>>> =
+            parts.iter().map(|part| part.columns(effect.shape.columns(&channel.states.samples))).collect();
+        let mut state = 0;
+        for (test, total) in channel.sensitivity.iter().enumerate() {
+            for (scalar, total) in total.iter().enumerate().filter(|_| channel.states.acts_in(test)) {
+                for k in 0..basis.ncols() {
+                    let of_part = |part: usize| sensitivity(part, test, scalar) * of_parts[part][k][state];
+                    let sum: f64 = (0..parts.len()).map(of_part).sum();
+                    basis[(state, k)] = if *total > 0.0 { sum / total } else { 0.0 };
+                }
+                state += 1;
+            }
+        }
+        let (count, numbers) = (effect.shape.coefficients(), effect.shape.numbers());
+        Some(EffectColumns { count, numbers, channel, basis: Arc::new(basis) })
     }
 
     /// The columns of an effect on the channel of another, which differs from it in the shape numbers alone.
@@ -77,7 +126,7 @@ impl Columns<'_> {
         let lag_s = effect.shape.lag_s();
         let key = format!("{} {:?} {name} {part:?} {}", effect.component, effect.tests, lag_s.is_some());
         cached(&self.channels, key, || {
-            let (sensitivity, greatest_factor) = self.acting(effect)?;
+            let (sensitivity, greatest_factor) = self.acting(&effect.component, effect)?;
             let mut samples = Vec::new();
             for (number, test) in self.problem.tests.iter().enumerate() {
                 let of_driver = match effect.acts_in(&test.name) {
@@ -92,10 +141,10 @@ impl Columns<'_> {
         })
     }
 
-    /// What the component of an effect changes. `None` if a test in which it acts has no readings.
-    fn acting(&self, effect: &Effect) -> Option<Acting> {
+    /// What a component changes in the tests of an effect. `None` if a test in which it acts has no readings.
+    fn acting(&self, component: &Component, effect: &Effect) -> Option<Acting> {
         let machine = &self.problem.session.machine;
-        cached(&self.acting, format!("{} {:?}", effect.component, effect.tests), || {
+        cached(&self.acting, format!("{component} {:?}", effect.tests), || {
             let mut greatest_factor = 0.0_f64;
             let mut sensitivity = Vec::new();
             for (number, test) in self.problem.tests.iter().enumerate() {
@@ -104,7 +153,7 @@ impl Columns<'_> {
                     continue;
                 }
                 let readings = test.readings.as_ref()?;
-                let slots = effect.component.slots_in(machine, test.station.kind().unknowns(), readings);
+                let slots = component.slots_in(machine, test.station.kind().unknowns(), readings);
                 let derivatives = &self.derivatives[number];
                 let known: Vec<_> =
                     slots.into_iter().filter_map(|(slot, factor)| Some((derivatives.get(&slot)?, factor))).collect();
@@ -325,7 +374,7 @@ mod tests {
     #[test]
     fn chunks_are_filled_in_order() {
         let column_sets = |counts: &[usize]| -> Vec<EffectColumns> {
-            let states = Arc::new(DriverStates { samples: Vec::new(), of_reading: Vec::new() });
+            let states = Arc::new(DriverStates::of(&[], DriverPart::Value));
             let channel = Arc::new(Channel { sensitivity: Vec::new(), states, greatest_factor: 1.0, lagging: None });
             let of_count = |&count: &usize| EffectColumns {
                 count,

@@ -120,12 +120,13 @@ impl<'p> Columns<'p> {
             if column_set.acts_in(block.test) {
                 let Channel { sensitivity, states, .. } = &*column_set.channel;
                 let of_block = block.rows.start * channels..block.rows.end * channels;
+                let first = of_block.start;
                 let sensitivity = &sensitivity[block.test][of_block];
-                let states = &states.of_reading[block.test][block.rows.clone()];
                 for k in 0..column_set.count {
                     let basis = column_set.basis.col_as_slice(k);
                     let entries = raw.col_as_slice_mut(column + k).iter_mut().zip(sensitivity).enumerate();
-                    entries.for_each(|(i, (entry, s))| *entry = s * basis[states[i / channels] as usize]);
+                    let state = |i: usize| states.of_scalar(block.test, first + i, channels);
+                    entries.for_each(|(i, (entry, s))| *entry = s * basis[state(i)]);
                 }
             }
             column += column_set.count;

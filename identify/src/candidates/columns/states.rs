@@ -14,7 +14,9 @@ pub struct DriverStates {
     /// One sample for each state, in ascending order.
     pub samples: Vec<DriverSample<f64>>,
     /// Index of the state of each reading, by test. Empty for a test in which the effect does not act.
-    pub of_reading: Vec<Vec<u32>>,
+    of_reading: Vec<Vec<u32>>,
+    /// Whether each scalar reading has a state of its own.
+    scalar: bool,
 }
 
 impl DriverStates {
@@ -46,13 +48,13 @@ impl DriverStates {
             }
             of_reading[test][row] = distinct.len() as u32 - 1;
         }
-        DriverStates { samples: distinct, of_reading }
+        DriverStates { samples: distinct, of_reading, scalar: false }
     }
 
     /// A state for each reading, in the order of tests and readings: what an effect that lags behind its driver has
     /// been following depends on all readings before.
     pub fn of_readings(samples: &[Option<Arc<Vec<DriverSample<f64>>>>]) -> DriverStates {
-        let mut states = DriverStates { samples: Vec::new(), of_reading: Vec::new() };
+        let mut states = DriverStates { samples: Vec::new(), of_reading: Vec::new(), scalar: false };
         for of_test in samples {
             let rows = of_test.as_ref().map_or(&[][..], |samples| samples.as_slice());
             let first = states.samples.len() as u32;
@@ -60,6 +62,30 @@ impl DriverStates {
             states.of_reading.push((0..rows.len() as u32).map(|row| first + row).collect());
         }
         states
+    }
+
+    /// A state for each scalar reading, in the order of tests, readings and channels. An effect on two components has
+    /// another basis function in each channel. `channels` are those of each test.
+    pub fn of_scalars(samples: &[Option<Arc<Vec<DriverSample<f64>>>>], channels: &[usize]) -> DriverStates {
+        let mut states = DriverStates { samples: Vec::new(), of_reading: Vec::new(), scalar: true };
+        for (of_test, channels) in samples.iter().zip(channels) {
+            let rows = of_test.as_ref().map_or(&[][..], |samples| samples.as_slice());
+            let first = states.samples.len() as u32;
+            states.samples.extend(rows.iter().flat_map(|sample| std::iter::repeat_n(*sample, *channels)));
+            states.of_reading.push((0..(rows.len() * channels) as u32).map(|scalar| first + scalar).collect());
+        }
+        states
+    }
+
+    /// Whether the effect acts in a test.
+    pub fn acts_in(&self, test: usize) -> bool {
+        !self.of_reading[test].is_empty()
+    }
+
+    /// Index of the state of a scalar reading of a test that has so many channels.
+    pub fn of_scalar(&self, test: usize, scalar: usize, channels: usize) -> usize {
+        let place = if self.scalar { scalar } else { scalar / channels };
+        self.of_reading[test][place] as usize
     }
 }
 

@@ -29,21 +29,19 @@ impl LocalStates {
     /// Of some whitened rows. `rows` are the scalar readings that they combine.
     pub fn of(states: &DriverStates, training: &TrainingRows, rows: &[(u32, u32)]) -> LocalStates {
         let mut place = vec![NONE; states.samples.len()];
-        let readings =
-            rows.iter().map(|(test, scalar)| (*test as usize, *scalar as usize / training.channels[*test as usize]));
-        for (test, reading) in readings.clone().filter(|(test, _)| !states.of_reading[*test].is_empty()) {
-            place[states.of_reading[test][reading] as usize] = 0;
+        let state_of = |(test, scalar): &(u32, u32)| {
+            let (test, scalar) = (*test as usize, *scalar as usize);
+            states.acts_in(test).then(|| states.of_scalar(test, scalar, training.channels[test]))
+        };
+        for state in rows.iter().filter_map(state_of) {
+            place[state] = 0;
         }
         let mut present = Vec::new();
         for (state, place) in place.iter_mut().enumerate().filter(|(_, place)| **place != NONE) {
             *place = present.len() as u32;
             present.push(state as u32);
         }
-        let of_row = |(test, reading): (usize, usize)| {
-            let of_reading = &states.of_reading[test];
-            if of_reading.is_empty() { NONE } else { place[of_reading[reading] as usize] }
-        };
-        let of_rows: Vec<u32> = readings.map(of_row).collect();
+        let of_rows: Vec<u32> = rows.iter().map(|row| state_of(row).map_or(NONE, |state| place[state])).collect();
         let mut ends = vec![0; present.len() + 1];
         of_rows.iter().filter(|place| **place != NONE).for_each(|place| ends[*place as usize + 1] += 1);
         (1..ends.len()).for_each(|k| ends[k] += ends[k - 1]);
@@ -58,10 +56,10 @@ impl LocalStates {
         if training.filter.is_pointwise() {
             return local;
         }
-        for block in training.blocks.iter().filter(|block| !states.of_reading[block.test].is_empty()) {
+        for block in training.blocks.iter().filter(|block| states.acts_in(block.test)) {
             for (i, _) in block.iter() {
                 let places = training.filter.terms(i).map(|(raw, _)| {
-                    local.of_scalar(&states.of_reading[block.test], block.start + raw, training.channels[block.test])
+                    local.place_of(states, block.test, block.start + raw, training.channels[block.test])
                 });
                 let (low, high) = places.fold((usize::MAX, 0), |(low, high), p| (low.min(p), high.max(p)));
                 local.band = local.band.max(high - low);
@@ -70,8 +68,9 @@ impl LocalStates {
         local
     }
 
-    fn of_scalar(&self, of_reading: &[u32], scalar: usize, channels: usize) -> usize {
-        self.place[of_reading[scalar / channels] as usize] as usize
+    /// The index among these states of that of a scalar reading.
+    fn place_of(&self, states: &DriverStates, test: usize, scalar: usize, channels: usize) -> usize {
+        self.place[states.of_scalar(test, scalar, channels)] as usize
     }
 
     /// Number of these states.
@@ -124,14 +123,13 @@ impl<'r> OwnProducts<'r> {
             band = vec![vec![0.0; states]; local.band + 1];
             let mut terms: Vec<(usize, f64)> = Vec::new();
             for block in training.blocks.iter().filter(|block| channel.acts_in(block.test)) {
-                let (sensitivity, of_reading) =
-                    (&channel.sensitivity[block.test], &channel.states.of_reading[block.test]);
+                let sensitivity = &channel.sensitivity[block.test];
                 for (i, _) in block.iter() {
                     terms.clear();
                     terms.extend(training.filter.terms(i).map(|(raw, factor)| {
                         let scalar = block.start + raw;
                         (
-                            local.of_scalar(of_reading, scalar, training.channels[block.test]),
+                            local.place_of(&channel.states, block.test, scalar, training.channels[block.test]),
                             factor * sensitivity[scalar],
                         )
                     }));
@@ -218,15 +216,13 @@ impl<'r> OwnProducts<'r> {
             let mut next = column.iter_mut();
             for block in &training.blocks {
                 let acts = self.channel.acts_in(block.test);
-                let (sensitivity, of_reading) =
-                    (&self.channel.sensitivity[block.test], &self.channel.states.of_reading[block.test]);
+                let (sensitivity, states) = (&self.channel.sensitivity[block.test], &self.channel.states);
+                let channels = training.channels[block.test];
                 for ((i, _), value) in block.iter().zip(&mut next) {
                     if acts {
                         let term = |(raw, factor): (usize, f64)| {
                             let scalar = block.start + raw;
-                            factor
-                                * sensitivity[scalar]
-                                * basis[of_reading[scalar / training.channels[block.test]] as usize]
+                            factor * sensitivity[scalar] * basis[states.of_scalar(block.test, scalar, channels)]
                         };
                         *value = training.filter.terms(i).map(term).sum();
                     }

@@ -11,7 +11,7 @@ use crate::document::value::Positive;
 use crate::driver::{Driver, column};
 use crate::effect::keys::KeyReader;
 use crate::effect::shape::{Entry, SHAPES};
-use crate::effect::{CoefficientPrior, Component, Effect, Shape};
+use crate::effect::{CoefficientPrior, Component, Effect, EffectPart, Shape};
 use crate::files::quantity;
 use crate::files::spelling::known_names;
 use crate::instrument::{InstrumentParameter, InternalUnit};
@@ -72,6 +72,12 @@ fn one(
         let message = format!("the shape \"{}\" cannot have the driver \"{driver}\"", shape.word());
         Fault::new(message, help).at("shape")
     })?;
+    if shape.turns().is_some() && !EffectPart::can_turn(context.machine, &component, &driver) {
+        let message = format!("the shape \"{}\" for the component \"{component}\" over \"{driver}\"", shape.word());
+        let help = "its component is an error motion of a rotary axis at right angles to it, tilt or radial, and its \
+                    driver that axis, such as EAC over C";
+        return Err(Fault::new(message, help).at("shape"));
+    }
     let tests = tests(document.tests.as_deref().unwrap_or_default(), declared).within("tests")?;
     let prior = prior(document, &component, &shape, &context.of_instruments)?;
     shape.check().map_err(|fault| Fault::new(fault.to_string(), None).at("shape"))?;

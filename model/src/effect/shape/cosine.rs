@@ -20,8 +20,11 @@ pub(super) const ENTRY: Entry = Entry {
     keys: &[ORDER],
     follows: Follows::RotaryAxis,
     read: |keys| Ok(Shape::Cosine(Cosine { order: keys.required_positive("order", "add `order = 1`")? })),
-    // The library has the harmonics, which hold it.
-    members: |_| Vec::new(),
+    // Elsewhere the library has the harmonics, which hold it.
+    members: |sampled| match sampled.is_elevation {
+        true => vec![(Shape::Cosine(Cosine { order: 1.0 }), 0.0)],
+        false => Vec::new(),
+    },
 };
 
 impl ShapeKind for Cosine {

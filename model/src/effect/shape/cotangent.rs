@@ -6,6 +6,7 @@
 use super::kind::{Basis, Entry, Follows, ShapeFault, ShapeKind};
 use super::words::EffectWords;
 use super::{DriverSample, KeyWriter, Shape};
+use crate::effect::sampled::Sampled;
 use crate::scalar::Nominal;
 
 pub(super) const ENTRY: Entry = Entry {
@@ -13,8 +14,20 @@ pub(super) const ENTRY: Entry = Entry {
     keys: &[],
     follows: Follows::RotaryAxis,
     read: |_| Ok(Shape::Cotangent),
-    members: |_| Vec::new(),
+    members: |sampled| match sampled.is_elevation && is_finite(sampled) {
+        true => vec![(Shape::Cotangent, 0.0)],
+        false => Vec::new(),
+    },
 };
+
+/// Least distance of the positions from where there is no value, rad: 1°.
+const LEAST_DISTANCE: f64 = std::f64::consts::PI / 180.0;
+
+/// Whether it has a value at all positions between the ends of the travel.
+fn is_finite(sampled: &Sampled) -> bool {
+    let half_turns = |position: f64| (position / std::f64::consts::PI).floor();
+    sampled.ends.is_some_and(|[low, high]| half_turns(low - LEAST_DISTANCE) == half_turns(high + LEAST_DISTANCE))
+}
 
 /// The cotangent of a rotary position.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -49,16 +49,16 @@ impl Harmonic {
         let orders = (1..=most).map(|order| order as f64);
         orders.map(|order| (Shape::Harmonic(Harmonic { order }), order.ln())).collect()
     }
+}
 
-    /// `once`, `twice`, `17 times`.
-    fn times(&self) -> String {
-        if self.order == 1.0 {
-            "once".to_string()
-        } else if self.order == 2.0 {
-            "twice".to_string()
-        } else {
-            format!("{} times", self.order)
-        }
+/// `once`, `twice`, `17 times`.
+pub(super) fn times(order: f64) -> String {
+    if order == 1.0 {
+        "once".to_string()
+    } else if order == 2.0 {
+        "twice".to_string()
+    } else {
+        format!("{order} times")
     }
 }
 
@@ -73,7 +73,7 @@ impl ShapeKind for Harmonic {
         positive(self.order, "the order of a harmonic")
     }
     fn describe(&self, words: &EffectWords) -> String {
-        format!("{} {} per turn{}", words.motion, self.times(), words.of_another_axis)
+        format!("{} {} per turn{}", words.motion, times(self.order), words.of_another_axis)
     }
     fn tag(&self) -> String {
         format!("h{}", self.order)

@@ -113,7 +113,7 @@ pub trait ShapeKind {
     fn tag(&self) -> String {
         self.word().to_string()
     }
-    /// The order of a harmonic or the degree of a polynomial.
+    /// The order of a harmonic or the degree of a polynomial; of a precession negative if it turns against the axis.
     fn order(&self) -> Option<f64> {
         None
     }
@@ -131,6 +131,12 @@ pub trait ShapeKind {
     /// Whether the coefficients are a cosine and a sine, reported as amplitude and phase.
     fn is_wave(&self) -> bool {
         false
+    }
+    /// For a wave whose direction turns: the sense in which the error at right angles to the component follows it by a
+    /// quarter of a cycle, 1 with the axis, −1 against it ([`crate::effect::Effect::parts`]). `None` for a shape of the
+    /// component alone.
+    fn turns(&self) -> Option<f64> {
+        None
     }
     /// Whether its coefficients need a prior, because readings over part of the travel leave them undetermined.
     fn needs_prior(&self) -> bool {

@@ -75,6 +75,7 @@ shapes! {
     harmonic: Harmonic(Harmonic),
     cosine: Cosine(Cosine),
     cotangent: Cotangent,
+    precession: Precession(Precession),
     periodic: Periodic(Periodic),
     spectrum: Spectrum(Spectrum),
     triangle: Triangle(Triangle),
