@@ -26,6 +26,8 @@ pub(crate) struct Sampling {
     pub duration_s: f64,
     /// The driver columns that all readings have and that vary.
     pub columns: Vec<ColumnSampling>,
+    /// Whether the rows are independent poses and all readings are angles, of what the machine points at.
+    pub reads_directions: bool,
     pub reverses_inside_runs: Vec<bool>,
     pub both_directions: Vec<bool>,
 }
@@ -41,6 +43,7 @@ impl Sampling {
             has_time: true,
             duration_s: 0.0,
             columns: columns(problem),
+            reads_directions: false,
             reverses_inside_runs: vec![false; axes],
             both_directions: vec![false; axes],
         };
@@ -74,6 +77,8 @@ impl Sampling {
             let last = readings.time_s.iter().copied().fold(0.0, f64::max);
             sampling.duration_s = sampling.duration_s.max(last - problem.reference.time_s);
         }
+        let channels = problem.models.iter().flat_map(|model| model.channels());
+        sampling.reads_directions = sampling.is_poses() && channels.clone().all(|channel| channel.is_angle());
         for axis in 0..axes {
             sampling.moves[axis] = sampling.high[axis] - sampling.low[axis] > 1e-6;
         }

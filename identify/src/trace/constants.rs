@@ -4,6 +4,8 @@
 pub const INDISTINGUISHABLE: f64 = 2.0;
 /// Highest order of the spectra of joints, as of the harmonics of poses.
 pub const HIGHEST_ORDER_OF_SPECTRA: usize = 40;
+/// Least number of scalar readings for each coefficient of the spectra of all joints.
+pub const READINGS_PER_COEFFICIENT: usize = 2;
 /// Least effective number of parameters of a family. The readings hardly depend on a family with fewer, such as the
 /// spectrum of a last joint whose axis passes close to the target.
 pub const MIN_EFFECTIVE: f64 = 1.0;

@@ -15,6 +15,7 @@ use abbe_model::effect::{CoefficientPrior, Component, Effect, Shape};
 use super::TraceOptions;
 use super::constants::{HIGHEST_ORDER_OF_SPECTRA, MIN_EFFECTIVE, MIN_EFFECTIVE_OF_MEMBER};
 use super::interrupt::Interrupt;
+use super::policy::has_few_poses;
 use super::screening::is_requested;
 use crate::candidates::sampling::Sampling;
 use crate::error::IdentifyError;
@@ -75,8 +76,9 @@ fn groups(problem: &Problem, options: &TraceOptions, most: usize) -> Vec<Group> 
     };
     let joints: Vec<usize> = (0..machine.axes.len()).filter(rotary).collect();
     let moving = joints.iter().copied().filter(|axis| sampling.moves[*axis]);
+    let spectra = if has_few_poses(problem) { Vec::new() } else { moving.map(spectrum).collect() };
     let groups = [
-        Group { name: "angular positioning errors of all joints, all orders", effects: moving.map(spectrum).collect() },
+        Group { name: "angular positioning errors of all joints, all orders", effects: spectra },
         Group {
             name: "compliance of all joints under gravity",
             effects: joints.iter().copied().map(compliance).collect(),

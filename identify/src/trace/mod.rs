@@ -211,12 +211,17 @@ fn with_noise_of_repeats(
         Some(again) => again,
         None => first,
     };
-    // Variation between runs counts as noise as long as the model lacks its cause.
+    // Variation between runs counts as noise as long as the model lacks its cause. Among few poses an outlier that shows
+    // only beside the found effects can hide further ones.
     let mut problem = first.before.clone();
-    if first.result.interrupted
-        || first.effects.is_empty()
-        || !estimate_noise_model(&mut problem, &first.after_fit.residuals)
-    {
+    if first.result.interrupted || first.effects.is_empty() {
+        return Ok(first);
+    }
+    let outliers = Policy::of(&problem).folds_follow && problem.rejected != first.after.rejected;
+    if outliers {
+        problem.rejected.clone_from(&first.after.rejected);
+    }
+    if !estimate_noise_model(&mut problem, &first.after_fit.residuals) && !outliers {
         return Ok(first);
     }
     let before_fit = fit(&problem, Some(&first.before_fit.beta))?;

@@ -1,5 +1,9 @@
 //! The policies of the search: one for readings along runs, one for independent poses.
 
+use abbe_model::axis::AxisKind;
+
+use super::constants::{HIGHEST_ORDER_OF_SPECTRA, LINES_TRIED, READINGS_PER_COEFFICIENT};
+use crate::candidates::sampling::Sampling;
 use crate::problem::Problem;
 
 /// Where the null draws come from.
@@ -44,6 +48,12 @@ pub struct Policy {
     pub every_addition_lowers_heldout: bool,
     /// Whether families of effects under one prior are proposed before single effects.
     pub families: bool,
+    /// Whether the branches without a fold have the effects of the branch on all readings. Few readings without a fold
+    /// often name another effect by chance, which then predicts the fold wildly.
+    pub folds_follow: bool,
+    /// Number of candidates that are tried in a round, one for each component and driver; the one with the lowest held-out
+    /// error is added.
+    pub tried: usize,
     /// Number of selected effects from which a swap no longer tunes positions and periods again.
     pub swap_tunes_below: usize,
     /// The moves after each addition, in order.
@@ -67,6 +77,8 @@ const RUNS: Policy = Policy {
     in_residual_variance: false,
     every_addition_lowers_heldout: false,
     families: false,
+    folds_follow: false,
+    tried: 1,
     swap_tunes_below: 5,
     after_addition: &[MoveName::Swap, MoveName::Merge],
     without_addition: &[MoveName::Refine, MoveName::Pair],
@@ -83,15 +95,34 @@ const POSES: Policy = Policy {
     in_residual_variance: true,
     every_addition_lowers_heldout: true,
     families: true,
+    folds_follow: false,
+    tried: 1,
     swap_tunes_below: 0,
     after_addition: &[MoveName::Swap],
     without_addition: &[],
     withdraws: false,
 };
 
+/// The policy for independent poses that are too few for spectra ([`has_few_poses`]).
+const FEW_POSES: Policy = Policy { folds_follow: true, tried: LINES_TRIED, ..POSES };
+
 impl Policy {
     /// The policy for the readings of a problem.
     pub fn of(problem: &Problem) -> Policy {
-        if problem.folds.kind.is_poses() { POSES } else { RUNS }
+        match problem.folds.kind.is_poses() {
+            true if has_few_poses(problem) => FEW_POSES,
+            true => POSES,
+            false => RUNS,
+        }
     }
+}
+
+/// Whether the readings are too few for the spectra of all joints that move: they cannot tell a curve of all orders from
+/// the few effects that the library names.
+pub fn has_few_poses(problem: &Problem) -> bool {
+    let machine = &problem.session.machine;
+    let moves = Sampling::of(problem).moves;
+    let joints = (0..machine.axes.len()).filter(|axis| moves[*axis] && machine.axes[*axis].kind == AxisKind::Rotary);
+    let readings: usize = problem.blocks().iter().map(|block| problem.kept_rows(block).len()).sum();
+    readings < READINGS_PER_COEFFICIENT * 2 * HIGHEST_ORDER_OF_SPECTRA * joints.count()
 }

@@ -11,7 +11,7 @@ use super::moves::add::Add;
 use super::moves::remove::Remove;
 use super::moves::withdraw::Withdraw;
 use super::moves::{self, Move};
-use super::state::{ALL, SearchState};
+use super::state::{ALL, SearchBranch, SearchState};
 use super::{Progress, SearchStep};
 use crate::error::IdentifyError;
 
@@ -145,12 +145,35 @@ fn add_best(
     if !moves::on_every_branch(&Add { p_value }, search)? {
         return Ok((p_value, None));
     }
-    let added = search.selected().last().map(|selected| selected.candidate);
-    let before_heldout = search.selection.held_out.last().copied().unwrap_or(f64::INFINITY);
-    if search.policy.every_addition_lowers_heldout && search.held_out_now()? >= before_heldout {
+    if search.policy.every_addition_lowers_heldout && !lowers_heldout(search, &before)? {
         search.selection.branches = before;
         return Ok((p_value, None));
     }
+    let added = search.selected().last().map(|selected| selected.candidate);
     Remove { threshold }.try_on(search, ALL)?;
+    search.follow_all_readings();
     Ok((p_value, added))
+}
+
+/// Whether an addition lowers the held-out error. If the policy tries several candidates, the significant ones of other
+/// components and drivers are added in place of the first, each to the branches as they were before; the addition with the
+/// lowest held-out error remains.
+fn lowers_heldout(search: &mut SearchState<'_>, before: &[SearchBranch]) -> Result<bool, IdentifyError> {
+    let before_heldout = search.selection.held_out.last().copied().unwrap_or(f64::INFINITY);
+    let mut lowest = (search.held_out_now()?, search.selection.branches.clone());
+    for _ in 1..search.policy.tried {
+        search.pass_over_last();
+        search.selection.branches = before.to_vec();
+        let Some((_, p_value, _)) = search.best_against_null()? else { break };
+        if p_value > search.policy.significance || !moves::on_every_branch(&Add { p_value }, search)? {
+            break;
+        }
+        let held_out = search.held_out_now()?;
+        if held_out < lowest.0 {
+            lowest = (held_out, search.selection.branches.clone());
+        }
+    }
+    search.passed_over.clear();
+    search.selection.branches = lowest.1;
+    Ok(lowest.0 < before_heldout)
 }

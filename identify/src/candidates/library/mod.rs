@@ -16,7 +16,9 @@ use shapes::shapes;
 const LIBRARY: &str = include_str!("library.toml");
 
 /// The words of the library for drivers that a session names: axes, and columns of the data.
-const NAMED_DRIVERS: [&str; 5] = ["own", "own-rotary", "own-linear", "other", COLUMN];
+const NAMED_DRIVERS: [&str; 6] = ["own", "own-rotary", "own-linear", "other", CARRIER, COLUMN];
+/// The word for the rotary axis that carries the axis of the component.
+const CARRIER: &str = "carrier";
 /// The word for each driver column of the data.
 const COLUMN: &str = "column";
 
@@ -44,6 +46,7 @@ pub struct Family {
 enum Components {
     Motion,
     OwnMotion,
+    Transversal,
     AnyMotion,
     Location,
     Body,
@@ -169,6 +172,13 @@ fn components(problem: &Problem, sampling: &Sampling, choice: Components) -> Vec
         Components::OwnMotion => {
             moving().map(|axis| error(axis, ErrorKind::Motion, machine.axes[axis].own_freedom())).collect()
         }
+        Components::Transversal => moving()
+            .filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary)
+            .flat_map(|axis| {
+                let next = (machine.axes[axis].own_freedom().index() + 1) % 3;
+                [next, next + 3].map(|freedom| error(axis, ErrorKind::Motion, Freedom::ALL[freedom]))
+            })
+            .collect(),
         Components::AnyMotion => (0..machine.axes.len())
             .filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary)
             .flat_map(|axis| Freedom::ALL.map(|freedom| error(axis, ErrorKind::Motion, freedom)))
@@ -226,6 +236,14 @@ fn drivers(problem: &Problem, sampling: &Sampling, choice: &str, component: &Com
         "other" => (0..machine.axes.len())
             .filter(|axis| sampling.moves[*axis] && Some(*axis) != own)
             .map(|axis| Driver::Axis(machine.axes[axis].name.clone()))
+            .collect(),
+        // Along runs `other` has it.
+        CARRIER if !sampling.is_poses() => Vec::new(),
+        CARRIER => own
+            .and_then(|axis| machine.carrier(axis))
+            .filter(|axis| sampling.moves[*axis] && machine.axes[*axis].kind == AxisKind::Rotary)
+            .map(|axis| Driver::Axis(machine.axes[axis].name.clone()))
+            .into_iter()
             .collect(),
         COLUMN => sampling.columns.iter().map(|column| Driver::Column(column.name.clone())).collect(),
         word => {

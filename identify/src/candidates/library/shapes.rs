@@ -75,6 +75,7 @@ fn sampled(problem: &Problem, sampling: &Sampling, component: &Component, driver
     Sampled {
         ends: axis.map(|axis| [sampling.low[axis], sampling.high[axis]]),
         rotary: axis.is_some_and(|axis| machine.axes[axis].kind == AxisKind::Rotary),
+        is_elevation: sampling.reads_directions && axis.is_some_and(|axis| machine.stays_level(axis)),
         step: axis.map_or(0.0, |axis| sampling.step[axis]),
         poses: sampling.is_poses(),
         both_directions: axis.is_some_and(|axis| sampling.both_directions[axis]),

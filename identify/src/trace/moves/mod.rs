@@ -96,6 +96,10 @@ pub fn named(name: MoveName) -> &'static dyn Move {
 pub fn on_every_branch(tried: &dyn Move, search: &mut SearchState<'_>) -> Result<bool, IdentifyError> {
     let all = tried.try_on(search, ALL)?;
     search.forget_unselected(ALL);
+    if search.policy.folds_follow {
+        search.follow_all_readings();
+        return Ok(all);
+    }
     if all || !tried.follows_all_readings() {
         search.prepare_branches()?;
         let (folds, common) = (search.selection.branches.len() - 1, search.candidates.len());

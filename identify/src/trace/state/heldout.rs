@@ -1,5 +1,6 @@
 //! The held-out error: each fold is predicted, unwhitened, by the model of the search that excludes it. Effects are
-//! accepted only if this error decreases by more than the standard error of the decrease.
+//! accepted only if this error decreases by more than the standard error of the decrease. Where the branches without a fold
+//! follow the one on all readings ([`Policy::folds_follow`](super::super::policy::Policy)), they predict by its effects.
 //!
 //! Near the threshold, the readings of the other folds hardly distinguish the best explanation from the next ones. The
 //! prediction is therefore an average over them, weighted by `exp(score)`, in analogy to Bayesian model averaging (Hoeting
@@ -137,7 +138,11 @@ impl SearchState<'_> {
         let branches = &self.selection.branches;
         let of_all = self.prediction_of(&branches[ALL].chosen(), &branches[ALL].folds)?;
         let by_fold = parallel::map(branches.len() - 1, &|fold| {
-            let predicted = self.averaged_prediction(&branches[ALL + 1 + fold])?;
+            let branch = &branches[ALL + 1 + fold];
+            let predicted = match self.policy.folds_follow {
+                true => self.prediction_of(&branch.chosen(), &branch.folds)?,
+                false => self.averaged_prediction(branch)?,
+            };
             self.forget_unselected(ALL + 1 + fold);
             Ok((self.residuals_of_fold(fold, &predicted), self.residuals_of_fold(fold, &of_all)))
         });

@@ -12,7 +12,8 @@ mod tuning;
 
 use std::sync::Arc;
 
-use abbe_model::effect::Effect;
+use abbe_model::driver::Driver;
+use abbe_model::effect::{Component, Effect};
 
 use super::constants::{Effort, ON_ALL, ON_FOLDS};
 use super::interrupt::Interrupt;
@@ -75,6 +76,8 @@ pub struct SearchState<'s> {
     pub last_resort: bool,
     /// The unwhitened model and residual for the held-out error.
     unwhitened: Arc<UnwhitenedModel>,
+    /// Components and drivers that were tried in this round.
+    pub passed_over: Vec<(Component, Driver)>,
     /// Effects that scored better than readings without structure but were not accepted, in order of addition.
     pub rejected: Vec<RejectedByHeldOut>,
     /// Number of the library's detectable effects. A dictionary counts once: its step tables share its identifier, and
@@ -111,6 +114,7 @@ impl<'s> SearchState<'s> {
             thresholds: Vec::new(),
             last_resort: false,
             unwhitened: Arc::new(unwhitened),
+            passed_over: Vec::new(),
             rejected: Vec::new(),
             detectable_effects: 0,
             interrupt: None,

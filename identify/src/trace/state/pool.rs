@@ -12,6 +12,7 @@ use crate::error::IdentifyError;
 use crate::numerics::parallel;
 use crate::trace::constants::MIN_PLAUSIBLE_SIGMA;
 use abbe_model::driver::Driver;
+use abbe_model::effect::Component;
 
 impl SearchState<'_> {
     /// Judges for each candidate whether it is detectable at its largest plausible size.
@@ -36,7 +37,28 @@ impl SearchState<'_> {
     /// Whether a branch with some training folds may add a candidate now.
     pub fn may_be_added(&self, candidate: usize, folds: &[usize]) -> bool {
         let Candidate { detectable, dictionary, last_resort, .. } = *self.candidates[candidate];
-        detectable && !dictionary && (!last_resort || self.last_resort) && self.may_be_used(candidate, folds)
+        let possible =
+            detectable && !dictionary && (!last_resort || self.last_resort) && self.may_be_used(candidate, folds);
+        possible && (self.passed_over.is_empty() || !self.passed_over.contains(&self.kind(candidate)))
+    }
+
+    /// Gives every branch the effects of the one on all readings, where the policy says so.
+    pub fn follow_all_readings(&mut self) {
+        if let (true, [all, folds @ ..]) = (self.policy.folds_follow, &mut self.selection.branches[..]) {
+            folds.iter_mut().for_each(|fold| fold.selected.clone_from(&all.selected));
+        }
+    }
+
+    /// Component and driver of a candidate.
+    fn kind(&self, candidate: usize) -> (Component, Driver) {
+        let effect = self.effect(candidate);
+        (effect.component.clone(), effect.driver.clone())
+    }
+
+    /// Passes over the candidates of component and driver of the last selected effect until the list is cleared.
+    pub fn pass_over_last(&mut self) {
+        let last = self.selected().last().map(|selected| self.kind(selected.candidate));
+        self.passed_over.extend(last);
     }
 
     /// Whether a candidate is an effect of the library or was tuned on exactly these folds.
