@@ -4,13 +4,14 @@ use std::path::PathBuf;
 
 use abbe::document::StatedValidation;
 use abbe::identify::model_file;
-use abbe::identify::validate::validate;
+use abbe::identify::validate::validate_anew;
+use abbe::model::component::ErrorName;
 use abbe::model::files;
 use clap::Args;
 
 use super::failure::Failure;
 use super::results::Read;
-use super::{CommonArguments, SessionArguments, read_session};
+use super::{CommonArguments, SessionArguments, read_session, values};
 use crate::report;
 
 /// Examples of `abbe validate`.
@@ -23,6 +24,10 @@ pub struct ValidateArguments {
     model: PathBuf,
     #[command(flatten)]
     session: SessionArguments,
+    /// Errors of the machine that a new mounting changes, such as EC0AZ: estimated from SESSION like its set-up, not taken
+    /// from the model. Separate several by commas.
+    #[arg(long, value_name = "ERROR", value_delimiter = ',', value_parser = values::error_name)]
+    anew: Vec<ErrorName>,
     #[command(flatten)]
     common: CommonArguments,
 }
@@ -35,7 +40,7 @@ pub fn run(arguments: &ValidateArguments) -> Result<(), Failure> {
     let source = files::text(&arguments.model, "the model file")?;
     let model = model_file::of_source(&source)?;
     let (session, sources) = read_session(&arguments.session, &outputs)?;
-    let validation = validate(&model, &session)?;
+    let validation = validate_anew(&model, &session, &arguments.anew)?;
     let mut read = Read::session(&session, &sources, common.seed);
     read.files.extend(&source.stamp);
     let stated = StatedValidation::of_validation(&validation.result);

@@ -1,5 +1,6 @@
 //! Quantities that options state, each with its limits. A number that cannot be one is refused with the option.
 
+use abbe::model::component::ErrorName;
 use abbe::model::session::limits::{LARGEST, MAX_LENGTH_MM, MIN_UM};
 use abbe::model::words::number;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -105,6 +106,12 @@ pub fn count(option: &str, things: &str, value: usize, most: usize) -> Result<us
     }
     let of = if things.is_empty() { String::new() } else { format!(" of {things}") };
     Err(Failure::Other(format!("`{option} {value}`: a number{of} from 1 to {most} is expected")))
+}
+
+/// The name of an error of an axis.
+pub fn error_name(text: &str) -> Result<ErrorName, String> {
+    ErrorName::parse(text)
+        .ok_or_else(|| "an error of an axis according to ISO 230-1 is expected, such as EC0C".to_string())
 }
 
 /// A number of threads.

@@ -1,5 +1,8 @@
 //! Pointing observations: the reading against rotation matrices, the stars of two telescopes against the fits of TPOINT.
 
+mod anew;
+mod precession;
+
 use std::fs;
 use std::path::Path;
 

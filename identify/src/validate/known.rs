@@ -1,5 +1,6 @@
 //! The fit of a session's set-up with known errors of the machine.
 
+use abbe_model::component::ErrorName;
 use abbe_model::session::Session;
 use abbe_model::session::limits::MIN_UM;
 
@@ -70,15 +71,36 @@ impl<'m> KnownErrors<'m> {
     /// A model on a session.
     ///
     /// # Errors
-    /// If the session has no readings, or none that depends on the model.
-    pub fn new(model: &'m IdentifiedModel, session: &Session) -> Result<KnownErrors<'m>, IdentifyError> {
+    /// If the session has no readings, or none that depends on the model, or an error of `anew` is no parameter of the
+    /// model.
+    pub fn new(
+        model: &'m IdentifiedModel,
+        session: &Session,
+        anew: &[ErrorName],
+    ) -> Result<KnownErrors<'m>, IdentifyError> {
+        let is_anew = |j: &usize| {
+            let parameter = &model.parameters[*j];
+            parameter.role == Role::Error && anew.iter().any(|name| name.to_string() == parameter.id)
+        };
+        let carried = model.carried_parameters();
+        if let Some(name) =
+            anew.iter().find(|name| !carried.iter().any(|j| model.parameters[*j].id == name.to_string()))
+        {
+            let errors =
+                carried.iter().map(|j| &model.parameters[*j]).filter(|parameter| parameter.role == Role::Error);
+            let known: Vec<&str> = errors.map(|parameter| parameter.id.as_str()).collect();
+            return Err(IdentifyError::Request(format!(
+                "\"{name}\" is to be estimated anew, but the model does not hold it; it holds {}",
+                if known.is_empty() { "no location errors".to_string() } else { known.join(", ") }
+            )));
+        }
         let (noise, noise_source) = first_noise(model, session)?;
         let mut full = Problem::new(&model.session(session), noise.clone(), 1)?;
         // The uncertainty of the model contains the priors of its coefficients.
         full.parameters.list.iter_mut().filter(|p| !is_set_up(p.role)).for_each(|p| p.prior = Prior::Free);
-        let own = Session { unknowns: Vec::new(), effects: Vec::new(), ..session.clone() };
+        let own = Session { unknowns: anew.to_vec(), effects: Vec::new(), ..session.clone() };
         let set_up = Problem::new(&own, noise, 1)?;
-        let carried = model.carried_parameters();
+        let carried: Vec<usize> = carried.into_iter().filter(|j| !is_anew(j)).collect();
         let effects: Vec<usize> = model.carried_effects().collect();
         let column = |j: &usize| {
             full.parameters.list.iter().position(|parameter| match (model.parameters[*j].role, parameter.role) {

@@ -1,4 +1,5 @@
-//! A saved model against readings that it never saw, with only the session's own set-up estimated.
+//! A saved model against readings that it never saw, with only the session's own set-up estimated, and the errors of the
+//! machine that the caller counts to it.
 //!
 //! The errors of the machine are those of the model. The set-up (balls, bar, pose of the tracker) is estimated from the
 //! session with its priors. With the whitened Jacobians `J_m` of the model's parameters and `J_s` of the set-up, and
@@ -19,6 +20,7 @@ mod prediction;
 pub mod results;
 mod verdict;
 
+use abbe_model::component::ErrorName;
 use abbe_model::session::Session;
 
 use crate::error::IdentifyError;
@@ -56,11 +58,25 @@ pub struct Validation {
 /// If the session is of another machine or has no readings, no reading depends on the model, or the set-up cannot be
 /// estimated.
 pub fn validate(model: &IdentifiedModel, session: &Session) -> Result<Validation, IdentifyError> {
+    validate_anew(model, session, &[])
+}
+
+/// Validates a model on a session in which some errors of the machine belong to the set-up: those that a new mounting
+/// changes, such as the orientation of a robot's base or the index errors and the tilt of a telescope's mount. They are
+/// estimated from the session without a prior, and the rest of the model is judged.
+///
+/// # Errors
+/// As [`validate`], and if an error of `anew` is no parameter of the model.
+pub fn validate_anew(
+    model: &IdentifiedModel,
+    session: &Session,
+    anew: &[ErrorName],
+) -> Result<Validation, IdentifyError> {
     let mut warnings = session.warnings.clone();
     warnings.extend(machine::check(model, session)?);
     // Where its own fit fails, the natural lever stays.
     let session = &crate::fit::with_lever(session, 1).unwrap_or_else(|_| session.clone());
-    let mut known = KnownErrors::new(model, session)?;
+    let mut known = KnownErrors::new(model, session, anew)?;
     warnings.extend(known.not_carried.iter().map(|why| format!("not part of the machine, and left out: {why}")));
     let values = known.model_values();
     let beta = known.settle(&values)?;
