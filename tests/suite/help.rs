@@ -102,8 +102,9 @@ fn every_example_of_the_help_runs() {
     std::fs::write(folder.path().join("program.csv"), "x_mm,y_mm,z_mm,a_deg,c_deg\n10,20,30,40,50\n").unwrap();
     std::fs::write(folder.path().join("poses.csv"), "px_mm,py_mm,pz_mm,i,j,k\n10,20,30,0,0.6,0.8\n").unwrap();
     std::fs::copy(workspace().join("tests/robots/ur5e.urdf"), folder.path().join("robot.urdf")).unwrap();
-    std::fs::write(folder.path().join("robot.csv"), "a_mm,alpha_deg,d_mm,theta_deg\n0,90,162.5,0\n-425,0,0,0\n")
-        .unwrap();
+    // A UR5e: a ball in sockets needs as many joints.
+    let table = "a_mm,alpha_deg,d_mm,theta_deg\n0,90,162.5,0\n-425,0,0,0\n-392.2,0,0,0\n0,90,133.3,0\n0,-90,99.7,0\n0,0,99.6,0\n";
+    std::fs::write(folder.path().join("robot.csv"), table).unwrap();
     std::fs::write(folder.path().join("laboratory.toml"), abbe::certificate::EXAMPLE).unwrap();
     for line in lines {
         let run = Command::new(env!("CARGO_BIN_EXE_abbe"))
