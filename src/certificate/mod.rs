@@ -54,8 +54,6 @@ pub struct Head {
     pub begin: Option<String>,
     /// Last day of the measurement; by default the first.
     pub end: Option<String>,
-    /// Day of issue.
-    pub issued: Option<String>,
     /// Where the measurement was made.
     #[serde(default)]
     pub place: Place,
@@ -74,8 +72,8 @@ pub enum Place {
     LaboratoryBranch,
     /// At a branch of the customer.
     CustomerBranch,
-    /// Elsewhere.
-    Other,
+    /// At another place.
+    Elsewhere,
 }
 
 /// A device: what is calibrated, or what measures.
@@ -109,7 +107,7 @@ pub struct Organisation {
     /// Country, two letters of ISO 3166-1.
     pub country: Option<String>,
     /// Address for electronic mail.
-    pub email: Option<String>,
+    pub email: String,
     /// Telephone.
     pub phone: Option<String>,
     /// Code of the accreditation, of a laboratory.
@@ -155,10 +153,12 @@ street = "Main Street 1"
 post_code = "70173"
 city = "Stuttgart"
 country = "DE"
+email = "laboratory@example.org"
 
 [customer]
 name = "Example Aerospace"
 city = "Ulm"
+email = "quality@example.com"
 
 [[person]]
 name = "A. Example"
@@ -195,7 +195,7 @@ fn check(certificate: &Certificate) -> Result<(), Fault> {
     if let Some(language) = &head.language {
         code("language", language, char::is_ascii_lowercase).map_err(of_head)?;
     }
-    for (key, day) in [("begin", &head.begin), ("end", &head.end), ("issued", &head.issued)] {
+    for (key, day) in [("begin", &head.begin), ("end", &head.end)] {
         if day.as_ref().is_some_and(|day| !is_day(day)) {
             return Err(of_head(Fault::unexpected("a day: \"2026-11-23\"").at(key)));
         }
@@ -213,7 +213,7 @@ fn check(certificate: &Certificate) -> Result<(), Fault> {
             ("street", street.as_ref()),
             ("post_code", post_code.as_ref()),
             ("city", Some(city)),
-            ("email", email.as_ref()),
+            ("email", Some(email)),
             ("phone", phone.as_ref()),
             ("code", own.as_ref()),
         ];
@@ -317,11 +317,17 @@ pub fn xml(problem: &Problem, result: &FitResult, certificate: &Certificate) -> 
         return Err(IdentifyError::Request(why.into()));
     }
     let is_setup = |id: &str| problem.parameters.list.iter().any(|known| known.role == Role::Setup && known.id == id);
-    let certified: Vec<_> = result.parameters.iter().filter(|own| !is_setup(&own.id) && own.u > 0.0).collect();
+    let (mut certified, mut without_unit) = (Vec::new(), Vec::new());
+    for own in result.parameters.iter().filter(|own| !is_setup(&own.id) && own.u > 0.0) {
+        match write::si_unit(&own.unit) {
+            Some(unit) => certified.push((own, unit)),
+            None => without_unit.push(own.id.as_str()),
+        }
+    }
     if certified.is_empty() {
         return Err(IdentifyError::Request("the readings determine no error that could be certified".into()));
     }
-    let contents = write::Contents { session, result, certificate, begin, serial_number, certified };
+    let contents = write::Contents { session, result, certificate, begin, serial_number, certified, without_unit };
     write::document(&contents)
         .map_err(|cause| IdentifyError::Request(format!("the certificate cannot be written: {cause}")))
 }

@@ -9,6 +9,7 @@ use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesText, Event};
 
 use super::{Certificate, Item, Organisation, Place};
+use crate::report::number::unit;
 
 /// The schema of certificates that the document follows.
 const SCHEMA: &str = "3.1.2";
@@ -24,8 +25,10 @@ pub struct Contents<'c> {
     pub begin: String,
     /// Serial number of what is calibrated.
     pub serial_number: String,
-    /// Its estimates.
-    pub certified: Vec<&'c ParameterResult>,
+    /// Its estimates, each with its unit of D-SI.
+    pub certified: Vec<(&'c ParameterResult, String)>,
+    /// Estimates in a unit that D-SI does not have.
+    pub without_unit: Vec<&'c str>,
 }
 
 type Xml = Writer<Vec<u8>>;
@@ -100,10 +103,9 @@ fn administrative(xml: &mut Xml, contents: &Contents) -> io::Result<()> {
                 Place::Laboratory => "laboratory",
                 Place::LaboratoryBranch => "laboratoryBranch",
                 Place::CustomerBranch => "customerBranch",
-                Place::Other => "other",
+                Place::Elsewhere => "other",
             };
-            text(xml, "dcc:performanceLocation", place)?;
-            stated(xml, "dcc:issueDate", head.issued.as_ref())
+            text(xml, "dcc:performanceLocation", place)
         })?;
         within(xml, "dcc:items", |xml| {
             let own = &certificate.item;
@@ -160,7 +162,7 @@ fn device(xml: &mut Xml, language: &str, name: &str, own: &Item, serial_number: 
 
 fn contact(xml: &mut Xml, language: &str, own: &Organisation) -> io::Result<()> {
     words(xml, "dcc:name", language, &own.name)?;
-    stated(xml, "dcc:eMail", own.email.as_ref())?;
+    text(xml, "dcc:eMail", &own.email)?;
     stated(xml, "dcc:phone", own.phone.as_ref())?;
     within(xml, "dcc:location", |xml| {
         text(xml, "dcc:city", &own.city)?;
@@ -213,14 +215,13 @@ fn results(xml: &mut Xml, contents: &Contents) -> io::Result<()> {
                 })?;
             }
             within(xml, "dcc:results", |xml| {
-                for own in certified {
+                for (own, unit) in certified {
                     within(xml, "dcc:result", |xml| {
                         words(xml, "dcc:name", "en", &format!("{}: {}", own.id, own.meaning))?;
                         within(xml, "dcc:data", |xml| {
                             within(xml, "dcc:quantity", |xml| {
                                 words(xml, "dcc:name", "en", &own.id)?;
-                                let (unit, factor) = si_unit(&own.unit);
-                                real(xml, &own.id, own.value * factor, unit, Some(own.expanded_u * factor))?;
+                                real(xml, &own.id, own.value, unit, Some(own.expanded_u))?;
                                 conformity(xml, contents, &own.id)
                             })
                         })
@@ -254,15 +255,31 @@ fn decimal(value: f64) -> String {
     if plain.len() <= 20 { plain } else { format!("{value:e}") }
 }
 
-/// The unit of D-SI of a unit of results, and the factor that leads to it.
-fn si_unit(unit: &str) -> (&'static str, f64) {
-    match unit {
-        "um" => ("\\micro\\metre", 1.0),
-        "mm" => ("\\milli\\metre", 1.0),
-        "arcsec" => ("\\arcsecond", 1.0),
-        "deg" => ("\\degree", 1.0),
-        _ => ("\\one", 1.0),
+/// The name in D-SI of the unit of a result: `um/h` is `\micro\metre\hour\tothe{-1}`. `None` if it has none.
+pub fn si_unit(unit: &str) -> Option<String> {
+    let mut found = String::new();
+    for (place, part) in unit.split('/').enumerate() {
+        found += match part {
+            "um" => "\\micro\\metre",
+            "mm" => "\\milli\\metre",
+            "m" => "\\metre",
+            "arcsec" => "\\arcsecond",
+            "deg" => "\\degree",
+            "mrad" => "\\milli\\radian",
+            "rad" => "\\radian",
+            "ms" => "\\milli\\second",
+            "s" => "\\second",
+            "min" => "\\minute",
+            "h" => "\\hour",
+            "K" => "\\kelvin",
+            "1" => "\\one",
+            _ => return None,
+        };
+        if place > 0 {
+            found += "\\tothe{-1}";
+        }
     }
+    Some(found)
 }
 
 /// The decision about a limit of the session. An undecided one is in words: the schema has no such status.
@@ -270,10 +287,10 @@ fn conformity(xml: &mut Xml, contents: &Contents, id: &str) -> io::Result<()> {
     let items = contents.result.conformity.iter().flat_map(|conformity| &conformity.items);
     let Some(own) = items.into_iter().find(|item| item.id == id) else { return Ok(()) };
     let lower = own.lower.map_or(String::new(), |lower| format!("{} to ", decimal(lower)));
-    let limits = format!("Permitted: {lower}{} {}. Decision: {}.", decimal(own.upper), own.unit, own.decision.word());
+    let limits =
+        format!("Permitted: {lower}{} {}. Decision: {}.", decimal(own.upper), unit(&own.unit), own.decision.word());
     within(xml, "dcc:measurementMetaData", |xml| {
         within(xml, "dcc:metaData", |xml| {
-            words(xml, "dcc:name", "en", "Conformity")?;
             text(xml, "dcc:norm", "ISO 14253-1:2017")?;
             words(xml, "dcc:declaration", "en", &limits)?;
             match own.decision {
@@ -294,11 +311,14 @@ fn description(contents: &Contents) -> String {
         env!("CARGO_PKG_VERSION")
     )];
     let list = |ids: &mut dyn Iterator<Item = &str>| ids.collect::<Vec<_>>().join(", ");
-    let by_prior = certified.iter().filter(|own| own.determined_by == DeterminedBy::Prior);
-    let by_prior = list(&mut by_prior.map(|own| own.id.as_str()));
+    let by_prior = certified.iter().filter(|(own, _)| own.determined_by == DeterminedBy::Prior);
+    let by_prior = list(&mut by_prior.map(|(own, _)| own.id.as_str()));
     if !by_prior.is_empty() {
         sentences
             .push(format!("Determined together with the stated values and uncertainties of the set-up: {by_prior}."));
+    }
+    if !contents.without_unit.is_empty() {
+        sentences.push(format!("Not certified, since D-SI has no such unit: {}.", contents.without_unit.join(", ")));
     }
     let left_out = &result.outcome.not_estimated;
     if !left_out.is_empty() {

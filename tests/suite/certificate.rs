@@ -58,7 +58,9 @@ fn one<'t>(texts: &'t [(String, String)], ending: &str) -> &'t str {
 #[test]
 fn a_certificate_holds_the_figures_of_the_fit() {
     let folder = tempfile::tempdir().unwrap();
-    let own = EXAMPLE.replace("Example Aerospace", "Müller & Söhne <Ulm>");
+    let own = EXAMPLE
+        .replace("Example Aerospace", "Müller & Söhne <Ulm>")
+        .replace("country = \"DE\"\nbegin", "country = \"DE\"\nplace = \"laboratory-branch\"\nbegin");
     let session = session(folder.path(), &own);
     let (file, json) = (folder.path().join("certificate.xml"), folder.path().join("fit.json"));
     let run = abbe(&["fit", text(&session), "--dcc", text(&file), "--json", text(&json), "--quiet"]);
@@ -67,6 +69,7 @@ fn a_certificate_holds_the_figures_of_the_fit() {
     assert_eq!(one(&texts, "/uniqueIdentifier"), "2026-0042");
     assert_eq!(one(&texts, "/beginPerformanceDate"), "2026-11-23");
     assert_eq!(one(&texts, "/endPerformanceDate"), "2026-11-23");
+    assert_eq!(one(&texts, "/performanceLocation"), "laboratoryBranch");
     assert_eq!(one(&texts, "/customer/name/content"), "Müller & Söhne <Ulm>");
     assert_eq!(one(&texts, "/item/identifications/identification/value"), "17-331");
     let fit: Value = serde_json::from_slice(&std::fs::read(&json).unwrap()).unwrap();
