@@ -1,6 +1,6 @@
 // The drawing of a set-up. Its library is loaded when it is first shown.
 
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
 import type { Dragged, SetUp, SetUpScene } from "./scene";
 
 interface Props {
@@ -45,7 +45,8 @@ export function SetUpView({ setUp, of, axes, dragged }: Props) {
       scene.current?.dispose();
     };
   }, []);
-  useEffect(() => scene.current?.show(setUp, position), [setUp, of, position]);
+  // At once, so that the drawing is at the position that its caption states.
+  useLayoutEffect(() => scene.current?.show(setUp, position), [setUp, of, position]);
   const at = (setUp.stops[position]?.at ?? []).map((number, k) => {
     const { name, unit } = axes[k];
     return `${name} ${Number(number.toFixed(unit === "deg" ? 2 : 1))}${unit === "deg" ? "°" : ""}`;
