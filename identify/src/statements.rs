@@ -9,11 +9,13 @@
 //! ```
 //!
 //! A linear axis has its own squareness errors in place of `ω_k`. The components across the axis are reported; a shift
-//! of a line along itself is none.
+//! of a line along itself is none. A rotation about the axis itself, or a shift of a linear axis along itself, is the zero
+//! of the axis: `d_k · ω_k`, `d_k · t_k`.
 
-use abbe_model::axis::AxisKind;
+use abbe_model::axis::{Axis, AxisKind};
 use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
+use abbe_model::instrument::Contact;
 
 use crate::parameters::Role;
 use crate::plausibility::Plausibility;
@@ -44,6 +46,7 @@ impl Statements {
         };
         Statements {
             good: good(goodness, result.conformity.as_ref()),
+            further: further(problem, &result.parameters),
             correct: corrections(&problem.session.machine, &result.parameters, &result.covariance),
             measure: measure.into(),
         }
@@ -73,6 +76,7 @@ impl Statements {
         };
         Statements {
             good: GoodStatement { verdict: Some(result.verdict), ..good(goodness, result.conformity.as_ref()) },
+            further: further(problem, &result.after.parameters),
             correct: corrections(&problem.session.machine, &result.after.parameters, &result.after.covariance),
             measure,
         }
@@ -91,20 +95,24 @@ impl Statements<ValidationStatement, MovedParameter> {
         Statements {
             good: ValidationStatement { verdict, readings, readings_in_range },
             correct: result.moved.clone(),
+            further: Vec::new(),
             measure: step.into(),
         }
     }
 }
 
-/// Whether candidate tests exist for a problem: it has errors to identify, the instrument is a ball bar, and a rotary
-/// axis can be swept.
+/// Whether candidate tests exist for a problem: it has errors to identify, and its last instrument reads a motion that a
+/// session can state. That of a ball bar, a nest or a stylus turns a rotary axis; a ball in sockets goes from one to another.
 pub fn has_candidates(problem: &Problem) -> bool {
     let session = &problem.session;
     let has_errors = problem.parameters.list.iter().any(|parameter| parameter.role == Role::Error);
-    let last = session.tests.last().map(|test| &test.station);
+    let has_rotary = session.machine.axes.iter().any(|axis| axis.kind == AxisKind::Rotary);
     has_errors
-        && last.is_some_and(|station| station.bar().is_some())
-        && session.machine.axes.iter().any(|axis| axis.kind == AxisKind::Rotary)
+        && session.tests.last().is_some_and(|last| match last.station.contact() {
+            Contact::None => true,
+            Contact::InR(_) => false,
+            _ => has_rotary,
+        })
 }
 
 /// The step that has to come before any further test.
@@ -143,6 +151,14 @@ fn corrections(machine: &Machine, parameters: &[ParameterResult], covariance: &C
         if axis.kind == AxisKind::Rotary {
             quantities.insert(0, LineQuantity::Point);
         }
+        let nearest = nearest(axis.direction);
+        found.extend(correction(
+            &axis.name,
+            (LineQuantity::Zero, ['X', 'Y', 'Z'][nearest]),
+            0.0,
+            &zero_terms(axis, nearest),
+            (parameters, covariance),
+        ));
         for quantity in quantities {
             for (i, coordinate) in ['X', 'Y', 'Z'].into_iter().enumerate() {
                 if axis.direction[i].abs() > ALONG {
@@ -152,8 +168,10 @@ fn corrections(machine: &Machine, parameters: &[ParameterResult], covariance: &C
                 let nominal = match quantity {
                     LineQuantity::Point => axis.origin_mm[i],
                     LineQuantity::Direction => axis.direction[i],
+                    LineQuantity::Zero => 0.0,
                 };
-                found.extend(correction(&axis.name, quantity, coordinate, nominal, &terms, parameters, covariance));
+                let of = (quantity, coordinate);
+                found.extend(correction(&axis.name, of, nominal, &terms, (parameters, covariance)));
             }
         }
     }
@@ -180,7 +198,7 @@ fn terms(machine: &Machine, index: usize, quantity: LineQuantity, i: usize) -> T
         };
         let lever: [f64; 3] = match quantity {
             LineQuantity::Point => std::array::from_fn(|c| axis.origin_mm[c] - machine.axes[k].origin_mm[c]),
-            LineQuantity::Direction => axis.direction,
+            LineQuantity::Direction | LineQuantity::Zero => axis.direction,
         };
         if quantity == LineQuantity::Point {
             terms.push((name(i), 1.0));
@@ -192,15 +210,66 @@ fn terms(machine: &Machine, index: usize, quantity: LineQuantity, i: usize) -> T
     terms
 }
 
+/// The coordinate of R nearest to a direction.
+fn nearest(direction: [f64; 3]) -> usize {
+    (1..3).fold(0, |best, i| if direction[i].abs() > direction[best].abs() + 1e-9 { i } else { best })
+}
+
+/// The location errors that displace an axis along or about itself, in its own positive direction; the one along `nearest`
+/// comes first.
+fn zero_terms(axis: &Axis, nearest: usize) -> Terms {
+    let first = if axis.kind == AxisKind::Rotary { 3 } else { 0 };
+    let of = |i: usize| {
+        let freedom = Freedom::ALL[first + i];
+        (ErrorName { kind: ErrorKind::Location, freedom, axis: axis.name.clone() }, axis.direction[i])
+    };
+    let others = (0..3).filter(|i| *i != nearest && axis.direction[*i] != 0.0);
+    [nearest].into_iter().chain(others).map(of).collect()
+}
+
+/// What exceeds its expanded uncertainty, is no set-up parameter and changes no axis line: the most significant coefficient
+/// of each effect, constant errors, shifts of a rotary axis along itself.
+fn further(problem: &Problem, parameters: &[ParameterResult]) -> Vec<ParameterResult> {
+    let machine = &problem.session.machine;
+    let is_of_line = |id: &str| {
+        let Some(name) = ErrorName::parse(id).filter(|name| name.kind == ErrorKind::Location) else { return false };
+        machine.axes.iter().find(|axis| axis.name == name.axis).is_some_and(|axis| {
+            let share = axis.direction[name.freedom.index() % 3].abs();
+            match (axis.kind, name.freedom.is_angle()) {
+                (AxisKind::Rotary, true) => true,
+                // No shift along itself, and no roll.
+                (AxisKind::Rotary, false) | (AxisKind::Linear, true) => share <= ALONG,
+                (AxisKind::Linear, false) => share > 0.0,
+            }
+        })
+    };
+    let ratio = |found: &ParameterResult| (found.value / found.u).abs();
+    let mut list: Vec<(Option<usize>, ParameterResult)> = Vec::new();
+    // The phase of an amplitude is no size.
+    for found in parameters.iter().filter(|found| found.exceeds_u() && !found.id.ends_with(".phase")) {
+        let effect = problem.parameters.effect_ids.iter().position(|id| {
+            let rest = found.id.strip_prefix(id.as_str());
+            rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+        });
+        let same = problem.parameters.list.iter().find(|parameter| parameter.id == found.id);
+        let is_setup = same.is_some_and(|parameter| parameter.role == Role::Setup);
+        match list.iter_mut().find(|(other, _)| effect.is_some() && *other == effect) {
+            Some((_, other)) if ratio(found) > ratio(other) => *other = found.clone(),
+            Some(_) => {}
+            None if effect.is_none() && (is_setup || is_of_line(&found.id)) => {}
+            None => list.push((effect, found.clone())),
+        }
+    }
+    list.into_iter().map(|(_, found)| found).collect()
+}
+
 /// The change of one component; `None` if no error of it is identified.
 fn correction(
     axis: &str,
-    quantity: LineQuantity,
-    coordinate: char,
+    (quantity, coordinate): (LineQuantity, char),
     nominal: f64,
     terms: &[(ErrorName, f64)],
-    parameters: &[ParameterResult],
-    covariance: &Covariance,
+    (parameters, covariance): (&[ParameterResult], &Covariance),
 ) -> Option<AxisCorrection> {
     // Index and change of the component in mm or 1 per unit of the parameter.
     let own: Vec<(usize, f64)> = (terms.iter())
@@ -211,14 +280,21 @@ fn correction(
             Some((place, internal))
         })
         .collect();
-    // An error of the axis itself has to be identified.
-    let is_own = |place: usize| parameters[place].id.ends_with(&format!("0{axis}"));
+    // An error of the axis itself has to be identified; of a zero, the one along the axis.
+    let is_own = |place: usize| match (quantity, terms.first()) {
+        (LineQuantity::Zero, Some((name, _))) => parameters[place].id == name.to_string(),
+        _ => parameters[place].id.ends_with(&format!("0{axis}")),
+    };
     if !own.iter().any(|(place, _)| is_own(*place)) {
         return None;
     }
-    let shown = match quantity {
-        LineQuantity::Point => THOUSAND,
-        LineQuantity::Direction => THOUSAND * THOUSAND,
+    let is_angle = terms.first().is_some_and(|(name, _)| name.freedom.is_angle());
+    // Changes and nominal values per mm, per rad or per 1.
+    let (shown, identified, unit) = match quantity {
+        LineQuantity::Point => (THOUSAND, 1.0, "um"),
+        LineQuantity::Direction => (THOUSAND * THOUSAND, 1.0, "um/m"),
+        LineQuantity::Zero if is_angle => (ARCSEC, 1f64.to_degrees(), "arcsec"),
+        LineQuantity::Zero => (THOUSAND, 1.0, "um"),
     };
     let change: f64 = own.iter().map(|(place, by)| by * parameters[*place].value).sum();
     let of = |a: usize, b: usize| covariance.matrix.get(a).and_then(|row| row.get(b)).copied().unwrap_or(0.0);
@@ -229,10 +305,10 @@ fn correction(
         quantity,
         coordinate,
         nominal,
-        identified: nominal + change,
+        identified: nominal + change * identified,
         change: change * shown,
         u: variance.max(0.0).sqrt() * shown,
-        unit: if quantity == LineQuantity::Point { "um" } else { "um/m" }.to_string(),
+        unit: unit.to_string(),
         determined_by: if by_prior { DeterminedBy::Prior } else { DeterminedBy::Readings },
         quotable: own.iter().all(|(place, _)| parameters[*place].quotable),
     })

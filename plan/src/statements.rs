@@ -45,6 +45,7 @@ impl PlanAnalysis {
                 worst: worst.map(|error| error.id.clone()),
             },
             correct: worst.map_or(Vec::new(), limiting),
+            further: Vec::new(),
             measure: step.into(),
         }
     }

@@ -82,6 +82,7 @@ pub fn statements(machines: &[MachineHistory]) -> HistoryStatements {
             out_of_control: out.map(|machine| machine.machine_id.clone()).collect(),
         },
         correct: machines.iter().flat_map(changed).collect(),
+        further: Vec::new(),
         measure: step.into(),
     }
 }

@@ -2,15 +2,17 @@
 
 use abbe::apply::compare::ComparisonStatement;
 use abbe::apply::compare::results::Difference;
+use abbe::codegen::nc::has_letters;
 #[cfg(feature = "fleet")]
 use abbe::fleet::history::HistoryStatements;
 use abbe::identify::results::{
-    AxisCorrection, DeterminedBy, GoodStatement, LineQuantity, MeasureStatement, NextStep, Statements,
+    AxisCorrection, DeterminedBy, GoodStatement, LineQuantity, MeasureStatement, NextStep, ParameterResult, Statements,
     ValidationStatement,
 };
 use abbe::identify::tolerance::rule::Decision;
 use abbe::identify::validate::ValidationVerdict;
 use abbe::identify::validate::results::MovedParameter;
+use abbe::model::chain::Machine;
 use abbe::model::session::Session;
 use abbe::model::words::{counted, first_of};
 use abbe::plan::PlanStatement;
@@ -48,7 +50,7 @@ pub fn opening(
         let what = format!("a run once more, or state {keys}: only then can the model be judged");
         sentences.push(format!("What to measure next: {what}").into());
     } else {
-        sentences.extend(measure(&statements.measure, commands));
+        sentences.extend(measure(&statements.measure, Some(&session.machine), commands));
     }
     sentences
 }
@@ -72,15 +74,27 @@ fn correct(statements: &Statements) -> String {
     if !statements.good.goodness.quotable {
         return "What to correct: nothing yet; the effect that the model lacks biases the estimates".to_string();
     }
-    if large.is_empty() {
+    let further = || {
+        let mut further: Vec<&ParameterResult> = statements.further.iter().collect();
+        let ratio = |found: &ParameterResult| (found.value / found.u).abs();
+        further.sort_by(|a, b| ratio(b).total_cmp(&ratio(a)));
+        further.into_iter()
+    };
+    if large.is_empty() && statements.further.is_empty() {
         return match statements.correct.is_empty() {
             true => "What to correct: no location error is identified".to_string(),
             false => "What to correct: nothing; no axis deviates by more than the uncertainty".to_string(),
         };
     }
-    let named: Vec<String> = large.iter().map(|change| in_short(change)).collect();
+    let is_by_prior = large.iter().map(|change| change.determined_by).chain(further().map(|found| found.determined_by));
+    let is_by_prior = is_by_prior.into_iter().any(|by| by == DeterminedBy::Prior);
+    let estimates = further().map(|found| {
+        let mark = if found.determined_by == DeterminedBy::Prior { PRIOR } else { "" };
+        format!("{} {}{mark}", found.id, estimate(found.value, found.u, &found.unit))
+    });
+    let named: Vec<String> = large.iter().map(|change| in_short(change)).chain(estimates).collect();
     let named = first_of(&named, NAMED, ", ", "further change");
-    let by_prior = match large.iter().any(|change| change.determined_by == DeterminedBy::Prior) {
+    let by_prior = match is_by_prior {
         true => format!(" ({PRIOR}: if the set-up is as stated)"),
         false => String::new(),
     };
@@ -94,20 +108,21 @@ fn in_short(change: &AxisCorrection) -> String {
     let of = match change.quantity {
         LineQuantity::Point => format!("{} in {}", change.axis, change.coordinate),
         LineQuantity::Direction => format!("direction of {} in {}", change.axis, change.coordinate),
+        LineQuantity::Zero => format!("zero of {}", change.axis),
     };
     format!("{of} {}{mark}", quantity(&format!("{value} ± {u}"), &change.unit))
 }
 
-/// What to measure next, and the commands for it.
-fn measure(statement: &MeasureStatement, commands: &Commands) -> Vec<Sentence> {
+/// What to measure next, and the commands for it: its program, if the axes of the machine have letters.
+fn measure(statement: &MeasureStatement, machine: Option<&Machine>, commands: &Commands) -> Vec<Sentence> {
     let (next, command) = (commands.next_session(), |verb: &str, options: &str| commands.command(verb, options));
     let with_program = |what: String, verb: &str, options: &str| {
         let program = format!("abbe nc {next} --control CONTROL --out programs");
-        vec![
-            what.into(),
-            Sentence::Command(command(verb, options), "writes the test,".into()),
-            Sentence::Command(program, "its program".into()),
-        ]
+        let written = |words: &str| Sentence::Command(command(verb, options), words.into());
+        match machine.is_some_and(has_letters) {
+            true => vec![what.into(), written("writes the test,"), Sentence::Command(program, "its program".into())],
+            false => vec![what.into(), written("writes the test")],
+        }
     };
     let plan = |purpose: &str| {
         with_program(
@@ -147,6 +162,7 @@ fn estimate(value: f64, u: f64, unit: &str) -> String {
 pub fn of_plan(
     statements: &Statements<PlanStatement, Contribution>,
     analysis: &PlanAnalysis,
+    machine: &Machine,
     commands: &Commands,
 ) -> Vec<Sentence> {
     let PlanStatement { errors, not_identifiable, determined_by_prior, .. } = &statements.good;
@@ -184,7 +200,7 @@ pub fn of_plan(
         ),
     };
     let mut sentences = vec![good.into(), format!("What to correct: {correct}").into()];
-    sentences.extend(measure(&statements.measure, commands));
+    sentences.extend(measure(&statements.measure, Some(machine), commands));
     sentences
 }
 
@@ -233,7 +249,7 @@ pub fn of_validation(
             .into(),
         ),
         NextStep::Nothing => sentences.push("What to measure next: nothing; the model holds".to_string().into()),
-        _ => sentences.extend(measure(&statements.measure, commands)),
+        _ => sentences.extend(measure(&statements.measure, None, commands)),
     }
     sentences
 }
@@ -296,18 +312,24 @@ pub fn corrections(statements: &Statements) -> Table {
             // Of a point in mm, those of its change in µm and three more.
             LineQuantity::Point => places(change.u) + 3,
             LineQuantity::Direction => DIRECTION_PLACES,
+            // Of degrees, those of its change in arcseconds and four more; of mm, as of a point.
+            LineQuantity::Zero => places(change.u) + if change.unit == "arcsec" { 4 } else { 3 },
         };
         let mark = match change.determined_by {
             DeterminedBy::Prior if change.exceeds_u() => PRIOR,
             _ if change.exceeds_u() && change.quotable => "*",
             _ => "",
         };
-        let of = format!("{} {}", change.quantity, change.coordinate);
+        let of = match change.quantity {
+            LineQuantity::Zero => change.quantity.to_string(),
+            _ => format!("{} {}", change.quantity, change.coordinate),
+        };
         let (nominal, identified) = (fixed(change.nominal, digits), fixed(change.identified, digits));
         cells![&change.axis, of, nominal, identified, value, u, super::number::unit(&change.unit), mark]
     });
     let columns = ["axis", "in R", ">nominal", ">identified", ">change", ">u", "unit", ""];
     Table::new(columns, rows).titled(
-        "Axes at zero: a point of each rotary axis in mm, the direction of each axis as a unit vector, and the change to enter",
+        "Axes at zero: a point of each rotary axis in mm, the direction of each axis as a unit vector, its zero in degrees or mm, and \
+         the change to enter",
     )
 }

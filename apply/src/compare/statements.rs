@@ -24,6 +24,7 @@ impl Comparison {
         Statements {
             good: ComparisonStatement { significant: correct.len(), compared: self.differences.len() },
             correct,
+            further: Vec::new(),
             measure: step.into(),
         }
     }

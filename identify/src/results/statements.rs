@@ -6,11 +6,11 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::outcome::{Goodness, TraceVerdict};
-use super::parameter::DeterminedBy;
+use super::parameter::{DeterminedBy, ParameterResult};
 use crate::tolerance::rule::Decision;
 use crate::validate::results::ValidationVerdict;
 
-/// A component of an axis line or a direction.
+/// A component of an axis line or a direction, or the zero of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum LineQuantity {
@@ -18,6 +18,9 @@ pub enum LineQuantity {
     Point,
     /// A component of the unit vector of an axis.
     Direction,
+    /// The position of the axis where its command is zero, in its own positive direction: degrees of a rotary axis (the zero
+    /// angle of a joint), mm of a linear one.
+    Zero,
 }
 
 impl fmt::Display for LineQuantity {
@@ -25,20 +28,21 @@ impl fmt::Display for LineQuantity {
         f.write_str(match self {
             LineQuantity::Point => "point",
             LineQuantity::Direction => "direction",
+            LineQuantity::Zero => "zero",
         })
     }
 }
 
-/// A component of the line of an axis in R with all axes at zero: nominal, identified, and the change.
+/// A component of the line of an axis in R with all axes at zero, or its zero: nominal, identified, and the change.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct AxisCorrection {
     /// The axis.
     pub axis: String,
-    /// Whether it is of a point on the axis or of its direction.
+    /// Whether it is of a point on the axis, of its direction, or its zero.
     pub quantity: LineQuantity,
-    /// The coordinate in R: `X`, `Y`, `Z`.
+    /// The coordinate in R: `X`, `Y`, `Z`; of a zero the direction of R nearest to the axis.
     pub coordinate: char,
-    /// Nominal value: mm of a point, 1 of a direction.
+    /// Nominal value: mm of a point, 1 of a direction, degrees or mm of a zero.
     pub nominal: f64,
     /// Identified value, in the unit of `nominal`.
     pub identified: f64,
@@ -46,7 +50,7 @@ pub struct AxisCorrection {
     pub change: f64,
     /// Standard uncertainty of the change, in `unit`.
     pub u: f64,
-    /// `um` of a point, `um/m` of a direction.
+    /// `um` of a point and the zero of a linear axis, `um/m` of a direction, `arcsec` of the zero of a rotary axis.
     pub unit: String,
     /// What determines the change.
     pub determined_by: DeterminedBy,
@@ -150,6 +154,10 @@ pub struct Statements<G = GoodStatement, C = AxisCorrection> {
     /// What to correct: of a fit and a trace the line of each axis whose location errors are identified, else what has
     /// changed; of a plan what of the set-up limits its worst error.
     pub correct: Vec<C>,
+    /// Of a fit and a trace: what else exceeds its expanded uncertainty and is no set-up parameter, the most significant
+    /// coefficient of each effect and errors that move no axis line.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub further: Vec<ParameterResult>,
     /// What to measure next.
     pub measure: MeasureStatement,
 }

@@ -47,7 +47,7 @@ pub fn report(
         analysis.noise_source
     );
     report.values = values(analysis);
-    let statements = statements::of_plan(&stated.statements, analysis, commands);
+    let statements = statements::of_plan(&stated.statements, analysis, &problem.session.machine, commands);
     report.opening("", statements.into_iter().chain([extent(analysis).into()]));
     report.key(key_figures(problem, analysis));
     report.section("Predicted uncertainty");
