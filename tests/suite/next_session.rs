@@ -75,6 +75,35 @@ fn a_trace_writes_the_next_measurement_as_a_session_of_its_own() {
     assert!(!abbe(&asked).status.success());
 }
 
+/// A control that does not exist is refused before the search, and no folder is left. A folder that exists and is empty gets
+/// all files, those of the programs too.
+#[test]
+fn the_next_measurement_is_written_whole_or_not_at_all() {
+    let place = tempfile::tempdir().unwrap();
+    let measured = ready("hermle-c600u/measured/session.toml");
+    let next = place.path().join("next");
+    let only = ["--only", "EZC~C:h", "--only", "EAC~C:h", "--quiet"];
+    let asked = |control: &str| {
+        let asked = ["trace", text(&measured), "--next", text(&next), "--programs", control];
+        abbe(&[&asked[..], &only].concat())
+    };
+    let refused = asked("nonsense");
+    let said = String::from_utf8(refused.stderr).unwrap();
+    assert!(!refused.status.success() && refused.stdout.is_empty(), "{said}");
+    assert!(said.contains("no control is called `nonsense`") && said.contains("siemens"), "{said}");
+    assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 0);
+    // An empty folder.
+    std::fs::create_dir(&next).unwrap();
+    let written = asked("siemens");
+    assert!(written.status.success(), "{}", String::from_utf8_lossy(&written.stderr));
+    for file in ["session.toml", "machine.toml", "sheets.html", "programs/main.mpf"] {
+        assert!(next.join(file).is_file(), "{file}");
+    }
+    // The sheets name the programs.
+    assert!(std::fs::read_to_string(next.join("sheets.html")).unwrap().contains("main.mpf"));
+    assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 1, "nothing is left beside it");
+}
+
 #[test]
 fn a_trace_appends_the_tests_that_separate() {
     let place = tempfile::tempdir().unwrap();

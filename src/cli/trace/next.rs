@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use abbe::codegen::nc;
 use abbe::identify::trace::TraceOutcome;
 use abbe::model::ModelError;
 use abbe::model::document::edit::SessionText;
@@ -33,10 +34,15 @@ pub struct NextArguments {
 
 /// The name of the session in the folder.
 const SESSION: &str = "session.toml";
+/// The folder of the programs in it.
+const PROGRAMS: &str = "programs";
+/// The sheets in it.
+const SHEETS: &str = "sheets.html";
 
 impl NextArguments {
-    /// Refuses a folder that cannot be written before the search.
+    /// Refuses a folder that cannot be written, and a control that does not exist, before the search.
     pub fn check(&self) -> Result<(), Failure> {
+        self.programs.as_deref().map(nc::control).transpose()?;
         self.next.as_ref().map_or(Ok(()), |folder| folder::check(folder, None).map(|_| ()))
     }
 
@@ -63,22 +69,27 @@ impl NextArguments {
         proposed.into_iter().try_for_each(|block| text.add_block(block))?;
         folder::write(out, &files_of(text, sources)?, false, |made| {
             files::session(&made.join(SESSION), &ReadOptions { read_data: false, ..ReadOptions::default() })?;
-            Ok(())
+            self.documents(made)
         })?;
-        self.documents(out, quiet)
+        if !quiet {
+            let at = |name: &str| out.join(name).display().to_string();
+            say!("{}: the tests to measure next", at(SESSION));
+            if let Some(control) = &self.programs {
+                say!("{}: their programs for {control}", at(PROGRAMS));
+            }
+            say!("{}: their set-up sheets", at(SHEETS));
+        }
+        Ok(())
     }
 
-    /// The programs and the sheets of the session in the folder.
-    fn documents(&self, out: &Path, quiet: bool) -> Result<(), Failure> {
-        let [session, programs, sheets] =
-            [SESSION, "programs", "sheets.html"].map(|name| out.join(name).display().to_string());
-        if !quiet {
-            say!("{session}: the tests to measure next");
+    /// The programs and the sheets of the session in a folder that is not in its place yet.
+    fn documents(&self, made: &Path) -> Result<(), Failure> {
+        let [session, programs, sheets] = [SESSION, PROGRAMS, SHEETS].map(|name| made.join(name).display().to_string());
+        let control: Vec<&str> = self.programs.iter().flat_map(|control| ["--control", control.as_str()]).collect();
+        if !control.is_empty() {
+            again(&[&["nc", &session, "--out", &programs], &control[..]].concat(), true)?;
         }
-        if let Some(control) = &self.programs {
-            again(&["nc", &session, "--control", control, "--out", &programs], quiet)?;
-        }
-        again(&["sheet", &session, "--out", &sheets], quiet)
+        again(&[&["sheet", &session, "--out", &sheets], &control[..]].concat(), true)
     }
 }
 
