@@ -19,8 +19,10 @@ pub mod options;
 mod path;
 pub mod program;
 
-use abbe_model::session::Session;
+use abbe_model::chain::Machine;
+use abbe_model::session::motion::Motion;
 use abbe_model::session::moves::Moves;
+use abbe_model::session::{Session, Test};
 
 pub use options::NcOptions;
 pub use program::Program;
@@ -116,6 +118,17 @@ pub struct NcFiles {
     pub moves: Vec<Moves>,
     /// What the operator has to know of the program of each test, in their order.
     pub runs: Vec<Run>,
+}
+
+/// Whether every axis has a letter of NC programs: joints of robots are moved by other means.
+pub fn has_letters(machine: &Machine) -> bool {
+    program::letters(machine).is_ok()
+}
+
+/// Whether programs of a session can be written: every axis has a letter, and every test states a motion.
+pub fn has_programs(session: &Session) -> bool {
+    let states_motion = |test: &Test| !matches!(test.motion, None | Some(Motion::List));
+    has_letters(&session.machine) && session.tests.iter().all(states_motion)
 }
 
 /// The programs of every test of a session, and `main`, which calls them.

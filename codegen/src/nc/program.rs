@@ -85,7 +85,7 @@ impl Program {
 }
 
 /// The letters of the axes.
-fn letters(machine: &Machine) -> Result<Vec<char>, CodegenError> {
+pub(super) fn letters(machine: &Machine) -> Result<Vec<char>, CodegenError> {
     let letter = |name: &String| {
         let mut letters = name.chars();
         letters.next().filter(|letter| letters.next().is_none() && "ABCXYZUVW".contains(*letter))

@@ -51,10 +51,10 @@ pub struct MotionArguments {
     /// Program number of `main` on a fanuc; the tests follow [default: 1000].
     ///
     /// Example: --number 7000
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", requires = "control")]
     number: Option<u32>,
     /// Write paths of rotary and linear axes for the tool point over the table.
-    #[arg(long)]
+    #[arg(long, requires = "control")]
     tool_point: bool,
 }
 

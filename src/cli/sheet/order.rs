@@ -9,15 +9,25 @@ use super::SheetArguments;
 use crate::cli::failure::Failure;
 use crate::printers::sheet::Order;
 
-/// The programs of the sheets, if the plan has some: poses have none. Without a stated control, the motion is that of one
-/// without an increment, and the names are left out.
-fn programs(session: &Session, arguments: &SheetArguments) -> Result<Option<(&'static dyn Control, NcFiles)>, Failure> {
+/// The programs of the sheets, if the plan has some: poses and robots have none. Without a stated control, the motion is that
+/// of one without an increment, the names are left out, and what forbids programs is a warning.
+fn programs(
+    session: &Session,
+    arguments: &SheetArguments,
+    warnings: &mut Vec<String>,
+) -> Result<Option<(&'static dyn Control, NcFiles)>, Failure> {
     let control = nc::control(arguments.control.as_deref().unwrap_or("linuxcnc"))?;
-    let found = nc::files(session, control, &arguments.motion.options());
-    if arguments.control.is_some() {
-        return Ok(Some((control, found?)));
+    if arguments.control.is_none() && !nc::has_programs(session) {
+        return Ok(None);
     }
-    Ok(found.ok().map(|found| (control, found)))
+    match nc::files(session, control, &arguments.motion.options()) {
+        Ok(programs) => Ok(Some((control, programs))),
+        Err(error) if arguments.control.is_some() => Err(error.into()),
+        Err(error) => {
+            warnings.push(format!("no program can be written: {error}"));
+            Ok(None)
+        }
+    }
 }
 
 /// The order of work of these sheets.
@@ -28,8 +38,8 @@ pub fn order(
     source: String,
     basic_bar_mm: Option<f64>,
 ) -> Result<Order, Failure> {
-    let programs = programs(session, arguments)?;
     let mut warnings = session.warnings.clone();
+    let programs = programs(session, arguments, &mut warnings)?;
     warnings.extend(collision::unchecked(session, true));
     let clearances: Vec<_> = sheets.iter().filter_map(|sheet| sheet.clearance.clone()).collect();
     warnings.extend(collision::warnings(session, &clearances));
