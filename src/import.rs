@@ -49,8 +49,10 @@ pub struct ImportOptions {
     pub hints: Vec<Hint>,
     /// The test whose set-up new tests of a session have.
     pub like: Option<String>,
-    /// Accept readings that contradict the machine, and a session that reads files outside its folder.
+    /// Accept a session that reads files outside its folder.
     pub allow_outside: bool,
+    /// Accept readings that contradict the machine.
+    pub allow_implausible: bool,
 }
 
 /// A session of foreign files.
@@ -173,7 +175,7 @@ pub fn import(files: &[Foreign], target: Target<'_>, options: &ImportOptions) ->
     let session = draft.read()?;
     let nominal_misfit = plausibility::nominal_misfit(&session);
     let mut warnings = session.warnings.clone();
-    let plausibility = checked(&session, nominal_misfit, options.allow_outside, &mut warnings)?;
+    let plausibility = checked(&session, nominal_misfit, options.allow_implausible, &mut warnings)?;
     warnings.extend(plausibility::warnings(&plausibility));
     let result = ImportResult {
         session: draft.file.file_name().map_or_else(|| SESSION_FILE.into(), |name| name.to_string_lossy().into_owned()),
@@ -231,7 +233,7 @@ const NOISE_MM: f64 = 0.05;
 fn checked(
     session: &Session,
     nominal_misfit: Option<f64>,
-    allow_outside: bool,
+    allow_implausible: bool,
     warnings: &mut Vec<String>,
 ) -> Result<Plausibility, IdentifyError> {
     let two_sided = session.instruments().iter().any(|kind| kind.is_two_sided());
@@ -242,7 +244,7 @@ fn checked(
     };
     let found = match fit::prepare(&stated, 1) {
         Ok((problem, fit)) => plausibility::examine(&problem, &fit),
-        Err(error @ IdentifyError::Contradicted { .. }) if !allow_outside && !explained => return Err(error),
+        Err(error @ IdentifyError::Contradicted { .. }) if !allow_implausible && !explained => return Err(error),
         Err(error) => {
             warnings.push(format!("the session is not fitted yet: {error}"));
             Plausibility::default()
@@ -252,12 +254,14 @@ fn checked(
         matches!(
             kind,
             ConflictKind::ExplainedVariance
+                | ConflictKind::Orientations
                 | ConflictKind::LocationError
+                | ConflictKind::ZeroAngle
                 | ConflictKind::Residual
                 | ConflictKind::Statement
         )
     };
-    if allow_outside || !found.conflicts.iter().any(|conflict| of_readings(conflict.kind)) {
+    if allow_implausible || !found.conflicts.iter().any(|conflict| of_readings(conflict.kind)) {
         return Ok(found);
     }
     let conflicts: Vec<&str> = (found.conflicts.iter())

@@ -17,7 +17,7 @@ use crate::work;
 /// The files to write, the session as the last, and how they were understood, as JSON. One of `machine` and `session` is
 /// given.
 #[pyfunction]
-#[pyo3(signature = (files, machine, session, kind, set, columns, like, allow_outside))]
+#[pyo3(signature = (files, machine, session, kind, set, columns, like, allow_outside, allow_implausible))]
 pub fn import_readings(
     py: Python<'_>,
     files: Vec<PathBuf>,
@@ -28,6 +28,7 @@ pub fn import_readings(
     columns: Vec<String>,
     like: Option<String>,
     allow_outside: bool,
+    allow_implausible: bool,
 ) -> PyResult<(Vec<(String, Vec<u8>)>, String)> {
     let of_words = |(message, help): (String, String)| Failed::argument(message, help);
     let known = || InstrumentKind::ALL.iter().map(|kind| kind.word()).collect::<Vec<_>>().join(", ");
@@ -41,6 +42,7 @@ pub fn import_readings(
         hints: columns.iter().map(|text| Hint::parse(text)).collect::<Result<_, _>>().map_err(of_words)?,
         like,
         allow_outside,
+        allow_implausible,
     };
     let imported = work::run(py, None, move |_| {
         let read = files.iter().map(|file| Foreign::read(&Store::Disk, file).map(|(file, _)| file));

@@ -42,6 +42,9 @@ pub enum Failure {
     /// Options that contradict each other.
     #[error("{0}")]
     CommandLine(String),
+    /// Estimates that mean nothing.
+    #[error("{0}")]
+    Implausible(String),
     /// The user interrupted the work. The results found until then have been written.
     #[error("{0}")]
     Interrupted(String),
@@ -128,6 +131,12 @@ impl Failure {
                 | ModelError::Plan { help, .. }
                 | ModelError::Session { help, .. },
             ) => tell(Kind::Help, help),
+            Failure::Implausible(_) => {
+                tell(
+                    Kind::Help,
+                    "`--allow-implausible` accepts it: for a machine that really is that far from its drawing",
+                );
+            }
             Failure::Model(ModelError::FileAccess { help, .. }) => tell(
                 Kind::Help,
                 &format!("{help} (`--data DIR` names the data folder, `--allow-outside` allows files outside)"),

@@ -27,6 +27,8 @@ pub struct FitArguments {
     #[command(flatten)]
     common: CommonArguments,
     #[command(flatten)]
+    plausibility: super::PlausibilityArguments,
+    #[command(flatten)]
     save: SaveArguments,
     #[command(flatten)]
     forms: FormArguments,
@@ -96,7 +98,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     let (problem, found) = fit::prepare(&session, common.seed)?;
     arguments.readings.write(&problem, &found)?;
     let mut result = fit::report(&problem, &found)?;
-    arguments.session.refuse_implausible(&result.plausibility)?;
+    arguments.plausibility.check(&result.plausibility)?;
     if let Some(draws) = &draws {
         propagation::add_monte_carlo(&problem, &found, draws, &mut result)?;
     }

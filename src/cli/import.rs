@@ -65,10 +65,12 @@ pub struct ImportArguments {
     /// Example: --like C100
     #[arg(long, value_name = "TEST", requires = "session", allow_hyphen_values = true)]
     like: Option<String>,
-    /// Accept readings that contradict the machine, such as location errors above 5 % of a link; and allow the session to
-    /// read files outside its folder.
+    /// Allow the session to read files outside its folder.
     #[arg(long)]
     allow_outside: bool,
+    /// Accept readings that contradict the machine, such as location errors above 5 % of a link.
+    #[arg(long)]
+    allow_implausible: bool,
     /// Replace files with the same names: in the new folder, or beside the session.
     #[arg(long)]
     force: bool,
@@ -86,6 +88,7 @@ pub fn run(arguments: &ImportArguments) -> Result<(), Failure> {
         hints: arguments.column.iter().map(|text| Hint::parse(text)).collect::<Result<_, _>>().map_err(of_words)?,
         like: arguments.like.clone(),
         allow_outside: arguments.allow_outside,
+        allow_implausible: arguments.allow_implausible,
     };
     let read = arguments.files.iter().map(|path| Foreign::read(&Store::Disk, path));
     let (files, stamps): (Vec<_>, Vec<_>) = read.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
@@ -107,7 +110,7 @@ pub fn run(arguments: &ImportArguments) -> Result<(), Failure> {
 /// What the command can do about readings that contradict the machine.
 fn refused(error: IdentifyError) -> Failure {
     if let IdentifyError::Contradicted { .. } = &error {
-        tell(Kind::Note, "nothing is written; --allow-outside writes the session all the same");
+        tell(Kind::Note, "nothing is written; --allow-implausible writes the session all the same");
     }
     error.into()
 }

@@ -55,7 +55,6 @@ use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use crate::report::commands::Commands;
 use failure::Failure;
-use message::{Kind, tell};
 use output::Outputs;
 use results::OutputArguments;
 
@@ -186,26 +185,34 @@ pub struct SessionArguments {
     /// Example: --data measurements
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Allow the session to read files outside its own folder and the folder of --data; in fit, also location errors of a
-    /// robot above 5 % of a link.
+    /// Allow the session to read files outside its own folder and the folder of --data.
     #[arg(long)]
     allow_outside: bool,
+}
+
+/// What an identification does with estimates that mean nothing.
+#[derive(Args, Clone, Copy)]
+pub struct PlausibilityArguments {
+    /// Accept location errors of poses that are more than 5 % of a link.
+    #[arg(long)]
+    allow_implausible: bool,
+}
+
+impl PlausibilityArguments {
+    /// Refuses estimates that mean nothing: location errors of a robot that are a large share of its links.
+    fn check(self, found: &Plausibility) -> Result<(), Failure> {
+        let conflict = found.conflicts.iter().find(|conflict| conflict.kind == ConflictKind::LocationError);
+        let Some(conflict) = conflict.filter(|_| !self.allow_implausible) else { return Ok(()) };
+        let why = plausibility::explained(found);
+        let why = why.unwrap_or_else(|| "check the units, signs and order of the columns".to_string());
+        Err(Failure::Implausible(format!("{}; {why}", conflict.words)))
+    }
 }
 
 impl SessionArguments {
     /// Options of the reader.
     fn options(&self) -> ReadOptions {
         ReadOptions { data_directory: self.data.clone(), allow_outside: self.allow_outside, ..ReadOptions::default() }
-    }
-
-    /// Refuses estimates that mean nothing: location errors of a robot that are a large share of its links.
-    fn refuse_implausible(&self, found: &Plausibility) -> Result<(), Failure> {
-        let conflict = found.conflicts.iter().find(|conflict| conflict.kind == ConflictKind::LocationError);
-        let Some(conflict) = conflict.filter(|_| !self.allow_outside) else { return Ok(()) };
-        let why = plausibility::explained(found);
-        let why = why.unwrap_or_else(|| "check the units, signs and order of the columns".to_string());
-        tell(Kind::Note, "--allow-outside accepts it");
-        Err(Failure::Other(format!("{}; {why}", conflict.words)))
     }
 
     /// How command lines name the session.

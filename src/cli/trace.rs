@@ -13,11 +13,12 @@ use clap::Args;
 use clock::seconds;
 
 use super::failure::Failure;
-use super::message::{Kind, tell};
 use super::results::Read;
 use super::save::SaveArguments;
 use super::search::SearchArguments;
-use super::{CommonArguments, SessionArguments, compensation, next_session, output, read_session};
+use super::{
+    CommonArguments, PlausibilityArguments, SessionArguments, compensation, next_session, output, read_session,
+};
 use crate::report::{readings, trace as present};
 
 /// Examples of `abbe trace`.
@@ -30,6 +31,8 @@ pub struct TraceArguments {
     session: SessionArguments,
     #[command(flatten)]
     common: CommonArguments,
+    #[command(flatten)]
+    plausibility: PlausibilityArguments,
     #[command(flatten)]
     save: SaveArguments,
     #[command(flatten)]
@@ -89,7 +92,8 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     if arguments.list {
         return progress::list(&session, &options);
     }
-    let trace = progress::trace(&session, &options, arguments.time_limit, common.output.quiet)?;
+    let ends = (arguments.time_limit, common.output.quiet);
+    let trace = progress::trace(&session, &options, arguments.plausibility, ends)?;
     let stated = StatedTrace::of_trace(&trace);
     let report = present::report(&trace, &stated, &arguments.session.commands(), common.output.figures())?;
     common.output.put(&outputs, &report, &stated, &Read::session(&session, &sources, common.seed))?;
@@ -102,16 +106,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         output::write_whole(path, &output::csv(&readings::residuals(&trace.after, &trace.after_fit))?)?;
     }
     if trace.result.interrupted {
-        if arguments.compensation.wanted() {
-            tell(Kind::Warning, "no compensation tables are written: effects may be missing from the model");
-        }
-        if arguments.save.file().is_some() {
-            tell(Kind::Warning, "no model is saved: effects may be missing from it");
-        }
-        return match trace.result.time_limit_s {
-            Some(_) => Ok(()),
-            None => Err(Failure::Interrupted(trace.result.interruption())),
-        };
+        return progress::ended_early(&trace, arguments.compensation.wanted(), arguments.save.file().is_some());
     }
     arguments.next.run(&session, &sources, &trace, common.output.quiet)?;
     arguments.save.run(&trace.after, &trace.after_fit, &sources, common.seed)?;

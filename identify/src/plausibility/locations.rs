@@ -1,34 +1,56 @@
-//! Location errors of poses that are too large for a machine: more than a share of its links.
+//! Location errors of poses that are too large for a machine: more than a share of its links; and zeros of joints that are
+//! too large for a mounting.
+//!
+//! What counts is the part of an estimate beyond its expanded uncertainty, `|value| − 2 u`: a location error that few poses
+//! determine badly is large by chance.
 
+use abbe_model::axis::AxisKind;
 use abbe_model::chain::{ERRORS_PER_AXIS, Machine};
 use abbe_model::component::{ErrorKind, ErrorName};
 use nalgebra::Vector3;
 
 use super::results::{Conflict, ConflictKind};
+use crate::fit::Fit;
 use crate::parameters::Role;
 use crate::problem::Problem;
 
 /// Largest share of a link by which an axis may lie beside its place; for angles, in radians.
 const MAX_SHARE: f64 = 0.05;
+/// Largest zero angle of a joint, rad: 10°. A scale is mounted anew by a few degrees, and the zero of a drawing is another
+/// than that of the encoder.
+const MAX_ZERO: f64 = 10.0 * std::f64::consts::PI / 180.0;
+/// A component of a unit vector above which it is taken as along the axis.
+const ALONG: f64 = 0.9;
 /// Axes that are nearer than this meet, mm.
 const MEET_MM: f64 = 1.0;
+/// Coverage factor of the expanded uncertainty.
+const COVERAGE_FACTOR: f64 = 2.0;
 
-/// The location errors above 5 % of their link, the largest first.
-pub(super) fn conflicts(problem: &Problem, beta: &[f64]) -> Vec<Conflict> {
+/// The location errors above 5 % of their link and the zeros of joints above 10°, the largest against its limit first.
+pub(super) fn conflicts(problem: &Problem, fit: &Fit) -> Vec<Conflict> {
     let machine = &problem.session.machine;
     let tool = problem.models.first().map(|model| model.station().tool_point_mm()).unwrap_or_default();
     let links = links_mm(machine, tool);
     let mut found: Vec<(f64, Conflict)> = Vec::new();
-    for (parameter, value) in problem.parameters.list.iter().zip(beta) {
+    for (k, (parameter, value)) in problem.parameters.list.iter().zip(&fit.beta).enumerate() {
         let Some(name) = ErrorName::parse(&parameter.id) else { continue };
         if parameter.role != Role::Error || name.kind != ErrorKind::Location {
             continue;
         }
         let Some(slot) = machine.error_slot(&name) else { continue };
         let is_length = slot % ERRORS_PER_AXIS < 3;
-        let Some(link) = links.get(slot / ERRORS_PER_AXIS).copied() else { continue };
-        let share = if is_length { value.abs() / link } else { value.abs() };
-        if share <= MAX_SHARE || share.is_nan() {
+        let place = slot / ERRORS_PER_AXIS;
+        let (Some(link), Some(axis)) = (links.get(place).copied(), machine.axes.get(place)) else { continue };
+        let along = axis.direction[name.freedom.index() % 3].abs() > ALONG;
+        let is_zero = axis.kind == AxisKind::Rotary && !is_length && along;
+        let limit = match (is_length, is_zero) {
+            (true, _) => MAX_SHARE * link,
+            (false, true) => MAX_ZERO,
+            (false, false) => MAX_SHARE,
+        };
+        let u = fit.covariance[(k, k)].max(0.0).sqrt() * fit.u_enlargement;
+        let beyond = (value.abs() - COVERAGE_FACTOR * u) / limit;
+        if beyond <= 1.0 || beyond.is_nan() {
             continue;
         }
         let shown = |value: f64| value * parameter.unit.display_per_internal;
@@ -37,24 +59,29 @@ pub(super) fn conflicts(problem: &Problem, beta: &[f64]) -> Vec<Conflict> {
                 "{} is {:.1} mm, {:.0} % of the link of {link:.0} mm: no machine is that far from its drawing",
                 parameter.id,
                 value,
-                100.0 * share
+                100.0 * value.abs() / link
+            )
+        } else if is_zero {
+            format!(
+                "{}, the zero angle of {}, is {:.2}°: does the column count from another zero or in the other sense than the \
+                 machine file states?",
+                parameter.id,
+                axis.name,
+                value.to_degrees()
             )
         } else {
             format!("{} is {:.2}°: no machine is that far from its drawing", parameter.id, value.to_degrees())
         };
-        let stated = if is_length { MAX_SHARE * link } else { MAX_SHARE };
-        found.push((
-            share,
-            Conflict {
-                kind: ConflictKind::LocationError,
-                subject: parameter.id.clone(),
-                value: shown(*value),
-                stated: shown(stated),
-                unit: parameter.unit.name.clone(),
-                pull: None,
-                words,
-            },
-        ));
+        let conflict = Conflict {
+            kind: if is_zero { ConflictKind::ZeroAngle } else { ConflictKind::LocationError },
+            subject: parameter.id.clone(),
+            value: shown(*value),
+            stated: shown(limit),
+            unit: parameter.unit.name.clone(),
+            pull: None,
+            words,
+        };
+        found.push((beyond, conflict));
     }
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     found.into_iter().map(|(_, conflict)| conflict).collect()

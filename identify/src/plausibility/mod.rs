@@ -6,7 +6,8 @@
 //! - set-up parameters far from their stated values, each (`pulls`) and all together;
 //! - a residual of a hundred times the noise in every test;
 //! - poses of which the model explains less than 99 % of the variance (`poses`);
-//! - location errors above 5 % of the link, of poses (`locations`).
+//! - orientations of poses of which the model leaves more than 3°;
+//! - location errors above 5 % of the link and zero angles above 10°, of poses (`locations`).
 //!
 //! Mistakes are found by refits of the session with one statement changed at a time (`hypotheses`, `suggest`).
 
@@ -28,12 +29,14 @@ pub(crate) use tracing::{is_another_session, with_set_ups_freed};
 
 use crate::error::IdentifyError;
 use crate::fit::Fit;
-use crate::heldout::rms_mm;
+use crate::heldout::{rms_by_unit_mm, rms_mm};
 use crate::noise::NoiseSource;
 use crate::problem::Problem;
 
 /// Share of the variance of the measured positions that a model of poses explains at least.
 const MIN_EXPLAINED: f64 = 0.99;
+/// Residual of the measured orientations that a model of poses leaves at most, rad: 3°.
+const MAX_TURNED: f64 = 3.0 * std::f64::consts::PI / 180.0;
 /// Below this share, mistakes that explain more are searched.
 const WELL_EXPLAINED: f64 = 0.9999;
 /// The readings are those of another session if the residual of every test is this many times the noise.
@@ -260,8 +263,10 @@ fn of_poses(problem: &Problem, fit: &Fit) -> Plausibility {
     let left = channels * rms_mm(problem, &fit.residuals).powi(2);
     let explained = 1.0 - left / spread;
     // Links that shrink to nothing explain positions in another unit, too.
-    let locations = locations::conflicts(problem, &fit.beta);
-    let is_searched = explained < WELL_EXPLAINED || !locations.is_empty();
+    let locations = locations::conflicts(problem, fit);
+    let of_angles = rms_by_unit_mm(problem, &fit.residuals)[1].map(|mm| mm / problem.session.lever_mm);
+    let turned = of_angles.filter(|rad| *rad > MAX_TURNED);
+    let is_searched = explained < WELL_EXPLAINED || turned.is_some() || !locations.is_empty();
     let suggestions = if is_searched { poses::suggestions(problem) } else { Vec::new() };
     let little = explained < MIN_EXPLAINED;
     let mut conflicts = if little || !suggestions.is_empty() {
@@ -282,6 +287,15 @@ fn of_poses(problem: &Problem, fit: &Fit) -> Plausibility {
     } else {
         Vec::new()
     };
+    conflicts.extend(turned.map(|rad| Conflict {
+        kind: ConflictKind::Orientations,
+        subject: "session".to_string(),
+        value: rad.to_degrees(),
+        stated: MAX_TURNED.to_degrees(),
+        unit: "deg".to_string(),
+        pull: None,
+        words: format!("the model leaves a residual of {:.1}° in the measured angles", rad.to_degrees()),
+    }));
     conflicts.extend(locations);
     Plausibility { conflicts, suggestions, explained_variance: Some(explained) }
 }

@@ -82,6 +82,9 @@ pub(super) fn suggestions(problem: &Problem) -> Vec<Suggestion> {
     let mut nominal = thinned(problem, MAX_POSES);
     nominal.unknowns.clear();
     nominal.effects.clear();
+    // A turn of a radian weighs as much as the spread. The lever of a session that states no noise follows from the residual,
+    // and hides orientations that are misread.
+    nominal.lever_mm = spread_mm2(problem).map_or(nominal.lever_mm, f64::sqrt);
     let base_mm = trial(&with_targets(&nominal), &noise).map_or(f64::INFINITY, |found| found.rms_mm);
     let hypotheses = of_poses(&nominal);
     // A target without a prior is looked for with each mistake.
@@ -142,6 +145,11 @@ fn of_poses(session: &Session) -> Vec<Hypothesis> {
             "the measured positions are left-handed: one of {names} has the opposite sign, or two are exchanged"
         );
         list.push(Hypothesis::new(SuggestionKind::ColumnSign, &names, words, mirrored));
+        for misreading in measured.map_or(&[][..], |test| test.station.misreadings()) {
+            let reread = changed(&|_, values| (misreading.reread)(values));
+            let words = misreading.words.to_string();
+            list.push(Hypothesis::new(SuggestionKind::ColumnsExchanged, misreading.columns, words, reread));
+        }
     }
     let scaled = |axes: &[usize], factor: f64| {
         with_readings(session, |_, positions, _| {

@@ -29,8 +29,12 @@ pub enum ConflictKind {
     Residual,
     /// The model explains too little of the variance of the measured positions.
     ExplainedVariance,
-    /// A location error is more than 5 % of its link.
+    /// The model leaves too much of the measured orientations.
+    Orientations,
+    /// A location error is more than 5 % of its link, beyond its expanded uncertainty.
     LocationError,
+    /// The zero angle of a joint is more than 10°, beyond its expanded uncertainty.
+    ZeroAngle,
     /// The session with one of the suggestions fits far better.
     Statement,
 }
@@ -42,11 +46,11 @@ pub struct Conflict {
     pub kind: ConflictKind,
     /// The set-up parameter, or `session`.
     pub subject: String,
-    /// What was found: the estimate of the set-up parameter, χ² of all of them, the residual, the share of the variance, or
-    /// the location error; in `unit`.
+    /// What was found: the estimate of the set-up parameter, χ² of all of them, the residual, the share of the variance, the
+    /// residual of the orientations, or the location error; in `unit`.
     pub value: f64,
     /// What it is compared with, in `unit`: the stated standard uncertainty, the degrees of freedom, the noise, the least
-    /// share, or 5 % of the link.
+    /// share, or the limit.
     pub stated: f64,
     /// Unit of `value` and `stated`; `1` for none.
     pub unit: String,

@@ -18,10 +18,12 @@ const STATEMENT_EXPLAINS: f64 = 5.0;
 /// Whether readings and session disagree so much that a search for effects is meaningless.
 pub(crate) fn is_another_session(plausibility: &Plausibility) -> bool {
     plausibility.conflicts.iter().any(|conflict| match conflict.kind {
-        ConflictKind::Residual => true,
+        ConflictKind::Residual | ConflictKind::Orientations => true,
         ConflictKind::ExplainedVariance => conflict.value < conflict.stated,
         ConflictKind::Statement => conflict.value > STATEMENT_EXPLAINS * conflict.stated,
-        ConflictKind::SetupParameter | ConflictKind::Setups | ConflictKind::LocationError => false,
+        ConflictKind::SetupParameter | ConflictKind::Setups | ConflictKind::LocationError | ConflictKind::ZeroAngle => {
+            false
+        }
     })
 }
 

@@ -4,6 +4,7 @@
 use abbe_model::effect::Effect;
 
 use super::TraceOutcome;
+use super::progress::Progress;
 use super::result::unsearched;
 use crate::error::IdentifyError;
 use crate::fit::{self, Fit};
@@ -36,6 +37,13 @@ impl Contradicted {
             contradicted.freed = Some((freed, found));
         }
         Ok(contradicted)
+    }
+
+    /// Tells the caller of contradictions.
+    pub fn report(&self, progress: &dyn Fn(Progress) -> bool) {
+        if !self.plausibility.conflicts.is_empty() {
+            progress(Progress::Contradicted(Box::new(self.plausibility.clone())));
+        }
     }
 
     /// Whether the set-up is still contradicted in a model with effects that were found without its priors.

@@ -171,6 +171,7 @@ fn without_conformity(
 ) -> Result<TraceOutcome, IdentifyError> {
     let (problem, fitted) = prepare(session, options.seed)?;
     let contradicted = Contradicted::of(&problem, &fitted)?;
+    contradicted.report(progress);
     if contradicted.forbids_search() {
         return contradicted.outcome_without_search(problem, fitted);
     }

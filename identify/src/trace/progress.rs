@@ -1,5 +1,6 @@
 //! What a trace does now, in words.
 
+use crate::plausibility::Plausibility;
 use crate::unit::ReadingUnit;
 use abbe_model::words::counted;
 
@@ -8,6 +9,8 @@ use abbe_model::words::counted;
 pub enum Progress {
     /// The declared model is being fitted.
     Fitting,
+    /// The readings contradict the declared model: how. The trace ends if the caller does not accept it.
+    Contradicted(Box<Plausibility>),
     /// The candidates are being screened: the number of candidates.
     Screening(usize),
     /// An effect was added: the number of effects, its identifier, the held-out rms in µm.
@@ -31,7 +34,7 @@ impl Progress {
             }
             Progress::Folds(ended, folds) => format!("searching without one fold: {ended} of {folds}"),
             Progress::Judging => "refitting and judging".to_string(),
-            Progress::Working => return None,
+            Progress::Contradicted(_) | Progress::Working => return None,
         })
     }
 }

@@ -35,6 +35,7 @@ def import_readings(
     columns: Mapping[str, str | int] | None = None,
     like: str | None = None,
     allow_outside: bool = False,
+    allow_implausible: bool = False,
 ) -> Imported:
     """Import foreign files of readings: each becomes the test of its name, as ``abbe import``.
 
@@ -61,7 +62,9 @@ def import_readings(
     like : str, optional
         The test of the session whose set-up new tests have.
     allow_outside : bool
-        Accept readings that contradict the machine, and a session that reads files outside its folder.
+        Accept a session that reads files outside its folder.
+    allow_implausible : bool
+        Accept readings that contradict the machine.
 
     Returns
     -------
@@ -83,7 +86,15 @@ def import_readings(
         raise TypeError("state `machine` with `out`, or `session`")
     hints = [f"{own}={theirs}" for own, theirs in (columns or {}).items()]
     written, result = _abbe.import_readings(
-        [Path(file) for file in files], machine, session, kind, dict(set or {}), hints, like, allow_outside
+        [Path(file) for file in files],
+        machine,
+        session,
+        kind,
+        dict(set or {}),
+        hints,
+        like,
+        allow_outside,
+        allow_implausible,
     )
     folder = Path(session).parent if session is not None else Path(out or ".")
     folder.mkdir(parents=True, exist_ok=True)

@@ -12,22 +12,35 @@ use abbe::plan::test_variations::TestVariations;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::clock::Clock;
+use crate::cli::PlausibilityArguments;
 use crate::cli::failure::Failure;
 use crate::cli::interrupt::Interrupts;
+use crate::cli::message::{Kind, tell};
 
 /// Traces a session and compares tests that separate its effects from their aliases, until they are done, the time is up
 /// or the user interrupts.
+///
+/// # Errors
+/// If the session cannot be fitted, or its estimates mean nothing and `plausibility` does not accept it.
 pub fn trace(
     session: &Session,
     options: &TraceOptions,
-    time_limit: Option<f64>,
-    quiet: bool,
+    plausibility: PlausibilityArguments,
+    (time_limit, quiet): (Option<f64>, bool),
 ) -> Result<TraceOutcome, Failure> {
     let clock = Clock::started(time_limit);
     let bar = progress_bar(quiet);
     let interrupts = Interrupts::handled(bar.clone());
     let shown = Mutex::new(());
+    let refused: Mutex<Option<Failure>> = Mutex::new(None);
     let report = |progress: Progress| {
+        if let Progress::Contradicted(found) = &progress
+            && let Err(failure) = plausibility.check(found)
+            && let Ok(mut refused) = refused.lock()
+        {
+            *refused = Some(failure);
+            return false;
+        }
         let Some(words) = progress.words() else {
             // Called often and from many threads; it shows nothing.
             interrupts.keep_results();
@@ -45,6 +58,10 @@ pub fn trace(
         !interrupts.came() && !clock.has_run_out()
     };
     let mut trace = trace::trace(session, options, &report)?;
+    if let Some(failure) = refused.lock().ok().and_then(|mut refused| refused.take()) {
+        bar.finish_and_clear();
+        return Err(failure);
+    }
     bar.set_message("comparing candidate tests");
     separate_aliases(&mut trace, &TestVariations::short(), &report)?;
     interrupts.end_at_once();
@@ -53,6 +70,23 @@ pub fn trace(
         trace.result.mark_time_limit(seconds);
     }
     Ok(trace)
+}
+
+/// Says what is not written of a trace that ended early: compensation tables, a saved model.
+///
+/// # Errors
+/// If the user interrupted it.
+pub fn ended_early(trace: &TraceOutcome, tables: bool, model: bool) -> Result<(), Failure> {
+    if tables {
+        tell(Kind::Warning, "no compensation tables are written: effects may be missing from the model");
+    }
+    if model {
+        tell(Kind::Warning, "no model is saved: effects may be missing from it");
+    }
+    match trace.result.time_limit_s {
+        Some(_) => Ok(()),
+        None => Err(Failure::Interrupted(trace.result.interruption())),
+    }
 }
 
 fn progress_bar(quiet: bool) -> ProgressBar {

@@ -150,7 +150,7 @@ fn eighteen_of_twenty_foreign_files_are_read_without_a_hint() {
     for (name, plan, normalised) in READ {
         let folder = place.path().join(stem(name));
         // Poses drawn at random lie in no socket: the readings of that file are right, the session is not.
-        let more: &[&str] = if name == "sockets.csv" { &["--allow-outside"] } else { &[] };
+        let more: &[&str] = if name == "sockets.csv" { &["--allow-implausible"] } else { &[] };
         let json = place.path().join(format!("{}.json", stem(name)));
         let (output, session) = import(&folder, &foreign(name), plan, &[more, &["--json", text(&json)]].concat());
         if !output.status.success() {
@@ -249,8 +249,8 @@ fn a_location_error_above_five_per_cent_of_the_link_is_refused_unless_it_is_allo
     let found = message(&output).split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(!output.status.success() && !out.exists(), "{found}");
     assert!(found.contains("0J3 is") && found.contains("% of the link"), "{found}");
-    assert!(found.contains("--allow-outside"), "{found}");
-    let output = abbe(&[&asked[..], &["--allow-outside"]].concat());
+    assert!(found.contains("--allow-implausible"), "{found}");
+    let output = abbe(&[&asked[..], &["--allow-implausible"]].concat());
     assert!(output.status.success() && out.join("session.toml").exists(), "{}", message(&output));
 }
 
@@ -268,10 +268,17 @@ fn a_fit_refuses_location_errors_that_mean_nothing() {
     let output = abbe(&["fit", text(&session), "--quiet"]);
     let found = message(&output);
     assert!(
-        !output.status.success() && found.contains("% of the link") && found.contains("--allow-outside"),
+        !output.status.success() && found.contains("% of the link") && found.contains("--allow-implausible"),
         "{found}"
     );
-    assert!(abbe(&["fit", text(&session), "--quiet", "--allow-outside"]).status.success());
+    assert!(abbe(&["fit", text(&session), "--quiet", "--allow-implausible"]).status.success());
+    // That the session may read files elsewhere says nothing of its estimates.
+    assert!(!abbe(&["fit", text(&session), "--quiet", "--allow-outside"]).status.success());
+    // A search for effects of such a machine is refused as well, before it begins.
+    let output = abbe(&["trace", text(&session), "--quiet"]);
+    let found = message(&output);
+    assert!(!output.status.success() && output.stdout.is_empty(), "{found}");
+    assert!(found.contains("% of the link") && found.contains("--allow-implausible"), "{found}");
 }
 
 #[test]

@@ -128,3 +128,48 @@ fn a_joint_of_the_opposite_sign_is_named() {
         assert!(told.contains(&name), "{name}: {told}");
     }
 }
+
+/// A quaternion is written with its scalar first or last. Either order read as the other is named, also where no noise is
+/// stated and the orientations would weigh nothing beside the positions.
+#[test]
+fn the_order_of_a_quaternion_is_named() {
+    let table = std::fs::read_to_string(ready("pose/body.csv")).unwrap();
+    let own = std::fs::read_to_string(ready("pose/session.toml")).unwrap();
+    let unstated = own.replace("noise_um = 20\nnoise_arcsec = 10\n", "");
+    assert_ne!(own, unstated);
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::copy(ready("pose/machine.toml"), folder.path().join("machine.toml")).unwrap();
+    for (order, expected) in [("qw,qx,qy,qz", "scalar last"), ("qx,qy,qz,qw", "")] {
+        for text in [&own, &unstated] {
+            std::fs::write(folder.path().join("body.csv"), table.replace("qx,qy,qz,qw", order)).unwrap();
+            std::fs::write(folder.path().join("session.toml"), text).unwrap();
+            let session = files::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
+            let told = match fitted(&session) {
+                Ok(result) => result.plausibility.suggestions.iter().map(|one| one.words.clone()).collect(),
+                Err(error) => error.to_string(),
+            };
+            println!("{order}: {told}");
+            match expected {
+                "" => assert!(told.is_empty(), "{told}"),
+                words => assert!(told.contains(words), "{told}"),
+            }
+        }
+    }
+    // The scalar first in the file, read by the header of the other order.
+    let turned: Vec<String> = table
+        .lines()
+        .map(|line| {
+            let cells: Vec<&str> = line.split(',').collect();
+            let [others @ .., x, y, z, w] = &cells[..] else { panic!("{line}") };
+            if *x == "qx" { line.to_string() } else { [others, &[w, x, y, z]].concat().join(",") }
+        })
+        .collect();
+    std::fs::write(folder.path().join("body.csv"), turned.join("\n")).unwrap();
+    std::fs::write(folder.path().join("session.toml"), &own).unwrap();
+    let session = files::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
+    let told = match fitted(&session) {
+        Ok(result) => result.plausibility.suggestions.iter().map(|one| one.words.clone()).collect(),
+        Err(error) => error.to_string(),
+    };
+    assert!(told.contains("scalar first"), "{told}");
+}
