@@ -8,7 +8,7 @@ use maud::{Markup, html};
 use super::Kind;
 use super::scale::{coordinate, polyline, span};
 use super::set_up::{along, projected};
-use super::svg::{Drawing, legend, shortened};
+use super::svg::{Drawing, label_place, legend, shortened};
 use crate::report::table::{Cell, Table, cells, numbers, words};
 
 /// Space around the drawing, SVG units.
@@ -105,6 +105,7 @@ fn edges(shape: &BodyShape) -> Vec<[[f64; 3]; 2]> {
 struct Paper {
     per_mm: f64,
     offset: [f64; 2],
+    size: [f64; 2],
 }
 
 impl Paper {
@@ -114,7 +115,7 @@ impl Paper {
         let per_mm = (width - 2.0 * MARGIN) / (across[1] - across[0]).max(down[1] - down[0]).max(1e-9);
         let height = per_mm * (down[1] - down[0]) + 2.0 * MARGIN;
         let offset = [width / 2.0 - per_mm * (across[0] + across[1]) / 2.0, MARGIN - per_mm * down[0]];
-        (Paper { per_mm, offset }, height)
+        (Paper { per_mm, offset, size: [width, height] }, height)
     }
 
     fn at(&self, point: [f64; 3]) -> (f64, f64) {
@@ -138,8 +139,9 @@ impl Paper {
     }
 
     fn label(&self, text: &str, point: [f64; 3]) -> Markup {
-        let (x, y) = self.at(point);
-        html! { text x=(coordinate(x + 4.0)) y=(coordinate(y - 4.0)) { (shortened(text, 16)) } }
+        let ((x, y), text) = (self.at(point), shortened(text, 16));
+        let (x, y) = label_place((x + 4.0, y - 4.0), &text, self.size);
+        html! { text x=(coordinate(x)) y=(coordinate(y)) { (text) } }
     }
 }
 

@@ -5,7 +5,7 @@ use maud::{Markup, html};
 
 use super::Kind;
 use super::scale::{coordinate, dots, polyline, span};
-use super::svg::{Drawing, legend, shortened};
+use super::svg::{Drawing, label_place, legend, shortened};
 use crate::report::table::{Cell, Table, cells, numbers, words};
 
 /// Space around the drawing of a panel, SVG units.
@@ -70,8 +70,9 @@ impl Panel {
     }
 
     fn label(&self, text: &str, point: [f64; 3]) -> Markup {
-        let (x, y) = self.at(point);
-        html! { text class="small" x=(coordinate(x + 3.0)) y=(coordinate(y - 3.0)) { (shortened(text, 6)) } }
+        let ((x, y), text) = (self.at(point), shortened(text, 6));
+        let (x, y) = label_place((x + 3.0, y - 3.0), &text, [self.side; 2]);
+        html! { text class="small" x=(coordinate(x)) y=(coordinate(y)) { (text) } }
     }
 
     fn ball(&self, class: &str, point: [f64; 3]) -> Markup {

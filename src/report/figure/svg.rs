@@ -141,6 +141,17 @@ pub fn shortened(text: &str, max: usize) -> String {
     format!("{kept}…")
 }
 
+/// Greatest width of a letter of a drawing, SVG units: widths of text are estimated generously.
+const LETTER: f64 = 7.8;
+/// Height of a letter above its line.
+const ASCENT: f64 = 11.0;
+
+/// Where a label beside a point starts, so that all of it is within a drawing of this size.
+pub fn label_place((x, y): (f64, f64), text: &str, [width, height]: [f64; 2]) -> (f64, f64) {
+    let last = width - LETTER * text.chars().count() as f64;
+    (x.min(last).max(0.0), y.min(height).max(ASCENT))
+}
+
 /// Draws a legend from the left, in as many lines as needed. Returns it with the ordinate of its last line. Text widths
 /// are estimated generously.
 pub fn legend<S: AsRef<str>>(entries: &[(S, String)], x: f64, y: f64, width: f64) -> (Markup, f64) {
@@ -148,7 +159,7 @@ pub fn legend<S: AsRef<str>>(entries: &[(S, String)], x: f64, y: f64, width: f64
     let (mut left, mut baseline) = (x, y);
     for (class, label) in entries {
         let class = class.as_ref();
-        let needed = 26.0 + 7.8 * label.chars().count() as f64;
+        let needed = 26.0 + LETTER * label.chars().count() as f64;
         if left > x && left + needed > x + width {
             left = x;
             baseline += 17.0;
