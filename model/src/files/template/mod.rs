@@ -49,7 +49,9 @@ pub fn of_code(code: &str, sizes: Sizes) -> Result<[String; 2], ModelError> {
              because a ball on it would be in the head",
             parsed.spaced()
         ),
-        help: "use the code of a machine with more axes".into(),
+        help: "write the chain and its axes into a machine file, and plan the tests of an instrument without a bar, such as \
+               `kind = \"laser\"`, `\"angle\"` or `\"tracker\"`; or use a code with linear axes along X, Y and Z"
+            .into(),
     })?;
     Ok([machine(&parsed, &bodies, &geometry), plan])
 }
