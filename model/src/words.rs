@@ -59,7 +59,7 @@ pub fn counted(count: impl TryInto<u64> + std::fmt::Display + Copy, thing: &str)
 }
 
 /// `a, b and c`.
-pub(crate) fn listed(words: &[impl AsRef<str>], joint: &str) -> String {
+pub fn listed(words: &[impl AsRef<str>], joint: &str) -> String {
     let words: Vec<&str> = words.iter().map(AsRef::as_ref).collect();
     match words.split_last() {
         Some((last, [_, ..])) => format!("{} {joint} {last}", words[..words.len() - 1].join(", ")),

@@ -1,5 +1,6 @@
 //! Positions of the carried ball in candidate tests, and positions of the rotary axes that do not sweep.
 
+use abbe_model::instrument::InstrumentKind;
 use abbe_model::session::Session;
 
 use super::test_variations::TestVariations;
@@ -17,26 +18,21 @@ pub(super) struct BallPosition {
     pub new: bool,
 }
 
-/// The positions of the carried ball: as mounted in the session, or newly mounted about each rotary axis of its side.
+/// The positions of the ball that an instrument of this kind has on a side: as mounted in the session, or newly mounted about
+/// each rotary axis of that side.
 pub(super) fn ball_positions(
     session: &Session,
+    kind: InstrumentKind,
     variations: &TestVariations,
     rotary: &[usize],
     on_table: bool,
 ) -> Vec<BallPosition> {
     let machine = &session.machine;
     let mut positions: Vec<BallPosition> = Vec::new();
-    for test in &session.tests {
-        let Some(bar) = test.station.bar() else {
-            continue;
-        };
-        let (ball, setup) = if on_table {
-            (bar.workpiece_ball, test.setup.clone())
-        } else {
-            (bar.spindle_ball, test.spindle_setup.clone())
-        };
-        if on_table && !positions.iter().any(|position| position.setup == setup) {
-            positions.push(BallPosition { ball, setup, new: false });
+    for test in session.tests.iter().filter(|test| on_table && test.station.kind() == kind) {
+        let Some(ball) = test.station.table_point_mm() else { continue };
+        if !positions.iter().any(|position| position.setup == test.setup) {
+            positions.push(BallPosition { ball, setup: test.setup.clone(), new: false });
         }
     }
     for &about in rotary.iter().filter(|axis| (**axis < machine.workpiece_side) == on_table) {
@@ -137,7 +133,7 @@ mod tests {
             TestVariations { radii_mm: vec![60.0, 90.0], heights_mm: vec![0.0, 25.0], ..TestVariations::default() };
         let balls_about = |about: usize| -> Vec<[f64; 2]> {
             let axis = &session.machine.axes[about];
-            let found = ball_positions(&session, &variations, &[about], true);
+            let found = ball_positions(&session, session.instrument, &variations, &[about], true);
             let along_and_off = found.iter().map(|position| {
                 assert!(position.new && position.setup.is_empty());
                 let from: [f64; 3] = std::array::from_fn(|i| position.ball[i] - axis.origin_mm[i]);
@@ -156,7 +152,7 @@ mod tests {
         let both = [[0.0, 60.0], [25.0, 60.0], [-25.0, 60.0], [0.0, 90.0], [25.0, 90.0], [-25.0, 90.0]];
         near(balls_about(1), &both);
         // Axes of the other side carry no ball of the table.
-        assert!(ball_positions(&session, &variations, &[0, 1], false).is_empty());
+        assert!(ball_positions(&session, session.instrument, &variations, &[0, 1], false).is_empty());
     }
 
     #[test]

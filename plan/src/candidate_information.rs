@@ -10,6 +10,8 @@ use abbe_identify::numerics::parallel;
 use abbe_identify::numerics::triangle::Triangle;
 use abbe_identify::parameters::{Parameter, Role};
 use abbe_identify::problem::Problem;
+use abbe_model::instrument::{Contact, SharedBy};
+use abbe_model::session::Test;
 
 /// The information of every candidate test on the shared parameters.
 pub struct PreparedCandidates {
@@ -65,16 +67,35 @@ impl PreparedCandidates {
     }
 }
 
-/// Whether a new test can share a parameter: errors and effects, a mounted workpiece ball, the spindle ball of the last
-/// test, the sensor.
+/// Whether a new test can share a parameter: errors and effects, what stands on the table or beside the machine, what is
+/// mounted at the tool in the last test, what all tests share.
 fn may_be_shared(problem: &Problem, parameter: &Parameter) -> bool {
     if parameter.role != Role::Setup {
         return true;
     }
-    let last = problem.tests.last().map_or("", |test| test.spindle_setup.as_str());
-    parameter.id.starts_with("workpiece_ball.")
-        || (parameter.id.starts_with("spindle_ball.") && parameter.id.ends_with(&format!("[{last}]")))
-        || !parameter.id.contains('[')
+    let last = problem.tests.last();
+    match shared_by(problem.tests.iter(), &parameter.id) {
+        Some(SharedBy::Setup | SharedBy::Session) => true,
+        Some(SharedBy::SpindleSetup) => {
+            last.is_some_and(|last| parameter.id.ends_with(&bracketed(&last.spindle_setup)))
+        }
+        _ => !parameter.id.contains('['),
+    }
+}
+
+/// What shares a set-up parameter, by the instruments of these tests: that of the sensors is the mount of their body.
+fn shared_by<'t>(mut tests: impl Iterator<Item = &'t Test>, id: &str) -> Option<SharedBy> {
+    let thing = id.split(['.', '[']).next().unwrap_or_default();
+    tests.find_map(|test| {
+        let unknowns = test.station.kind().unknowns();
+        let found = unknowns.iter().find(|unknown| unknown.thing == thing)?.shared_by;
+        Some(if found == SharedBy::Sensors { test.station.sensors() } else { found })
+    })
+}
+
+/// The group of a parameter as its identifier has it.
+fn bracketed(group: &str) -> String {
+    format!("[{group}]")
 }
 
 /// The information of a candidate test with a newly mounted spindle ball and, if permitted, with the spindle ball that
@@ -100,18 +121,24 @@ fn ready(
     let r = Triangle::new(nominal.len()).merged(&alone.triangles(&nominal)?).r();
     let mut ready = Vec::new();
     let last = problem.tests.last().filter(|last| {
-        variations.keep_spindle_ball && last.station.tool_point_mm() == candidate.test.station.tool_point_mm()
+        variations.keep_spindle_ball
+            && last.station.kind() == candidate.test.station.kind()
+            && last.spindle_setup != candidate.test.spindle_setup
+            // Optics and sensors of angles are aligned anew.
+            && !matches!(last.station.contact(), Contact::None)
+            && last.station.tool_point_mm() == candidate.test.station.tool_point_mm()
     });
     if let Some(last) = last {
-        let [own, mounted_setup] =
-            [&candidate.test.spindle_setup, &last.spindle_setup].map(|setup| format!("[{setup}]"));
+        let [own, mounted_setup] = [&candidate.test.spindle_setup, &last.spindle_setup].map(|setup| bracketed(setup));
+        let is_of_tool = |id: &str| shared_by(alone.tests.iter(), id) == Some(SharedBy::SpindleSetup);
         let root = shared.root_of_test(&alone, r.as_ref(), |id| match id.strip_suffix(&own) {
-            Some(id_stem) if id.starts_with("spindle_ball.") => format!("{id_stem}{mounted_setup}"),
+            Some(id_stem) if is_of_tool(id) => format!("{id_stem}{mounted_setup}"),
             _ => id.to_string(),
         });
         let mut candidate = candidate.clone();
         candidate.test.spindle_setup = last.spindle_setup.clone();
-        candidate.name.push_str(&format!(", spindle ball left mounted as in {}", last.name));
+        let mounted = last.station.points()[1].map_or("tool", |point| point.name);
+        candidate.name.push_str(&format!(", {mounted} left mounted as in {}", last.name));
         ready.push(CandidateInformation { test: candidate, root });
     }
     let root = shared.root_of_test(&alone, r.as_ref(), str::to_string);

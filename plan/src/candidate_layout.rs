@@ -70,7 +70,7 @@ pub(super) fn drafts(session: &Session, variations: &TestVariations, last: &Test
             .flat_map(|share| variations.both_directions.iter().map(|both| whole.part(*share, *both)))
             .collect();
         let on_table = axis < machine.workpiece_side;
-        for ball in ball_positions(session, variations, &rotary, on_table) {
+        for ball in ball_positions(session, last.station.kind(), variations, &rotary, on_table) {
             for at in axis_positions(session, variations, &rotary, axis) {
                 for (sweep, &feed) in sweeps.iter().flat_map(|sweep| variations.feeds.iter().map(|feed| (*sweep, feed)))
                 {

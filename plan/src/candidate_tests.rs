@@ -1,17 +1,19 @@
-//! The candidate ball-bar tests for the next measurement: the permitted variations, and those that the machine can
-//! perform.
+//! The candidate tests for the next measurement: the permitted variations, and those that the machine can perform.
 //!
-//! A candidate test sweeps one rotary axis. The other ball is on that axis, in the plane of the circle or beside it, as
+//! Those of an instrument without a bar are motions of the axes that it reads (`candidate_motions`). A candidate test of a
+//! ball bar sweeps one rotary axis. The other ball is on that axis, in the plane of the circle or beside it, as
 //! the bar length requires. Alternatively the linear axes keep the bar radial, tangential or axial. A part of the
 //! range, or one direction, never gives more information than the whole. Such tests are candidates only if the gain per
 //! minute decides. Tests beyond the travel of an axis or the reach of the bar are not candidates.
 
 use std::sync::Arc;
 
-use abbe_model::session::{Session, Test};
+use abbe_model::instrument::InstrumentKind;
+use abbe_model::session::{Session, Test, planned};
 use abbe_model::words::{counted, number};
 
 use super::candidate_layout::{Draft, MAX_DRAFTS, draft_count, drafts};
+use super::candidate_motions;
 use super::collision::{Bodies, Parts};
 use super::states;
 use super::test_variations::TestVariations;
@@ -34,13 +36,34 @@ pub struct CandidateTest {
 /// The candidate tests that a session's machine can perform. The session is complete (see [`states::complete`]).
 ///
 /// # Errors
-/// If the instrument is no ball bar, or no rotary axis can be swept.
+/// If there are too many, or none that the machine can perform.
 pub fn candidate_tests(session: &Session, variations: &TestVariations) -> Result<Vec<CandidateTest>, PlanError> {
-    let Some(last) = session.tests.last().filter(|test| test.station.bar().is_some()) else {
+    let mut kinds: Vec<InstrumentKind> = session.tests.iter().map(|test| test.station.kind()).collect();
+    kinds.sort_by_key(|kind| kind.word());
+    kinds.dedup();
+    let mut drafts = Vec::new();
+    for kind in kinds {
+        let last = session.tests.iter().rev().find(|test| test.station.kind() == kind);
+        match last.filter(|last| last.station.bar().is_some()) {
+            Some(last) => drafts.extend(with_bar(session, variations, last)?),
+            None => drafts.extend(candidate_motions::drafts(session, variations, kind)),
+        }
+    }
+    let bodies = Bodies::of(&session.machine);
+    let finished = parallel::map(drafts.len(), &|k| finished(session, &bodies, variations, drafts[k].clone()));
+    let tests: Vec<CandidateTest> = finished.into_iter().flatten().collect();
+    if tests.is_empty() {
         return Err(PlanError::Request(
-            "candidate tests are available for ball bars only; this session uses another instrument".to_string(),
+            "no candidate test is feasible on this machine: the instrument reads no motion of its axes, no bar reaches, the \
+             travel is too short, or no test clears the bodies of the machine"
+                .to_string(),
         ));
-    };
+    }
+    Ok(tests)
+}
+
+/// The candidates of a ball bar.
+fn with_bar(session: &Session, variations: &TestVariations, last: &Test) -> Result<Vec<Draft>, PlanError> {
     let count = draft_count(session, variations);
     if count > MAX_DRAFTS as f64 {
         let TestVariations { bars_mm, radii_mm, heights_mm, feeds, ranges, .. } = variations;
@@ -54,24 +77,18 @@ pub fn candidate_tests(session: &Session, variations: &TestVariations) -> Result
             counted(ranges.len(), "share of the range"),
         )));
     }
-    let drafts = drafts(session, variations, last);
-    let bodies = Bodies::of(&session.machine);
-    let finished = parallel::map(drafts.len(), &|k| finished(session, &bodies, variations, drafts[k].clone()));
-    let tests: Vec<CandidateTest> = finished.into_iter().flatten().collect();
-    if tests.is_empty() {
-        return Err(PlanError::Request(
-            "no candidate test is feasible on this machine: no bar reaches, the travel is too short, or no test clears the bodies of the machine".to_string(),
-        ));
-    }
-    Ok(tests)
+    Ok(drafts(session, variations, last))
 }
 
 /// Plans the states of a candidate test. `None` if the travel forbids them or the bar does not reach.
 fn finished(session: &Session, bodies: &Bodies, variations: &TestVariations, draft: Draft) -> Option<CandidateTest> {
     let Draft { mut test, name, new_setup } = draft;
-    let length = test.station.bar()?.bar;
+    if test.station.bar().is_none() {
+        planned::feasible(&session.machine, &test)?;
+    }
     let mut readings = states::planned(session, &test).ok()?;
-    if readings.observed.iter().any(|reading| (reading - length).abs() > variations.reach_mm) {
+    let beyond = |length: f64| readings.observed.iter().any(|reading| (reading - length).abs() > variations.reach_mm);
+    if test.station.bar().is_some_and(|bar| beyond(bar.bar)) {
         return None;
     }
     // Only tests that clear are proposed.

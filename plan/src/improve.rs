@@ -70,12 +70,15 @@ pub struct ProposedTest {
     pub makes_identifiable: Vec<String>,
     /// The errors and their standard uncertainties with it.
     pub uncertainties: Vec<NamedUncertainty>,
-    /// Centre of the workpiece ball in the table frame, mm.
-    pub workpiece_ball_mm: [f64; 3],
-    /// Centre of the spindle ball in the tool frame, mm.
-    pub spindle_ball_mm: [f64; 3],
-    /// Calibrated length of the bar, mm.
-    pub bar_mm: f64,
+    /// Of a ball bar: centre of the workpiece ball in the table frame, mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub workpiece_ball_mm: Option<[f64; 3]>,
+    /// Of a ball bar: centre of the spindle ball in the tool frame, mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spindle_ball_mm: Option<[f64; 3]>,
+    /// Of a ball bar: its calibrated length, mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bar_mm: Option<f64>,
     /// Name of the test in `session_toml`.
     pub name: String,
     /// The test as a `[[test]]` block of a session file.
@@ -272,8 +275,6 @@ fn step(
         .map(|j| shared.ids[first + j].clone())
         .collect();
     let bar = candidate.test.station.bar();
-    let (workpiece_ball_mm, spindle_ball_mm, bar_mm) =
-        bar.map_or(([0.0; 3], [0.0; 3], 0.0), |bar| (bar.workpiece_ball, bar.spindle_ball, bar.bar));
     ProposedTest {
         test: candidate.name.clone(),
         after: outside(&root),
@@ -281,9 +282,9 @@ fn step(
         new_setup: candidate.new_setup,
         makes_identifiable,
         uncertainties: with_units(named_uncertainties(shared, &root)),
-        workpiece_ball_mm,
-        spindle_ball_mm,
-        bar_mm,
+        workpiece_ball_mm: bar.map(|bar| bar.workpiece_ball),
+        spindle_ball_mm: bar.map(|bar| bar.spindle_ball),
+        bar_mm: bar.map(|bar| bar.bar),
         name: String::new(),
         proposal: proposal::none(),
     }

@@ -25,6 +25,7 @@ pub mod bias;
 pub mod budget;
 pub(crate) mod candidate_information;
 mod candidate_layout;
+mod candidate_motions;
 pub mod candidate_tests;
 pub mod clearance;
 pub mod collision;

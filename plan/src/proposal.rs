@@ -3,7 +3,7 @@
 use abbe_model::document::of_domain;
 use abbe_model::document::print::Block;
 use abbe_model::document::test::Test as Document;
-use abbe_model::instrument::ballbar::BAR;
+use abbe_model::instrument::SharedBy;
 use abbe_model::session::motion::Motion;
 use abbe_model::session::{Session, Test};
 
@@ -20,7 +20,7 @@ pub fn name(proposal: &Block<Document>) -> String {
 }
 
 /// The proposal of a candidate test, with its description as a remark, under a name that no test of the session and no
-/// proposal before it has: `C150`, `C150-2`. `taken` are the names of earlier proposals; the new name is added to them.
+/// proposal before it has: `C150`, `C150-2`, `X` of an instrument without a bar. `taken` are the names of earlier proposals; the new name is added to them.
 pub fn proposal(
     session: &Session,
     candidate: &Test,
@@ -28,17 +28,25 @@ pub fn proposal(
     variations: &TestVariations,
     taken: &mut Vec<String>,
 ) -> Option<Block<Document>> {
-    let bar = candidate.station.bar()?;
     let mut test = Test { readings: None, ..candidate.clone() };
-    let axis = match test.motion.as_mut()? {
+    // Candidate tests may be evaluated at every n-th position.
+    let thin = variations.thin.max(1) as f64;
+    let name = |axis: usize| session.machine.axes[axis].name.as_str();
+    let moved = match test.motion.as_mut()? {
         Motion::Sweep { axis, step, .. } | Motion::Follow { axis, step, .. } => {
-            // Candidate tests may be evaluated at every n-th position.
-            *step /= variations.thin.max(1) as f64;
-            *axis
+            *step /= thin;
+            name(*axis).to_string()
         }
-        Motion::Circle { .. } | Motion::List => return None,
+        Motion::Circle { first, second, step, .. } => {
+            *step /= thin;
+            [name(*first), name(*second)].concat()
+        }
+        Motion::List => return None,
     };
-    let stem = format!("{}{:.0}", session.machine.axes[axis].name, bar.bar);
+    let stem = match candidate.station.bar() {
+        Some(bar) => format!("{moved}{:.0}", bar.bar),
+        None => moved,
+    };
     // A set-up of the same name would be shared with the test that has it.
     let names = |test: &Test| [&test.name, &test.setup, &test.spindle_setup, &test.bar_setup].map(String::clone);
     let is_taken = |name: &String| taken.contains(name) || session.tests.iter().any(|test| names(test).contains(name));
@@ -50,22 +58,21 @@ pub fn proposal(
             setup.clone_from(&name);
         }
     }
-    // A ball that is mounted already has the priors of its mount.
-    let mounted = |of: fn(&Test) -> &str, own: &str| session.tests.iter().find(|test| of(test) == own);
-    let shared = [
-        (mounted(|test| &test.setup, &test.setup), 0..3),
-        (mounted(|test| &test.spindle_setup, &test.spindle_setup), 3..6),
-        (mounted(|test| &test.bar_setup, &test.bar_setup), BAR..BAR + 1),
-    ];
-    for (other, range) in shared {
-        if let Some(priors) = other.and_then(|other| other.priors.get(range.clone()))
-            && let Some(own) = test.priors.get_mut(range)
-        {
-            own.copy_from_slice(priors);
+    // What is mounted already has the priors of its mount.
+    let unknowns = test.station.kind().unknowns();
+    for (place, unknown) in unknowns.iter().enumerate() {
+        let is_of_mount = matches!(unknown.shared_by, SharedBy::Setup | SharedBy::SpindleSetup | SharedBy::BarSetup);
+        let same = |other: &&Test| {
+            other.station.kind() == test.station.kind()
+                && other.group(unknown.shared_by) == test.group(unknown.shared_by)
+        };
+        let mounted = session.tests.iter().filter(|_| is_of_mount).find(same);
+        if let Some(prior) = mounted.and_then(|other| other.priors.get(place)) {
+            test.priors[place] = *prior;
         }
     }
     test.name.clone_from(&name);
-    let document = of_domain::test(&test, &session.machine)?;
+    let document = of_domain::test(&test, &session.machine, session.instrument)?;
     taken.push(name);
     Some(Block { list: "test", entry: Some((document, description.to_string())) })
 }

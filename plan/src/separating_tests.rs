@@ -18,8 +18,8 @@ use abbe_identify::trace::{Progress, TraceOutcome};
 /// Maximum number of aliases that are compared with an effect, the nearest first. Each alias adds columns.
 const MAX_COMPARED_TESTS: usize = 24;
 
-/// Adds to each found effect the candidate tests that separate it from its aliases. Adds nothing if there are no
-/// candidate tests for the session's instrument. If `progress` returns `false`, the trace is marked as interrupted and
+/// Adds to each found effect the candidate tests that separate it from its aliases. Adds nothing if the session's
+/// instrument has no bar, or there are no candidate tests. If `progress` returns `false`, the trace is marked as interrupted and
 /// keeps the tests found so far.
 ///
 /// # Errors
@@ -29,7 +29,10 @@ pub fn separate_aliases(
     variations: &TestVariations,
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<(), PlanError> {
-    if trace.result.interrupted {
+    // The candidates of other instruments are many, and a search that proposes them for every effect takes longer than the
+    // search for the effects: `separation` compares one pair.
+    let has_bar = trace.after.session.tests.last().is_some_and(|test| test.station.bar().is_some());
+    if trace.result.interrupted || !has_bar {
         return Ok(());
     }
     let interrupt = Interrupt(progress);

@@ -74,10 +74,10 @@ fn proposed(report: &mut Report, found: &Improvement) {
         let mut rows = vec![
             cells![&criterion, three_digits(step.after)],
             cells!["duration", format!("{:.1} min{set_up}", step.duration_min)],
-            cells!["workpiece ball", point(step.workpiece_ball_mm)],
-            cells!["spindle ball", point(step.spindle_ball_mm)],
-            cells!["bar", format!("{} mm", step.bar_mm)],
         ];
+        let balls = [("workpiece ball", step.workpiece_ball_mm), ("spindle ball", step.spindle_ball_mm)];
+        rows.extend(balls.into_iter().filter_map(|(name, mm)| Some(cells![name, point(mm?)])));
+        rows.extend(step.bar_mm.map(|mm| cells!["bar", format!("{mm} mm")]));
         if !step.makes_identifiable.is_empty() {
             rows.push(cells!["makes identifiable", step.makes_identifiable.join(", ")]);
         }

@@ -332,7 +332,7 @@ fn a_report_suggests_no_command_that_is_refused() {
     assert!(offers(&super::ready("table-and-head/measured/session.toml")));
     assert!(!offers(&super::ready("hermle-c600u/measured/session.toml")));
     let r_test = super::ready("r-test/measured/session.toml");
-    assert!(!offers(&r_test));
+    assert!(offers(&r_test));
     let run = abbe(&["plan", text(&r_test), "--no-effects", "--improve", "1"]);
-    assert_eq!(run.status.code(), Some(1), "what is not offered is refused");
+    assert!(run.status.success(), "what is offered is not refused: {}", String::from_utf8_lossy(&run.stderr));
 }

@@ -117,6 +117,100 @@ fn every_bundled_plan_has_sheets() {
     }
 }
 
+/// The sheets of an instrument say nothing of another: no ball and no bar of a laser, a level, a camera, a tracker.
+#[test]
+fn sheets_have_the_words_of_their_instrument() {
+    for (plan, expected) in [
+        ("laser/plan.toml", "Laser, its beam along X of R and aligned over the whole travel: mount it"),
+        ("angle/plan.toml", "Sensor of angles, on the tool: it reads about Y and X of R: mount it"),
+        ("distance/session.toml", "Station: mount it"),
+        ("pose/session.toml", "Measuring system, where it sees the target at every position"),
+        ("pose/tracker.toml", "Laser tracker, where it sees the target at every position"),
+    ] {
+        let page = page(plan, &[]);
+        assert!(page.contains(expected), "{plan}: {expected}\n{page}");
+        let (_, body) = page.split_once("<body>").unwrap();
+        let words = body.split(|c: char| !c.is_alphanumeric()).map(str::to_lowercase);
+        let of_bars = words.filter(|word| matches!(&**word, "ball" | "balls" | "bar" | "bars")).count();
+        assert_eq!(of_bars, 0, "{plan}\n{page}");
+    }
+    // A robot has no spindle, no work offset, no program and no pivot.
+    let robot = page("pose/session.toml", &[]);
+    for absent in ["spindle", "work offset", "single block", "Pivot", "control shows"] {
+        assert!(!robot.contains(absent), "{absent}");
+    }
+    let level = page("angle/plan.toml", &[]);
+    assert!(level.contains("Run each program in single block before it is trusted."), "{level}");
+    let r_test = page("r-test/plan.toml", &[]);
+    assert!(r_test.contains("in single block and without the nest with the sensors before"), "{r_test}");
+}
+
+/// A motion that the axes cannot make is a warning on the sheet, and an error where a control is stated; options that belong to
+/// a control need it.
+#[test]
+fn errors_of_the_motion_are_told() {
+    // The overshoot of 2 mm leaves the travel.
+    let plan = ready("laser/plan.toml");
+    let fixed = ["sheet", text(&plan), "--out", "-"];
+    let expected = "axis `X` goes to -302.000 mm";
+    let output = abbe(&fixed);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success() && said.contains("no program can be written") && said.contains(expected), "{said}");
+    assert!(String::from_utf8_lossy(&output.stdout).contains(expected));
+    let output = abbe(&[&fixed[..], &["--control", "siemens"]].concat());
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains(expected), "{said}");
+    for option in [&["--number", "7000"][..], &["--tool-point"]] {
+        let output = abbe(&[&["sheet", text(&plan), "--out", "-"], option].concat());
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains("--control <CONTROL>"), "{said}");
+    }
+}
+
+/// Every label of the drawings is within them, on small machines and large ones.
+#[test]
+fn labels_stay_within_their_drawings() {
+    // The axis of a trunnion ends at the edge of the drawing.
+    let folder = tempfile::tempdir().unwrap();
+    let made = folder.path().join("trunnion");
+    let code = ["new", text(&made), "--from-code", "w A b X Y Z t", "--quiet"];
+    assert!(abbe(&code).status.success());
+    let made = made.join("plan.toml");
+    let ready = ["hermle-c600u/chapter5.toml", "tilting-head/session.toml", "laser/plan.toml", "angle/plan.toml"];
+    let plans = ready.into_iter().map(super::ready).chain([made]);
+    let number = |tag: &str, name: &str| {
+        let (_, rest) = tag.split_once(&format!(" {name}=\"")).unwrap();
+        rest.split_once('"').unwrap().0.parse::<f64>().unwrap()
+    };
+    for plan in plans {
+        let output = abbe(&["sheet", text(&plan), "--out", "-"]);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let page = String::from_utf8(output.stdout).unwrap();
+        let mut labels = 0;
+        for drawing in page.split("<svg").skip(1) {
+            let (head, rest) = drawing.split_once('>').unwrap();
+            let size = head.split_once("viewBox=\"0 0 ").unwrap().1.split_once('"').unwrap().0;
+            let width: f64 = size.split(' ').next().unwrap().parse().unwrap();
+            let drawing = rest.split_once("</svg>").unwrap().0;
+            for label in drawing.split("<text").skip(1) {
+                let (tag, words) = label.split_once('>').unwrap();
+                if tag.contains("middle") {
+                    continue;
+                }
+                let words = words.split_once('<').unwrap().0;
+                // Letters of 12.5 units are 7 wide on average.
+                let right = number(tag, "x") + 7.0 * words.chars().count() as f64;
+                assert!(number(tag, "x") >= 0.0 && right <= width, "{}: {words} at {right} of {width}", plan.display());
+                assert!(number(tag, "y") >= 10.0, "{}: {words}", plan.display());
+                labels += 1;
+            }
+        }
+        assert!(labels > 5, "{}", plan.display());
+    }
+}
+
 #[test]
 fn a_test_is_one_printed_page() {
     let Some(browser) = test_needs::browser("a_test_is_one_printed_page") else { return };

@@ -200,6 +200,14 @@ impl Node {
         }
     }
 
+    /// The number, if it is one.
+    pub fn as_number(&self) -> Option<f64> {
+        match &self.value {
+            Value::Number(number, _) => Some(*number),
+            _ => None,
+        }
+    }
+
     /// The text, if it is one.
     pub fn as_text(&self) -> Option<&str> {
         match &self.value {

@@ -1,22 +1,22 @@
 //! From the domain to documents, which read back to the same bits.
 
-use std::ops::Range;
-
+use super::effect;
+use super::kind::Kind;
 use super::lower::effect::{SCALES, internal};
 use super::machine::{Axis, Machine};
 use super::movement::{Circle, Follow, Path, Sweep};
-use super::node::{Named, Node};
+use super::node::Named;
 use super::test::Test;
 use super::value::{Count, Length, Positive, Three};
-use super::{effect, node};
 use crate::axis::AxisKind;
 use crate::driver::DriverUnit;
 use crate::effect::keys::KeyWriter;
 use crate::effect::{CoefficientPrior, Effect};
 use crate::frames::Rotation;
-use crate::instrument::ballbar::BAR;
+use crate::instrument::set_up::rounded;
+use crate::instrument::{InstrumentKind, SharedBy};
+use crate::session::Test as DomainTest;
 use crate::session::motion::{FollowOffset, Motion};
-use crate::session::{Prior, Test as DomainTest};
 use crate::{axis, chain};
 
 /// A machine without its bodies. Numbers read back to the same bits, except a direction, which the reader scales to
@@ -78,8 +78,8 @@ pub fn effect(effect: &Effect, machine: &chain::Machine) -> effect::Effect {
     document
 }
 
-/// A planned ball-bar test, with the positions of the axes that it does not move. `None` for another instrument, or for
-/// a test without a motion of its own.
+/// A planned test of a session with this instrument, with the positions of the axes that it does not move. `None` for a test
+/// without a motion of its own.
 ///
 /// ```
 /// use abbe_model::chain::Machine;
@@ -93,46 +93,32 @@ pub fn effect(effect: &Effect, machine: &chain::Machine) -> effect::Effect {
 /// let test = json!({"name": "C100", "bar_mm": 125, "workpiece_ball_mm": [0, 100, 0], "spindle_ball_mm": [0, 0, 0],
 ///                   "at": {"z_mm": 75}, "sweep": turn});
 /// add_node(&mut session, "test", test.into(), &[])?;
-/// let text = print::text_of(&of_domain::test(&session.tests[0], &session.machine))?;
+/// let text = print::text_of(&of_domain::test(&session.tests[0], &session.machine, session.instrument))?;
 /// assert!(text.starts_with("name = \"C100\"\nbar_mm = 125\n"), "{text}");
 /// # Ok::<(), abbe_model::ModelError>(())
 /// ```
-pub fn test(test: &DomainTest, machine: &chain::Machine) -> Option<Test> {
-    let bar = test.station.bar()?;
+pub fn test(test: &DomainTest, machine: &chain::Machine, instrument: InstrumentKind) -> Option<Test> {
     let (moved, sweep, path) = motion(test.motion.as_ref()?, machine)?;
-    let point = |mm: [f64; 3]| mm.map(number).into_iter().collect::<Node>();
-    let mut set_up = Node::table::<Node>([]);
-    set_up.set("bar_mm", number(bar.bar));
-    set_up.set("workpiece_ball_mm", point(bar.workpiece_ball));
-    set_up.set("spindle_ball_mm", point(bar.spindle_ball));
-    let u = |range: Range<usize>| -> Vec<f64> {
-        test.priors.get(range).unwrap_or_default().iter().map(|prior| uncertainty_um(*prior)).collect()
-    };
-    for (key, range) in [("workpiece_ball_u_um", 0..3), ("spindle_ball_u_um", 3..6)] {
-        let u = u(range);
-        if u.iter().any(|u| *u != 0.0) {
-            set_up.set(key, node::Node::from_iter(u));
-        }
-    }
-    if let [u] = u(BAR..BAR + 1)[..]
-        && u != 0.0
-    {
-        set_up.set("bar_u_um", u);
-    }
-    let stated = |set_up: &String| (*set_up != test.name).then(|| set_up.clone());
-    if let Some(name) = stated(&test.bar_setup) {
+    let mut set_up = test.station.written(&test.priors)?;
+    let kind = test.station.kind();
+    let stated = |set_up: &String, default: &str| (set_up != default).then(|| set_up.clone());
+    if let Some(name) = stated(&test.bar_setup, &test.name).filter(|_| kind.shares(SharedBy::BarSetup)) {
         set_up.set("bar_setup", name.as_str());
+    }
+    if let Some(socket) = &test.socket {
+        set_up.set("socket", socket.as_str());
     }
     let held = (0..machine.axes.len())
         .filter(|axis| !moved.contains(axis))
-        .map(|axis| (axis, number(machine.axes[axis].kind.to_display(test.at[axis]))))
+        .map(|axis| (axis, rounded(machine.axes[axis].kind.to_display(test.at[axis]))))
         .filter(|(_, position)| *position != 0.0)
         .map(|(axis, position)| (machine.axes[axis].column(""), Length::Number(position)));
     Some(Test {
         name: test.name.clone(),
         set_up,
-        setup: stated(&test.setup),
-        spindle_setup: stated(&test.spindle_setup),
+        kind: (kind != instrument).then_some(Kind(kind)),
+        setup: stated(&test.setup, &test.name),
+        spindle_setup: stated(&test.spindle_setup, kind.spindle_setup(&test.name)),
         at: Named(held.collect()),
         sweep,
         path,
@@ -143,12 +129,12 @@ pub fn test(test: &DomainTest, machine: &chain::Machine) -> Option<Test> {
 /// The axes whose positions follow from a motion, and its document.
 fn motion(motion: &Motion, machine: &chain::Machine) -> Option<(Vec<usize>, Option<Sweep>, Option<Path>)> {
     let name = |axis: usize| machine.axes[axis].name.clone();
-    let degrees = |angle: f64| number(angle.to_degrees());
+    let degrees = |angle: f64| rounded(angle.to_degrees());
     let often = |runs: usize| Some(Count(runs));
     Some(match *motion {
         Motion::Sweep { axis, from, to, step, speed, runs, both_directions } => {
             let kind = machine.axes[axis].kind;
-            let in_unit = |of: AxisKind, value: f64| (kind == of).then(|| number(kind.to_display(value)));
+            let in_unit = |of: AxisKind, value: f64| (kind == of).then(|| rounded(kind.to_display(value)));
             let sweep = Sweep {
                 axis: name(axis),
                 from_mm: in_unit(AxisKind::Linear, from),
@@ -167,24 +153,23 @@ fn motion(motion: &Motion, machine: &chain::Machine) -> Option<(Vec<usize>, Opti
         Motion::Circle { first, second, radius, centre, from, to, step, speed, runs, both_directions } => {
             let circle = Circle {
                 plane: format!("{}{}", machine.axes[first].name, machine.axes[second].name),
-                radius_mm: Length::Number(number(radius)),
-                centre_mm: Some(Three(centre.map(|mm| Length::Number(number(mm))))),
+                radius_mm: Length::Number(rounded(radius)),
+                centre_mm: Some(Three(centre.map(|mm| Length::Number(rounded(mm))))),
                 from_deg: Some(degrees(from)),
                 to_deg: Some(degrees(to)),
                 step_deg: degrees(step),
-                feed_mm_min: Some(Positive(number(60.0 * speed))),
+                feed_mm_min: Some(Positive(rounded(60.0 * speed))),
                 runs: often(runs),
                 both_directions: Some(both_directions),
             };
             (vec![first, second], None, Some(Path::Circle(circle)))
         }
         Motion::Follow { axis, from, to, step, speed, runs, both_directions, offset } => {
-            if matches!(offset, FollowOffset::None | FollowOffset::Touching) {
-                return None;
-            }
+            // An instrument without a bar has no direction of it.
+            let bar = Some(offset).filter(|offset| !matches!(offset, FollowOffset::None | FollowOffset::Touching));
             let follow = Follow {
                 axis: name(axis),
-                offset: Some(offset),
+                offset: bar,
                 from_deg: Some(degrees(from)),
                 to_deg: Some(degrees(to)),
                 step_deg: degrees(step),
@@ -195,23 +180,10 @@ fn motion(motion: &Motion, machine: &chain::Machine) -> Option<(Vec<usize>, Opti
                 both_directions: Some(both_directions),
             };
             let linear = (0..machine.axes.len()).filter(|axis| machine.axes[*axis].kind == AxisKind::Linear);
-            (std::iter::once(axis).chain(linear).collect(), None, Some(Path::Follow(follow)))
+            // The linear axes follow from the balls, but for a tool that stays where it is over the table at the start.
+            let follows = linear.filter(|_| offset != FollowOffset::None);
+            (std::iter::once(axis).chain(follows).collect(), None, Some(Path::Follow(follow)))
         }
         Motion::List => return None,
     })
-}
-
-/// A standard uncertainty of a set-up length, µm.
-fn uncertainty_um(prior: Prior) -> f64 {
-    match prior {
-        Prior::Known => 0.0,
-        Prior::Gaussian(u) => number(u * 1e3),
-        Prior::Free => f64::INFINITY,
-    }
-}
-
-/// A number with nine decimals at most: far below what a control resolves.
-fn number(value: f64) -> f64 {
-    // Zero has no sign.
-    format!("{value:.9}").parse().unwrap_or(value) + 0.0
 }

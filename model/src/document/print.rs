@@ -9,6 +9,7 @@ use toml_edit::ser::ValueSerializer;
 use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value};
 
 use super::de::REST;
+use super::node::{self, Node};
 use crate::error::ModelError;
 
 /// The text of a file that holds a document.
@@ -77,6 +78,24 @@ impl<T> JsonSchema for Block<T> {
 /// As [`text_of`].
 pub fn json_of(document: &impl Serialize) -> Result<serde_json::Value, ModelError> {
     Ok(json(value_of(document)?))
+}
+
+/// A document as a tree of values; `None` if a value has no form in TOML.
+pub(crate) fn node_of(document: &impl Serialize) -> Option<Node> {
+    fn node(value: Value) -> Node {
+        match value {
+            Value::String(text) => text.value().as_str().into(),
+            Value::Integer(number) => (*number.value() as f64).into(),
+            Value::Float(number) => (*number.value()).into(),
+            Value::Boolean(truth) => (*truth.value()).into(),
+            Value::Datetime(date) => node::Value::Date(date.to_string()).into(),
+            Value::Array(items) => items.into_iter().map(node).collect(),
+            Value::InlineTable(table) => {
+                Node::table(table.into_iter().map(|(key, value)| (key.to_string(), node(value))))
+            }
+        }
+    }
+    value_of(document).ok().map(node)
 }
 
 fn json(value: Value) -> serde_json::Value {

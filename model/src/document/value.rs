@@ -7,7 +7,7 @@ use std::marker::PhantomData;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{SeqAccess, Visitor, value};
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::fault::Fault;
 use crate::session::expression::{self, Constant};
@@ -198,7 +198,7 @@ impl<const LEAST: usize, const MOST: usize> JsonSchema for Count<LEAST, MOST> {
 }
 
 /// A direction of length 1.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "Vector")]
 #[schemars(inline)]
 pub struct Direction(pub [f64; 3]);
@@ -216,6 +216,15 @@ impl TryFrom<Vector> for Direction {
 #[derive(Clone, Debug, PartialEq, JsonSchema)]
 #[schemars(inline)]
 pub struct Directions(#[schemars(with = "OneOrMoreDirections")] pub Vec<[f64; 3]>);
+
+impl Serialize for Directions {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match &self.0[..] {
+            [one] => one.serialize(serializer),
+            several => several.serialize(serializer),
+        }
+    }
+}
 
 /// The forms of directions in the schema.
 #[derive(JsonSchema)]

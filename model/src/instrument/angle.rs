@@ -4,16 +4,17 @@
 //! one, plus a zero that is not known: `φ = d · (θ·n) + φ₀` ([`crate::rotation_error`]).
 
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::kind::{self, Checked};
 use super::set_up::{self, SetUp, Written};
-use super::{
-    Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
+use super::{Aligned, Travel, 
+    Entry, Fault, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
     point,
 };
+use crate::axis::AxisKind;
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
@@ -36,6 +37,9 @@ pub(super) const ENTRY: Entry = Entry {
     ..Entry::new(InstrumentKind::Angle, ["angle", "a sensor of angles"], &PARAMETERS, schema::properties::<Keys>, read)
 };
 
+/// A direction is horizontal if its component along gravity is smaller.
+const LEVEL: f64 = 1e-6;
+
 /// The channels.
 const CHANNELS: [Channel; 2] = [Channel::angle("angle"), Channel::angle("angle2")];
 
@@ -46,7 +50,7 @@ const COLUMNS: [Column; 2] = [
 ];
 
 /// The keys of a test.
-#[derive(Deserialize, JsonSchema)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Keys {
     /// Direction in R about which the rotation is read, such as [0, 0, 1]; two for two columns, such as [[1, 0, 0], [0, 1,
@@ -105,6 +109,46 @@ impl<N> Geometry<N> for Angle<N> {
 }
 
 impl Instrument for Angle<f64> {
+    /// About a rotary axis, or across a linear one; a level about horizontal directions only, of a linear axis its roll too.
+    fn aligned(&self, travel: &Travel<'_>) -> Vec<Aligned> {
+        if !travel.moves(self.body) {
+            return Vec::new();
+        }
+        let directions = match travel.machine.axes[travel.axis].kind {
+            AxisKind::Rotary => vec![travel.direction],
+            AxisKind::Linear if self.body == Body::Relative => travel.across().to_vec(),
+            AxisKind::Linear => travel.across().into_iter().chain([travel.positive()]).collect(),
+        };
+        let gravity = travel.machine.gravity;
+        let is_level = |about: &[f64; 3]| (0..3).map(|i| about[i] * gravity[i]).sum::<f64>().abs() < LEVEL;
+        let readable: Vec<[f64; 3]> =
+            directions.into_iter().filter(|about| self.body == Body::Relative || is_level(about)).collect();
+        // As many directions at a time as it has columns.
+        let sets = readable.chunks(self.about.len().max(1));
+        let aligned = sets.map(|about| {
+            let words: Vec<String> = about.iter().map(|about| kind::direction_in_words(*about)).collect();
+            let station = Station::Angle(Angle { about: about.to_vec(), body: self.body });
+            Aligned { station, words: format!("read about {}", words.join(" and ")), is_new: true }
+        });
+        aligned.collect()
+    }
+    fn written(&self, _: &[Prior]) -> Option<Node> {
+        let about = self.about.iter().map(|about| about.map(set_up::rounded)).collect();
+        set_up::written(&Keys { about: document::Directions(about), body: self.body }, &[])
+    }
+    fn handling(&self) -> Handling {
+        let about: Vec<String> = self.about.iter().map(|about| kind::direction_in_words(*about)).collect();
+        let on = match self.body {
+            Body::Relative => "Sensor of angles, between table and tool",
+            Body::Tool => "Sensor of angles, on the tool",
+            Body::Table => "Sensor of angles, on the table",
+        };
+        Handling { beside: Some(format!("{on}: it reads about {} of R", about.join(" and "))), ..Handling::default() }
+    }
+    fn absent_channels_known(&self, priors: &mut [Prior]) {
+        let zero = |channel: usize| if channel < self.about.len() { Prior::Free } else { Prior::Known };
+        priors.iter_mut().enumerate().for_each(|(channel, prior)| *prior = zero(channel));
+    }
     fn channels(&self) -> &[Channel] {
         &CHANNELS[..self.about.len()]
     }

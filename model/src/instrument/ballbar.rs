@@ -4,19 +4,20 @@
 //! with the gain error `k` adds `k·(L − L_bar)`.
 
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::kind::{MAX_MM, doubt_on_scatter, median};
 use super::set_up::{self, SetUp};
 use super::{Contact, 
-    Checked, Entry, Fault, Following, Geometry, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, InternalUnit, Reading,
+    Checked, Entry, Fault, Following, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, InternalUnit, Reading,
     SharedBy, Station, default_errors, displaced, point,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
+use crate::files::quantity::MICROMETRE;
 use crate::frames::Point;
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
@@ -57,7 +58,7 @@ const COLUMNS: [Column; 2] =
 const MIN_MM: f64 = 1e-6;
 
 /// The keys of a test.
-#[derive(Deserialize, JsonSchema)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Keys {
     /// Calibrated length.
@@ -172,6 +173,26 @@ impl<N> Geometry<N> for BallBar<N> {
 }
 
 impl Instrument for BallBar<f64> {
+    fn written(&self, priors: &[Prior]) -> Option<Node> {
+        let keys = Keys {
+            bar_mm: set_up::rounded(self.bar).into(),
+            bar_u_um: set_up::written_u(priors.get(BAR), MICROMETRE),
+            workpiece_ball_mm: set_up::written_point(self.workpiece_ball),
+            workpiece_ball_u_um: set_up::written_lengths(priors, 0),
+            spindle_ball_mm: set_up::written_point(self.spindle_ball),
+            spindle_ball_u_um: set_up::written_lengths(priors, 3),
+            bar_setup: None,
+        };
+        set_up::written(&keys, &[])
+    }
+    fn handling(&self) -> Handling {
+        Handling {
+            probed: Some("workpiece ball"),
+            taken_off: Some("the bar"),
+            changes: Some("changes of the bar"),
+            ..Handling::default()
+        }
+    }
     fn contact(&self) -> Contact {
         Contact::AtDistance(self.bar)
     }

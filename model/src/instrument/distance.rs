@@ -8,14 +8,16 @@ use serde::{Deserialize, Serialize};
 use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::set_up::{self, SetUp};
-use super::{
-    Checked, Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station,
+use super::{Aligned, Travel, 
+    Checked, Entry, Fault, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station,
     default_errors, displaced, point,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
+use crate::files::quantity::MICROMETRE;
 use crate::scalar::{Nominal, Scalar};
+use crate::session::Prior;
 use crate::session::expression::Constant;
 
 /// The station, the reflector in the tool frame, the dead path.
@@ -63,7 +65,7 @@ pub enum StationFrame {
 }
 
 /// The keys of a test.
-#[derive(Deserialize, JsonSchema)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Keys {
     /// Reflector in the tool frame.
@@ -141,6 +143,25 @@ impl<N> Geometry<N> for Distance<N> {
 }
 
 impl Instrument for Distance<f64> {
+    /// Its beam follows the reflector.
+    fn aligned(&self, _: &Travel<'_>) -> Vec<Aligned> {
+        Aligned::as_it_stands(self.clone())
+    }
+    fn written(&self, priors: &[Prior]) -> Option<Node> {
+        let keys = Keys {
+            reflector_mm: set_up::written_point(self.reflector),
+            reflector_u_um: set_up::written_lengths(priors, 3),
+            station_mm: set_up::written_point(self.station),
+            station_u_um: set_up::written_lengths(priors, 0),
+            station_frame: self.frame,
+            zero_u_um: set_up::written_u(priors.get(ZERO), MICROMETRE),
+        };
+        set_up::written(&keys, &["station_u_um", "zero_u_um"])
+    }
+    fn handling(&self) -> Handling {
+        let beside = (self.frame == StationFrame::Bed).then(|| "Station, fixed to the bed: its place is estimated".into());
+        Handling { beside, ..Handling::default() }
+    }
     fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
         [Some(&mut self.station), Some(&mut self.reflector)]
     }

@@ -12,6 +12,7 @@ use crate::component::ErrorName;
 use crate::document::Fault as KeyFault;
 use crate::document::node::Node;
 use crate::files::quantity::ARCSECOND;
+use crate::frames::{Point, cross};
 use crate::rotation_error::Body;
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
@@ -214,6 +215,89 @@ impl Checked<'_> {
     }
 }
 
+/// A way in which files of an instrument are misread.
+pub struct Misreading {
+    /// The columns.
+    pub columns: &'static str,
+    /// What would explain the readings, after "if": a clause.
+    pub words: &'static str,
+    /// The values of the columns of a reading as they would be.
+    pub reread: fn(&mut [f64]),
+}
+
+/// What an operator does with an instrument, in the words of a set-up sheet.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Handling {
+    /// What stands beside the machine and is set up there: `Laser tracker, where it sees the target at every position`.
+    pub beside: Option<String>,
+    /// The object on the table whose centre the machine probes to find R if no axis of the table gives it.
+    pub probed: Option<&'static str>,
+    /// What is taken off when a program runs for the first time: `the bar`.
+    pub taken_off: Option<&'static str>,
+    /// What is done between tests beside mounting objects: `changes of the bar`.
+    pub changes: Option<&'static str>,
+}
+
+/// A move of one axis, for which an instrument is set up.
+#[derive(Clone, Copy)]
+pub struct Travel<'m> {
+    /// The machine.
+    pub machine: &'m Machine,
+    /// The axis, by index.
+    pub axis: usize,
+    /// Its direction in R where the other axes stand, of unit length.
+    pub direction: [f64; 3],
+}
+
+impl Travel<'_> {
+    /// Whether the axis moves the body that an instrument reads.
+    pub(super) fn moves(&self, body: Body) -> bool {
+        let on_table = self.axis < self.machine.workpiece_side;
+        match body {
+            Body::Relative => true,
+            Body::Tool => !on_table,
+            Body::Table => on_table,
+        }
+    }
+
+    /// The direction of the axis with its largest component positive.
+    pub(super) fn positive(&self) -> [f64; 3] {
+        let largest = |a: f64, b: f64| if b.abs() > a.abs() + 1e-9 { b } else { a };
+        let sign = self.direction.iter().copied().fold(0.0, largest).signum();
+        self.direction.map(|x| x * sign + 0.0)
+    }
+
+    /// Two directions across the axis, perpendicular to each other, as near to R's directions as they can be.
+    pub(super) fn across(&self) -> [[f64; 3]; 2] {
+        let along = self.direction;
+        let farthest = (1..3).fold(0, |best, i| if along[i].abs() < along[best].abs() - 1e-9 { i } else { best });
+        let share = along[farthest];
+        let first: [f64; 3] = std::array::from_fn(|i| f64::from(u8::from(i == farthest)) - share * along[i]);
+        let length = first.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let first = first.map(|x| x / length);
+        let second = cross(along, Point(first)).0;
+        [first, Travel { direction: second, ..*self }.positive()]
+    }
+}
+
+/// A set-up of an instrument that reads a motion.
+#[derive(Clone, Debug)]
+pub struct Aligned {
+    /// The set-up.
+    pub station: Station<f64>,
+    /// What differs from the present one, in words; empty if nothing does.
+    pub words: String,
+    /// Whether the instrument has to be set up anew.
+    pub is_new: bool,
+}
+
+impl Aligned {
+    /// A set-up that stays.
+    pub(super) fn as_it_stands(station: impl Into<Station<f64>>) -> Vec<Aligned> {
+        vec![Aligned { station: station.into(), words: String::new(), is_new: false }]
+    }
+}
+
 /// Everything that is particular to one instrument as set up for a test, except its reading: see [`Geometry`].
 pub trait Instrument {
     /// The channels of a reading, in order.
@@ -242,6 +326,9 @@ pub trait Instrument {
     fn columns_of_channels(&self, machine: &Machine, state: &[AxisPosition<f64>], values: &mut [f64]) {
         let _ = (machine, state, values);
     }
+    /// The keys of a test that describe this set-up with these priors, as they stand in a file; `None` if it cannot be
+    /// written.
+    fn written(&self, priors: &[Prior]) -> Option<Node>;
     /// What data lack: the columns and what to do. `has` says whether there is a column of a quantity.
     fn missing(&self, has: &dyn Fn(Quantity) -> bool) -> Option<Fault>;
 
@@ -257,6 +344,26 @@ pub trait Instrument {
     /// Whether the place of its object is known: stated, or found from readings.
     fn is_located(&self) -> bool {
         true
+    }
+    /// What an operator does with it.
+    fn handling(&self) -> Handling {
+        Handling::default()
+    }
+    /// The set-ups that read a move of one axis while the others stand. None of an instrument whose points have to stay in
+    /// contact ([`Instrument::approaches`]), or that does not read this move.
+    fn aligned(&self, travel: &Travel<'_>) -> Vec<Aligned> {
+        let _ = travel;
+        Vec::new()
+    }
+    /// Where its point of the tool is beside its point of the table when they are in contact, in the table frame, mm: one
+    /// vector for each side of approach. None without a contact, or at the length of a bar.
+    fn approaches(&self) -> Vec<[f64; 3]> {
+        Vec::new()
+    }
+    /// The radius of the circle on which the tool stays in contact about its point of the table, and the axis of that circle
+    /// in the table frame, if there is one.
+    fn circled(&self) -> Option<(f64, [f64; 3])> {
+        None
     }
     /// The length to which deviations refer, mm; 0 without one.
     fn reference_mm(&self) -> f64 {
@@ -290,6 +397,10 @@ pub trait Instrument {
     /// Mirrors a measured position or pose in the instrument's frame.
     fn mirror(&self, values: &mut [f64]) {
         let _ = values;
+    }
+    /// Orders of its columns that are taken for one another, beside signs and units.
+    fn misreadings(&self) -> &'static [Misreading] {
+        &[]
     }
     /// The same with the point from which its readings count, if that is another than the nominal one.
     fn with_datum(&self, machine: &Machine, readings: &Readings) -> Option<Station<f64>> {
@@ -350,6 +461,15 @@ pub trait Instrument {
     fn check_observed(&self, test: &str, observed: &[f64]) -> Result<(), Fault> {
         let _ = (test, observed);
         Ok(())
+    }
+}
+
+/// A direction of R for an operator: `−X`, or its components.
+pub(super) fn direction_in_words(direction: [f64; 3]) -> String {
+    let principal = (0..3).find(|i| direction[*i].abs() > 1.0 - 1e-9);
+    match principal {
+        Some(i) => format!("{}{}", if direction[i] < 0.0 { "−" } else { "" }, ["X", "Y", "Z"][i]),
+        None => format!("[{}]", direction.map(|x| number((x * 1e4).round() / 1e4)).join(", ")),
     }
 }
 

@@ -14,19 +14,21 @@
 //! nominal value; `displacement_mm` counts from any point.
 
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::kind::{self, Checked, MAX_MM, median};
 use super::set_up::{self, SetUp, Written};
-use super::{
-    Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station,
+use super::{Aligned, Travel, 
+    Entry, Fault, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station,
     displaced, point,
 };
+use crate::axis::AxisKind;
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
+use crate::files::quantity::ARCSECOND;
 use crate::frames::{Point, cross, dot, dot_nominal};
 use crate::rotation_error::Body;
 use crate::scalar::{Nominal, Scalar};
@@ -95,7 +97,7 @@ const MAX_ZERO_MM: f64 = 1.0;
 const VERTICAL: f64 = 0.999;
 
 /// The keys of a test.
-#[derive(Deserialize, JsonSchema)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Keys {
     /// Reflector in the tool frame; default [0, 0, 0].
@@ -116,7 +118,7 @@ struct Keys {
 }
 
 /// The word of a channel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[schemars(inline)]
 enum Word {
@@ -126,6 +128,11 @@ enum Word {
     Pitch,
     Yaw,
     Roll,
+}
+
+impl Word {
+    /// In the order of the channels.
+    const ALL: [Word; 6] = [Word::Displacement, Word::Horizontal, Word::Vertical, Word::Pitch, Word::Yaw, Word::Roll];
 }
 
 fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
@@ -318,6 +325,39 @@ fn beam_frame<S: Scalar>(
 }
 
 impl Instrument for Laser<f64> {
+    /// The beam along a linear axis.
+    fn aligned(&self, travel: &Travel<'_>) -> Vec<Aligned> {
+        if travel.machine.axes[travel.axis].kind != AxisKind::Linear {
+            return Vec::new();
+        }
+        let beam = travel.positive();
+        let station = Station::Laser(Laser { frame: frame(beam), datum: 0.0, ..self.clone() });
+        vec![Aligned { station, words: format!("beam along {}", kind::direction_in_words(beam)), is_new: true }]
+    }
+    fn written(&self, priors: &[Prior]) -> Option<Node> {
+        let point = |point: [f64; 3]| (point != [0.0; 3]).then(|| set_up::written_point(point));
+        let words = places(&self.channels).filter_map(|place| Word::ALL.get(place).copied());
+        let keys = Keys {
+            reflector_mm: point(self.reflector),
+            reflector_u_um: set_up::written_lengths(priors, 0),
+            optic_mm: point(self.optic),
+            optic_u_um: set_up::written_lengths(priors, OPTIC),
+            beam: set_up::written_direction(self.frame[0]),
+            beam_u_arcsec: None,
+            channels: Some(words.collect()),
+        };
+        let mut node = set_up::written(&keys, &[])?;
+        if self.is_beam_stated {
+            // Zero is stated too: without it the direction is estimated with a straightness.
+            node.set("beam_u_arcsec", set_up::written_u(priors.get(BEAM), ARCSECOND).0);
+        }
+        Some(node)
+    }
+    fn handling(&self) -> Handling {
+        let beam = kind::direction_in_words(self.frame[0]);
+        let beside = format!("Laser, its beam along {beam} of R and aligned over the whole travel");
+        Handling { beside: Some(beside), taken_off: Some("the optics"), ..Handling::default() }
+    }
     fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
         [Some(&mut self.optic), Some(&mut self.reflector)]
     }

@@ -10,7 +10,10 @@ mod parameter;
 pub mod set_up;
 pub mod stand;
 
-pub use kind::{Checked, Contact, Entry, Fault, Following, Geometry, Group, Instrument, InstrumentPoint};
+pub use kind::{
+    Aligned, Checked, Contact, Entry, Fault, Following, Geometry, Group, Handling, Instrument, InstrumentPoint,
+    Misreading, Travel,
+};
 pub use parameter::{InstrumentParameter, InternalUnit, SharedBy};
 
 use std::ops::{Deref, DerefMut};

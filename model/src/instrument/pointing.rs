@@ -6,21 +6,23 @@
 //! positions are the encoders.
 
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::bearing::{Sight, bearings, direction, observed_bearings};
 use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::kind::{Checked, median};
 use super::set_up::{self, SetUp, Written};
-use super::{
+use super::{Aligned, Travel, 
     Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
     default_errors, point,
 };
+use crate::axis::AxisKind;
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
-use crate::frames::{Point, cross};
+use crate::files::quantity::ARCSECOND;
+use crate::frames::{Point, cross, dot};
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
 use crate::session::expression::Constant;
@@ -49,7 +51,7 @@ const COLUMNS: [Column; 2] = [
 ];
 
 /// The keys of a test.
-#[derive(Deserialize, JsonSchema)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Keys {
     /// Line of sight in the tool frame; default [1, 0, 0].
@@ -122,6 +124,25 @@ impl<N> Geometry<N> for Pointing<N> {
 }
 
 impl Instrument for Pointing<f64> {
+    /// Directions are observed wherever the mount points; a linear axis turns nothing.
+    fn aligned(&self, travel: &Travel<'_>) -> Vec<Aligned> {
+        match travel.machine.axes[travel.axis].kind {
+            AxisKind::Rotary => Aligned::as_it_stands(self.clone()),
+            AxisKind::Linear => Vec::new(),
+        }
+    }
+    fn written(&self, priors: &[Prior]) -> Option<Node> {
+        let is_default = matches!(priors, [Prior::Free, Prior::Known]);
+        let keys = Keys {
+            line_of_sight: Some(set_up::written_direction(self.directions[0])),
+            line_of_sight_u_arcsec: None,
+        };
+        let mut node = set_up::written(&keys, &[])?;
+        if !is_default {
+            node.set("line_of_sight_u_arcsec", set_up::written_u(priors.first(), ARCSECOND).0);
+        }
+        Some(node)
+    }
     fn channels(&self) -> &[Channel] {
         &CHANNELS
     }
@@ -133,8 +154,7 @@ impl Instrument for Pointing<f64> {
     }
     fn channels_of_columns(&self, machine: &Machine, state: &[AxisPosition<f64>], values: &mut [f64]) {
         if let [azimuth, elevation] = values {
-            let ((sin_a, cos_a), (sin_e, cos_e)) = (azimuth.sin_cos(), elevation.sin_cos());
-            let observed = Point([cos_e * cos_a, -cos_e * sin_a, sin_e]);
+            let observed = observed(*azimuth, *elevation);
             [*azimuth, *elevation] = observed_bearings(self.nominal::<f64>(machine, state), observed);
         }
     }
@@ -157,9 +177,8 @@ impl Instrument for Pointing<f64> {
         let mut away = Vec::with_capacity(readings.rows());
         for (row, values) in readings.observed.chunks_exact(CHANNELS.len()).enumerate() {
             readings.state(checked.machine, row, &mut state);
-            let mut values = [values[0], values[1]];
-            self.channels_of_columns(checked.machine, &state, &mut values);
-            away.push(values[0].hypot(values[1]).atan().to_degrees());
+            let ahead = self.nominal::<f64>(checked.machine, &state)[0];
+            away.push(dot(observed(values[0], values[1]), ahead).clamp(-1.0, 1.0).acos().to_degrees());
         }
         let typical = median(&mut away);
         if typical <= MAX_AWAY_DEG {
@@ -177,6 +196,12 @@ impl Instrument for Pointing<f64> {
                 .into(),
         ))
     }
+}
+
+/// The direction of an azimuth and an elevation in R.
+fn observed(azimuth: f64, elevation: f64) -> Point<f64> {
+    let ((sin_a, cos_a), (sin_e, cos_e)) = (azimuth.sin_cos(), elevation.sin_cos());
+    Point([cos_e * cos_a, -cos_e * sin_a, sin_e])
 }
 
 /// Largest typical angle between the nominal line of sight and what was observed, deg: index errors are smaller.

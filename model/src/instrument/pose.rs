@@ -12,16 +12,16 @@
 //! `T` is the actual and `T₀` the commanded orientation of the tool frame, `D` a small rotation (three parameters). As `B`,
 //! `H` is found from the readings before the fit, so that the rotations are small.
 
-use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::channel::Channel;
 use super::column::{Column, OF_ROTATION, Quantity};
 use super::set_up::{self, SetUp};
 use super::stand::{self, Stand, pose_error};
-use super::{
-    Entry, Fault, Geometry, Group, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station,
+use super::{Aligned, Travel, 
+    Entry, Fault, Geometry, Group, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Misreading, Reading, SharedBy, Station,
     default_errors, displaced, point,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
@@ -84,7 +84,7 @@ const COLUMNS: [Column; 10] = [
 ];
 
 /// The keys of a test.
-#[derive(Deserialize, JsonSchema)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Keys {
     /// Target in the tool frame.
@@ -163,6 +163,30 @@ fn commanded(machine: &Machine, state: &[AxisPosition<f64>]) -> Matrix3<f64> {
     Matrix3::from_columns(&[column(0), column(1), column(2)])
 }
 
+/// Quaternions are written with the scalar first or last.
+const QUATERNIONS: [Misreading; 2] = [
+    Misreading {
+        columns: "qx, qy, qz, qw",
+        words: "the quaternions have the scalar first: their columns are qw, qx, qy, qz in this order",
+        reread: |values| reordered(values, [1, 2, 3, 0]),
+    },
+    Misreading {
+        columns: "qx, qy, qz, qw",
+        words: "the quaternions have the scalar last: their columns are qx, qy, qz, qw in this order",
+        reread: |values| reordered(values, [3, 0, 1, 2]),
+    },
+];
+
+/// Replaces an orientation by that of the quaternion whose x, y, z, w are these of the x, y, z, w that were read.
+fn reordered(values: &mut [f64], order: [usize; 4]) {
+    if values[OF_ROTATION].iter().all(|value| value.is_finite()) {
+        let read = observed(values).coords;
+        let [x, y, z, w] = order.map(|place| read[place]);
+        let vector = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)).scaled_axis();
+        values[OF_ROTATION].copy_from_slice(vector.as_slice());
+    }
+}
+
 /// The rotation of a vector in three of the columns.
 fn observed(values: &[f64]) -> UnitQuaternion<f64> {
     UnitQuaternion::from_scaled_axis(Vector3::from_column_slice(&values[OF_ROTATION]))
@@ -199,6 +223,23 @@ fn orientations(machine: &Machine, readings: &Readings) -> Vec<[Matrix3<f64>; 2]
 }
 
 impl Instrument for Pose<f64> {
+    /// It sees the target wherever the axes are.
+    fn aligned(&self, _: &Travel<'_>) -> Vec<Aligned> {
+        let turn = self.turn.map(|_| UnitQuaternion::identity());
+        Aligned::as_it_stands(Pose { stand: Stand::upright([0.0; 3]), turn, ..self.clone() })
+    }
+    fn written(&self, priors: &[Prior]) -> Option<Node> {
+        let keys = Keys {
+            target_mm: set_up::written_point(self.target),
+            target_u_um: set_up::written_lengths(priors, TARGET),
+            target_u_arcsec: set_up::written_angles(priors, ORIENTATION),
+        };
+        set_up::written(&keys, &["target_u_arcsec"])
+    }
+    fn handling(&self) -> Handling {
+        let beside = "Measuring system, where it sees the target at every position: its place is estimated";
+        Handling { beside: Some(beside.into()), ..Handling::default() }
+    }
     fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
         [None, Some(&mut self.target)]
     }
@@ -230,6 +271,9 @@ impl Instrument for Pose<f64> {
     /// X has the opposite sign, and with it the rotations about the others.
     fn mirror(&self, values: &mut [f64]) {
         [0, 4, 5].into_iter().for_each(|place| values[place] = -values[place]);
+    }
+    fn misreadings(&self) -> &'static [Misreading] {
+        &QUATERNIONS
     }
     fn missing(&self, has: &dyn Fn(Quantity) -> bool) -> Option<Fault> {
         let by_quaternion = (0..4).any(|component| has(Quantity::Quaternion(component)));

@@ -13,7 +13,7 @@
 //! the literature is `−d`.
 
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::channel::Channel;
 use super::column::{Column, Quantity};
@@ -21,13 +21,14 @@ use super::kind::MAX_MM;
 use super::set_up::{self, SetUp, Written};
 use super::stand::pose_error;
 use super::{Contact, 
-    Checked, Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station,
+    Checked, Entry, Fault, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station,
     default_errors, displaced, point,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
-use crate::frames::{Point, dot};
+use crate::files::quantity::MICROMETRE;
+use crate::frames::{Point, cross, dot};
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
 use crate::session::expression::Constant;
@@ -68,7 +69,7 @@ const COLUMNS: [Column; 2] =
     [Column::new("distance", "mm", Quantity::Length), Column::new("deviation", "um", Quantity::Outward)];
 
 /// The keys of a test.
-#[derive(Deserialize, JsonSchema)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Keys {
     /// A point of the cylinder's axis in the table frame.
@@ -245,6 +246,34 @@ impl<N> Geometry<N> for Probe<N> {
 }
 
 impl Instrument for Probe<f64> {
+    /// From four sides of the cylinder; from the one that a stated direction leaves.
+    fn approaches(&self) -> Vec<[f64; 3]> {
+        if let Some(direction) = self.direction {
+            return vec![direction.map(|x| -x * self.radius)];
+        }
+        let (first, second) = across(self.axis);
+        [first, first.map(|x| -x), second, second.map(|x| -x)].map(|side| side.map(|x| x * self.radius)).to_vec()
+    }
+    fn circled(&self) -> Option<(f64, [f64; 3])> {
+        self.direction.is_none().then_some((self.radius, self.axis))
+    }
+    fn written(&self, priors: &[Prior]) -> Option<Node> {
+        let keys = Keys {
+            artefact_mm: set_up::written_point(self.artefact),
+            artefact_u_um: set_up::written_lengths(priors, 0),
+            artefact_u_arcsec: set_up::written_angles(priors, 3),
+            artefact_axis: (self.axis != [0.0, 0.0, 1.0]).then(|| set_up::written_direction(self.axis)),
+            radius_mm: set_up::rounded(self.radius).into(),
+            radius_u_um: set_up::written_u(priors.get(RADIUS), MICROMETRE),
+            stylus_mm: set_up::written_point(self.stylus),
+            stylus_u_um: set_up::written_lengths(priors, STYLUS),
+            direction: self.direction.map(set_up::written_direction),
+        };
+        set_up::written(&keys, &[])
+    }
+    fn handling(&self) -> Handling {
+        Handling { probed: Some("artefact"), taken_off: Some("the stylus"), ..Handling::default() }
+    }
     fn contact(&self) -> Contact {
         Contact::Touching
     }
@@ -283,6 +312,14 @@ impl Instrument for Probe<f64> {
         }
         Ok(())
     }
+}
+
+/// Two directions across a cylinder, perpendicular to each other.
+fn across(axis: [f64; 3]) -> ([f64; 3], [f64; 3]) {
+    let start = if axis[0].abs() < 0.5 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+    let first = perpendicular(Point(start), Point(axis));
+    let first = first.0.map(|x| x / first.norm());
+    (first, cross(axis, Point(first)).0)
 }
 
 /// The component of `v` perpendicular to the unit vector `along`.

@@ -15,14 +15,14 @@
 //! printed in a different order from the expanded equations and the text.
 
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize, Serializer};
 
 use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::kind::{MAX_MM, median};
 use super::set_up::{self, SetUp, Written};
 use super::{Contact, 
-    Checked, Entry, Fault, Following, Geometry, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy,
+    Checked, Entry, Fault, Following, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy,
     Station, default_errors, displaced, point,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
@@ -30,6 +30,7 @@ use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
 use crate::frames::{Coordinate, Point, Rotation, SinCos, cross, turn_about};
 use crate::scalar::{Nominal, Scalar};
+use crate::session::Prior;
 use crate::session::expression::Constant;
 
 /// Both points, then ω₁, φ₁ and θ₁ of the nest.
@@ -66,7 +67,7 @@ const SENSORS: [Column; 3] = Column::vector(["du", "dv", "dw"], "um");
 const MIN_VOLUME: f64 = 0.05;
 
 /// The keys of a test.
-#[derive(Deserialize, JsonSchema)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Keys {
     /// Sensors on the table ("E") or in the spindle ("Es").
@@ -89,7 +90,7 @@ struct Keys {
 }
 
 /// One of three angles.
-#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize, JsonSchema)]
 #[schemars(inline)]
 struct Degrees(f64);
 
@@ -146,6 +147,15 @@ pub enum Setting {
     Table,
     /// Es: the sensors in the spindle, the master ball on the table.
     Spindle,
+}
+
+impl Serialize for Setting {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(match self {
+            Setting::Table => "E",
+            Setting::Spindle => "Es",
+        })
+    }
 }
 
 impl TryFrom<String> for Setting {
@@ -313,6 +323,27 @@ impl RTest<f64> {
 }
 
 impl Instrument for RTest<f64> {
+    /// The master ball in the middle of the nest.
+    fn approaches(&self) -> Vec<[f64; 3]> {
+        vec![[0.0; 3]]
+    }
+    fn written(&self, priors: &[Prior]) -> Option<Node> {
+        let keys = Keys {
+            setting: self.setting,
+            workpiece_ball_mm: set_up::written_point(self.workpiece_ball),
+            workpiece_ball_u_um: set_up::written_lengths(priors, 0),
+            spindle_ball_mm: set_up::written_point(self.spindle_ball),
+            spindle_ball_u_um: set_up::written_lengths(priors, 3),
+            sensor_angles_deg: None,
+            sensor_directions: self.sensors.map(|rows| document::Three(rows.map(set_up::written_direction))),
+            sensor_u_arcsec: set_up::written_angles(priors, SENSOR),
+        };
+        set_up::written(&keys, &[])
+    }
+    fn handling(&self) -> Handling {
+        let probed = (self.setting == Setting::Spindle).then_some("master ball");
+        Handling { probed, taken_off: Some("the nest with the sensors"), ..Handling::default() }
+    }
     fn contact(&self) -> Contact {
         Contact::AtDistance(0.0)
     }

@@ -2,11 +2,13 @@
 //! own as a type of documents.
 
 use schemars::JsonSchema;
+use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::Station;
 use crate::document::fault::{Fault, Within};
-use crate::document::node::Node;
+use crate::document::node::{Node, Value};
+use crate::document::print::node_of;
 use crate::document::value::{self as document, Point, Three, Uncertainties, Uncertainty};
 use crate::document::{from_node, schema};
 use crate::files::quantity::{ARCSECOND, MICROMETRE};
@@ -47,6 +49,60 @@ impl SetUp {
     pub(super) fn new(station: Station<Written>, priors: Vec<Prior>) -> SetUp {
         SetUp { station, priors, socket: None, bar_setup: None }
     }
+}
+
+/// The keys of a set-up as they stand in a file. Uncertainties of zero are left out, those of the keys `unknown` where they are
+/// infinite: what the reader takes without them.
+pub(super) fn written(keys: &impl Serialize, unknown: &[&str]) -> Option<Node> {
+    let is_default = |key: &str, node: &Node| {
+        let numbers = match &node.value {
+            Value::Number(number, _) => vec![*number],
+            Value::List(items) => items.iter().filter_map(Node::as_number).collect(),
+            _ => return false,
+        };
+        let default = if unknown.contains(&key) { f64::INFINITY } else { 0.0 };
+        key.contains("_u_") && numbers.iter().all(|number| *number == default)
+    };
+    let node = node_of(keys)?;
+    let kept = node.entries().iter().filter(|entry| !is_default(&entry.key, &entry.node));
+    // What is set up, then how well it is known.
+    let (of_u, values): (Vec<_>, Vec<_>) = kept.partition(|entry| entry.key.contains("_u_"));
+    Some(Node::table(values.into_iter().chain(of_u).map(|entry| (entry.key.clone(), entry.node.clone()))))
+}
+
+/// A number with nine decimals at most: far below what a control resolves.
+pub(crate) fn rounded(value: f64) -> f64 {
+    // Zero has no sign.
+    format!("{value:.9}").parse().unwrap_or(value) + 0.0
+}
+
+/// A point as it is written.
+pub(super) fn written_point(point: [f64; 3]) -> Point {
+    Three(point.map(|mm| document::Length::Number(rounded(mm))))
+}
+
+/// A direction as it is written.
+pub(super) fn written_direction(direction: [f64; 3]) -> document::Direction {
+    document::Direction(direction.map(rounded))
+}
+
+/// The uncertainty of a length, µm, or of an angle, arcsec, from its prior.
+pub(super) fn written_u(prior: Option<&Prior>, unit: f64) -> Uncertainty {
+    Uncertainty(match prior {
+        None | Some(Prior::Known) => 0.0,
+        Some(Prior::Gaussian(u)) => rounded(u / unit),
+        Some(Prior::Free) => f64::INFINITY,
+    })
+}
+
+/// The uncertainties of three parameters from the first, lengths in µm.
+pub(super) fn written_lengths(priors: &[Prior], first: usize) -> Uncertainties {
+    Uncertainties([0, 1, 2].map(|i| written_u(priors.get(first + i), MICROMETRE)))
+}
+
+/// The same of angles, arcsec.
+pub(super) fn written_angles(priors: &[Prior], first: usize) -> Uncertainties {
+    Uncertainties([0, 1, 2].map(|i| written_u(priors.get(first + i), ARCSECOND)))
 }
 
 /// The keys of a set-up. A missing one is explained by its documentation.

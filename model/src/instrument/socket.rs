@@ -4,13 +4,13 @@
 
 use nalgebra::Vector3;
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::set_up::{self, SetUp, Written};
 use super::{Contact, 
-    Entry, Fault, Geometry, Group, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station,
+    Entry, Fault, Geometry, Group, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station,
     default_errors, displaced, point,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
@@ -47,7 +47,7 @@ const CHANNELS: [Channel; 3] = Channel::vector(["x", "y", "z"]);
 const COLUMNS: [Column; 1] = [Column::new("socket", "", Quantity::Socket)];
 
 /// The keys of a test.
-#[derive(Deserialize, JsonSchema)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Keys {
     /// Ball in the tool frame.
@@ -112,6 +112,18 @@ impl<N> Geometry<N> for Socket<N> {
 }
 
 impl Instrument for Socket<f64> {
+    fn written(&self, priors: &[Prior]) -> Option<Node> {
+        let keys = Keys {
+            ball_mm: set_up::written_point(self.ball),
+            ball_u_um: set_up::written_lengths(priors, 3),
+            socket: None,
+            socket_mm: self.is_located.then(|| set_up::written_point(self.socket)),
+        };
+        set_up::written(&keys, &[])
+    }
+    fn handling(&self) -> Handling {
+        Handling { beside: Some("Sockets, fixed where the ball reaches them".into()), ..Handling::default() }
+    }
     fn contact(&self) -> Contact {
         Contact::InR(self.socket)
     }

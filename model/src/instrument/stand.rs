@@ -5,10 +5,17 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::kind::median;
 use super::set_up::Written;
 use super::{InstrumentParameter, SharedBy, point};
 use crate::frames::{Point, Rotation, SmallMotion, dot_nominal};
 use crate::scalar::{Nominal, Scalar};
+
+/// A point is a gross error if it is this many times the median farther from where it would be, and by so many mm.
+const GROSS: f64 = 10.0;
+const MIN_GROSS_MM: f64 = 1.0;
+/// Points that are left at least.
+const MIN_POINTS: usize = 3;
 
 /// The parameters of the pose: three positions and three angles.
 pub(super) const fn parameters(thing: &'static str) -> [InstrumentParameter; 6] {
@@ -74,6 +81,40 @@ impl Stand<f64> {
         let origin = measured - rotation * of_r;
         let rotation = std::array::from_fn(|i| std::array::from_fn(|j| rotation[(i, j)]));
         Stand { rotation, origin: [origin.x, origin.y, origin.z] }
+    }
+
+    /// With the rotation and the origin that map points of R onto the same points as measured with the least sum of squares,
+    /// without the gross errors: one point behind the instrument would turn it by degrees.
+    pub(super) fn best(pairs: &[[Vector3<f64>; 2]]) -> Stand<f64> {
+        let mut kept = pairs.to_vec();
+        loop {
+            let stand = Stand::through(best_rotation(covariance(&kept).0), &kept);
+            let apart = |[of_r, measured]: &[Vector3<f64>; 2]| {
+                (stand.matrix() * of_r + Vector3::from(stand.origin) - measured).norm()
+            };
+            let limit = (GROSS * median(&mut pairs.iter().map(apart).collect::<Vec<_>>())).max(MIN_GROSS_MM);
+            let within: Vec<_> = pairs.iter().filter(|pair| apart(pair) <= limit).copied().collect();
+            if within.len() == kept.len() || within.len() < MIN_POINTS {
+                return stand;
+            }
+            // Fewer in every round, or more for good: it ends.
+            let is_less = within.len() < kept.len();
+            kept = within;
+            if !is_less {
+                return Stand::through(best_rotation(covariance(&kept).0), &kept);
+            }
+        }
+    }
+
+    /// Upright at a place in R, mm.
+    pub(super) fn upright([x, y, z]: [f64; 3]) -> Stand<f64> {
+        Stand { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], origin: [-x, -y, -z] }
+    }
+
+    /// Where the instrument stands in R, mm.
+    pub(super) fn place_mm(&self) -> [f64; 3] {
+        let [x, y, z]: [f64; 3] = (self.matrix().transpose() * Vector3::from(self.origin)).into();
+        [-x, -y, -z]
     }
 
     /// The rotation as a matrix.

@@ -11,15 +11,15 @@
 
 use nalgebra::Vector3;
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::bearing::{Sight, bearings, direction, observed_bearings};
 use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::set_up::{self, SetUp, Written};
 use super::stand::{self, Stand, pose_error};
-use super::{
-    Checked, Entry, Fault, Geometry, Group, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy,
+use super::{Aligned, Travel, 
+    Checked, Entry, Fault, Geometry, Group, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy,
     Station, default_errors, displaced, point,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
@@ -84,7 +84,7 @@ const POLAR_FIRST: [Column; 6] =
 const MIN_MM: f64 = 1.0;
 
 /// The keys of a test.
-#[derive(Deserialize, JsonSchema)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Keys {
     /// Target in the tool frame.
@@ -168,6 +168,23 @@ impl<N> Geometry<N> for Tracker<N> {
 }
 
 impl Instrument for Tracker<f64> {
+    /// It sees the target wherever the axes are. A tracker that reads angles is planned upright where it stands.
+    fn aligned(&self, _: &Travel<'_>) -> Vec<Aligned> {
+        let stand = if self.is_polar { Stand::upright(self.stand.place_mm()) } else { Stand::upright([0.0; 3]) };
+        Aligned::as_it_stands(Tracker { stand, ..self.clone() })
+    }
+    fn written(&self, priors: &[Prior]) -> Option<Node> {
+        let keys = Keys {
+            target_mm: set_up::written_point(self.target),
+            target_u_um: set_up::written_lengths(priors, TARGET),
+            tracker_mm: self.is_polar.then(|| set_up::written_point(self.stand.place_mm())),
+        };
+        set_up::written(&keys, &[])
+    }
+    fn handling(&self) -> Handling {
+        let beside = "Laser tracker, where it sees the target at every position: its place is estimated";
+        Handling { beside: Some(beside.into()), ..Handling::default() }
+    }
     fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
         [None, Some(&mut self.target)]
     }
@@ -214,8 +231,7 @@ impl Instrument for Tracker<f64> {
     }
     fn placed(&self, group: &Group<'_>) -> Option<Station<f64>> {
         let pairs = group.positions();
-        let stand = Stand::through(stand::best_rotation(stand::covariance(&pairs).0), &pairs);
-        (!pairs.is_empty()).then(|| Station::Tracker(Tracker { stand, ..self.clone() }))
+        (!pairs.is_empty()).then(|| Station::Tracker(Tracker { stand: Stand::best(&pairs), ..self.clone() }))
     }
     /// A planned line of sight has an azimuth.
     fn check_set_up(&self, checked: &Checked<'_>) -> Result<(), Fault> {

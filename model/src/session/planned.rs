@@ -31,6 +31,15 @@ pub fn reaches(machine: &Machine, test: &Test) -> Result<(), ModelError> {
     found.map_err(|(message, help)| ModelError::Plan { message, help })
 }
 
+/// The planned states of a test that its instrument reads as it is set up; `None` if an axis would leave its travel, or a
+/// reading would be none.
+pub fn feasible(machine: &Machine, test: &Test) -> Option<Readings> {
+    let readings = checked_plan(machine, test).ok()?;
+    let checked = Checked { machine, test: &test.name, readings: &readings };
+    test.station.check_set_up(&checked).ok()?;
+    Some(readings)
+}
+
 /// The planned states of every test of a session, consecutive in time.
 ///
 /// # Errors

@@ -18,6 +18,8 @@ pub struct Datum {
     pub probing: Vec<String>,
     /// Tool length and pivot.
     pub tool: Vec<String>,
+    /// Whether the control shows coordinates, so that a work offset gives programs their positions: not of a robot or a mount.
+    pub shows_coordinates: bool,
 }
 
 /// The datum of a session.
@@ -25,7 +27,11 @@ pub fn datum(session: &Session) -> Datum {
     let machine = &*session.machine;
     let rotary = |axis: &&Axis| axis.kind == AxisKind::Rotary;
     let (table, head) = machine.axes.split_at(machine.workpiece_side);
-    let mut datum = Datum::default();
+    // Joints of a robot have names of their own, and its controller shows another frame.
+    let has_letter = |axis: &Axis| axis.name.len() == 1 && "ABCXYZUVW".contains(&axis.name);
+    let has_linear = machine.axes.iter().any(|axis| axis.kind == AxisKind::Linear);
+    let shows_coordinates = has_linear && machine.axes.iter().all(has_letter);
+    let mut datum = Datum { shows_coordinates, ..Datum::default() };
     let through: Vec<&str> =
         table.iter().filter(rotary).filter(|axis| is_through(axis)).map(|axis| &*axis.name).collect();
     if !through.is_empty() {
@@ -34,20 +40,38 @@ pub fn datum(session: &Session) -> Datum {
     for axis in table.iter().filter(rotary).filter(|axis| !is_through(axis)) {
         datum.origin.push(format!("The axis of {} passes the origin of R at {}.", axis.name, place(axis)));
     }
-    if table.iter().all(|axis| axis.kind != AxisKind::Rotary) {
+    if !shows_coordinates {
         datum.origin.push(
-            "No rotary axis of the table fixes the origin of R: mount the workpiece ball, probe its centre, and set the \
-             offset so that the control shows its coordinates."
+            "R is the frame in which the machine file places the axes. Nothing is set: the positions are those of the axes."
                 .into(),
         );
+    } else if table.iter().all(|axis| axis.kind != AxisKind::Rotary) {
+        let probed = session.tests.iter().find_map(|test| test.station.handling().probed);
+        datum.origin.push(match probed {
+            Some(object) => format!(
+                "No rotary axis of the table fixes the origin of R: mount the {object}, probe its centre, and set the offset \
+                 so that the control shows its coordinates."
+            ),
+            None => "The origin of R is where the tool point is with all axes at zero.".to_string(),
+        });
     } else if let [only] = through[..]
         && let Some(along) = table.iter().find(|axis| axis.name == only).and_then(along)
+        && let Some(object) = session.tests.iter().find_map(|test| Some(test.station.points()[0]?.name))
     {
-        datum.origin.push(format!("Along {} it is where the coordinate of the workpiece ball says.", LETTERS[along]));
+        datum.origin.push(format!("Along {} it is where the coordinate of the {object} says.", LETTERS[along]));
     }
     datum.probing.extend(table.iter().filter(rotary).map(probing));
-    datum.tool = tool(session, machine, head);
+    datum.tool = if shows_coordinates { tool(session, machine, head) } else { tool_frame(session) };
     datum
+}
+
+/// The point at the tool on a machine whose control shows no coordinates: a robot, a mount.
+fn tool_frame(session: &Session) -> Vec<String> {
+    let name = session.tests.iter().find_map(|test| Some(test.station.points()[1]?.name));
+    let words = |name| {
+        format!("The coordinates of the {name} count in the tool frame, which coincides with R with all axes at zero.")
+    };
+    name.map(words).into_iter().collect()
 }
 
 fn axes(names: &[&str]) -> &'static str {
@@ -104,17 +128,27 @@ fn probing(axis: &Axis) -> String {
 
 /// What the control has to know of the tool.
 fn tool(session: &Session, machine: &Machine, head: &[Axis]) -> Vec<String> {
-    let balls: Vec<[f64; 3]> = session.tests.iter().map(|test| test.station.tool_point_mm()).collect();
-    let is_ball = balls.iter().all(|ball| ball.iter().all(|mm| mm.abs() < THROUGH_MM));
-    let mut words = vec![if is_ball {
-        "Tool length: from the spindle nose to the centre of the spindle ball, as measured. The tool point is that centre.".to_string()
-    } else {
-        "Tool length: from the spindle nose to the tool point, from which the coordinates of the spindle ball count."
-            .to_string()
-    }];
-    if let Some(holder) = session.clearance.and_then(|sizes| sizes.spindle_holder) {
-        words
-            .push(format!("The plan assumes {} mm from the nose to the centre of the ball.", number(holder.length_mm)));
+    let points: Vec<_> = session.tests.iter().filter_map(|test| test.station.points()[1]).collect();
+    let mut words = Vec::new();
+    if let Some(point) = points.first() {
+        let is_centre = points.iter().all(|point| point.mm.iter().all(|mm| mm.abs() < THROUGH_MM));
+        words.push(match is_centre {
+            true => format!(
+                "Tool length: from the spindle nose to the centre of the {}, as measured. The tool point is that centre.",
+                point.name
+            ),
+            false => format!(
+                "Tool length: from the spindle nose to the tool point, from which the coordinates of the {} count.",
+                point.name
+            ),
+        });
+        if let Some(holder) = session.clearance.and_then(|sizes| sizes.spindle_holder) {
+            words.push(format!(
+                "The plan assumes {} mm from the nose to the centre of the {}.",
+                number(holder.length_mm),
+                point.name
+            ));
+        }
     }
     for axis in head.iter().filter(|axis| axis.kind == AxisKind::Rotary && along(axis) != Some(2)) {
         words.push(format!(

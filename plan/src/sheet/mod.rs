@@ -5,8 +5,8 @@ mod mounts;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
-use abbe_model::instrument::InstrumentPoint;
 use abbe_model::instrument::ballbar::BallBar;
+use abbe_model::instrument::{Handling, InstrumentPoint};
 use abbe_model::session::placing::{balls, positions_for_bar};
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Prior, Session, Test};
@@ -38,6 +38,8 @@ pub struct TestSheet {
     pub name: String,
     /// What is mounted for it, and what stays mounted, a sentence each.
     pub mounts: Vec<String>,
+    /// What an operator does with the instrument.
+    pub handling: Handling,
     /// The instrument's point in the table frame, mm, and its standard uncertainty, mm; `None` if it has none.
     pub table_point: Option<PlacedPoint>,
     /// The instrument's point in the tool frame, if it has one.
@@ -166,6 +168,7 @@ fn sheet(
             + if before.bar_changes { times.bar_min } else { 0.0 },
         moving_min: moving_s / 60.0,
         mounts: before.words,
+        handling: test.station.handling(),
         table_point,
         tool_point: on_tool.map(|own| point(own, path.tool_mm.first())),
         bar_mm: test.station.bar().map(|bar| bar.bar),

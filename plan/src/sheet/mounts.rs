@@ -41,6 +41,10 @@ pub(super) fn mounting(earlier: &[Test], test: &Test, basic_mm: Option<f64>) -> 
             note(&format!("{}{rest}", first.to_uppercase()), shared(group), stays);
         }
     }
+    if let Some(beside) = test.station.handling().beside {
+        // One stands; what stood elsewhere in between is set up again.
+        note(&beside, shared(|test| &test.setup), last.is_some_and(|last| last.setup == test.setup));
+    }
     if let Some(bar) = test.station.bar() {
         let (words, changes) = of_bar(earlier, test, bar.bar, basic_mm.unwrap_or(bar.bar));
         found.words.push(words);

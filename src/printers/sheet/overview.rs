@@ -1,7 +1,7 @@
 //! The first sheet: datum, tool, machine, tests in their order, warnings.
 
 use abbe::model::session::Session;
-use abbe::model::words::counted;
+use abbe::model::words::{counted, listed};
 use abbe::plan::sheet::{Datum, TestSheet, datum};
 use maud::{Markup, html};
 
@@ -15,22 +15,38 @@ use crate::report::table::{Cell, Table, cells};
 /// The first page.
 pub(super) fn overview(session: &Session, sheets: &[TestSheet], order: &Order) -> Markup {
     let total: f64 = sheets.iter().map(|sheet| order.minutes(sheet)).sum();
+    let datum = datum(session);
+    let arrows = match datum.shows_coordinates {
+        true => " Arrows show where the body of a linear axis moves.",
+        false => "",
+    };
     let figure = Figure::new(
         "machine",
         "Machine",
-        "in R with all axes at zero, seen along (1, 1, 1). Arrows show where the body of a linear axis moves.",
+        format!("in R with all axes at zero, seen along (1, 1, 1).{arrows}"),
         Chart::Machine(MachineAxes::of(&session.machine, DRAWING)),
     );
     let (_, drawing) = element(&figure);
+    let each = |of: fn(&TestSheet) -> Option<&'static str>| -> Vec<&'static str> {
+        let mut found: Vec<&str> = sheets.iter().filter_map(of).collect();
+        found.sort_unstable();
+        found.dedup();
+        found
+    };
+    let changes: String = each(|sheet| sheet.handling.changes).iter().map(|change| format!("{change}, ")).collect();
+    let without = match &each(|sheet| sheet.handling.taken_off)[..] {
+        [] => String::new(),
+        taken_off => format!(" and without {}", listed(taken_off, "and")),
+    };
     html! {
         section class="sheet" {
             h1 { (session.machine.name) ": set-up sheets" }
             p {
                 "Session " code { (order.source) } ". " (counted(sheets.len(), "test")) ", " (clock(total))
-                " h with mounting, changes of the bar, motion and pauses."
+                " h with mounting, " (changes) "motion and pauses."
             }
             div class="halves" {
-                div { (before(order, &datum(session))) }
+                div { (before(order, &datum)) }
                 div { (drawing) }
             }
             h2 { "Tests in their order" }
@@ -43,14 +59,16 @@ pub(super) fn overview(session: &Session, sheets: &[TestSheet], order: &Order) -
             @if !session.about.is_empty() {
                 dl { @for (name, note) in &session.about { dt { (name.replace('_', " ")) } dd { (note) } } }
             }
-            p { "Run each program in single block and without the bar before it is trusted." }
+            @if !order.runs.is_empty() {
+                p { "Run each program in single block" (without) " before it is trusted." }
+            }
             (notes(&["Operator", "Date", "Instrument, serial number", "Temperature at start and end, °C"]))
         }
     }
 }
 
 /// What the control has to be told.
-fn before(order: &Order, Datum { origin, probing, tool }: &Datum) -> Markup {
+fn before(order: &Order, Datum { origin, probing, tool, shows_coordinates }: &Datum) -> Markup {
     let offset = match order.control {
         Some(control) => format!("Set {}, and leave it active", control.work_offset()),
         None => {
@@ -62,10 +80,14 @@ fn before(order: &Order, Datum { origin, probing, tool }: &Datum) -> Markup {
         ul {
             @for line in origin { li { (line) } }
             @for line in probing { li { (line) } }
-            li { (offset) ": positions count from the origin of R. The programs change no offset." }
+            @if *shows_coordinates {
+                li { (offset) ": positions count from the origin of R. The programs change no offset." }
+            }
         }
-        h2 { "Tool" }
-        ul { @for line in tool { li { (line) } } }
+        @if !tool.is_empty() {
+            h2 { "Tool" }
+            ul { @for line in tool { li { (line) } } }
+        }
     }
 }
 

@@ -1,0 +1,414 @@
+//! Candidate tests of instruments without a bar: motions of the axes, and the set-ups of the instrument that read them.
+//!
+//! - a linear axis over its travel, with each of the others where the session holds it and at both ends of its travel;
+//! - a rotary axis over its range, with the others at the permitted positions;
+//! - a rotary axis with linear axes that keep two points in contact, and alone about a point on it;
+//! - a circle of two linear axes about the artefact of a probe.
+//!
+//! What the instrument is set up for such a motion follows from the instrument ([`Instrument::aligned`],
+//! [`Instrument::approaches`], [`Instrument::circled`]).
+//!
+//! [`Instrument::aligned`]: abbe_model::instrument::Instrument::aligned
+//! [`Instrument::approaches`]: abbe_model::instrument::Instrument::approaches
+//! [`Instrument::circled`]: abbe_model::instrument::Instrument::circled
+
+use std::f64::consts::{PI, TAU};
+
+use abbe_identify::start;
+use abbe_model::axis::AxisKind;
+use abbe_model::chain::{BodyErrors, Machine};
+use abbe_model::frames::Point;
+use abbe_model::instrument::ballbar::BallBar;
+use abbe_model::instrument::{Following, InstrumentKind, Station, Travel};
+use abbe_model::session::expression::Length;
+use abbe_model::session::motion::{FollowOffset, Motion};
+use abbe_model::session::{Prior, Session, Test, placing};
+use abbe_model::words::{listed, number};
+
+use super::ball_positions::{BallPosition, axis_positions, ball_positions, dot, standing_positions};
+use super::candidate_layout::Draft;
+use super::test_variations::TestVariations;
+
+/// The name of a candidate, and of what is mounted for it.
+const PROPOSED: &str = "proposed";
+/// Steps of a motion that no test of the session has.
+const STEPS: f64 = 30.0;
+/// Farther travels are none: a file that states 10⁹ means that the axis has no ends, mm or rad.
+const NO_TRAVEL: f64 = 1e6;
+/// Speed of an axis that no test of the session moves: 1000 mm/min, 2 °/s.
+const SPEED_MM_S: f64 = 1000.0 / 60.0;
+const SPEED_RAD_S: f64 = 2.0 / 180.0 * PI;
+/// Tests whose set-up candidates keep, the last of them.
+const MAX_TEMPLATES: usize = 4;
+
+/// A motion of one axis, as tests have it.
+#[derive(Clone, Copy)]
+struct Range {
+    from: f64,
+    to: f64,
+    step: f64,
+    speed: f64,
+    runs: usize,
+    both_directions: bool,
+}
+
+/// The candidates of an instrument that has no bar, before travel and reach are checked.
+pub(super) fn drafts(session: &Session, variations: &TestVariations, kind: InstrumentKind) -> Vec<Draft> {
+    let placed = start::stations(session, &session.tests);
+    let mut templates: Vec<(&Test, &Station<f64>)> = Vec::new();
+    for (test, station) in session.tests.iter().zip(&placed).rev().filter(|(test, _)| test.station.kind() == kind) {
+        let is_same = |other: &Test| {
+            other.station == test.station && (&other.setup, &other.spindle_setup) == (&test.setup, &test.spindle_setup)
+        };
+        if templates.len() < MAX_TEMPLATES && !templates.iter().any(|(other, _)| is_same(other)) {
+            templates.push((test, station));
+        }
+    }
+    let mut drafts: Vec<Draft> = Vec::new();
+    for (test, station) in &templates {
+        let template = Template { session, variations, test, station };
+        drafts.extend(template.moves_of_one_axis());
+    }
+    // What is in contact needs one of them: every place on the table is a candidate.
+    if let Some((test, station)) = templates.first() {
+        let template = Template { session, variations, test, station };
+        drafts.extend(template.in_contact());
+    }
+    let is_same = |a: &Test, b: &Test| {
+        a.station == b.station
+            && a.at == b.at
+            && a.motion == b.motion
+            && (&a.setup, &a.spindle_setup) == (&b.setup, &b.spindle_setup)
+    };
+    let mut distinct: Vec<Draft> = Vec::with_capacity(drafts.len());
+    for draft in drafts {
+        if !distinct.iter().any(|other| is_same(&other.test, &draft.test)) {
+            distinct.push(draft);
+        }
+    }
+    distinct
+}
+
+/// A test of the session whose set-up candidates have, as far as they can.
+struct Template<'s> {
+    session: &'s Session,
+    variations: &'s TestVariations,
+    test: &'s Test,
+    /// Where its instrument stands.
+    station: &'s Station<f64>,
+}
+
+impl Template<'_> {
+    fn machine(&self) -> &Machine {
+        &self.session.machine
+    }
+
+    /// One axis moves, the others stand.
+    fn moves_of_one_axis(&self) -> Vec<Draft> {
+        let machine = self.machine();
+        let mut drafts = Vec::new();
+        for axis in 0..machine.axes.len() {
+            let Some(range) = range(self.session, axis) else { continue };
+            for at in self.postures(axis) {
+                let (_, direction) = placing::axis_line(machine, &at, axis);
+                for aligned in self.station.aligned(&Travel { machine, axis, direction }) {
+                    let mut at = at.clone();
+                    at[axis] = range.from;
+                    let mut words = moved_words(machine, axis, range) + &self.stand_words(&at, axis);
+                    if !aligned.words.is_empty() {
+                        words += &format!(", {}", aligned.words);
+                    }
+                    let motion = self.sweep(axis, range);
+                    let mounts = match aligned.is_new {
+                        true => [PROPOSED.to_string(), PROPOSED.to_string()],
+                        false => [self.test.setup.clone(), self.test.spindle_setup.clone()],
+                    };
+                    drafts.push(self.draft(aligned.station, at, motion, words, mounts, aligned.is_new));
+                }
+            }
+        }
+        drafts
+    }
+
+    /// Where the axes stand while one moves: as in the tests of the session, and each at the ends of its travel or at the
+    /// permitted positions while the rest are at zero.
+    fn postures(&self, moved: usize) -> Vec<Vec<f64>> {
+        let machine = self.machine();
+        let zero = |axis: usize| match travel(machine, axis) {
+            Some([low, high]) if low > 0.0 || high < 0.0 => 0.5 * (low + high),
+            _ => 0.0,
+        };
+        let home: Vec<f64> = (0..machine.axes.len()).map(zero).collect();
+        let mut postures = vec![home.clone()];
+        let mut add = |mut at: Vec<f64>| {
+            at[moved] = home[moved];
+            if !postures.contains(&at) {
+                postures.push(at);
+            }
+        };
+        let planned = self.session.tests.iter().filter(|test| test.readings.is_none() || test.motion.is_some());
+        planned.for_each(|test| add(test.at.clone()));
+        for other in (0..machine.axes.len()).filter(|other| *other != moved) {
+            let stands: Vec<f64> = match (machine.axes[other].kind, travel(machine, other)) {
+                (AxisKind::Linear, ends) => ends.map_or(Vec::new(), |ends| ends.to_vec()),
+                (AxisKind::Rotary, _) => standing_positions(self.session, self.variations, other).collect(),
+            };
+            for stand in stands {
+                let mut at = home.clone();
+                at[other] = stand;
+                add(at);
+            }
+        }
+        postures
+    }
+
+    /// Two points stay in contact: linear axes follow a rotary one, a rotary axis turns about the point on it, the tool goes
+    /// round an artefact.
+    fn in_contact(&self) -> Vec<Draft> {
+        let machine = self.machine();
+        let approaches = self.station.approaches();
+        if approaches.is_empty() {
+            return Vec::new();
+        }
+        let kind = self.station.kind();
+        let rotary: Vec<usize> =
+            (0..machine.axes.len()).filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary).collect();
+        // On the axis too.
+        let radii_mm = std::iter::once(0.0).chain(self.variations.radii_mm.iter().copied()).collect();
+        let wider = TestVariations { radii_mm, ..self.variations.clone() };
+        let points = ball_positions(self.session, kind, &wider, &rotary, true);
+        let mut drafts = Vec::new();
+        for &axis in &rotary {
+            let Some(range) = range(self.session, axis) else { continue };
+            for at in axis_positions(self.session, self.variations, &rotary, axis) {
+                for point in &points {
+                    for approach in &approaches {
+                        // With the axis at zero, as a file that states no position of the moved axis is read.
+                        let Some(at) = self.touching(point, *approach, &at) else { continue };
+                        let words = self.contact_words(&at, axis, range, point, *approach);
+                        let offset = match self.station.following() {
+                            Following::AtBar => continue,
+                            Following::Touching(..) => FollowOffset::Touching,
+                            Following::Apart => FollowOffset::None,
+                        };
+                        for motion in [self.follow(axis, range, offset), self.sweep(axis, range)] {
+                            let way = match motion {
+                                Motion::Follow { .. } => ", the linear axes follow",
+                                _ => ", the linear axes stand",
+                            };
+                            drafts.push(self.at_point(point, at.clone(), motion, format!("{words}{way}")));
+                        }
+                    }
+                }
+            }
+        }
+        drafts.extend(points.iter().flat_map(|point| self.circles(point)));
+        drafts
+    }
+
+    /// Circles of two linear axes about an artefact.
+    fn circles(&self, point: &BallPosition) -> Vec<Draft> {
+        let machine = self.machine();
+        let Some((radius, axis)) = self.station.circled() else { return Vec::new() };
+        let linear: Vec<usize> =
+            (0..machine.axes.len()).filter(|axis| machine.axes[*axis].kind == AxisKind::Linear).collect();
+        let is_across = |k: &usize| dot(machine.axes[*k].direction, axis).abs() < 1e-6;
+        let across: Vec<usize> = linear.into_iter().filter(is_across).collect();
+        let [first, second] = across[..] else { return Vec::new() };
+        let Some(at) = self.touching(point, [0.0; 3], &vec![0.0; machine.axes.len()]) else { return Vec::new() };
+        let motion = Motion::Circle {
+            first,
+            second,
+            radius,
+            centre: [0.0; 3],
+            from: 0.0,
+            to: TAU,
+            step: TAU / STEPS * self.variations.thin.max(1) as f64,
+            speed: SPEED_MM_S,
+            runs: 1,
+            both_directions: true,
+        };
+        let names = [first, second].map(|k| machine.axes[k].name.as_str()).concat();
+        let words = format!("a circle in {names} about the artefact{}", self.place_words(point));
+        vec![self.at_point(point, at, motion, words)]
+    }
+
+    /// The positions at which the tool's point is beside a point of the table. `approach` is in the table frame.
+    fn touching(&self, point: &BallPosition, approach: [f64; 3], at: &[f64]) -> Option<Vec<f64>> {
+        let machine = self.machine();
+        let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
+        let state = machine.axis_positions(at);
+        let in_r = |mm: [f64; 3]| machine.workpiece_point::<f64>(&state, &none, Point(mm)).0;
+        let beside: [f64; 3] = std::array::from_fn(|i| point.ball[i] + approach[i]);
+        let (from, to) = (in_r(point.ball), in_r(beside));
+        let bar = BallBar { workpiece_ball: point.ball, spindle_ball: self.station.tool_point_mm(), bar: 0.0 };
+        placing::positions_for_bar(machine, &bar, at, std::array::from_fn(|i| to[i] - from[i]))
+    }
+
+    /// A candidate with the instrument's point of the table at a place.
+    fn at_point(&self, point: &BallPosition, at: Vec<f64>, motion: Motion, words: String) -> Draft {
+        let mut station = self.station.clone();
+        if let [Some(own), _] = station.points_mut() {
+            *own = point.ball;
+        }
+        let setup = if point.new { PROPOSED.to_string() } else { point.setup.clone() };
+        self.draft(station, at, motion, words, [setup, PROPOSED.to_string()], point.new)
+    }
+
+    fn draft(
+        &self,
+        station: Station<f64>,
+        at: Vec<f64>,
+        motion: Motion,
+        words: String,
+        [setup, spindle_setup]: [String; 2],
+        new_setup: bool,
+    ) -> Draft {
+        let mut priors: Vec<Prior> = self.test.priors.clone();
+        station.absent_channels_known(&mut priors);
+        let test = Test {
+            name: PROPOSED.to_string(),
+            geometry: station.map(|length| Length::Number(*length)),
+            station,
+            priors,
+            setup,
+            spindle_setup,
+            bar_setup: PROPOSED.to_string(),
+            socket: None,
+            motion: Some(motion),
+            at_written: vec![None; at.len()],
+            at,
+            readings: None,
+        };
+        Draft { test, name: words, new_setup }
+    }
+
+    fn sweep(&self, axis: usize, range: Range) -> Motion {
+        let Range { from, to, step, speed, runs, both_directions } = range;
+        let step = step * self.variations.thin.max(1) as f64;
+        Motion::Sweep { axis, from, to, step, speed, runs, both_directions }
+    }
+
+    fn follow(&self, axis: usize, range: Range, offset: FollowOffset) -> Motion {
+        let Range { from, to, step, speed, runs, both_directions } = range;
+        let step = step * self.variations.thin.max(1) as f64;
+        Motion::Follow { axis, from, to, step, speed, runs, both_directions, offset }
+    }
+
+    /// Where the axes stand that do not move: `, with Y at 200 mm`.
+    fn stand_words(&self, at: &[f64], moved: usize) -> String {
+        let machine = self.machine();
+        let stands = (0..at.len()).filter(|k| *k != moved && at[*k].abs() > 1e-9);
+        let words: Vec<String> = stands.map(|k| position(machine, k, at[k])).collect();
+        if words.is_empty() { String::new() } else { format!(", with {}", listed(&words, "and")) }
+    }
+
+    /// Where the instrument's point of the table is.
+    fn place_words(&self, point: &BallPosition) -> String {
+        if !point.new {
+            return format!(" as in {}", point.setup);
+        }
+        let [x, y, z] = point.ball.map(|mm| number((mm * 10.0).round() / 10.0));
+        format!(" at ({x}, {y}, {z}) mm of the table")
+    }
+
+    fn contact_words(&self, at: &[f64], axis: usize, range: Range, point: &BallPosition, approach: [f64; 3]) -> String {
+        let machine = self.machine();
+        let rotary = (0..at.len()).filter(|k| machine.axes[*k].kind == AxisKind::Rotary && *k != axis);
+        let turned: Vec<String> = rotary.filter(|k| at[*k] != 0.0).map(|k| position(machine, k, at[k])).collect();
+        let turned = if turned.is_empty() { String::new() } else { format!(", with {}", listed(&turned, "and")) };
+        let name = self.station.points()[0].map_or("point", |point| point.name);
+        let side = match (0..3).find(|i| approach[*i].abs() > 0.7 * self.station.circled().map_or(1.0, |(r, _)| r)) {
+            Some(i) if self.station.circled().is_some() => {
+                format!(" from {}{}", if approach[i] < 0.0 { "−" } else { "+" }, ["X", "Y", "Z"][i])
+            }
+            _ => String::new(),
+        };
+        format!("{}{turned}, {name}{}{side}", moved_words(machine, axis, range), self.place_words(point))
+    }
+}
+
+/// `Y at 200 mm`.
+fn position(machine: &Machine, axis: usize, q: f64) -> String {
+    let axis = &machine.axes[axis];
+    let unit = if axis.kind == AxisKind::Rotary { "°" } else { " mm" };
+    format!("{} at {}{unit}", axis.name, shown(axis.kind.to_display(q)))
+}
+
+fn moved_words(machine: &Machine, axis: usize, range: Range) -> String {
+    let axis = &machine.axes[axis];
+    let unit = if axis.kind == AxisKind::Rotary { "°" } else { " mm" };
+    let [from, to] = [range.from, range.to].map(|q| shown(axis.kind.to_display(q)));
+    format!("{} from {from} to {to}{unit}", axis.name)
+}
+
+fn shown(value: f64) -> String {
+    number((value * 10.0).round() / 10.0).replace('-', "−")
+}
+
+/// The travel of an axis, if it has ends.
+fn travel(machine: &Machine, axis: usize) -> Option<[f64; 2]> {
+    machine.axes[axis].travel.filter(|ends| ends.iter().all(|end| end.abs() < NO_TRAVEL))
+}
+
+/// The range of an axis: that of a test of the session, else that of its readings or its travel, a rotary axis within half a
+/// turn of zero. `None` of a linear axis of which neither is known.
+fn range(session: &Session, axis: usize) -> Option<Range> {
+    let kind = session.machine.axes[axis].kind;
+    let of_motion = |test: &Test| match test.motion {
+        Some(
+            Motion::Sweep { axis: moved, from, to, step, speed, runs, both_directions }
+            | Motion::Follow { axis: moved, from, to, step, speed, runs, both_directions, .. },
+        ) => Some((moved, Range { from, to, step, speed, runs, both_directions })),
+        _ => None,
+    };
+    let motions: Vec<(usize, Range)> = session.tests.iter().filter_map(of_motion).collect();
+    if let Some((_, own)) = motions.iter().find(|(moved, _)| *moved == axis) {
+        return Some(*own);
+    }
+    let ends = || {
+        let columns = session.tests.iter().filter_map(|test| test.readings.as_ref()?.positions.get(axis));
+        let read = columns.flatten().copied().filter(|q| q.is_finite());
+        let [low, high] = read.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| [low.min(q), high.max(q)]);
+        (high - low > 1e-6).then_some([low, high])
+    };
+    let [low, high] = match (kind, travel(&session.machine, axis)) {
+        (AxisKind::Linear, travel) => travel.or_else(ends)?,
+        (AxisKind::Rotary, travel) => {
+            let [low, high] = travel.unwrap_or([-PI, PI]);
+            [low.max(-PI), high.min(PI)]
+        }
+    };
+    if high - low <= 1e-9 {
+        return None;
+    }
+    let alike = motions.iter().rev().find(|(moved, _)| session.machine.axes[*moved].kind == kind);
+    let usual = if kind == AxisKind::Rotary { SPEED_RAD_S } else { SPEED_MM_S };
+    let any = motions.last();
+    Some(Range {
+        from: low,
+        to: high,
+        step: kind.to_internal(nice(kind.to_display(high - low) / STEPS)),
+        speed: alike.map_or(usual, |(_, range)| range.speed),
+        runs: any.map_or(1, |(_, range)| range.runs),
+        both_directions: any.is_none_or(|(_, range)| range.both_directions),
+    })
+}
+
+/// The largest of 1, 2, 5, 10, … that is no larger.
+fn nice(step: f64) -> f64 {
+    let power = 10_f64.powf(step.log10().floor());
+    [5.0, 2.0, 1.0].into_iter().map(|digit| digit * power).find(|nice| *nice <= step * (1.0 + 1e-9)).unwrap_or(power)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::nice;
+
+    #[test]
+    fn steps_are_round() {
+        for (step, wanted) in [(20.0, 20.0), (19.9, 10.0), (6.7, 5.0), (12.0, 10.0), (0.3, 0.2), (100.0, 100.0)] {
+            assert!((nice(step) / wanted - 1.0).abs() < 1e-12, "{step}: {}", nice(step));
+        }
+    }
+}

@@ -1,0 +1,264 @@
+//! `plan --improve` for every instrument: a session that lacks an error gets a test that determines it, the written session
+//! reads back, and its fits scatter as the plan predicts. The readings are closed forms written here, which share nothing with
+//! the kinematic chain.
+
+use std::sync::Arc;
+
+use abbe::identify::fit::prepare;
+use abbe::model::files::{self, ReadOptions};
+use abbe::model::instrument::Station;
+use abbe::model::session::planned::planned;
+use abbe::model::session::{Session, Test};
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use serde_json::Value;
+
+use super::{abbe, text};
+
+/// Simulated fits of each written session.
+const FITS: usize = 60;
+/// A millionth of a unit.
+const MICRO: f64 = 1e-6;
+
+/// An axis of a test, mm and rad, at a reading.
+type At<'a> = &'a dyn Fn(&str) -> f64;
+/// The readings without noise at a reading of a test, in the order of its channels, mm and rad.
+type Reading = fn(&Test, At<'_>) -> Vec<f64>;
+
+/// A session that lacks a test.
+struct Case {
+    chain: &'static str,
+    axes: &'static str,
+    session: &'static str,
+    /// Beginnings of the parameters that it does not determine, and their true values, mm and rad.
+    lacks: &'static [(&'static str, f64)],
+    reading: Reading,
+    /// Noise of a length and of an angle, mm and rad.
+    noise: [f64; 2],
+}
+
+/// Travels of three linear axes.
+const LINEAR: &str = "[axis.X]\ndirection = [1, 0, 0]\ntravel_mm = [-300, 300]\n[axis.Y]\ndirection = [0, 1, 0]\n\
+                      travel_mm = [-200, 200]\n[axis.Z]\ndirection = [0, 0, 1]\ntravel_mm = [-200, 300]\n";
+
+fn run(arguments: &[&str]) {
+    let output = abbe(arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+}
+
+fn parsed(file: &std::path::Path) -> Value {
+    serde_json::from_slice(&std::fs::read(file).unwrap()).unwrap()
+}
+
+/// The standard uncertainty of each named error of a list, in its unit; infinite where there is none.
+fn uncertainties(list: &Value) -> Vec<(String, f64)> {
+    let of = |item: &Value| (item["id"].as_str().unwrap().to_string(), item["u"].as_f64().unwrap_or(f64::INFINITY));
+    list.as_array().unwrap().iter().map(of).collect()
+}
+
+/// The session with readings of its planned states.
+fn measured(plan: &Session, case: &Case, seed: u64) -> Session {
+    let mut random = rand_pcg::Pcg64::seed_from_u64(seed);
+    let mut session = plan.clone();
+    for test in &mut session.tests {
+        let mut readings = planned(&plan.machine, test).unwrap();
+        let angles: Vec<bool> = test.station.channels().iter().map(|channel| channel.is_angle()).collect();
+        let mut observed = Vec::new();
+        for row in 0..readings.rows() {
+            let at = |name: &str| {
+                let axis = plan.machine.axes.iter().position(|axis| axis.name == name).unwrap();
+                readings.positions[axis][row]
+            };
+            let values = (case.reading)(test, &at);
+            assert_eq!(values.len(), angles.len(), "{}", test.name);
+            for (value, is_angle) in values.into_iter().zip(&angles) {
+                let normal: f64 = StandardNormal.sample(&mut random);
+                observed.push(value + normal * case.noise[usize::from(*is_angle)]);
+            }
+        }
+        readings.observed = observed;
+        test.readings = Some(Arc::new(readings));
+    }
+    session
+}
+
+fn check(case: &Case) {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let [machine, session, next, found, again] =
+        ["machine.toml", "session.toml", "next.toml", "found.json", "again.json"].map(at);
+    let head = format!("name = \"Machine\"\nchain = \"{}\"\n{}{LINEAR}", case.chain, case.axes);
+    std::fs::write(&machine, head).unwrap();
+    std::fs::write(&session, format!("[machine]\nfile = \"machine.toml\"\n\n{}", case.session)).unwrap();
+    // A proposal that determines what the session lacks.
+    run(&["plan", text(&session), "--improve", "--write", text(&next), "--json", text(&found), "--quiet"]);
+    let improvement = parsed(&found)["improvement"].clone();
+    let step = &improvement["steps"][0];
+    println!("{}", step["test"].as_str().unwrap());
+    let before = uncertainties(&improvement["uncertainties_before"]);
+    let with = uncertainties(&step["uncertainties"]);
+    let of = |list: &[(String, f64)], begin: &str| {
+        let own = list.iter().find(|(id, _)| id.starts_with(begin));
+        own.unwrap_or_else(|| panic!("{begin}: {list:?}")).clone()
+    };
+    for (begin, _) in case.lacks {
+        assert!(of(&before, begin).1.is_infinite(), "{before:?}");
+        assert!(of(&with, begin).1.is_finite(), "{with:?}");
+    }
+    // The written session reads back, and its plan has the same uncertainties.
+    assert!(std::fs::read_to_string(&next).unwrap().contains(step["session_toml"].as_str().unwrap()));
+    run(&["plan", text(&next), "--no-effects", "--json", text(&again), "--quiet"]);
+    let planned = uncertainties(&parsed(&again)["errors"]);
+    for (id, u) in &with {
+        let (_, own) = of(&planned, id);
+        assert!((own / u - 1.0).abs() < 0.01, "{id}: {own} planned, {u} promised");
+    }
+    // Fits of its simulated readings scatter as promised, about the truth.
+    let plan = files::session(&next, &ReadOptions::default()).unwrap();
+    let mut pulls = vec![Vec::new(); case.lacks.len()];
+    for seed in 0..FITS {
+        let (problem, fit) = prepare(&measured(&plan, case, seed as u64), 1).unwrap();
+        for ((begin, truth), pulls) in case.lacks.iter().zip(&mut pulls) {
+            let (id, u) = of(&with, begin);
+            let place = problem.parameters.list.iter().position(|parameter| parameter.id == id).unwrap();
+            let u = u / problem.parameters.list[place].unit.display_per_internal;
+            pulls.push((fit.beta[place] - truth) / u);
+        }
+    }
+    for ((begin, _), pulls) in case.lacks.iter().zip(&pulls) {
+        let count = pulls.len() as f64;
+        let mean = pulls.iter().sum::<f64>() / count;
+        let rms = (pulls.iter().map(|pull| pull * pull).sum::<f64>() / count).sqrt();
+        println!("{begin}: {FITS} fits, mean pull {mean:.2}, rms {rms:.2}");
+        // Four standard deviations of the mean and of the rms.
+        assert!(mean.abs() < 4.0 / count.sqrt(), "{begin}: mean {mean}");
+        assert!((rms - 1.0).abs() < 4.0 / (2.0 * count).sqrt(), "{begin}: rms {rms}");
+    }
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|i| a[i] * b[i]).sum()
+}
+
+/// A turn about Z.
+fn turned(angle: f64, [x, y, z]: [f64; 3]) -> [f64; 3] {
+    let (sin, cos) = angle.sin_cos();
+    [cos * x - sin * y, sin * x + cos * y, z]
+}
+
+/// A laser along X alone says nothing of the scale of Y.
+#[test]
+fn a_laser_is_aligned_with_the_axis_that_no_test_moves() {
+    check(&Case {
+        chain: "w b X Y Z t",
+        axes: "",
+        session: "[instrument]\nkind = \"laser\"\nnoise_um = 0.5\n\n\
+                  [[effect]]\ncomponent = \"EXX\"\ndriver = \"X\"\nshape = \"polynomial\"\norder = 1\nscale_mm = 300\n\n\
+                  [[effect]]\ncomponent = \"EYY\"\ndriver = \"Y\"\nshape = \"polynomial\"\norder = 1\nscale_mm = 200\n\n\
+                  [[test]]\nname = \"LX\"\nbeam = [1, 0, 0]\n\
+                  sweep = { axis = \"X\", from_mm = -300, to_mm = 300, step_mm = 30 }\n",
+        lacks: &[("EYY~Y", 4e-3)],
+        reading: |test, at| {
+            let Station::Laser(laser) = &test.station else { panic!("a laser") };
+            assert_eq!(laser.channels.len(), 1);
+            let (x, y) = (at("X"), at("Y"));
+            vec![dot(laser.frame[0], [x + 7e-3 * x / 300.0, y + 4e-3 * y / 200.0, at("Z")])]
+        },
+        noise: [5e-4, 0.0],
+    });
+}
+
+/// A level on X alone says nothing of the pitch of Y.
+#[test]
+fn a_level_reads_across_the_axis_that_no_test_moves() {
+    check(&Case {
+        chain: "w b X Y Z t",
+        axes: "",
+        session: "[instrument]\nkind = \"angle\"\nnoise_arcsec = 0.2\n\n\
+                  [[effect]]\ncomponent = \"EBX\"\ndriver = \"X\"\nshape = \"polynomial\"\norder = 1\nscale_mm = 300\n\n\
+                  [[effect]]\ncomponent = \"EAY\"\ndriver = \"Y\"\nshape = \"polynomial\"\norder = 1\nscale_mm = 200\n\n\
+                  [[test]]\nname = \"level\"\nabout = [[0, 1, 0], [1, 0, 0]]\nbody = \"tool\"\n\
+                  sweep = { axis = \"X\", from_mm = -300, to_mm = 300, step_mm = 30 }\n",
+        lacks: &[("EAY~Y", 30.0 * MICRO)],
+        reading: |test, at| {
+            let Station::Angle(level) = &test.station else { panic!("a level") };
+            // A level does not read about the vertical.
+            assert!(level.about.iter().all(|about| about[2] == 0.0));
+            let turned = [30.0 * MICRO * at("Y") / 200.0, -20.0 * MICRO * at("X") / 300.0, 0.0];
+            level.about.iter().map(|about| dot(*about, turned)).collect()
+        },
+        noise: [0.0, 0.2 / 3600.0 * std::f64::consts::PI / 180.0],
+    });
+}
+
+/// Lines along X and Y say nothing of the squareness of Z.
+#[test]
+fn a_tracker_sees_the_axis_that_no_test_moves() {
+    check(&Case {
+        chain: "w b X Y Z t",
+        axes: "",
+        session: "[instrument]\nkind = \"tracker\"\nnoise_um = 8\n\n[unknowns]\nerrors = [\"EC0Y\", \"EA0Z\", \"EB0Z\"]\n\n\
+                  [[test]]\nname = \"X\"\nsetup = \"T\"\nspindle_setup = \"S\"\ntarget_mm = [0, 0, 0]\n\
+                  sweep = { axis = \"X\", from_mm = -300, to_mm = 300, step_mm = 30 }\n\n\
+                  [[test]]\nname = \"Y\"\nsetup = \"T\"\nspindle_setup = \"S\"\ntarget_mm = [0, 0, 0]\n\
+                  sweep = { axis = \"Y\", from_mm = -200, to_mm = 200, step_mm = 20 }\n",
+        lacks: &[("EA0Z", 40.0 * MICRO), ("EB0Z", -60.0 * MICRO)],
+        reading: |_, at| {
+            let (x, y, z) = (at("X"), at("Y"), at("Z"));
+            // Y leans towards −X by EC0Y, Z towards X by EB0Z and towards −Y by EA0Z.
+            let point = [x - 25.0 * MICRO * y - 60.0 * MICRO * z, y - 40.0 * MICRO * z, z];
+            let seen = turned(0.5, point);
+            vec![seen[0] + 800.0, seen[1] - 1500.0, seen[2] + 200.0]
+        },
+        noise: [8e-3, 0.0],
+    });
+}
+
+/// A nest that no test turns says nothing of the axis of the table.
+#[test]
+fn an_r_test_follows_the_axis_that_no_test_moves() {
+    check(&Case {
+        chain: "w C b X Y Z t",
+        axes: "[axis.C]\ndirection = [0, 0, 1]\ntravel_deg = [-180, 180]\n",
+        session: "[instrument]\nkind = \"r-test\"\nnoise_um = 0.5\n\n[unknowns]\nerrors = [\"EX0C\", \"EY0C\"]\n\n\
+                  [[test]]\nname = \"X\"\nsetting = \"E\"\nworkpiece_ball_mm = [80, 0, 60]\nworkpiece_ball_u_um = inf\n\
+                  spindle_ball_mm = [0, 0, 0]\nsetup = \"N\"\nspindle_setup = \"S\"\nat = { x_mm = 80, z_mm = 60 }\n\
+                  sweep = { axis = \"X\", from_mm = 78, to_mm = 82, step_mm = 0.5 }\n",
+        lacks: &[("EX0C", 12e-3), ("EY0C", -8e-3)],
+        reading: |test, at| {
+            let Station::RTest(nest) = &test.station else { panic!("an R-test") };
+            let spindle: [f64; 3] = [at("X"), at("Y"), at("Z")];
+            let from_axis = [spindle[0] - 12e-3, spindle[1] + 8e-3, spindle[2]];
+            let in_table = turned(-at("C"), from_axis);
+            (0..3).map(|i| in_table[i] + nest.spindle_ball[i] - nest.workpiece_ball[i]).collect()
+        },
+        noise: [5e-4, 0.0],
+    });
+}
+
+/// A probe around a cylinder that does not turn says nothing of the axis of the table.
+#[test]
+fn a_probe_touches_while_the_axis_turns_that_no_test_moves() {
+    check(&Case {
+        chain: "w C b X Y Z t",
+        axes: "[axis.C]\ndirection = [0, 0, 1]\ntravel_deg = [-180, 180]\n",
+        session: "[instrument]\nkind = \"probe\"\nnoise_um = 1\n\n[unknowns]\nerrors = [\"EX0C\", \"EY0C\"]\n\n\
+                  [[test]]\nname = \"round\"\nradius_mm = 45\nradius_u_um = inf\nartefact_mm = [0, 0, 0]\n\
+                  artefact_u_um = [inf, inf, 0]\nstylus_mm = [0, 0, 0]\nsetup = \"cylinder\"\nspindle_setup = \"stylus\"\n\
+                  path = { kind = \"circle\", plane = \"XY\", radius_mm = 45, step_deg = 15, both_directions = false }\n",
+        lacks: &[("EX0C", 12e-3), ("EY0C", -8e-3)],
+        reading: |test, at| {
+            let Station::Probe(probe) = &test.station else { panic!("a probe") };
+            let stylus: [f64; 3] = std::array::from_fn(|i| at(["X", "Y", "Z"][i]) + probe.stylus[i]);
+            let nominal = turned(at("C"), probe.artefact);
+            let centre = [nominal[0] + 12e-3, nominal[1] - 8e-3];
+            let (dx, dy) = (nominal[0] - stylus[0], nominal[1] - stylus[1]);
+            let ahead = [dx / dx.hypot(dy), dy / dx.hypot(dy)];
+            let from = [stylus[0] - centre[0], stylus[1] - centre[1]];
+            let along = from[0] * ahead[0] + from[1] * ahead[1];
+            let square = from[0] * from[0] + from[1] * from[1] - probe.radius * probe.radius;
+            vec![-along - (along * along - square).sqrt()]
+        },
+        noise: [1e-3, 0.0],
+    });
+}
