@@ -10,9 +10,8 @@ use super::output;
 /// A file to write: its name in the folder, with the names of folders within it, and its contents.
 pub type NewFile = (String, String);
 
-/// Writes files into a folder. They are first written into a temporary folder beside it, where `check_files` reads
-/// them, and may add others. Then all are moved: a new folder in one step; into an existing folder one file after the
-/// other, in their order, the added ones last.
+/// Writes files into a folder: first into a temporary folder beside it, where `check_files` reads them and may add others.
+/// Then all are moved: a new folder in one step; into an existing one file after the other, the added ones last.
 ///
 /// A folder that is not empty is refused, unless `force` allows to replace files with these names. Other files stay.
 pub fn write(
@@ -49,28 +48,12 @@ pub fn write(
             std::fs::rename(whole.join(name), folder.join(name)).map_err(fault)
         };
         files.iter().try_for_each(|(name, _)| move_file(Path::new(name)))?;
-        let added = files_below(&whole).map_err(fault)?;
+        let added = temporary::files_below(&whole).map_err(fault)?;
         added.iter().filter_map(|file| file.strip_prefix(&whole).ok()).try_for_each(move_file)?;
     } else {
         std::fs::rename(&whole, folder).map_err(fault)?;
     }
     Ok(())
-}
-
-/// All files in a folder and the folders within it, in the order of their names.
-fn files_below(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
-    let mut entries: Vec<PathBuf> =
-        std::fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect::<std::io::Result<_>>()?;
-    entries.sort();
-    let mut files = Vec::new();
-    for entry in entries {
-        if entry.is_dir() {
-            files.extend(files_below(&entry)?);
-        } else {
-            files.push(entry);
-        }
-    }
-    Ok(files)
 }
 
 /// Adds files to an existing folder in their order, except those that are named as `read` where they lie. The last one is
