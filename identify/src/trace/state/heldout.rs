@@ -139,10 +139,7 @@ impl SearchState<'_> {
         let of_all = self.prediction_of(&branches[ALL].chosen(), &branches[ALL].folds)?;
         let by_fold = parallel::map(branches.len() - 1, &|fold| {
             let branch = &branches[ALL + 1 + fold];
-            let predicted = match self.policy.folds_follow {
-                true => self.prediction_of(&branch.chosen(), &branch.folds)?,
-                false => self.averaged_prediction(branch)?,
-            };
+            let predicted = self.averaged_prediction(branch)?;
             self.forget_unselected(ALL + 1 + fold);
             Ok((self.residuals_of_fold(fold, &predicted), self.residuals_of_fold(fold, &of_all)))
         });
@@ -214,6 +211,10 @@ impl SearchState<'_> {
             return Ok(Vec::new());
         }
         let own = explanation(effect, &own);
+        // Branches that follow the one on all readings choose nothing, so that there is no other choice to average over.
+        if self.policy.folds_follow {
+            return Ok(vec![own]);
+        }
         let least = own.score - MAX_SCORE_DEFICIT;
         let mut found: Vec<Explanation> = (self.gains(without)?.iter().enumerate())
             .filter(|(candidate, gain)| {
