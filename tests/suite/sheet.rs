@@ -123,7 +123,7 @@ fn sheets_have_the_words_of_their_instrument() {
     for (plan, expected) in [
         ("laser/plan.toml", "Laser, its beam along X of R and aligned over the whole travel: mount it"),
         ("angle/plan.toml", "Sensor of angles, on the tool: it reads about Y and X of R: mount it"),
-        ("distance/session.toml", "Station: mount it"),
+        ("distance/session.toml", "Station, fixed to the bed: its place is estimated"),
         ("pose/session.toml", "Measuring system, where it sees the target at every position"),
         ("pose/tracker.toml", "Laser tracker, where it sees the target at every position"),
     ] {
@@ -139,8 +139,8 @@ fn sheets_have_the_words_of_their_instrument() {
     for absent in ["spindle", "work offset", "single block", "Pivot", "control shows"] {
         assert!(!robot.contains(absent), "{absent}");
     }
-    let level = page("angle/plan.toml", &[]);
-    assert!(level.contains("Run each program in single block before it is trusted."), "{level}");
+    let probe = page("self-calibration/session.toml", &[]);
+    assert!(probe.contains("in single block and without the stylus before it is trusted."), "{probe}");
     let r_test = page("r-test/plan.toml", &[]);
     assert!(r_test.contains("in single block and without the nest with the sensors before"), "{r_test}");
 }
