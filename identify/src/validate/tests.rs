@@ -34,7 +34,7 @@ fn a_change_is_the_difference_of_two_fits() {
     let place = |model: &IdentifiedModel| model.parameters.iter().position(|p| p.id == "EX0C").unwrap();
     let (i, j) = (place(&moved), place(&other));
     moved.parameters[i].value += 30.0 * moved.u(i).hypot(other.u(j));
-    let known_noise = KnownErrors::new(&moved, &second).unwrap();
+    let known_noise = KnownErrors::new(&moved, &second, &[]).unwrap();
     let values = known_noise.model_values();
     let beta = known_noise.fit(&values).unwrap();
     let found = moved::moved(&known_noise, &known_noise.linearised(&values, &beta).unwrap()).unwrap();

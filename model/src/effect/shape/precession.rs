@@ -33,8 +33,11 @@ pub struct Precession {
 /// Highest order of the library: bearings of few lobes and supports. Finer harmonics are searched one error at a time.
 const HIGHEST_ORDER: usize = 4;
 
-const BACKWARD: Key =
-    Key { name: "backward", form: KeyForm::Flag, meaning: "whether the direction of a precession turns against the axis" };
+const BACKWARD: Key = Key {
+    name: "backward",
+    form: KeyForm::Flag,
+    meaning: "whether the direction of a precession turns against the axis",
+};
 
 pub(super) const ENTRY: Entry = Entry {
     word: "precession",

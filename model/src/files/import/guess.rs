@@ -1,6 +1,6 @@
 //! The instrument that the columns of a table belong to, where no session names it.
 
-use super::{Expected, Hint, grid, meaning};
+use super::{Expected, Hint, grid, hint, meaning};
 use crate::chain::Machine;
 use crate::document::node::{Node, Value};
 use crate::instrument::{Fault, InstrumentKind, Station};
@@ -55,7 +55,7 @@ pub fn instrument(bytes: &[u8], machine: &Machine, hints: &[Hint]) -> Result<Ins
     for &kind in InstrumentKind::ALL {
         let Some(station) = station(kind, &any_set_up(kind)) else { continue };
         let expected = Expected { machine, station: &station, circle: None, moved: only_axis(machine), hints };
-        match meaning::of(&grid, &expected) {
+        match hint::found(&grid, &expected).and_then(|found| meaning::of(&grid, &expected, found)) {
             Ok(found) => {
                 let readings = found.iter().filter(|one| one.is_reading()).count();
                 // Three coordinates are those of a tracker if they are large, of an R-test if they are small.

@@ -2,7 +2,6 @@
 
 use super::Expected;
 use super::grid::{Grid, number_with_unit};
-use super::hint;
 use super::unit::{self, Dimension, Unit};
 use super::words::{self, AxisWord, Direction};
 use crate::axis::AxisKind;
@@ -72,10 +71,9 @@ impl Found {
     }
 }
 
-/// The columns that are used, each meaning once in each direction. What the user says of a column stands, whatever the
-/// file calls it.
-pub(super) fn of(grid: &Grid, expected: &Expected<'_>) -> Result<Vec<Found>, Fault> {
-    let mut found: Vec<Found> = hint::found(grid, expected)?;
+/// The columns that are used, each meaning once in each direction. `found` are those of which the user says what they hold:
+/// that stands, whatever the file calls them.
+pub(super) fn of(grid: &Grid, expected: &Expected<'_>, mut found: Vec<Found>) -> Result<Vec<Found>, Fault> {
     let hinted: Vec<usize> = found.iter().map(|one| one.column).collect();
     let joints_from = first_joint(grid, expected);
     for column in (0..grid.width()).filter(|column| !hinted.contains(column)) {

@@ -133,7 +133,8 @@ pub fn understand(name: &str, bytes: &[u8], expected: &Expected<'_>) -> Result<U
         return Err((found, "thin out the readings, or split the file".into()));
     }
     let grid = grid::of(bytes)?;
-    let found = meaning::of(&grid, expected).map_err(|fault| grid.with_layout(fault))?;
+    let found = hint::found(&grid, expected).and_then(|found| meaning::of(&grid, expected, found));
+    let found = found.map_err(|fault| grid.with_layout(fault))?;
     let readings = normalise::readings(name, &grid, &found, expected).map_err(|fault| grid.with_layout(fault))?;
     let first = readings.first().ok_or_else(|| ("the file has no rows".to_string(), String::new()))?;
     Ok(Understood {

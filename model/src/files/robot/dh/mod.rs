@@ -111,7 +111,7 @@ pub fn read(source: &Source, convention: Convention) -> Result<Table, ModelError
             return Err(at(*line)((message, "complete the row".into())));
         }
         let number = read.iter().filter(|row: &&RowRead| row.kind.is_some()).count() + 1;
-        read.push(RowRead::of(&columns, &cells, separator != ',', number, *line).map_err(at(*line))?);
+        read.push(RowRead::of(|own| columns.place(own), &cells, separator != ',', number, *line).map_err(at(*line))?);
     }
     let mut table = Table { convention, rows: Vec::new(), assumed: columns.decide(&read) };
     for row in &read {

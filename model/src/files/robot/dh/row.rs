@@ -1,7 +1,6 @@
 //! A row of a table of Denavit–Hartenberg parameters as it stands in the file.
 
 use super::cell::Value;
-use super::columns::Columns;
 use crate::axis::AxisKind;
 use crate::files::import::unit::Dimension;
 use crate::instrument::Fault;
@@ -19,9 +18,15 @@ pub(super) struct RowRead {
 }
 
 impl RowRead {
-    /// `number` is that of the joint, `comma` whether a comma is a decimal sign.
-    pub fn of(columns: &Columns, cells: &[String], comma: bool, number: usize, line: usize) -> Result<RowRead, Fault> {
-        let cell = |own: &str| columns.place(own).map_or("", |place| cells[place].as_str());
+    /// `place` is that of a parameter's cell, `number` that of the joint, `comma` whether a comma is a decimal sign.
+    pub fn of(
+        place: impl Fn(&str) -> Option<usize>,
+        cells: &[String],
+        comma: bool,
+        number: usize,
+        line: usize,
+    ) -> Result<RowRead, Fault> {
+        let cell = |own: &str| place(own).map_or("", |place| cells[place].as_str());
         let mut values = Vec::new();
         for own in PARAMETERS {
             let text = cell(own);
