@@ -25,7 +25,7 @@ pub struct CertificateArguments {
     dcc: Option<PathBuf>,
     /// File of the administrative data of `--dcc`, if it is not `certificate.toml` beside the session.
     ///
-    /// Example: --certificate laboratory.toml
+    /// Example: --dcc certificate.xml --certificate laboratory.toml
     #[arg(long, value_name = "FILE.toml", requires = "dcc")]
     certificate: Option<PathBuf>,
 }

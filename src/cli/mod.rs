@@ -69,7 +69,7 @@ struct Arguments {
     quiet: bool,
 }
 
-const EXAMPLES: &str = "From a template to a found effect (`abbe COMMAND --help` has more):
+const EXAMPLES: &str = "Example, from a template to a found effect (`abbe COMMAND --help` has more):
   abbe new my --template hermle-c600u
   abbe plan my/chapter5.toml
   abbe simulate my/chapter5.toml --out my/run1 --error EY0A=35.3um --error EB0A=-1.29arcsec
@@ -78,7 +78,7 @@ const EXAMPLES: &str = "From a template to a found effect (`abbe COMMAND --help`
   abbe equation my/chapter5.toml --test C150 --order first
 
 Results go to standard output, progress and messages to standard error; FILE `-` is standard output.
-Exit status: 0 done; 1 unusable input; 2 wrong command line; 130, 143 ended by a signal.";
+Exit status: 0 done; 1 the input cannot be used; 2 wrong command line; 130 interrupted; 143 ended.";
 
 /// The commands by task.
 const TASKS: [(&str, &[&str]); 5] = [
@@ -378,6 +378,7 @@ mod tests {
                     "study" if example.contains("--out") => &["STUDY"],
                     "study" => &["STUDY", "--out", "DIR"],
                     "run" if example.contains("--list") => &["--out", "DIR"],
+                    "sheet" if example.contains("--number") => &["SESSION", "--out", "OUT", "--control", "fanuc"],
                     "simulate" | "paper" | "run" | "sheet" => &["SESSION", "--out", "OUT"],
                     "volumetric" => &["MACHINE"],
                     "new" => &["DIR"],

@@ -15,6 +15,7 @@ use abbe::model::files::{ReadOptions, session as read};
 use abbe::model::session::Session;
 
 use super::plan_help::{noise_um, ready};
+use super::workspace;
 
 /// A circle of X and Y in both directions on a machine with a table C and a head B, with time and temperature.
 fn circle() -> Session {
@@ -74,6 +75,7 @@ fn every_candidate_of_the_library_has_its_own_description() {
         ready("r-test/measured/session.toml"),
         circle(),
         robot(),
+        read(&workspace().join("tests/precession/mount.toml"), &ReadOptions::default()).unwrap(),
     ] {
         let problem = Problem::new(&session, noise_um(0.3), 1).unwrap();
         let mut described: HashMap<String, Effect> = HashMap::new();

@@ -186,6 +186,7 @@ fn the_session_schema_has_the_keys_that_the_reader_knows() {
     for shape in [
         "component = \"bar\"\nshape = \"constant\"",
         "component = \"EZC\"\nshape = \"harmonic\"\norder = 2",
+        "component = \"EAC\"\nshape = \"precession\"\norder = 2\nbackward = true",
         "component = \"EZC\"\nshape = \"spectrum\"\norders = 20",
         "component = \"EXX\"\nshape = \"polynomial\"\norder = 2",
         "component = \"EXX\"\nshape = \"periodic\"\nperiod_mm = 2",
