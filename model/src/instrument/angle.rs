@@ -8,7 +8,9 @@ use serde::{Deserialize, Serialize};
 
 use super::channel::Channel;
 use super::column::{Column, Quantity};
-use super::kind::{self, Checked};
+use super::check::check_small;
+use super::kind::Checked;
+use super::operation::direction_in_words;
 use super::set_up::{self, SetUp, Written};
 use super::{Aligned, Travel, 
     Entry, Fault, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
@@ -126,7 +128,7 @@ impl Instrument for Angle<f64> {
         // As many directions at a time as it has columns.
         let sets = readable.chunks(self.about.len().max(1));
         let aligned = sets.map(|about| {
-            let words: Vec<String> = about.iter().map(|about| kind::direction_in_words(*about)).collect();
+            let words: Vec<String> = about.iter().map(|about| direction_in_words(*about)).collect();
             let station = Station::Angle(Angle { about: about.to_vec(), body: self.body });
             Aligned { station, words: format!("read about {}", words.join(" and ")), is_new: true }
         });
@@ -137,7 +139,7 @@ impl Instrument for Angle<f64> {
         set_up::written(&Keys { about: document::Directions(about), body: self.body }, &[])
     }
     fn handling(&self) -> Handling {
-        let about: Vec<String> = self.about.iter().map(|about| kind::direction_in_words(*about)).collect();
+        let about: Vec<String> = self.about.iter().map(|about| direction_in_words(*about)).collect();
         let on = match self.body {
             Body::Relative => "Sensor of angles, between table and tool",
             Body::Tool => "Sensor of angles, on the tool",
@@ -160,7 +162,7 @@ impl Instrument for Angle<f64> {
     }
     /// Rotation errors are small.
     fn check_readings(&self, checked: &Checked<'_>) -> Result<(), Fault> {
-        kind::check_small(self.channels(), checked, 0)
+        check_small(self.channels(), checked, 0)
     }
     fn missing(&self, has: &dyn Fn(Quantity) -> bool) -> Option<Fault> {
         let column = self.columns().iter().find(|column| !has(column.quantity))?;

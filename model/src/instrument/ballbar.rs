@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::channel::Channel;
 use super::column::{Column, Quantity};
-use super::kind::{MAX_MM, doubt_on_scatter, median};
+use super::check::{MAX_MM, doubt_on_scatter, median};
 use super::set_up::{self, SetUp};
 use super::{Contact, 
     Checked, Entry, Fault, Following, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, InternalUnit, Reading,

@@ -5,14 +5,13 @@ use nalgebra::Vector3;
 use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::default_errors;
+use super::operation::{Aligned, Contact, Following, Handling, Travel};
 use super::set_up::SetUp;
 use super::{InstrumentKind, InstrumentParameter, Reading, SharedBy, Station};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::component::ErrorName;
 use crate::document::Fault as KeyFault;
 use crate::document::node::Node;
-use crate::files::quantity::ARCSECOND;
-use crate::frames::{Point, cross};
 use crate::rotation_error::Body;
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
@@ -126,43 +125,8 @@ impl<'a, N> InstrumentPoint<'a, N> {
     }
 }
 
-/// What a pose that the instrument measures has to meet.
-#[derive(Clone, Copy, Debug)]
-pub enum Contact {
-    /// Nothing: a line of sight or a direction is all that it needs.
-    None,
-    /// The tool's point is at a point of R, mm.
-    InR([f64; 3]),
-    /// The tool's point is at this distance from the point of the table, mm.
-    AtDistance(f64),
-    /// A stylus touches its artefact.
-    Touching,
-}
-
-/// How the tool point follows the instrument's point of the table on a path of kind `follow`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Following {
-    /// At the length of a bar, whose direction the path states.
-    AtBar,
-    /// The two points coincide: a path that states a direction is refused with this message and help.
-    Touching(&'static str, &'static str),
-    /// At no fixed distance.
-    Apart,
-}
-
 /// A message and what to do.
 pub type Fault = (String, String);
-
-/// The readings of a test, for the check of a set-up.
-#[derive(Clone, Copy)]
-pub struct Checked<'a> {
-    /// The machine.
-    pub machine: &'a Machine,
-    /// The name of the test.
-    pub test: &'a str,
-    /// Its readings.
-    pub readings: &'a Readings,
-}
 
 /// Tests that share an object, with their readings.
 pub struct Group<'a> {
@@ -190,6 +154,17 @@ impl Group<'_> {
         let pairs = self.tool_points().into_iter().zip(measured).filter_map(|(point, seen)| Some([point, seen?]));
         pairs.filter(|[_, seen]| seen.iter().all(|value| value.is_finite())).collect()
     }
+}
+
+/// The readings of a test, for the check of a set-up.
+#[derive(Clone, Copy)]
+pub struct Checked<'a> {
+    /// The machine.
+    pub machine: &'a Machine,
+    /// The name of the test.
+    pub test: &'a str,
+    /// Its readings.
+    pub readings: &'a Readings,
 }
 
 impl Checked<'_> {
@@ -223,79 +198,6 @@ pub struct Misreading {
     pub words: &'static str,
     /// The values of the columns of a reading as they would be.
     pub reread: fn(&mut [f64]),
-}
-
-/// What an operator does with an instrument, in the words of a set-up sheet.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Handling {
-    /// What stands beside the machine and is set up there: `Laser tracker, where it sees the target at every position`.
-    pub beside: Option<String>,
-    /// The object on the table whose centre the machine probes to find R if no axis of the table gives it.
-    pub probed: Option<&'static str>,
-    /// What is taken off when a program runs for the first time: `the bar`.
-    pub taken_off: Option<&'static str>,
-    /// What is done between tests beside mounting objects: `changes of the bar`.
-    pub changes: Option<&'static str>,
-}
-
-/// A move of one axis, for which an instrument is set up.
-#[derive(Clone, Copy)]
-pub struct Travel<'m> {
-    /// The machine.
-    pub machine: &'m Machine,
-    /// The axis, by index.
-    pub axis: usize,
-    /// Its direction in R where the other axes stand, of unit length.
-    pub direction: [f64; 3],
-}
-
-impl Travel<'_> {
-    /// Whether the axis moves the body that an instrument reads.
-    pub(super) fn moves(&self, body: Body) -> bool {
-        let on_table = self.axis < self.machine.workpiece_side;
-        match body {
-            Body::Relative => true,
-            Body::Tool => !on_table,
-            Body::Table => on_table,
-        }
-    }
-
-    /// The direction of the axis with its largest component positive.
-    pub(super) fn positive(&self) -> [f64; 3] {
-        let largest = |a: f64, b: f64| if b.abs() > a.abs() + 1e-9 { b } else { a };
-        let sign = self.direction.iter().copied().fold(0.0, largest).signum();
-        self.direction.map(|x| x * sign + 0.0)
-    }
-
-    /// Two directions across the axis, perpendicular to each other, as near to R's directions as they can be.
-    pub(super) fn across(&self) -> [[f64; 3]; 2] {
-        let along = self.direction;
-        let farthest = (1..3).fold(0, |best, i| if along[i].abs() < along[best].abs() - 1e-9 { i } else { best });
-        let share = along[farthest];
-        let first: [f64; 3] = std::array::from_fn(|i| f64::from(u8::from(i == farthest)) - share * along[i]);
-        let length = first.iter().map(|x| x * x).sum::<f64>().sqrt();
-        let first = first.map(|x| x / length);
-        let second = cross(along, Point(first)).0;
-        [first, Travel { direction: second, ..*self }.positive()]
-    }
-}
-
-/// A set-up of an instrument that reads a motion.
-#[derive(Clone, Debug)]
-pub struct Aligned {
-    /// The set-up.
-    pub station: Station<f64>,
-    /// What differs from the present one, in words; empty if nothing does.
-    pub words: String,
-    /// Whether the instrument has to be set up anew.
-    pub is_new: bool,
-}
-
-impl Aligned {
-    /// A set-up that stays.
-    pub(super) fn as_it_stands(station: impl Into<Station<f64>>) -> Vec<Aligned> {
-        vec![Aligned { station: station.into(), words: String::new(), is_new: false }]
-    }
 }
 
 /// Everything that is particular to one instrument as set up for a test, except its reading: see [`Geometry`].
@@ -462,75 +364,4 @@ pub trait Instrument {
         let _ = (test, observed);
         Ok(())
     }
-}
-
-/// A direction of R for an operator: `−X`, or its components.
-pub(super) fn direction_in_words(direction: [f64; 3]) -> String {
-    let principal = (0..3).find(|i| direction[*i].abs() > 1.0 - 1e-9);
-    match principal {
-        Some(i) => format!("{}{}", if direction[i] < 0.0 { "−" } else { "" }, ["X", "Y", "Z"][i]),
-        None => format!("[{}]", direction.map(|x| number((x * 1e4).round() / 1e4)).join(", ")),
-    }
-}
-
-/// The sensor range is one to two millimetres for a ball bar and a few for an R-test. A larger deviation is not an
-/// error of the machine, mm.
-pub(super) const MAX_MM: f64 = 5.0;
-
-/// A typical angle that a sensor reads about its zero is smaller, rad: ten times the rotation errors of a poor machine.
-const MAX_RAD: f64 = 2e-3;
-
-/// Checks that the values of channels stay near their median, 5 mm or 2 mrad, except the first `skipped` channels.
-///
-/// # Errors
-/// If those of a channel do not.
-pub(super) fn check_small(channels: &[Channel], checked: &Checked<'_>, skipped: usize) -> Result<(), Fault> {
-    let readings = checked.readings;
-    for (place, channel) in channels.iter().enumerate().skip(skipped) {
-        let read = readings.observed.iter().skip(place).step_by(channels.len()).copied();
-        let mut values: Vec<f64> = read.filter(|value| !value.is_nan()).collect();
-        let middle = median(&mut values);
-        let away = median(&mut values.iter().map(|value| (value - middle).abs()).collect::<Vec<_>>());
-        let (most, limit, shown) = match channel.is_angle() {
-            true => (MAX_RAD, "2 mrad (412″)", format!("{:.1}″", away / ARCSECOND)),
-            false => (MAX_MM, "5 mm", format!("{away:.3} mm")),
-        };
-        if away > most {
-            return Err((
-                format!(
-                    "test \"{}\": the readings of `{}` differ from their median by {shown} (median of {} readings); the \
-                     limit is {limit}",
-                    checked.test,
-                    channel.name,
-                    values.len()
-                ),
-                "is the column in another unit than its name says, or is it a position and no deviation?".into(),
-            ));
-        }
-    }
-    Ok(())
-}
-
-/// Deviations that scatter by less are below what an interferometer or a ball bar resolves, mm.
-const MIN_SCATTER_MM: f64 = 5e-5;
-
-/// The doubt about deviations whose scatter no instrument resolves, as where a column in mm has a name in µm.
-pub(super) fn doubt_on_scatter(deviations: &mut [f64]) -> Option<String> {
-    let middle = median(deviations);
-    let scatter = median(&mut deviations.iter().map(|value| (value - middle).abs()).collect::<Vec<_>>());
-    (scatter > 0.0 && scatter < MIN_SCATTER_MM).then(|| {
-        format!(
-            "the deviations scatter by {:.2} nm about their median, less than such an instrument resolves: is the column in \
-             mm, and its name in µm?",
-            scatter * 1e6
-        )
-    })
-}
-
-pub(super) fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

@@ -18,7 +18,9 @@ use serde::{Deserialize, Serialize};
 
 use super::channel::Channel;
 use super::column::{Column, Quantity};
-use super::kind::{self, Checked, MAX_MM, median};
+use super::check::{self, MAX_MM, median};
+use super::kind::Checked;
+use super::operation::direction_in_words;
 use super::set_up::{self, SetUp, Written};
 use super::{Aligned, Travel, 
     Entry, Fault, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station,
@@ -332,7 +334,7 @@ impl Instrument for Laser<f64> {
         }
         let beam = travel.positive();
         let station = Station::Laser(Laser { frame: frame(beam), datum: 0.0, ..self.clone() });
-        vec![Aligned { station, words: format!("beam along {}", kind::direction_in_words(beam)), is_new: true }]
+        vec![Aligned { station, words: format!("beam along {}", direction_in_words(beam)), is_new: true }]
     }
     fn written(&self, priors: &[Prior]) -> Option<Node> {
         let point = |point: [f64; 3]| (point != [0.0; 3]).then(|| set_up::written_point(point));
@@ -354,7 +356,7 @@ impl Instrument for Laser<f64> {
         Some(node)
     }
     fn handling(&self) -> Handling {
-        let beam = kind::direction_in_words(self.frame[0]);
+        let beam = direction_in_words(self.frame[0]);
         let beside = format!("Laser, its beam along {beam} of R and aligned over the whole travel");
         Handling { beside: Some(beside), taken_off: Some("the optics"), ..Handling::default() }
     }
@@ -410,10 +412,10 @@ impl Instrument for Laser<f64> {
             }
         }
         let skipped = usize::from(places(&self.channels).next() == Some(0));
-        kind::check_small(self.channels(), checked, skipped)
+        check::check_small(self.channels(), checked, skipped)
     }
     fn doubt(&self, checked: &Checked<'_>) -> Option<String> {
-        kind::doubt_on_scatter(&mut self.displacements(checked.machine, checked.readings)?)
+        check::doubt_on_scatter(&mut self.displacements(checked.machine, checked.readings)?)
     }
     fn absent_channels_known(&self, priors: &mut [Prior]) {
         hold_absent(&places(&self.channels).collect::<Vec<_>>(), self.is_beam_stated, priors);

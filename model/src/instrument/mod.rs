@@ -3,17 +3,17 @@
 
 mod bearing;
 pub mod channel;
+mod check;
 pub mod column;
 mod default_errors;
 mod kind;
+mod operation;
 mod parameter;
 pub mod set_up;
 pub mod stand;
 
-pub use kind::{
-    Aligned, Checked, Contact, Entry, Fault, Following, Geometry, Group, Handling, Instrument, InstrumentPoint,
-    Misreading, Travel,
-};
+pub use kind::{Checked, Entry, Fault, Geometry, Group, Instrument, InstrumentPoint, Misreading};
+pub use operation::{Aligned, Contact, Following, Handling, Travel};
 pub use parameter::{InstrumentParameter, InternalUnit, SharedBy};
 
 use std::ops::{Deref, DerefMut};

@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 use super::bearing::{Sight, bearings, direction, observed_bearings};
 use super::channel::Channel;
 use super::column::{Column, Quantity};
-use super::kind::{Checked, median};
+use super::check::median;
+use super::kind::Checked;
 use super::set_up::{self, SetUp, Written};
 use super::{Aligned, Travel, 
     Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use super::channel::Channel;
 use super::column::{Column, Quantity};
-use super::kind::MAX_MM;
+use super::check::MAX_MM;
 use super::set_up::{self, SetUp, Written};
 use super::stand::pose_error;
 use super::{Contact, 

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize, Serializer};
 
 use super::channel::Channel;
 use super::column::{Column, Quantity};
-use super::kind::{MAX_MM, median};
+use super::check::{MAX_MM, median};
 use super::set_up::{self, SetUp, Written};
 use super::{Contact, 
     Checked, Entry, Fault, Following, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy,

@@ -5,7 +5,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::kind::median;
+use super::check::median;
 use super::set_up::Written;
 use super::{InstrumentParameter, SharedBy, point};
 use crate::frames::{Point, Rotation, SmallMotion, dot_nominal};
