@@ -10,12 +10,13 @@ use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
 use abbe_identify::results::FitResult;
 use abbe_model::ModelError;
+use abbe_model::calendar;
 use abbe_model::document::fault::Fault;
 use abbe_model::files::Source;
 use abbe_model::files::read::lowered;
+use abbe_model::session::Session;
 use schemars::JsonSchema;
 use serde::Deserialize;
-use toml::value::Datetime;
 
 /// The administrative data of a certificate: what no measurement tells.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
@@ -34,7 +35,7 @@ pub struct Certificate {
     pub person: Vec<Person>,
     /// The measuring equipment.
     #[serde(default)]
-    pub equipment: Vec<Item>,
+    pub equipment: Vec<Equipment>,
     /// The conditions during the measurement.
     #[serde(default)]
     pub conditions: Conditions,
@@ -76,11 +77,11 @@ pub enum Place {
     Elsewhere,
 }
 
-/// A device: what is calibrated, or what measures.
+/// What is calibrated.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename = "certificate_item", deny_unknown_fields)]
 pub struct Item {
-    /// Name.
+    /// Name; by default that of the machine.
     pub name: Option<String>,
     /// Manufacturer.
     pub manufacturer: Option<String>,
@@ -88,7 +89,21 @@ pub struct Item {
     pub model: Option<String>,
     /// Serial number.
     pub serial_number: Option<String>,
-    /// The certificate of the equipment.
+}
+
+/// A measuring device.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename = "certificate_equipment", deny_unknown_fields)]
+pub struct Equipment {
+    /// Name.
+    pub name: String,
+    /// Manufacturer.
+    pub manufacturer: Option<String>,
+    /// Model.
+    pub model: Option<String>,
+    /// Serial number.
+    pub serial_number: Option<String>,
+    /// Number of its own certificate.
     pub certificate: Option<String>,
 }
 
@@ -196,15 +211,9 @@ fn check(certificate: &Certificate) -> Result<(), Fault> {
         code("language", language, char::is_ascii_lowercase).map_err(of_head)?;
     }
     for (key, day) in [("begin", &head.begin), ("end", &head.end)] {
-        if day.as_ref().is_some_and(|day| !is_day(day)) {
+        if day.as_deref().is_some_and(|text| self::day(text).is_none()) {
             return Err(of_head(Fault::unexpected("a day: \"2026-11-23\"").at(key)));
         }
-    }
-    // Days of this form are in the order of their texts.
-    if let (Some(begin), Some(end)) = (&head.begin, &head.end)
-        && end < begin
-    {
-        return Err(of_head(Fault::is("before `begin`").at("end")));
     }
     for (key, organisation) in [("laboratory", &certificate.laboratory), ("customer", &certificate.customer)] {
         let Organisation { name, street, post_code, city, country, email, phone, code: own } = organisation;
@@ -222,11 +231,19 @@ fn check(certificate: &Certificate) -> Result<(), Fault> {
             code("country", country, char::is_ascii_uppercase).map_err(|fault| fault.at(key))?;
         }
     }
-    item(&certificate.item).map_err(|fault| fault.at("item"))?;
+    let Item { name, manufacturer, model, serial_number } = &certificate.item;
+    let stated = [("name", name), ("manufacturer", manufacturer), ("model", model), ("serial_number", serial_number)];
+    texts(stated.map(|(key, text)| (key, text.as_ref()))).map_err(|fault| fault.at("item"))?;
     for (number, equipment) in certificate.equipment.iter().enumerate() {
-        let named =
-            if equipment.name.is_some() { Ok(()) } else { Err(Fault::missing("name", "the name of the device")) };
-        named.and_then(|()| item(equipment)).map_err(|fault| fault.at_item(number).at("equipment"))?;
+        let Equipment { name, manufacturer, model, serial_number, certificate } = equipment;
+        let stated = [
+            ("name", Some(name)),
+            ("manufacturer", manufacturer.as_ref()),
+            ("model", model.as_ref()),
+            ("serial_number", serial_number.as_ref()),
+            ("certificate", certificate.as_ref()),
+        ];
+        texts(stated).map_err(|fault| fault.at_item(number).at("equipment"))?;
     }
     if certificate.person.is_empty() {
         return Err(Fault::missing("person", "who is responsible for the certificate: `[[person]]` with `name`"));
@@ -244,31 +261,21 @@ fn check(certificate: &Certificate) -> Result<(), Fault> {
     }
 }
 
-fn item(item: &Item) -> Result<(), Fault> {
-    texts([
-        ("name", item.name.as_ref()),
-        ("manufacturer", item.manufacturer.as_ref()),
-        ("model", item.model.as_ref()),
-        ("serial_number", item.serial_number.as_ref()),
-        ("certificate", item.certificate.as_ref()),
-    ])
-}
-
 /// Refuses texts that are empty, have blanks at an end or characters that XML does not permit.
 fn texts<'t>(stated: impl IntoIterator<Item = (&'static str, Option<&'t String>)>) -> Result<(), Fault> {
     for (key, text) in stated {
-        if let Some(text) = text
-            && (text.trim() != text || text.is_empty() || text.chars().any(|letter| !is_permitted(letter)))
-        {
+        if text.is_some_and(|text| !is_text(text)) {
             return Err(Fault::unexpected("a text without blanks at its ends and without control characters").at(key));
         }
     }
     Ok(())
 }
 
-/// Whether XML 1.0 permits the character in a line.
-fn is_permitted(letter: char) -> bool {
-    !letter.is_control() && !matches!(letter, '\u{fffe}' | '\u{ffff}')
+/// Whether a text is one that a certificate may have: not empty, without blanks at its ends, and of characters that XML 1.0
+/// permits in a line.
+fn is_text(text: &str) -> bool {
+    let is_permitted = |letter: char| !letter.is_control() && !matches!(letter, '\u{fffe}' | '\u{ffff}');
+    !text.is_empty() && text.trim() == text && text.chars().all(is_permitted)
 }
 
 fn code(key: &'static str, text: &str, is_letter: fn(&char) -> bool) -> Result<(), Fault> {
@@ -280,54 +287,88 @@ fn code(key: &'static str, text: &str, is_letter: fn(&char) -> bool) -> Result<(
     Err(Fault::unexpected(example).at(key))
 }
 
-/// Whether this is a day without a time.
-fn is_day(text: &str) -> bool {
-    text.parse::<Datetime>().is_ok_and(|found| found.date.is_some() && found.time.is_none())
+/// The day of a text without a time, as the schema writes it; `None` for other texts.
+fn day(text: &str) -> Option<String> {
+    let moment = calendar::iso(text).filter(|moment| moment.second.is_none())?;
+    Some(calendar::date(moment.day? as f64))
 }
 
-/// The certificate of a fit as XML. The errors of the machine and the coefficients of its effects are its quantities, each
-/// with `U = 2u`. Its text names those that hold with the stated uncertainties of the set-up only, and those that the
-/// readings do not determine.
-///
-/// # Errors
-/// If the model lacks an effect, if no error is determined, or if neither the certificate nor the session states a serial
-/// number and a day.
-pub fn xml(problem: &Problem, result: &FitResult, certificate: &Certificate) -> Result<String, IdentifyError> {
-    let session = &problem.session;
-    let about = |name: &str| session.about.iter().find(|(known, _)| known == name).map(|(_, text)| text.as_str());
-    let head = &certificate.certificate;
-    let lacking = |key: &str, table: &str, note: &str| {
-        IdentifyError::Request(format!(
-            "the certificate has no {key}: state it in `[{table}]` of the file of the certificate, or as `{note}` in `[about]` of the session"
-        ))
-    };
-    let begin = match &head.begin {
-        Some(day) => day.clone(),
-        None => {
-            let day = about("date").and_then(|date| date.get(..10)).filter(|day| is_day(day));
-            day.ok_or_else(|| lacking("day of the measurement (`begin`)", "certificate", "date"))?.to_string()
+/// The certificate of a session: what the laboratory states, and where that says nothing, the notes of the session.
+pub struct Stated<'c> {
+    certificate: &'c Certificate,
+    /// First and last day of the measurement.
+    days: [String; 2],
+    serial_number: String,
+}
+
+impl<'c> Stated<'c> {
+    /// What the laboratory states, with `date` and `serial_number` of `[about]`.
+    ///
+    /// # Errors
+    /// If neither states a serial number and a day, or the last day is before the first.
+    pub fn of(certificate: &'c Certificate, session: &Session) -> Result<Stated<'c>, IdentifyError> {
+        let about = |name: &str| session.about.iter().find(|(known, _)| known == name).map(|(_, text)| text.as_str());
+        let lacking = |key: &str, table: &str, note: &str| {
+            IdentifyError::Request(format!(
+                "the certificate has no {key}: state it in `[{table}]` of the file of the certificate, or as `{note}` in \
+                 `[about]` of the session"
+            ))
+        };
+        let head = &certificate.certificate;
+        let begin = match &head.begin {
+            Some(begin) => day(begin),
+            None => about("date").and_then(|date| day(date.get(..10)?)),
+        };
+        let begin = begin.ok_or_else(|| lacking("day of the measurement (`begin`)", "certificate", "date"))?;
+        let end = head.end.as_deref().and_then(day).unwrap_or_else(|| begin.clone());
+        // Days of this form are in the order of their texts.
+        if end < begin {
+            let why = format!("the measurement ends on {end} (`end`) before it begins on {begin}");
+            return Err(IdentifyError::Request(why));
         }
-    };
-    let serial_number = match &certificate.item.serial_number {
-        Some(number) => number.clone(),
-        None => about("serial_number").ok_or_else(|| lacking("`serial_number`", "item", "serial_number"))?.to_string(),
-    };
-    if !result.outcome.goodness.quotable {
-        let why = "no estimate may be certified, since the model lacks an effect: its uncertainty does not cover that; `abbe trace` looks for the effect";
-        return Err(IdentifyError::Request(why.into()));
+        let noted = about("serial_number").map(str::trim).filter(|number| is_text(number));
+        let number = certificate.item.serial_number.as_deref().or(noted);
+        let number = number.ok_or_else(|| lacking("`serial_number`", "item", "serial_number"))?;
+        Ok(Stated { certificate, days: [begin, end], serial_number: number.to_string() })
     }
-    let is_setup = |id: &str| problem.parameters.list.iter().any(|known| known.role == Role::Setup && known.id == id);
-    let (mut certified, mut without_unit) = (Vec::new(), Vec::new());
-    for own in result.parameters.iter().filter(|own| !is_setup(&own.id) && own.u > 0.0) {
-        match write::si_unit(&own.unit) {
-            Some(unit) => certified.push((own, unit)),
-            None => without_unit.push(own.id.as_str()),
+
+    /// The certificate of a fit of the session as XML. The errors of the machine are its quantities, each with `U = 2u`.
+    /// Its text names those that hold with the stated uncertainties of the set-up only, and what it leaves out:
+    /// coefficients of effects, which mean nothing without their shape, and errors that the readings do not determine.
+    ///
+    /// # Errors
+    /// If the readings contradict the session, if the model lacks an effect or that cannot be judged, or if no error is
+    /// determined.
+    pub fn xml(&self, problem: &Problem, result: &FitResult) -> Result<String, IdentifyError> {
+        let refused = |why: &str| Err(IdentifyError::Request(format!("there is no certificate: {why}")));
+        if let Some(why) = result.outcome.goodness.verdict.forbids_decisions() {
+            return refused(why);
         }
-    }
-    if certified.is_empty() {
-        return Err(IdentifyError::Request("the readings determine no error that could be certified".into()));
-    }
-    let contents = write::Contents { session, result, certificate, begin, serial_number, certified, without_unit };
-    write::document(&contents)
+        if !result.plausibility.conflicts.is_empty() {
+            return refused("the readings contradict the session");
+        }
+        let of_role = |id: &str| problem.parameters.list.iter().find(|known| known.id == id).map(|known| known.role);
+        let (mut certified, mut coefficients) = (Vec::new(), Vec::new());
+        for own in &result.parameters {
+            match (of_role(&own.id), write::si_unit(&own.unit)) {
+                (Some(Role::Setup), _) => {}
+                (Some(Role::Error), Some(unit)) if own.u > 0.0 => certified.push((own, unit)),
+                _ => coefficients.push(own.id.as_str()),
+            }
+        }
+        if certified.is_empty() {
+            return refused("the readings determine no error of the machine");
+        }
+        let open = result.outcome.not_estimated.iter().filter(|own| of_role(&own.id) == Some(Role::Error));
+        let open = open.map(|own| own.id.as_str()).collect();
+        write::document(&write::Contents {
+            session: &problem.session,
+            result,
+            stated: self,
+            certified,
+            coefficients,
+            open,
+        })
         .map_err(|cause| IdentifyError::Request(format!("the certificate cannot be written: {cause}")))
+    }
 }

@@ -4,11 +4,13 @@ use std::io;
 
 use abbe_identify::results::{DeterminedBy, FitResult, ParameterResult};
 use abbe_identify::tolerance::rule::Decision;
+use abbe_model::axis::AxisKind;
+use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::session::Session;
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesText, Event};
 
-use super::{Certificate, Item, Organisation, Place};
+use super::{Organisation, Place, Stated};
 use crate::report::number::unit;
 
 /// The schema of certificates that the document follows.
@@ -20,15 +22,13 @@ const COVERAGE: &str = "0.9545";
 pub struct Contents<'c> {
     pub session: &'c Session,
     pub result: &'c FitResult,
-    pub certificate: &'c Certificate,
-    /// First day of the measurement.
-    pub begin: String,
-    /// Serial number of what is calibrated.
-    pub serial_number: String,
-    /// Its estimates, each with its unit of D-SI.
-    pub certified: Vec<(&'c ParameterResult, String)>,
-    /// Estimates in a unit that D-SI does not have.
-    pub without_unit: Vec<&'c str>,
+    pub stated: &'c Stated<'c>,
+    /// Its errors, each with its unit of D-SI.
+    pub certified: Vec<(&'c ParameterResult, &'static str)>,
+    /// Estimates that it leaves out.
+    pub coefficients: Vec<&'c str>,
+    /// Errors that the readings do not determine.
+    pub open: Vec<&'c str>,
 }
 
 type Xml = Writer<Vec<u8>>;
@@ -65,7 +65,7 @@ fn text(xml: &mut Xml, name: &str, text: &str) -> io::Result<()> {
 }
 
 /// The same, if there is a text.
-fn stated(xml: &mut Xml, name: &str, own: Option<&String>) -> io::Result<()> {
+fn stated(xml: &mut Xml, name: &str, own: Option<&str>) -> io::Result<()> {
     own.map_or(Ok(()), |own| text(xml, name, own))
 }
 
@@ -78,7 +78,7 @@ fn words(xml: &mut Xml, name: &str, language: &str, own: &str) -> io::Result<()>
 }
 
 fn administrative(xml: &mut Xml, contents: &Contents) -> io::Result<()> {
-    let Contents { certificate, begin, .. } = contents;
+    let Stated { certificate, days: [begin, end], serial_number } = contents.stated;
     let head = &certificate.certificate;
     let language = head.language.as_deref().unwrap_or("en");
     within(xml, "dcc:administrativeData", |xml| {
@@ -97,7 +97,7 @@ fn administrative(xml: &mut Xml, contents: &Contents) -> io::Result<()> {
             text(xml, "dcc:mandatoryLangCodeISO639_1", "en")?;
             text(xml, "dcc:uniqueIdentifier", &head.id)?;
             text(xml, "dcc:beginPerformanceDate", begin)?;
-            text(xml, "dcc:endPerformanceDate", head.end.as_ref().unwrap_or(begin))?;
+            text(xml, "dcc:endPerformanceDate", end)?;
             let place = match head.place {
                 Place::Customer => "customer",
                 Place::Laboratory => "laboratory",
@@ -110,18 +110,18 @@ fn administrative(xml: &mut Xml, contents: &Contents) -> io::Result<()> {
         within(xml, "dcc:items", |xml| {
             let own = &certificate.item;
             let name = own.name.as_deref().unwrap_or(&contents.session.machine.name);
-            let serial_number = Some(contents.serial_number.as_str());
-            within(xml, "dcc:item", |xml| device(xml, language, name, own, serial_number))
+            let made = [own.manufacturer.as_deref(), own.model.as_deref()];
+            within(xml, "dcc:item", |xml| device(xml, language, name, made, [Some(serial_number), None]))
         })?;
         within(xml, "dcc:calibrationLaboratory", |xml| {
-            stated(xml, "dcc:calibrationLaboratoryCode", certificate.laboratory.code.as_ref())?;
+            stated(xml, "dcc:calibrationLaboratoryCode", certificate.laboratory.code.as_deref())?;
             within(xml, "dcc:contact", |xml| contact(xml, language, &certificate.laboratory))
         })?;
         within(xml, "dcc:respPersons", |xml| {
             for person in &certificate.person {
                 within(xml, "dcc:respPerson", |xml| {
                     within(xml, "dcc:person", |xml| words(xml, "dcc:name", language, &person.name))?;
-                    stated(xml, "dcc:role", person.role.as_ref())?;
+                    stated(xml, "dcc:role", person.role.as_deref())?;
                     text(xml, "dcc:mainSigner", if person.signs { "true" } else { "false" })
                 })?;
             }
@@ -131,17 +131,21 @@ fn administrative(xml: &mut Xml, contents: &Contents) -> io::Result<()> {
     })
 }
 
-/// The contents of a device: what is calibrated, or what measures.
-fn device(xml: &mut Xml, language: &str, name: &str, own: &Item, serial_number: Option<&str>) -> io::Result<()> {
+/// The contents of a device, with its manufacturer and model, its serial number and the number of its certificate.
+fn device(
+    xml: &mut Xml,
+    language: &str,
+    name: &str,
+    [manufacturer, model]: [Option<&str>; 2],
+    [serial_number, certificate]: [Option<&str>; 2],
+) -> io::Result<()> {
     words(xml, "dcc:name", language, name)?;
-    if let Some(manufacturer) = &own.manufacturer {
+    if let Some(manufacturer) = manufacturer {
         within(xml, "dcc:manufacturer", |xml| words(xml, "dcc:name", language, manufacturer))?;
     }
-    stated(xml, "dcc:model", own.model.as_ref())?;
-    let identifications = [
-        (serial_number, "manufacturer", "Serial number"),
-        (own.certificate.as_deref(), "calibrationLaboratory", "Certificate"),
-    ];
+    stated(xml, "dcc:model", model)?;
+    let identifications =
+        [(serial_number, "manufacturer", "Serial number"), (certificate, "calibrationLaboratory", "Certificate")];
     let known =
         identifications.into_iter().filter_map(|(value, issuer, name)| value.map(|value| (value, issuer, name)));
     let known: Vec<_> = known.collect();
@@ -163,17 +167,17 @@ fn device(xml: &mut Xml, language: &str, name: &str, own: &Item, serial_number: 
 fn contact(xml: &mut Xml, language: &str, own: &Organisation) -> io::Result<()> {
     words(xml, "dcc:name", language, &own.name)?;
     text(xml, "dcc:eMail", &own.email)?;
-    stated(xml, "dcc:phone", own.phone.as_ref())?;
+    stated(xml, "dcc:phone", own.phone.as_deref())?;
     within(xml, "dcc:location", |xml| {
         text(xml, "dcc:city", &own.city)?;
-        stated(xml, "dcc:countryCode", own.country.as_ref())?;
-        stated(xml, "dcc:postCode", own.post_code.as_ref())?;
-        stated(xml, "dcc:street", own.street.as_ref())
+        stated(xml, "dcc:countryCode", own.country.as_deref())?;
+        stated(xml, "dcc:postCode", own.post_code.as_deref())?;
+        stated(xml, "dcc:street", own.street.as_deref())
     })
 }
 
 fn results(xml: &mut Xml, contents: &Contents) -> io::Result<()> {
-    let Contents { certificate, certified, .. } = contents;
+    let Contents { stated: Stated { certificate, .. }, certified, session, .. } = contents;
     let language = certificate.certificate.language.as_deref().unwrap_or("en");
     within(xml, "dcc:measurementResults", |xml| {
         within(xml, "dcc:measurementResult", |xml| {
@@ -184,16 +188,19 @@ fn results(xml: &mut Xml, contents: &Contents) -> io::Result<()> {
                     words(xml, "dcc:name", "en", "Least-squares fit of the kinematic model to all readings")?;
                     words(xml, "dcc:description", "en", &method(contents))?;
                     text(xml, "dcc:norm", "JCGM 102:2011")?;
-                    text(xml, "dcc:norm", "ISO 230-7:2015")
+                    // Location errors of rotary axes are those of this standard.
+                    if certified.iter().any(|(own, _)| is_of_rotary_axis(session, &own.id)) {
+                        text(xml, "dcc:norm", "ISO 230-7:2015")?;
+                    }
+                    Ok(())
                 })
             })?;
             if !certificate.equipment.is_empty() {
                 within(xml, "dcc:measuringEquipments", |xml| {
                     for own in &certificate.equipment {
-                        let name = own.name.as_deref().unwrap_or_default();
-                        within(xml, "dcc:measuringEquipment", |xml| {
-                            device(xml, language, name, own, own.serial_number.as_deref())
-                        })?;
+                        let made = [own.manufacturer.as_deref(), own.model.as_deref()];
+                        let numbers = [own.serial_number.as_deref(), own.certificate.as_deref()];
+                        within(xml, "dcc:measuringEquipment", |xml| device(xml, language, &own.name, made, numbers))?;
                     }
                     Ok(())
                 })?;
@@ -255,40 +262,35 @@ fn decimal(value: f64) -> String {
     if plain.len() <= 20 { plain } else { format!("{value:e}") }
 }
 
-/// The name in D-SI of the unit of a result: `um/h` is `\micro\metre\hour\tothe{-1}`. `None` if it has none.
-pub fn si_unit(unit: &str) -> Option<String> {
-    let mut found = String::new();
-    for (place, part) in unit.split('/').enumerate() {
-        found += match part {
-            "um" => "\\micro\\metre",
-            "mm" => "\\milli\\metre",
-            "m" => "\\metre",
-            "arcsec" => "\\arcsecond",
-            "deg" => "\\degree",
-            "mrad" => "\\milli\\radian",
-            "rad" => "\\radian",
-            "ms" => "\\milli\\second",
-            "s" => "\\second",
-            "min" => "\\minute",
-            "h" => "\\hour",
-            "K" => "\\kelvin",
-            "1" => "\\one",
-            _ => return None,
-        };
-        if place > 0 {
-            found += "\\tothe{-1}";
-        }
+/// The name in D-SI of the unit of an error. `None` for units that no error has.
+pub fn si_unit(unit: &str) -> Option<&'static str> {
+    match unit {
+        "um" => Some("\\micro\\metre"),
+        "um/m" => Some("\\micro\\metre\\metre\\tothe{-1}"),
+        "arcsec" => Some("\\arcsecond"),
+        "deg" => Some("\\degree"),
+        _ => None,
     }
-    Some(found)
+}
+
+/// Whether this is a location error of a rotary axis.
+fn is_of_rotary_axis(session: &Session, id: &str) -> bool {
+    let axis = |name: &ErrorName| session.machine.axes.iter().find(|axis| axis.name == name.axis).map(|axis| axis.kind);
+    ErrorName::parse(id).is_some_and(|name| name.kind == ErrorKind::Location && axis(&name) == Some(AxisKind::Rotary))
 }
 
 /// The decision about a limit of the session. An undecided one is in words: the schema has no such status.
 fn conformity(xml: &mut Xml, contents: &Contents, id: &str) -> io::Result<()> {
-    let items = contents.result.conformity.iter().flat_map(|conformity| &conformity.items);
-    let Some(own) = items.into_iter().find(|item| item.id == id) else { return Ok(()) };
+    let Some(conformity) = &contents.result.conformity else { return Ok(()) };
+    let Some(own) = conformity.items.iter().find(|item| item.id == id) else { return Ok(()) };
     let lower = own.lower.map_or(String::new(), |lower| format!("{} to ", decimal(lower)));
-    let limits =
-        format!("Permitted: {lower}{} {}. Decision: {}.", decimal(own.upper), unit(&own.unit), own.decision.word());
+    let limits = format!(
+        "Permitted: {lower}{} {}. Decision: {}; a pass or a fail is true with a probability of at least {}.",
+        decimal(own.upper),
+        unit(&own.unit),
+        own.decision.word(),
+        decimal(conformity.probability)
+    );
     within(xml, "dcc:measurementMetaData", |xml| {
         within(xml, "dcc:metaData", |xml| {
             text(xml, "dcc:norm", "ISO 14253-1:2017")?;
@@ -304,28 +306,24 @@ fn conformity(xml: &mut Xml, contents: &Contents, id: &str) -> io::Result<()> {
 
 /// What the result is, and what it leaves out.
 fn description(contents: &Contents) -> String {
-    let Contents { session, result, certified, .. } = contents;
-    let mut sentences = vec![format!(
-        "Location errors of the axes of the machine {} by ISO 230-7, and coefficients of its other declared errors. The frame, the signs and the names are those of the documentation of Abbe {}.",
+    let Contents { session, certified, coefficients, open, .. } = contents;
+    let by_prior = certified.iter().filter(|(own, _)| own.determined_by == DeterminedBy::Prior);
+    let by_prior: Vec<&str> = by_prior.map(|(own, _)| own.id.as_str()).collect();
+    let mut text = format!(
+        "Errors of the axes of the machine {}. The frame, the signs and the names are those of the documentation of Abbe {}.",
         session.machine.code(),
         env!("CARGO_PKG_VERSION")
-    )];
-    let list = |ids: &mut dyn Iterator<Item = &str>| ids.collect::<Vec<_>>().join(", ");
-    let by_prior = certified.iter().filter(|(own, _)| own.determined_by == DeterminedBy::Prior);
-    let by_prior = list(&mut by_prior.map(|(own, _)| own.id.as_str()));
-    if !by_prior.is_empty() {
-        sentences
-            .push(format!("Determined together with the stated values and uncertainties of the set-up: {by_prior}."));
+    );
+    for (what, ids) in [
+        ("Determined together with the stated values and uncertainties of the set-up", &by_prior),
+        ("Not certified, since they are coefficients of a shape", coefficients),
+        ("Not determined by the readings", open),
+    ] {
+        if !ids.is_empty() {
+            text += &format!(" {what}: {}.", ids.join(", "));
+        }
     }
-    if !contents.without_unit.is_empty() {
-        sentences.push(format!("Not certified, since D-SI has no such unit: {}.", contents.without_unit.join(", ")));
-    }
-    let left_out = &result.outcome.not_estimated;
-    if !left_out.is_empty() {
-        let ids = list(&mut left_out.iter().map(|own| own.id.as_str()));
-        sentences.push(format!("Not determined by the readings: {ids}."));
-    }
-    sentences.join(" ")
+    text
 }
 
 /// What was fitted, and how well.

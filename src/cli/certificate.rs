@@ -2,14 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use abbe::certificate::{self, Certificate, EXAMPLE};
+use abbe::certificate::{self, Certificate, EXAMPLE, Stated};
 use abbe::identify::problem::Problem;
 use abbe::identify::results::FitResult;
 use abbe::model::files;
+use abbe::model::files::stamp::FileStamp;
+use abbe::model::session::Session;
 use clap::Args;
 
 use super::failure::Failure;
-use super::output;
+use super::output::{self, Outputs};
 
 /// The name of the file of administrative data beside the session.
 const FILE: &str = "certificate.toml";
@@ -34,6 +36,8 @@ pub struct CertificateArguments {
 pub struct Wanted<'a> {
     file: &'a Path,
     data: Certificate,
+    /// The file of the laboratory as it was read.
+    pub stamp: Option<FileStamp>,
 }
 
 impl CertificateArguments {
@@ -45,13 +49,14 @@ impl CertificateArguments {
     /// What the laboratory states, before the work; `None` if no certificate is asked for.
     ///
     /// # Errors
-    /// If there is no file of it, with an example, or the file has a fault.
-    pub fn read(&self, session: &Path) -> Result<Option<Wanted<'_>>, Failure> {
+    /// If there is no file of it, with an example, if the file has a fault, or if an output would replace it.
+    pub fn read(&self, session: &Path, outputs: &Outputs) -> Result<Option<Wanted<'_>>, Failure> {
         let Some(file) = &self.dcc else { return Ok(None) };
         let place = match &self.certificate {
             Some(place) => place.clone(),
             None => output::folder_of(session).join(FILE),
         };
+        outputs.refuse_overwrite([place.as_path()])?;
         if self.certificate.is_none() && !place.exists() {
             return Err(Failure::Other(format!(
                 "{}: `--dcc` needs the administrative data of the certificate; write this file, for example\n\n{EXAMPLE}",
@@ -59,13 +64,21 @@ impl CertificateArguments {
             )));
         }
         let source = files::text(&place, "the file of a certificate")?;
-        Ok(Some(Wanted { file, data: certificate::read(&source)? }))
+        Ok(Some(Wanted { file, data: certificate::read(&source)?, stamp: source.stamp }))
     }
 }
 
 impl Wanted<'_> {
+    /// What the certificate of a session states.
+    ///
+    /// # Errors
+    /// If neither the file nor the session states a day and a serial number.
+    pub fn of(&self, session: &Session) -> Result<Stated<'_>, Failure> {
+        Ok(Stated::of(&self.data, session)?)
+    }
+
     /// Writes the certificate.
-    pub fn write(&self, problem: &Problem, result: &FitResult) -> Result<(), Failure> {
-        output::write_whole(self.file, certificate::xml(problem, result, &self.data)?.as_bytes())
+    pub fn write(&self, stated: &Stated, problem: &Problem, result: &FitResult) -> Result<(), Failure> {
+        output::write_whole(self.file, stated.xml(problem, result)?.as_bytes())
     }
 }

@@ -71,17 +71,19 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     let [views, residuals] = arguments.readings.files();
     let others = [views, residuals, arguments.save.file(), arguments.certificate.file()];
     let outputs = common.output.prepared(&others)?;
-    let certificate = arguments.certificate.read(&arguments.session.session)?;
+    let wanted = arguments.certificate.read(&arguments.session.session, &outputs)?;
     if !arguments.repeat.is_empty() {
         if arguments.method != Method::Full {
             let message = "`--repeat` compares full fits: leave out `--method` or `--repeat`";
             return Err(Failure::CommandLine(message.into()));
         }
-        return repeated::run(&arguments.session, &arguments.repeat, common, &outputs);
+        return repeated::run(&arguments.session, &arguments.repeat, arguments.plausibility, common, &outputs);
     }
     let (session, sources) = read_session(&arguments.session, &outputs)?;
     let session = fit::assume(&session, &arguments.assume)?;
-    let read = Read::session(&session, &sources, common.seed);
+    let certificate = wanted.as_ref().map(|wanted| wanted.of(&session)).transpose()?;
+    let mut read = Read::session(&session, &sources, common.seed);
+    read.files.extend(wanted.as_ref().and_then(|wanted| wanted.stamp.as_ref()));
     if arguments.method != Method::Full {
         method::refuse([
             ("--views", views.is_some()),
@@ -91,6 +93,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
             ("--terms", arguments.forms.terms.is_some()),
             ("--save", arguments.save.file().is_some()),
             ("--dcc", arguments.certificate.file().is_some()),
+            ("--allow-implausible", arguments.plausibility.allow_implausible),
         ])?;
         return arguments.method.run(&session, &arguments.draws, (common, &outputs), &read);
     }
@@ -103,13 +106,13 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
         propagation::add_monte_carlo(&problem, &found, draws, &mut result)?;
     }
     arguments.forms.add(&problem, &found, &mut result)?;
-    if let Some(certificate) = &certificate {
-        certificate.write(&problem, &result)?;
-    }
     let commands = arguments.session.commands();
     let stated = StatedFit::of_fit(&problem, &result);
     let report = report::fit::report(&problem, &found, &stated, &commands, common.output.figures())?;
     common.output.put(&outputs, &report, &stated, &read)?;
+    if let (Some(wanted), Some(certificate)) = (&wanted, &certificate) {
+        wanted.write(certificate, &problem, &result)?;
+    }
     arguments.save.run(&problem, &found, &sources, common.seed)?;
     arguments.compensation.run(&problem, &found, outputs.tables())
 }

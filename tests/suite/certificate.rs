@@ -113,9 +113,11 @@ fn what_no_measurement_tells_is_asked_for_before_the_fit() {
             Some(contents) => std::fs::write(&stated, contents).unwrap(),
             None => std::fs::remove_file(&stated).unwrap(),
         }
-        let run = abbe(&["fit", text(&session), "--dcc", text(&out)]);
+        // The table of residuals is written as soon as there is a fit.
+        let residuals = folder.path().join("residuals.csv");
+        let run = abbe(&["fit", text(&session), "--dcc", text(&out), "--residuals", text(&residuals)]);
         let message = String::from_utf8_lossy(&run.stderr);
-        assert!(!run.status.success() && !out.exists(), "{message}");
+        assert!(!run.status.success() && !out.exists() && !residuals.exists(), "{message}");
         for words in wanted {
             assert!(message.contains(words), "{words}: {message}");
         }
@@ -124,9 +126,25 @@ fn what_no_measurement_tells_is_asked_for_before_the_fit() {
     refused(Some(&EXAMPLE.replace("2026-11-23", "23.11.2026")), &["certificate.toml:4", "begin", "\"2026-11-23\""]);
     refused(Some(&EXAMPLE.replace("custome", "costume")), &["costumer", "customer"]);
     refused(Some(&EXAMPLE.replace("serial_number = \"17-331\"\n", "")), &["serial_number", "[item]", "[about]"]);
+    let ended = EXAMPLE.replace("begin = \"2026-11-23\"", "begin = \"2026-11-23\"\nend = \"2026-01-01\"");
+    refused(Some(&ended), &["2026-01-01", "before it begins on 2026-11-23"]);
     refused(Some(&EXAMPLE.replace("[19.6, 20.3]", "[20.3, 19.6]")), &["temperature_c", "lowest and the highest"]);
     refused(Some(&EXAMPLE.replace("A. Example", "")), &["name", "text without blanks"]);
     refused(None, &["certificate.toml", "[laboratory]", "[[person]]"]);
+}
+
+/// The file of the laboratory is read, so that no output takes its place.
+#[test]
+fn no_output_replaces_the_file_of_the_laboratory() {
+    let folder = tempfile::tempdir().unwrap();
+    let session = session(folder.path(), EXAMPLE);
+    let laboratory = session.with_file_name("certificate.toml");
+    let other = folder.path().join("certificate.xml");
+    for outputs in [&["--dcc", text(&laboratory)][..], &["--dcc", text(&other), "--json", text(&laboratory)]] {
+        let run = abbe(&[&["fit", text(&session)], outputs].concat());
+        assert!(!run.status.success(), "{outputs:?}");
+        assert_eq!(std::fs::read_to_string(&laboratory).unwrap(), EXAMPLE);
+    }
 }
 
 #[test]
@@ -166,9 +184,22 @@ fn nothing_is_certified_while_the_model_lacks_an_effect() {
         })
         .collect();
     std::fs::write(&file, changed).unwrap();
-    let out = folder.path().join("certificate.xml");
-    let run = abbe(&["fit", text(&session), "--dcc", text(&out)]);
+    let (out, json) = (folder.path().join("certificate.xml"), folder.path().join("fit.json"));
+    let run = abbe(&["fit", text(&session), "--dcc", text(&out), "--json", text(&json)]);
     let message = String::from_utf8_lossy(&run.stderr);
-    assert!(!run.status.success() && !out.exists());
+    // The fit that shows it is kept.
+    assert!(!run.status.success() && !out.exists() && json.exists());
     assert!(message.contains("the model lacks an effect"), "{message}");
+    // Without a noise there is no telling, and χ²/ν is 1 by construction.
+    let stated = std::fs::read_to_string(&session).unwrap();
+    let without: String =
+        stated.lines().filter(|line| !line.starts_with("noise_um")).map(|line| format!("{line}\n")).collect();
+    assert!(without.len() < stated.len());
+    std::fs::write(
+        &session,
+        without.replace("both_directions = true", "both_directions = false").replace("runs = 2", "runs = 1"),
+    )
+    .unwrap();
+    let run = abbe(&["fit", text(&session), "--dcc", text(&out)]);
+    assert!(!run.status.success() && !out.exists(), "{}", String::from_utf8_lossy(&run.stderr));
 }
