@@ -12,6 +12,7 @@
 //! [`Instrument::approaches`]: abbe_model::instrument::Instrument::approaches
 //! [`Instrument::circled`]: abbe_model::instrument::Instrument::circled
 
+use std::collections::HashSet;
 use std::f64::consts::{PI, TAU};
 
 use abbe_identify::start;
@@ -23,11 +24,12 @@ use abbe_model::instrument::{Following, InstrumentKind, Station, Travel};
 use abbe_model::session::expression::Length;
 use abbe_model::session::motion::{FollowOffset, Motion};
 use abbe_model::session::{Prior, Session, Test, placing};
-use abbe_model::words::{listed, number};
+use abbe_model::words::{counted, listed, number};
 
 use super::ball_positions::{BallPosition, axis_positions, ball_positions, dot, standing_positions};
-use super::candidate_layout::Draft;
+use super::candidate_layout::{Draft, MAX_DRAFTS};
 use super::test_variations::TestVariations;
+use crate::PlanError;
 
 /// The name of a candidate, and of what is mounted for it.
 const PROPOSED: &str = "proposed";
@@ -50,10 +52,28 @@ struct Range {
     speed: f64,
     runs: usize,
     both_directions: bool,
+    /// Multiple of the speed of tests of the axis.
+    feed: f64,
+}
+
+impl Range {
+    /// A share of it about its middle.
+    fn part(self, share: f64) -> Range {
+        let middle = 0.5 * (self.from + self.to);
+        let half = 0.5 * share * (self.to - self.from);
+        if share == 1.0 { self } else { Range { from: middle - half, to: middle + half, ..self } }
+    }
 }
 
 /// The candidates of an instrument that has no bar, before travel and reach are checked.
-pub(super) fn drafts(session: &Session, variations: &TestVariations, kind: InstrumentKind) -> Vec<Draft> {
+///
+/// # Errors
+/// If there are more than [`MAX_DRAFTS`].
+pub(super) fn drafts(
+    session: &Session,
+    variations: &TestVariations,
+    kind: InstrumentKind,
+) -> Result<Vec<Draft>, PlanError> {
     let placed = start::stations(session, &session.tests);
     let mut templates: Vec<(&Test, &Station<f64>)> = Vec::new();
     for (test, station) in session.tests.iter().zip(&placed).rev().filter(|(test, _)| test.station.kind() == kind) {
@@ -64,29 +84,31 @@ pub(super) fn drafts(session: &Session, variations: &TestVariations, kind: Instr
             templates.push((test, station));
         }
     }
-    let mut drafts: Vec<Draft> = Vec::new();
-    for (test, station) in &templates {
-        let template = Template { session, variations, test, station };
-        drafts.extend(template.moves_of_one_axis());
-    }
+    let templates: Vec<Template<'_>> =
+        templates.into_iter().map(|(test, station)| Template { session, variations, test, station }).collect();
     // What is in contact needs one of them: every place on the table is a candidate.
-    if let Some((test, station)) = templates.first() {
-        let template = Template { session, variations, test, station };
-        drafts.extend(template.in_contact());
+    let in_contact = templates.first().and_then(Template::contacts);
+    let count = templates.iter().map(Template::count_of_one_axis).sum::<usize>()
+        + in_contact.as_ref().map_or(0, Contacts::count);
+    if count > MAX_DRAFTS {
+        let TestVariations { radii_mm, heights_mm, feeds, ranges, .. } = variations;
+        return Err(PlanError::Request(format!(
+            "some {count} candidate tests of {}; the limit is {MAX_DRAFTS}: state fewer of the {}, {}, {} and {}",
+            kind.entry().phrase,
+            counted(radii_mm.len(), "distance of the ball from its axis"),
+            counted(heights_mm.len(), "height"),
+            counted(feeds.len(), "feed"),
+            counted(ranges.len(), "share of the range"),
+        )));
     }
-    let is_same = |a: &Test, b: &Test| {
-        a.station == b.station
-            && a.at == b.at
-            && a.motion == b.motion
-            && (&a.setup, &a.spindle_setup) == (&b.setup, &b.spindle_setup)
-    };
-    let mut distinct: Vec<Draft> = Vec::with_capacity(drafts.len());
-    for draft in drafts {
-        if !distinct.iter().any(|other| is_same(&other.test, &draft.test)) {
-            distinct.push(draft);
-        }
-    }
-    distinct
+    let mut drafts: Vec<Draft> = templates.iter().flat_map(Template::moves_of_one_axis).collect();
+    drafts.extend(in_contact.iter().flat_map(Contacts::drafts));
+    // Numbers are compared by their digits, which tell any two apart.
+    let mut known = HashSet::new();
+    drafts.retain(|Draft { test, .. }| {
+        known.insert(format!("{:?}", (&test.station, &test.at, &test.motion, &test.setup, &test.spindle_setup)))
+    });
+    Ok(drafts)
 }
 
 /// A test of the session whose set-up candidates have, as far as they can.
@@ -103,14 +125,29 @@ impl Template<'_> {
         &self.session.machine
     }
 
+    /// The motions of an axis: shares of its range about its middle, one way or both, at each feed.
+    fn ranges(&self, axis: usize) -> impl Iterator<Item = Range> {
+        let TestVariations { ranges, both_directions, feeds, .. } = self.variations;
+        let own = range(self.session, axis).into_iter();
+        own.flat_map(move |own| ranges.iter().map(move |share| own.part(*share)))
+            .flat_map(move |own| both_directions.iter().map(move |both| Range { both_directions: *both, ..own }))
+            .flat_map(move |own| feeds.iter().map(move |feed| Range { speed: own.speed * feed, feed: *feed, ..own }))
+    }
+
+    /// How often one axis moves while the others stand, with the instrument set up in one way.
+    fn count_of_one_axis(&self) -> usize {
+        let axes = 0..self.machine().axes.len();
+        axes.map(|axis| self.postures(axis).len() * self.ranges(axis).count()).sum()
+    }
+
     /// One axis moves, the others stand.
     fn moves_of_one_axis(&self) -> Vec<Draft> {
         let machine = self.machine();
         let mut drafts = Vec::new();
         for axis in 0..machine.axes.len() {
-            let Some(range) = range(self.session, axis) else { continue };
-            for at in self.postures(axis) {
-                let (_, direction) = placing::axis_line(machine, &at, axis);
+            for (at, range) in self.postures(axis).iter().flat_map(|at| self.ranges(axis).map(move |range| (at, range)))
+            {
+                let (_, direction) = placing::axis_line(machine, at, axis);
                 for aligned in self.station.aligned(&Travel { machine, axis, direction }) {
                     let mut at = at.clone();
                     at[axis] = range.from;
@@ -163,47 +200,25 @@ impl Template<'_> {
     }
 
     /// Two points stay in contact: linear axes follow a rotary one, a rotary axis turns about the point on it, the tool goes
-    /// round an artefact.
-    fn in_contact(&self) -> Vec<Draft> {
+    /// round an artefact. `None` for an instrument without contact.
+    fn contacts(&self) -> Option<Contacts<'_>> {
         let machine = self.machine();
         let approaches = self.station.approaches();
         if approaches.is_empty() {
-            return Vec::new();
+            return None;
         }
-        let kind = self.station.kind();
         let rotary: Vec<usize> =
             (0..machine.axes.len()).filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary).collect();
         // On the axis too.
         let radii_mm = std::iter::once(0.0).chain(self.variations.radii_mm.iter().copied()).collect();
         let wider = TestVariations { radii_mm, ..self.variations.clone() };
-        let points = ball_positions(self.session, kind, &wider, &rotary, true);
-        let mut drafts = Vec::new();
-        for &axis in &rotary {
-            let Some(range) = range(self.session, axis) else { continue };
-            for at in axis_positions(self.session, self.variations, &rotary, axis) {
-                for point in &points {
-                    for approach in &approaches {
-                        // With the axis at zero, as a file that states no position of the moved axis is read.
-                        let Some(at) = self.touching(point, *approach, &at) else { continue };
-                        let words = self.contact_words(&at, axis, range, point, *approach);
-                        let offset = match self.station.following() {
-                            Following::AtBar => continue,
-                            Following::Touching(..) => FollowOffset::Touching,
-                            Following::Apart => FollowOffset::None,
-                        };
-                        for motion in [self.follow(axis, range, offset), self.sweep(axis, range)] {
-                            let way = match motion {
-                                Motion::Follow { .. } => ", the linear axes follow",
-                                _ => ", the linear axes stand",
-                            };
-                            drafts.push(self.at_point(point, at.clone(), motion, format!("{words}{way}")));
-                        }
-                    }
-                }
-            }
-        }
-        drafts.extend(points.iter().flat_map(|point| self.circles(point)));
-        drafts
+        let points = ball_positions(self.session, self.station.kind(), &wider, &rotary, true);
+        let of_axis = |axis: &usize| {
+            let positions = axis_positions(self.session, self.variations, &rotary, *axis).into_iter();
+            positions.flat_map(|at| self.ranges(*axis).map(move |range| (*axis, at.clone(), range))).collect::<Vec<_>>()
+        };
+        let turns = rotary.iter().flat_map(of_axis).collect();
+        Some(Contacts { template: self, points, approaches, turns })
     }
 
     /// Circles of two linear axes about an artefact.
@@ -284,13 +299,13 @@ impl Template<'_> {
     }
 
     fn sweep(&self, axis: usize, range: Range) -> Motion {
-        let Range { from, to, step, speed, runs, both_directions } = range;
+        let Range { from, to, step, speed, runs, both_directions, .. } = range;
         let step = step * self.variations.thin.max(1) as f64;
         Motion::Sweep { axis, from, to, step, speed, runs, both_directions }
     }
 
     fn follow(&self, axis: usize, range: Range, offset: FollowOffset) -> Motion {
-        let Range { from, to, step, speed, runs, both_directions } = range;
+        let Range { from, to, step, speed, runs, both_directions, .. } = range;
         let step = step * self.variations.thin.max(1) as f64;
         Motion::Follow { axis, from, to, step, speed, runs, both_directions, offset }
     }
@@ -335,11 +350,61 @@ fn position(machine: &Machine, axis: usize, q: f64) -> String {
     format!("{} at {}{unit}", axis.name, shown(axis.kind.to_display(q)))
 }
 
+/// The candidates with two points in contact.
+struct Contacts<'t> {
+    template: &'t Template<'t>,
+    /// Where the instrument's point of the table may lie.
+    points: Vec<BallPosition>,
+    /// The directions from which the tool comes.
+    approaches: Vec<[f64; 3]>,
+    /// The rotary axis that turns, the positions of the axes, and its motion.
+    turns: Vec<(usize, Vec<f64>, Range)>,
+}
+
+impl Contacts<'_> {
+    /// The largest possible number of candidates.
+    fn count(&self) -> usize {
+        let ways = if self.template.variations.follow { 2 } else { 1 };
+        self.points.len() * (1 + self.approaches.len() * self.turns.len() * ways)
+    }
+
+    fn drafts(&self) -> Vec<Draft> {
+        let template = self.template;
+        let mut drafts = Vec::new();
+        for (axis, at, range) in &self.turns {
+            for point in &self.points {
+                for approach in &self.approaches {
+                    // With the axis at zero, as a file that states no position of the moved axis is read.
+                    let Some(at) = template.touching(point, *approach, at) else { continue };
+                    let words = template.contact_words(&at, *axis, *range, point, *approach);
+                    let offset = match template.station.following() {
+                        Following::AtBar => continue,
+                        Following::Touching(..) => FollowOffset::Touching,
+                        Following::Apart => FollowOffset::None,
+                    };
+                    let follow = template.variations.follow.then(|| template.follow(*axis, *range, offset));
+                    for motion in follow.into_iter().chain([template.sweep(*axis, *range)]) {
+                        let way = match motion {
+                            Motion::Follow { .. } => ", the linear axes follow",
+                            _ => ", the linear axes stand",
+                        };
+                        drafts.push(template.at_point(point, at.clone(), motion, format!("{words}{way}")));
+                    }
+                }
+            }
+        }
+        drafts.extend(self.points.iter().flat_map(|point| template.circles(point)));
+        drafts
+    }
+}
+
 fn moved_words(machine: &Machine, axis: usize, range: Range) -> String {
     let axis = &machine.axes[axis];
     let unit = if axis.kind == AxisKind::Rotary { "°" } else { " mm" };
     let [from, to] = [range.from, range.to].map(|q| shown(axis.kind.to_display(q)));
-    format!("{} from {from} to {to}{unit}", axis.name)
+    let ways = if range.both_directions { "" } else { " in one direction" };
+    let feed = if range.feed == 1.0 { String::new() } else { format!(" at {} times the feed", range.feed) };
+    format!("{} from {from} to {to}{unit}{ways}{feed}", axis.name)
 }
 
 fn shown(value: f64) -> String {
@@ -359,7 +424,7 @@ fn range(session: &Session, axis: usize) -> Option<Range> {
         Some(
             Motion::Sweep { axis: moved, from, to, step, speed, runs, both_directions }
             | Motion::Follow { axis: moved, from, to, step, speed, runs, both_directions, .. },
-        ) => Some((moved, Range { from, to, step, speed, runs, both_directions })),
+        ) => Some((moved, Range { from, to, step, speed, runs, both_directions, feed: 1.0 })),
         _ => None,
     };
     let motions: Vec<(usize, Range)> = session.tests.iter().filter_map(of_motion).collect();
@@ -392,6 +457,7 @@ fn range(session: &Session, axis: usize) -> Option<Range> {
         speed: alike.map_or(usual, |(_, range)| range.speed),
         runs: any.map_or(1, |(_, range)| range.runs),
         both_directions: any.is_none_or(|(_, range)| range.both_directions),
+        feed: 1.0,
     })
 }
 

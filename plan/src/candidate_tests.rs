@@ -46,7 +46,7 @@ pub fn candidate_tests(session: &Session, variations: &TestVariations) -> Result
         let last = session.tests.iter().rev().find(|test| test.station.kind() == kind);
         match last.filter(|last| last.station.bar().is_some()) {
             Some(last) => drafts.extend(with_bar(session, variations, last)?),
-            None => drafts.extend(candidate_motions::drafts(session, variations, kind)),
+            None => drafts.extend(candidate_motions::drafts(session, variations, kind)?),
         }
     }
     let bodies = Bodies::of(&session.machine);

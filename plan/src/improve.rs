@@ -48,8 +48,8 @@ pub struct Improvement {
     pub steps: Vec<ProposedTest>,
     /// The exchanges of proposed tests, one sentence each.
     pub exchanged: Vec<String>,
-    /// The best single candidate tests, in the order of the criterion or of its gain per minute. Of tests with equal
-    /// readings, one is listed.
+    /// The best single candidate tests, in the order of the criterion or of its gain per minute; none if none helps. Of
+    /// tests with equal readings, one is listed.
     pub alternatives: Vec<AlternativeTest>,
 }
 
@@ -112,6 +112,8 @@ pub struct AlternativeTest {
 
 /// Share of the physical size above which the uncertainty of an error means that the error is not identifiable.
 const UNIDENTIFIABLE_SHARE: f64 = 0.1;
+/// Least share by which a test lowers the uncertainty of an error, where others are not identifiable.
+const MIN_LOWERED: f64 = 0.01;
 /// Maximum number of listed alternatives.
 const MAX_ALTERNATIVES: usize = 5;
 
@@ -174,6 +176,13 @@ pub fn improve(
         }
         chosen.push(best);
     }
+    // A test may be of use with the next one only.
+    while options.goal.is_of_uncertainties()
+        && let Some((_, others)) = chosen.split_last()
+        && determines_nothing(shared, &design.with(others), &design.with(&chosen))
+    {
+        chosen.pop();
+    }
     let exchanged = if options.by_minute || chosen.len() < 2 { Vec::new() } else { design.exchange(&mut chosen) };
     let name = |candidate: usize| prepared.candidates[candidate].test.name.as_str();
     let exchanged = exchanged.into_iter().map(|[gone, come]| format!("{} in place of {}", name(come), name(gone)));
@@ -196,7 +205,7 @@ pub fn improve(
             .collect()
     };
     let mut taken = Vec::new();
-    let steps = (0..chosen.len())
+    let steps: Vec<ProposedTest> = (0..chosen.len())
         .map(|k| {
             let candidate = &prepared.candidates[chosen[k]].test;
             let proposal = proposal(&problem.session, &candidate.test, &candidate.name, variations, &mut taken);
@@ -213,9 +222,9 @@ pub fn improve(
         before: outside(&prepared.base),
         uncertainties_before: with_units(named_uncertainties(shared, &prepared.base)),
         bound: if chosen.len() > 1 { bound::best_value(&design, &chosen) } else { None },
-        steps,
         exchanged,
-        alternatives,
+        alternatives: if steps.is_empty() { Vec::new() } else { alternatives },
+        steps,
     })
 }
 
@@ -288,6 +297,14 @@ fn step(
         name: String::new(),
         proposal: proposal::none(),
     }
+}
+
+/// Whether some error stays not identifiable while the uncertainty of no other falls: the figure then falls towards the
+/// regularisation only.
+fn determines_nothing(shared: &SharedParameters, before: &Root, after: &Root) -> bool {
+    let (before, after) = (named_uncertainties(shared, before), named_uncertainties(shared, after));
+    let lowered = |((_, before), (_, after)): (&(String, f64), &(String, f64))| *after < (1.0 - MIN_LOWERED) * before;
+    after.iter().any(|(_, u)| u.is_infinite()) && !before.iter().zip(&after).any(lowered)
 }
 
 /// Whether the `j`-th target parameter is not identifiable. Its uncertainty is then that of the regularisation at its

@@ -3,7 +3,7 @@
 use abbe::identify::problem::Problem;
 use abbe::identify::results::Interval;
 use abbe::identify::unit::ReadingUnit;
-use abbe::model::words::counted;
+use abbe::model::words::{counted, listed};
 use abbe::plan::improve::Improvement;
 use abbe::plan::next_test::NextTest;
 use abbe::plan::range::Shrinkage;
@@ -49,11 +49,15 @@ pub fn report(problem: &Problem, found: &NextTest) -> Report {
 fn verdict(found: &Improvement) -> String {
     let criterion = unit(&found.criterion);
     match found.steps.as_slice() {
-        [] => format!(
-            "None of {} improves the {criterion} {}.",
-            counted(found.candidate_tests, "candidate test"),
-            three_digits(found.before)
-        ),
+        [] => {
+            let of = counted(found.candidate_tests, "candidate test");
+            let open = found.uncertainties_before.iter().filter(|error| error.u.is_infinite());
+            let open: Vec<&str> = open.map(|error| error.id.as_str()).collect();
+            match open.as_slice() {
+                [] => format!("None of {of} improves the {criterion} {}.", three_digits(found.before)),
+                open => format!("None of {of} makes {} identifiable.", listed(open, "or")),
+            }
+        }
         [.., last] => format!(
             "With {} of {}: {criterion}: {} in place of {}.",
             found.steps.len(),

@@ -262,3 +262,47 @@ fn a_probe_touches_while_the_axis_turns_that_no_test_moves() {
         noise: [1e-3, 0.0],
     });
 }
+
+/// The slope of a straightness over X and the direction of the beam are one in every reading of one beam, wherever the
+/// other axes stand.
+#[test]
+fn nothing_is_proposed_for_what_no_candidate_determines() {
+    let folder = tempfile::tempdir().unwrap();
+    let (next, found) = (folder.path().join("next.toml"), folder.path().join("found.json"));
+    let plan = super::ready("laser/plan.toml");
+    run(&["plan", text(&plan), "--improve", "--json", text(&found), "--quiet"]);
+    let improvement = parsed(&found)["improvement"].clone();
+    assert_eq!(improvement["steps"], serde_json::json!([]));
+    assert_eq!(improvement["alternatives"], serde_json::json!([]));
+    let said = String::from_utf8(abbe(&["plan", text(&plan), "--improve"]).stdout).unwrap();
+    assert!(said.contains("candidate tests makes EZX~X:p2.1 identifiable"), "{said}");
+    let output = abbe(&["plan", text(&plan), "--improve", "--write", text(&next)]);
+    let refused = String::from_utf8(output.stderr).unwrap();
+    assert!(!output.status.success() && refused.contains("no candidate test helps") && !next.exists(), "{refused}");
+}
+
+/// A choice among feeds and directions is one for every instrument, and what is too much is counted and refused.
+#[test]
+fn feeds_directions_and_limits_hold_without_a_bar() {
+    let plan = super::ready("r-test/plan.toml");
+    let said = |more: &[&str]| {
+        let output = abbe(&[&["plan", text(&plan), "--improve"], more].concat());
+        (output.status.success(), String::from_utf8([output.stdout, output.stderr].concat()).unwrap())
+    };
+    let (_, usual) = said(&[]);
+    let (_, without) = said(&["--no-follow"]);
+    assert!(usual.contains("the linear axes follow") && !without.contains("the linear axes follow"), "{without}");
+    let (_, one) = said(&["--directions", "one", "--feeds", "0.5"]);
+    assert!(one.contains("in one direction at 0.5 times the feed"), "{one}");
+    let many = (1..=400).map(|k| k.to_string()).collect::<Vec<_>>().join(",");
+    let (is_done, refused) = said(&["--radii-mm", &many, "--heights-mm", &many]);
+    assert!(!is_done && refused.contains("the limit is 100000"), "{refused}");
+}
+
+/// Straightness is a declared effect, and there are moves that read it.
+#[test]
+fn a_plan_of_effects_has_candidates() {
+    let output = abbe(&["plan", text(&super::ready("laser/plan.toml"))]);
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(!said.contains("no candidate test is known"), "{said}");
+}

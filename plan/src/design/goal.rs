@@ -44,6 +44,11 @@ impl Goal {
         }
     }
 
+    /// Whether it is about uncertainties of errors.
+    pub fn is_of_uncertainties(&self) -> bool {
+        !matches!(self, Goal::Separation { .. })
+    }
+
     /// Indices of its target parameters in a problem.
     pub fn targets(&self, problem: &Problem) -> Vec<usize> {
         let list = &problem.parameters.list;

@@ -67,6 +67,10 @@ impl ImproveArguments {
         let Some(path) = &self.write else {
             return Ok(());
         };
+        if found.steps.is_empty() {
+            let message = format!("`--write`: no candidate test helps, so that {} is not written", path.display());
+            return Err(Failure::Other(message));
+        }
         next_session::write(path, sources, session, |text| {
             found.steps.iter().try_for_each(|step| text.add_block(&step.proposal))
         })
