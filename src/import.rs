@@ -189,6 +189,12 @@ pub fn import(files: &[Foreign], target: Target<'_>, options: &ImportOptions) ->
     Ok(Imported { files: draft.files(), session, result })
 }
 
+/// Whether an error of [`import()`] is one of the session that would be written, which lacks a key or has a wrong one.
+pub fn is_of_new_session(error: &IdentifyError) -> bool {
+    let place = if let IdentifyError::Model(cause) = error { cause.location() } else { None };
+    place.is_some_and(|place| place.file == Path::new(SESSION_FILE))
+}
+
 /// The error of a fault of a file.
 fn of_file(name: &str, (message, help): Fault) -> IdentifyError {
     ModelError::Foreign { location: Location::file(Path::new(name)), message, help }.into()

@@ -73,8 +73,9 @@ pub fn add(folder: &Path, files: &[(String, Vec<u8>)], read: &[PathBuf], force: 
         match std::fs::read(&path) {
             Ok(present) if present == *contents => continue,
             Err(cause) if cause.kind() == std::io::ErrorKind::NotFound => {}
-            _ if force => {}
-            _ => {
+            Err(source) => return Err(Failure::Write { path: path.display().to_string(), source }),
+            Ok(_) if force => {}
+            Ok(_) => {
                 return Err(Failure::Other(format!(
                     "{}: a file with this name exists, and its contents are others; rename one of the two, or use --force to replace it",
                     path.display()
@@ -97,9 +98,8 @@ fn fault(folder: &Path, source: std::io::Error) -> Failure {
 /// If nothing may be written into the folder.
 pub fn check(folder: &Path, force: Option<bool>) -> Result<bool, Failure> {
     if folder.as_os_str() == "-" {
-        return Err(Failure::CommandLine(
-            "`-` is standard output, which cannot contain a folder; name a folder".into(),
-        ));
+        let what = "`-` is standard output, which cannot contain a folder; name a folder";
+        return Err(Failure::CommandLine(what.into()));
     }
     if folder.is_file() {
         return Err(Failure::Other(format!("{}: this is a file; name a folder", folder.display())));

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use abbe::identify::IdentifyError;
-use abbe::import::{ImportOptions, Target, import};
+use abbe::import::{ImportOptions, Target, import, is_of_new_session};
 use abbe::model::files::import::{Foreign, Hint, session};
 use abbe::model::files::store::Store;
 use abbe::model::instrument::InstrumentKind;
@@ -107,10 +107,13 @@ pub fn run(arguments: &ImportArguments) -> Result<(), Failure> {
     arguments.output.put(&outputs, &report, &imported.result, &Read::files(&stamps))
 }
 
-/// What the command can do about readings that contradict the machine.
+/// What the command can do about readings that contradict the machine, or about keys that its session lacks.
 fn refused(error: IdentifyError) -> Failure {
-    if let IdentifyError::Contradicted { .. } = &error {
-        tell(Kind::Note, "nothing is written; --allow-implausible writes the session all the same");
-    }
+    let note = match &error {
+        IdentifyError::Contradicted { .. } => "--allow-implausible writes the session all the same",
+        error if is_of_new_session(error) => "--set states a key of the new tests, as in --set bar_mm=100",
+        _ => return error.into(),
+    };
+    tell(Kind::Note, &format!("nothing is written; {note}"));
     error.into()
 }

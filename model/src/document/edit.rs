@@ -146,7 +146,8 @@ impl SessionText {
         Ok(())
     }
 
-    /// Removes the tests that are not among these, and the distances between sockets, which may name others.
+    /// Removes the tests that are not among these, effects that act in no other, and the distances between sockets, which
+    /// may name others.
     pub fn keep_tests(&mut self, is_kept: &dyn Fn(&str) -> bool) {
         self.document.remove("socket_distance");
         match self.document.get_mut("test") {
@@ -156,6 +157,22 @@ impl SessionText {
             Some(Item::Value(Value::Array(tests))) => {
                 let name_of = |test: &Value| test.as_inline_table()?.get("name")?.as_str().map(str::to_string);
                 tests.retain(|test| name_of(test).is_some_and(|name| is_kept(&name)));
+            }
+            _ => {}
+        }
+        for mut effect in tables(&mut self.document, "effect") {
+            if let Some(Item::Value(Value::Array(tests))) = effect.table().get_mut("tests") {
+                tests.retain(|test| test.as_str().is_none_or(is_kept));
+            }
+        }
+        let acts = |effect: &dyn TableLike| match effect.get("tests").and_then(Item::as_array) {
+            Some(tests) => !tests.is_empty(),
+            None => true,
+        };
+        match self.document.get_mut("effect") {
+            Some(Item::ArrayOfTables(effects)) => effects.retain(|effect| acts(effect)),
+            Some(Item::Value(Value::Array(effects))) => {
+                effects.retain(|effect| effect.as_inline_table().is_none_or(|effect| acts(effect)));
             }
             _ => {}
         }

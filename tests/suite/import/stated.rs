@@ -245,3 +245,51 @@ fn a_refusal_says_how_the_file_was_read_and_names_it_once() {
     let said = message(&output).split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(!output.status.success() && said.contains("`--kind` names the instrument"), "{said}");
 }
+
+#[test]
+fn a_key_that_the_new_session_lacks_is_stated_with_set() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("bar.csv");
+    std::fs::write(&file, "X [mm];Y [mm];Laenge [mm]\n100,0;0,0;100,0001\n0,0;100,0;100,0004\n-100,0;0,0;100,0002\n")
+        .unwrap();
+    let (machine, out) = (super::ready("hermle-c600u/machine.toml"), folder.path().join("run1"));
+    let output = super::abbe(&["import", text(&file), "--machine", text(&machine), "--out", text(&out)]);
+    let said = message(&output);
+    assert!(!output.status.success() && !out.exists(), "{said}");
+    assert!(said.contains("no `bar_mm`") && said.contains("--set bar_mm=100"), "{said}");
+}
+
+/// One cell without a date leaves the others as they are: days of December, no 12th of several months.
+#[test]
+fn a_cell_without_a_date_does_not_turn_the_others_about() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut contents = String::from("time,c_deg,length_mm\n");
+    for k in 0..60 {
+        let day = 11 + k / 20;
+        let time = if k == 30 { "n/a".to_string() } else { format!("12/{day}/2026 12:{k:02}:00") };
+        writeln!(contents, "{time},{k},{}", 149.99 + 1e-4 * f64::from(k)).unwrap();
+    }
+    let set = ["--set", "bar_mm=150", "--set", "workpiece_ball_mm=[150,0,0]", "--set", "spindle_ball_mm=[0,0,0]"];
+    let file = folder.path().join("bar.csv");
+    std::fs::write(&file, contents).unwrap();
+    let (machine, out) = (super::ready("hermle-c600u/machine.toml"), folder.path().join("run1"));
+    let asked = [
+        "import",
+        text(&file),
+        "--machine",
+        text(&machine),
+        "--out",
+        text(&out),
+        "--set",
+        "at={x_mm=0,y_mm=0,z_mm=0,a_deg=0}",
+    ];
+    let output = super::abbe(&[&asked[..], &set].concat());
+    assert!(output.status.success(), "{}", message(&output));
+    let session = files::session(&out.join("session.toml"), &ReadOptions::default()).unwrap();
+    let time = &session.tests[0].readings.as_ref().unwrap().time_s;
+    // From 11 December 12:00 to 13 December 12:59.
+    let last = time.iter().fold(f64::NEG_INFINITY, |a: f64, b| a.max(*b))
+        - time.iter().fold(f64::INFINITY, |a: f64, b| a.min(*b));
+    assert_eq!(last, 2.0 * 86400.0 + 59.0 * 60.0);
+    assert_eq!(time.len(), 59);
+}

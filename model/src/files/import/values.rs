@@ -142,14 +142,12 @@ fn number_of(grid: &Grid, one: &Found, line: usize, cell: &str, needs: &mut Need
     }
 }
 
-/// The order of the dates of a column: the day first, unless only the other is possible for all of them.
+/// The order of the dates of a column: the day first, unless more cells have a date with the month first.
 fn date_order(grid: &Grid, one: &Found) -> DateOrder {
-    let is_possible = |order: DateOrder| {
-        let mut cells = grid.rows.iter().map(|row| row.cells[one.column].as_str()).filter(|cell| !cell.is_empty());
-        cells.all(|cell| clock(cell, order).is_some())
+    let possible = |order: DateOrder| {
+        grid.rows.iter().filter(|row| clock(row.cells[one.column].as_str(), order).is_some()).count()
     };
-    let is_other =
-        one.meaning == Meaning::Clock && !is_possible(DateOrder::DayFirst) && is_possible(DateOrder::MonthFirst);
+    let is_other = one.meaning == Meaning::Clock && possible(DateOrder::MonthFirst) > possible(DateOrder::DayFirst);
     if is_other { DateOrder::MonthFirst } else { DateOrder::DayFirst }
 }
 
