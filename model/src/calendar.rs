@@ -154,7 +154,7 @@ fn zone(text: &str) -> Option<(&str, f64)> {
     let plain = offset[1..].replace(':', "");
     let (hours, minutes) = match plain.len() {
         2 => (digits(&plain, 2)?, 0),
-        4 => (digits(&plain[..2], 2)?, digits(&plain[2..], 2)?),
+        4 => (digits(plain.get(..2)?, 2)?, digits(plain.get(2..)?, 2)?),
         _ => return None,
     };
     (hours < 24 && minutes < 60).then_some((time.trim_end(), sign * (hours * 3600 + minutes * 60) as f64))
@@ -232,7 +232,16 @@ mod tests {
         {
             assert_eq!(clock(text, DateOrder::DayFirst), None, "{text}");
         }
-        for text in ["23.11.2026", "2026-13-01", "2026-02-30T00:00:00", "2026-11-23T", "1764000000", "2026-11-23T08"] {
+        for text in [
+            "2026-11-23T08:00:00+1é5",
+            "08:00:00+1é5",
+            "23.11.2026",
+            "2026-13-01",
+            "2026-02-30T00:00:00",
+            "2026-11-23T",
+            "1764000000",
+            "2026-11-23T08",
+        ] {
             assert_eq!(iso(text), None, "{text}");
         }
     }
