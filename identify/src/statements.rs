@@ -17,6 +17,7 @@ use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
 use abbe_model::instrument::Contact;
 
+use crate::linear::is_of_interest;
 use crate::parameters::Role;
 use crate::plausibility::Plausibility;
 use crate::problem::Problem;
@@ -101,14 +102,14 @@ impl Statements<ValidationStatement, MovedParameter> {
     }
 }
 
-/// Whether candidate tests exist for a problem: it has errors to identify, and its last instrument reads a motion that a
-/// session can state. That of a ball bar, a nest or a stylus turns a rotary axis; a ball in sockets goes from one to another.
+/// Whether candidate tests exist for a problem: it has errors or effects to identify, and one of its instruments reads a
+/// motion that a session can state. That of a ball bar, a nest or a stylus turns a rotary axis; a ball in sockets goes from one to another.
 pub fn has_candidates(problem: &Problem) -> bool {
     let session = &problem.session;
-    let has_errors = problem.parameters.list.iter().any(|parameter| parameter.role == Role::Error);
+    let has_errors = problem.parameters.list.iter().any(is_of_interest);
     let has_rotary = session.machine.axes.iter().any(|axis| axis.kind == AxisKind::Rotary);
     has_errors
-        && session.tests.last().is_some_and(|last| match last.station.contact() {
+        && session.tests.iter().any(|test| match test.station.contact() {
             Contact::None => true,
             Contact::InR(_) => false,
             _ => has_rotary,
@@ -247,10 +248,12 @@ fn further(problem: &Problem, parameters: &[ParameterResult]) -> Vec<ParameterRe
     let mut list: Vec<(Option<usize>, ParameterResult)> = Vec::new();
     // The phase of an amplitude is no size.
     for found in parameters.iter().filter(|found| found.exceeds_u() && !found.id.ends_with(".phase")) {
-        let effect = problem.parameters.effect_ids.iter().position(|id| {
+        // The order of another effect may continue an identifier: `EZC~C:h2` and `EZC~C:h2.5`.
+        let ids = problem.parameters.effect_ids.iter().enumerate().filter(|(_, id)| {
             let rest = found.id.strip_prefix(id.as_str());
             rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
         });
+        let effect = ids.max_by_key(|(_, id)| id.len()).map(|(number, _)| number);
         let same = problem.parameters.list.iter().find(|parameter| parameter.id == found.id);
         let is_setup = same.is_some_and(|parameter| parameter.role == Role::Setup);
         match list.iter_mut().find(|(other, _)| effect.is_some() && *other == effect) {

@@ -76,10 +76,7 @@ impl Member {
         let readings = test.readings.as_deref().cloned().unwrap_or_default();
         let step = readings.rows().div_ceil(MAX_ROWS).max(1);
         let readings = readings.of_rows(&(0..readings.rows()).step_by(step).collect::<Vec<_>>());
-        let (readings, observed) = match test.station.kind() {
-            InstrumentKind::Tracker => complete(&test.station, &readings),
-            _ => (readings, Vec::new()),
-        };
+        let (readings, observed) = complete(&test.station, &readings);
         let points = |at: Vector3<f64>| readings.nominal_points(&session.machine, at.into());
         let origin = points(Vector3::zeros());
         let units = [Vector3::x(), Vector3::y(), Vector3::z()].map(points);
@@ -96,13 +93,13 @@ impl Member {
     }
 }
 
-/// The rows with all coordinates, and these. A row without one says nothing of the point.
+/// The rows with all coordinates, and these. A row without one says nothing of the point. Of an instrument that measures no
+/// position, all rows.
 fn complete(station: &Station<f64>, readings: &Readings) -> (Readings, Vec<Vector3<f64>>) {
-    let measured = readings.observed.chunks_exact(readings.channels.max(1)).enumerate().filter_map(|(row, values)| {
-        let point = station.measured_mm(values)?;
-        point.iter().all(|coordinate| coordinate.is_finite()).then_some((row, point))
-    });
-    let (rows, points): (Vec<usize>, Vec<Vector3<f64>>) = measured.unzip();
+    let measured = |row: usize| station.measured_mm(&readings.observed[row * readings.channels..][..readings.channels]);
+    let is_complete = |row: &usize| measured(*row).is_none_or(|point| point.iter().all(|x| x.is_finite()));
+    let rows: Vec<usize> = (0..readings.rows()).filter(is_complete).collect();
+    let points = rows.iter().filter_map(|row| measured(*row)).collect();
     (readings.of_rows(&rows), points)
 }
 

@@ -98,7 +98,10 @@ impl<'m> KnownErrors<'m> {
         let mut full = Problem::new(&model.session(session), noise.clone(), 1)?;
         // The uncertainty of the model contains the priors of its coefficients.
         full.parameters.list.iter_mut().filter(|p| !is_set_up(p.role)).for_each(|p| p.prior = Prior::Free);
-        let own = Session { unknowns: anew.to_vec(), effects: Vec::new(), ..session.clone() };
+        let mut unknowns = anew.to_vec();
+        unknowns.sort();
+        unknowns.dedup();
+        let own = Session { unknowns, effects: Vec::new(), ..session.clone() };
         let set_up = Problem::new(&own, noise, 1)?;
         let carried: Vec<usize> = carried.into_iter().filter(|j| !is_anew(j)).collect();
         let effects: Vec<usize> = model.carried_effects().collect();
