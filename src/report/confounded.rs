@@ -1,10 +1,11 @@
 //! What the readings leave open: null-space directions, and readings that are excluded.
 
 use abbe::identify::results::{DeterminedByPrior, Outlier, Unobservable};
+use abbe::identify::unit::ReadingUnit;
 use abbe::model::words::counted;
 
 use super::block::{Level, Report, Text};
-use super::number::{micrometres, with_symbols};
+use super::number::{of_readings, with_symbols};
 use super::table::{Table, cells};
 
 /// Outliers that a terminal shows without `--all`.
@@ -25,7 +26,12 @@ pub fn by_prior(errors: &[DeterminedByPrior]) -> Vec<String> {
 
 /// The section of null-space directions, of errors that set-up priors determine, and of outliers. One sentence where
 /// there is nothing.
-pub fn section(report: &mut Report, null_space: &[Unobservable], prior: &[DeterminedByPrior], outliers: &[Outlier]) {
+pub fn section(
+    report: &mut Report,
+    null_space: &[Unobservable],
+    prior: &[DeterminedByPrior],
+    (outliers, unit): (&[Outlier], ReadingUnit),
+) {
     report.section("Confounded parameters and outliers");
     match (null_space.is_empty() && prior.is_empty(), outliers.is_empty()) {
         (true, true) => report.key("No parameters are confounded. No reading is an outlier."),
@@ -43,14 +49,14 @@ pub fn section(report: &mut Report, null_space: &[Unobservable], prior: &[Determ
         let heading = format!("Confounded: {directions} (a combination that leaves every reading unchanged)");
         report.headed(Level::Key, heading, Text::List(sentences(null_space)));
     }
-    report.key(self::outliers(outliers));
+    report.key(self::outliers(outliers, unit));
 }
 
 /// The readings that are excluded as outliers; without `--all`, those with the largest residual.
-fn outliers(outliers: &[Outlier]) -> Table {
+fn outliers(outliers: &[Outlier], unit: ReadingUnit) -> Table {
     let is_are = if outliers.len() == 1 { "is" } else { "are" };
     let title = format!("{} {is_are} excluded as outliers", counted(outliers.len(), "reading"));
-    let rows = outliers.iter().map(|o| cells![&o.test, &o.file, o.line.to_string(), micrometres(o.residual_um)]);
+    let rows = outliers.iter().map(|o| cells![&o.test, &o.file, o.line.to_string(), of_readings(o.residual_um, unit)]);
     let mut table = Table::new(["test", "file", ">line", ">residual"], rows).titled(title);
     if outliers.len() > MAX_OUTLIERS + 1 {
         let mut order: Vec<usize> = (0..outliers.len()).collect();

@@ -72,7 +72,7 @@ pub fn report(
     estimates.set_up(&mut report, None);
     conformity::section(&mut report, result.conformity.as_ref());
     let by_prior = &result.outcome.determined_by_prior;
-    confounded::section(&mut report, &result.unobservable, by_prior, &result.outliers);
+    confounded::section(&mut report, &result.unobservable, by_prior, (&result.outliers, result.reading_unit));
     circular::section(&mut report, &result.circular);
     positioning::section(&mut report, &result.positioning);
     straightness::section(&mut report, &result.straightness);

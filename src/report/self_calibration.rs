@@ -55,7 +55,7 @@ pub fn report(session: &Session, result: &SelfCalibration) -> Report {
     if !result.parameters.is_empty() {
         report.key(functions(&result.error_motions).titled(format!("Error motions of axis {axis}, µm")));
     }
-    confounded::section(&mut report, &result.unobservable, &[], &[]);
+    confounded::section(&mut report, &result.unobservable, &[], (&[], ReadingUnit::Micrometre));
     if let Some(drawn) = &result.monte_carlo {
         report.section("Monte Carlo");
         report.key(intervals(drawn).titled(format!(

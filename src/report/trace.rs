@@ -79,7 +79,7 @@ pub fn report(
     report.key(before_and_after(result));
     conformity::section(&mut report, result.conformity.as_ref());
     let by_prior = &result.outcome.determined_by_prior;
-    confounded::section(&mut report, &result.unobservable, by_prior, &result.outliers);
+    confounded::section(&mut report, &result.unobservable, by_prior, (&result.outliers, result.reading_unit));
     report.section("Next");
     report.headed(Level::Key, "Tests that separate an effect from its aliases:", Text::List(measure_next(result)));
     let page = "write residuals, plots and alternatives as a page";
