@@ -28,6 +28,7 @@ mod nc;
 mod new;
 mod next_session;
 mod output;
+mod overview;
 mod paper;
 mod plan;
 mod readings;
@@ -60,46 +61,13 @@ use results::OutputArguments;
 
 /// Geometric errors of machine tools, robots and other serial chains
 #[derive(Parser)]
-#[command(name = "abbe", version, max_term_width = 110, help_template = template(), after_help = EXAMPLES)]
+#[command(name = "abbe", version, max_term_width = 110, help_template = overview::template(), after_help = overview::EXAMPLES)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
     /// Suppress tables and progress output; warnings and errors stay.
     #[arg(short, long, global = true)]
     quiet: bool,
-}
-
-const EXAMPLES: &str = "Example, from a template to a found effect (`abbe COMMAND --help` has more):
-  abbe new my --template hermle-c600u
-  abbe plan my/chapter5.toml
-  abbe simulate my/chapter5.toml --out my/run1 --error EY0A=35.3um --error EB0A=-1.29arcsec
-  abbe fit my/run1/session.toml --json my/fit.json
-  abbe trace my/run1/session.toml --only EZC --only EAC
-  abbe equation my/chapter5.toml --test C150 --order first
-
-Results go to standard output, progress and messages to standard error; FILE `-` is standard output.
-Exit status: 0 done; 1 the input cannot be used; 2 wrong command line; 130 interrupted; 143 ended.";
-
-/// The commands by task.
-const TASKS: [(&str, &[&str]); 5] = [
-    ("Prepare", &["new", "import", "plan", "simulate", "sheet", "nc"]),
-    ("Analyse", &["fit", "trace", "validate", "compare"]),
-    ("Correct", &["compensate", "volumetric", "export"]),
-    ("Many machines", &["run", "history", "study"]),
-    ("Write", &["equation", "paper", "schema", "completions"]),
-];
-
-/// The help of `abbe` with the commands by task: clap lists them in one.
-fn template() -> String {
-    let all = Command::augment_subcommands(clap::Command::new("abbe"));
-    let line = |name: &&str| {
-        let about =
-            all.find_subcommand(name).and_then(clap::Command::get_about).map_or(String::new(), ToString::to_string);
-        format!("  {name:<13}{about}\n")
-    };
-    let tasks = TASKS.iter().map(|(task, names)| format!("{task}:\n{}\n", names.iter().map(line).collect::<String>()));
-    let tasks: String = tasks.collect();
-    format!("{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{tasks}Options:\n{{options}}{{after-help}}\n")
 }
 
 const COMPLETIONS: &str = "Example:

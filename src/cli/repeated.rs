@@ -7,7 +7,7 @@ use abbe::identify::{fit, repeated};
 use super::failure::Failure;
 use super::output::{self, Outputs};
 use super::results::Read;
-use super::{CommonArguments, SessionArguments, read_session};
+use super::{CommonArguments, PlausibilityArguments, SessionArguments, read_session};
 use crate::report::block::Report;
 use crate::report::repeated as present;
 
@@ -15,6 +15,7 @@ use crate::report::repeated as present;
 pub fn run(
     first: &SessionArguments,
     repeat: &[PathBuf],
+    plausibility: PlausibilityArguments,
     common: &CommonArguments,
     outputs: &Outputs,
 ) -> Result<(), Failure> {
@@ -30,8 +31,9 @@ pub fn run(
     let (mut sessions, mut warnings) = (Vec::with_capacity(all.len()), Vec::new());
     for (path, (session, _)) in all.iter().zip(&read) {
         let (problem, found) = fit::prepare(session, common.seed)?;
-        let own = fit::report(&problem, &found)?.warnings;
-        warnings.extend(own.iter().map(|warning| format!("{}: {warning}", path.display())));
+        let own = fit::report(&problem, &found)?;
+        plausibility.check(&own.plausibility)?;
+        warnings.extend(own.warnings.iter().map(|warning| format!("{}: {warning}", path.display())));
         sessions.push(repeated::Session::new(&path.display().to_string(), &problem, &found));
     }
     let result = repeated::compare(&sessions)?;

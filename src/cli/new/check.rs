@@ -12,9 +12,12 @@ use abbe::plan::{PlanOptions, analyse};
 use crate::cli::failure::Failure;
 use crate::cli::folder::NewFile;
 
-/// Poses in sockets that have to be possible, and the candidates among which they are looked for.
-const CHECKED_POSES: usize = 40;
-const CHECKED_CANDIDATES: usize = 200;
+/// Least number of poses in sockets that have to be possible. A pose has three readings, and an axis has four errors.
+const MIN_POSES: usize = 40;
+/// Poses for each axis.
+const POSES_PER_AXIS: usize = 2;
+/// Candidates for each pose.
+const CANDIDATES_PER_POSE: usize = 5;
 
 /// Refuses files that `abbe plan` would refuse, before they are written. They are in memory, by their final paths. For sockets,
 /// which have no poses yet, some are chosen.
@@ -28,10 +31,11 @@ pub fn planned(folder: &Path, files: &[NewFile]) -> Result<(), Failure> {
     let (session, _) =
         session_with_sources(&folder.join("plan.toml"), &options).map_err(|error| refused(&error, error.help()))?;
     let planned = if session.tests.iter().any(|test| test.motion.is_none()) {
+        let poses = MIN_POSES.max(POSES_PER_AXIS * session.machine.axes.len());
         let options = PoseOptions {
-            poses: CHECKED_POSES,
+            poses,
             goal: Goal::WorstUncertainty,
-            candidates: CHECKED_CANDIDATES,
+            candidates: CANDIDATES_PER_POSE * poses,
             seed: 1,
             limits: PoseLimits::default(),
             noise_mm: None,
