@@ -5,6 +5,7 @@ Azimuth counts from north through east. Signs and terms are those of the table i
 
 import math
 import re
+import sys
 
 
 def mod_file(path):
@@ -76,7 +77,7 @@ def effect_columns(effect):
     }
     component, order, driver = effect["component"], effect.get("order") or 1, effect["driver"]
     if component not in of or driver not in ("AZ", "EL"):
-        return []
+        sys.exit(f"no columns are known of {component} over {driver}")
     angle = lambda a, e: abs(order) * (a if driver == "AZ" else e)
     times = lambda cell, value: (cell[0] * value, cell[1] * value)
     own = of[component]
@@ -89,7 +90,8 @@ def effect_columns(effect):
     if effect["shape"] == "harmonic":
         return [cosine, sine]
     if effect["shape"] == "polynomial":
-        return [lambda a, e: times(own(a, e), (a if driver == "AZ" else e) ** order)]
+        powers = range(1, order + 1)
+        return [lambda a, e, power=power: times(own(a, e), (a if driver == "AZ" else e) ** power) for power in powers]
     # The error at right angles to the component, and the sign of the vector product of the axis and the component.
     partner = {"EAAZ": "EBAZ", "ECEL": "EAEL"}.get(component)
     if effect["shape"] == "precession" and partner:
@@ -100,7 +102,7 @@ def effect_columns(effect):
             lambda a, e: add(cosine(a, e), across(a, e, math.sin(angle(a, e)))),
             lambda a, e: add(sine(a, e), across(a, e, -math.cos(angle(a, e)))),
         ]
-    return []
+    sys.exit(f"no columns are known of {effect['shape']} of {component}")
 
 
 def solve(rows, right):
