@@ -90,14 +90,6 @@ impl PureError {
                 rows.clone().map(|row| deviation(row) - past(row)).collect()
             })
             .collect();
-        let ordinate = |run: &Vec<f64>, half_cycles: usize| {
-            let step = std::f64::consts::PI * half_cycles as f64 / run.len() as f64;
-            let (c, s) = run.iter().enumerate().fold((0.0, 0.0), |(c, s), (t, value)| {
-                let (sin, cos) = (step * t as f64).sin_cos();
-                (c + value * cos, s + value * sin)
-            });
-            (c * c + s * s) / run.len() as f64
-        };
         let first = *FIRST.start();
         let sums: Vec<f64> = (first..HIGHEST.min(shortest))
             .map(|half_cycles| whitened.iter().map(|run| ordinate(run, half_cycles)).sum())
@@ -126,6 +118,25 @@ impl PureError {
             .filter(|(_, p_value)| *p_value < BAND_SIGNIFICANCE / candidates)
             .map(|(band, _)| band)
     }
+}
+
+/// Values for which sine and cosine are computed once per ordinate.
+const AT_ONCE: usize = 64;
+
+/// The ordinate of the periodogram at a number of half cycles along a run, `|Σ v(t) exp(iωt)|²/n`. With `t = b + k` the sum
+/// is `Σ exp(iωb) Σ v(b + k) exp(iωk)`: a sine and a cosine for each block `b` and for each place `k` within a block.
+fn ordinate(run: &[f64], half_cycles: usize) -> f64 {
+    let step = std::f64::consts::PI * half_cycles as f64 / run.len() as f64;
+    let within: [(f64, f64); AT_ONCE] = std::array::from_fn(|k| (step * k as f64).sin_cos());
+    let (mut c, mut s) = (0.0, 0.0);
+    for (block, values) in run.chunks(AT_ONCE).enumerate() {
+        let (own_c, own_s) = (values.iter().zip(&within))
+            .fold((0.0, 0.0), |(c, s), (value, (sin, cos))| (c + value * cos, s + value * sin));
+        let (sin, cos) = (step * (block * AT_ONCE) as f64).sin_cos();
+        c += cos * own_c - sin * own_s;
+        s += sin * own_c + cos * own_s;
+    }
+    (c * c + s * s) / run.len() as f64
 }
 
 /// Removes a wave of so many half cycles from the deviations of a run, by least squares. Rescales the rest for the
@@ -162,6 +173,17 @@ fn remove_wave(run: &mut [Option<f64>], half_cycles: usize) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The ordinate of a wave of amplitude `a` over `n` values is `a² n/4`, and that of another whole number of cycles is
+    /// zero; the length is no multiple of a block.
+    #[test]
+    fn the_periodogram_has_one_ordinate_for_a_wave() {
+        const N: usize = 5 * AT_ONCE + 7;
+        let angle = |t: usize| std::f64::consts::PI * 6.0 * t as f64 / N as f64 + 0.4;
+        let run: Vec<f64> = (0..N).map(|t| 3.0 * angle(t).cos()).collect();
+        assert!((ordinate(&run, 6) - 9.0 * N as f64 / 4.0).abs() < 1e-9);
+        assert!([2, 4, 8, 98].iter().all(|half_cycles| ordinate(&run, *half_cycles) < 1e-20 * N as f64));
+    }
 
     /// Waves of whole cycles are orthogonal along a run: one is removed, the other remains, rescaled by `√(n/(n − 2))`.
     #[test]
