@@ -42,7 +42,9 @@ impl EffectColumns {
 /// The basis functions of a shape at some samples: samples × coefficients.
 fn basis_of(shape: &Shape, samples: &[DriverSample<f64>]) -> Arc<Mat<f64>> {
     let columns = shape.columns(samples);
-    Arc::new(Mat::from_fn(samples.len(), columns.len(), |i, k| columns[k][i]))
+    let mut basis = Mat::zeros(samples.len(), columns.len());
+    columns.iter().enumerate().for_each(|(k, column)| basis.col_as_slice_mut(k).copy_from_slice(column));
+    Arc::new(basis)
 }
 
 impl Columns<'_> {

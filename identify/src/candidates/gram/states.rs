@@ -80,6 +80,13 @@ impl LocalStates {
 
     /// Copies the entries of a basis function at some of these states.
     pub fn copy(&self, states: Range<usize>, from: &[f64], to: &mut [f64]) {
+        // Mostly all states occur, and every piece of them is a piece of the basis function.
+        if let [first, .., last] = self.states[states.clone()]
+            && (last - first) as usize + 1 == states.len()
+        {
+            to[..states.len()].copy_from_slice(&from[first as usize..=last as usize]);
+            return;
+        }
         to.iter_mut().zip(&self.states[states]).for_each(|(to, state)| *to = from[*state as usize]);
     }
 
