@@ -24,6 +24,8 @@ use abbe_model::error::Location;
 use abbe_model::files::ReadOptions;
 use abbe_model::files::import::session::{Draft, SESSION_FILE};
 use abbe_model::files::import::{ColumnFound, Foreign, Hint, Reading, Source, Understood, instrument};
+use abbe_model::files::read::machine_with_bodies;
+use abbe_model::files::store::Store;
 use abbe_model::instrument::{Fault, InstrumentKind};
 use abbe_model::session::Session;
 use schemars::JsonSchema;
@@ -49,6 +51,8 @@ pub struct ImportOptions {
     pub hints: Vec<Hint>,
     /// The test whose set-up new tests of a session have.
     pub like: Option<String>,
+    /// Where the file of the [`Target`] and those that it names lie: on the disk by default, or in memory.
+    pub store: Store,
     /// Accept a session that reads files outside its folder.
     pub allow_outside: bool,
     /// Accept readings that contradict the machine.
@@ -144,17 +148,18 @@ pub fn import(files: &[Foreign], target: Target<'_>, options: &ImportOptions) ->
             return Err(IdentifyError::Request(format!("two files are named {name}: each is the test of its name")));
         }
     }
-    let read_options = ReadOptions { allow_outside: options.allow_outside, ..ReadOptions::default() };
+    let read_options =
+        ReadOptions { allow_outside: options.allow_outside, store: options.store.clone(), ..ReadOptions::default() };
     let (mut draft, tests) = match target {
         Target::Session(file) => Draft::of_session(file, &read_options, &names, options.like.as_deref(), &options.set)?,
         Target::Machine(file) => {
             let Some(first) = files.first() else {
                 return Err(IdentifyError::Request("no file is named".into()));
             };
-            let machine = abbe_model::files::machine(file)?;
             let kind = match options.kind {
                 Some(kind) => kind,
                 None => {
+                    let machine = machine_with_bodies(file, &read_options)?.machine;
                     instrument(&first.bytes, &machine, &options.hints).map_err(|fault| of_file(&first.name, fault))?
                 }
             };

@@ -41,6 +41,7 @@ pub fn import_readings(
         set: if set.is_empty() { Node::table::<Node>([]) } else { node_of("test", set.as_any())? },
         hints: columns.iter().map(|text| Hint::parse(text)).collect::<Result<_, _>>().map_err(of_words)?,
         like,
+        store: Store::Disk,
         allow_outside,
         allow_implausible,
     };

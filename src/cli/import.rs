@@ -87,6 +87,7 @@ pub fn run(arguments: &ImportArguments) -> Result<(), Failure> {
         set: session::keys(&arguments.set).map_err(of_words)?,
         hints: arguments.column.iter().map(|text| Hint::parse(text)).collect::<Result<_, _>>().map_err(of_words)?,
         like: arguments.like.clone(),
+        store: Store::Disk,
         allow_outside: arguments.allow_outside,
         allow_implausible: arguments.allow_implausible,
     };
