@@ -7,10 +7,9 @@ import { Drop } from "./drop";
 import { Editor } from "./editor";
 import { Engine, isStopped } from "./engine";
 import { FaultBox, faultOf } from "./fault";
-import { beside, download, type FileMap, isEditable, sessionsIn, text } from "./files";
+import { beside, download, type FileMap, isEditable, isTable, sessionsIn, text } from "./files";
 import { FirstScreen } from "./first-screen";
 import type { Importable } from "./import";
-import { isReadings } from "./layout";
 import type { Opened } from "./main";
 import type { Fault } from "./protocol";
 import { type Result, ResultView } from "./result";
@@ -110,7 +109,7 @@ export function Analyse({ opened, explore, imports }: Props) {
     const [first] = others;
     if (!first) return;
     const [name, bytes] = first;
-    if (own === undefined && others.size === 1 && isReadings(name, bytes) && !isNamed(files, name)) {
+    if (own === undefined && others.size === 1 && isTable(name) && !isNamed(files, name)) {
       imports({ base: session ? { files, session } : undefined, file: { name, bytes } });
       return;
     }
@@ -295,7 +294,11 @@ export function Analyse({ opened, explore, imports }: Props) {
             <p>
               <label>
                 File{" "}
-                <select value={shown} onChange={(event) => setDesk({ ...desk, shown: event.currentTarget.value })}>
+                <select
+                  aria-label="File"
+                  value={shown}
+                  onChange={(event) => setDesk({ ...desk, shown: event.currentTarget.value })}
+                >
                   {[...new Set([...editable, shown])].map((path) => (
                     <option key={path}>{path}</option>
                   ))}

@@ -29,3 +29,18 @@ export function filesOf(session: string): FileMap {
     .filter(([path]) => path.startsWith(folder) && !path.slice(folder.length).includes("/"));
   return new Map(own.map(([path, text]) => [path.slice(folder.length), encode.encode(text)]));
 }
+
+/** The name that a machine file states. */
+const named = (text: string): string => /^[ \t]*name[ \t]*=[ \t]*"([^"\n]*)"/m.exec(text)?.[1] ?? "";
+
+/** The machines of the bundled sessions: paths with names, each machine once. */
+export const machines: [path: string, name: string][] = (() => {
+  const all = Object.entries(texts).filter(([path]) => /\/machine[^/]*\.toml$/.test(path));
+  const once = new Map(all.reverse().map(([path, text]) => [text, path] as const));
+  return [...once]
+    .map(([text, path]): [string, string] => [path.replace("../../sessions/", ""), named(text)])
+    .sort(([a], [b]) => a.localeCompare(b));
+})();
+
+/** The text of a file of the bundled sessions. */
+export const bundledText = (path: string): string => texts[`../../sessions/${path}`] ?? "";

@@ -233,6 +233,9 @@ function kindOf(contents: Uint8Array): Kind {
   return kind;
 }
 
+/** Whether a file may be a table of readings, by its name: the library says whether it is. */
+export const isTable = (path: string): boolean => /\.(csv|tsv|txt|dat|asc|prn)$/i.test(path);
+
 /** Whether the editor takes a file. */
 export const isEditable = (contents?: Uint8Array): boolean =>
   contents !== undefined && contents.length <= LARGEST_TEXT && kindOf(contents).editable;

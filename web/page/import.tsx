@@ -1,18 +1,17 @@
-// Import: a foreign CSV becomes the readings of a test. The wizard writes `[test.format]` and `[test.columns]`; the
-// library reads the file with them.
+// Import: foreign files become tests of a session, as the command `abbe import` makes it. The library understands the
+// files; the page asks for what the command has as options, and shows how they were understood.
 
 import { useEffect, useRef, useState } from "preact/hooks";
+import { bundledText, machines } from "./bundled";
 import { ChooseSession } from "./choose-session";
 import { Drop } from "./drop";
-import { Engine } from "./engine";
+import { Engine, isStopped } from "./engine";
 import { FaultBox, faultOf } from "./fault";
-import { beside, FileFault, type FileMap, sessionsIn, text } from "./files";
-import { ENCODINGS, guess, type Layout, type Own, rowsOf, SEPARATORS, written } from "./layout";
+import { beside, type FileMap, sessionsIn } from "./files";
 import type { Opened } from "./main";
-import { NumberField } from "./number-field";
-import { Scroll } from "./scroll";
+import type { Fault } from "./protocol";
 import { begun, Status, type Work } from "./status";
-import { type Variant, variants } from "./variants";
+import { type Understood, UnderstoodView } from "./understood";
 import { keptValue, useKeeping, useUnsaved } from "./work";
 
 /** A file of another program. */
@@ -21,351 +20,263 @@ interface Foreign {
   bytes: Uint8Array;
 }
 
-/** What another view hands over: a session that has the test, a file of readings, or both. */
+/** What another view hands over: the session to which tests are added, a file of readings, or both. */
 export interface Importable {
   base?: Opened;
   file?: Foreign;
 }
 
-interface Found {
-  tests: string[];
-  columns: Own[];
-}
-
-interface Tried {
+/** Where the tests go: into a new session of a machine, or into one that exists. */
+interface Target {
+  files: FileMap;
+  /** The machine file of a new session, and its name. */
+  machine?: string;
   words: string;
-  rms_um?: number;
-  fault?: string;
+  session?: string;
 }
 
-/** The name, or one like it that no file beside the session has: another test may read that file. */
-function freeName(files: FileMap, session: string, name: string): string {
-  const [, stem, extension] = /^(.*?)(\.[^.]*)?$/s.exec(name) ?? ["", name];
-  let free = name;
-  for (let number = 2; files.has(beside(session, free)); number++) free = `${stem}-${number}${extension ?? ""}`;
-  return free;
+/** What the user says, as the options of the command. */
+interface Said {
+  kind: string;
+  set: string;
+  columns: string;
+  like: string;
+  allowImplausible: boolean;
 }
 
-/** The session with these readings in place of the data of a test. */
-export function imported(
-  files: FileMap,
-  session: string,
-  test: number,
-  name: string,
-  bytes: Uint8Array,
-  layout: Layout,
-): FileMap {
-  const own = freeName(files, session, name);
-  const next = new Map(files).set(beside(session, own), bytes);
-  return next.set(session, new TextEncoder().encode(written(text(files, session), test, own, layout)));
+const NOTHING: Said = { kind: "", set: "", columns: "", like: "", allowImplausible: false };
+
+/** Folder of the foreign files: one may have the name of a file of the session. */
+const FOREIGN = "foreign files/";
+
+const intoSession = ({ files, session }: Opened): Target => ({ files, session, words: session });
+
+function ofBundled(path: string): Target {
+  const name = path.slice(path.lastIndexOf("/") + 1);
+  const words = machines.find(([own]) => own === path)?.[1] ?? name;
+  return { files: new Map([[name, new TextEncoder().encode(bundledText(path))]]), machine: name, words };
+}
+
+/** The lines of a text that say something. */
+const lines = (text: string): string[] =>
+  text
+    .split("\n")
+    .map((line) => line.trim())
+    .filter((line) => line !== "");
+
+/** The text with what a column is said to be; the other lines stay. */
+function withColumn(text: string, number: number, own: string): string {
+  const others = lines(text).filter((line) => line.split("=")[1]?.trim() !== String(number));
+  return [...others, ...(own ? [`${own}=${number}`] : [])].join("\n");
 }
 
 export function Wizard({ opened, analyse }: { opened?: Importable; analyse: (opened: Opened) => void }) {
   const engine = useRef<Engine | undefined>(undefined);
   engine.current ??= new Engine();
   const keeping = useKeeping();
-  const [base, setBase] = useState<Opened | undefined>(() => opened?.base ?? keptValue(keeping, "import base"));
-  const [found, setFound] = useState<Found>();
-  const [test, setTest] = useState(0);
-  const [file, setFile] = useState<Foreign | undefined>(() => opened?.file ?? keptValue(keeping, "import file"));
-  const [layout, setLayout] = useState<Layout>();
-  const [tried, setTried] = useState<Tried[]>([]);
+  const [files, setFiles] = useState<Foreign[]>(() => keptValue(keeping, "import files") ?? []);
+  const [target, setTarget] = useState<Target | undefined>(() => keptValue(keeping, "import target"));
+  const [said, setSaid] = useState<Said>(() => keptValue(keeping, "import said") ?? NOTHING);
+  const [found, setFound] = useState<Understood>();
+  const [kinds, setKinds] = useState<string[]>([]);
   const [work, setWork] = useState<Work>();
   const [note, setNote] = useState("");
-  const [fault, setFault] = useState<unknown>();
+  const [fault, setFault] = useState<Fault>();
   useUnsaved("Import", work !== undefined);
-  useEffect(() => keeping.store.keep("import base", base), [base]);
-  useEffect(() => keeping.store.keep("import file", file), [file]);
-  useEffect(() => {
-    if (layout) keeping.store.keep("import layout", { test, layout });
-  }, [test, layout]);
-  /** What was set before a reload, until it is shown. */
-  const kept = useRef(keptValue<{ test: number; layout: Layout }>(keeping, "import layout"));
+  useEffect(() => keeping.store.keep("import files", files), [files]);
+  useEffect(() => keeping.store.keep("import target", target), [target]);
+  useEffect(() => keeping.store.keep("import said", said), [said]);
   useEffect(() => {
     if (!opened) return;
-    if (opened.base) setBase(opened.base);
-    if (opened.file) take(opened.file);
-    else setFile(undefined);
+    if (opened.base) setTarget(intoSession(opened.base));
+    setFiles(opened.file ? [opened.file] : []);
+    setSaid(NOTHING);
   }, [opened]);
-  /** Number of what is imported into what: what was begun for another is not told. */
-  const trying = useRef(0);
-  const forget = () => {
-    trying.current += 1;
-    engine.current?.stop();
-    setTried([]);
-    setWork(undefined);
-    setNote("");
-    return trying.current;
-  };
+  /** Number of what is asked for: the answer to an earlier question is not told. */
+  const asked = useRef(0);
   useEffect(() => {
-    if (!base) return;
-    const number = forget();
-    setFound(undefined);
-    setTest(0);
-    setFault(undefined);
-    const read = engine.current?.call<Found>("columns", [base.session], { files: base.files });
-    read?.then(
-      (known) => number === trying.current && setFound(known),
-      (error) => number === trying.current && setFault(error),
-    );
-  }, [base]);
-  // A file may come before the session whose columns it has.
-  useEffect(() => {
-    if (file && found && kept.current) {
-      setLayout(kept.current.layout);
-      setTest(kept.current.test);
-      kept.current = undefined;
-      return;
-    }
-    setLayout(file && found ? guess(file.bytes, found.columns) : undefined);
-  }, [file, found]);
+    void ask();
+  }, [files, target, said]);
 
-  const take = (next: Foreign) => {
-    if (/^PK\x03\x04|^\xd0\xcf\x11\xe0/.test(String.fromCharCode(...next.bytes.subarray(0, 4)))) {
-      setFault(
-        new FileFault(`${next.name}: this is a spreadsheet; name it as \`data\` of the test, or save it as CSV`),
-      );
-      return;
-    }
-    // Before the columns of the session are read, nothing was begun with another file.
-    if (found) forget();
-    kept.current = undefined;
-    setFile(next);
+  const ask = async () => {
+    const number = ++asked.current;
+    engine.current?.stop();
+    setFound(undefined);
     setFault(undefined);
-  };
-  /** Takes the session that has the test, or the file of readings. */
-  const receive = (files: FileMap) => {
-    const [session] = sessionsIn(files);
-    const [first] = files;
-    if (session !== undefined) {
-      kept.current = undefined;
-      setBase({ files, session });
-    } else if (first) take({ name: first[0].split("/").pop() ?? "readings.csv", bytes: first[1] });
-  };
-  const set = (next: Partial<Layout>) => {
-    if (!layout || !file || !found) return;
-    // Another separator makes other columns, which are guessed again.
-    const columnsChange = "separator" in next || "header" in next || "skip" in next || "encoding" in next;
-    const changed = { ...layout, ...next };
-    setLayout(columnsChange ? guess(file.bytes, found.columns, changed) : changed);
-    forget();
-  };
-  const rms = async (of: Layout): Promise<number> => {
-    if (!base || !file || !engine.current) return Number.NaN;
-    const files = imported(base.files, base.session, test, file.name, file.bytes, of);
-    const { json } = await engine.current.call<{ json: string }>("fit", [base.session], { files });
-    return JSON.parse(json).rms_um as number;
-  };
-  const tryAll = async () => {
-    if (!layout || !found) return;
-    const number = forget();
-    const results: Tried[] = [];
-    const all: Variant[] = [{ words: "as guessed", layout }, ...variants(layout, found.columns)];
-    const { since } = begun("");
-    for (const [k, variant] of all.entries()) {
-      setWork({ words: `fit ${k + 1} of ${all.length}: ${variant.words}`, since });
-      try {
-        results.push({ words: variant.words, rms_um: await rms(variant.layout) });
-      } catch (error) {
-        const { message, line } = faultOf(error);
-        results.push({ words: variant.words, fault: line ? `line ${line}: ${message}` : message });
-      }
-      if (number !== trying.current) return;
-      setTried([...results]);
-    }
+    setNote("");
     setWork(undefined);
+    if (files.length === 0 || !target) return;
+    setWork(begun(files.length === 1 ? `reading ${files[0].name}` : `reading ${files.length} files`));
+    const foreign = files.map(({ name, bytes }) => [`${FOREIGN}${name}`, bytes] as [string, Uint8Array]);
+    const question = {
+      files: foreign.map(([path]) => path),
+      machine: target.machine ?? null,
+      session: target.session ?? null,
+      kind: said.kind || null,
+      set: lines(said.set),
+      columns: lines(said.columns),
+      like: said.like || null,
+      allow_implausible: said.allowImplausible,
+    };
+    try {
+      setKinds((await engine.current?.call<string[]>("instruments")) ?? []);
+      const folder = [...target.files, ...foreign];
+      const answer = await engine.current?.call<Understood>("import", [question], { files: folder });
+      if (number === asked.current) setFound(answer);
+    } catch (error) {
+      if (number === asked.current && !isStopped(error)) setFault(faultOf(error));
+    }
+    if (number === asked.current) setWork(undefined);
   };
-  /** What was fitted until then stays. */
   const stop = () => {
-    trying.current += 1;
+    asked.current += 1;
     engine.current?.stop();
     setWork(undefined);
     setNote("stopped");
   };
-  const use = () => {
-    if (!base || !file || !layout) return;
-    const files = imported(base.files, base.session, test, file.name, file.bytes, layout);
-    analyse({ files, session: base.session, base: base.files });
-    // The next file goes into the same session.
-    kept.current = undefined;
-    setBase({ files, session: base.session });
-    setFile(undefined);
+  const say = (part: Partial<Said>) => setSaid({ ...said, ...part });
+  /** Takes the session or the machine to which the tests belong, and files of readings. */
+  const receive = (dropped: FileMap) => {
+    const [session] = sessionsIn(dropped);
+    if (session !== undefined) {
+      setTarget(intoSession({ files: dropped, session }));
+      return;
+    }
+    const [machine] = [...dropped.keys()].filter((path) => path.endsWith(".toml"));
+    if (machine !== undefined) setTarget({ files: dropped, machine, words: machine });
+    const tables = [...dropped].filter(([path]) => !path.endsWith(".toml"));
+    const named = tables.map(([path, bytes]) => ({ name: path.split("/").pop() ?? path, bytes }));
+    if (named.length === 0) return;
+    const others = files.filter(({ name }) => !named.some((one) => one.name === name));
+    setFiles([...others, ...named]);
   };
-  const rows = file && layout ? rowsOf(file.bytes, layout).slice(0, 8) : [];
+  const use = () => {
+    if (!found || !target) return;
+    const session = target.session ?? found.result.session;
+    const made = found.files.map(([name, bytes]) => [beside(session, name), bytes] as const);
+    if (target.session === undefined) {
+      analyse({ files: new Map(made), session });
+    } else {
+      const all = new Map([...target.files, ...made]);
+      analyse({ files: all, session, base: target.files });
+      // The next files go into the same session.
+      setTarget(intoSession({ files: all, session }));
+    }
+    setFiles([]);
+    setSaid(NOTHING);
+  };
   return (
     <>
       <p>
-        Readings of another program become those of a test.{" "}
-        {base ? `They go into ${base.session}.` : "First the session that has the test, then the file."}{" "}
-        <ChooseSession label="Session" placeholder={base ? base.session : "choose …"} open={setBase} />
+        Each file of another program becomes a test, in a new session of a machine or in a session that exists, as the
+        command <code>abbe import</code> does it.
       </p>
-      <Drop words={wanted(base, file)} open={receive} failed={setFault} />
-      {fault !== undefined && <FaultBox fault={faultOf(fault)} />}
-      {found && (
-        <p>
-          <label>
-            Test{" "}
-            <select
-              aria-label="Test"
-              value={test}
-              onChange={(event) => {
-                setTest(Number(event.currentTarget.value));
-                forget();
-              }}
-            >
-              {found.tests.map((name, k) => (
-                <option key={name} value={k}>
-                  {name}
-                </option>
-              ))}
-            </select>
-          </label>
-        </p>
+      <Drop
+        words={
+          files.length === 0
+            ? "Drop files of readings here (.csv, .txt, …), and the machine file or the session if you have one."
+            : `Files: ${files.map(({ name }) => name).join(", ")}. Drop more, the machine or the session here.`
+        }
+        open={receive}
+        failed={(error) => setFault(faultOf(error))}
+      />
+      <p class="actions">
+        <label>
+          Machine of a new session{" "}
+          <select
+            aria-label="Machine"
+            value=""
+            onChange={(event) => {
+              const path = event.currentTarget.value;
+              if (path) setTarget(ofBundled(path));
+            }}
+          >
+            <option value="">{target?.machine ? target.words : "choose …"}</option>
+            {machines.map(([path, name]) => (
+              <option key={path} value={path}>
+                {name} ({path.split("/")[0]})
+              </option>
+            ))}
+          </select>
+        </label>
+        <ChooseSession
+          label="Session"
+          placeholder={target?.session ?? "or add to a session …"}
+          open={(one) => setTarget(intoSession(one))}
+        />
+        {files.length > 0 && <button onClick={() => setFiles([])}>Forget the files</button>}
+        {work && <button onClick={stop}>Stop</button>}
+        {note && <button onClick={() => void ask()}>Read again</button>}
+        <Status work={work} note={note} />
+      </p>
+      {files.length > 0 && !target && (
+        <p>Choose the machine on which they were read, or the session to which they belong.</p>
       )}
-      {found && file && layout && (
-        <>
-          <h2>Layout of {file.name}</h2>
-          <p class="actions">
-            <Choice
-              label="Separator"
-              value={layout.separator}
-              of={SEPARATORS}
-              set={(separator) => set({ separator })}
-            />
-            <Choice
-              label="Decimal sign"
-              value={layout.decimal}
-              of={[
-                [".", "point"],
-                [",", "comma"],
-              ]}
-              set={(decimal) => set({ decimal })}
-            />
-            <Choice label="Encoding" value={layout.encoding} of={ENCODINGS} set={(encoding) => set({ encoding })} />
+      {target && (
+        <p>{target.session ? `The tests go into ${target.session}.` : `The tests go into a new session: ${target.words}.`}</p>
+      )}
+      {fault && <FaultBox fault={fault} />}
+      {files.length > 0 && target && (
+        <details open={fault !== undefined || Object.values(said).some(Boolean)}>
+          <summary>Say more about the files</summary>
+          <div class="said">
+            {target.machine && (
+              <label>
+                Instrument
+                <select value={said.kind} onChange={(event) => say({ kind: event.currentTarget.value })}>
+                  <option value="">as the columns tell</option>
+                  {kinds.map((kind) => (
+                    <option key={kind}>{kind}</option>
+                  ))}
+                </select>
+              </label>
+            )}
+            {target.session && (
+              <label>
+                New tests are set up like
+                <input
+                  value={said.like}
+                  placeholder="a test of the session"
+                  onChange={(event) => say({ like: event.currentTarget.value.trim() })}
+                />
+              </label>
+            )}
             <label>
-              Lines above{" "}
-              <NumberField
-                value={layout.skip}
-                of={file}
-                min={0}
-                max={1000}
-                step={1}
-                refused={(lines) => (Number.isInteger(lines) && lines >= 0 ? undefined : "lines are counted from 0")}
-                set={(skip) => set({ skip })}
+              Keys of the new tests, one a line
+              <textarea
+                rows={3}
+                value={said.set}
+                placeholder="bar_mm=150"
+                onChange={(event) => say({ set: event.currentTarget.value })}
               />
             </label>
             <label>
+              What columns hold, by name or number
+              <textarea
+                rows={3}
+                value={said.columns}
+                placeholder="c_deg=3"
+                onChange={(event) => say({ columns: event.currentTarget.value })}
+              />
+            </label>
+            <label class="check">
               <input
                 type="checkbox"
-                checked={layout.header}
-                onChange={(event) => set({ header: event.currentTarget.checked })}
+                checked={said.allowImplausible}
+                onChange={(event) => say({ allowImplausible: event.currentTarget.checked })}
               />{" "}
-              a header line
+              accept readings that contradict the machine
             </label>
-          </p>
-          <Scroll label="First rows and meanings of the columns">
-            <table>
-              <thead>
-                <tr>
-                  {layout.columns.map((own, k) => (
-                    <th key={k}>
-                      <select
-                        aria-label={`Column ${k + 1}`}
-                        value={own ?? ""}
-                        onChange={(event) => {
-                          const name = event.currentTarget.value || undefined;
-                          set({
-                            columns: layout.columns.map((old, i) => (i === k ? name : old === name ? undefined : old)),
-                          });
-                        }}
-                      >
-                        <option value="">not used</option>
-                        {found.columns
-                          .flatMap(({ stem, units }) =>
-                            units.length ? units.map((unit) => `${stem}_${unit}`) : [stem],
-                          )
-                          .map((name) => (
-                            <option key={name}>{name}</option>
-                          ))}
-                      </select>
-                    </th>
-                  ))}
-                </tr>
-              </thead>
-              <tbody>
-                {rows.map((row, k) => (
-                  <tr key={k}>
-                    {layout.columns.map((_, column) => (
-                      <td key={column}>{row[column] ?? ""}</td>
-                    ))}
-                  </tr>
-                ))}
-              </tbody>
-            </table>
-          </Scroll>
-          <p class="actions">
-            <button class="main" disabled={work !== undefined} onClick={() => void tryAll()}>
-              Fit, and the same with other guesses
-            </button>
-            <button disabled={!work} onClick={stop}>
-              Stop
-            </button>
-            <button onClick={use}>Open in Analyse</button>
-            <Status work={work} note={note} />
-          </p>
-          {tried.length > 0 && (
-            <Scroll label="Residuals of the guesses">
-              <table>
-                <thead>
-                  <tr>
-                    <th>guess</th>
-                    <th>rms of the residual, µm</th>
-                  </tr>
-                </thead>
-                <tbody>
-                  {tried.map((one) => (
-                    <tr key={one.words}>
-                      <td>{one.words}</td>
-                      <td>{one.fault ?? one.rms_um?.toPrecision(4)}</td>
-                    </tr>
-                  ))}
-                </tbody>
-              </table>
-            </Scroll>
-          )}
-        </>
+          </div>
+        </details>
+      )}
+      {found && (
+        <UnderstoodView
+          found={found}
+          say={(number, own) => say({ columns: withColumn(said.columns, number, own) })}
+          use={use}
+        />
       )}
     </>
-  );
-}
-
-/** What is dropped next. */
-function wanted(base?: Opened, file?: Foreign): string {
-  if (!base) return `${file ? `The file is ${file.name}. ` : ""}Drop the files of the session that has the test here.`;
-  return file ? `The file is ${file.name}. Drop another here.` : "Drop the file of readings here (.csv, .txt).";
-}
-
-function Choice<T extends string>({
-  label,
-  value,
-  of,
-  set,
-}: {
-  label: string;
-  value: T;
-  of: readonly (readonly [T, string])[];
-  set: (value: T) => void;
-}) {
-  return (
-    <label>
-      {label}{" "}
-      <select value={value} onChange={(event) => set(event.currentTarget.value as T)}>
-        {of.map(([word, words]) => (
-          <option key={word} value={word}>
-            {words}
-          </option>
-        ))}
-      </select>
-    </label>
   );
 }

@@ -1,6 +1,6 @@
 // The worker: holds a folder and a plan, and calls the module.
 
-import init, { type InitOutput, Fit, Folder, Plan, Trace, filesOfCode } from "../pkg/abbe.js";
+import init, { type InitOutput, Fit, Folder, Import, Plan, Trace, filesOfCode, instruments } from "../pkg/abbe.js";
 import { BROKEN, type Fault } from "./protocol";
 
 export type Files = [path: string, contents: Uint8Array][];
@@ -36,7 +36,17 @@ function texts(result: Fit | Trace) {
 }
 
 const methods: Record<string, (...args: never[]) => unknown> = {
-  columns: (session: string) => JSON.parse(held(folder).columns(session)),
+  instruments,
+  /** Foreign files as a session: how they are understood, and the files to write. */
+  import(asked: unknown) {
+    const made = Import.of(held(folder), JSON.stringify(asked));
+    try {
+      const { names, ...shown } = JSON.parse(made.shown());
+      return { ...shown, files: names.map((name: string, k: number) => [name, made.contents(k)]) };
+    } finally {
+      made.free();
+    }
+  },
   check: (session: string) => JSON.parse(held(folder).check(session)),
   fit: (session: string) => texts(Fit.of(held(folder), session, 1)),
   trace(session: string) {

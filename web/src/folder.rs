@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use abbe::document::Origin;
-use abbe::model::axis::AxisKind;
 use abbe::model::files::store::Store;
 use abbe::model::files::{self, ReadOptions, SourceMap};
 use abbe::model::session::Session;
@@ -63,37 +62,17 @@ impl Folder {
         });
         Ok(found.to_string())
     }
-
-    /// The tests of a session, and the columns that a data file of it may have: names without the unit, and the units.
-    /// No data are read.
-    ///
-    /// # Errors
-    /// As [`Folder::check`].
-    pub fn columns(&self, session: &str) -> Result<String, Failed> {
-        let read = self.read(session, false)?;
-        let mut columns = vec![json!({ "stem": "time", "units": ["s"] }), json!({ "stem": "run", "units": [] })];
-        for axis in &read.session.machine.axes {
-            let units: &[&str] = if axis.kind == AxisKind::Rotary { &["deg", "rad"] } else { LENGTHS };
-            columns.push(json!({ "stem": axis.name.to_lowercase(), "units": units }));
-        }
-        let station = read.session.tests.first().map(|test| test.station.columns()).unwrap_or_default();
-        for column in station {
-            let units = if column.unit.is_empty() { &[] } else { LENGTHS };
-            columns.push(json!({ "stem": column.stem, "units": units }));
-        }
-        columns.push(json!({ "stem": "temperature", "units": ["c"] }));
-        let tests: Vec<&str> = read.session.tests.iter().map(|test| test.name.as_str()).collect();
-        Ok(json!({ "tests": tests, "columns": columns }).to_string())
-    }
 }
 
-/// The units of a length in the name of a column, the usual one first.
-const LENGTHS: &[&str] = &["mm", "um", "in", "mil", "m"];
-
 impl Folder {
+    /// Its files, as the library reads them.
+    pub fn store(&self) -> Store {
+        Store::in_memory(self.files.iter().map(|(path, contents)| (path, contents.clone())))
+    }
+
     /// Reads a session, with its data if they are wanted.
     pub fn read(&self, session: &str, read_data: bool) -> Result<Read, Failed> {
-        let store = Store::in_memory(self.files.iter().map(|(path, contents)| (path, contents.clone())));
+        let store = self.store();
         let options = ReadOptions { read_data, store: store.clone(), ..ReadOptions::default() };
         let read = files::session_with_sources(Path::new(session), &options);
         let (session, sources) = read.map_err(|fault| Failed::from(fault).within(&store))?;

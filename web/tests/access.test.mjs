@@ -57,11 +57,19 @@ const VIEWS = {
   Import: async (page) => {
     await page.getByRole("tab", { name: "Import" }).click();
     const view = page.getByLabel("Import", { exact: true });
-    await view.getByLabel("Session", { exact: true }).selectOption("hermle-c600u/measured/session.toml");
+    await view.getByLabel("Session", { exact: true }).selectOption("hermle-c600u/chapter5.toml");
     const buffer = filesOf(hermle)["C150.csv"];
     await view.locator('input[type="file"]').setInputFiles({ name: "C150.csv", mimeType: "text/csv", buffer });
-    await view.getByRole("button", { name: /^Fit/ }).click();
-    await view.locator("tbody").nth(1).waitFor();
+    await view.locator("tbody").waitFor();
+    for (const closed of await page.locator("summary:visible").all()) await closed.click();
+  },
+  "Import with a fault": async (page) => {
+    await page.getByRole("tab", { name: "Import" }).click();
+    const view = page.getByLabel("Import", { exact: true });
+    await view.getByLabel("Machine", { exact: true }).selectOption("ur10/machine.toml");
+    const buffer = Buffer.from("1,2\n3,4\n5,6\n");
+    await view.locator('input[type="file"]').setInputFiles({ name: "readings.csv", mimeType: "text/csv", buffer });
+    await page.getByRole("alert").waitFor();
   },
 };
 

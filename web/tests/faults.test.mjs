@@ -144,26 +144,3 @@ test("the table of figures is that of the command, with its convention of signs"
   assert.deepEqual(words(ours), words(theirs));
   await page.close();
 });
-
-test("Stop ends all guesses of the import", async () => {
-  const { page, wrong } = await opened(own.chromium, own.server.address);
-  await page.getByRole("tab", { name: "Import" }).click();
-  const view = page.getByLabel("Import", { exact: true });
-  await view.getByLabel("Session", { exact: true }).selectOption("hermle-c600u/measured/session.toml");
-  await view.getByLabel("Test", { exact: true }).selectOption("C150");
-  const buffer = readFileSync(join(hermle, "C150.csv"));
-  await view.locator('input[type="file"]').setInputFiles({ name: "machine.toml", mimeType: "text/csv", buffer });
-  await view.getByRole("button", { name: /^Fit/ }).click();
-  await view.getByRole("button", { name: "Stop" }).click();
-  await view.getByText("stopped", { exact: true }).waitFor();
-  // What was fitted until then stays, and nothing comes to it.
-  const rows = await view.locator("tr").count();
-  await page.waitForTimeout(1000);
-  assert.equal(await view.locator("tr").count(), rows);
-  assert.equal(await page.getByRole("alert").count(), 0);
-  // A file of readings with the name of another file of the session takes another name.
-  await view.getByRole("button", { name: "Open in Analyse" }).click();
-  await page.getByText("2416 readings").waitFor();
-  assert.deepEqual(wrong, []);
-  await page.close();
-});

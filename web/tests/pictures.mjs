@@ -38,23 +38,15 @@ const VIEWS = {
   async import(page) {
     await page.getByRole("tab", { name: "Import" }).click();
     const view = page.getByLabel("Import", { exact: true });
-    await view.getByLabel("Session", { exact: true }).selectOption("hermle-c600u/measured/session.toml");
-    await view.getByLabel("Test", { exact: true }).selectOption("C150");
+    await view.getByLabel("Session", { exact: true }).selectOption("hermle-c600u/chapter5.toml");
     const rows = readFileSync(join(hermle, "C150.csv"), "utf8").trim().split("\n").slice(1);
     const foreign = [
       "Zeit [s];Run;X [mm];Y [mm];Z [mm];A [deg];C-Achse [°];Länge [mm]",
       ...rows.map((row) => row.replaceAll(",", ";").replaceAll(".", ",")),
     ];
     const buffer = Buffer.from(foreign.join("\r\n"), "latin1");
-    await view.locator('input[type="file"]').setInputFiles({ name: "export.csv", mimeType: "text/csv", buffer });
-    await view.getByRole("button", { name: /^Fit/ }).click();
-    await view.locator("tbody").last().getByText("decimal point", { exact: true }).waitFor();
-    await page.waitForFunction(
-      () =>
-        [...document.querySelectorAll("button")].some(
-          (button) => /^Fit, and/.test(button.textContent) && !button.disabled,
-        ),
-    );
+    await view.locator('input[type="file"]').setInputFiles({ name: "C150.csv", mimeType: "text/csv", buffer });
+    await view.locator("tbody").waitFor();
   },
 };
 

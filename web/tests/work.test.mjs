@@ -138,38 +138,32 @@ test("a folder of a disk is dropped on the page", async () => {
 test("a CSV alone leads to the import, before or after its session", async () => {
   const { page, wrong } = await opened(own.chromium, own.server.address);
   const view = page.getByLabel("Import", { exact: true });
-  const guessed = () => view.locator("thead select").evaluateAll((all) => all.map((one) => one.value));
+  const meanings = () => view.locator("thead select").evaluateAll((all) => all.map((one) => one.value));
   const names = `${files["C150.csv"]}`.split("\n").find((line) => !line.startsWith("#"));
   await drop(page, area(page), [join(hermle, "C150.csv")]);
-  await view.getByText("The file is C150.csv.").waitFor();
+  await view.getByText("Files: C150.csv.").waitFor();
   assert.equal(await page.getByRole("tab", { name: "Import" }).getAttribute("aria-selected"), "true");
+  // The session names the file, which is not among its own.
   await drop(
     page,
     view.locator(".drop"),
     ["machine.toml", "session.toml", "A100.csv", "A150.csv", "C100.csv"].map((name) => join(hermle, name)),
   );
   await view.locator("thead select").first().waitFor();
-  assert.deepEqual(await guessed(), names.trim().split(","));
-  await view.getByLabel("Test", { exact: true }).selectOption("C150");
+  assert.deepEqual(await meanings(), names.trim().split(","));
   await view.getByRole("button", { name: "Open in Analyse" }).click();
   await page.getByText("2416 readings").waitFor();
-  // Another file, for another test of the same session.
-  await page.getByRole("tab", { name: "Import" }).click();
-  await view.locator('input[type="file"]').setInputFiles({
-    name: "second.csv",
-    mimeType: "text/csv",
-    buffer: Buffer.from(`${files["A100.csv"]}`.trimEnd().split("\n").slice(0, -100).join("\n")),
-  });
-  await view.locator("thead select").first().waitFor();
-  await view.getByRole("button", { name: "Open in Analyse" }).click();
-  await page.getByText("2316 readings").waitFor();
-  await page.getByText("the imported readings are in the session").waitFor();
-  // A file that no session names, beside an open one.
+  // A file that no session names, beside an open one: the page asks which test is set up like it.
   await give(page, { "of another program.csv": `${files["C150.csv"]}`.replaceAll(",", ";").replaceAll(".", ",") });
-  await view.getByText("The file is of another program.csv.").waitFor();
-  await view.getByText("They go into session.toml.").waitFor();
+  await view.getByText("Files: of another program.csv.").waitFor();
+  await view.getByText("The tests go into session.toml.").waitFor();
+  await view.getByRole("alert").getByText("its tests differ in their set-up").waitFor();
+  await enter(page, "New tests are set up like", "C150");
   await view.locator("thead select").first().waitFor();
-  assert.deepEqual(await guessed(), names.trim().split(","));
+  assert.deepEqual(await meanings(), names.trim().split(","));
+  await view.getByRole("button", { name: "Open in Analyse" }).click();
+  await page.getByText("3220 readings").waitFor();
+  await page.getByText("the imported readings are in the session").waitFor();
   assert.deepEqual(wrong, []);
   await page.close();
 });
@@ -248,15 +242,16 @@ test("the plan, what it was before, and the import survive a reload", async () =
   await page.waitForFunction(() => document.querySelector("#bar").value === "99.9881");
   await page.getByRole("tab", { name: "Import" }).click();
   const view = page.getByLabel("Import", { exact: true });
-  await view.getByLabel("Session", { exact: true }).selectOption("hermle-c600u/measured/session.toml");
-  await view.getByLabel("Test", { exact: true }).selectOption("C150");
+  await view.getByLabel("Session", { exact: true }).selectOption("hermle-c600u/chapter5.toml");
   await view.locator('input[type="file"]').setInputFiles(join(hermle, "C150.csv"));
   await view.locator("thead select").first().waitFor();
-  await view.locator("thead select").last().selectOption("deviation_mm");
+  await view.locator("thead select").nth(2).selectOption("x_um");
+  await view.getByText("Say more about the files").waitFor();
+  const said = view.getByLabel("What columns hold, by name or number");
+  await page.waitForFunction((area) => area.value === "x_um=3", await said.elementHandle());
   await page.reload();
-  await view.locator("thead select").first().waitFor();
-  assert.equal(await view.locator("thead select").last().inputValue(), "deviation_mm");
-  assert.equal(await view.getByLabel("Test", { exact: true }).locator("option:checked").textContent(), "C150");
+  await page.waitForFunction((area) => area.value === "x_um=3", await said.elementHandle());
+  await view.getByText("The tests go into chapter5.toml.").waitFor();
   assert.deepEqual(wrong, []);
   await page.close();
 });
