@@ -18,6 +18,9 @@ export interface Analysis {
 
 const SIGNS: Record<string, string> = { um: "µm", arcsec: "″" };
 
+/** The words of the library with the signs of units: 1 arcsec is 1 ″. */
+const withSigns = (words: string): string => words.replace(/(?<=\d )(um|arcsec)\b/g, (unit) => SIGNS[unit] ?? unit);
+
 function combination(of: Record<string, number> | [string, number][]): string {
   const parts = Array.isArray(of) ? of : Object.entries(of);
   return parts.map(([id, factor]) => `${factor >= 0 ? "+" : "−"} ${Math.abs(factor).toPrecision(3)} ${id}`).join(" ");
@@ -64,7 +67,7 @@ export function Identifiability({ analysis }: { analysis: Analysis }) {
           <ul>
             {analysis.unidentifiable.map((direction, k) => (
               <li key={k}>
-                <code>{combination(direction.combination)}</code> {direction.why}
+                <code>{combination(direction.combination)}</code> {withSigns(direction.why)}
               </li>
             ))}
           </ul>
@@ -75,13 +78,11 @@ export function Identifiability({ analysis }: { analysis: Analysis }) {
           <h2>Confounded and poorly separable</h2>
           <ul>
             {analysis.determined_by_prior.map((one) => (
-              <li key={one.error}>
-                {one.error}: {one.why}
-              </li>
+              <li key={one.error}>{withSigns(one.why)}</li>
             ))}
             {analysis.nearly_collinear.map((one, k) => (
               <li key={k}>
-                <code>{combination(one.combination)}</code> {one.why}
+                <code>{combination(one.combination)}</code> {withSigns(one.why)}
               </li>
             ))}
           </ul>

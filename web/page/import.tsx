@@ -180,7 +180,7 @@ export function Wizard({ opened, analyse }: { opened?: Importable; analyse: (ope
         open={receive}
         failed={(error) => setFault(faultOf(error))}
       />
-      <p class="actions">
+      <p class="actions target">
         <label>
           Machine of a new session{" "}
           <select

@@ -6,7 +6,6 @@ interface Column {
   number: number;
   name: string;
   own?: string;
-  unit_is_stated: boolean;
   direction?: string;
 }
 
@@ -139,7 +138,6 @@ function TestView({ test, known, isAlone, say }: TestProps) {
                 <td key={k}>
                   {column?.name || `column ${k + 1}`}
                   {column?.direction && `, ${column.direction}`}
-                  {column?.own && /_/.test(column.own) && !column.unit_is_stated && ", unit found by the values"}
                 </td>
               ))}
             </tr>
