@@ -30,6 +30,9 @@ pub struct Effect {
     pub family: Option<String>,
     /// The tests in which it acts; default: all.
     pub tests: Option<Vec<String>>,
+    /// Numbers of the shape that a fit estimates, from the values given here: "centre", "width", "period" or "tau";
+    /// default: none.
+    pub estimate: Option<Vec<String>>,
     /// Whether the effect is taken for the explanation on the user's word, so that uncertainties do not cover its
     /// aliases; default: false.
     pub assumed: Option<bool>,

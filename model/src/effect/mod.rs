@@ -21,7 +21,7 @@ pub use shape::{Shape, ShapeFault};
 
 use crate::axis::AxisKind;
 use crate::chain::Machine;
-use crate::driver::{Driver, DriverUnit};
+use crate::driver::{Driver, DriverSample, DriverUnit};
 
 /// An effect: component × driver × shape.
 ///
@@ -54,21 +54,43 @@ pub struct Effect {
     /// The effects that explain the readings equally well in its place, the most probable first. Uncertainties cover
     /// what each would change. An alias has no aliases of its own.
     pub aliases: Vec<Effect>,
+    /// The numbers of the shape that a fit estimates from the values of the shape, by index among
+    /// [`ShapeKind::number_names`](shape::ShapeKind::number_names).
+    pub estimated: Vec<usize>,
     /// Whether the effect is taken for the explanation on the user's word, so that uncertainties do not cover its
     /// aliases.
     pub assumed: bool,
 }
 
+/// Step of a difference quotient in a number of a shape, as a share of the interval in which it is tuned.
+const NUMBER_STEP: f64 = 1e-4;
+
 impl Effect {
     /// An effect in all tests, with the prior of its shape.
     pub fn new(component: Component, driver: Driver, shape: Shape) -> Effect {
         let prior = CoefficientPrior::default_of(&shape);
-        Effect { component, driver, shape, tests: Vec::new(), prior, aliases: Vec::new(), assumed: false }
+        Effect {
+            component,
+            driver,
+            shape,
+            tests: Vec::new(),
+            prior,
+            aliases: Vec::new(),
+            estimated: Vec::new(),
+            assumed: false,
+        }
     }
 
-    /// The effect without its aliases.
+    /// The effect without its aliases, with all numbers of its shape as they are.
     pub fn alone(&self) -> Effect {
-        Effect { aliases: Vec::new(), assumed: false, ..self.clone() }
+        Effect { aliases: Vec::new(), estimated: Vec::new(), assumed: false, ..self.clone() }
+    }
+
+    /// The effect with all numbers of its shape that can be estimated declared so.
+    #[must_use]
+    pub fn with_estimated_numbers(self) -> Effect {
+        let estimated = (0..self.shape.number_names().len()).collect();
+        Effect { estimated, ..self }
     }
 
     /// Whether another effect is the same, whatever the aliases of both.
@@ -76,9 +98,45 @@ impl Effect {
         self.alone() == other.alone()
     }
 
+    /// Whether another effect is the same but for numbers of its shape that are estimated.
+    pub fn is_same_but_for_numbers(&self, other: &Effect) -> bool {
+        let with_number = |shape: Shape, which: &usize| shape.with_number(*which, other.shape.number(*which));
+        let shape = self.estimated.iter().fold(self.shape.clone(), with_number);
+        self.estimated == other.estimated && Effect { shape, ..self.alone() } == other.alone()
+    }
+
     /// The aliases that uncertainties cover: none if the effect is assumed.
     pub fn covered_aliases(&self) -> &[Effect] {
         if self.assumed { &[] } else { &self.aliases }
+    }
+
+    /// The basis functions of its coefficients at a reading, and behind them the derivatives of the effect with these
+    /// coefficients by its estimated numbers.
+    pub fn basis_with_numbers(&self, sample: &DriverSample<f64>, coefficients: &[f64], basis: &mut Vec<f64>) {
+        self.shape.basis(sample, basis);
+        for which in &self.estimated {
+            let (ends, step) = self.around_number(*which);
+            let [less, more] = ends.map(|effect| {
+                let mut own = Vec::with_capacity(coefficients.len());
+                effect.shape.basis(sample, &mut own);
+                own.iter().zip(coefficients).map(|(b, c)| b * c).sum::<f64>()
+            });
+            basis.push((more - less) / step);
+        }
+    }
+
+    /// How far an estimated number is uncertain at most, internal unit of the driver: the interval in which a search tunes
+    /// it. It serves as a weak prior, so that a number that the readings do not determine leaves the rest determined.
+    pub fn width_of_number(&self, which: usize) -> f64 {
+        let spacing = 0.5 * self.shape.number(which).abs();
+        self.shape.brackets(spacing).get(which).map_or(f64::NAN, |[low, high]| high - low)
+    }
+
+    /// The effect with one of its numbers a little smaller and a little larger, and the difference of the two numbers.
+    pub fn around_number(&self, which: usize) -> ([Effect; 2], f64) {
+        let (number, step) = (self.shape.number(which), NUMBER_STEP * self.width_of_number(which));
+        let at = |number: f64| Effect { shape: self.shape.with_number(which, number), ..self.clone() };
+        ([at(number - step), at(number + step)], 2.0 * step)
     }
 
     /// The family whose prior standard deviation is estimated from the readings: the one that it names, or its own

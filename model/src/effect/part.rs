@@ -12,7 +12,8 @@ use crate::scalar::Nominal;
 pub struct EffectPart {
     /// The component.
     pub component: Component,
-    /// `None`: the basis functions of the shape. A sign: cosine and sine a quarter of a cycle later, times this sign.
+    /// `None`: the basis functions of the shape. A sign `s`: `(cos, sin)` become `s (sin, −cos)`, the wave a quarter of a
+    /// cycle later.
     pub quadrature: Option<f64>,
 }
 
@@ -107,7 +108,7 @@ mod tests {
         }
     }
 
-    /// Columns and basis functions of the part at right angles: those of the wave a quarter of a cycle earlier, with the
+    /// Columns and basis functions of the part at right angles: those of the wave a quarter of a cycle later, with the
     /// sense as sign.
     #[test]
     fn the_part_at_right_angles_follows_by_a_quarter_of_a_cycle() {

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::{Context, Declared};
 use crate::component::ErrorKind;
 use crate::document::effect as document;
-use crate::document::fault::{Fault, Within};
+use crate::document::fault::{Fault, Help, Within};
 use crate::document::schema;
 use crate::document::value::Positive;
 use crate::driver::{Driver, column};
@@ -26,11 +26,15 @@ pub(super) fn effect(
     document: &document::Effect,
 ) -> Result<Effect, Fault> {
     let alias = |alias: &document::Effect| {
-        let own = [("alias", !alias.alias.is_empty()), ("assumed", alias.assumed.is_some())];
-        match own.into_iter().find(|(_, stated)| *stated) {
+        let own = [
+            ("alias", !alias.alias.is_empty()),
+            ("assumed", alias.assumed.is_some()),
+            ("estimate", alias.estimate.is_some()),
+        ];
+        match own.iter().find(|(_, stated)| *stated) {
             Some((key, _)) => {
                 let known = schema::fields::<document::Effect>().into_iter();
-                Err(Fault::unknown_key(key, known.filter(|key| !matches!(key.as_str(), "alias" | "assumed")).collect()))
+                Err(Fault::unknown_key(key, known.filter(|key| own.iter().all(|(own, _)| own != key)).collect()))
             }
             None => one(context, declared, columns, alias),
         }
@@ -39,7 +43,31 @@ pub(super) fn effect(
     let aliases = aliases.map(|(item, document)| alias(document).within_item(item));
     let aliases = aliases.collect::<Result<_, _>>().within("alias")?;
     let assumed = document.assumed.unwrap_or_default();
-    Ok(Effect { aliases, assumed, ..one(context, declared, columns, document)? })
+    let effect = one(context, declared, columns, document)?;
+    let estimated = estimated(&effect.shape, document.estimate.as_deref().unwrap_or_default()).within("estimate")?;
+    Ok(Effect { aliases, assumed, estimated, ..effect })
+}
+
+/// The numbers of a shape that a fit estimates, by index, ascending.
+fn estimated(shape: &Shape, names: &[String]) -> Result<Vec<usize>, Fault> {
+    let known = shape.number_names();
+    let mut estimated = Vec::with_capacity(names.len());
+    for (item, name) in names.iter().enumerate() {
+        let Some(which) = known.iter().position(|known| known == name) else {
+            let message = format!("\"{name}\" is not a number of the shape \"{}\" that can be estimated", shape.word());
+            let help: Help = match known {
+                [] => "remove `estimate`: all of its coefficients are estimated anyway".into(),
+                known => known_names(name, known).into(),
+            };
+            return Err(Fault::new(message, help).at_item(item));
+        };
+        if estimated.contains(&which) {
+            return Err(Fault::new(format!("\"{name}\" stands twice"), None).at_item(item));
+        }
+        estimated.push(which);
+    }
+    estimated.sort_unstable();
+    Ok(estimated)
 }
 
 /// An effect without its aliases.

@@ -68,6 +68,9 @@ impl ShapeKind for FirstOrderLag {
     fn brackets(&self, _: f64) -> Vec<[f64; 2]> {
         vec![[self.tau_s * 0.5, self.tau_s * 2.0]]
     }
+    fn number_names(&self) -> &'static [&'static str] {
+        &["tau"]
+    }
     fn set_number(&mut self, _: usize, value: f64) {
         self.tau_s = value;
     }

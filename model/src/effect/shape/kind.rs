@@ -185,6 +185,10 @@ pub trait ShapeKind {
         let _ = spacing;
         Vec::new()
     }
+    /// The names of the numbers that have a bracket, in their order: those of [`ShapeKind::reported`], as one word.
+    fn number_names(&self) -> &'static [&'static str] {
+        &[]
+    }
     /// Sets one of the numbers that have a bracket.
     fn set_number(&mut self, which: usize, value: f64) {
         let _ = (which, value);

@@ -104,6 +104,9 @@ impl ShapeKind for Local {
     fn brackets(&self, _: f64) -> Vec<[f64; 2]> {
         vec![[self.centre - self.width, self.centre + self.width], [self.width * 0.5, self.width * 2.0]]
     }
+    fn number_names(&self) -> &'static [&'static str] {
+        &["centre", "width"]
+    }
     fn set_number(&mut self, which: usize, value: f64) {
         match which {
             0 => self.centre = value,

@@ -106,6 +106,11 @@ impl Shape {
         changed
     }
 
+    /// One of the numbers that have a bracket.
+    pub fn number(&self, which: usize) -> f64 {
+        self.reported().get(which).and_then(|(_, values)| values.first()).copied().unwrap_or(f64::NAN)
+    }
+
     /// The same shape with other positions ([`ShapeKind::positions`]).
     #[must_use]
     pub fn with_positions(&self, positions: Vec<f64>) -> Shape {

@@ -73,6 +73,9 @@ impl ShapeKind for ReversalSpike {
     fn brackets(&self, _: f64) -> Vec<[f64; 2]> {
         vec![[self.width * 0.4, self.width * 2.5]]
     }
+    fn number_names(&self) -> &'static [&'static str] {
+        &["width"]
+    }
     fn set_number(&mut self, _: usize, value: f64) {
         self.width = value;
     }

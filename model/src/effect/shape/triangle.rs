@@ -58,6 +58,9 @@ impl ShapeKind for Triangle {
     fn brackets(&self, spacing: f64) -> Vec<[f64; 2]> {
         vec![periodic::bracket(self.period, spacing)]
     }
+    fn number_names(&self) -> &'static [&'static str] {
+        &["period"]
+    }
     fn set_number(&mut self, _: usize, value: f64) {
         self.period = value;
     }
