@@ -68,6 +68,13 @@ struct Arguments {
     /// Suppress tables and progress output; warnings and errors stay.
     #[arg(short, long, global = true)]
     quiet: bool,
+    /// Number of threads, by default all processors.
+    ///
+    /// `run` and `study` take one by default. No result depends on it.
+    ///
+    /// Example: --threads 4
+    #[arg(long, global = true, value_name = "N", value_parser = values::threads())]
+    threads: Option<u32>,
 }
 
 const COMPLETIONS: &str = "Example:
@@ -204,7 +211,7 @@ pub struct CommonArguments {
 /// Runs the command line and returns the exit status.
 pub fn run() -> ExitCode {
     interrupt::watch_termination();
-    let Arguments { command, quiet } = match Arguments::try_parse() {
+    let Arguments { command, quiet, threads } = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         // Help and version, to standard output.
         Err(shown) if !shown.use_stderr() => shown.exit(),
@@ -213,7 +220,11 @@ pub fn run() -> ExitCode {
             return ExitCode::from(2);
         }
     };
-    match execute(command, quiet) {
+    if let Some(threads) = threads {
+        // The pool of the process is made here only.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build_global();
+    }
+    match execute(command, quiet, threads) {
         Ok(()) => ExitCode::SUCCESS,
         Err(_) if interrupt::is_terminated() => ExitCode::from(interrupt::status()),
         Err(failure) => {
@@ -227,11 +238,11 @@ pub fn run() -> ExitCode {
 fn again(arguments: &[&str], quiet: bool) -> Result<(), Failure> {
     let words = std::iter::once("abbe").chain(arguments.iter().copied());
     let parsed = Arguments::try_parse_from(words).map_err(|wrong| Failure::CommandLine(wrong.to_string()))?;
-    execute(parsed.command, quiet)
+    execute(parsed.command, quiet, parsed.threads)
 }
 
 /// Runs a command.
-fn execute(command: Command, quiet: bool) -> Result<(), Failure> {
+fn execute(command: Command, quiet: bool, threads: Option<u32>) -> Result<(), Failure> {
     match command {
         Command::Equation(arguments) => equation::run(&arguments),
         Command::Volumetric(arguments) => volumetric::run(&arguments),
@@ -251,11 +262,11 @@ fn execute(command: Command, quiet: bool) -> Result<(), Failure> {
         }
         Command::History(arguments) => history::run(&arguments),
         Command::Import(arguments) => import::run(&arguments),
-        Command::Run(arguments) => run::run(&arguments),
+        Command::Run(arguments) => run::run(&arguments, threads.unwrap_or(1)),
         Command::Schema(arguments) => schema::run(&arguments),
         Command::Sheet(arguments) => sheet::run(&arguments, quiet),
         Command::Simulate(arguments) => simulate::run(&arguments),
-        Command::Study(arguments) => study::run(&arguments),
+        Command::Study(arguments) => study::run(&arguments, threads.unwrap_or(1)),
         Command::Trace(arguments) => trace::run(&arguments),
         Command::Validate(arguments) => validate::run(&arguments),
     }

@@ -16,7 +16,6 @@ use super::interrupt::Interrupts;
 use super::message::progress_bar;
 use super::results::{OutputArguments, Read};
 use super::search::SearchArguments;
-use super::values;
 use crate::report;
 
 /// Examples of `abbe run`.
@@ -56,11 +55,6 @@ pub struct RunArguments {
     /// Allow sessions to read files outside their own folders.
     #[arg(long)]
     allow_outside: bool,
-    /// Number of threads for all sessions together.
-    ///
-    /// Example: --threads 4
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::threads())]
-    threads: u32,
     #[command(flatten)]
     output: OutputArguments,
 }
@@ -75,7 +69,7 @@ fn part(text: &str) -> Result<(usize, usize), String> {
 }
 
 /// Runs `abbe run`.
-pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
+pub fn run(arguments: &RunArguments, threads: u32) -> Result<(), Failure> {
     let outputs = arguments.output.prepared(&[])?;
     let (paths, files) = list::chosen(&arguments.sessions, arguments.list.as_deref(), arguments.part)?;
     if let Some(models) = arguments.models.as_ref().filter(|models| !models.is_dir()) {
@@ -95,7 +89,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let (bar, interrupts) = (progress_bar(files.len(), "sessions", arguments.output.quiet), Interrupts::noticed());
     let Pooled { done, ended } = pool::all(
         &files,
-        arguments.threads as usize,
+        threads as usize,
         &|| !interrupts.came(),
         |file, if_claimed, should_continue| unit::run(file, &options, &places, &store, if_claimed, should_continue),
         &|| bar.inc(1),

@@ -13,7 +13,6 @@ use super::failure::Failure;
 use super::interrupt::Interrupts;
 use super::message::progress_bar;
 use super::results::{OutputArguments, Read};
-use super::values;
 use crate::report::study as present;
 
 /// Examples of `abbe study`.
@@ -30,17 +29,12 @@ pub struct StudyArguments {
     /// Example: --out study
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Number of threads for all draws together.
-    ///
-    /// Example: --threads 4
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::threads())]
-    threads: u32,
     #[command(flatten)]
     output: OutputArguments,
 }
 
 /// Runs `abbe study`.
-pub fn run(arguments: &StudyArguments) -> Result<(), Failure> {
+pub fn run(arguments: &StudyArguments, threads: u32) -> Result<(), Failure> {
     let outputs = arguments.output.prepared(&[])?;
     outputs.refuse_overwrite([arguments.study.as_path()])?;
     let study = file::read(&arguments.study)?;
@@ -50,7 +44,7 @@ pub fn run(arguments: &StudyArguments) -> Result<(), Failure> {
     let (bar, interrupts) = (progress_bar(numbers.len(), "draws", arguments.output.quiet), Interrupts::noticed());
     let Pooled { done: draws, ended } = pool::all(
         &numbers,
-        arguments.threads as usize,
+        threads as usize,
         &|| !interrupts.came(),
         |number, if_claimed, should_continue| {
             let draw = study::run(&study, *number, &store, if_claimed, should_continue)?;

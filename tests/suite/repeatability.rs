@@ -209,3 +209,22 @@ fn equations_and_maps() {
         ],
     );
 }
+
+/// The option of the command has the effect of the environment, and none on the result.
+#[test]
+fn the_option_for_threads_changes_no_result() {
+    let folder = tempfile::tempdir().unwrap();
+    let session = ready("hermle-c600u/measured/session.toml");
+    let result = |threads: &str| {
+        let json = folder.path().join(format!("{threads}.json"));
+        let output = Command::new(env!("CARGO_BIN_EXE_abbe"))
+            .args(["fit", session.to_str().unwrap(), "--threads", threads, "--json", json.to_str().unwrap()])
+            .output()
+            .expect("the command starts");
+        (output.status.success(), fs::read(json).ok(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let [(_, one, _), (_, two, _)] = ["1", "2"].map(result);
+    assert!(one.is_some() && one == two);
+    let (is_done, _, said) = result("0");
+    assert!(!is_done && said.contains("--threads"), "{said}");
+}
