@@ -85,9 +85,9 @@ impl Linearisation {
 }
 
 /// Whether a parameter is a target of the plan: an error of the machine or a coefficient of a declared effect, not a
-/// set-up quantity.
+/// set-up quantity or a number of a shape.
 pub fn is_of_interest(parameter: &Parameter) -> bool {
-    parameter.role != Role::Setup
+    matches!(parameter.role, Role::Error | Role::Coefficient { .. })
 }
 
 /// The prior standard uncertainty of a set-up quantity, internal unit.

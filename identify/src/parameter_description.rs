@@ -74,6 +74,11 @@ pub(crate) fn coefficient_meaning(machine: &Machine, effect: &Effect, coefficien
 pub fn parameter_meaning(problem: &Problem, index: usize, coefficient: Option<&str>) -> String {
     let (machine, parameter) = (&problem.session.machine, &problem.parameters.list[index]);
     match parameter.role {
+        Role::Number { effect, number } => {
+            let effect = &problem.parameters.effects[effect];
+            let name = effect.shape.reported().get(number).map_or("", |(name, _)| *name);
+            format!("{}, {name}", meaning(machine, effect))
+        }
         Role::Error => error_meaning(machine, &parameter.id),
         Role::Setup => setup_meaning(machine, &parameter.id),
         Role::Coefficient { effect, coefficient: k } => {

@@ -29,6 +29,14 @@ pub enum Role {
         /// Index among its coefficients.
         coefficient: usize,
     },
+    /// A number of the shape of an effect, as its change from the number of the shape. The readings depend on it through
+    /// the coefficients: see [`Parameters::linearise_numbers`].
+    Number {
+        /// Index among the effects.
+        effect: usize,
+        /// Index among the numbers of the shape.
+        number: usize,
+    },
 }
 
 /// One parameter.
@@ -91,7 +99,7 @@ impl TestParameters {
 /// The parameters of a session.
 #[derive(Clone, Debug, Default)]
 pub struct Parameters {
-    /// Errors first, then set-up quantities, then coefficients of effects.
+    /// Errors first, then set-up quantities, then of each effect the coefficients and the estimated numbers of its shape.
     pub list: Vec<Parameter>,
     /// For each test with readings, the contributions of parameters to slots.
     pub contributions: Vec<Vec<SlotContribution>>,
@@ -241,67 +249,30 @@ impl Parameters {
         };
         let mut largest = vec![0.0_f64; effect.shape.coefficients()];
         for (position, (test, model)) in tests.iter().zip(models).enumerate() {
-            if !effect.acts_in(&test.name) {
-                continue;
+            let Some(basis) = BasisOverTest::of(session, test, model, reference, effect)? else { continue };
+            for (most, column) in largest.iter_mut().zip(&basis.columns) {
+                *most = column.iter().fold(*most, |most, value| most.max(value.abs()));
             }
-            let Some(readings) = &test.readings else { continue };
-            let driver = effect.driver.kind();
-            let input = DriverInput {
-                machine: &session.machine,
-                model,
-                readings,
-                reference,
-                component_axis: effect.component.axis(&session.machine),
-                lag_s: effect.shape.lag_s(),
-            };
-            let samples = driver.samples(&input).ok_or_else(|| IdentifyError::MissingDriver {
-                effect: effect.id(),
-                driver: effect.driver.to_string(),
-                test: test.name.clone(),
-                column: driver.missing_column(readings).unwrap_or_else(|| effect.driver.to_string()),
-            })?;
-            let effective = model.effective_slots();
-            let columns: Vec<Arc<Vec<f64>>> = effect.shape.columns(&samples).into_iter().map(Arc::new).collect();
-            for (k, column) in columns.iter().enumerate() {
-                largest[k] = column.iter().fold(largest[k], |most, value| most.max(value.abs()));
-            }
-            let parameters = test.station.kind().unknowns();
-            for (slot, factor, columns) in effect.parts(&session.machine).into_iter().flat_map(|part| {
-                let slots = part.component.slots_in(&session.machine, parameters, readings).into_iter();
-                let of_part = match part.quadrature {
-                    None => columns.clone(),
-                    Some(_) => part
-                        .columns(columns.iter().map(|column| column.to_vec()).collect())
-                        .into_iter()
-                        .map(Arc::new)
-                        .collect(),
-                };
-                slots.map(move |(slot, factor)| (slot, factor, of_part.clone()))
-            }) {
-                if !effective.contains(&slot) {
-                    continue;
-                }
-                for (k, column) in columns.iter().enumerate() {
-                    let basis = match &factor {
-                        None => column.clone(),
-                        Some(factor) => Arc::new(column.iter().zip(factor).map(|(b, f)| b * f).collect()),
-                    };
-                    self.contributions[position].push(SlotContribution {
-                        parameter: first + k,
-                        slot,
-                        basis: Some(basis),
-                    });
-                }
-            }
+            self.contributions[position].extend(basis.contributions(first));
         }
+        let dot = |name: &str| if name.is_empty() { "" } else { "." };
         for (k, name) in effect.shape.coefficient_names().into_iter().enumerate() {
-            let dot = if name.is_empty() { "" } else { "." };
             self.push(Parameter {
-                id: format!("{id}{dot}{name}"),
+                id: format!("{id}{}{name}", dot(&name)),
                 unit: Unit::of_effect(session, effect, k),
                 size: if largest[k] > 0.0 { size / largest[k] } else { size },
                 prior,
                 role: Role::Coefficient { effect: number, coefficient: k },
+            })?;
+        }
+        for which in &effect.estimated {
+            let width = effect.width_of_number(*which);
+            self.push(Parameter {
+                id: format!("{id}.{}", effect.shape.number_names()[*which]),
+                unit: Unit::of_number(session, effect),
+                size: width,
+                prior: Prior::Gaussian(width),
+                role: Role::Number { effect: number, number: *which },
             })?;
         }
         self.effects.push(effect.clone());
@@ -314,7 +285,7 @@ impl Parameters {
     pub(crate) fn without_families(&self) -> (Parameters, Vec<usize>) {
         let of_family = |parameter: &Parameter| match parameter.role {
             Role::Coefficient { effect, .. } => self.effects[effect].family().is_some(),
-            Role::Error | Role::Setup => false,
+            Role::Error | Role::Setup | Role::Number { .. } => false,
         };
         let kept: Vec<usize> = (0..self.list.len()).filter(|j| !of_family(&self.list[*j])).collect();
         let contribution = |contribution: &SlotContribution| {
@@ -331,6 +302,72 @@ impl Parameters {
             ..self.clone()
         };
         (parameters, kept)
+    }
+
+    /// Whether numbers of shapes are among the parameters.
+    pub(crate) fn has_numbers(&self) -> bool {
+        self.effects.iter().any(|effect| !effect.estimated.is_empty())
+    }
+
+    /// The value of a parameter at the parameters `beta`, internal units: a number of a shape is stated itself, not as its
+    /// change.
+    pub fn value(&self, parameter: usize, beta: &[f64]) -> f64 {
+        match self.list[parameter].role {
+            Role::Number { effect, number } => self.effects[effect].shape.number(number) + beta[parameter],
+            Role::Error | Role::Setup | Role::Coefficient { .. } => beta[parameter],
+        }
+    }
+
+    /// Adds the changes of estimated numbers in `beta` to the shapes, sets them to zero, and linearises the model in these
+    /// numbers at the coefficients in `beta`:
+    ///
+    /// ```text
+    /// ∂component/∂n = Σ_k c_k · ∂b_k(driver; n)/∂n
+    /// ```
+    ///
+    /// # Errors
+    /// If the data lack the column of a driver.
+    pub(crate) fn linearise_numbers(
+        &mut self,
+        session: &Session,
+        tests: &[Test],
+        models: &[TestModel],
+        reference: &Reference,
+        beta: &mut [f64],
+    ) -> Result<(), IdentifyError> {
+        for index in 0..self.effects.len() {
+            if self.effects[index].estimated.is_empty() {
+                continue;
+            }
+            let own = |role: Role| match role {
+                Role::Coefficient { effect, .. } | Role::Number { effect, .. } => effect == index,
+                Role::Error | Role::Setup => false,
+            };
+            let places: Vec<usize> = (0..self.list.len()).filter(|j| own(self.list[*j].role)).collect();
+            let count = self.effects[index].shape.coefficients();
+            let (coefficients, numbers) = places.split_at(count);
+            let mut effect = self.effects[index].clone();
+            for (j, which) in numbers.iter().zip(&self.effects[index].estimated) {
+                let number = effect.shape.number(*which) + std::mem::take(&mut beta[*j]);
+                effect.shape = effect.shape.with_number(*which, number);
+            }
+            let values: Vec<f64> = coefficients.iter().map(|j| beta[*j]).collect();
+            for (position, (test, model)) in tests.iter().zip(models).enumerate() {
+                let contributions = &mut self.contributions[position];
+                contributions.retain(|contribution| !places.contains(&contribution.parameter));
+                let over = |effect: &Effect| BasisOverTest::of(session, test, model, reference, effect);
+                let Some(basis) = over(&effect)? else { continue };
+                contributions.extend(basis.contributions(coefficients[0]));
+                for (parameter, which) in numbers.iter().zip(&effect.estimated) {
+                    let ([less, more], step) = effect.around_number(*which);
+                    if let (Some(less), Some(more)) = (over(&less)?, over(&more)?) {
+                        contributions.extend(more.less(&less, &values, step, *parameter));
+                    }
+                }
+            }
+            self.effects[index] = effect;
+        }
+        Ok(())
     }
 
     /// The components of every test at the parameters `beta` (internal units).
@@ -364,6 +401,96 @@ impl Parameters {
                 values
             })
             .collect()
+    }
+}
+
+/// The basis functions of an effect over the readings of a test.
+struct BasisOverTest {
+    /// One column per coefficient.
+    columns: Vec<Arc<Vec<f64>>>,
+    /// The slots that the readings depend on, each with the basis functions as they act on it.
+    slots: Vec<(usize, Vec<Arc<Vec<f64>>>)>,
+}
+
+impl BasisOverTest {
+    /// `None` if the effect does not act in the test, or the test has no readings.
+    ///
+    /// # Errors
+    /// If the data lack the column of the driver.
+    fn of(
+        session: &Session,
+        test: &Test,
+        model: &TestModel,
+        reference: &Reference,
+        effect: &Effect,
+    ) -> Result<Option<BasisOverTest>, IdentifyError> {
+        let Some(readings) = test.readings.as_ref().filter(|_| effect.acts_in(&test.name)) else { return Ok(None) };
+        let driver = effect.driver.kind();
+        let input = DriverInput {
+            machine: &session.machine,
+            model,
+            readings,
+            reference,
+            component_axis: effect.component.axis(&session.machine),
+            lag_s: effect.shape.lag_s(),
+        };
+        let samples = driver.samples(&input).ok_or_else(|| IdentifyError::MissingDriver {
+            effect: effect.id(),
+            driver: effect.driver.to_string(),
+            test: test.name.clone(),
+            column: driver.missing_column(readings).unwrap_or_else(|| effect.driver.to_string()),
+        })?;
+        let effective = model.effective_slots();
+        let columns: Vec<Arc<Vec<f64>>> = effect.shape.columns(&samples).into_iter().map(Arc::new).collect();
+        let unknowns = test.station.kind().unknowns();
+        let mut slots = Vec::new();
+        for part in effect.parts(&session.machine) {
+            let of_part: Vec<Arc<Vec<f64>>> = match part.quadrature {
+                None => columns.clone(),
+                Some(_) => {
+                    let own = part.columns(columns.iter().map(|column| column.to_vec()).collect());
+                    own.into_iter().map(Arc::new).collect()
+                }
+            };
+            for (slot, factor) in part.component.slots_in(&session.machine, unknowns, readings) {
+                if !effective.contains(&slot) {
+                    continue;
+                }
+                let scaled = |column: &Arc<Vec<f64>>| match &factor {
+                    None => column.clone(),
+                    Some(factor) => Arc::new(column.iter().zip(factor).map(|(b, f)| b * f).collect()),
+                };
+                slots.push((slot, of_part.iter().map(scaled).collect()));
+            }
+        }
+        Ok(Some(BasisOverTest { columns, slots }))
+    }
+
+    /// The contributions of its coefficients, which begin with the parameter `first`.
+    fn contributions(self, first: usize) -> impl Iterator<Item = SlotContribution> {
+        self.slots.into_iter().flat_map(move |(slot, columns)| {
+            let columns = columns.into_iter().enumerate();
+            columns.map(move |(k, basis)| SlotContribution { parameter: first + k, slot, basis: Some(basis) })
+        })
+    }
+
+    /// The contributions of a number of the shape, as the quotient of the difference from another basis and a step of the
+    /// number, at some coefficients.
+    fn less(
+        &self,
+        other: &BasisOverTest,
+        coefficients: &[f64],
+        step: f64,
+        parameter: usize,
+    ) -> impl Iterator<Item = SlotContribution> {
+        self.slots.iter().zip(&other.slots).map(move |((slot, more), (_, less))| {
+            let mut basis = vec![0.0; more.first().map_or(0, |column| column.len())];
+            for (coefficient, (more, less)) in coefficients.iter().zip(more.iter().zip(less)) {
+                let quotients = more.iter().zip(less.iter()).map(|(more, less)| coefficient * (more - less) / step);
+                basis.iter_mut().zip(quotients).for_each(|(sum, quotient)| *sum += quotient);
+            }
+            SlotContribution { parameter, slot: *slot, basis: Some(Arc::new(basis)) }
+        })
     }
 }
 

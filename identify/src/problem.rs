@@ -26,7 +26,7 @@ use crate::heldout::folds::Folds;
 use crate::noise::Noise;
 use crate::numerics::parallel;
 use crate::numerics::triangle::BLOCK_ROWS;
-use crate::parameters::{Parameters, TestParameters};
+use crate::parameters::{Parameters, Role, TestParameters};
 use crate::unit::ReadingUnit;
 use abbe_model::driver::Reference;
 
@@ -84,6 +84,8 @@ fn weighted(session: &Session, station: &Station<f64>, readings: Arc<Readings>) 
     Arc::new(readings)
 }
 
+/// Largest factor by which one step changes a number that must be positive.
+const MAX_FACTOR_OF_NUMBER: f64 = 3.0;
 /// Mean number of readings below which runs are evaluated together.
 const SHORT_RUN: usize = 8;
 impl Problem {
@@ -147,6 +149,44 @@ impl Problem {
         self.parameters.add_effect(&self.session, &self.tests, &self.models, &self.reference, effect)?;
         self.update_test_parameters();
         Ok(())
+    }
+
+    /// Linearises the model in the estimated numbers of shapes ([`Parameters::linearise_numbers`]).
+    ///
+    /// # Errors
+    /// As there.
+    pub(crate) fn linearise_numbers(&mut self, beta: &mut [f64]) -> Result<(), IdentifyError> {
+        if self.parameters.has_numbers() {
+            let (tests, models) = (&self.tests, &self.models);
+            self.parameters.linearise_numbers(&self.session, tests, models, &self.reference, beta)?;
+            self.update_test_parameters();
+        }
+        Ok(())
+    }
+
+    /// Limits the changes of estimated numbers to what their shapes permit and to a factor of [`MAX_FACTOR_OF_NUMBER`].
+    pub(crate) fn bound_numbers(&self, beta: &mut [f64]) {
+        for (parameter, change) in self.parameters.list.iter().zip(beta) {
+            let Role::Number { effect, number } = parameter.role else { continue };
+            let shape = &self.parameters.effects[effect].shape;
+            let present = shape.number(number);
+            let is_valid = |change: f64| shape.with_number(number, present + change).check().is_ok();
+            if !is_valid(-2.0 * present.abs()) {
+                let [low, high] = [1.0 / MAX_FACTOR_OF_NUMBER, MAX_FACTOR_OF_NUMBER].map(|factor| factor * present);
+                *change = change.clamp(low - present, high - present);
+            }
+        }
+    }
+
+    /// Whether the shapes can have their numbers with these changes.
+    pub(crate) fn has_valid_numbers(&self, beta: &[f64]) -> bool {
+        self.parameters.list.iter().zip(beta).all(|(parameter, change)| match parameter.role {
+            Role::Number { effect, number } => {
+                let shape = &self.parameters.effects[effect].shape;
+                shape.with_number(number, shape.number(number) + change).check().is_ok()
+            }
+            Role::Error | Role::Setup | Role::Coefficient { .. } => true,
+        })
     }
 
     fn update_test_parameters(&mut self) {

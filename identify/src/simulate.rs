@@ -333,7 +333,7 @@ fn unknown_identifier(parameters: &Parameters, id: &str) -> IdentifyError {
         let chosen = parameters.list.iter().filter(|parameter| match parameter.role {
             Role::Coefficient { .. } => coefficients,
             Role::Setup => !coefficients,
-            Role::Error => false,
+            Role::Error | Role::Number { .. } => false,
         });
         chosen.map(|parameter| parameter.id.as_str()).collect::<Vec<_>>()
     };

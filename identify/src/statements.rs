@@ -246,7 +246,7 @@ fn further(problem: &Problem, parameters: &[ParameterResult]) -> Vec<ParameterRe
     };
     let ratio = |found: &ParameterResult| (found.value / found.u).abs();
     let mut list: Vec<(Option<usize>, ParameterResult)> = Vec::new();
-    // The phase of an amplitude is no size.
+    // The phase of an amplitude and the numbers of a shape are no sizes.
     for found in parameters.iter().filter(|found| found.exceeds_u() && !found.id.ends_with(".phase")) {
         // The order of another effect may continue an identifier: `EZC~C:h2` and `EZC~C:h2.5`.
         let ids = problem.parameters.effect_ids.iter().enumerate().filter(|(_, id)| {
@@ -255,6 +255,9 @@ fn further(problem: &Problem, parameters: &[ParameterResult]) -> Vec<ParameterRe
         });
         let effect = ids.max_by_key(|(_, id)| id.len()).map(|(number, _)| number);
         let same = problem.parameters.list.iter().find(|parameter| parameter.id == found.id);
+        if same.is_some_and(|parameter| matches!(parameter.role, Role::Number { .. })) {
+            continue;
+        }
         let is_setup = same.is_some_and(|parameter| parameter.role == Role::Setup);
         match list.iter_mut().find(|(other, _)| effect.is_some() && *other == effect) {
             Some((_, other)) if ratio(found) > ratio(other) => *other = found.clone(),

@@ -69,6 +69,15 @@ impl ReadingUnit {
 pub const ARCSEC: f64 = 180.0 * 3600.0 / std::f64::consts::PI;
 
 impl Unit {
+    /// The unit of the numbers of the shape of an effect: that of its driver, or a time constant.
+    pub fn of_number(session: &Session, effect: &Effect) -> Unit {
+        if effect.shape.lag_s().is_some() {
+            return Unit { name: "s".to_string(), display_per_internal: 1.0 };
+        }
+        let unit = effect.driver_unit(&session.machine);
+        Unit { name: unit.result.to_string(), display_per_internal: unit.to_display(1.0) }
+    }
+
     /// The unit of a component.
     pub fn of(internal_unit: InternalUnit) -> Unit {
         let (name, display_per_internal) = match internal_unit {

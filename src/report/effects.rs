@@ -1,6 +1,6 @@
 //! Effects that a trace has found, each beside its competing explanations.
 
-use abbe::identify::results::{AliasResult, EffectName, EffectResult, SeparatingTestResult};
+use abbe::identify::results::{AliasResult, EffectName, EffectResult, SeparatingTestResult, ShapeParameter};
 use abbe::identify::trace::TraceOutcome;
 use abbe::identify::trace::alias::CompetingEffect;
 use abbe::model::words::counted;
@@ -84,7 +84,12 @@ pub fn estimate(effect: &EffectResult) -> String {
         let value = quantity(&format!("{value} ± {u}"), &parameter.unit);
         format!("{coefficient}{separator} {value}").trim().to_string()
     });
-    let numbers = effect.shape_parameters.iter().map(shape_number);
+    // Estimated numbers are among the parameters.
+    let is_fixed = |number: &&ShapeParameter| {
+        let name = if number.name == "time constant" { "tau" } else { &number.name };
+        !effect.parameters.iter().any(|parameter| parameter.id.ends_with(&format!(".{name}")))
+    };
+    let numbers = effect.shape_parameters.iter().filter(is_fixed).map(shape_number);
     values.chain(numbers).collect::<Vec<_>>().join(", ")
 }
 

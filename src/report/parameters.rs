@@ -143,6 +143,12 @@ pub fn table(parameters: &[&ParameterResult], before: Option<&[ParameterResult]>
             .notes
             .push(format!("{PRIOR}: |value| > U, if the set-up is as stated; the readings alone do not show it"));
     }
+    for parameter in parameters {
+        let Some([low, high]) = parameter.interval_95 else { continue };
+        let (id, unit) = (&parameter.id, unit(&parameter.unit));
+        let [low, high] = [low, high].map(|end| Cell::fixed(end, places(parameter.u)));
+        table.notes.push(format!("{id}: 95 % interval from {low} to {high} {unit}, since χ² is not parabolic in it"));
+    }
     beside(table, parameters, before)
 }
 

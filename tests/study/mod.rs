@@ -16,6 +16,7 @@ mod clean;
 mod columns;
 mod fleet;
 mod gate;
+mod numbers;
 mod outside;
 mod pairs;
 mod single;

@@ -164,7 +164,7 @@ fn pair(a: &Named<'_>, b: &Named<'_>, options: &CompareOptions) -> Result<Compar
         let mut ids: BTreeMap<String, ()> = BTreeMap::new();
         for j in missing.filter(|j| !own.parameters[*j].held) {
             let id = match own.parameters[j].role {
-                Role::Coefficient { effect, .. } => own.effects[effect].id(),
+                Role::Coefficient { effect, .. } | Role::Number { effect, .. } => own.effects[effect].id(),
                 _ => own.parameters[j].id.clone(),
             };
             ids.insert(id, ());
@@ -197,8 +197,9 @@ fn common(a: &IdentifiedModel, b: &IdentifiedModel) -> Vec<(usize, usize)> {
         let (p, q) = (&a.parameters[i], &b.parameters[j]);
         p.id == q.id
             && match (p.role, q.role) {
-                (Role::Coefficient { effect: e, .. }, Role::Coefficient { effect: f, .. }) => {
-                    a.effects[e].is_same(&b.effects[f])
+                (Role::Coefficient { effect: e, .. }, Role::Coefficient { effect: f, .. })
+                | (Role::Number { effect: e, .. }, Role::Number { effect: f, .. }) => {
+                    a.effects[e].is_same_but_for_numbers(&b.effects[f])
                 }
                 (p, q) => p == q,
             }

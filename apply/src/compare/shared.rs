@@ -59,7 +59,7 @@ pub(super) fn difference(
     let mut shared = shared(a, b, things)?;
     let refuted = refuted(a, b, &mut shared);
     if shared.is_empty() {
-        let delta = common.iter().map(|(i, j)| b.parameters[*j].value - a.parameters[*i].value).collect();
+        let delta = common.iter().map(|(i, j)| b.estimate(*j) - a.estimate(*i)).collect();
         let covariance = Mat::from_fn(common.len(), common.len(), |k, l| {
             a.covariance[(common[k].0, common[l].0)] + b.covariance[(common[k].1, common[l].1)]
         });
@@ -76,7 +76,7 @@ pub(super) fn difference(
     let mut gradient = vec![0.0; count];
     let mut add = |model: &IdentifiedModel, place: &dyn Fn(usize) -> usize| -> Result<(), ApplyError> {
         let own = inverse(model)?;
-        let value: Vec<f64> = model.parameters.iter().map(|parameter| parameter.value).collect();
+        let value: Vec<f64> = (0..model.parameters.len()).map(|j| model.estimate(j)).collect();
         for i in 0..value.len() {
             for j in 0..value.len() {
                 information[(place(i), place(j))] += own[(i, j)];

@@ -28,28 +28,35 @@ pub struct ErrorCurve {
     /// The positions through which the axis moved while readings observed the error, mm or rad.
     pub range: Range<f64>,
     terms: Vec<(Effect, Vec<f64>)>,
-    /// The indices of the terms' coefficients among the fit's parameters, term by term.
-    coefficients: Vec<usize>,
-    /// Covariance of the coefficients, row by row, with the fit's factor on uncertainties; internal units.
+    /// The indices of the terms' coefficients and estimated numbers among the fit's parameters, term by term.
+    unknowns: Vec<usize>,
+    /// Their covariance, row by row, with the fit's factor on uncertainties; internal units.
     covariance: Vec<Vec<f64>>,
 }
 
 impl ErrorCurve {
-    /// The basis functions of all terms at a position (mm or rad), approached in a direction (+1 or −1).
+    /// The derivatives of the error by the unknowns of all terms at a position (mm or rad), approached in a direction (+1
+    /// or −1).
     fn basis(&self, position: f64, direction: f64) -> Vec<f64> {
         let sample = DriverSample { value: position, direction, ..DriverSample::default() };
-        let mut basis = Vec::with_capacity(self.coefficients.len());
-        for (effect, _) in &self.terms {
-            effect.shape.basis(&sample, &mut basis);
+        let mut basis = Vec::with_capacity(self.unknowns.len());
+        for (effect, coefficients) in &self.terms {
+            effect.basis_with_numbers(&sample, coefficients, &mut basis);
         }
         basis
     }
 
     /// The error at a position (mm or rad), approached in a direction (+1 or −1), mm or rad.
     pub fn at(&self, position: f64, direction: f64) -> f64 {
-        let coefficients = self.terms.iter().flat_map(|(_, coefficients)| coefficients);
-        let basis = self.basis(position, direction);
-        basis.iter().zip(coefficients).map(|(b, k)| b * k).sum()
+        let sample = DriverSample { value: position, direction, ..DriverSample::default() };
+        let mut basis = Vec::new();
+        let mut sum = 0.0;
+        for (effect, coefficients) in &self.terms {
+            basis.clear();
+            effect.shape.basis(&sample, &mut basis);
+            sum += basis.iter().zip(coefficients).map(|(b, k)| b * k).sum::<f64>();
+        }
+        sum
     }
 
     /// The standard uncertainty of [`ErrorCurve::at`], mm or rad.
@@ -152,9 +159,11 @@ pub fn of_fit(problem: &Problem, fit: &Fit) -> Compensation {
             continue;
         };
         let term = (effect.clone(), coefficients.iter().map(|j| fit.beta[*j]).collect());
+        let is_number = |j: &usize| matches!(list[*j].role, Role::Number { effect, .. } if effect == index);
+        let unknowns = coefficients.into_iter().chain((0..list.len()).filter(is_number));
         if let Some(curve) = result.curves.iter_mut().find(|curve| curve.error == *error) {
             curve.terms.push(term);
-            curve.coefficients.extend(coefficients);
+            curve.unknowns.extend(unknowns);
             continue;
         }
         let Some(observed) = observed_range(problem, error, axis) else {
@@ -176,17 +185,17 @@ pub fn of_fit(problem: &Problem, fit: &Fit) -> Compensation {
             axis,
             range: observed.range,
             terms: vec![term],
-            coefficients,
+            unknowns: unknowns.collect(),
             covariance: Vec::new(),
         });
     }
     let covariance = fit.covariance_with_aliases();
     for curve in &mut result.curves {
         let row = |j: &usize| -> Vec<f64> {
-            let columns = curve.coefficients.iter();
+            let columns = curve.unknowns.iter();
             columns.map(|k| covariance[(*j, *k)]).collect()
         };
-        curve.covariance = curve.coefficients.iter().map(row).collect();
+        curve.covariance = curve.unknowns.iter().map(row).collect();
     }
     result
 }

@@ -194,7 +194,7 @@ impl<'m> Lines<'m> {
         let states = States { readings: self.grid.clone(), tool_mm: self.tool_mm, table_mm: model.table_mm };
         let carried = model.carried_parameters();
         let used = |parameter: usize| match model.parameters[parameter].role {
-            Role::Coefficient { effect, .. } => follows_position(&model.effects[effect]),
+            Role::Coefficient { effect, .. } | Role::Number { effect, .. } => follows_position(&model.effects[effect]),
             _ => true,
         };
         let mut slots: Vec<usize> = Vec::new();
@@ -222,7 +222,7 @@ impl<'m> Lines<'m> {
             changes.push((parameter, self.solve(free, &[&column]).column(0).into_owned()));
             let own = &model.parameters[parameter];
             let id = match own.role {
-                Role::Coefficient { effect, .. } => model.effects[effect].id(),
+                Role::Coefficient { effect, .. } | Role::Number { effect, .. } => model.effects[effect].id(),
                 _ => own.id.clone(),
             };
             let vectors = column.iter().map(|vector| vector * own.value);

@@ -52,7 +52,7 @@ impl Gauge {
         let kind = |parameter: &Parameter| {
             let kind = match parameter.role {
                 Role::Error => 0,
-                Role::Coefficient { .. } => 1,
+                Role::Coefficient { .. } | Role::Number { .. } => 1,
                 Role::Setup => 2,
             };
             if self == Gauge::SetUp { 2 - kind } else { kind }

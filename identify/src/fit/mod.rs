@@ -10,6 +10,7 @@ pub(crate) mod assume;
 pub mod base;
 mod covariance;
 pub(crate) mod families;
+pub(crate) mod numbers;
 pub(crate) mod outcome;
 mod prepare;
 mod quantities;
@@ -34,8 +35,9 @@ use crate::problem::Problem;
 pub use aliases::{AliasChange, EffectAliases};
 pub use assume::assume;
 pub(crate) use covariance::{null_space, of_parameters as covariance_of_parameters};
+pub use numbers::NumberInterval;
 pub use prepare::{prepare, with_lever};
-pub(crate) use prepare::{prepare_with, with_families};
+pub(crate) use prepare::{prepare_with, refit, with_families};
 pub(crate) use quantities::{Quantity, quantities, values_at};
 pub(crate) use reported::{ids, rms_of_units};
 pub use reported::{outliers, parameters, report, unobservable};
@@ -69,6 +71,8 @@ pub struct Fit {
     pub u_enlargement: f64,
     /// How the parameters change if an alias takes the place of an effect, for each effect with aliases.
     pub aliases: Vec<EffectAliases>,
+    /// The 95 % intervals of the numbers of shapes in which χ² is not parabolic.
+    pub intervals: Vec<NumberInterval>,
 }
 
 /// Significance level of the χ² test of the residual against the noise.
@@ -203,6 +207,7 @@ fn finish(problem: &Problem, minimum: Minimum) -> Result<Fit, IdentifyError> {
         p_value,
         u_enlargement: if p_value < BIRGE_SIGNIFICANCE { birge_ratio.max(1.0) } else { 1.0 },
         aliases,
+        intervals: Vec::new(),
     })
 }
 

@@ -60,7 +60,9 @@ impl Determined {
             }
         };
         let mut determined = Determined { by: (0..list.len()).map(of_null_space).collect(), by_prior: Vec::new() };
-        let has_prior = |role: Role, prior: Prior| role == Role::Setup && matches!(prior, Prior::Gaussian(_));
+        let is_number = |role: Role| matches!(role, Role::Number { .. });
+        let has_prior =
+            |role: Role, prior: Prior| (role == Role::Setup || is_number(role)) && matches!(prior, Prior::Gaussian(_));
         if !list.iter().any(|parameter| has_prior(parameter.role, parameter.prior)) {
             return Ok(determined);
         }
@@ -69,7 +71,8 @@ impl Determined {
         let linear = Linearisation::of(&problem, &vec![0.0; kept.len()])?;
         let alone = Rank::decide(&linear.readings, &linear.size, &linear.preference)?;
         for (k, j) in kept.iter().enumerate() {
-            let by_prior = is_of_interest(&list[*j]) && linear.rank.is_identifiable(k) && !alone.is_identifiable(k);
+            let of_interest = is_of_interest(&list[*j]) || is_number(list[*j].role);
+            let by_prior = of_interest && linear.rank.is_identifiable(k) && !alone.is_identifiable(k);
             if by_prior && determined.by[*j] == DeterminedBy::Readings {
                 determined.by[*j] = DeterminedBy::Prior;
             }

@@ -9,6 +9,7 @@ use faer::Mat;
 
 use super::Fit;
 use super::families::{FoldEquations, families};
+use super::numbers::{fit_with_numbers, intervals};
 use crate::error::IdentifyError;
 use crate::heldout::{rms_by_unit_mm, rms_mm};
 use crate::noise::outliers;
@@ -41,6 +42,22 @@ pub fn prepare(session: &Session, seed: u64) -> Result<(Problem, Fit), IdentifyE
 /// # Errors
 /// See [`prepare`].
 pub(crate) fn prepare_with(session: &Session, effects: &[Effect], seed: u64) -> Result<(Problem, Fit), IdentifyError> {
+    let (problem, mut fit) = prepare_at_noise(session, effects, seed)?;
+    fit.intervals = intervals(&problem, &fit)?;
+    Ok((problem, fit))
+}
+
+/// Fits a problem anew from a solution, after a change of its noise.
+///
+/// # Errors
+/// If the iterations do not converge.
+pub(crate) fn refit(problem: &mut Problem, present: &Fit) -> Result<Fit, IdentifyError> {
+    let mut fit = fit_with_numbers(problem, Some(&present.beta))?;
+    fit.intervals = intervals(problem, &fit)?;
+    Ok(fit)
+}
+
+fn prepare_at_noise(session: &Session, effects: &[Effect], seed: u64) -> Result<(Problem, Fit), IdentifyError> {
     if session.is_lever_known() {
         return prepare_at_lever(session, effects, seed);
     }
@@ -128,6 +145,10 @@ fn prepare_at_lever(session: &Session, effects: &[Effect], seed: u64) -> Result<
     let mut start = vec![0.0; problem.parameters.list.len()];
     kept.iter().zip(&fit.beta).for_each(|(j, value)| start[*j] = *value);
     (problem.noise, problem.rejected) = (without.noise, without.rejected);
+    for (effect, settled) in problem.parameters.effects.iter_mut().zip(&without.parameters.effects) {
+        effect.shape.clone_from(&settled.shape);
+    }
+    problem.linearise_numbers(&mut start)?;
     with_families(problem, start)
 }
 
@@ -137,7 +158,8 @@ fn settled(mut problem: Problem, stated: bool, floor: f64) -> Result<(Problem, F
         problem.noise =
             Noise::white(nominal_residual_mm(&problem)?.max(floor).max(MIN_NOISE_MM), NoiseSource::Residual);
     }
-    let mut fit = plausibility::checked(&problem, super::fit(&problem, None))?;
+    let found = fit_with_numbers(&mut problem, None);
+    let mut fit = plausibility::checked(&problem, found)?;
     // Noise and outliers depend on the residuals, and the residuals on the fit. The returned fit always uses the
     // returned noise.
     for _ in 0..MAX_ROUNDS {
@@ -150,7 +172,8 @@ fn settled(mut problem: Problem, stated: bool, floor: f64) -> Result<(Problem, F
             break;
         }
         problem.noise = noise;
-        fit = plausibility::checked(&problem, super::fit(&problem, Some(&fit.beta)))?;
+        let found = fit_with_numbers(&mut problem, Some(&fit.beta));
+        fit = plausibility::checked(&problem, found)?;
     }
     Ok((problem, fit))
 }

@@ -67,7 +67,7 @@ pub(crate) fn values_at(
     let list = &problem.parameters.list;
     for quantity in quantities {
         match *quantity {
-            Quantity::Parameter(j) => accept(beta[j] * list[j].unit.display_per_internal),
+            Quantity::Parameter(j) => accept(problem.parameters.value(j, beta) * list[j].unit.display_per_internal),
             Quantity::Rms(j, count) => accept(rms_of_waves(&beta[j..j + count]) * list[j].unit.display_per_internal),
             Quantity::Harmonic(j) => {
                 accept(beta[j].hypot(beta[j + 1]) * list[j].unit.display_per_internal);

@@ -113,12 +113,14 @@ pub fn parameters(problem: &Problem, fit: &Fit) -> Vec<ParameterResult> {
             Quantity::Rms(j, count) => results.push(rms_of_spectrum(problem, fit, j, count)),
             Quantity::Parameter(j) => {
                 let unit = &list[j].unit;
-                let value = fit.beta[j] * unit.display_per_internal;
+                let value = problem.parameters.value(j, &fit.beta) * unit.display_per_internal;
                 let u = u_internal(j) * unit.display_per_internal;
-                results.push(
-                    ParameterResult::new(&list[j].id, value, u, &unit.name)
-                        .with_meaning(parameter_meaning(problem, j, None)),
-                );
+                let mut result = ParameterResult::new(&list[j].id, value, u, &unit.name)
+                    .with_meaning(parameter_meaning(problem, j, None));
+                let interval = fit.intervals.iter().find(|interval| interval.parameter == j);
+                result.interval_95 =
+                    interval.map(|interval| interval.ends.map(|end| value + end * unit.display_per_internal));
+                results.push(result);
             }
         }
     }

@@ -48,9 +48,20 @@ impl IdentifiedModel {
         let carried = |j: &usize| match self.parameters[*j].role {
             Role::Error => true,
             Role::Setup => false,
-            Role::Coefficient { effect, .. } => IdentifiedModel::is_carried(&self.effects[effect]),
+            Role::Coefficient { effect, .. } | Role::Number { effect, .. } => {
+                IdentifiedModel::is_carried(&self.effects[effect])
+            }
         };
         (0..self.parameters.len()).filter(carried).collect()
+    }
+
+    /// The estimate of a parameter, internal units: a number of a shape is stated itself, not as its change.
+    pub fn estimate(&self, parameter: usize) -> f64 {
+        let parameter = &self.parameters[parameter];
+        match parameter.role {
+            Role::Number { effect, number } => self.effects[effect].shape.number(number) + parameter.value,
+            Role::Error | Role::Setup | Role::Coefficient { .. } => parameter.value,
+        }
     }
 
     /// The location errors of the model.
@@ -119,6 +130,8 @@ impl IdentifiedModel {
         for effect in &session.effects {
             parameters.add_effect(&session, &tests, &models, &self.reference, effect)?;
         }
+        let mut beta: Vec<f64> = self.carried_parameters().iter().map(|j| self.parameters[*j].value).collect();
+        parameters.linearise_numbers(&session, &tests, &models, &self.reference, &mut beta)?;
         Ok(parameters)
     }
 }

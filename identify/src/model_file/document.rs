@@ -125,10 +125,10 @@ pub struct Parameter {
     pub id: String,
     /// What it is.
     pub role: Role,
-    /// Index of the effect of a coefficient.
+    /// Index of the effect of a coefficient or of a number.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub effect: Option<usize>,
-    /// Index of a coefficient within its effect.
+    /// Index of a coefficient among those of its effect, or of a number among those of its shape.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub coefficient: Option<usize>,
     /// Value, in `unit`; 0 if it is held.
@@ -139,7 +139,8 @@ pub struct Parameter {
     pub unit: String,
     /// Number of display units per internal unit.
     pub display_per_internal: Positive,
-    /// Value in the internal unit, from which predictions follow.
+    /// Value in the internal unit, from which predictions follow; of a number of a shape its change from that of the
+    /// effect.
     pub internal: f64,
     /// Whether it is held at nominal, since it is not separable from other parameters.
     pub held: bool,
@@ -160,6 +161,8 @@ pub enum Role {
     SetUp,
     /// A coefficient of an effect.
     Coefficient,
+    /// A number of the shape of an effect that was estimated.
+    Number,
 }
 
 /// A location error.

@@ -73,7 +73,7 @@ impl EstimatedErrors {
                     }
                 }
                 Role::Coefficient { effect, coefficient } => coefficients[effect][coefficient] = parameter.value,
-                Role::Setup => {}
+                Role::Setup | Role::Number { .. } => {}
             }
         }
         let effects = model.carried_effects().map(|index| EstimatedEffect {

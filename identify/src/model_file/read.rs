@@ -176,6 +176,13 @@ fn parameters(
             let what = format!("have {found} coefficients of `effects[{k}]`, whose shape has {needed}");
             return Err(Fault::of_key(what, None));
         }
+        let number = |j: &ModelParameter| match j.role {
+            Role::Number { effect, number } if effect == k => Some(number),
+            _ => None,
+        };
+        if !parameters.iter().filter_map(number).eq(effect.estimated.iter().copied()) {
+            return Err(Fault::of_key(format!("do not have the numbers that `effects[{k}]` estimates"), None));
+        }
     }
     Ok(parameters)
 }
@@ -192,7 +199,8 @@ fn parameter(
         return Err(fault("another parameter has the same name"));
     }
     let same = |other: &&document::Parameter| {
-        entry.effect.is_some() && (other.effect, other.coefficient) == (entry.effect, entry.coefficient)
+        entry.effect.is_some()
+            && (other.role, other.effect, other.coefficient) == (entry.role, entry.effect, entry.coefficient)
     };
     if let Some(other) = others.iter().find(same) {
         return Err(fault(&format!("it is the coefficient of an effect that {} is too", other.id)));
@@ -211,9 +219,14 @@ fn parameter(
         {
             Role::Coefficient { effect, coefficient }
         }
+        (document::Role::Number, Some(effect), Some(number))
+            if effects.get(effect).is_some_and(|effect| effect.estimated.contains(&number)) =>
+        {
+            Role::Number { effect, number }
+        }
         _ => {
             return Err(fault(
-                "`role` is \"location\", \"set-up\", or \"coefficient\" with an index of `effects` and of its coefficients",
+                "`role` is \"location\", \"set-up\", \"coefficient\" or \"number\", the last two with an index of `effects`",
             ));
         }
     };

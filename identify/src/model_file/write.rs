@@ -89,6 +89,7 @@ impl IdentifiedModel {
             Role::Error => (document::Role::Location, None, None),
             Role::Setup => (document::Role::SetUp, None, None),
             Role::Coefficient { effect, coefficient } => (document::Role::Coefficient, Some(effect), Some(coefficient)),
+            Role::Number { effect, number } => (document::Role::Number, Some(effect), Some(number)),
         };
         let display = parameter.unit.display_per_internal;
         document::Parameter {
@@ -96,7 +97,7 @@ impl IdentifiedModel {
             role,
             effect,
             coefficient,
-            value: parameter.value * display,
+            value: self.estimate(j) * display,
             u: (!parameter.held).then(|| self.u(j) * display),
             unit: parameter.unit.name.clone(),
             display_per_internal: Positive(display),

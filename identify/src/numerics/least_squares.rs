@@ -57,6 +57,10 @@ const ROUNDING_OF_SUM: f64 = 1e-12;
 /// Relative step below which the nonlinearity of the model is negligible: its square is below rounding.
 const LINEAR_RELATIVE_STEP: f64 = 1e-7;
 
+/// Predicted decrease of the sum of squares, in units of the variance of a reading, at which steps that do not end within
+/// [`MAX_ITERATIONS`] are close enough to the minimum.
+const NEGLIGIBLE_DECREASE: f64 = 1e-4;
+
 /// Iterations after which steps that shrink slowly are extrapolated.
 const PATIENCE: usize = 10;
 /// Least `|q|` of steps that shrink slowly. With less, some hundred steps reach [`SMALLEST_RELATIVE_STEP`].
@@ -190,6 +194,15 @@ pub fn minimise(
         };
         if converged {
             return Ok(LeastSquaresSolution { x, triangle, sum_of_squares: current, iterations: iteration });
+        }
+    }
+    // In standard deviations of the readings, a remaining decrease far below 1 is a distance from the minimum far below the
+    // uncertainty of the parameters.
+    if let Scaling::Physical(_) = scaling {
+        let (r, c, _) = triangle.parts();
+        let scaled = Mat::from_fn(n, n, |i, j| r[(i, j)] * scale[j]);
+        if Svd::of(scaled.as_ref())?.explained(&c) < NEGLIGIBLE_DECREASE {
+            return Ok(LeastSquaresSolution { x, triangle, sum_of_squares: current, iterations: MAX_ITERATIONS });
         }
     }
     Err(IdentifyError::NoConvergence { iterations: MAX_ITERATIONS, sum_of_squares: current })

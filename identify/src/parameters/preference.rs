@@ -31,7 +31,7 @@ impl Parameters {
 pub fn pivot_preference(list: &[Parameter]) -> Vec<usize> {
     let kind = |parameter: &Parameter| match parameter.role {
         Role::Error => 0,
-        Role::Coefficient { .. } => 1,
+        Role::Coefficient { .. } | Role::Number { .. } => 1,
         Role::Setup => 2,
     };
     let mut order: Vec<usize> = (0..list.len()).collect();

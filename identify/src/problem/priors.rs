@@ -7,18 +7,22 @@ use num_dual::DualNum;
 
 use super::Problem;
 use crate::numerics::triangle::Triangle;
+use crate::parameters::{Parameter, Role};
 
 impl Problem {
-    /// Number of prior observations: the rows of [`Problem::prior_triangle`].
+    /// Number of prior observations: the rows of [`Problem::prior_triangle`] without those of numbers of shapes, which
+    /// are about the estimates themselves.
     pub fn prior_rows(&self) -> usize {
-        let gaussian = |prior: &Prior| matches!(prior, Prior::Gaussian(_));
+        let gaussian = |parameter: &&Parameter| {
+            matches!(parameter.prior, Prior::Gaussian(_)) && !matches!(parameter.role, Role::Number { .. })
+        };
         let list = &self.parameters.list;
         let distances = self.session.socket_distances.iter();
         let stated = distances.filter(|distance| {
             let mut ends = distance.between.iter();
             ends.all(|name| self.socket(name).is_some())
         });
-        list.iter().filter(|parameter| gaussian(&parameter.prior)).count() + stated.count()
+        list.iter().filter(gaussian).count() + stated.count()
     }
 
     /// The triangular factor of the priors: Gaussian priors and distances between sockets.

@@ -114,7 +114,7 @@ fn shares(problem: &Problem, fit: &Fit) -> Vec<Share> {
             Role::Setup => add("set-up", Cause::Setup, j),
             _ if !fit.rank.is_identifiable(j) => add("confounded", Cause::Unseen, j),
             Role::Error => add(&parameter.id, Cause::Error, j),
-            Role::Coefficient { effect, .. } => {
+            Role::Coefficient { effect, .. } | Role::Number { effect, .. } => {
                 add(&problem.parameters.effect_ids[effect], Cause::Effect, j);
             }
         }

@@ -40,6 +40,11 @@ pub const SWAP_EVERY: usize = 8;
 /// Maximum number of selected effects for which sets of effects are compared.
 pub const MAX_COMPARED: usize = 3;
 
+/// Share of the gain of a found effect that a candidate needs on the grid of the library to be tuned in its place. Between
+/// two grid points a feature keeps more than half of its gain.
+pub const MIN_SHARE_ON_GRID: f64 = 0.5;
+/// Maximum number of candidates that are tuned in the place of one found effect.
+pub const MAX_TUNED_ALIASES: usize = 64;
 /// Share of the best evidence that a candidate needs on the grid to be tuned. A local feature between two grid points
 /// loses a third of its evidence.
 pub const MIN_EVIDENCE_SHARE: f64 = 0.5;

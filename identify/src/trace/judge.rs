@@ -9,7 +9,7 @@ use super::state::SearchState;
 use super::{TraceOptions, null, null_draw_count};
 use crate::candidates::columns::Columns;
 use crate::error::IdentifyError;
-use crate::fit::{Fit, fit, prepare_with};
+use crate::fit::{Fit, prepare_with, refit};
 use crate::noise::NoiseSource;
 use crate::problem::Problem;
 
@@ -44,10 +44,11 @@ impl RefittedModel {
         }
         // Noise, outliers and rank are determined anew, as in a fit of a session that declares these effects. The
         // residual of the declared model contains the effects and overstates the noise.
-        let (mut after, mut after_fit) = prepare_with(&problem.session, &effects, options.seed)?;
+        let estimated: Vec<Effect> = effects.iter().cloned().map(Effect::with_estimated_numbers).collect();
+        let (mut after, mut after_fit) = prepare_with(&problem.session, &estimated, options.seed)?;
         if noise_is_from_residual(problem, &after) {
             after.noise = problem.noise.clone();
-            after_fit = fit(&after, Some(&after_fit.beta))?;
+            after_fit = refit(&mut after, &after_fit)?;
         }
         let structure = structure_before
             .map(|_| remaining_structure(&after, &after_fit, options, &|| search.should_continue()))

@@ -351,6 +351,7 @@ fn trace_or_interrupted(
         None => (None, RefittedModel::of(problem, before_fit, &search, options, None)?),
     };
     let RefittedModel { after, after_fit, structure: structure_after, .. } = judged;
+    search.tune_aliases()?;
     let mut reported = result::report(&result::TraceFindings {
         before: problem,
         before_fit,

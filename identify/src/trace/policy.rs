@@ -1,8 +1,9 @@
 //! The policies of the search: one for readings along runs, one for independent poses.
 
 use abbe_model::axis::AxisKind;
+use abbe_model::sensitivity::TestModel;
 
-use super::constants::{HIGHEST_ORDER_OF_SPECTRA, LINES_TRIED, READINGS_PER_COEFFICIENT};
+use super::constants::{HIGHEST_ORDER_OF_SPECTRA, READINGS_PER_COEFFICIENT};
 use crate::candidates::sampling::Sampling;
 use crate::problem::Problem;
 
@@ -103,8 +104,11 @@ const POSES: Policy = Policy {
     withdraws: false,
 };
 
+/// Candidates that a round tries on few poses.
+const TRIED_ON_FEW_POSES: usize = 8;
+
 /// The policy for independent poses that are too few for spectra ([`has_few_poses`]).
-const FEW_POSES: Policy = Policy { folds_follow: true, tried: LINES_TRIED, ..POSES };
+const FEW_POSES: Policy = Policy { folds_follow: true, tried: TRIED_ON_FEW_POSES, ..POSES };
 
 impl Policy {
     /// The policy for the readings of a problem.
@@ -123,6 +127,7 @@ pub fn has_few_poses(problem: &Problem) -> bool {
     let machine = &problem.session.machine;
     let moves = Sampling::of(problem).moves;
     let joints = (0..machine.axes.len()).filter(|axis| moves[*axis] && machine.axes[*axis].kind == AxisKind::Rotary);
-    let readings: usize = problem.blocks().iter().map(|block| problem.kept_rows(block).len()).sum();
+    // Outliers count too, so that the policy is one for the whole search.
+    let readings: usize = problem.models.iter().map(TestModel::rows).sum();
     readings < READINGS_PER_COEFFICIENT * 2 * HIGHEST_ORDER_OF_SPECTRA * joints.count()
 }

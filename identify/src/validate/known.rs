@@ -111,11 +111,17 @@ impl<'m> KnownErrors<'m> {
                 (Role::Coefficient { effect, coefficient }, Role::Coefficient { effect: of, coefficient: k }) => {
                     effects.get(of) == Some(&effect) && coefficient == k
                 }
+                (Role::Number { effect, number }, Role::Number { effect: of, number: k }) => {
+                    effects.get(of) == Some(&effect) && number == k
+                }
                 _ => false,
             })
         };
         let columns: Option<Vec<usize>> = carried.iter().map(column).collect();
         let columns = columns.unwrap_or_default();
+        let mut beta = vec![0.0; full.parameters.list.len()];
+        columns.iter().zip(&carried).for_each(|(column, j)| beta[*column] = model.parameters[*j].value);
+        full.linearise_numbers(&mut beta)?;
         let depends = |test: usize| full.own_parameters(test).iter().any(|j| columns.contains(j));
         if columns.is_empty() || !(0..full.tests.len()).any(depends) {
             return Err(IdentifyError::Request(

@@ -304,7 +304,7 @@ fn with_aliases(
         .map(|((candidate, assumed), aliases)| Effect {
             aliases: aliases.clone(),
             assumed: *assumed,
-            ..search.effect(*candidate).clone()
+            ..search.effect(*candidate).clone().with_estimated_numbers()
         })
         .collect();
     let as_found = search.selected().iter().zip(chosen).all(|(found, chosen)| found.candidate == chosen.0);
@@ -312,13 +312,16 @@ fn with_aliases(
         let (mut after, mut fitted) = prepare_with(&findings.before.session, &effects, findings.seed)?;
         if after.noise != findings.after.noise {
             after.noise = findings.after.noise.clone();
-            fitted = fit::fit(&after, Some(&fitted.beta))?;
+            fitted = fit::refit(&mut after, &fitted)?;
         }
         return Ok((after, fitted));
     }
     let (mut after, mut fitted) = (findings.after.clone(), findings.after_fit.clone());
     let declared = findings.before.parameters.effects.len();
-    after.parameters.effects[declared..].clone_from_slice(&effects);
+    for (own, found) in after.parameters.effects[declared..].iter_mut().zip(effects) {
+        // The numbers of its shape have been estimated.
+        *own = Effect { shape: own.shape.clone(), ..found };
+    }
     fitted.aliases = aliases::at_solution(&after, &fitted.beta)?;
     Ok((after, fitted))
 }

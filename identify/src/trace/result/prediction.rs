@@ -10,6 +10,7 @@ use abbe_model::effect::Effect;
 use super::TraceFindings;
 use crate::error::IdentifyError;
 use crate::heldout::left_out_test::{LeftOutTests, left_out_tests};
+use crate::parameters::Role;
 use crate::problem::Problem;
 use crate::trace::alias::Alias;
 use crate::trace::constants::{INDISTINGUISHABLE, MAX_PREDICTING};
@@ -40,14 +41,13 @@ pub(super) fn predictions(
     if aliases.is_empty() || findings.after.models.len() < 2 {
         return Ok(none);
     }
-    let search = findings.search;
     let found = left_out_tests(findings.after, &findings.after_fit.beta)?;
     let Some(found_mm) = found.rms_mm(findings.after) else { return Ok(none) };
     let judged = scalars(findings.after, &found) / findings.after.noise.sigma_mm.powi(2);
     let mut ranked = Vec::with_capacity(aliases.len());
     for (place, alias) in aliases.drain(..).enumerate() {
         let mm = match place < MAX_PREDICTING {
-            true => predicted_mm(findings, k, search.effect(alias.candidate), &found)?,
+            true => predicted_mm(findings, k, findings.search.effect(alias.candidate), &found)?,
             false => None,
         };
         // Twice the difference of the log-likelihoods; it counts in whole margins.
@@ -82,19 +82,17 @@ fn predicted_mm(
     problem.noise = after.noise.clone();
     problem.rejected = after.rejected.clone();
     // The parameters of the declared model come first, then those of the found effects in their order.
-    let declared = before.parameters.list.len();
-    let mut beta = findings.after_fit.beta[..declared].to_vec();
-    let mut rest = &findings.after_fit.beta[declared..];
-    for (number, taken) in findings.search.selected().iter().enumerate() {
-        let effect = findings.search.effect(taken.candidate);
-        let (own, others) = rest.split_at(effect.shape.coefficients());
-        rest = others;
-        if number == k {
+    let mut beta = findings.after_fit.beta[..before.parameters.list.len()].to_vec();
+    let declared = before.parameters.effects.len();
+    for (number, effect) in after.parameters.effects.iter().enumerate().skip(declared) {
+        if number == declared + k {
             problem.add_effect(alias)?;
             beta.resize(beta.len() + alias.shape.coefficients(), 0.0);
         } else {
-            problem.add_effect(effect)?;
-            beta.extend(own);
+            problem.add_effect(&effect.alone())?;
+            let own = after.parameters.list.iter().zip(&findings.after_fit.beta);
+            let is_own = |role: Role| matches!(role, Role::Coefficient { effect, .. } if effect == number);
+            beta.extend(own.filter(|(parameter, _)| is_own(parameter.role)).map(|(_, value)| value));
         }
     }
     let mut left_out = left_out_tests(&problem, &beta)?;

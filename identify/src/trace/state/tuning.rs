@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use abbe_model::effect::Effect;
 
-use super::SearchState;
+use super::{ALL, SearchState};
 use crate::candidates::candidate::Candidate;
 use crate::candidates::gain::{Gain, TrainedModel};
 use crate::candidates::step_table::{StepTable, best_step_table};
@@ -16,7 +16,7 @@ use crate::candidates::tuned::{TunedChannel, Tuning};
 use crate::error::IdentifyError;
 use crate::numerics::parallel;
 use crate::numerics::tails::most_evidence;
-use crate::trace::constants::{MAX_EVIDENCE_DEFICIT, MIN_EVIDENCE_SHARE};
+use crate::trace::constants::{MAX_EVIDENCE_DEFICIT, MAX_TUNED_ALIASES, MIN_EVIDENCE_SHARE, MIN_SHARE_ON_GRID};
 
 /// An effect with tuned numbers or positions.
 pub(super) struct Tuned {
@@ -79,7 +79,7 @@ impl SearchState<'_> {
         near.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         near.truncate(most);
         let tuning = model.tuning();
-        let tuned = |k: usize| self.with_best_numbers(&tuning, model, near[k].0, gains[near[k].0].gain);
+        let tuned = |k: usize| Some(self.with_best_numbers(&tuning, model, near[k].0, gains[near[k].0].gain)?.0);
         let mut fresh: Vec<Tuned> = parallel::map(near.len(), &tuned).into_iter().flatten().collect();
         fresh.extend(self.step_tables_near_best(&tuning, model, best, most)?);
         fresh.retain(|tuned| {
@@ -127,7 +127,7 @@ impl SearchState<'_> {
         } else {
             match self.with_best_numbers(&model.tuning(), &model, tunable, model.gain(tunable)?.gain) {
                 None => return Ok(Some(tunable)),
-                fresh => fresh,
+                Some((fresh, _)) => Some(fresh),
             }
         };
         drop(model);
@@ -144,14 +144,48 @@ impl SearchState<'_> {
         best_step_table(model, dictionary, &self.candidates[dictionary], self.variance(model))
     }
 
-    /// Tunes the shape numbers of an effect for the largest gain. `None` if the gain does not increase.
+    /// Tunes what may stand in the place of each selected effect: on the grid of the library an alias can explain much less
+    /// than with its own best numbers.
+    pub fn tune_aliases(&mut self) -> Result<(), IdentifyError> {
+        let folds = self.selection.branches[ALL].folds.clone();
+        for k in 0..self.selected().len() {
+            let fresh = self.tuned_in_place_of(k)?;
+            self.add_tuned(fresh, &folds);
+        }
+        Ok(())
+    }
+
+    fn tuned_in_place_of(&self, k: usize) -> Result<Vec<Tuned>, IdentifyError> {
+        let model = self.model_without(Some(k))?;
+        let least = MIN_SHARE_ON_GRID * model.gain(self.selected()[k].candidate)?.gain;
+        let mut best: HashMap<String, (usize, f64)> = HashMap::new();
+        for (candidate, gain) in self.gains(&model)?.iter().enumerate() {
+            let is_tunable = !self.candidates[candidate].brackets().is_empty();
+            if is_tunable && gain.gain >= least && self.may_be_added(candidate, &model.folds) {
+                let of_id = best.entry(self.effect(candidate).id()).or_insert((candidate, gain.gain));
+                if gain.gain > of_id.1 {
+                    *of_id = (candidate, gain.gain);
+                }
+            }
+        }
+        let mut near: Vec<(usize, f64)> = best.into_values().collect();
+        near.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        near.truncate(MAX_TUNED_ALIASES);
+        let tuning = model.tuning();
+        let tuned = |i: usize| Some(self.with_best_numbers(&tuning, &model, near[i].0, near[i].1)?.0);
+        let fresh = parallel::map(near.len(), &tuned).into_iter().flatten();
+        Ok(fresh.filter(|tuned| !self.candidates.iter().any(|present| present.effect == tuned.effect)).collect())
+    }
+
+    /// Tunes the shape numbers of an effect for the largest gain. Returns it with its gain; `None` if the gain does not
+    /// increase.
     fn with_best_numbers(
         &self,
         tuning: &Tuning<'_>,
         model: &TrainedModel<'_>,
         original: usize,
         before: f64,
-    ) -> Option<Tuned> {
+    ) -> Option<(Tuned, f64)> {
         let Candidate { selection_penalty, ref effect, ref columns, .. } = *self.candidates[original];
         let mut effect = effect.clone();
         let channel = TunedChannel::of(self.columns, tuning, columns);
@@ -173,7 +207,7 @@ impl SearchState<'_> {
                 }
             }
         }
-        (best > before * (1.0 + 1e-6)).then_some(Tuned { original, effect, selection_penalty })
+        (best > before * (1.0 + 1e-6)).then_some((Tuned { original, effect, selection_penalty }, best))
     }
 
     /// Moves each step position by fractions of the grid for the largest joint gain. Returns the effect and its gain.

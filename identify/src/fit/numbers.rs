@@ -1,0 +1,299 @@
+//! The numbers of shapes that a fit estimates: a period, a centre, a width, a time constant.
+//!
+//! A number `n` acts through the basis functions: `component = Σ_k c_k b_k(driver; n)`. It is a parameter of the problem as
+//! its change `δ` from the number of the shape, linear in
+//!
+//! ```text
+//! ∂component/∂n = Σ_k c_k ∂b_k/∂n
+//! ```
+//!
+//! at the present coefficients (Gauss–Newton). After each fit the changes go into the shapes, by less if χ² would rise, and
+//! the problem is linearised again. At the end all changes are zero, and the covariance of the fit contains the numbers:
+//! what shares its constant part with a location error has its uncertainty there.
+//!
+//! The prior of a number is as wide as the interval in which a search tunes it, and always about the present value. It moves
+//! no estimate, and leaves the rest determined where the readings do not determine the number.
+//!
+//! Where χ² is not parabolic in a number within two standard uncertainties, the interval of the profile likelihood is
+//! stated: the values at which χ², minimised over all other parameters, rises by the 95 % quantile of one degree of freedom.
+
+use abbe_model::session::Prior;
+
+use super::{Fit, fit, minimum};
+use crate::error::IdentifyError;
+use crate::parameters::Role;
+use crate::problem::Problem;
+
+/// Maximum number of linearisations.
+const MAX_ROUNDS: usize = 30;
+/// Shares of a step that are tried until χ² does not rise.
+const SHARES: [f64; 7] = [1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125, 0.015625];
+/// Largest change of a number, as a share of its prior, at which the linearisations end.
+const TOLERANCE: f64 = 1e-7;
+/// Relative rise of χ² that is rounding.
+const ROUNDING: f64 = 1e-12;
+/// Rise of χ² at two standard uncertainties, if it is parabolic: 4. Between these limits it counts as that.
+const PARABOLIC: [f64; 2] = [3.0, 5.3];
+/// The 95 % quantile of χ² with one degree of freedom.
+const QUANTILE_95: f64 = 3.841_458_820_694_124;
+/// Steps of the search for an end of an interval.
+const MAX_STEPS: usize = 24;
+/// Relative accuracy of the rise of χ² at an end.
+const END_TOLERANCE: f64 = 0.01;
+/// Standard deviation of the prior of a number that is held, as a share of its own.
+const HELD: f64 = 1e-9;
+
+/// A profile interval of a number.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NumberInterval {
+    /// Index of the number among the parameters.
+    pub parameter: usize,
+    /// The ends of the 95 % interval, as changes of the number, internal units. An end at which the search for it ended may
+    /// lie further out.
+    pub ends: [f64; 2],
+}
+
+/// As [`fit`], with the estimated numbers of shapes moved to their best values in the problem.
+///
+/// # Errors
+/// As [`fit`].
+pub(crate) fn fit_with_numbers(problem: &mut Problem, start: Option<&[f64]>) -> Result<Fit, IdentifyError> {
+    if !problem.parameters.has_numbers() {
+        return fit(problem, start);
+    }
+    let mut from = start.map_or_else(|| vec![0.0; problem.parameters.list.len()], <[f64]>::to_vec);
+    if start.is_none() {
+        from = minimum(problem, None)?.beta;
+    }
+    problem.linearise_numbers(&mut from)?;
+    settle(problem, &mut from)?;
+    match fit(problem, Some(&from)) {
+        // A number along which the readings say nothing: it is held, and its uncertainty is that of its prior.
+        Err(IdentifyError::NoConvergence { .. }) => {
+            let mut held = problem.clone();
+            let size = |parameter: usize| problem.parameters.list[parameter].size;
+            for parameter in numbers(problem) {
+                held.parameters.list[parameter].prior = Prior::Gaussian(HELD * size(parameter));
+            }
+            let mut found = fit(&held, Some(&from))?;
+            numbers(problem).for_each(|parameter| found.covariance[(parameter, parameter)] = size(parameter).powi(2));
+            Ok(found)
+        }
+        found => found,
+    }
+}
+
+/// Moves the numbers of a problem to their best values, and the parameters with them, from a linearisation at these
+/// parameters.
+fn settle(problem: &mut Problem, from: &mut Vec<f64>) -> Result<(), IdentifyError> {
+    let numbers: Vec<usize> = numbers(problem).collect();
+    for _ in 0..MAX_ROUNDS {
+        let to = match minimum(problem, Some(from)) {
+            Err(IdentifyError::NoConvergence { .. }) => break,
+            found => found?.beta,
+        };
+        let width = |j: usize| problem.parameters.list[j].size;
+        let moved = numbers.iter().map(|j| to[*j].abs() / width(*j)).fold(0.0, f64::max);
+        let before = problem.sum_of_squares(from);
+        let mut better = None;
+        for share in SHARES {
+            let mut at: Vec<f64> = from.iter().zip(&to).map(|(from, to)| from + share * (to - from)).collect();
+            let mut next = problem.clone();
+            next.bound_numbers(&mut at);
+            next.linearise_numbers(&mut at)?;
+            if next.sum_of_squares(&at) <= before * (1.0 + ROUNDING) {
+                better = Some((next, at));
+                break;
+            }
+        }
+        let Some((next, at)) = better else { break };
+        (*problem, *from) = (next, at);
+        if moved < TOLERANCE {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// The estimated numbers, by index among the parameters.
+fn numbers(problem: &Problem) -> impl Iterator<Item = usize> {
+    let list = &problem.parameters.list;
+    (0..list.len()).filter(|j| matches!(list[*j].role, Role::Number { .. }))
+}
+
+/// The profile intervals of the numbers in which χ² is not parabolic.
+///
+/// # Errors
+/// As [`fit`].
+pub(crate) fn intervals(problem: &Problem, fit: &Fit) -> Result<Vec<NumberInterval>, IdentifyError> {
+    let mut found = Vec::new();
+    for parameter in numbers(problem) {
+        let u = fit.covariance[(parameter, parameter)].max(0.0).sqrt();
+        if u <= 0.0 || !u.is_finite() {
+            continue;
+        }
+        let profile = Profile { problem, fit, parameter, least: problem.sum_of_squares(&fit.beta) };
+        let mut is_parabolic = true;
+        for side in [-2.0, 2.0] {
+            let rise = profile.rise(side * u)?;
+            is_parabolic &= rise.is_some_and(|rise| (PARABOLIC[0]..=PARABOLIC[1]).contains(&rise));
+        }
+        if !is_parabolic {
+            let ends = [profile.end(-u)?, profile.end(u)?];
+            found.push(NumberInterval { parameter, ends });
+        }
+    }
+    Ok(found)
+}
+
+/// χ² minimised over all parameters but one number.
+struct Profile<'p> {
+    problem: &'p Problem,
+    fit: &'p Fit,
+    parameter: usize,
+    /// χ² at the solution.
+    least: f64,
+}
+
+impl Profile<'_> {
+    /// The rise of χ² where the number has changed by this much; `None` if the shape cannot have this number.
+    fn rise(&self, change: f64) -> Result<Option<f64>, IdentifyError> {
+        let mut held = self.problem.clone();
+        let parameter = &mut held.parameters.list[self.parameter];
+        parameter.prior = Prior::Gaussian(HELD * parameter.size);
+        let mut at = self.fit.beta.clone();
+        at[self.parameter] += change;
+        if !held.has_valid_numbers(&at) {
+            return Ok(None);
+        }
+        held.linearise_numbers(&mut at)?;
+        settle(&mut held, &mut at)?;
+        Ok(Some((held.sum_of_squares(&at) - self.least).max(0.0)))
+    }
+
+    /// The change at which χ² has risen by the quantile, on the side of `step`. A residual beyond the noise widens the
+    /// interval as it enlarges uncertainties.
+    fn end(&self, step: f64) -> Result<f64, IdentifyError> {
+        let wanted = QUANTILE_95 * self.fit.u_enlargement.powi(2);
+        let (mut inside, mut outside) = (0.0, None);
+        let mut next = 1.96 * step * self.fit.u_enlargement;
+        for _ in 0..MAX_STEPS {
+            match self.rise(next)? {
+                Some(rise) if (rise / wanted - 1.0).abs() < END_TOLERANCE => return Ok(next),
+                Some(rise) if rise < wanted => inside = next,
+                _ => outside = Some(next),
+            }
+            next = match outside {
+                Some(outside) => 0.5 * (inside + outside),
+                None => 1.6 * inside,
+            };
+        }
+        Ok(inside)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::sync::Arc;
+
+    use abbe_model::driver::Driver;
+    use abbe_model::effect::shape::Local;
+    use abbe_model::effect::{Component, Effect, Shape};
+    use abbe_model::files::{self, ReadOptions};
+    use nalgebra::DMatrix;
+
+    use super::*;
+    use crate::fit::prepare;
+
+    /// A bump of 5 µm of EZC at 120° with a half width of 30°, and the numbers from which its estimation starts.
+    const TRUE_NUMBERS: [f64; 2] = [2.1, 0.5];
+    const START_NUMBERS: [f64; 2] = [2.2, 0.4];
+    const HEIGHT_MM: f64 = 5e-3;
+
+    fn bump([centre, width]: [f64; 2]) -> Effect {
+        let shape = Shape::Local(Local { centre, width, recurs: Some(std::f64::consts::TAU) });
+        Effect::new(Component::parse("EZC").unwrap(), Driver::parse("C"), shape).with_estimated_numbers()
+    }
+
+    /// The problem of a measured session with readings that its model predicts exactly, with a bump at other numbers.
+    fn problem() -> Problem {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let session = files::session(&file, &ReadOptions::default()).unwrap();
+        let (mut problem, _) = prepare(&session, 1).unwrap();
+        let mut true_problem = problem.clone();
+        true_problem.add_effect(&bump(TRUE_NUMBERS)).unwrap();
+        let mut beta = vec![0.0; true_problem.parameters.list.len()];
+        let coefficient = beta.len() - 3;
+        beta[coefficient] = HEIGHT_MM;
+        let residuals = true_problem.residuals(&beta);
+        for (test, residuals) in problem.tests.iter_mut().zip(residuals) {
+            let readings = Arc::make_mut(test.readings.as_mut().unwrap());
+            readings.observed.iter_mut().zip(residuals).for_each(|(observed, residual)| *observed -= residual);
+        }
+        problem.add_effect(&bump(START_NUMBERS)).unwrap();
+        problem
+    }
+
+    /// The covariance is the inverse of `JᵀJ` with `J` by difference quotients of the readings, the numbers among the
+    /// unknowns.
+    #[test]
+    fn numbers_are_estimated_with_their_covariance() {
+        let mut problem = problem();
+        let fit = fit_with_numbers(&mut problem, None).unwrap();
+        let count = fit.beta.len();
+        let values: Vec<f64> = (0..count).map(|j| problem.parameters.value(j, &fit.beta)).collect();
+        let [height, centre, width] = [values[count - 3], values[count - 2], values[count - 1]];
+        assert!((height - HEIGHT_MM).abs() < 1e-8, "{height}");
+        assert!((centre - TRUE_NUMBERS[0]).abs() < 1e-6 && (width - TRUE_NUMBERS[1]).abs() < 1e-6, "{centre} {width}");
+
+        let at = |change: &dyn Fn(usize) -> f64| {
+            let mut own = problem.clone();
+            let mut beta: Vec<f64> = (0..count).map(|j| fit.beta[j] + change(j)).collect();
+            own.linearise_numbers(&mut beta).unwrap();
+            own.residuals(&beta).into_iter().flatten().collect::<Vec<f64>>()
+        };
+        let rows = at(&|_| 0.0).len();
+        let mut jacobian = DMatrix::<f64>::zeros(rows, count);
+        let mut information = DMatrix::<f64>::zeros(count, count);
+        for j in 0..count {
+            let step = 1e-5 * problem.parameters.list[j].size;
+            let [more, less] = [step, -step].map(|step| at(&|k| if k == j { step } else { 0.0 }));
+            for (i, (more, less)) in more.iter().zip(&less).enumerate() {
+                jacobian[(i, j)] = (less - more) / (2.0 * step) / problem.noise.sigma_mm;
+            }
+            if let Prior::Gaussian(u) = problem.parameters.list[j].prior {
+                information[(j, j)] = u.powi(-2);
+            }
+        }
+        let kept: Vec<usize> = (0..count).filter(|j| fit.rank.is_identifiable(*j)).collect();
+        assert_eq!(kept.len(), count, "every parameter is identifiable with the priors");
+        information += jacobian.transpose() * &jacobian;
+        let scale: Vec<f64> = (0..count).map(|j| information[(j, j)].sqrt().recip()).collect();
+        let scaled = DMatrix::from_fn(count, count, |i, j| information[(i, j)] * scale[i] * scale[j]);
+        let inverse = scaled.try_inverse().unwrap();
+        for j in 0..count {
+            let u = inverse[(j, j)].sqrt() * scale[j];
+            let own = fit.covariance[(j, j)].sqrt();
+            assert!((own / u - 1.0).abs() < 1e-3, "{}: {own} and {u}", problem.parameters.list[j].id);
+        }
+    }
+
+    /// At an end of the interval χ², minimised over the rest, is higher by the quantile.
+    #[test]
+    fn an_interval_ends_where_chi_square_has_risen_by_the_quantile() {
+        let mut problem = problem();
+        problem.noise.sigma_mm *= 10.0;
+        let fit = fit_with_numbers(&mut problem, None).unwrap();
+        let parameter = fit.beta.len() - 1;
+        let u = fit.covariance[(parameter, parameter)].sqrt();
+        let profile = Profile { problem: &problem, fit: &fit, parameter, least: problem.sum_of_squares(&fit.beta) };
+        for step in [-u, u] {
+            let end = profile.end(step).unwrap();
+            let rise = profile.rise(end).unwrap().unwrap();
+            assert!((rise / QUANTILE_95 - 1.0).abs() < 2.0 * END_TOLERANCE, "{rise} at {end}");
+        }
+        let near = profile.rise(0.05 * u).unwrap().unwrap();
+        assert!((near / 0.0025 - 1.0).abs() < 0.1, "parabolic near the minimum: {near}");
+    }
+}
