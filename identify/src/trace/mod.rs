@@ -299,7 +299,14 @@ fn trace_or_interrupted(
     interrupt.check()?;
     let null = |block: usize| {
         let (count, seed) = (null_draw_count(options), options.seed);
-        null::draws(problem, &columns, pure, &start.residual, count, block, seed)
+        let draws = null::draws(problem, &columns, pure, &start.residual, count, block, seed);
+        let told = move |(formed, draw): (usize, Vec<f64>)| {
+            if formed > 0 && formed % DRAWS_BETWEEN_NEWS == 0 {
+                progress(Progress::NullDraws(formed, count));
+            }
+            draw
+        };
+        draws.enumerate().map(told)
     };
     let should_continue = || interrupt.check().is_ok();
     let structure_before = || {
@@ -413,6 +420,9 @@ fn with_accepted_families(
     (interrupt.0)(Progress::Judging);
     result::outcome_with_families(problem, fit, found, ended)
 }
+
+/// Null draws from one message of progress to the next.
+const DRAWS_BETWEEN_NEWS: usize = 16;
 
 /// The number of null draws: the requested number, but at least as many as the significance level needs.
 fn null_draw_count(options: &TraceOptions) -> usize {

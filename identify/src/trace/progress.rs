@@ -13,6 +13,8 @@ pub enum Progress {
     Contradicted(Box<Plausibility>),
     /// The candidates are being screened: the number of candidates.
     Screening(usize),
+    /// Draws of the null distribution of the search that are formed, and their number.
+    NullDraws(usize, usize),
     /// An effect was added: the number of effects, its identifier, the held-out rms in µm.
     SelectedEffect(usize, String, f64, ReadingUnit),
     /// Searches without one fold that have ended, and their number. Each predicts the readings that it lacks.
@@ -29,6 +31,7 @@ impl Progress {
         Some(match self {
             Progress::Fitting => "fitting the declared model".to_string(),
             Progress::Screening(candidates) => format!("screening {}", counted(*candidates, "candidate")),
+            Progress::NullDraws(formed, all) => format!("null distribution: {formed} of {all} draws"),
             Progress::SelectedEffect(number, id, rms, unit) => {
                 format!("{}: {id}, held out {}", counted(*number, "effect"), unit.text(*rms, 3))
             }
