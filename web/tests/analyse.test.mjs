@@ -120,9 +120,11 @@ test("a trace tells what it does with counts, and for how long", async () => {
     told.words.some((words) => /^screening \d+ candidates$/.test(words)),
     told.words.join("\n"),
   );
+  const draws = told.words.map((words) => /^null distribution: (\d+) of (\d+) draws$/.exec(words)).filter(Boolean);
+  assert.ok(draws.length > 5, told.words.join("\n"));
   const folds = told.words.map((words) => /^searching without one fold: (\d+) of (\d+)$/.exec(words)).filter(Boolean);
   assert.ok(folds.length > 1, told.words.join("\n"));
-  for (const [, ended, all] of folds) assert.ok(told.bars.includes(`${ended} of ${all}`), told.bars.join("\n"));
+  for (const [, ended, all] of [...draws, ...folds]) assert.ok(told.bars.includes(`${ended} of ${all}`), told.bars.join("\n"));
   assert.ok(told.times.includes("0 s"), told.times.join("\n"));
   await page.close();
 });
