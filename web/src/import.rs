@@ -117,7 +117,7 @@ fn columns(session: &Session) -> Vec<String> {
         (axis.name.to_lowercase(), units)
     });
     let station = session.tests.first().map(|test| test.station.columns()).unwrap_or_default();
-    let readings = station.into_iter().map(|column| {
+    let readings = station.iter().map(|column| {
         let units = match column.unit {
             "" => &[][..],
             "arcsec" | "deg" => ANGLES,
