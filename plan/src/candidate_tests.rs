@@ -86,7 +86,7 @@ fn finished(session: &Session, bodies: &Bodies, variations: &TestVariations, dra
     if test.station.bar().is_none() {
         planned::feasible(&session.machine, &test)?;
     }
-    let mut readings = states::planned(session, &test).ok()?;
+    let mut readings = states::planned(session, &test, &test.station).ok()?;
     let beyond = |length: f64| readings.observed.iter().any(|reading| (reading - length).abs() > variations.reach_mm);
     if test.station.bar().is_some_and(|bar| beyond(bar.bar)) {
         return None;

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use abbe_model::instrument::Station;
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test, motion, planned};
@@ -10,23 +11,26 @@ use crate::PlanError;
 use abbe_identify::heldout::Folds;
 use abbe_identify::noise::{Noise, NoiseSource};
 use abbe_identify::problem::Problem;
+use abbe_identify::start;
 use abbe_identify::unit::ReadingUnit;
 
 /// Assumed pause between two tests, s.
 const BETWEEN_TESTS_S: f64 = 120.0;
 
 /// A session in which every test has readings: its data, or its planned states with nominal readings. With
-/// `planned_only`, a test with a movement uses its planned states even if it has data.
+/// `planned_only`, a test with a movement uses its planned states even if it has data. An instrument that data of the
+/// session place stands there in its planned tests too.
 ///
 /// # Errors
 /// If a test has neither data nor a movement, or a movement leaves the travel.
 pub fn complete(session: &Session, planned_only: bool) -> Result<Session, PlanError> {
     let mut complete = session.clone();
     let mut clock_s = 0.0;
-    for test in &mut complete.tests {
+    let placed = start::stations(session, &session.tests);
+    for (test, station) in complete.tests.iter_mut().zip(&placed) {
         let moves = !matches!(test.motion, None | Some(motion::Motion::List));
         if test.readings.is_none() || (planned_only && moves) {
-            let mut readings = planned(session, test)?;
+            let mut readings = planned(session, test, station)?;
             readings.time_s.iter_mut().for_each(|time| *time += clock_s);
             test.readings = Some(Arc::new(readings));
         }
@@ -36,15 +40,15 @@ pub fn complete(session: &Session, planned_only: bool) -> Result<Session, PlanEr
     Ok(complete)
 }
 
-/// The planned states of one test with the readings of a machine without errors.
+/// The planned states of one test with the readings of a machine without errors, of the instrument where it stands.
 ///
 /// # Errors
 /// If the movement leaves the travel or there is none.
-pub fn planned(session: &Session, test: &Test) -> Result<Readings, PlanError> {
+pub fn planned(session: &Session, test: &Test, station: &Station<f64>) -> Result<Readings, PlanError> {
     let mut readings = planned::planned(&session.machine, test)?;
-    let model = TestModel::new(Arc::clone(&session.machine), test.station.clone(), &readings);
+    let model = TestModel::new(Arc::clone(&session.machine), station.clone(), &readings);
     readings.observed = model.readings(&SlotValues::zero(model.slots()));
-    readings.channels_to_columns(&session.machine, &test.station);
+    readings.channels_to_columns(&session.machine, station);
     Ok(readings)
 }
 

@@ -30,6 +30,8 @@ struct Case {
     chain: &'static str,
     axes: &'static str,
     session: &'static str,
+    /// Names and contents of its data files.
+    data: &'static dyn Fn() -> Vec<(&'static str, String)>,
     /// Beginnings of the parameters that it does not determine, and their true values, mm and rad.
     lacks: &'static [(&'static str, f64)],
     reading: Reading,
@@ -90,6 +92,9 @@ fn check(case: &Case) {
     let head = format!("name = \"Machine\"\nchain = \"{}\"\n{}{LINEAR}", case.chain, case.axes);
     std::fs::write(&machine, head).unwrap();
     std::fs::write(&session, format!("[machine]\nfile = \"machine.toml\"\n\n{}", case.session)).unwrap();
+    for (name, content) in (case.data)() {
+        std::fs::write(at(name), content).unwrap();
+    }
     // A proposal that determines what the session lacks.
     run(&["plan", text(&session), "--improve", "--write", text(&next), "--json", text(&found), "--quiet"]);
     let improvement = parsed(&found)["improvement"].clone();
@@ -157,6 +162,7 @@ fn a_laser_is_aligned_with_the_axis_that_no_test_moves() {
                   [[effect]]\ncomponent = \"EYY\"\ndriver = \"Y\"\nshape = \"polynomial\"\norder = 1\nscale_mm = 200\n\n\
                   [[test]]\nname = \"LX\"\nbeam = [1, 0, 0]\n\
                   sweep = { axis = \"X\", from_mm = -300, to_mm = 300, step_mm = 30 }\n",
+        data: &Vec::new,
         lacks: &[("EYY~Y", 4e-3)],
         reading: |test, at| {
             let Station::Laser(laser) = &test.station else { panic!("a laser") };
@@ -179,6 +185,7 @@ fn a_level_reads_across_the_axis_that_no_test_moves() {
                   [[effect]]\ncomponent = \"EAY\"\ndriver = \"Y\"\nshape = \"polynomial\"\norder = 1\nscale_mm = 200\n\n\
                   [[test]]\nname = \"level\"\nabout = [[0, 1, 0], [1, 0, 0]]\nbody = \"tool\"\n\
                   sweep = { axis = \"X\", from_mm = -300, to_mm = 300, step_mm = 30 }\n",
+        data: &Vec::new,
         lacks: &[("EAY~Y", 30.0 * MICRO)],
         reading: |test, at| {
             let Station::Angle(level) = &test.station else { panic!("a level") };
@@ -202,6 +209,7 @@ fn a_tracker_sees_the_axis_that_no_test_moves() {
                   sweep = { axis = \"X\", from_mm = -300, to_mm = 300, step_mm = 30 }\n\n\
                   [[test]]\nname = \"Y\"\nsetup = \"T\"\nspindle_setup = \"S\"\ntarget_mm = [0, 0, 0]\n\
                   sweep = { axis = \"Y\", from_mm = -200, to_mm = 200, step_mm = 20 }\n",
+        data: &Vec::new,
         lacks: &[("EA0Z", 40.0 * MICRO), ("EB0Z", -60.0 * MICRO)],
         reading: |_, at| {
             let (x, y, z) = (at("X"), at("Y"), at("Z"));
@@ -211,6 +219,54 @@ fn a_tracker_sees_the_axis_that_no_test_moves() {
             vec![seen[0] + 800.0, seen[1] - 1500.0, seen[2] + 200.0]
         },
         noise: [8e-3, 0.0],
+    });
+}
+
+/// Where a tracker that leans by 20° sees a point: a turn about X, then about Z, then a shift.
+fn leaning(point: [f64; 3]) -> [f64; 3] {
+    let (sin, cos) = 20.0_f64.to_radians().sin_cos();
+    let seen = turned(0.5, [point[0], cos * point[1] - sin * point[2], sin * point[1] + cos * point[2]]);
+    [seen[0] + 800.0, seen[1] - 1500.0, seen[2] + 200.0]
+}
+
+/// Range, azimuth and elevation of a point.
+fn polar([x, y, z]: [f64; 3]) -> [f64; 3] {
+    [x.hypot(y).hypot(z), y.atan2(x), z.atan2(x.hypot(y))]
+}
+
+/// A point of the tool of a machine whose Y and Z lean.
+fn leant(x: f64, y: f64, z: f64) -> [f64; 3] {
+    [x - 25.0 * MICRO * y - 60.0 * MICRO * z, y - 40.0 * MICRO * z, z]
+}
+
+/// Data along X and Y of a tracker that leans say nothing of the squareness of Z. The tracker stays where it stands.
+#[test]
+fn a_tracker_with_data_stays_where_it_stands() {
+    let data = || {
+        let file = |axis: usize, to: f64| {
+            let row = |k: i32| {
+                let mut at = [0.0; 3];
+                at[axis] = to * f64::from(k) / 10.0;
+                let [range, azimuth, elevation] = polar(leaning(leant(at[0], at[1], at[2])));
+                let [azimuth, elevation] = [azimuth, elevation].map(f64::to_degrees);
+                format!("{},{},{},{range:.6},{azimuth:.9},{elevation:.9}\n", at[0], at[1], at[2])
+            };
+            let rows: String = (-10..=10).map(row).collect();
+            format!("x_mm,y_mm,z_mm,range_mm,azimuth_deg,elevation_deg\n{rows}")
+        };
+        vec![("X.csv", file(0, 300.0)), ("Y.csv", file(1, 200.0))]
+    };
+    check(&Case {
+        chain: "w b X Y Z t",
+        axes: "",
+        session: "[instrument]\nkind = \"tracker\"\nnoise_um = 1\nnoise_arcsec = 2\n\n\
+                  [unknowns]\nerrors = [\"EC0Y\", \"EA0Z\", \"EB0Z\"]\n\n\
+                  [[test]]\nname = \"X\"\nsetup = \"T\"\nspindle_setup = \"S\"\ntarget_mm = [0, 0, 0]\ndata = \"X.csv\"\n\n\
+                  [[test]]\nname = \"Y\"\nsetup = \"T\"\nspindle_setup = \"S\"\ntarget_mm = [0, 0, 0]\ndata = \"Y.csv\"\n",
+        data: &data,
+        lacks: &[("EA0Z", 40.0 * MICRO), ("EB0Z", -60.0 * MICRO)],
+        reading: |_, at| polar(leaning(leant(at("X"), at("Y"), at("Z")))).to_vec(),
+        noise: [1e-3, 2.0 / 3600.0 * std::f64::consts::PI / 180.0],
     });
 }
 
@@ -224,6 +280,7 @@ fn an_r_test_follows_the_axis_that_no_test_moves() {
                   [[test]]\nname = \"X\"\nsetting = \"E\"\nworkpiece_ball_mm = [80, 0, 60]\nworkpiece_ball_u_um = inf\n\
                   spindle_ball_mm = [0, 0, 0]\nsetup = \"N\"\nspindle_setup = \"S\"\nat = { x_mm = 80, z_mm = 60 }\n\
                   sweep = { axis = \"X\", from_mm = 78, to_mm = 82, step_mm = 0.5 }\n",
+        data: &Vec::new,
         lacks: &[("EX0C", 12e-3), ("EY0C", -8e-3)],
         reading: |test, at| {
             let Station::RTest(nest) = &test.station else { panic!("an R-test") };
@@ -246,6 +303,7 @@ fn a_probe_touches_while_the_axis_turns_that_no_test_moves() {
                   [[test]]\nname = \"round\"\nradius_mm = 45\nradius_u_um = inf\nartefact_mm = [0, 0, 0]\n\
                   artefact_u_um = [inf, inf, 0]\nstylus_mm = [0, 0, 0]\nsetup = \"cylinder\"\nspindle_setup = \"stylus\"\n\
                   path = { kind = \"circle\", plane = \"XY\", radius_mm = 45, step_deg = 15, both_directions = false }\n",
+        data: &Vec::new,
         lacks: &[("EX0C", 12e-3), ("EY0C", -8e-3)],
         reading: |test, at| {
             let Station::Probe(probe) = &test.station else { panic!("a probe") };

@@ -225,8 +225,7 @@ fn orientations(machine: &Machine, readings: &Readings) -> Vec<[Matrix3<f64>; 2]
 impl Instrument for Pose<f64> {
     /// It sees the target wherever the axes are.
     fn aligned(&self, _: &Travel<'_>) -> Vec<Aligned> {
-        let turn = self.turn.map(|_| UnitQuaternion::identity());
-        Aligned::as_it_stands(Pose { stand: Stand::upright([0.0; 3]), turn, ..self.clone() })
+        Aligned::as_it_stands(self.clone())
     }
     fn written(&self, priors: &[Prior]) -> Option<Node> {
         let keys = Keys {
@@ -306,11 +305,11 @@ impl Instrument for Pose<f64> {
                 sum += (from_first + known) * share;
             }
         }
-        let stand = Stand::through(stand::best_rotation(sum), &pairs);
+        let stand = Stand::through(stand::best_rotation(sum, &self.stand.matrix()), &pairs);
         (!pairs.is_empty()).then(|| Station::Pose(Pose { stand, ..self.clone() }))
     }
     fn mounted(&self, group: &Group<'_>) -> Option<Station<f64>> {
-        self.turn?;
+        let present = self.turn?.to_rotation_matrix().into_inner();
         let mut sum = Matrix3::zeros();
         for (station, readings) in &group.tests {
             if let Station::Pose(Pose { stand, .. }) = station {
@@ -318,6 +317,6 @@ impl Instrument for Pose<f64> {
                 sum += turns.iter().map(|[of, measured]| (stand.matrix() * of).transpose() * measured).sum::<Matrix3<f64>>();
             }
         }
-        Some(Station::Pose(Pose { turn: Some(quaternion(stand::best_rotation(sum))), ..self.clone() }))
+        Some(Station::Pose(Pose { turn: Some(quaternion(stand::best_rotation(sum, &present))), ..self.clone() }))
     }
 }

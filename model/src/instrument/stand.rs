@@ -16,6 +16,10 @@ const GROSS: f64 = 10.0;
 const MIN_GROSS_MM: f64 = 1.0;
 /// Points that are left at least.
 const MIN_POINTS: usize = 3;
+/// Points are on a line if the second singular value of their products is this share of the first.
+const ON_A_LINE: f64 = 1e-9;
+/// Share with which a rotation about such a line stays as it is.
+const AS_IT_IS: f64 = 1e-6;
 
 /// The parameters of the pose: three positions and three angles.
 pub(super) const fn parameters(thing: &'static str) -> [InstrumentParameter; 6] {
@@ -84,11 +88,13 @@ impl Stand<f64> {
     }
 
     /// With the rotation and the origin that map points of R onto the same points as measured with the least sum of squares,
-    /// without the gross errors: one point behind the instrument would turn it by degrees.
-    pub(super) fn best(pairs: &[[Vector3<f64>; 2]]) -> Stand<f64> {
+    /// without the gross errors: one point behind the instrument would turn it by degrees. Points on a line leave the
+    /// rotation about it open, which stays as it is.
+    pub(super) fn best(&self, pairs: &[[Vector3<f64>; 2]]) -> Stand<f64> {
+        let through = |kept: &[_]| Stand::through(best_rotation(covariance(kept).0, &self.matrix()), kept);
         let mut kept = pairs.to_vec();
         loop {
-            let stand = Stand::through(best_rotation(covariance(&kept).0), &kept);
+            let stand = through(&kept);
             let apart = |[of_r, measured]: &[Vector3<f64>; 2]| {
                 (stand.matrix() * of_r + Vector3::from(stand.origin) - measured).norm()
             };
@@ -101,14 +107,9 @@ impl Stand<f64> {
             let is_less = within.len() < kept.len();
             kept = within;
             if !is_less {
-                return Stand::through(best_rotation(covariance(&kept).0), &kept);
+                return through(&kept);
             }
         }
-    }
-
-    /// Upright at a place in R, mm.
-    pub(super) fn upright([x, y, z]: [f64; 3]) -> Stand<f64> {
-        Stand { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], origin: [-x, -y, -z] }
     }
 
     /// Where the instrument stands in R, mm.
@@ -138,11 +139,16 @@ pub(super) fn covariance(pairs: &[[Vector3<f64>; 2]]) -> (Matrix3<f64>, f64) {
 }
 
 /// The rotation that maps vectors onto others with the least sum of squares, from the sum of their products `b · aᵀ`
-/// (Kabsch, Acta Cryst. A32 (1976) 922).
-pub(super) fn best_rotation(covariance: Matrix3<f64>) -> Matrix3<f64> {
-    let svd = covariance.svd(true, true);
+/// (Kabsch, Acta Cryst. A32 (1976) 922). Of equal ones, that nearest to `present`.
+pub(super) fn best_rotation(covariance: Matrix3<f64>, present: &Matrix3<f64>) -> Matrix3<f64> {
+    let mut svd = covariance.svd(true, true);
+    let [first, second, _] = svd.singular_values.as_slice() else { return *present };
+    if *second <= ON_A_LINE * first {
+        let share = if *first > 0.0 { AS_IT_IS * first } else { 1.0 };
+        svd = (covariance + present * share).svd(true, true);
+    }
     let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
-        return Matrix3::identity();
+        return *present;
     };
     // The sign on the smallest singular value makes the result a rotation, not a reflection.
     let mut signs = Matrix3::identity();

@@ -168,10 +168,9 @@ impl<N> Geometry<N> for Tracker<N> {
 }
 
 impl Instrument for Tracker<f64> {
-    /// It sees the target wherever the axes are. A tracker that reads angles is planned upright where it stands.
+    /// It sees the target wherever the axes are.
     fn aligned(&self, _: &Travel<'_>) -> Vec<Aligned> {
-        let stand = if self.is_polar { Stand::upright(self.stand.place_mm()) } else { Stand::upright([0.0; 3]) };
-        Aligned::as_it_stands(Tracker { stand, ..self.clone() })
+        Aligned::as_it_stands(self.clone())
     }
     fn written(&self, priors: &[Prior]) -> Option<Node> {
         let keys = Keys {
@@ -231,7 +230,7 @@ impl Instrument for Tracker<f64> {
     }
     fn placed(&self, group: &Group<'_>) -> Option<Station<f64>> {
         let pairs = group.positions();
-        (!pairs.is_empty()).then(|| Station::Tracker(Tracker { stand: Stand::best(&pairs), ..self.clone() }))
+        (!pairs.is_empty()).then(|| Station::Tracker(Tracker { stand: self.stand.best(&pairs), ..self.clone() }))
     }
     /// A planned line of sight has an azimuth.
     fn check_set_up(&self, checked: &Checked<'_>) -> Result<(), Fault> {
