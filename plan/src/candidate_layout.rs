@@ -180,6 +180,7 @@ impl Choice<'_> {
             motion: Some(motion),
             at_written: vec![None; at.len()],
             at,
+            contributors: None,
             readings: None,
         };
         Draft { test, name, new_setup: self.ball.new }

@@ -293,6 +293,7 @@ impl Template<'_> {
             motion: Some(motion),
             at_written: vec![None; at.len()],
             at,
+            contributors: self.test.contributors,
             readings: None,
         };
         Draft { test, name: words, new_setup }

@@ -41,6 +41,10 @@ pub fn proposal(
             *step /= thin;
             [name(*first), name(*second)].concat()
         }
+        Motion::Line { axes, step, .. } => {
+            *step /= thin;
+            axes.iter().map(|axis| name(*axis)).collect()
+        }
         Motion::List => return None,
     };
     let stem = match candidate.station.bar() {

@@ -125,6 +125,7 @@ fn test(number: usize, station: Station<f64>, readings: Readings, axes: usize) -
         motion: None,
         at: vec![0.0; axes],
         at_written: vec![None; axes],
+        contributors: None,
         readings: Some(Arc::new(readings)),
     }
 }

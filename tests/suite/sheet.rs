@@ -149,9 +149,9 @@ fn sheets_have_the_words_of_their_instrument() {
 /// a control need it.
 #[test]
 fn errors_of_the_motion_are_told() {
-    // The overshoot of 2 mm leaves the travel.
+    // A stated overshoot leaves the travel.
     let plan = ready("laser/plan.toml");
-    let fixed = ["sheet", text(&plan), "--out", "-"];
+    let fixed = ["sheet", text(&plan), "--out", "-", "--overshoot-mm", "2"];
     let expected = "axis `X` goes to -302.000 mm";
     let output = abbe(&fixed);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();

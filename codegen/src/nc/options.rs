@@ -15,8 +15,8 @@ const LAST_NUMBER: u32 = 9999;
 pub struct NcOptions {
     /// Overshoot of an angle before and after the measured path, degrees; `None`: 180° on full circles, 2° otherwise.
     pub overshoot_deg: Option<f64>,
-    /// Overshoot of a linear axis, mm.
-    pub overshoot_mm: f64,
+    /// Overshoot of a linear axis or along a line, mm; `None`: 2 mm, or less where the travel ends.
+    pub overshoot_mm: Option<f64>,
     /// Length by which the bar is longer at the feed-in than at the start, mm.
     pub feed_in_mm: f64,
     /// Distance along the tool from which a position is approached, mm.
@@ -41,7 +41,7 @@ impl Default for NcOptions {
     fn default() -> Self {
         NcOptions {
             overshoot_deg: None,
-            overshoot_mm: 2.0,
+            overshoot_mm: None,
             feed_in_mm: 1.0,
             clearance_mm: 50.0,
             dwell_s: 3.0,
@@ -76,7 +76,7 @@ impl NcOptions {
             })
         };
         fault("the overshoot in degrees", self.overshoot_deg.unwrap_or(0.0), 0.0, 360.0)?;
-        fault("the overshoot in mm", self.overshoot_mm, 0.0, 1e3)?;
+        fault("the overshoot in mm", self.overshoot_mm.unwrap_or(0.0), 0.0, 1e3)?;
         fault("the feed-in in mm", self.feed_in_mm, 0.0, 10.0)?;
         fault("the clearance in mm", self.clearance_mm, 0.0, 1e3)?;
         fault("the dwell in s", self.dwell_s, 0.0, 600.0)?;

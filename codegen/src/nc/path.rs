@@ -5,7 +5,7 @@ mod duration;
 use std::f64::consts::{PI, TAU};
 
 use abbe_model::ModelError;
-use abbe_model::axis::AxisKind;
+use abbe_model::axis::{Axis, AxisKind};
 use abbe_model::chain::{BodyErrors, Machine};
 use abbe_model::frames::Point;
 use abbe_model::instrument::ballbar::BallBar;
@@ -22,6 +22,8 @@ use crate::error::CodegenError;
 const FULL_CIRCLE_DEG: f64 = 180.0;
 /// Overshoot of a part of a circle or of a turn, degrees.
 const PART_DEG: f64 = 2.0;
+/// Overshoot of a linear axis, or along a line, mm.
+const USUAL_MM: f64 = 2.0;
 /// Steps of an overshoot in which the clearance of its states is compared.
 const OVERSHOOT_STEPS: usize = 90;
 /// Largest number of segments of a leg.
@@ -71,12 +73,13 @@ impl Path {
             Some(
                 Motion::Sweep { from, to, runs, both_directions, .. }
                 | Motion::Circle { from, to, runs, both_directions, .. }
+                | Motion::Line { from, to, runs, both_directions, .. }
                 | Motion::Follow { from, to, runs, both_directions, .. },
             ) => ([*from, *to], *runs, *both_directions),
             Some(Motion::List) | None => {
                 return Err(CodegenError::Nc {
                     message: format!("test \"{}\" states no motion", test.name),
-                    help: "add `sweep = { … }` or `path = { kind = \"circle\" | \"follow\", … }`".into(),
+                    help: "add `sweep = { … }` or `path = { kind = \"circle\" | \"line\" | \"follow\", … }`".into(),
                 });
             }
         };
@@ -86,7 +89,7 @@ impl Path {
                 let kind = machine.axes[*axis].kind;
                 (60.0 * kind.to_display(*speed), if kind == AxisKind::Rotary { "°/min" } else { "mm/min" })
             }
-            Some(Motion::Circle { speed, .. }) => (60.0 * speed, "mm/min"),
+            Some(Motion::Circle { speed, .. } | Motion::Line { speed, .. }) => (60.0 * speed, "mm/min"),
             _ => (0.0, ""),
         };
         let (mut remarks, mut warnings) = (Vec::new(), Vec::new());
@@ -125,6 +128,7 @@ fn with_range(test: &Test, range: [f64; 2], steps: usize) -> Test {
     if let Some(
         Motion::Sweep { from, to, step, runs, both_directions, .. }
         | Motion::Circle { from, to, step, runs, both_directions, .. }
+        | Motion::Line { from, to, step, runs, both_directions, .. }
         | Motion::Follow { from, to, step, runs, both_directions, .. },
     ) = &mut test.motion
     {
@@ -158,10 +162,15 @@ fn overshot(
         Some(Motion::Sweep { axis, .. } | Motion::Follow { axis, .. }) => Some(&machine.axes[*axis]),
         _ => None,
     };
-    let linear = driven.is_some_and(|axis| axis.kind == AxisKind::Linear);
+    let is_line = matches!(test.motion, Some(Motion::Line { .. }));
+    let linear = is_line || driven.is_some_and(|axis| axis.kind == AxisKind::Linear);
     let full = !linear && (to - from).abs() > TAU - 1e-9;
-    let stated = if linear { Some(options.overshoot_mm) } else { options.overshoot_deg.map(f64::to_radians) };
-    let usual = if full { FULL_CIRCLE_DEG } else { PART_DEG }.to_radians();
+    let stated = if linear { options.overshoot_mm } else { options.overshoot_deg.map(f64::to_radians) };
+    let usual = match (linear, full) {
+        (true, _) => USUAL_MM,
+        (false, true) => FULL_CIRCLE_DEG.to_radians(),
+        (false, false) => PART_DEG.to_radians(),
+    };
     let wanted = stated.unwrap_or(usual);
     let with = |before: f64, after: f64| [from - sign * before, to + sign * after];
     let whole = with(wanted, wanted);
@@ -170,18 +179,40 @@ fn overshot(
         return reached.map(|_| whole);
     }
     // Less where the travel of the axis, or of an axis that follows it, ends.
-    let room = |end: f64, sign: f64| match driven.and_then(|axis| axis.travel) {
-        Some([low, high]) => if sign > 0.0 { high - end } else { end - low }.clamp(0.0, wanted),
-        None => wanted,
+    let room = |end: f64, sign: f64| match &test.motion {
+        Some(Motion::Line { axes, ends, .. }) => room_on_line(machine, axes, ends, end, sign, wanted),
+        _ => driven.map_or(wanted, |axis| room_of(axis, end, sign, wanted)),
     };
     let less = with(room(from, -sign), room(to, sign));
     let range = if states(machine, test, less, 64).is_ok() { less } else { [from, to] };
     states(machine, test, range, 64)?;
-    let [before, after] = [(from - range[0]).abs().to_degrees(), (range[1] - to).abs().to_degrees()];
+    let unit = if linear { "mm" } else { "deg" };
+    let [before, after] = [from - range[0], range[1] - to].map(|part| {
+        let part = part.abs();
+        if linear { part } else { part.to_degrees() }
+    });
     warnings.push(format!(
-        "Overshoot {before:.3} deg before and {after:.3} deg after the measured path: the travel ends there"
+        "Overshoot {before:.3} {unit} before and {after:.3} {unit} after the measured path: the travel ends there"
     ));
     Ok(range)
+}
+
+/// How far an axis can go beyond a position, at most as far as wanted, mm or rad.
+fn room_of(axis: &Axis, end: f64, sign: f64, wanted: f64) -> f64 {
+    match axis.travel {
+        Some([low, high]) => if sign > 0.0 { high - end } else { end - low }.clamp(0.0, wanted),
+        None => wanted,
+    }
+}
+
+/// How far a line can go beyond a distance along it, at most as far as wanted, mm.
+fn room_on_line(machine: &Machine, axes: &[usize], ends: &[[f64; 2]], at: f64, sign: f64, wanted: f64) -> f64 {
+    let length = ends.iter().map(|[start, end]| (end - start).powi(2)).sum::<f64>().sqrt();
+    axes.iter().zip(ends).fold(wanted, |least, (axis, [start, end])| {
+        let rate = (end - start) / length;
+        let position = start + rate * at;
+        least.min(room_of(&machine.axes[*axis], position, sign * rate, wanted * rate.abs()) / rate.abs())
+    })
 }
 
 impl Leg {
@@ -198,6 +229,12 @@ impl Leg {
             Some(Motion::Sweep { axis, speed, .. }) => {
                 let feed = 60.0 * machine.axes[*axis].kind.to_display(*speed);
                 return Ok(Leg { vertices: states(machine, test, range, 1)?, measured, shape: Shape::Line(feed) });
+            }
+            Some(Motion::Line { step, speed, in_turn, .. }) => {
+                // Axes that move in turn leave the line at every step.
+                let steps = if *in_turn { (span / step).round().max(1.0) as usize } else { 1 };
+                let vertices = states(machine, test, range, steps)?;
+                return Ok(Leg { vertices, measured, shape: Shape::Line(60.0 * speed) });
             }
             Some(Motion::Circle { first, second, radius, speed, .. }) => {
                 // Half a turn at most: a block with equal ends means nothing or a whole turn, as the control has it.

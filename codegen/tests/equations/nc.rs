@@ -402,3 +402,39 @@ fn the_tool_point_stays_over_its_place_of_the_table() {
     }
     std::fs::remove_dir_all(place).unwrap();
 }
+
+/// A laser along a body diagonal: the axes move together, or one after the other at each step.
+#[test]
+fn axes_move_along_a_diagonal_together_or_in_turn() {
+    let place = folder("diagonals");
+    let linear = ["X", "Y", "Z"].iter().zip(["[1, 0, 0]", "[0, 1, 0]", "[0, 0, 1]"]);
+    // X ends where the diagonal does, and Y a millimetre farther.
+    let travel = [300, 101, 400];
+    let axes: String = (linear.zip(travel))
+        .map(|((axis, way), end)| format!("axis.{axis} = {{ direction = {way}, travel_mm = [-{end}, {end}] }}\n"))
+        .collect();
+    let mut text = format!(
+        "[machine]\nname = \"Mill\"\nchain = \"w b X Y Z t\"\n{axes}[instrument]\nkind = \"laser\"\nnoise_um = 0.1\n"
+    );
+    for (name, in_turn) in [("PNP", false), ("steps", true)] {
+        text += &format!(
+            "[[test]]\nname = \"{name}\"\nbeam = [6, -2, 3]\npath = {{ kind = \"line\", from = {{ x_mm = -300, y_mm = 100, z_mm = 0 }}, \
+             to = {{ x_mm = 300, y_mm = -100, z_mm = 300 }}, step_mm = 70, runs = 2, in_turn = {in_turn} }}\n"
+        );
+    }
+    let plan = place.join("plan.toml");
+    std::fs::write(&plan, text).unwrap();
+    let session = session(&plan);
+    for control in nc::CONTROLS {
+        let files = nc::files(&session, control, &NcOptions::default()).unwrap().files;
+        for ((_, text), test) in files[1..].iter().zip(&session.tests) {
+            let decoded = if control.word() == "heidenhain" { of_plain_text } else { of_g_codes };
+            let moves = decoded(text, Counting::Turns);
+            holds_the_plan(&session, test, &moves, 0.1_f64.powi(control.decimals() as i32), f64::INFINITY);
+            // Together: one block for each of four traversals; in turn: three for each of ten steps.
+            let measured = moves.iter().filter(|own| own.run.is_some()).count();
+            assert_eq!(measured, if test.name == "steps" { 4 * 30 } else { 4 }, "{}", control.word());
+        }
+    }
+    std::fs::remove_dir_all(place).unwrap();
+}

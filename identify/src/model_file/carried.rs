@@ -123,6 +123,7 @@ impl IdentifiedModel {
             motion: None,
             at: vec![0.0; self.machine.axes.len()],
             at_written: vec![None; self.machine.axes.len()],
+            contributors: None,
             readings: Some(Arc::new(states.readings.clone())),
         };
         let (tests, models) = (vec![test], vec![model]);

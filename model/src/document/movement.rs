@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, Serializer};
 
+use super::node::Named;
 use super::value::{Count, Length, Point, Positive};
 use crate::session::motion::{FollowOffset, MAX_READINGS};
 
@@ -45,6 +46,8 @@ pub enum Path {
     List(List),
     /// Two linear axes move on a circle.
     Circle(Circle),
+    /// Linear axes move on a line, such as a diagonal of their travels.
+    Line(Line),
     /// A rotary axis turns and the linear axes keep the tool at the point of the table.
     Follow(Follow),
 }
@@ -56,11 +59,13 @@ impl Serialize for Path {
         enum Tagged<'p> {
             List(&'p List),
             Circle(&'p Circle),
+            Line(&'p Line),
             Follow(&'p Follow),
         }
         let tagged = match self {
             Path::List(list) => Tagged::List(list),
             Path::Circle(circle) => Tagged::Circle(circle),
+            Path::Line(line) => Tagged::Line(line),
             Path::Follow(follow) => Tagged::Follow(follow),
         };
         tagged.serialize(serializer)
@@ -91,6 +96,29 @@ pub struct Circle {
     /// Step along the circle, degrees.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub step_deg: f64,
+    /// Feed along the path.
+    pub feed_mm_min: Option<Positive>,
+    /// Number of runs; default 1.
+    pub runs: Option<Count<1, MAX_READINGS>>,
+    /// Whether each run has a forward and a backward traversal; default true.
+    pub both_directions: Option<bool>,
+}
+
+/// Linear axes move on a line, such as a diagonal of their travels.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename = "line", deny_unknown_fields)]
+#[schemars(inline)]
+pub struct Line {
+    /// Positions of the axes that move at the start: x_mm, y_mm.
+    pub from: Named<Length>,
+    /// Positions of the same axes at the end.
+    pub to: Named<Length>,
+    /// Step along the line, mm.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub step_mm: f64,
+    /// Whether the axes of each step move one after the other, in the order of `from`, with a reading after each (step
+    /// diagonal); default false.
+    pub in_turn: Option<bool>,
     /// Feed along the path.
     pub feed_mm_min: Option<Positive>,
     /// Number of runs; default 1.

@@ -4,7 +4,7 @@ use super::effect;
 use super::kind::Kind;
 use super::lower::effect::{SCALES, internal};
 use super::machine::{Axis, Machine};
-use super::movement::{Circle, Follow, Path, Sweep};
+use super::movement::{Circle, Follow, Line, Path, Sweep};
 use super::node::Named;
 use super::test::Test;
 use super::value::{Count, Length, Positive, Three};
@@ -124,6 +124,7 @@ pub fn test(test: &DomainTest, machine: &chain::Machine, instrument: InstrumentK
         setup: stated(&test.setup, &test.name),
         spindle_setup: stated(&test.spindle_setup, kind.spindle_setup(&test.name)),
         at: Named(held.collect()),
+        contributors: test.contributors,
         sweep,
         path,
         ..Test::default()
@@ -135,6 +136,27 @@ fn motion(motion: &Motion, machine: &chain::Machine) -> Option<(Vec<usize>, Opti
     let name = |axis: usize| machine.axes[axis].name.clone();
     let degrees = |angle: f64| rounded(angle.to_degrees());
     let often = |runs: usize| Some(Count(runs));
+    if let Motion::Line { axes, ends, .. } = motion {
+        let at = |end: usize| {
+            let named = axes
+                .iter()
+                .zip(ends)
+                .map(|(axis, ends)| (machine.axes[*axis].column(""), Length::Number(rounded(ends[end]))));
+            Named(named.collect())
+        };
+        let (from, to) = (at(0), at(1));
+        let Motion::Line { step, speed, runs, both_directions, in_turn, .. } = *motion else { return None };
+        let line = Line {
+            from,
+            to,
+            step_mm: rounded(step),
+            in_turn: in_turn.then_some(true),
+            feed_mm_min: Some(Positive(rounded(60.0 * speed))),
+            runs: often(runs),
+            both_directions: Some(both_directions),
+        };
+        return Some((axes.clone(), None, Some(Path::Line(line))));
+    }
     Some(match *motion {
         Motion::Sweep { axis, from, to, step, speed, runs, both_directions } => {
             let kind = machine.axes[axis].kind;
@@ -188,6 +210,6 @@ fn motion(motion: &Motion, machine: &chain::Machine) -> Option<(Vec<usize>, Opti
             let follows = linear.filter(|_| offset != FollowOffset::None);
             (std::iter::once(axis).chain(follows).collect(), None, Some(Path::Follow(follow)))
         }
-        Motion::List => return None,
+        Motion::Line { .. } | Motion::List => return None,
     })
 }

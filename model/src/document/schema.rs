@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 
 use super::fault::Step;
 use super::machine::Machine;
-use super::movement::{Circle, Follow, Sweep};
+use super::movement::{Circle, Follow, Line, Sweep};
 use super::session::Session;
 use super::test::Test;
 use crate::driver::{Driver, unit_suffixes};
@@ -47,6 +47,7 @@ pub fn keys_of_test(instrument: InstrumentKind) -> Map<String, Value> {
 pub fn keys_of_motions() -> Map<String, Value> {
     let mut keys = properties::<Sweep>();
     keys.extend(properties::<Circle>());
+    keys.extend(properties::<Line>());
     keys.extend(properties::<Follow>());
     keys
 }

@@ -8,6 +8,7 @@ use super::layout::{Columns, Format};
 use super::movement::{Path, Sweep};
 use super::node::{Named, Node};
 use super::value::Length;
+use crate::session::contributors::Contributors;
 
 /// A test.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -35,6 +36,8 @@ pub struct Test {
     pub format: Option<Format>,
     /// Own name = foreign name or number; the own name contains the unit.
     pub columns: Option<Columns>,
+    /// Contributors to the measurement uncertainty of positioning figures.
+    pub contributors: Option<Contributors>,
     /// One axis moves.
     pub sweep: Option<Sweep>,
     /// Several axes move together.

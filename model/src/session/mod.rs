@@ -3,6 +3,7 @@
 //! A session is validated and in mm, rad and s. [`files`](crate::files) reads it, from files or memory, and writes it.
 
 pub(crate) mod check;
+pub mod contributors;
 pub mod expression;
 pub mod limits;
 pub mod motion;
@@ -252,6 +253,8 @@ pub struct Test {
     pub at: Vec<f64>,
     /// The same as expressions, for linear axes stated in mm; equations keep them as symbols.
     pub at_written: Vec<Option<expression::Length>>,
+    /// Contributors to the measurement uncertainty of positioning figures.
+    pub contributors: Option<contributors::Contributors>,
     /// The measured readings.
     pub readings: Option<Arc<Readings>>,
 }

@@ -51,6 +51,27 @@ pub enum Motion {
         /// Whether each run consists of a forward and a backward traversal.
         both_directions: bool,
     },
+    /// Linear axes move on a line: along a diagonal of their travels.
+    Line {
+        /// The axes that move, by index, in the order in which they do so in turn.
+        axes: Vec<usize>,
+        /// Positions of the axes at the start of the line and at its end, mm.
+        ends: Vec<[f64; 2]>,
+        /// Start of the motion, as a distance along the line, mm.
+        from: f64,
+        /// Its end.
+        to: f64,
+        /// The step between readings along the line, mm.
+        step: f64,
+        /// Path speed, mm/s.
+        speed: f64,
+        /// Number of runs.
+        runs: usize,
+        /// Whether each run consists of a forward and a backward traversal.
+        both_directions: bool,
+        /// Whether the axes of each step move one after the other, with a reading after each.
+        in_turn: bool,
+    },
     /// A rotary axis rotates and the linear axes keep the spindle ball at a constant offset from the workpiece ball.
     Follow {
         /// The rotary axis, by index.
@@ -126,11 +147,17 @@ pub fn programmed_over_path_feed(radius_mm: f64) -> f64 {
     1.0_f64.hypot(180.0 / (std::f64::consts::PI * radius_mm))
 }
 
+/// The length of a line of linear axes from the positions at its ends, mm.
+pub(crate) fn length_of(ends: &[[f64; 2]]) -> f64 {
+    ends.iter().map(|[start, end]| (end - start).powi(2)).sum::<f64>().sqrt()
+}
+
 /// The axes that a motion names.
 pub(crate) fn named_axes(motion: Option<&Motion>) -> Vec<usize> {
     match motion {
         Some(Motion::Sweep { axis, .. } | Motion::Follow { axis, .. }) => vec![*axis],
         Some(Motion::Circle { first, second, .. }) => vec![*first, *second],
+        Some(Motion::Line { axes, .. }) => axes.clone(),
         Some(Motion::List) | None => Vec::new(),
     }
 }

@@ -15,6 +15,7 @@ const MIN_ADVANCE: f64 = 0.5;
 pub(crate) fn difference_from_stated(motion: Option<&Motion>, readings: &Readings) -> Option<String> {
     let (Motion::Sweep { runs, both_directions, .. }
     | Motion::Circle { runs, both_directions, .. }
+    | Motion::Line { runs, both_directions, .. }
     | Motion::Follow { runs, both_directions, .. }) = motion?
     else {
         return None;
@@ -82,6 +83,16 @@ fn advance_and_length(motion: &Motion, readings: &Readings, run: &Range<usize>) 
             let [x, y] = [*first, *second].map(|axis| &readings.positions[axis][run.clone()]);
             let area = |k: usize| (x[k] - x[0]) * (y[k + 1] - y[0]) - (x[k + 1] - x[0]) * (y[k] - y[0]);
             sum(&mut (0..x.len() - 1).map(|k| area(k) * (to - from)))
+        }
+        Motion::Line { axes, ends, from, to, .. } => {
+            let step = |k: usize| {
+                let way = axes.iter().zip(ends).map(|(axis, [start, end])| {
+                    let positions = &readings.positions[*axis][run.clone()];
+                    (positions[k + 1] - positions[k]) * (end - start)
+                });
+                way.sum::<f64>() * (to - from)
+            };
+            sum(&mut (0..run.len() - 1).map(step))
         }
         Motion::List => (0.0, 0.0),
     }

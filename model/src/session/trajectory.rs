@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::Test;
-use super::motion::{FollowOffset, Motion};
+use super::motion::{FollowOffset, Motion, length_of};
 use super::readings::Readings;
 use crate::axis::AxisKind;
 use crate::chain::{AxisPosition, BodyErrors, Machine};
@@ -44,6 +44,11 @@ pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<
             let turn = *speed / *radius;
             traversals(machine, &along, turn, *runs, *both_directions, |angle| Ok(circle.state(*radius, angle)))
         }
+        Motion::Line { axes, ends, from, to, step, speed, runs, both_directions, in_turn } => {
+            let along = steps(*from, *to, *step);
+            let (way, mut states) = on_line(&test.at, axes, ends, &along, *in_turn);
+            traversals(machine, &way, *speed, *runs, *both_directions, |_| Ok(states.next().unwrap_or_default()))
+        }
         Motion::Follow { axis, from, to, step, speed, runs, both_directions, offset } => {
             let Some(mut bar) = bar_between_points(&test.station) else {
                 return Err((
@@ -80,6 +85,35 @@ pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<
     }
 }
 
+/// The states of linear axes at these distances along a line, in turn with those between them, and the length of the way
+/// to each, mm.
+fn on_line(
+    at: &[f64],
+    axes: &[usize],
+    ends: &[[f64; 2]],
+    along: &[f64],
+    in_turn: bool,
+) -> (Vec<f64>, impl Iterator<Item = Vec<f64>>) {
+    let length = length_of(ends);
+    let (mut way, mut states) = (Vec::new(), Vec::<Vec<f64>>::new());
+    let mut gone = 0.0;
+    for &distance in along {
+        let mut state = states.last().cloned().unwrap_or_else(|| at.to_vec());
+        for (place, (&axis, [start, end])) in axes.iter().zip(ends).enumerate() {
+            let position = start + (end - start) * (distance / length);
+            gone += if in_turn && !states.is_empty() { (position - state[axis]).abs() } else { 0.0 };
+            state[axis] = position;
+            // The first state has all axes on the line.
+            let is_last = place + 1 == axes.len();
+            if is_last || (in_turn && distance != along[0]) {
+                way.push(if in_turn { gone } else { distance });
+                states.push(state.clone());
+            }
+        }
+    }
+    (way, states.into_iter())
+}
+
 /// The instrument's points of table and tool, as the ends of a bar.
 pub(super) fn bar_between_points(station: &Station<f64>) -> Option<BallBar<f64>> {
     station.table_point_mm().map(|point| BallBar {
@@ -112,9 +146,9 @@ fn traversals(
     speed: f64,
     runs: usize,
     both_directions: bool,
-    state: impl Fn(f64) -> Result<Vec<f64>, Fault>,
+    state: impl FnMut(f64) -> Result<Vec<f64>, Fault>,
 ) -> Result<Readings, Fault> {
-    let states = along.iter().map(|&q| state(q)).collect::<Result<Vec<_>, _>>()?;
+    let states = along.iter().copied().map(state).collect::<Result<Vec<_>, _>>()?;
     let mut readings = Readings { positions: vec![Vec::new(); machine.axes.len()], ..Readings::default() };
     let last = along.len() - 1;
     let mut start_s = 0.0;
@@ -314,6 +348,21 @@ pub(super) fn axis_line(machine: &Machine, state: &[AxisPosition<f64>], axis: us
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Along a diagonal of 3 : 4 the axes move together, or X before Y at each step.
+    #[test]
+    fn axes_move_on_a_line_together_or_in_turn() {
+        let states = |in_turn| {
+            let (way, states) =
+                on_line(&[0.0, 0.0, 7.0], &[0, 1], &[[-3.0, 3.0], [0.0, 8.0]], &[0.0, 5.0, 10.0], in_turn);
+            (way, states.collect::<Vec<_>>())
+        };
+        let [start, middle, end] = [[-3.0, 0.0, 7.0], [0.0, 4.0, 7.0], [3.0, 8.0, 7.0]].map(|state| state.to_vec());
+        assert_eq!(states(false), (vec![0.0, 5.0, 10.0], vec![start.clone(), middle.clone(), end.clone()]));
+        let (way, found) = states(true);
+        assert_eq!(way, [0.0, 3.0, 7.0, 10.0, 14.0]);
+        assert_eq!(found, [start, vec![0.0, 0.0, 7.0], middle, vec![3.0, 4.0, 7.0], end]);
+    }
 
     /// The last step ends exactly at the end if the path is a whole number of steps, and before it otherwise.
     #[test]

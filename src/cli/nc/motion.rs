@@ -12,11 +12,11 @@ pub struct MotionArguments {
     /// Example: --overshoot-deg 10
     #[arg(long, value_name = "DEG")]
     overshoot_deg: Option<f64>,
-    /// Overshoot of a sweep of a linear axis, mm.
+    /// Overshoot of a sweep of a linear axis, or along a line, mm [default: 2, as far as the travel goes].
     ///
     /// Example: --overshoot-mm 5
-    #[arg(long, value_name = "MM", default_value_t = NcOptions::default().overshoot_mm)]
-    overshoot_mm: f64,
+    #[arg(long, value_name = "MM")]
+    overshoot_mm: Option<f64>,
     /// Length by which the bar is longer at the feed-in, mm; 0 for no feed-in.
     ///
     /// Example: --feed-in-mm 1.5

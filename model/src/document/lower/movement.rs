@@ -4,13 +4,14 @@ use super::Context;
 use crate::axis::{Axis, AxisKind};
 use crate::document::fault::{Fault, Within};
 use crate::document::movement as document;
+use crate::document::node::Named;
 use crate::document::schema;
-use crate::document::value::{Count, Positive};
+use crate::document::value::{Count, Length, Positive};
 use crate::files::quantity;
 use crate::instrument::{Following, Station};
 use crate::session::limits;
 use crate::session::motion::{
-    DEFAULT_FEED_MM_S, FollowOffset, MAX_READINGS, Motion, default_speed, programmed_over_path_feed,
+    DEFAULT_FEED_MM_S, FollowOffset, MAX_READINGS, Motion, default_speed, length_of, programmed_over_path_feed,
 };
 
 /// One axis moves.
@@ -48,6 +49,7 @@ pub(super) fn path(context: &Context<'_>, document: &document::Path, station: &S
     match document {
         document::Path::List(_) => Ok(Motion::List),
         document::Path::Circle(circle) => self::circle(context, circle),
+        document::Path::Line(line) => self::line(context, line),
         document::Path::Follow(follow) => self::follow(context, follow, station),
     }
 }
@@ -81,6 +83,61 @@ fn circle(context: &Context<'_>, document: &document::Circle) -> Result<Motion, 
     let (runs, both_directions) = runs_and_directions(document.runs, document.both_directions, range.steps())?;
     let StepRange { from, to, step } = range;
     Ok(Motion::Circle { first, second, radius, centre, from, to, step, speed, runs, both_directions })
+}
+
+fn line(context: &Context<'_>, document: &document::Line) -> Result<Motion, Fault> {
+    let machine = context.machine;
+    let positions = |named: &Named<Length>| {
+        let mut found: Vec<(usize, f64)> = Vec::with_capacity(named.0.len());
+        for (key, length) in &named.0 {
+            let linear = quantity::axis_position(machine, key)
+                .filter(|(axis, _)| machine.axes[*axis].kind == AxisKind::Linear)
+                .ok_or_else(|| {
+                    let linear = machine.axes.iter().filter(|axis| axis.kind == AxisKind::Linear);
+                    let known: Vec<String> = linear.map(|axis| axis.column("")).collect();
+                    let help = format!("a line moves linear axes: {}", known.join(", "));
+                    Fault::new(format!("`{key}` is no position of a linear axis"), help).on_key().at(key)
+                })?;
+            if found.iter().any(|(axis, _)| *axis == linear.0) {
+                let message = format!("the position of axis `{}` twice", machine.axes[linear.0].name);
+                return Err(Fault::new(message, None).on_key().at(key));
+            }
+            let (_, number) = length.evaluated(key, context.constants).within(key)?;
+            found.push((linear.0, linear.1.to_internal(number)));
+        }
+        Ok(found)
+    };
+    let starts = positions(&document.from).within("from")?;
+    let stops = positions(&document.to).within("to")?;
+    if starts.len() < 2 {
+        let help = "one axis alone is `sweep = { … }`";
+        return Err(Fault::of_key("names fewer than two axes", help).at("from"));
+    }
+    let is_of = |axis: usize| move |(other, _): &&(usize, f64)| *other == axis;
+    if let Some((axis, _)) = stops.iter().find(|(axis, _)| !starts.iter().any(|start| is_of(*axis)(&start))) {
+        let column = machine.axes[*axis].column("");
+        return Err(Fault::of_key(format!("names `{column}`, which `from` does not"), None).at("to"));
+    }
+    let (mut axes, mut ends) = (Vec::new(), Vec::new());
+    for (axis, start) in &starts {
+        let name = machine.axes[*axis].column("");
+        let Some((_, stop)) = stops.iter().find(is_of(*axis)) else {
+            return Err(Fault::of_key(format!("has no `{name}`"), format!("add `{name}`")).at("to"));
+        };
+        if start == stop {
+            let help = format!("state where it stands as `at = {{ {name} = … }}`");
+            return Err(Fault::of_key(format!("has the same `{name}` as `from`"), help).at("to"));
+        }
+        axes.push(*axis);
+        ends.push([*start, *stop]);
+    }
+    let range = StepRange::new(0.0, length_of(&ends), document.step_mm, "step_mm")?;
+    let in_turn = document.in_turn.unwrap_or(false);
+    let speed = document.feed_mm_min.map_or(DEFAULT_FEED_MM_S, |feed| feed.0 / 60.0);
+    let steps = range.steps() * if in_turn { axes.len() as f64 } else { 1.0 };
+    let (runs, both_directions) = runs_and_directions(document.runs, document.both_directions, steps)?;
+    let StepRange { from, to, step } = range;
+    Ok(Motion::Line { axes, ends, from, to, step, speed, runs, both_directions, in_turn })
 }
 
 fn follow(context: &Context<'_>, document: &document::Follow, station: &Station<f64>) -> Result<Motion, Fault> {

@@ -15,7 +15,8 @@ use crate::files::quantity;
 use crate::files::table::fill::Filling;
 use crate::files::table::{self, memory, request::Request};
 use crate::instrument::set_up::SetUp;
-use crate::instrument::{InstrumentKind, kinds};
+use crate::instrument::{InstrumentKind, Station, kinds};
+use crate::session::contributors::Contributors;
 use crate::session::expression::Length;
 use crate::session::motion::Motion;
 use crate::session::{Test, check, planned};
@@ -47,6 +48,7 @@ pub(super) fn tests(
         (None, Some(path)) => Some(movement::path(context, path, &station).within("path")?),
         (None, None) => None,
     };
+    let contributors = document.contributors.map(|of| contributors(of, &station).within("contributors")).transpose()?;
     let is_measured = document.data.is_some() || matches!(context.data, Data::Columns([_, ..]));
     if !is_measured && matches!(motion, None | Some(Motion::List)) {
         let help = "add `data = \"….csv\"`, or the motion of the axes: `sweep = { … }` or `path = { … }`";
@@ -66,6 +68,7 @@ pub(super) fn tests(
         motion,
         at,
         at_written,
+        contributors,
         readings: None,
     };
     if !is_measured {
@@ -172,6 +175,40 @@ fn at(context: &Context<'_>, entries: &Named<value::Length>) -> Result<HeldPosit
         held.listed[axis] = true;
     }
     Ok(held)
+}
+
+/// The contributors to the uncertainty of positioning figures, if the instrument reads such figures in their units.
+fn contributors(document: Contributors, station: &Station<f64>) -> Result<Contributors, Fault> {
+    if station.positioning().is_none() {
+        let help = "a laser with a displacement and a sensor of angles have figures of positioning: remove the table";
+        let message = format!("{} has no figures of positioning", station.kind().entry().phrase);
+        return Err(Fault::new(message, help).on_key());
+    }
+    let is_angle = station.channels().first().is_some_and(|channel| channel.is_angle());
+    let of_lengths = [
+        ("device_u_um", document.device_u_um),
+        ("device_u_um_m", document.device_u_um_m),
+        ("misalignment_mm", document.misalignment_mm),
+        ("expansion_um_m_k", document.expansion_um_m_k),
+        ("expansion_u_um_m_k", document.expansion_u_um_m_k),
+        ("temperature_difference_k", document.temperature_difference_k),
+        ("temperature_u_k", document.temperature_u_k),
+        ("environment_um", document.environment_um),
+        ("setup_u_um", document.setup_u_um),
+    ];
+    let of_angles = [
+        ("device_u_arcsec", document.device_u_arcsec),
+        ("environment_arcsec", document.environment_arcsec),
+        ("setup_u_arcsec", document.setup_u_arcsec),
+    ];
+    let (wrong, of): (&[_], _) = if is_angle { (&of_lengths, "lengths") } else { (&of_angles, "angles") };
+    match wrong.iter().find(|(_, value)| value.is_some()) {
+        Some((key, _)) => {
+            let reads = if is_angle { "angles" } else { "lengths" };
+            Err(Fault::of_key(format!("is of {of}; the figures of this test are of {reads}"), None).on_key().at(key))
+        }
+        None => Ok(document),
+    }
 }
 
 /// The data file: in the data directory if one is given, else beside the session file.
