@@ -31,12 +31,14 @@ struct Case {
     axes: &'static str,
     session: &'static str,
     /// Names and contents of its data files.
-    data: &'static dyn Fn() -> Vec<(&'static str, String)>,
+    data: fn() -> Vec<(&'static str, String)>,
     /// Beginnings of the parameters that it does not determine, and their true values, mm and rad.
     lacks: &'static [(&'static str, f64)],
     reading: Reading,
     /// Noise of a length and of an angle, mm and rad.
     noise: [f64; 2],
+    /// The channel of an azimuth, if there is one: the next is its elevation.
+    azimuth: Option<usize>,
 }
 
 /// Travels of three linear axes.
@@ -73,9 +75,12 @@ fn measured(plan: &Session, case: &Case, seed: u64) -> Session {
             };
             let values = (case.reading)(test, &at);
             assert_eq!(values.len(), angles.len(), "{}", test.name);
-            for (value, is_angle) in values.into_iter().zip(&angles) {
+            for (channel, is_angle) in angles.iter().enumerate() {
                 let normal: f64 = StandardNormal.sample(&mut random);
-                observed.push(value + normal * case.noise[usize::from(*is_angle)]);
+                // The noise of an azimuth is that across the line of sight.
+                let is_azimuth = case.azimuth == Some(channel);
+                let narrowed = if is_azimuth { values[channel + 1].cos() } else { 1.0 };
+                observed.push(values[channel] + normal * case.noise[usize::from(*is_angle)] / narrowed);
             }
         }
         readings.observed = observed;
@@ -89,7 +94,8 @@ fn check(case: &Case) {
     let at = |name: &str| folder.path().join(name);
     let [machine, session, next, found, again] =
         ["machine.toml", "session.toml", "next.toml", "found.json", "again.json"].map(at);
-    let head = format!("name = \"Machine\"\nchain = \"{}\"\n{}{LINEAR}", case.chain, case.axes);
+    let linear = if case.chain.contains('X') { LINEAR } else { "" };
+    let head = format!("name = \"Machine\"\nchain = \"{}\"\n{}{linear}", case.chain, case.axes);
     std::fs::write(&machine, head).unwrap();
     std::fs::write(&session, format!("[machine]\nfile = \"machine.toml\"\n\n{}", case.session)).unwrap();
     for (name, content) in (case.data)() {
@@ -162,7 +168,7 @@ fn a_laser_is_aligned_with_the_axis_that_no_test_moves() {
                   [[effect]]\ncomponent = \"EYY\"\ndriver = \"Y\"\nshape = \"polynomial\"\norder = 1\nscale_mm = 200\n\n\
                   [[test]]\nname = \"LX\"\nbeam = [1, 0, 0]\n\
                   sweep = { axis = \"X\", from_mm = -300, to_mm = 300, step_mm = 30 }\n",
-        data: &Vec::new,
+        data: Vec::new,
         lacks: &[("EYY~Y", 4e-3)],
         reading: |test, at| {
             let Station::Laser(laser) = &test.station else { panic!("a laser") };
@@ -171,6 +177,7 @@ fn a_laser_is_aligned_with_the_axis_that_no_test_moves() {
             vec![dot(laser.frame[0], [x + 7e-3 * x / 300.0, y + 4e-3 * y / 200.0, at("Z")])]
         },
         noise: [5e-4, 0.0],
+        azimuth: None,
     });
 }
 
@@ -185,7 +192,7 @@ fn a_level_reads_across_the_axis_that_no_test_moves() {
                   [[effect]]\ncomponent = \"EAY\"\ndriver = \"Y\"\nshape = \"polynomial\"\norder = 1\nscale_mm = 200\n\n\
                   [[test]]\nname = \"level\"\nabout = [[0, 1, 0], [1, 0, 0]]\nbody = \"tool\"\n\
                   sweep = { axis = \"X\", from_mm = -300, to_mm = 300, step_mm = 30 }\n",
-        data: &Vec::new,
+        data: Vec::new,
         lacks: &[("EAY~Y", 30.0 * MICRO)],
         reading: |test, at| {
             let Station::Angle(level) = &test.station else { panic!("a level") };
@@ -195,6 +202,7 @@ fn a_level_reads_across_the_axis_that_no_test_moves() {
             level.about.iter().map(|about| dot(*about, turned)).collect()
         },
         noise: [0.0, 0.2 / 3600.0 * std::f64::consts::PI / 180.0],
+        azimuth: None,
     });
 }
 
@@ -209,7 +217,7 @@ fn a_tracker_sees_the_axis_that_no_test_moves() {
                   sweep = { axis = \"X\", from_mm = -300, to_mm = 300, step_mm = 30 }\n\n\
                   [[test]]\nname = \"Y\"\nsetup = \"T\"\nspindle_setup = \"S\"\ntarget_mm = [0, 0, 0]\n\
                   sweep = { axis = \"Y\", from_mm = -200, to_mm = 200, step_mm = 20 }\n",
-        data: &Vec::new,
+        data: Vec::new,
         lacks: &[("EA0Z", 40.0 * MICRO), ("EB0Z", -60.0 * MICRO)],
         reading: |_, at| {
             let (x, y, z) = (at("X"), at("Y"), at("Z"));
@@ -219,6 +227,7 @@ fn a_tracker_sees_the_axis_that_no_test_moves() {
             vec![seen[0] + 800.0, seen[1] - 1500.0, seen[2] + 200.0]
         },
         noise: [8e-3, 0.0],
+        azimuth: None,
     });
 }
 
@@ -263,10 +272,84 @@ fn a_tracker_with_data_stays_where_it_stands() {
                   [unknowns]\nerrors = [\"EC0Y\", \"EA0Z\", \"EB0Z\"]\n\n\
                   [[test]]\nname = \"X\"\nsetup = \"T\"\nspindle_setup = \"S\"\ntarget_mm = [0, 0, 0]\ndata = \"X.csv\"\n\n\
                   [[test]]\nname = \"Y\"\nsetup = \"T\"\nspindle_setup = \"S\"\ntarget_mm = [0, 0, 0]\ndata = \"Y.csv\"\n",
-        data: &data,
+        data,
         lacks: &[("EA0Z", 40.0 * MICRO), ("EB0Z", -60.0 * MICRO)],
         reading: |_, at| polar(leaning(leant(at("X"), at("Y"), at("Z")))).to_vec(),
         noise: [1e-3, 2.0 / 3600.0 * std::f64::consts::PI / 180.0],
+        azimuth: Some(1),
+    });
+}
+
+/// Lines along X and Y say nothing of the squareness of Z.
+#[test]
+fn a_camera_system_sees_the_axis_that_no_test_moves() {
+    check(&Case {
+        chain: "w b X Y Z t",
+        axes: "",
+        session: "[instrument]\nkind = \"pose\"\nnoise_um = 20\nnoise_arcsec = 10\n\n\
+                  [unknowns]\nerrors = [\"EC0Y\", \"EA0Z\", \"EB0Z\"]\n\n\
+                  [[test]]\nname = \"X\"\nsetup = \"T\"\nspindle_setup = \"S\"\ntarget_mm = [0, 0, 0]\n\
+                  sweep = { axis = \"X\", from_mm = -300, to_mm = 300, step_mm = 30 }\n\n\
+                  [[test]]\nname = \"Y\"\nsetup = \"T\"\nspindle_setup = \"S\"\ntarget_mm = [0, 0, 0]\n\
+                  sweep = { axis = \"Y\", from_mm = -200, to_mm = 200, step_mm = 20 }\n",
+        data: Vec::new,
+        lacks: &[("EA0Z", 40.0 * MICRO), ("EB0Z", -60.0 * MICRO)],
+        reading: |_, at| {
+            let seen = turned(0.5, leant(at("X"), at("Y"), at("Z")));
+            vec![seen[0] + 800.0, seen[1] - 1500.0, seen[2] + 200.0, 0.0, 0.0, 0.5]
+        },
+        noise: [2e-2, 10.0 / 3600.0 * std::f64::consts::PI / 180.0],
+        azimuth: None,
+    });
+}
+
+/// Lines along X and Y from a known station say nothing of the squareness of Z towards X.
+#[test]
+fn a_station_of_distances_follows_the_axis_that_no_test_moves() {
+    check(&Case {
+        chain: "w b X Y Z t",
+        axes: "",
+        session: "[instrument]\nkind = \"distance\"\nnoise_um = 0.2\n\n\
+                  [unknowns]\nerrors = [\"EC0Y\", \"EB0Z\"]\n\n\
+                  [[test]]\nname = \"X\"\nsetup = \"T\"\nreflector_mm = [0, 0, 0]\nstation_mm = [-900, -600, 100]\nstation_u_um = 0\n\
+                  station_frame = \"bed\"\nsweep = { axis = \"X\", from_mm = -300, to_mm = 300, step_mm = 30 }\n\n\
+                  [[test]]\nname = \"Y\"\nsetup = \"T\"\nreflector_mm = [0, 0, 0]\nstation_mm = [-900, -600, 100]\nstation_u_um = 0\n\
+                  station_frame = \"bed\"\nsweep = { axis = \"Y\", from_mm = -200, to_mm = 200, step_mm = 20 }\n",
+        data: Vec::new,
+        lacks: &[("EB0Z", -60.0 * MICRO)],
+        reading: |_, at| {
+            let (x, y, z) = (at("X"), at("Y"), at("Z"));
+            let point = [x - 25.0 * MICRO * y - 60.0 * MICRO * z, y, z];
+            let [x, y, z] = [point[0] + 900.0, point[1] + 600.0, point[2] - 100.0];
+            // A dead path too.
+            vec![x.hypot(y).hypot(z) + 2.5]
+        },
+        noise: [2e-4, 0.0],
+        azimuth: None,
+    });
+}
+
+/// Stars at one elevation tell index error, collimation and the angle between the axes only together.
+#[test]
+fn a_mount_turns_about_the_axis_that_no_test_moves() {
+    check(&Case {
+        chain: "w b AZ EL t",
+        axes: "[axis.AZ]\nkind = \"rotary\"\ndirection = [0, 0, -1]\ntravel_deg = [-170, 170]\n[axis.EL]\nkind = \"rotary\"\n\
+               direction = [0, -1, 0]\ntravel_deg = [10, 80]\n",
+        session: "[instrument]\nkind = \"pointing\"\nnoise_arcsec = 1.5\n\n[unknowns]\nerrors = [\"EC0AZ\", \"EA0EL\"]\n\n\
+                  [[test]]\nname = \"AZ\"\nat = { el_deg = 30 }\n\
+                  sweep = { axis = \"AZ\", from_deg = -160, to_deg = 160, step_deg = 20 }\n",
+        data: Vec::new,
+        lacks: &[("EC0AZ", 100.0 * MICRO), ("EA0EL", -150.0 * MICRO)],
+        reading: |_, at| {
+            let (sin, cos) = at("EL").sin_cos();
+            let tilt = -150.0 * MICRO;
+            // The mount turns back from west.
+            let [x, y, z] = turned(100.0 * MICRO - at("AZ"), [cos, -tilt.sin() * sin, tilt.cos() * sin]);
+            vec![(-y).atan2(x), z.asin()]
+        },
+        noise: [0.0, 1.5 / 3600.0 * std::f64::consts::PI / 180.0],
+        azimuth: Some(0),
     });
 }
 
@@ -280,7 +363,7 @@ fn an_r_test_follows_the_axis_that_no_test_moves() {
                   [[test]]\nname = \"X\"\nsetting = \"E\"\nworkpiece_ball_mm = [80, 0, 60]\nworkpiece_ball_u_um = inf\n\
                   spindle_ball_mm = [0, 0, 0]\nsetup = \"N\"\nspindle_setup = \"S\"\nat = { x_mm = 80, z_mm = 60 }\n\
                   sweep = { axis = \"X\", from_mm = 78, to_mm = 82, step_mm = 0.5 }\n",
-        data: &Vec::new,
+        data: Vec::new,
         lacks: &[("EX0C", 12e-3), ("EY0C", -8e-3)],
         reading: |test, at| {
             let Station::RTest(nest) = &test.station else { panic!("an R-test") };
@@ -290,6 +373,7 @@ fn an_r_test_follows_the_axis_that_no_test_moves() {
             (0..3).map(|i| in_table[i] + nest.spindle_ball[i] - nest.workpiece_ball[i]).collect()
         },
         noise: [5e-4, 0.0],
+        azimuth: None,
     });
 }
 
@@ -303,7 +387,7 @@ fn a_probe_touches_while_the_axis_turns_that_no_test_moves() {
                   [[test]]\nname = \"round\"\nradius_mm = 45\nradius_u_um = inf\nartefact_mm = [0, 0, 0]\n\
                   artefact_u_um = [inf, inf, 0]\nstylus_mm = [0, 0, 0]\nsetup = \"cylinder\"\nspindle_setup = \"stylus\"\n\
                   path = { kind = \"circle\", plane = \"XY\", radius_mm = 45, step_deg = 15, both_directions = false }\n",
-        data: &Vec::new,
+        data: Vec::new,
         lacks: &[("EX0C", 12e-3), ("EY0C", -8e-3)],
         reading: |test, at| {
             let Station::Probe(probe) = &test.station else { panic!("a probe") };
@@ -318,6 +402,7 @@ fn a_probe_touches_while_the_axis_turns_that_no_test_moves() {
             vec![-along - (along * along - square).sqrt()]
         },
         noise: [1e-3, 0.0],
+        azimuth: None,
     });
 }
 
