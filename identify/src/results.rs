@@ -18,6 +18,7 @@ use crate::circular::CircularTest;
 use crate::noise::NoiseSource;
 use crate::plausibility::Plausibility;
 use crate::positioning::PositioningTest;
+use crate::positioning::diagonal::{DiagonalTest, LargestOfDiagonals};
 use crate::straightness::StraightnessTest;
 use crate::tolerance::Conformity;
 use crate::unit::ReadingUnit;
@@ -131,6 +132,12 @@ pub struct FitResult {
     /// Figures of ISO 230-2 of the tests in which a laser or a sensor of angles reads the axis that moves.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub positioning: Vec<PositioningTest>,
+    /// Figures of ISO 230-6 of the tests in which a laser reads along a diagonal.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub diagonals: Vec<DiagonalTest>,
+    /// The largest of them, for body and for face diagonals.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub largest_of_diagonals: Vec<LargestOfDiagonals>,
     /// Straightness of axes by ISO 230-1, from tests in which one linear axis moves under a laser.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub straightness: Vec<StraightnessTest>,

@@ -48,14 +48,19 @@ pub fn of_session(session: &Session, left_out: &[Vec<bool>]) -> Vec<Straightness
 
 fn of_test(session: &Session, test: &Test, left_out: &[bool]) -> Vec<StraightnessTest> {
     let machine = &session.machine;
-    let Some(axis) = positioning::moved_axis(machine, test) else { return Vec::new() };
+    let Some((axis, readings)) = positioning::moved_axis(machine, test).zip(test.readings.as_ref()) else {
+        return Vec::new();
+    };
+    let kind = machine.axes[axis].kind;
+    let places = positioning::along_axis(readings, axis, kind);
     let channels = test.station.channels().iter().enumerate();
     let across = channels.filter(|(place, _)| test.station.is_straightness(*place));
     across
         .filter_map(|(place, channel)| {
             let per_unit = Unit::of(channel.unit).display_per_internal;
             let observed = |row: usize, values: &[f64]| (row, values[place] * per_unit).1;
-            let positions = positioning::approaches(machine, test, left_out, (axis, place), observed)?;
+            let shown = |at| kind.to_display(at);
+            let positions = positioning::approaches(readings, left_out, place, &places, shown, observed);
             let points: Vec<[f64; 2]> = positions.iter().filter_map(point).collect();
             figures(&points).map(|[least_squares, end_points]| StraightnessTest {
                 test: test.name.clone(),

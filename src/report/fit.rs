@@ -75,6 +75,7 @@ pub fn report(
     confounded::section(&mut report, &result.unobservable, by_prior, (&result.outliers, result.reading_unit));
     circular::section(&mut report, &result.circular);
     positioning::section(&mut report, &result.positioning);
+    positioning::diagonals(&mut report, &result.diagonals, &result.largest_of_diagonals);
     straightness::section(&mut report, &result.straightness);
     report.section("Next");
     let steps = next(problem, result, statements.measure.step, commands);

@@ -14,11 +14,12 @@ use crate::noise;
 use crate::numerics::rank::Rank;
 use crate::parameter_description::parameter_meaning;
 use crate::plausibility;
+use crate::positioning::{self, diagonal};
 use crate::problem::Problem;
 use crate::results::{FitResult, OfAngles, Outlier, ParameterResult, Unobservable, phases_follow_amplitudes};
+use crate::straightness;
 use crate::tolerance::conformity;
 use crate::unit::ARCSEC;
-use crate::{positioning, straightness};
 
 /// The fit in its reported form.
 ///
@@ -41,6 +42,7 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> 
     determined.mark(problem, &mut parameters, goodness);
     let noise_um = problem.noise.sigma_mm * 1e3;
     let circular = circular::of_session(&problem.session, problem.noise.sigma_mm, &problem.rejected);
+    let diagonals = diagonal::of_session(&problem.session, &problem.rejected);
     Ok(FitResult {
         reading_unit: problem.unit(),
         of_angles,
@@ -69,6 +71,8 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> 
         outcome: outcome::outcome(problem, fit, goodness, &determined),
         circular,
         positioning: positioning::of_session(&problem.session, &problem.rejected),
+        largest_of_diagonals: diagonal::largest(&diagonals),
+        diagonals,
         straightness: straightness::of_session(&problem.session, &problem.rejected),
         parameters,
         plausibility,

@@ -34,6 +34,11 @@ pub const TEMPLATES: &[Template] = &[
         files: files!("angle": "machine.toml", "plan.toml", "session.toml", "level.csv", "polygon.csv"),
     },
     Template {
+        name: "diagonals",
+        about: "three-axis machine and a laser along its axes and four body diagonals (ISO 230-6); a plan, and simulated readings",
+        files: files!("diagonals": "machine.toml", "plan.toml", "session.toml", "X.csv", "Y.csv", "Z.csv", "PPP.csv", "NPP.csv", "PNP.csv", "PPN.csv"),
+    },
+    Template {
         name: "distance",
         about: "three-axis machine and a tracking interferometer at four unknown places; simulated readings",
         files: files!("distance": "machine.toml", "session.toml", "S1.csv", "S2.csv", "S3.csv", "S4.csv"),

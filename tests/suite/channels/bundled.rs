@@ -1,8 +1,9 @@
-//! The ready sessions of laser, angle, distance, pose and tracker: their data are those of the plant, and a fit finds the
+//! The ready sessions of laser, diagonals, angle, distance, pose and tracker: their data are those of the plant, and a fit finds the
 //! errors from which they were made. `ABBE_UPDATE_PAGES=1` writes the data.
 
 use std::path::{Path, PathBuf};
 
+use super::diagonals::{Box3, HIGH, LOW, body};
 use super::scatter::{OF_LEVEL, SQUARENESS, STATIONS, distance_data, level_data};
 use super::stands::{polar_data, pose_data};
 use super::*;
@@ -85,4 +86,28 @@ fn the_ready_sessions_of_poses_are_those_of_the_plant() {
     let (data, truth) = polar_data(&mut Pcg64::seed_from_u64(5));
     assert_data("pose", "target.csv", &data);
     assert_found("pose", "tracker.toml", &truth);
+}
+
+/// The ready session: laser along X, Y and Z, and along four body diagonals.
+#[test]
+fn the_ready_session_of_diagonals_is_that_of_the_plant() {
+    let mut random = Pcg64::seed_from_u64(10);
+    let arcsec = [6.0, -9.0, 4.0];
+    let machine = Box3 {
+        scale: [12e-6, -8e-6, 20e-6],
+        squareness: arcsec.map(|arcsec: f64| arcsec * ARCSECOND),
+        backlash: 1.2e-3,
+    };
+    let axis = |k: usize| {
+        let [mut from, mut to] = [[0.0; 3]; 2];
+        (from[k], to[k]) = (LOW[k], HIGH[k]);
+        [from, to]
+    };
+    let lines = [("X", axis(0)), ("Y", axis(1)), ("Z", axis(2))].into_iter();
+    for (name, ends) in lines.chain(["PPP", "NPP", "PNP", "PPN"].map(|name| (name, body(name)))) {
+        assert_data("diagonals", &format!("{name}.csv"), &machine.data(ends, false, 5, 1e-4, &mut random));
+    }
+    let mut truth: Vec<(&'static str, f64)> = SQUARENESS.iter().copied().zip(arcsec).collect();
+    truth.extend([("EXX~X:p1", 3.6), ("EYY~Y:p1", -0.8), ("EZZ~Z:p1", 6.0), ("EXX~X:backlash", -1.2)]);
+    assert_found("diagonals", "session.toml", &truth);
 }

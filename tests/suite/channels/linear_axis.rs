@@ -37,8 +37,8 @@ fn the_figures_of_a_linear_axis_are_those_of_its_report() {
     let result = fit::report(&problem, &found).unwrap();
     let [figures] = &result.positioning[..] else { panic!("{:?}", result.positioning) };
     assert_eq!((figures.axis.as_str(), figures.unit.as_str(), figures.positions.len()), ("X", "um", 9));
-    assert_eq!(format!("{:.2}", figures.mean_range.unwrap()), "93.65");
-    assert_eq!(format!("{:.2}", figures.accuracy.unwrap()), "135.27");
+    assert_eq!(format!("{:.2}", figures.figures.mean_range.unwrap()), "93.65");
+    assert_eq!(format!("{:.2}", figures.figures.accuracy.unwrap()), "135.27");
 }
 
 /// A table axis: what is read against the table falls where the axis rises. A laser along −X, a positioning error of the
@@ -81,7 +81,7 @@ fn the_figures_of_an_axis_that_carries_the_table_have_the_sign_of_its_deviations
     };
     near(mean(of_x, 10), [3.0, 2.0]);
     near(mean(of_x, 0), [0.0, -1.0]);
-    assert!((of_x.mean_reversal.unwrap() - 1.0).abs() < 1e-3);
+    assert!((of_x.figures.mean_reversal.unwrap() - 1.0).abs() < 1e-3);
     near(mean(of_c, 10), [5.0, 5.0]);
     assert_eq!((of_c.unit.as_str(), of_c.position_unit.as_str()), ("arcsec", "deg"));
 }

@@ -3,6 +3,7 @@
 
 mod bundled;
 mod columns;
+mod diagonals;
 mod layouts;
 mod linear_axis;
 mod noise;

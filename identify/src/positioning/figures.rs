@@ -1,0 +1,239 @@
+//! The figures of deviations that are read at positions, approached in both directions (ISO 230-2:2014, 3 and 7), and how
+//! an error of every reading moves them.
+//!
+//! At a position `i`, over the runs in one direction, `x̄ᵢ↑` and `sᵢ↑` are mean and standard deviation of the deviation
+//! from the commanded position.
+//!
+//! ```text
+//! Bᵢ = x̄ᵢ↑ − x̄ᵢ↓     Rᵢ↑ = 4sᵢ↑     Rᵢ = max(2sᵢ↑ + 2sᵢ↓ + |Bᵢ|; Rᵢ↑; Rᵢ↓)     M = max x̄ᵢ − min x̄ᵢ,  x̄ᵢ = (x̄ᵢ↑ + x̄ᵢ↓)/2
+//! E = max(x̄ᵢ↑; x̄ᵢ↓) − min(x̄ᵢ↑; x̄ᵢ↓)     A = max(x̄ᵢ↑ + 2sᵢ↑; x̄ᵢ↓ + 2sᵢ↓) − min(x̄ᵢ↑ − 2sᵢ↑; x̄ᵢ↓ − 2sᵢ↓)
+//! ```
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// Figures of ISO 230-2 over all positions.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct Figures {
+    /// Unidirectional accuracy A↑, from the runs in positive direction; absent with fewer than two.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accuracy_forward: Option<f64>,
+    /// Unidirectional accuracy A↓.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accuracy_backward: Option<f64>,
+    /// Bidirectional accuracy A.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accuracy: Option<f64>,
+    /// Unidirectional repeatability R↑.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub repeatability_forward: Option<f64>,
+    /// Unidirectional repeatability R↓.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub repeatability_backward: Option<f64>,
+    /// Bidirectional repeatability R.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub repeatability: Option<f64>,
+    /// Unidirectional systematic deviation E↑.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub systematic_forward: Option<f64>,
+    /// Unidirectional systematic deviation E↓.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub systematic_backward: Option<f64>,
+    /// Bidirectional systematic deviation E.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub systematic: Option<f64>,
+    /// Range of the mean bidirectional deviation M.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_range: Option<f64>,
+    /// Reversal value B: the largest |Bᵢ|.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reversal: Option<f64>,
+    /// Mean reversal value B̄.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_reversal: Option<f64>,
+}
+
+/// The deviations at one position.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Position {
+    /// The commanded position, in `position_unit`.
+    pub at: f64,
+    /// In positive direction.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub forward: Option<Approach>,
+    /// In negative direction.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub backward: Option<Approach>,
+}
+
+/// Deviations of repeated approaches in one direction.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Approach {
+    /// Number of approaches.
+    pub count: usize,
+    /// Their mean.
+    pub mean: f64,
+    /// Their standard deviation; absent with fewer than two.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub deviation: Option<f64>,
+}
+
+impl Approach {
+    pub(super) fn of(values: &[f64]) -> Option<Approach> {
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let squares = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+        let deviation = (values.len() > 1).then(|| (squares / (count - 1.0)).sqrt());
+        (!values.is_empty()).then_some(Approach { count: values.len(), mean, deviation })
+    }
+
+    /// The mean plus so many standard deviations; `None` if those are needed and missing.
+    fn with(self, deviations: f64) -> Option<Value> {
+        let count = self.count as f64;
+        let share = 1.0 / count;
+        if deviations == 0.0 {
+            return Some(Value { value: self.mean, share });
+        }
+        let value = self.mean + deviations * self.deviation?;
+        Some(Value { value, share: share + deviations.powi(2) / (count - 1.0) })
+    }
+
+    /// So many standard deviations.
+    fn spread(self, deviations: f64) -> Option<Value> {
+        let share = deviations.powi(2) / (self.count as f64 - 1.0);
+        Some(Value { value: deviations * self.deviation?, share })
+    }
+}
+
+/// A figure, and its variance per variance of an independent error of every reading.
+///
+/// To first order such an error moves a mean of `n` readings with the variance `1/n`, and their standard deviation, which is
+/// that of the machine, with `1/(n − 1)`; the two are not correlated.
+#[derive(Clone, Copy, Debug)]
+struct Value {
+    value: f64,
+    share: f64,
+}
+
+impl Value {
+    fn plus(self, other: Value, factor: f64) -> Value {
+        Value { value: self.value + factor * other.value, share: self.share + factor * factor * other.share }
+    }
+
+    fn times(self, factor: f64) -> Value {
+        Value { value: factor * self.value, share: factor * factor * self.share }
+    }
+
+    fn largest(self, other: Value) -> Value {
+        if other.value > self.value { other } else { self }
+    }
+
+    fn smallest(self, other: Value) -> Value {
+        if other.value < self.value { other } else { self }
+    }
+}
+
+impl Position {
+    fn reversal(&self) -> Option<Value> {
+        Some(self.forward?.with(0.0)?.plus(self.backward?.with(0.0)?, -1.0))
+    }
+
+    fn mean(&self) -> Option<Value> {
+        Some(self.forward?.with(0.0)?.plus(self.backward?.with(0.0)?, 1.0).times(0.5))
+    }
+
+    fn repeatability(&self) -> Option<Value> {
+        let (forward, backward) = (self.forward?, self.backward?);
+        let reversal = self.reversal()?;
+        let reversal = reversal.times(if reversal.value < 0.0 { -1.0 } else { 1.0 });
+        let both = forward.spread(2.0)?.plus(backward.spread(2.0)?, 1.0).plus(reversal, 1.0);
+        Some(both.largest(forward.spread(4.0)?).largest(backward.spread(4.0)?))
+    }
+}
+
+/// The figures of deviations at positions, and for each its variance per variance of an independent error of every reading.
+pub(super) fn figures(positions: &[Position]) -> [Figures; 2] {
+    type Of<'f> = &'f dyn Fn(&Position) -> Option<Value>;
+    // A figure of an axis exists if every position has the values that it combines.
+    let all = |of: Of<'_>| positions.iter().map(of).collect::<Option<Vec<Value>>>().filter(|all| !all.is_empty());
+    let greatest = |of: Of<'_>| all(of)?.into_iter().reduce(Value::largest);
+    let least = |of: Of<'_>| all(of)?.into_iter().reduce(Value::smallest);
+    let range = |high: Of<'_>, low: Of<'_>| Some(greatest(high)?.plus(least(low)?, -1.0));
+    let forward = |deviations: f64| move |p: &Position| p.forward?.with(deviations);
+    let backward = |deviations: f64| move |p: &Position| p.backward?.with(deviations);
+    let larger =
+        |deviations: f64| move |p: &Position| Some(p.forward?.with(deviations)?.largest(p.backward?.with(deviations)?));
+    let smaller = |deviations: f64| {
+        move |p: &Position| Some(p.forward?.with(deviations)?.smallest(p.backward?.with(deviations)?))
+    };
+    let size = |p: &Position| p.reversal().map(|reversal| reversal.times(reversal.value.signum()));
+    let mean_reversal = all(&Position::reversal).and_then(|all| {
+        let share = 1.0 / all.len() as f64;
+        Some(all.into_iter().reduce(|sum, one| sum.plus(one, 1.0))?.times(share))
+    });
+    let found = [
+        range(&forward(2.0), &forward(-2.0)),
+        range(&backward(2.0), &backward(-2.0)),
+        range(&larger(2.0), &smaller(-2.0)),
+        greatest(&|p| p.forward?.spread(4.0)),
+        greatest(&|p| p.backward?.spread(4.0)),
+        greatest(&Position::repeatability),
+        range(&forward(0.0), &forward(0.0)),
+        range(&backward(0.0), &backward(0.0)),
+        range(&larger(0.0), &smaller(0.0)),
+        range(&Position::mean, &Position::mean),
+        greatest(&size),
+        mean_reversal,
+    ];
+    [|of: Value| of.value, |of: Value| of.share].map(|part| Figures::of(found.map(|figure| figure.map(part))))
+}
+
+impl Figures {
+    /// In the order of the fields.
+    fn of(all: [Option<f64>; 12]) -> Figures {
+        let [
+            accuracy_forward,
+            accuracy_backward,
+            accuracy,
+            repeatability_forward,
+            repeatability_backward,
+            repeatability,
+            ..,
+        ] = all;
+        let [.., systematic_forward, systematic_backward, systematic, mean_range, reversal, mean_reversal] = all;
+        Figures {
+            accuracy_forward,
+            accuracy_backward,
+            accuracy,
+            repeatability_forward,
+            repeatability_backward,
+            repeatability,
+            systematic_forward,
+            systematic_backward,
+            systematic,
+            mean_range,
+            reversal,
+            mean_reversal,
+        }
+    }
+
+    /// Every figure converted: `apart` of figures that compare two positions, `within` of those of one position.
+    pub(super) fn each(self, apart: impl Fn(f64) -> f64, within: impl Fn(f64) -> f64) -> Figures {
+        let apart = |figure: Option<f64>| figure.map(&apart);
+        let within = |figure: Option<f64>| figure.map(&within);
+        Figures {
+            accuracy_forward: apart(self.accuracy_forward),
+            accuracy_backward: apart(self.accuracy_backward),
+            accuracy: apart(self.accuracy),
+            repeatability_forward: within(self.repeatability_forward),
+            repeatability_backward: within(self.repeatability_backward),
+            repeatability: within(self.repeatability),
+            systematic_forward: apart(self.systematic_forward),
+            systematic_backward: apart(self.systematic_backward),
+            systematic: apart(self.systematic),
+            mean_range: apart(self.mean_range),
+            reversal: within(self.reversal),
+            mean_reversal: within(self.mean_reversal),
+        }
+    }
+}
