@@ -6,7 +6,7 @@ use abbe::import::{ImportOptions, Target, import};
 use abbe::model::document::node::Node;
 use abbe::model::files::import::{Foreign, Hint};
 use abbe::model::files::store::Store;
-use abbe::model::instrument::InstrumentKind;
+use abbe::model::instrument;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -31,9 +31,9 @@ pub fn import_readings(
     allow_implausible: bool,
 ) -> PyResult<(Vec<(String, Vec<u8>)>, String)> {
     let of_words = |(message, help): (String, String)| Failed::argument(message, help);
-    let known = || InstrumentKind::ALL.iter().map(|kind| kind.word()).collect::<Vec<_>>().join(", ");
+    let known = || instrument::kinds().iter().map(|kind| kind.word()).collect::<Vec<_>>().join(", ");
     let kind = kind.map(|word| {
-        let found = InstrumentKind::ALL.iter().copied().find(|kind| kind.word() == word);
+        let found = instrument::kinds().iter().copied().find(|kind| kind.word() == word);
         found.ok_or_else(|| Failed::argument(format!("there is no instrument `{word}`"), format!("known: {}", known())))
     });
     let options = ImportOptions {

@@ -6,7 +6,7 @@ use abbe::identify::IdentifyError;
 use abbe::import::{ImportOptions, Target, import, is_of_new_session};
 use abbe::model::files::import::{Foreign, Hint, session};
 use abbe::model::files::store::Store;
-use abbe::model::instrument::InstrumentKind;
+use abbe::model::instrument;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 
@@ -20,7 +20,7 @@ use crate::report::import as present;
 pub const HELP: &str = include_str!("help/import.txt");
 
 fn kinds() -> PossibleValuesParser {
-    PossibleValuesParser::new(InstrumentKind::ALL.iter().map(|kind| kind.word()))
+    PossibleValuesParser::new(instrument::kinds().iter().map(|kind| kind.word()))
 }
 
 /// `abbe import FILE… (--machine MACHINE --out FOLDER | --session SESSION)`
@@ -83,7 +83,7 @@ pub fn run(arguments: &ImportArguments) -> Result<(), Failure> {
     let outputs = arguments.output.prepared(&[])?;
     let of_words = |(message, help): (String, String)| Failure::CommandLine(format!("{message}; {help}"));
     let options = ImportOptions {
-        kind: InstrumentKind::ALL.iter().copied().find(|kind| arguments.kind.as_deref() == Some(kind.word())),
+        kind: arguments.kind.as_deref().map(str::parse).transpose()?,
         set: session::keys(&arguments.set).map_err(of_words)?,
         hints: arguments.column.iter().map(|text| Hint::parse(text)).collect::<Result<_, _>>().map_err(of_words)?,
         like: arguments.like.clone(),
