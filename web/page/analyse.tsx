@@ -109,7 +109,7 @@ export function Analyse({ opened, explore, imports }: Props) {
     const [first] = others;
     if (!first) return;
     const [name, bytes] = first;
-    if (own === undefined && others.size === 1 && isTable(name) && !isNamed(files, name)) {
+    if (own === undefined && others.size === 1 && isTable(name, bytes) && !isNamed(files, name)) {
       imports({ base: session ? { files, session } : undefined, file: { name, bytes } });
       return;
     }

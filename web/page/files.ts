@@ -233,8 +233,16 @@ function kindOf(contents: Uint8Array): Kind {
   return kind;
 }
 
-/** Whether a file may be a table of readings, by its name: the library says whether it is. */
-export const isTable = (path: string): boolean => /\.(csv|tsv|txt|dat|asc|prn)$/i.test(path);
+/** Bytes that tell whether a file is a table. */
+const LOOKED_AT = 1 << 16;
+
+/** Whether a file may be a table of readings: some lines have numbers. The library says whether it is one. */
+export function isTable(path: string, contents: Uint8Array): boolean {
+  if (!/\.(csv|tsv|txt|dat|asc|prn)$/i.test(path)) return false;
+  // Every encoding has digits as these bytes, UTF-16 with zeros between them.
+  const text = new TextDecoder("latin1").decode(contents.subarray(0, LOOKED_AT)).replaceAll("\0", "");
+  return text.split(/[\r\n]+/).filter((line) => (line.match(/\d+/g)?.length ?? 0) > 1).length > 1;
+}
 
 /** Whether the editor takes a file. */
 export const isEditable = (contents?: Uint8Array): boolean =>
