@@ -68,11 +68,7 @@ struct Arguments {
     /// Suppress tables and progress output; warnings and errors stay.
     #[arg(short, long, global = true)]
     quiet: bool,
-    /// Number of threads, by default all processors.
-    ///
-    /// `run` and `study` take one by default. No result depends on it.
-    ///
-    /// Example: --threads 4
+    /// Number of threads; by default all processors, but one for `run` and `study`.
     #[arg(long, global = true, value_name = "N", value_parser = values::threads())]
     threads: Option<u32>,
 }

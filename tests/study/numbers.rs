@@ -1,12 +1,14 @@
 //! Effects whose shape has numbers (a centre, a width, a period, a time constant): the uncertainty of these numbers, and of
 //! the errors of the machine that share a part with the effect.
 
-use abbe::identify::results::{EffectResult, ParameterResult};
+use abbe::identify::results::{EffectName, EffectResult, ParameterResult};
 
 use super::judging::{found, is, pulls, summary};
 use super::rates::{Pulls, Rate};
-use super::sessions::{TracedSession, at_multiple, case, oracle, random, run, sessions, skipped, verbose};
-use crate::plant::{Decay, Injected, Profile, Shape};
+use super::sessions::{
+    NOISES, TracedSession, at_multiple, case, oracle, random, run, sessions, skipped, traced, verbose,
+};
+use crate::plant::{AxisName, Component, Decay, Driver, Freedom, Injected, Kind, Profile, Recipe, Shape};
 
 /// The number of this study among those that draw effects.
 const STUDY: u64 = 49;
@@ -110,4 +112,28 @@ fn numbers_of_shapes_have_honest_uncertainties() {
     };
     assert!(beyond(&of_errors, 4.0).is_consistent_with_at_most(0.01), "{:?}", of_errors.0);
     assert!(beyond(&of_numbers, 4.0).is_consistent_with_at_most(0.03), "{:?}", of_numbers.0);
+}
+
+/// A bump of a tilt at one end of the travel: readings of the other tests at A = 0 contain its tail, which is then a
+/// squareness of the other axis for an explanation by a translation. The uncertainty covers the tilt with its own numbers.
+#[test]
+fn a_tail_of_a_bump_is_within_the_uncertainty_of_a_squareness() {
+    let shape = Shape::Local { centre: 3.6, width: 6.1, profile: Profile::RaisedCosine };
+    let bump = Injected::new(Component::Motion(Freedom::B, AxisName::A), Driver::Axis(AxisName::A), shape, 40.0);
+    let recipe = Recipe::new(Kind::Rotary, 3).noise(NOISES[0]).with(bump);
+    let (result, _) = traced(&recipe.draw(), 0);
+    assert_eq!(result.effects.len(), 1, "{:?}", result.effects);
+    let effect = &result.effects[0];
+    let is_tilt = |name: &EffectName| name.component == "EBA" && name.shape == "local";
+    let alias = effect.aliases.iter().find(|alias| is_tilt(&alias.name));
+    let numbers = match alias {
+        Some(alias) => &alias.shape_parameters,
+        None if is_tilt(&effect.name) => &effect.shape_parameters,
+        None => panic!("{:?} and {:?}", effect.name, effect.aliases),
+    };
+    assert!((numbers[0].values[0] - 3.6).abs() < 1.0 && (numbers[1].values[0] - 6.1).abs() < 1.5, "{numbers:?}");
+    let draw = recipe.draw();
+    let (_, truth, _) = draw.truth.piges().find(|(id, ..)| *id == "EB0C").expect("a squareness of C");
+    let squareness = result.after.parameters.iter().find(|parameter| parameter.id == "EB0C").unwrap();
+    assert!((squareness.value - truth).abs() < 2.0 * squareness.u, "{squareness:?}, truth {truth}");
 }
