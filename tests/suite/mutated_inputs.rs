@@ -1,8 +1,8 @@
 //! Mutated inputs of every kind of file, and what is no file: no panic, no other exit status than those of the page on
 //! limits, no long message, no wait, no more than 1.5 GB of memory, nothing half-written.
 //!
-//! `ABBE_MUTATIONS` is the number of mutated inputs (100 by default). The seed is fixed: the number of a failing input
-//! names it.
+//! `ABBE_MUTATIONS` is the number of mutated inputs (100 by default), `ABBE_MUTATIONS_FIRST` that of the first. The seed is
+//! fixed: the number of a failing input names it.
 #![cfg(target_os = "linux")]
 
 use std::fs;
@@ -326,11 +326,13 @@ fn mutated(original: &[u8], random: &mut Pcg64Mcg) -> Vec<u8> {
 
 #[test]
 fn mutated_inputs_end_with_a_result_or_a_message() {
-    let count: u64 =
-        std::env::var("ABBE_MUTATIONS").map_or(100, |text| text.parse().expect("ABBE_MUTATIONS is a number"));
+    let number_of =
+        |name: &str, usual: u64| std::env::var(name).map_or(usual, |text| text.parse().expect("a number of inputs"));
+    let (first, end) = (number_of("ABBE_MUTATIONS_FIRST", 0), number_of("ABBE_MUTATIONS", 100));
+    let count = end.saturating_sub(first);
     let place = folder();
     let (mut done, mut refused) = (0, 0);
-    for number in 0..count {
+    for number in first..end {
         let mut random = Pcg64Mcg::seed_from_u64(41 + number);
         let (input, commands) = INPUTS[number as usize % INPUTS.len()];
         let command = commands[random.random_range(0..commands.len())];
