@@ -30,7 +30,7 @@ pub enum Role {
         coefficient: usize,
     },
     /// A number of the shape of an effect, as its change from the number of the shape. The readings depend on it through
-    /// the coefficients: see [`Parameters::linearise_numbers`].
+    /// the coefficients `c`: `∂component/∂n = Σ_k c_k · ∂b_k(driver; n)/∂n`.
     Number {
         /// Index among the effects.
         effect: usize,

@@ -354,3 +354,28 @@ fn robot() {
     assert_eq!(walk.verdict(), "partly-explained");
     assert_eq!(walk.fit["outcome"]["goodness"]["verdict"], "not-judged");
 }
+
+/// The centre and the width of a local feature are parameters with an uncertainty, whichever door one asks at.
+#[test]
+fn numbers_of_a_shape() {
+    let feature = "\n[[effect]]\ncomponent = \"EZA\"\nshape = \"local\"\ncentre_deg = 30\nwidth_deg = 12\n";
+    let door = Door::of("hermle-c600u", "chapter5.toml", |text| text + feature);
+    let (plan, run) = (door.at("session.toml"), door.at("run"));
+    let height = "EZA~A:local=3um";
+    let simulated =
+        abbe(&["simulate", text(&plan), "--out", text(&run), "--effect", height, "--hide-effects", "--quiet"]);
+    assert!(simulated.status.success(), "{}", String::from_utf8_lossy(&simulated.stderr));
+    for file in files_below(&run) {
+        fs::copy(&file, door.at(file.file_name().unwrap().to_str().unwrap())).unwrap();
+    }
+    let walk = door.walk(&["EZA~A:local"]);
+    assert_eq!(walk.verdict(), "explained");
+    walk.agrees("numbers of a shape");
+    let written = fs::read_to_string(door.at("next.toml")).unwrap();
+    assert!(written.contains("estimate = [\"centre\", \"width\"]"), "{written}");
+    for (id, truth) in [("EZA~A:local.centre", 30.0), ("EZA~A:local.width", 12.0)] {
+        let number = list(&walk.fit["parameters"], "fit").iter().find(|own| own["id"] == id).unwrap();
+        let [value, u] = ["value", "u"].map(|key| number[key].as_f64().unwrap());
+        assert!(u > 0.0 && (value - truth).abs() < 4.0 * u && number["unit"] == "deg", "{number}");
+    }
+}

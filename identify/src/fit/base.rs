@@ -147,7 +147,7 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<BaseResult, IdentifyError>
     let kept = (0..list.len()).filter(|j| !base.held.contains(j)).map(|j| {
         let display = list[j].unit.display_per_internal;
         let u = base.covariance[(j, j)].max(0.0).sqrt() * display;
-        ParameterResult::new(&list[j].id, base.beta[j] * display, u, &list[j].unit.name)
+        ParameterResult::new(&list[j].id, problem.parameters.value(j, &base.beta) * display, u, &list[j].unit.name)
             .with_meaning(parameter_meaning(problem, j, None))
     });
     Ok(BaseResult {
