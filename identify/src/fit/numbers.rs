@@ -40,6 +40,8 @@ const QUANTILE_95: f64 = 3.841_458_820_694_124;
 const MAX_STEPS: usize = 24;
 /// Relative accuracy of the rise of χ² at an end.
 const END_TOLERANCE: f64 = 0.01;
+/// Largest change of a number by the last fit, in standard uncertainties, at which it is at its best value.
+const SETTLED: f64 = 0.1;
 /// Standard deviation of the prior of a number that is held, as a share of its own.
 const HELD: f64 = 1e-9;
 
@@ -61,26 +63,50 @@ pub(crate) fn fit_with_numbers(problem: &mut Problem, start: Option<&[f64]>) -> 
     if !problem.parameters.has_numbers() {
         return fit(problem, start);
     }
-    let mut from = start.map_or_else(|| vec![0.0; problem.parameters.list.len()], <[f64]>::to_vec);
-    if start.is_none() {
-        from = minimum(problem, None)?.beta;
-    }
-    problem.linearise_numbers(&mut from)?;
+    let start = match start {
+        Some(beta) => beta.to_vec(),
+        None => minimum(problem, None)?.beta,
+    };
+    let mut from = linearised(problem, start)?;
     settle(problem, &mut from)?;
+    let is_settled = |found: &Fit| {
+        numbers(problem).all(|j| found.beta[j].abs() <= SETTLED * found.covariance[(j, j)].max(0.0).sqrt())
+    };
     match fit(problem, Some(&from)) {
-        // A number along which the readings say nothing: it is held, and its uncertainty is that of its prior.
-        Err(IdentifyError::NoConvergence { .. }) => {
-            let mut held = problem.clone();
-            let size = |parameter: usize| problem.parameters.list[parameter].size;
-            for parameter in numbers(problem) {
-                held.parameters.list[parameter].prior = Prior::Gaussian(HELD * size(parameter));
-            }
-            let mut found = fit(&held, Some(&from))?;
-            numbers(problem).for_each(|parameter| found.covariance[(parameter, parameter)] = size(parameter).powi(2));
-            Ok(found)
-        }
+        Ok(found) if is_settled(&found) => Ok(found),
+        Ok(_) | Err(IdentifyError::NoConvergence { .. }) => held(problem, &from),
         found => found,
     }
+}
+
+/// Takes the changes of the numbers in `start` over, if they lower χ², and linearises the problem there. Returns the
+/// parameters without them.
+fn linearised(problem: &mut Problem, mut start: Vec<f64>) -> Result<Vec<f64>, IdentifyError> {
+    let mut unchanged = (problem.clone(), start.clone());
+    numbers(problem).for_each(|j| unchanged.1[j] = 0.0);
+    unchanged.0.linearise_numbers(&mut unchanged.1)?;
+    problem.bound_numbers(&mut start);
+    problem.linearise_numbers(&mut start)?;
+    let [changed_sum, sum] = [problem.sum_of_squares(&start), unchanged.0.sum_of_squares(&unchanged.1)];
+    if changed_sum <= sum {
+        return Ok(start);
+    }
+    *problem = unchanged.0;
+    Ok(unchanged.1)
+}
+
+/// The fit with all numbers held, with the covariance of the model in which they are free: no values were found that the
+/// readings prefer.
+fn held(problem: &Problem, from: &[f64]) -> Result<Fit, IdentifyError> {
+    let mut held = problem.clone();
+    let size = |parameter: usize| problem.parameters.list[parameter].size;
+    for parameter in numbers(problem) {
+        held.parameters.list[parameter].prior = Prior::Gaussian(HELD * size(parameter));
+    }
+    let mut found = fit(&held, Some(from))?;
+    let whole = problem.prior_triangle(&found.beta).merged(&problem.triangles(&found.beta)?);
+    found.covariance = whole.covariance(&found.rank.identifiable_basis)?;
+    Ok(found)
 }
 
 /// Moves the numbers of a problem to their best values, and the parameters with them, from a linearisation at these
