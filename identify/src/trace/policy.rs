@@ -1,7 +1,6 @@
 //! The policies of the search: one for readings along runs, one for independent poses.
 
 use abbe_model::axis::AxisKind;
-use abbe_model::sensitivity::TestModel;
 
 use super::constants::{HIGHEST_ORDER_OF_SPECTRA, READINGS_PER_COEFFICIENT};
 use crate::candidates::sampling::Sampling;
@@ -128,6 +127,6 @@ pub fn has_few_poses(problem: &Problem) -> bool {
     let moves = Sampling::of(problem).moves;
     let joints = (0..machine.axes.len()).filter(|axis| moves[*axis] && machine.axes[*axis].kind == AxisKind::Rotary);
     // Outliers count too, so that the policy is one for the whole search.
-    let readings: usize = problem.models.iter().map(TestModel::rows).sum();
+    let readings: usize = problem.models.iter().map(|model| model.rows() * model.channels().len()).sum();
     readings < READINGS_PER_COEFFICIENT * 2 * HIGHEST_ORDER_OF_SPECTRA * joints.count()
 }
