@@ -216,11 +216,7 @@ pub fn run() -> ExitCode {
             return ExitCode::from(2);
         }
     };
-    if let Some(threads) = threads {
-        // The pool of the process is made here only.
-        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build_global();
-    }
-    match execute(command, quiet, threads) {
+    match with_threads(threads).and_then(|()| execute(command, quiet, threads)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(_) if interrupt::is_terminated() => ExitCode::from(interrupt::status()),
         Err(failure) => {
@@ -228,6 +224,13 @@ pub fn run() -> ExitCode {
             ExitCode::from(failure.status())
         }
     }
+}
+
+/// Makes the threads of the process, if their number is stated.
+fn with_threads(threads: Option<u32>) -> Result<(), Failure> {
+    let Some(threads) = threads else { return Ok(()) };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build_global();
+    pool.map_err(|cause| Failure::Other(format!("{threads} threads cannot be started: {cause}; state fewer")))
 }
 
 /// Runs another command line as a part of a command.
