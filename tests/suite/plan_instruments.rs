@@ -220,10 +220,7 @@ fn a_tracker_sees_the_axis_that_no_test_moves() {
         data: Vec::new,
         lacks: &[("EA0Z", 40.0 * MICRO), ("EB0Z", -60.0 * MICRO)],
         reading: |_, at| {
-            let (x, y, z) = (at("X"), at("Y"), at("Z"));
-            // Y leans towards −X by EC0Y, Z towards X by EB0Z and towards −Y by EA0Z.
-            let point = [x - 25.0 * MICRO * y - 60.0 * MICRO * z, y - 40.0 * MICRO * z, z];
-            let seen = turned(0.5, point);
+            let seen = turned(0.5, leant(at("X"), at("Y"), at("Z")));
             vec![seen[0] + 800.0, seen[1] - 1500.0, seen[2] + 200.0]
         },
         noise: [8e-3, 0.0],
@@ -243,7 +240,7 @@ fn polar([x, y, z]: [f64; 3]) -> [f64; 3] {
     [x.hypot(y).hypot(z), y.atan2(x), z.atan2(x.hypot(y))]
 }
 
-/// A point of the tool of a machine whose Y and Z lean.
+/// A point of the tool of a machine whose Y leans towards −X by EC0Y, and Z towards X by EB0Z and towards −Y by EA0Z.
 fn leant(x: f64, y: f64, z: f64) -> [f64; 3] {
     [x - 25.0 * MICRO * y - 60.0 * MICRO * z, y - 40.0 * MICRO * z, z]
 }
