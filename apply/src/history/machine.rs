@@ -123,7 +123,7 @@ impl<'m> Fitted<'m> {
                 y.push(white[(row, count)]);
             }
         }
-        Some(Joint { solved: Regression::solve(&columns, &y)?, first })
+        Some(Joint { solved: Regression::solve(columns, &y)?, first })
     }
 
     /// The year to which the level of a series with drift belongs.

@@ -192,7 +192,7 @@ impl Series {
     }
 
     fn solved(&self, drift: bool, steps: &[usize]) -> Option<Regression> {
-        Regression::solve(&self.columns(drift, steps), &self.whitened(|i| self.values[i]))
+        Regression::solve(self.columns(drift, steps), &self.whitened(|i| self.values[i]))
     }
 
     /// Drift per year with its standard uncertainty, beside the steps of the model.

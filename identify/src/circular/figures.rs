@@ -18,8 +18,8 @@ use abbe_model::session::placing::{axis_line, balls};
 use nalgebra::Vector3;
 
 use super::names;
-use super::path::{MovingAxes, Path};
-use super::polar::{PolarPath, about, mean, range, width_mm};
+use super::path::{MovingAxes, Path, length, range};
+use super::polar::{PolarPath, about, mean, width_mm};
 use super::results::{CircularTest, DirectionFigures};
 use super::set_up::{FigureUncertainties, SetUp};
 
@@ -110,10 +110,8 @@ pub(super) fn figures(machine: &Arc<Machine>, test: &Test, path: &Path) -> Circu
 fn linear_axes_rest(machine: &Machine, test: &Test) -> bool {
     const REST_MM: f64 = 1e-3;
     let Some(readings) = &test.readings else { return false };
-    machine.axes.iter().zip(&readings.positions).filter(|(axis, _)| axis.kind == AxisKind::Linear).all(|(_, column)| {
-        let (least, most) = range(column);
-        most - least <= REST_MM
-    })
+    let mut linear = machine.axes.iter().zip(&readings.positions).filter(|(axis, _)| axis.kind == AxisKind::Linear);
+    linear.all(|(_, column)| length(column) <= REST_MM)
 }
 
 /// Least share of the radial direction in that of the bar: as for the bar in the plane of a circle.

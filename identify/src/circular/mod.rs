@@ -5,16 +5,16 @@
 //! the classical faults of two linear axes (module `diagnosis`). Both use the readings only: fitted errors are not
 //! subtracted.
 
+mod decomposition;
 mod diagnosis;
-mod fault;
+mod faults;
 mod figures;
 mod names;
 mod path;
 mod polar;
 mod results;
-mod search;
+mod rows;
 mod set_up;
-mod terms;
 
 pub use results::{CircularTest, Diagnosis, DirectionFigures};
 

@@ -33,39 +33,6 @@ pub(super) enum MovingAxes {
     Rotary(usize),
 }
 
-/// Sign factors of two linear axes between the measured path (tool relative to workpiece, in the axes' positive
-/// directions) and the error motions `E` of the axes' bodies along R.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Signs {
-    /// +1 if the body of the axis moves along R for an increasing command, −1 if it moves against R.
-    direction: [f64; 2],
-    /// +1 for an axis on the tool side, −1 on the workpiece side.
-    side: [f64; 2],
-}
-
-impl Signs {
-    fn of(machine: &Machine, moves: &MovingAxes) -> Signs {
-        match moves {
-            MovingAxes::Linear { axes, .. } => Signs {
-                direction: axes.map(|axis| machine.axes[axis].principal().map_or(1.0, |(_, sign)| sign)),
-                side: axes.map(|axis| if axis < machine.workpiece_side { -1.0 } else { 1.0 }),
-            },
-            MovingAxes::Rotary(_) => Signs { direction: [1.0; 2], side: [1.0; 2] },
-        }
-    }
-
-    /// The factor of an error of axis `of` along axis `along`: a deviation `δ` of the path along `along` is an error
-    /// motion of `factor·δ`.
-    pub fn error(&self, of: usize, along: usize) -> f64 {
-        self.side[of] * self.side[along] * self.direction[along]
-    }
-
-    /// The factor of the squareness error of the two axes.
-    pub fn squareness(&self) -> f64 {
-        (0..2).map(|axis| self.side[axis] * self.direction[axis]).product()
-    }
-}
-
 /// The readings of one run in one direction.
 #[derive(Clone, Debug)]
 pub(super) struct DirectionRun {
@@ -90,8 +57,6 @@ pub(super) struct Path {
     pub left_out: Vec<bool>,
     /// Positions and velocities of the two linear axes.
     pub samples: [Vec<DriverSample<f64>>; 2],
-    /// Sign factors of the two linear axes.
-    pub signs: Signs,
     /// Speed along the path, mm/s, if the data have times and linear axes move.
     pub feed_mm_s: Option<f64>,
 }
@@ -127,7 +92,6 @@ impl Path {
             MovingAxes::Linear { axes, .. } => axes.map(|axis| readings.axis_samples(axis, AxisKind::Linear)),
             MovingAxes::Rotary(_) => [Vec::new(), Vec::new()],
         };
-        let signs = Signs::of(machine, &moves);
         let feed_mm_s = feed(&samples, !readings.time_s.is_empty());
         Some(Path {
             moves,
@@ -142,7 +106,6 @@ impl Path {
             nominal_mm,
             left_out: vec![false; readings.rows()],
             samples,
-            signs,
             feed_mm_s,
         })
     }
@@ -154,25 +117,26 @@ impl Path {
 
     /// Arc of the longest run, rad, at most one full turn.
     pub fn arc(&self) -> f64 {
-        let of = |run: &DirectionRun| {
-            let angles = &self.angle[run.rows.clone()];
-            let (least, most) =
-                angles.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
-            most - least
-        };
-        self.runs.iter().map(of).fold(0.0, f64::max).min(TAU)
+        self.runs.iter().map(|run| length(&self.angle[run.rows.clone()])).fold(0.0, f64::max).min(TAU)
     }
+}
+
+/// The least and the greatest value.
+pub(super) fn range(values: &[f64]) -> (f64, f64) {
+    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), x| (least.min(*x), most.max(*x)))
+}
+
+/// The length of the range of some values.
+pub(super) fn length(values: &[f64]) -> f64 {
+    let (least, most) = range(values);
+    most - least
 }
 
 /// The moving axes of a test, if they make a circle.
 fn moves(machine: &Machine, positions: &[Vec<f64>], nominal_mm: &[f64]) -> Option<MovingAxes> {
-    let range = |column: &[f64]| {
-        let least = column.iter().copied().fold(f64::INFINITY, f64::min);
-        column.iter().copied().fold(f64::NEG_INFINITY, f64::max) - least
-    };
     let moving = |kind: AxisKind, least: f64| -> Vec<usize> {
         (0..machine.axes.len())
-            .filter(|&axis| machine.axes[axis].kind == kind && range(&positions[axis]) > least)
+            .filter(|&axis| machine.axes[axis].kind == kind && length(&positions[axis]) > least)
             .collect()
     };
     let (linear, rotary) = (moving(AxisKind::Linear, 1e-3), moving(AxisKind::Rotary, 1e-4));

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use num_dual::DualNum;
 
-use super::path::{MovingAxes, Path};
+use super::path::{MovingAxes, Path, length};
 use crate::numerics::circle;
 
 /// A reading, or the mean of the readings of several runs at one angle.
@@ -49,8 +49,7 @@ pub(super) fn width_mm(path: &Path, direction: f64) -> Option<f64> {
     let (first, others) = runs.split_first().filter(|(_, others)| !others.is_empty())?;
     let widths = first.0.iter().map(|p| {
         let deviations: Vec<f64> = others.iter().filter_map(|run| run.at(p.angle)).chain([p.deviation_mm]).collect();
-        let (least, most) = range(&deviations);
-        most - least
+        length(&deviations)
     });
     widths.reduce(f64::max)
 }
@@ -130,9 +129,4 @@ pub(super) fn about<D: DualNum<Primitive = f64> + Copy>(
         deviations_mm: points.iter().zip(&trace.0).map(|(point, p)| distance(point) - nominal_of(p)).collect(),
         radius_mm: circle.radius - nominal,
     }
-}
-
-/// The least and the greatest value.
-pub(super) fn range(values: &[f64]) -> (f64, f64) {
-    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), x| (least.min(*x), most.max(*x)))
 }

@@ -9,6 +9,7 @@ use super::triangle::Triangle;
 
 /// A solved regression `y ≈ Σ βⱼ·xⱼ`.
 pub struct Regression {
+    columns: Vec<Vec<f64>>,
     /// The coefficients.
     pub beta: Vec<f64>,
     /// `(XᵀX)⁻¹`.
@@ -19,7 +20,7 @@ pub struct Regression {
 
 impl Regression {
     /// Solves; `None` if the columns are collinear.
-    pub fn solve(columns: &[Vec<f64>], y: &[f64]) -> Option<Regression> {
+    pub fn solve(columns: Vec<Vec<f64>>, y: &[f64]) -> Option<Regression> {
         let n = columns.len();
         if y.len() <= n {
             return None;
@@ -38,7 +39,7 @@ impl Regression {
         let root = Mat::from_fn(n, n, |j, k| root[(j, k)] / norms[j]);
         let beta: Vec<f64> = directions.solve(&c, 0.0).iter().zip(&norms).map(|(scaled, norm)| scaled / norm).collect();
         let residual = (0..y.len()).map(|i| y[i] - (0..n).map(|j| columns[j][i] * beta[j]).sum::<f64>()).collect();
-        Some(Regression { beta, inverse: &root * root.transpose(), residual })
+        Some(Regression { columns, beta, inverse: &root * root.transpose(), residual })
     }
 
     /// Sum of squares of the residual.
@@ -47,9 +48,9 @@ impl Regression {
     }
 
     /// The decrease of the sum of squares by further columns beside those of this regression.
-    pub fn gain(&self, columns: &[Vec<f64>], further: &[Vec<f64>]) -> f64 {
+    pub fn gain(&self, further: &[Vec<f64>]) -> f64 {
         let products = |a: &[Vec<f64>], b: &[Vec<f64>]| Mat::from_fn(a.len(), b.len(), |i, j| dot(&a[i], &b[j]));
-        let (cross, own) = (products(columns, further), products(further, further));
+        let (cross, own) = (products(&self.columns, further), products(further, further));
         let d = &own - cross.transpose() * (&self.inverse * &cross);
         let g: Vec<f64> = further.iter().map(|column| dot(column, &self.residual)).collect();
         quadratic_gain(&d, &own, &g)
@@ -77,12 +78,12 @@ mod tests {
         let column = |k: i32| (0..20).map(|i| (0.1 * f64::from(i)).powi(k)).collect::<Vec<f64>>();
         let y: Vec<f64> = (0..20).map(|i| (0.4 * f64::from(i)).sin()).collect();
         let columns = vec![column(0), column(1)];
-        let regression = Regression::solve(&columns, &y).unwrap();
+        let regression = Regression::solve(columns.clone(), &y).unwrap();
         let further = [column(2), column(3)];
-        let both = Regression::solve(&[columns.clone(), further.to_vec()].concat(), &y).unwrap();
+        let both = Regression::solve([columns.clone(), further.to_vec()].concat(), &y).unwrap();
         let decrease = regression.sum_of_squares() - both.sum_of_squares();
-        assert!((regression.gain(&columns, &further) / decrease - 1.0).abs() < 1e-9);
-        assert!(regression.gain(&columns, &columns).abs() < 1e-9);
-        assert!(Regression::solve(&[columns[0].clone(), columns[0].clone()], &y).is_none());
+        assert!((regression.gain(&further) / decrease - 1.0).abs() < 1e-9);
+        assert!(regression.gain(&columns).abs() < 1e-9);
+        assert!(Regression::solve(vec![columns[0].clone(), columns[0].clone()], &y).is_none());
     }
 }
