@@ -120,7 +120,7 @@ fn the_printed_sign_of_test_3_does_not_reproduce_table_5() {
         }
     }
     assert_eq!(rank_before(&printed).unwrap(), 31);
-    let reduction = reduce(printed.columns(), &conditions(&printed, "C").unwrap());
+    let reduction = reduce(printed.columns(), &conditions(&printed, "C").unwrap()).unwrap();
     let solution = solve(&printed, &reduction, 1e-3).unwrap();
     let (cells, worst) = off(&expanded_um(&calibration, &solution.covariance));
     assert_eq!(cells, 24, "worst {worst}");

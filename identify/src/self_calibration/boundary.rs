@@ -10,6 +10,8 @@ use faer::Mat;
 
 use super::equations::{Equations, Function};
 use crate::error::IdentifyError;
+use crate::numerics::rank::Rank;
+use crate::numerics::triangle::Triangle;
 
 /// A condition `Σ a·f(angle) = 0`.
 #[derive(Clone, Debug)]
@@ -75,38 +77,20 @@ pub struct Reduction {
     pub spread: Mat<f64>,
 }
 
-/// Eliminates one value per condition (Gauss–Jordan).
-pub fn reduce(columns: usize, conditions: &[Condition]) -> Reduction {
-    // Row k expresses column pivots[k] as the negative of the rest of the row.
-    let mut rows: Vec<Vec<f64>> = Vec::new();
-    let mut pivots: Vec<usize> = Vec::new();
-    for condition in conditions {
-        let mut row = vec![0.0; columns];
-        for (column, weight) in &condition.terms {
-            row[*column] += weight;
-        }
-        for (known, pivot) in rows.iter().zip(&pivots) {
-            let part = row[*pivot];
-            row.iter_mut().zip(known).for_each(|(entry, k)| *entry -= part * k);
-        }
-        let largest = (0..columns).max_by(|a, b| row[*a].abs().total_cmp(&row[*b].abs()));
-        let Some(pivot) = largest.filter(|column| row[*column].abs() > 1e-9) else {
-            continue;
-        };
-        let scale = row[pivot];
-        row.iter_mut().for_each(|entry| *entry /= scale);
-        for known in &mut rows {
-            let part = known[pivot];
-            known.iter_mut().zip(&row).for_each(|(entry, r)| *entry -= part * r);
-        }
-        rows.push(row);
-        pivots.push(pivot);
+/// Weight of a condition: far above the limit of an identifiable direction.
+const WEIGHT: f64 = 1e6;
+
+/// The values that the conditions leave free: the null space of the conditions.
+///
+/// # Errors
+/// If a condition holds a number that is not finite.
+pub fn reduce(columns: usize, conditions: &[Condition]) -> Result<Reduction, IdentifyError> {
+    let mut rows = Mat::zeros(conditions.len(), columns + 1);
+    for (row, condition) in conditions.iter().enumerate() {
+        condition.terms.iter().for_each(|(column, weight)| rows[(row, *column)] += WEIGHT * weight);
     }
-    let free: Vec<usize> = (0..columns).filter(|column| !pivots.contains(column)).collect();
-    let spread =
-        Mat::from_fn(columns, free.len(), |column, k| match pivots.iter().position(|pivot| *pivot == column) {
-            Some(row) => -rows[row][free[k]],
-            None => f64::from(u8::from(column == free[k])),
-        });
-    Reduction { free, spread }
+    let order: Vec<usize> = (0..columns).collect();
+    let rank = Rank::decide(&Triangle::of(rows), &vec![1.0; columns], &order)?;
+    let spread = Mat::from_fn(columns, rank.pivots.len(), |column, k| rank.null_combinations[k][column]);
+    Ok(Reduction { free: rank.pivots, spread })
 }

@@ -9,6 +9,9 @@
 //! φ is the angle of the probed point in the machine while the table is at C. The coefficients are the derivatives of
 //! the chain, so all signs follow from the machine file. In test 3 the probed point turns with the table. For a table
 //! that turns clockwise `e(φ) = (cos C, −sin C)`; Eq. (3) of the reference prints `+sin C`.
+//!
+//! Rank, null space, covariance and Monte Carlo are those of every fit. The parameters are not: the angles of the probed
+//! point, in the machine and on the artefact, are no drivers of effects.
 
 mod boundary;
 mod equations;
@@ -17,7 +20,6 @@ mod results;
 mod solve;
 
 use abbe_model::session::Session;
-use faer::Mat;
 
 pub use boundary::{Condition, Reduction, conditions, reduce};
 pub use equations::{Equations, Function, Reference};
@@ -61,7 +63,7 @@ const START_NOISE_MM: f64 = 1e-3;
 pub fn calibrate(session: &Session) -> Result<Calibration, IdentifyError> {
     let equations = Equations::of(session)?;
     let conditions = conditions(&equations, &session.machine.axes[equations.axis].name)?;
-    let reduction = reduce(equations.columns(), &conditions);
+    let reduction = reduce(equations.columns(), &conditions)?;
     let stated = session.stated_noise_mm();
     // The residual estimates the noise only if the radius is a parameter: relative to one reading, all rows share that
     // reading's noise.
@@ -118,20 +120,12 @@ impl Calibration {
 
     /// The distribution of every value, then of the axis position by circle (two) and by rotation (two).
     pub fn monte_carlo(&self, draws: &MonteCarlo) -> Vec<monte_carlo::Distribution> {
-        let zero = vec![0.0; self.solution.u_inputs_mm.len()];
-        let outputs = self.solution.values_mm.len();
-        let propagated = Propagated {
-            calibration: self,
-            // By column, so that an input contributes to all values at once.
-            columns: columns_of(&self.solution.estimator),
-            turns: self.turns(),
-            outputs,
-        };
+        let inputs = self.solution.estimator.ncols();
         monte_carlo::propagate(
-            &propagated,
+            &Propagated { calibration: self, turns: self.turns() },
             &monte_carlo::Draws {
-                mean: &zero,
-                u: &self.solution.u_inputs_mm,
+                mean: &vec![0.0; inputs],
+                u: &vec![self.sigma_mm * self.u_enlargement; inputs],
                 runs: draws.runs,
                 seed: draws.seed,
                 coverage: draws.coverage,
@@ -140,36 +134,31 @@ impl Calibration {
     }
 }
 
-fn columns_of(matrix: &Mat<f64>) -> Vec<Vec<f64>> {
-    (0..matrix.ncols()).map(|j| (0..matrix.nrows()).map(|i| matrix[(i, j)]).collect()).collect()
-}
-
 /// The function from deviations of the readings to values and axis position.
 struct Propagated<'a> {
     calibration: &'a Calibration,
-    columns: Vec<Vec<f64>>,
     turns: Vec<[f64; 2]>,
-    outputs: usize,
 }
 
 impl monte_carlo::Function for Propagated<'_> {
     type Scratch = Vec<[f64; 2]>;
 
     fn inputs(&self) -> usize {
-        self.columns.len()
+        self.calibration.solution.estimator.ncols()
     }
 
     fn outputs(&self) -> usize {
-        self.outputs + 4
+        self.calibration.solution.values_mm.len() + 4
     }
 
     fn evaluate(&self, inputs: &[f64], outputs: &mut [f64], points: &mut Self::Scratch) {
-        let (values, place) = outputs.split_at_mut(self.outputs);
-        values.copy_from_slice(&self.calibration.solution.values_mm);
-        for (input, column) in inputs.iter().zip(&self.columns) {
-            for (value, share) in values.iter_mut().zip(column) {
-                *value += input * share;
-            }
+        let solution = &self.calibration.solution;
+        let (values, place) = outputs.split_at_mut(solution.values_mm.len());
+        values.copy_from_slice(&solution.values_mm);
+        // By column, so that an input contributes to all values at once.
+        for (j, input) in inputs.iter().enumerate() {
+            let shares = solution.estimator.col_as_slice(j);
+            values.iter_mut().zip(shares).for_each(|(value, share)| *value += input * share);
         }
         let count = self.turns.len();
         let sense = self.calibration.equations.sense;

@@ -19,8 +19,6 @@ pub struct CalibrationSolution {
     pub covariance: Mat<f64>,
     /// `values = estimator · inputs`: rows as the values, columns as the readings.
     pub estimator: Mat<f64>,
-    /// Standard uncertainty of each input, mm.
-    pub u_inputs_mm: Vec<f64>,
     /// Identifiable directions of the free values.
     pub rank: Rank,
     /// Whether each of the values is identifiable.
@@ -42,71 +40,38 @@ pub fn solve(
     reduction: &Reduction,
     sigma_mm: f64,
 ) -> Result<CalibrationSolution, IdentifyError> {
-    let columns = equations.columns();
-    let free = reduction.free.len();
-    let radius = equations.reference == Reference::Estimated;
-    let parameters = free + usize::from(radius);
-    let inputs = &equations.outward_mm;
-    let u_inputs_mm = vec![sigma_mm; inputs.len()];
-    let rows: Vec<Vec<f64>> = equations
-        .rows
-        .iter()
-        .map(|row| {
-            let mut reduced = vec![0.0; parameters];
-            for (column, coefficient) in row.iter().enumerate().filter(|(_, a)| **a != 0.0) {
-                for k in 0..free {
-                    reduced[k] += coefficient * reduction.spread[(column, k)];
-                }
-            }
-            if radius {
-                reduced[free] = 1.0;
-            }
-            reduced
-        })
-        .collect();
-    let white = Mat::from_fn(rows.len(), parameters + 1, |i, j| {
-        let entry = if j == parameters { inputs[i] } else { rows[i][j] };
-        entry / u_inputs_mm[i]
-    });
-    let triangle = Triangle::of(white);
-    // The parameters are in the order of their functions and angles.
-    let preference: Vec<usize> = (0..parameters).collect();
-    let rank = Rank::decide(&triangle, &vec![1.0; parameters], &preference)?;
-    let of_free = triangle.covariance(&rank.identifiable_basis)?;
-
-    let outputs = columns + usize::from(radius);
+    let (columns, free) = (equations.columns(), reduction.free.len());
+    let radius = usize::from(equations.reference == Reference::Estimated);
+    let (outputs, parameters) = (columns + radius, free + radius);
+    let count = equations.rows.len();
+    let jacobian = Mat::from_fn(count, outputs, |i, j| equations.rows[i].get(j).copied().unwrap_or(1.0));
+    let inputs = Mat::from_fn(count, 1, |i, _| equations.outward_mm[i]);
     let spread = Mat::from_fn(outputs, parameters, |i, k| match (i < columns, k < free) {
         (true, true) => reduction.spread[(i, k)],
         (false, false) => 1.0,
         _ => 0.0,
     });
-    let weighted = Mat::from_fn(parameters, rows.len(), |k, i| rows[i][k] / u_inputs_mm[i].powi(2));
-    let estimator = &spread * (&of_free * weighted);
-    let covariance = &spread * of_free * spread.transpose();
-    let values_mm: Vec<f64> =
-        (0..outputs).map(|i| (0..inputs.len()).map(|j| estimator[(i, j)] * inputs[j]).sum()).collect();
-    let identifiable =
-        (0..outputs).map(|i| (0..parameters).all(|k| spread[(i, k)] == 0.0 || rank.is_identifiable(k))).collect();
-
-    let residual = |(row, observed): (&Vec<f64>, &f64)| {
-        let model: f64 = row.iter().zip(&values_mm).map(|(a, x)| a * x).sum();
-        let radius = if radius { values_mm[columns] } else { 0.0 };
-        observed - model - radius
-    };
-    let count = equations.rows.len();
-    let sum: f64 = equations.rows.iter().zip(&equations.outward_mm).map(residual).map(|r| r * r).sum();
-    let informative = rows.iter().filter(|row| row.iter().any(|a| *a != 0.0)).count();
-    let freedom = informative.saturating_sub(rank.identifiable_basis.ncols());
+    let rows = &jacobian * &spread;
+    let entry = |i: usize, j: usize| if j < parameters { rows[(i, j)] } else { inputs[(i, 0)] };
+    let triangle = Triangle::of(Mat::from_fn(count, parameters + 1, |i, j| entry(i, j) / sigma_mm));
+    // The parameters are in the order of their functions and angles.
+    let preference: Vec<usize> = (0..parameters).collect();
+    let rank = Rank::decide(&triangle, &vec![1.0; parameters], &preference)?;
+    let covariance = &spread * triangle.covariance(&rank.identifiable_basis)? * spread.transpose();
+    let estimator = &covariance * jacobian.transpose() * faer::Scale(sigma_mm.powi(-2));
+    let values = &estimator * &inputs;
+    let residual = inputs - jacobian * &values;
+    let is_identifiable = |i: usize| (0..parameters).all(|k| spread[(i, k)] == 0.0 || rank.is_identifiable(k));
+    let informative = (0..count).filter(|i| rows.row(*i).iter().any(|a| *a != 0.0)).count();
     Ok(CalibrationSolution {
-        values_mm,
+        values_mm: values.col(0).iter().copied().collect(),
+        identifiable: (0..outputs).map(is_identifiable).collect(),
+        freedom: informative.saturating_sub(rank.identifiable_basis.ncols()),
         covariance,
         estimator,
-        u_inputs_mm,
         rank,
-        identifiable,
         parameters,
-        rms_mm: (sum / count.max(1) as f64).sqrt(),
-        freedom,
+        rms_mm: (residual.squared_norm_l2() / count.max(1) as f64).sqrt(),
     })
 }
 
