@@ -10,6 +10,11 @@
 //! | table | `Ds/2 < H` | `L > W/2` |
 //! | spindle | `Ds/2 ≥ L` | `H ≥ Dt/2` and `L > W/2` |
 //! | spindle | `Ds/2 < L` | nothing: Yamaji et al. print `H ≤ Dt/2 should be satisfied`, which is permitted and not required |
+//!
+//! These are no clearances of bodies ([`crate::collision`]): each case compares one pair of parts. On the table, a jig within
+//! the device (`L ≤ W/2`) is permitted if `Ds/2 ≥ H`. In the spindle, the table begins at the end of the shaft, without
+//! `T`, and a device wider than the shaft reaches is permitted if `Ds/2 < L`. Bodies of these lengths would permit and
+//! refuse other devices than the paper does.
 
 use abbe_model::words::number;
 
