@@ -1,9 +1,10 @@
 //! The calibrated machine for other programs and for controls: one line of a registry for each format.
 
 use abbe_apply::ApplyError;
-use abbe_apply::compensation::{self, Compensation};
-use abbe_apply::export::control::{self, ENTRIES, EntryChoice, KinematicTable};
+use abbe_apply::compensation::{self, Compensation, TableFormat};
+use abbe_apply::control::{CONTROLS, Control, Kinematics};
 use abbe_apply::export::dh::{self, DhTable, DhUncertainty};
+use abbe_apply::export::kinematics::{ENTRIES, EntryChoice, KinematicTable};
 use abbe_apply::export::neutral::{self, AxisPlace};
 use abbe_apply::export::travel::Travel;
 use abbe_apply::export::{left_out, urdf, urdf_patch};
@@ -24,24 +25,15 @@ pub struct ExportFormat {
     /// The word by which it is requested.
     pub word: &'static str,
     /// What it is.
-    pub about: &'static str,
-    /// Whether it takes a choice of entries and the travel over which their error counts.
-    pub takes_entries: bool,
-    export: fn(&IdentifiedModel, &ExportOptions) -> Result<Exported, ApplyError>,
+    pub about: String,
+    form: Form,
 }
 
-impl ExportFormat {
-    const fn new(
-        word: &'static str,
-        about: &'static str,
-        export: fn(&IdentifiedModel, &ExportOptions) -> Result<Exported, ApplyError>,
-    ) -> ExportFormat {
-        ExportFormat { word, about, takes_entries: false, export }
-    }
-
-    const fn with_entries(self) -> ExportFormat {
-        ExportFormat { takes_entries: true, ..self }
-    }
+enum Form {
+    /// A description of the machine.
+    Description(fn(&IdentifiedModel, &ExportOptions) -> Result<Exported, ApplyError>),
+    /// What a control takes.
+    Control(&'static Control),
 }
 
 /// What a format takes beside the model.
@@ -74,21 +66,31 @@ impl ExportOptions {
     }
 }
 
-/// The formats.
-pub const FORMATS: [ExportFormat; 8] = [
-    ExportFormat::new("table", "where each axis is: point and direction, for any control", of_table),
-    ExportFormat::new("urdf", "URDF of the calibrated chain", of_urdf),
-    ExportFormat::new("dh", "Denavit-Hartenberg parameters, calibrated and nominal", of_dh),
-    ExportFormat::new("linuxcnc", "LinuxCNC, xyzac-trt-kins and xyzbc-trt-kins", |model, options| {
-        of_control(model, "linuxcnc", options)
-    })
-    .with_entries(),
-    ExportFormat::new("fanuc", "Fanuc 30i, table rotation type", |model, options| of_control(model, "fanuc", options))
-        .with_entries(),
-    ExportFormat::new("beckhoff", "Beckhoff TF5280, location errors", of_beckhoff),
-    ExportFormat::new("siemens", "SINUMERIK 840D", |model, options| of_control(model, "siemens", options)),
-    ExportFormat::new("heidenhain", "Heidenhain TNC", |model, options| of_control(model, "heidenhain", options)),
-];
+/// The formats: descriptions of the machine, then the controls.
+pub fn formats() -> Vec<ExportFormat> {
+    let described =
+        |word, about: &str, write| ExportFormat { word, about: about.to_string(), form: Form::Description(write) };
+    let descriptions = [
+        described("table", "where each axis is: point and direction, for any control", of_table),
+        described("urdf", "URDF of the calibrated chain", of_urdf),
+        described("dh", "Denavit-Hartenberg parameters, calibrated and nominal", of_dh),
+    ];
+    let of_control = |control: &'static Control| {
+        let about = match &control.kinematics {
+            Kinematics::Entries(kinematics) => kinematics.about,
+            Kinematics::Locations => "location errors",
+            Kinematics::NotDocumented(_) => "not publicly documented",
+        };
+        let about = format!("{}, {about}", control.name);
+        ExportFormat { word: control.word, about, form: Form::Control(control) }
+    };
+    descriptions.into_iter().chain(CONTROLS.iter().map(of_control)).collect()
+}
+
+/// The words of the controls that take a choice of entries and the travel over which their error counts.
+pub fn words_with_entries() -> Vec<&'static str> {
+    formats().iter().filter(|format| format.takes_entries()).map(|format| format.word).collect()
+}
 
 /// What is written.
 #[derive(Default)]
@@ -144,21 +146,25 @@ pub fn entries(word: &str) -> Result<EntryChoice, ApplyError> {
 ///
 /// # Errors
 /// If there is none.
-pub fn format(word: &str) -> Result<&'static ExportFormat, ApplyError> {
-    FORMATS.iter().find(|format| format.word == word).ok_or_else(|| {
-        let words = FORMATS.iter().map(|format| format.word).collect::<Vec<_>>().join(", ");
+pub fn format(word: &str) -> Result<ExportFormat, ApplyError> {
+    formats().into_iter().find(|format| format.word == word).ok_or_else(|| {
+        let words = formats().iter().map(|format| format.word).collect::<Vec<_>>().join(", ");
         ApplyError::Request(format!("there is no format `{word}`; the formats are {words}"))
     })
 }
 
 impl ExportFormat {
+    fn takes_entries(&self) -> bool {
+        matches!(self.form, Form::Control(Control { kinematics: Kinematics::Entries(_), .. }))
+    }
+
     /// An option that is stated and that this format does not take.
     pub fn ignored(&self, options: &ExportOptions) -> Option<&'static str> {
         match options {
             ExportOptions { patch: Some(_), .. } if self.word != "urdf" => Some("patch"),
             ExportOptions { dh: Some(_), .. } if self.word != "dh" => Some("dh"),
             ExportOptions { convention: Convention::Standard, .. } if self.word != "dh" => Some("convention"),
-            _ if self.takes_entries => None,
+            _ if self.takes_entries() => None,
             ExportOptions { entries: EntryChoice::Plain, .. } => Some("entries"),
             ExportOptions { travel: Travel { is_measured: false, .. }, .. } => Some("travel"),
             _ => None,
@@ -170,7 +176,13 @@ impl ExportFormat {
     /// # Errors
     /// If the format cannot hold the model.
     pub fn export(&self, model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, ApplyError> {
-        (self.export)(model, options)
+        match &self.form {
+            Form::Description(write) => write(model, options),
+            Form::Control(Control { kinematics: Kinematics::Locations, tables: Some(format), .. }) => {
+                of_locations(model, format)
+            }
+            Form::Control(control) => of_control(model, control, options),
+        }
     }
 }
 
@@ -212,27 +224,25 @@ fn of_dh(model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, A
     tabled(present::dh_header(&table), table, result)
 }
 
-fn of_control(model: &IdentifiedModel, word: &str, options: &ExportOptions) -> Result<Exported, ApplyError> {
-    let found = control::table(model, word, options.entries, &options.travel, options.tool_mm)?;
+fn of_control(model: &IdentifiedModel, control: &Control, options: &ExportOptions) -> Result<Exported, ApplyError> {
+    let found = control.kinematic_table(model, options.entries, &options.travel, options.tool_mm)?;
     let left_out = found.left_out.clone();
     let (header, table) = (present::kinematics_header(&found), present::kinematics(&found));
     tabled(header, table, ExportResult { kinematics: Some(found), left_out, ..ExportResult::default() })
 }
 
-/// The location errors in the format of the control, and what it does not hold.
-fn of_beckhoff(model: &IdentifiedModel, _: &ExportOptions) -> Result<Exported, ApplyError> {
-    let refused = |why: &str| ApplyError::Request(why.to_string());
+/// The location errors in a format of compensation tables, and what it does not hold.
+fn of_locations(model: &IdentifiedModel, format: &TableFormat) -> Result<Exported, ApplyError> {
     let errors = model.parameters.iter().enumerate().filter(|(_, parameter)| parameter.role == Role::Error);
     let named = errors
         .filter(|(index, _)| model.is_estimated(*index))
         .filter_map(|(_, parameter)| Some((ErrorName::parse(&parameter.id)?, parameter.value)));
     let locations = named.filter(|(name, _)| name.kind == ErrorKind::Location).collect();
     let compensation = Compensation { locations, left_out: left_out(model), ..Compensation::default() };
-    let control = compensation::CONTROLS.iter().find(|control| control.word == "beckhoff");
-    let control = control.ok_or_else(|| refused("the format of Beckhoff is not in the registry"))?;
-    let tables = compensation::tables(&model.machine, &compensation, control, compensation::MAX_POINTS);
+    let tables = compensation::tables(&model.machine, &compensation, format, compensation::MAX_POINTS);
     let file = tables.files.into_iter().next();
-    let (_, text) = file.ok_or_else(|| refused("the model has no location error that the format holds"))?;
+    let missing = || ApplyError::Request("the model has no location error that the format holds".to_string());
+    let (_, text) = file.ok_or_else(missing)?;
     let result = ExportResult { left_out: tables.left_out, ..ExportResult::default() };
     Ok(Exported { text: text.into_bytes(), table: None, result })
 }

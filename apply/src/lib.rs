@@ -1,6 +1,7 @@
 //! What follows from an identified model: what to enter in a control, how it is compared, and how it changes.
 //!
-//! - [`correction`]: corrected commands; [`compensation`]: identified error motions as tables of a control;
+//! - [`control`]: the controls and what each takes; [`compensation`]: identified error motions as tables of a control;
+//! - [`correction`]: corrected commands;
 //! - [`export`]: a model in the form of a control, a robot or a simulator; [`volumetric`]: the errors over the workspace;
 //! - [`compare`]: two models or sessions of one machine; [`history`]: the parameters of machines over time;
 //! - [`geometric`]: the methods of the literature that take circles apart, beside the fit.
@@ -12,6 +13,7 @@
 
 pub mod compare;
 pub mod compensation;
+pub mod control;
 pub mod correction;
 pub mod error;
 pub mod export;

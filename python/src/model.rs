@@ -114,12 +114,13 @@ impl Model {
             travel: travel.iter().try_fold(measured, |all, (axis, range)| all.with(&self.model, axis, *range))?,
         };
         if let Some(option) = format.ignored(&options) {
-            let owner = match option {
-                "patch" => "\"urdf\"",
-                "dh" | "convention" => "\"dh\"",
-                _ => "\"linuxcnc\" and \"fanuc\"",
+            let owners = match option {
+                "patch" => vec!["urdf"],
+                "dh" | "convention" => vec!["dh"],
+                _ => exports::words_with_entries(),
             };
-            return Err(Failed::argument(format!("`{option}` belongs to {owner}"), ""));
+            let owners: Vec<String> = owners.iter().map(|word| format!("\"{word}\"")).collect();
+            return Err(Failed::argument(format!("`{option}` belongs to {}", owners.join(" and ")), ""));
         }
         Ok(format.export(&self.model, &options)?.text)
     }

@@ -3,26 +3,18 @@
 use std::path::PathBuf;
 
 use abbe::apply::compensation::curves::of_fit;
-use abbe::apply::compensation::{CONTROLS, Control, MAX_POINTS, tables};
+use abbe::apply::compensation::{MAX_POINTS, TableFormat, tables};
 use abbe::identify::fit::Fit;
 use abbe::identify::problem::Problem;
 use clap::Args;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use super::failure::Failure;
 use super::message::{Kind, tell};
-use super::{folder, output};
+use super::{controls, folder, output};
 use crate::report::compensation::uncertainties;
 
 /// The file of the uncertainties.
 const UNCERTAINTIES: &str = "uncertainty.csv";
-
-/// The words of the formats, as the registry lists them.
-fn controls() -> impl TypedValueParser<Value = &'static Control> {
-    let values = CONTROLS.iter().map(|control| PossibleValue::new(control.word).help(control.about));
-    PossibleValuesParser::new(values)
-        .try_map(|word| CONTROLS.iter().find(|control| control.word == word).ok_or("no format of this name"))
-}
 
 /// Arguments of commands that estimate errors.
 #[derive(Args)]
@@ -35,8 +27,8 @@ pub struct CompensationArguments {
     /// The control that reads the tables.
     ///
     /// Example: --compensation tables --control beckhoff
-    #[arg(long, value_parser = controls(), requires = "compensation")]
-    control: Option<&'static Control>,
+    #[arg(long, value_parser = controls::with_tables(), requires = "compensation")]
+    control: Option<&'static TableFormat>,
     /// Number of points of a table, over the travel of the axis in the readings.
     ///
     /// Example: --compensation tables --control heidenhain --points 73
@@ -66,10 +58,10 @@ impl CompensationArguments {
 
     /// Writes the tables if they are requested, and lists the errors that they do not contain.
     pub fn run(&self, problem: &Problem, fit: &Fit, shown: bool) -> Result<(), Failure> {
-        let (Some(folder), Some(control)) = (&self.compensation, self.control) else {
+        let (Some(folder), Some(format)) = (&self.compensation, self.control) else {
             return Ok(());
         };
-        let found = tables(&problem.session.machine, &of_fit(problem, fit), control, self.points);
+        let found = tables(&problem.session.machine, &of_fit(problem, fit), format, self.points);
         if found.files.is_empty() {
             let all = found.left_out.iter().map(|line| format!("\n  {line}")).collect::<String>();
             return Err(Failure::Other(format!(
@@ -91,7 +83,7 @@ impl CompensationArguments {
         for (name, _) in &files {
             say!("{}", folder.join(name).display());
         }
-        for line in control.import {
+        for line in format.import {
             say!("  {line}");
         }
         say!("  standard uncertainty (k = 1) of each point: {UNCERTAINTIES}");

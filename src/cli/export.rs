@@ -4,8 +4,8 @@ mod travel;
 
 use std::path::PathBuf;
 
-use abbe::apply::export::control::ENTRIES;
-use abbe::exports::{self, ExportOptions, FORMATS};
+use abbe::apply::export::kinematics::ENTRIES;
+use abbe::exports::{self, ExportOptions};
 use abbe::identify::model_file;
 use abbe::model::files;
 use abbe::model::files::robot::dh::Convention;
@@ -21,7 +21,8 @@ use crate::report::export as present;
 pub const HELP: &str = include_str!("help/export.txt");
 
 fn formats() -> PossibleValuesParser {
-    PossibleValuesParser::new(FORMATS.iter().map(|format| PossibleValue::new(format.word).help(format.about)))
+    let formats = exports::formats().into_iter();
+    PossibleValuesParser::new(formats.map(|format| PossibleValue::new(format.word).help(format.about)))
 }
 
 fn entries() -> PossibleValuesParser {
@@ -99,12 +100,13 @@ pub fn run(arguments: &ExportArguments) -> Result<(), Failure> {
         travel: travel::stated(&arguments.travel, &model)?,
     };
     if let Some(option) = format.ignored(&options) {
-        let owner = match option {
-            "patch" => "`--as urdf`",
-            "dh" | "convention" => "`--as dh`",
-            _ => "`--as linuxcnc` and `--as fanuc`",
+        let owners = match option {
+            "patch" => vec!["urdf"],
+            "dh" | "convention" => vec!["dh"],
+            _ => exports::words_with_entries(),
         };
-        return Err(Failure::CommandLine(format!("`--{option}` belongs to {owner}")));
+        let owners: Vec<String> = owners.iter().map(|word| format!("`--as {word}`")).collect();
+        return Err(Failure::CommandLine(format!("`--{option}` belongs to {}", owners.join(" and "))));
     }
     let exported = format.export(&model, &options)?;
     output::write_whole(&arguments.out, &exported.text)?;

@@ -9,6 +9,7 @@ mod certificate;
 mod compare;
 mod compensate;
 mod compensation;
+mod controls;
 mod equation;
 mod excerpt;
 mod export;

@@ -12,7 +12,7 @@ use clap::Args;
 use self::motion::MotionArguments;
 use super::failure::Failure;
 use super::message::print_warnings;
-use super::{SessionArguments, folder, output};
+use super::{SessionArguments, controls, folder, output};
 use crate::printers::terminal;
 use crate::report::nc as present;
 
@@ -24,11 +24,11 @@ pub const HELP: &str = include_str!("help/nc.txt");
 pub struct NcArguments {
     #[command(flatten)]
     session: SessionArguments,
-    /// The control: linuxcnc, fanuc, siemens, heidenhain.
+    /// The control that runs the programs.
     ///
     /// Example: --control linuxcnc
-    #[arg(long, value_name = "CONTROL")]
-    control: String,
+    #[arg(long, value_name = "CONTROL", value_parser = controls::with_programs())]
+    control: &'static dyn nc::Control,
     /// New folder for the programs.
     ///
     /// Example: --out programs
@@ -43,7 +43,7 @@ pub struct NcArguments {
 
 /// Runs `abbe nc`.
 pub fn run(arguments: &NcArguments, quiet: bool) -> Result<(), Failure> {
-    let control = nc::control(&arguments.control)?;
+    let control = arguments.control;
     let options = arguments.motion.options();
     let reading = ReadOptions { read_data: false, ..arguments.session.options() };
     let (session, sources) = files::session_with_sources(&arguments.session.session, &reading)?;

@@ -4,6 +4,7 @@ mod order;
 
 use std::path::PathBuf;
 
+use abbe::codegen::nc::Control;
 use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::motion::Motion;
 use abbe::model::words::counted;
@@ -13,7 +14,7 @@ use clap::Args;
 use super::failure::Failure;
 use super::message::print_warnings;
 use super::nc::motion::MotionArguments;
-use super::{SessionArguments, output, values};
+use super::{SessionArguments, controls, output, values};
 use crate::printers::sheet as present;
 
 /// Examples of `abbe sheet`.
@@ -49,11 +50,11 @@ pub struct SheetArguments {
     /// Example: --bar-min 3
     #[arg(long, value_name = "MIN", default_value_t = 5.0)]
     bar_min: f64,
-    /// The control whose programs the sheets name: linuxcnc, fanuc, siemens, heidenhain.
+    /// The control whose programs the sheets name.
     ///
     /// Example: --control fanuc
-    #[arg(long, value_name = "CONTROL")]
-    control: Option<String>,
+    #[arg(long, value_name = "CONTROL", value_parser = controls::with_programs())]
+    control: Option<&'static dyn Control>,
     #[command(flatten)]
     motion: MotionArguments,
     /// Replace an existing file.

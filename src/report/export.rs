@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use abbe::apply::compare::workspace::AxisRange;
-use abbe::apply::export::control::{EntryChoice, KinematicTable};
 use abbe::apply::export::dh::{DhTables, FixedPose, PARAMETERS};
+use abbe::apply::export::kinematics::{EntryChoice, KinematicTable};
 use abbe::apply::export::neutral::AxisPlace;
 
 use abbe::model::files::robot::dh::Convention;

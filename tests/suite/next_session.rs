@@ -90,7 +90,7 @@ fn the_next_measurement_is_written_whole_or_not_at_all() {
     let refused = asked("nonsense");
     let said = String::from_utf8(refused.stderr).unwrap();
     assert!(!refused.status.success() && refused.stdout.is_empty(), "{said}");
-    assert!(said.contains("no control is called `nonsense`") && said.contains("siemens"), "{said}");
+    assert!(said.contains("invalid value 'nonsense'") && said.contains("siemens"), "{said}");
     assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 0);
     // An empty folder.
     std::fs::create_dir(&next).unwrap();

@@ -89,7 +89,7 @@ impl ErrorCurve {
 }
 
 /// Equidistant positions that all of these curves cover, internal units. Curves without a common position have none.
-pub(super) fn positions<'c>(
+pub(crate) fn positions<'c>(
     curves: impl IntoIterator<Item = &'c ErrorCurve>,
     points: usize,
 ) -> impl Iterator<Item = f64> {

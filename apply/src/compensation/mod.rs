@@ -1,26 +1,19 @@
 //! Estimated errors as compensation tables of controls, as far as their formats are publicly documented.
 //!
 //! - [`curves`]: the errors of a fit as functions of the position; `range`: where they were observed;
-//! - `linuxcnc`, `heidenhain`, `beckhoff`: one file per format; `position`: errors as changes of an axis position;
-//! - [`CONTROLS`]: the registry of formats.
+//! - [`TableFormat`]: the format of a control ([`crate::control`]); `position`: errors as changes of an axis position.
 
-mod beckhoff;
-mod control;
 pub mod curves;
-mod heidenhain;
-mod linuxcnc;
-mod position;
+mod format;
+pub(crate) mod position;
 mod range;
 mod uncertainty;
 
 use abbe_model::chain::Machine;
 
-pub use self::control::{Control, FileText};
 pub use self::curves::Compensation;
+pub use self::format::{FileText, TableFormat};
 pub use self::uncertainty::PointUncertainty;
-
-/// All formats, in the order in which they are listed.
-pub const CONTROLS: &[Control] = &[linuxcnc::CONTROL, heidenhain::CONTROL, beckhoff::CONTROL];
 
 /// Maximum number of points of a table: LinuxCNC reads 256 triplets per joint, Heidenhain 256 points per table.
 pub const MAX_POINTS: usize = 256;
@@ -35,14 +28,14 @@ pub struct Tables {
     pub left_out: Vec<String>,
 }
 
-/// The tables of the identified errors with a number of points, at least 2, over the range of each curve.
-pub fn tables(machine: &Machine, compensation: &Compensation, control: &Control, points: usize) -> Tables {
+/// The tables of the identified errors in a format, with a number of points, at least 2, over the range of each curve.
+pub fn tables(machine: &Machine, compensation: &Compensation, format: &TableFormat, points: usize) -> Tables {
     let mut left_out = compensation.left_out.clone();
-    if !control.holds_locations {
+    if !format.holds_locations {
         left_out.extend(compensation.locations.iter().map(|(name, _)| {
             format!("{name}: a location error belongs in the kinematics of the control, not in this table")
         }));
     }
-    let files = (control.files)(machine, compensation, points, &mut left_out);
+    let files = (format.files)(machine, compensation, points, &mut left_out);
     Tables { files, uncertainties: uncertainty::of_curves(machine, compensation, points), left_out }
 }

@@ -6,7 +6,7 @@ use super::curves::ErrorCurve;
 
 /// The axis that moves in the freedom of an error, and the change of its position that equals an error of 1 in R (tool
 /// against workpiece, rotary axes at zero).
-pub(super) fn as_position(machine: &Machine, curve: &ErrorCurve) -> Option<(usize, f64)> {
+pub(crate) fn as_position(machine: &Machine, curve: &ErrorCurve) -> Option<(usize, f64)> {
     let side = |axis: usize| if axis < machine.workpiece_side { -1.0 } else { 1.0 };
     let freedom = curve.error.freedom;
     let moves = |axis: usize| machine.axes[axis].own_freedom() == freedom && machine.axes[axis].principal().is_some();
@@ -19,6 +19,6 @@ pub(super) fn as_position(machine: &Machine, curve: &ErrorCurve) -> Option<(usiz
 }
 
 /// A curve whose table contains only the mean of both directions.
-pub(super) fn without_direction(curve: &ErrorCurve) -> String {
+pub(crate) fn without_direction(curve: &ErrorCurve) -> String {
     format!("{}: the difference between the directions; the table contains the mean of both", curve.error)
 }

@@ -4,18 +4,18 @@
 //! - [`neutral`]: the place of each axis, for any control;
 //! - [`urdf`]: the calibrated chain as URDF; [`urdf_patch`]: the calibrated origins in the URDF file of a robot; [`dh`]: Denavit–Hartenberg parameters, modified form of Craig with Hayati's
 //!   angle for parallel axes;
-//! - [`control`]: kinematic parameters of controls, as far as their models are publicly documented; [`entries`]: those
+//! - [`kinematics`]: kinematic parameters of controls, as far as their models are publicly documented; [`entries`]: those
 //!   that leave the least error over a [`travel`].
 //!
 //! A description of fixed geometry holds location errors only. Effects and constant error motions are listed as left
 //! out.
 
-pub mod control;
 pub mod dh;
 mod dh_frames;
 mod dh_nominal;
 pub mod entries;
 pub mod frames;
+pub mod kinematics;
 pub mod neutral;
 pub mod travel;
 pub mod urdf;
@@ -39,6 +39,6 @@ pub fn left_out(model: &IdentifiedModel) -> Vec<String> {
 }
 
 #[cfg(test)]
-mod control_tests;
+mod kinematics_tests;
 #[cfg(test)]
 mod tests;

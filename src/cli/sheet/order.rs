@@ -16,7 +16,7 @@ fn programs(
     arguments: &SheetArguments,
     warnings: &mut Vec<String>,
 ) -> Result<Option<(&'static dyn Control, NcFiles)>, Failure> {
-    let control = nc::control(arguments.control.as_deref().unwrap_or("linuxcnc"))?;
+    let control = arguments.control.map_or_else(|| nc::control("linuxcnc"), Ok)?;
     if arguments.control.is_none() && !nc::has_programs(session) {
         return Ok(None);
     }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use abbe::codegen::nc;
+use abbe::codegen::nc::Control;
 use abbe::identify::trace::TraceOutcome;
 use abbe::model::ModelError;
 use abbe::model::document::edit::SessionText;
@@ -14,7 +14,7 @@ use clap::Args;
 use crate::cli::failure::Failure;
 use crate::cli::message::{Kind, tell};
 use crate::cli::next_session::proposals;
-use crate::cli::{again, folder};
+use crate::cli::{again, controls, folder};
 
 /// The next measurement.
 #[derive(Args)]
@@ -25,11 +25,11 @@ pub struct NextArguments {
     /// Example: --next next --programs siemens
     #[arg(long, value_name = "FOLDER")]
     next: Option<PathBuf>,
-    /// Write the programs for this control beside it: linuxcnc, fanuc, siemens, heidenhain.
+    /// Write the programs for this control beside it.
     ///
     /// Example: --next next --programs fanuc
-    #[arg(long, value_name = "CONTROL", requires = "next")]
-    programs: Option<String>,
+    #[arg(long, value_name = "CONTROL", value_parser = controls::with_programs(), requires = "next")]
+    programs: Option<&'static dyn Control>,
 }
 
 /// The name of the session in the folder.
@@ -40,9 +40,8 @@ const PROGRAMS: &str = "programs";
 const SHEETS: &str = "sheets.html";
 
 impl NextArguments {
-    /// Refuses a folder that cannot be written, and a control that does not exist, before the search.
+    /// Refuses a folder that cannot be written before the search.
     pub fn check(&self) -> Result<(), Failure> {
-        self.programs.as_deref().map(nc::control).transpose()?;
         self.next.as_ref().map_or(Ok(()), |folder| folder::check(folder, None).map(|_| ()))
     }
 
@@ -74,8 +73,8 @@ impl NextArguments {
         if !quiet {
             let at = |name: &str| out.join(name).display().to_string();
             say!("{}: the tests to measure next", at(SESSION));
-            if let Some(control) = &self.programs {
-                say!("{}: their programs for {control}", at(PROGRAMS));
+            if let Some(control) = self.programs {
+                say!("{}: their programs for {}", at(PROGRAMS), control.word());
             }
             say!("{}: their set-up sheets", at(SHEETS));
         }
@@ -85,7 +84,7 @@ impl NextArguments {
     /// The programs and the sheets of the session in a folder that is not in its place yet.
     fn documents(&self, made: &Path) -> Result<(), Failure> {
         let [session, programs, sheets] = [SESSION, PROGRAMS, SHEETS].map(|name| made.join(name).display().to_string());
-        let control: Vec<&str> = self.programs.iter().flat_map(|control| ["--control", control.as_str()]).collect();
+        let control: Vec<&str> = self.programs.iter().flat_map(|control| ["--control", control.word()]).collect();
         if !control.is_empty() {
             again(&[&["nc", &session, "--out", &programs], &control[..]].concat(), true)?;
         }

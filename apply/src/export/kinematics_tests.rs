@@ -5,11 +5,12 @@ use abbe_model::frames::Point;
 use nalgebra::{Rotation3, Vector3};
 use rand::SeedableRng;
 
-use super::control::{self, EntryChoice, KinematicTable};
 use super::frames::location_errors;
+use super::kinematics::{EntryChoice, KinematicTable};
 use super::tests::{model, random_errors, robot};
 use super::travel::Travel;
 use crate::ApplyError;
+use crate::control::control;
 use abbe_identify::model_file::IdentifiedModel;
 
 /// The position of the tool over the table as `xyzac-trt-kins` computes it from its joints, mm.
@@ -37,7 +38,7 @@ fn entries_of(model: &IdentifiedModel, word: &str, choice: EntryChoice) -> Resul
         _ => [-std::f64::consts::FRAC_PI_2, std::f64::consts::FRAC_PI_2],
     };
     let travel = Travel { ranges: model.machine.axes.iter().map(range).collect(), is_measured: false };
-    control::table(model, word, choice, &travel, [0.0; 3])
+    control(word).unwrap().kinematic_table(model, choice, &travel, [0.0; 3])
 }
 
 #[test]

@@ -26,21 +26,19 @@ use crate::compare::workspace::AxisRange;
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_identify::parameters::Role;
 
-/// A control with a publicly documented kinematic model.
-pub struct ControlKinematics {
-    /// The word by which it is requested.
-    pub word: &'static str,
-    /// The control and its model.
+/// The publicly documented kinematic model of a control.
+pub struct KinematicModel {
+    /// The model in the control's own words.
     pub about: &'static str,
     /// Where the model is documented.
     pub source: &'static str,
     /// The entries for a machine whose first axis has this letter.
-    entries: fn(first: char) -> Vec<Entry>,
+    pub(crate) entries: fn(first: char) -> Vec<Entry>,
 }
 
 /// A displacement of an axis line that a control's model holds.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Line {
+pub(crate) enum Line {
     /// The first axis across itself in the plane of the table.
     FirstAcross,
     /// The first axis in Z.
@@ -67,81 +65,10 @@ impl Line {
 }
 
 /// An entry: field, meaning, and its change as a sum of displacements.
-struct Entry {
-    field: &'static str,
-    meaning: &'static str,
-    terms: Vec<(f64, Line)>,
-}
-
-/// A control whose kinematic model is not exported, with the reason.
-pub const NOT_DOCUMENTED: &[(&str, &str)] = &[
-    (
-        "siemens",
-        "the vectors of SINUMERIK 840D (MD24500 TRAFO5_PART_OFFSET, MD24550 TRAFO5_BASE_TOOL, MD24560 TRAFO5_JOINT_OFFSET) are \
-         listed in public manuals without the equation that fixes their signs for each machine type",
-    ),
-    (
-        "heidenhain",
-        "the kinematics tables of TNC controls belong to the machine manufacturer; the public manuals list their columns without \
-         the sign of a transformation",
-    ),
-];
-
-/// The controls with a documented model.
-pub const KINEMATICS: &[ControlKinematics] = &[
-    ControlKinematics {
-        word: "linuxcnc",
-        about: "LinuxCNC, xyzac-trt-kins and xyzbc-trt-kins (HAL pins)",
-        source: "LinuxCNC, src/emc/kinematics/trtfuncs.c, xyzacKinematicsForward and xyzbcKinematicsForward; \
-                 man 9 xyzac-trt-kins",
-        entries: linuxcnc,
-    },
-    ControlKinematics {
-        word: "fanuc",
-        about: "Fanuc Series 30i, tool centre point control, table rotation type (No. 19680 = 12)",
-        source: "Fanuc A-79348E, Series 30i-MODEL A, Tool center point control for 5-axis machining, Nos. 19680, 19700 to 19705",
-        entries: fanuc,
-    },
-];
-
-/// `tran = Rz(−c)·(Rx(−a)·(J − r − d) + d) + r`: the line of C is at `r`, that of A at `r + d`.
-fn linuxcnc(first: char) -> Vec<Entry> {
-    let across = vec![(1.0, Line::SecondAcross), (1.0, Line::FirstAcross)];
-    let along = vec![(1.0, Line::SecondAlong)];
-    let offset = vec![(-1.0, Line::SecondAcross)];
-    let (x, y, offset) = if first == 'A' {
-        (along, across, Entry { field: "y-offset", meaning: "line of A less line of C in Y", terms: offset })
-    } else {
-        (across, along, Entry { field: "x-offset", meaning: "line of B less line of C in X", terms: offset })
-    };
-    vec![
-        Entry { field: "x-rot-point", meaning: "line of C in X", terms: x },
-        Entry { field: "y-rot-point", meaning: "line of C in Y", terms: y },
-        Entry { field: "z-rot-point", meaning: "line of the tilting axis in Z", terms: vec![(1.0, Line::FirstHeight)] },
-        offset,
-    ]
-}
-
-/// Point A on the first axis in machine coordinates, and the vector from A to point B on the second axis. Along the first
-/// axis point A stays where it was: the displacement of the second axis there goes into the vector.
-fn fanuc(first: char) -> Vec<Entry> {
-    let of_first = vec![(1.0, Line::FirstAcross)];
-    let (along, across) = (vec![(1.0, Line::SecondAlong)], vec![(1.0, Line::SecondAcross)]);
-    let [point, vector] = if first == 'A' {
-        [[Vec::new(), of_first], [along, across]]
-    } else {
-        [[of_first, Vec::new()], [across, along]]
-    };
-    let ([point_x, point_y], [vector_x, vector_y]) = (point, vector);
-    let point_z = vec![(1.0, Line::FirstHeight)];
-    vec![
-        Entry { field: "19700", meaning: "rotary table position, X", terms: point_x },
-        Entry { field: "19701", meaning: "rotary table position, Y", terms: point_y },
-        Entry { field: "19702", meaning: "rotary table position, Z", terms: point_z },
-        Entry { field: "19703", meaning: "vector from first to second axis, X", terms: vector_x },
-        Entry { field: "19704", meaning: "vector from first to second axis, Y", terms: vector_y },
-        Entry { field: "19705", meaning: "vector from first to second axis, Z", terms: Vec::new() },
-    ]
+pub(crate) struct Entry {
+    pub field: &'static str,
+    pub meaning: &'static str,
+    pub terms: Vec<(f64, Line)>,
 }
 
 /// Which entries are written.
@@ -202,30 +129,29 @@ pub struct KinematicTable {
     pub left_out: Vec<String>,
 }
 
-/// The table of a control for a travel and a tool point in the tool frame, mm.
+/// The table of a control of this name for a travel and a tool point in the tool frame, mm.
 ///
 /// # Errors
-/// If the control's model is not documented, or is not one of this machine, or an error of the model cannot be evaluated
-/// over the travel.
+/// If the control's model is not one of this machine, or an error of the model cannot be evaluated over the travel.
 pub fn table(
     model: &IdentifiedModel,
-    word: &str,
+    name: &str,
+    kinematics: &KinematicModel,
     choice: EntryChoice,
     travel: &Travel,
     tool_mm: [f64; 3],
 ) -> Result<KinematicTable, ApplyError> {
-    let control = control(word)?;
+    let control = format!("{name}, {}", kinematics.about);
     let (first, second) = tilting_table(&model.machine).ok_or_else(|| {
         ApplyError::Request(format!(
-            "{} describes two rotary axes under the workpiece, a tilting A (along X) or B (along Y) with C (along Z) on it; this \
-             machine is `{}`",
-            control.about,
+            "{control} describes two rotary axes under the workpiece, a tilting A (along X) or B (along Y) with C (along Z) on it; \
+             this machine is `{}`",
             model.machine.code()
         ))
     })?;
     let axes = [first, second];
     let letter = if model.machine.axes[first].direction[0].abs() == 1.0 { 'A' } else { 'B' };
-    let name = |axis: usize, freedom: Freedom| ErrorName {
+    let error = |axis: usize, freedom: Freedom| ErrorName {
         kind: ErrorKind::Location,
         freedom,
         axis: model.machine.axes[axes[axis]].name.clone(),
@@ -237,14 +163,13 @@ pub fn table(
     };
     // The errors of each line, and those of them that the readings determine.
     let names = LINES.map(|line| {
-        line.errors(letter).into_iter().map(|(axis, freedom)| name(axis, freedom)).collect::<Vec<ErrorName>>()
+        line.errors(letter).into_iter().map(|(axis, freedom)| error(axis, freedom)).collect::<Vec<ErrorName>>()
     });
     let known = names.each_ref().map(|names| names.iter().filter_map(index).collect::<Vec<usize>>());
     let free = known.each_ref().map(|known| !known.is_empty());
     if !free.contains(&true) {
         return Err(ApplyError::Request(format!(
-            "{} has no entry for an error that the readings of the model determine",
-            control.about
+            "{control} has no entry for an error that the readings of the model determine"
         )));
     }
     let slots: Vec<usize> = names.iter().filter_map(|names| model.machine.error_slot(&names[0])).collect();
@@ -262,7 +187,7 @@ pub fn table(
     };
     let mut parameters = Vec::new();
     let mut left_out: Vec<String> = Vec::new();
-    for entry in (control.entries)(letter) {
+    for entry in (kinematics.entries)(letter) {
         let mut shares = [0.0; LINES.len()];
         for (share, line) in &entry.terms {
             shares[*line as usize] += share;
@@ -291,8 +216,8 @@ pub fn table(
     }
     left_out.extend(no_entry(model, &known));
     Ok(KinematicTable {
-        control: control.about.to_string(),
-        source: control.source.to_string(),
+        control,
+        source: kinematics.source.to_string(),
         entries: choice,
         parameters,
         travel: travel.axes(model),
@@ -301,17 +226,6 @@ pub fn table(
         remaining,
         not_represented,
         left_out,
-    })
-}
-
-/// The control of a word.
-fn control(word: &str) -> Result<&'static ControlKinematics, ApplyError> {
-    if let Some((_, why)) = NOT_DOCUMENTED.iter().find(|(own, _)| *own == word) {
-        return Err(ApplyError::Request(format!("no table for `{word}`: {why}; no sign is guessed")));
-    }
-    KINEMATICS.iter().find(|control| control.word == word).ok_or_else(|| {
-        let words: Vec<&str> = KINEMATICS.iter().map(|control| control.word).collect();
-        ApplyError::Request(format!("no control `{word}`; known are {}", words.join(", ")))
     })
 }
 

@@ -4,19 +4,24 @@
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 
-use super::control::{Control, FileText};
-use super::curves::{Compensation, ErrorCurve, positions};
-use super::position::without_direction;
+use super::{Control, Kinematics};
+use crate::compensation::curves::{Compensation, ErrorCurve, positions};
+use crate::compensation::position::without_direction;
+use crate::compensation::{FileText, TableFormat};
 
-/// The format.
 pub(super) const CONTROL: Control = Control {
     word: "beckhoff",
-    about: "Beckhoff TwinCAT CNC TF5280, ISG CSV format",
-    import: &[
-        "file_format[0] ISG_CSV; values are errors (actual less nominal), which the control subtracts; `negate` reverses the sign",
-    ],
-    holds_locations: true,
-    files,
+    name: "Beckhoff TwinCAT CNC TF5280",
+    tables: Some(TableFormat {
+        about: "ISG CSV format",
+        import: &[
+            "file_format[0] ISG_CSV; values are errors (actual less nominal), which the control subtracts; `negate` reverses the sign",
+        ],
+        holds_locations: true,
+        files,
+    }),
+    kinematics: Kinematics::Locations,
+    has_programs: false,
 };
 
 fn files(machine: &Machine, compensation: &Compensation, points: usize, left_out: &mut Vec<String>) -> Vec<FileText> {

@@ -7,16 +7,14 @@ use super::curves::Compensation;
 /// A file to write: its name and its text.
 pub type FileText = (String, String);
 
-/// One line of the registry.
-pub struct Control {
-    /// The word by which it is requested.
-    pub word: &'static str,
-    /// The control and its file.
+/// The format of the tables of a control.
+pub struct TableFormat {
+    /// The file.
     pub about: &'static str,
     /// How the control reads the files, one sentence or two.
     pub import: &'static [&'static str],
     /// Whether the files hold location errors.
     pub holds_locations: bool,
     /// Writes the files with a number of points, and adds the errors that they do not hold to the list.
-    pub(super) files: fn(&Machine, &Compensation, usize, &mut Vec<String>) -> Vec<FileText>,
+    pub(crate) files: fn(&Machine, &Compensation, usize, &mut Vec<String>) -> Vec<FileText>,
 }

@@ -1,4 +1,6 @@
-//! Heidenhain `.COM` (Technical Manual MANUALplus 620, 6.10.3): columns AXISPOS, BACKLASH, and one for each axis.
+//! Heidenhain.
+//!
+//! Compensation tables: `.COM` (Technical Manual MANUALplus 620, 6.10.3): columns AXISPOS, BACKLASH, and one for each axis.
 //!
 //! Points of the error curve (Technical Manual TNC 406/306, 4-21), positive where the travel is too long (TNC 407,
 //! 1.6.3). The frame of the file is not publicly documented.
@@ -7,21 +9,29 @@ use std::fmt::Write;
 
 use abbe_model::chain::Machine;
 
-use super::control::{Control, FileText};
-use super::curves::{Compensation, positions};
-use super::position::{as_position, without_direction};
+use super::{Control, Kinematics};
+use crate::compensation::curves::{Compensation, positions};
+use crate::compensation::position::{as_position, without_direction};
+use crate::compensation::{FileText, TableFormat};
 
-/// The format.
 pub(super) const CONTROL: Control = Control {
     word: "heidenhain",
-    about: "Heidenhain, columns of a .COM table",
-    import: &[
-        "columns of a .COM table; the frame of the file is not publicly documented: enter or import the \
-         columns in the table editor",
-        "values are points of the error curve, positive where the travel is too long; check the sign on one axis first",
-    ],
-    holds_locations: false,
-    files,
+    name: "Heidenhain",
+    tables: Some(TableFormat {
+        about: "columns of a .COM table",
+        import: &[
+            "columns of a .COM table; the frame of the file is not publicly documented: enter or import the \
+             columns in the table editor",
+            "values are points of the error curve, positive where the travel is too long; check the sign on one axis first",
+        ],
+        holds_locations: false,
+        files,
+    }),
+    kinematics: Kinematics::NotDocumented(
+        "the kinematics tables of TNC controls belong to the machine manufacturer; the public manuals list their columns without \
+         the sign of a transformation",
+    ),
+    has_programs: true,
 };
 
 fn files(machine: &Machine, compensation: &Compensation, points: usize, left_out: &mut Vec<String>) -> Vec<FileText> {
