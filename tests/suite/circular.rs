@@ -271,6 +271,61 @@ fn every_fault_agrees_with_its_closed_form() {
     assert!(fault(&test, "cyclic error", "Y").is_none() && fault(&test, "reversal spike", "X").is_none());
 }
 
+/// Faults that are also effects of the library: a fit of the session that declares them finds the figures of the diagnosis,
+/// with their uncertainties.
+#[test]
+fn faults_that_are_effects_have_the_figures_of_a_fit() {
+    let folder = tempfile::tempdir().unwrap();
+    let drawn = std::cell::Cell::new(9876_u64);
+    let test = circle(folder.path(), &[1.0, -1.0], true, |at| {
+        drawn.set(drawn.get().wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407));
+        let random = ((drawn.get() >> 33) as f64 / (1_u64 << 31) as f64 - 0.5) * 3.46e-4;
+        let (x, y) = (at.angle.cos(), at.angle.sin());
+        [
+            (3e-3 + random) * x - 2e-3 * y - 1.5e-3 * at.travels[0] + 4e-3 * y * y + 2e-3 * at.path * y,
+            random * y - 1e-3 * at.travels[0] - 0.5e-3 * at.travels[1] + 5e-3 * x * x,
+        ]
+    });
+    let file = folder.path().join("session.toml");
+    let effect = |(component, shape): (&str, &str)| {
+        format!("[[effect]]\ncomponent = \"{component}\"\ndriver = \"{}\"\nshape = {shape}\n", &component[2..])
+    };
+    let (backlash, square) = ("\"backlash\"", "\"power\"\norder = 2");
+    let effects = [("EXX", "\"power\"\norder = 1"), ("EXX", backlash), ("EYY", backlash), ("EYX", backlash)];
+    let others = [("EXY", backlash), ("EYX", square), ("EXY", square), ("EXX", "\"lag\"")];
+    let effects: String = effects.into_iter().chain(others).map(effect).collect();
+    let declared = std::fs::read_to_string(&file).unwrap();
+    let declared =
+        declared.replace("errors = []", "errors = [\"EC0Y\"]").replace("[[test]]", &format!("{effects}[[test]]"));
+    std::fs::write(&file, declared).unwrap();
+    let run = abbe(&["fit", text(&file), "--json", "-"]);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let fit: Value = serde_json::from_slice(&run.stdout).unwrap();
+    let estimate = |id: &str| {
+        let found = fit["parameters"].as_array().unwrap().iter().find(|parameter| parameter["id"] == id).unwrap();
+        (um(found, "value"), um(found, "u"))
+    };
+    // Powers count in 100 mm, the radius.
+    for (name, axes, id, effect, unit) in [
+        ("scale mismatch", "XY", "ratio", "EXX~X:power1", 10.0),
+        ("squareness", "XY", "angle", "EC0Y", PI / 0.648),
+        ("servo mismatch", "XY", "delay", "EXX~X:lag", 1.0),
+        ("lateral play", "X", "play", "EYX~X:backlash", 1.0),
+        ("lateral play", "Y", "play", "EXY~Y:backlash", 1.0),
+        ("straightness", "X", "sagitta", "EYX~X:power2", 1.0),
+        ("straightness", "Y", "sagitta", "EXY~Y:power2", 1.0),
+    ] {
+        let ((value, u), (estimate, u_of_fit)) = (figure(&test, name, axes, id), estimate(effect));
+        assert!((value - estimate * unit).abs() < 0.05 * u, "{name} of {axes}: {value}, {effect} {estimate}");
+        assert!((u / (u_of_fit * unit) - 1.0).abs() < 0.1, "{name} of {axes}: u {u}, {effect} {u_of_fit}");
+    }
+    for axis in ["X", "Y"] {
+        let [plus, minus] = ["+", "-"].map(|end| figure(&test, "backlash", axis, &format!("{axis}{end}")));
+        let (estimate, _) = estimate(&format!("E{axis}{axis}~{axis}:backlash"));
+        assert!((0.5 * (plus.0 + minus.0) - estimate).abs() < 0.05 * plus.1, "{plus:?} {minus:?}, fit {estimate}");
+    }
+}
+
 #[test]
 fn quantities_that_one_direction_does_not_determine_are_listed() {
     let folder = tempfile::tempdir().unwrap();

@@ -16,7 +16,8 @@
 //! The terms stand beside [`crate::problem::Problem`]. A spike decays with the angle of the path. The slope of backlash and
 //! the powers of a bow count from the centre of the circle. A cyclic error has an amplitude for each direction, and a lag
 //! has a direction where the data have no time. No shape and no driver of the library of effects is any of these: half of
-//! the terms would be effects of a problem, and the other half columns beside it.
+//! the terms would be effects of a problem, and the other half columns beside it. Those that are effects have the figures
+//! of a fit that declares them.
 
 use abbe_model::chain::Machine;
 
