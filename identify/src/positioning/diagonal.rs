@@ -127,8 +127,8 @@ fn of_test(session: &Session, test: &Test, left_out: &[bool]) -> Option<Diagonal
     let channel = test.station.channels().first().filter(|channel| !channel.is_angle())?;
     let axes = moved(machine, readings)?;
     let station = test.station.with_datum(machine, readings).unwrap_or_else(|| test.station.clone());
-    let nominal: Vec<f64> =
-        (0..readings.rows()).map(|row| readings.nominal(machine, &station, row).channels()[0]).collect();
+    let mut nominal = readings.nominal(machine, &station);
+    let nominal: Vec<f64> = (0..readings.rows()).map(|row| nominal(row).channels()[0]).collect();
     let way = Way::of(readings, &axes, &nominal)?;
     let unit = Unit::of(channel.unit);
     let factor = way.sign * unit.display_per_internal;

@@ -77,8 +77,9 @@ fn of_test(session: &Session, test: &Test, left_out: &[bool]) -> Option<Position
     let unit = Unit::of(channel.unit);
     let kind = machine.axes[axis].kind;
     let factor = sign * cosine.signum() * unit.display_per_internal;
-    let deviation =
-        |row: usize, values: &[f64]| (values[0] - readings.nominal(machine, &station, row).channels()[0]) * factor;
+    let mut nominal = readings.nominal(machine, &station);
+    let nominal: Vec<f64> = (0..readings.rows()).map(|row| nominal(row).channels()[0]).collect();
+    let deviation = |row: usize, values: &[f64]| (values[0] - nominal[row]) * factor;
     let places = along_axis(readings, axis, kind);
     let positions = approaches(readings, left_out, 0, &places, |at| kind.to_display(at), deviation);
     // A sweep whose positions do not return is no test of positioning.

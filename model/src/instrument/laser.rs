@@ -180,9 +180,10 @@ impl Laser<f64> {
             return None;
         }
         let station = Station::Laser(self.clone());
+        let mut nominal = readings.nominal(machine, &station);
         let deviation = |row: usize| {
             let observed = readings.observed.get(row * readings.channels).copied()?;
-            Some(observed - readings.nominal(machine, &station, row).channels()[0]).filter(|value| value.is_finite())
+            Some(observed - nominal(row).channels()[0]).filter(|value| value.is_finite())
         };
         Some((0..readings.rows()).filter_map(deviation).collect())
     }

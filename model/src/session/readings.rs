@@ -78,12 +78,18 @@ impl Readings {
         self.observed.get(row * self.channels + channel).is_none_or(|value| !value.is_nan())
     }
 
-    /// The nominal reading of an instrument in a row.
-    pub fn nominal(&self, machine: &Machine, station: &Station<f64>, row: usize) -> Reading<f64> {
-        let mut state = Vec::new();
-        self.state(machine, row, &mut state);
+    /// A function that gives the nominal reading of an instrument in a row.
+    pub fn nominal<'r>(
+        &'r self,
+        machine: &'r Machine,
+        station: &'r Station<f64>,
+    ) -> impl FnMut(usize) -> Reading<f64> + 'r {
         let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
-        station.read::<f64>(machine, &state, &none, |_| None)
+        let mut state = Vec::new();
+        move |row| {
+            self.state(machine, row, &mut state);
+            station.read::<f64>(machine, &state, &none, |_| None)
+        }
     }
 
     /// The nominal position in R of a point of the tool frame, mm, at every row.

@@ -84,7 +84,8 @@ fn column(session: &Session, (station, readings): (&Station<f64>, &Readings), na
         "dz_um" => channel(2, 1e3),
         // A laser's deviation from the nominal displacement.
         "deviation_um" => {
-            let nominal = |row: usize| readings.nominal(&session.machine, station, row).channels()[0];
+            let mut reading = readings.nominal(&session.machine, station);
+            let mut nominal = |row: usize| reading(row).channels()[0];
             (0..readings.rows()).map(|row| (readings.observed[row] - nominal(row)) * 1e3).collect()
         }
         _ => {

@@ -385,11 +385,13 @@ impl<'a> Filled<'a> {
             let station = columns::kept(&self.request.test.station, &columns::quantities(&self.columns));
             let Readings { observed, channels, .. } = &mut self.readings;
             let (mut observed, channels) = (std::mem::take(observed), *channels);
+            let mut nominal = self.readings.nominal(self.request.machine, &station);
             for (row, values) in observed.chunks_exact_mut(channels).enumerate() {
-                let nominal = self.readings.nominal(self.request.machine, &station, row);
-                let of_nominal = values.iter_mut().zip(&self.from_nominal).zip(nominal.channels());
+                let reading = nominal(row);
+                let of_nominal = values.iter_mut().zip(&self.from_nominal).zip(reading.channels());
                 of_nominal.filter(|((_, from), _)| **from).for_each(|((value, _), nominal)| *value += nominal);
             }
+            drop(nominal);
             self.readings.observed = observed;
         }
         Ok(())
