@@ -298,34 +298,57 @@ impl Machine {
     /// on the workpiece side), in mm (newton millimetre per newton): `d · ((p − o) × g)` with the nominal chain.
     pub fn gravity_moment_mm(&self, index: usize, state: &[AxisPosition<f64>], point_mm: [f64; 3]) -> f64 {
         let none = vec![BodyErrors::<f64>::NONE; self.axes.len()];
-        let workpiece = index < self.workpiece_side;
-        let whole = |point| {
-            if workpiece {
-                self.workpiece_point(state, &none, Point(point)).0
-            } else {
-                self.tool_point(state, &none, Point(point)).0
-            }
+        let load = if index < self.workpiece_side {
+            self.workpiece_point(state, &none, Point(point_mm)).0
+        } else {
+            self.tool_point(state, &none, Point(point_mm)).0
         };
-        // Only the bodies between an axis and the bed carry the axis line.
-        let carried = |point: [f64; 3]| {
-            let outside: Vec<usize> = if workpiece {
-                (index + 1..self.workpiece_side).collect()
-            } else {
-                (self.workpiece_side..index).rev().collect()
-            };
-            outside.into_iter().fold(Point(point), |point, k| push(&self.axes[k], &state[k], &none[k], point))
-        };
+        self.moment_about_mm(index, state, load)
+    }
+
+    /// The moment about axis `index` of a unit weight at the origin of the axis `loaded`, which the axis carries, in mm;
+    /// `None` if it does not carry it.
+    pub fn gravity_moment_of_axis_mm(&self, index: usize, state: &[AxisPosition<f64>], loaded: usize) -> Option<f64> {
+        self.carries(index, loaded)
+            .then(|| self.moment_about_mm(index, state, self.carried_mm(loaded, state, self.axes[loaded].origin_mm)))
+    }
+
+    /// Whether an axis carries another one: both are on one side of the bed, and it is nearer to the bed.
+    pub fn carries(&self, index: usize, other: usize) -> bool {
+        match index < self.workpiece_side {
+            true => other < index,
+            false => other > index,
+        }
+    }
+
+    /// The moment about an axis of a unit weight at a point of R, in mm.
+    fn moment_about_mm(&self, index: usize, state: &[AxisPosition<f64>], load: [f64; 3]) -> f64 {
         let axis = &self.axes[index];
-        let origin = carried(axis.origin_mm).0;
+        let origin = self.carried_mm(index, state, axis.origin_mm);
         let tip: [f64; 3] = std::array::from_fn(|i| axis.origin_mm[i] + axis.direction[i]);
-        let tip = carried(tip).0;
-        let load = whole(point_mm);
+        let tip = self.carried_mm(index, state, tip);
         let direction: [f64; 3] = std::array::from_fn(|i| tip[i] - origin[i]);
         let lever = std::array::from_fn(|i| load[i] - origin[i]);
         let moment = crate::frames::cross(lever, Point(self.gravity)).0;
-        (0..3).map(|i| direction[i] * moment[i]).sum()
+        let about: f64 = (0..3).map(|i| direction[i] * moment[i]).sum();
+        // A weight on the axis or above it has no moment. Rounding would leave a coefficient of no size.
+        if about.abs() < NO_MOMENT_MM { 0.0 } else { about }
+    }
+
+    /// A point of the line of an axis in R: only the bodies between the axis and the bed carry it.
+    fn carried_mm(&self, index: usize, state: &[AxisPosition<f64>], point_mm: [f64; 3]) -> [f64; 3] {
+        let outside: Vec<usize> = if index < self.workpiece_side {
+            (index + 1..self.workpiece_side).collect()
+        } else {
+            (self.workpiece_side..index).rev().collect()
+        };
+        let none = BodyErrors::<f64>::NONE;
+        outside.into_iter().fold(Point(point_mm), |point, k| push(&self.axes[k], &state[k], &none, point)).0
     }
 }
+
+/// Moment of a unit weight that is rounding, mm.
+const NO_MOMENT_MM: f64 = 1e-9;
 
 /// Transforms a point from the moved side of an axis to its bed side.
 #[inline]

@@ -172,6 +172,7 @@ fn written_effects_read_back_equal() {
         effect("bar", "time", Shape::Warmup(Warmup { tau_s: 1234.5 })),
         effect("workpiece_ball.z", "temperature", Shape::Polynomial(Polynomial { degree: 1, scale: 1.0 })),
         effect("EAA", "gravity", Shape::Polynomial(Polynomial { degree: 1, scale: 1.0 })),
+        effect("EAA", "gravity-C", Shape::Polynomial(Polynomial { degree: 1, scale: 1.0 })),
         effect("EXX", "speed-squared", Shape::Polynomial(Polynomial { degree: 1, scale: 2.5e3 })),
         effect("EXX", "X", Shape::Steps(Steps { at: vec![-50.0, 0.1, 50.0] })),
         effect("ECC", "C", Shape::Steps(Steps { at: vec![0.3, 1.0, 2.0_f64.to_radians()] })),
@@ -279,6 +280,47 @@ fn sockets_named_by_a_column_become_tests() {
     assert_eq!(readings.observed, [0.0; 6]);
     assert_eq!(session.machine.axes[0].direction, [0.0, 0.0, 1.0]);
     assert_eq!(session.tests[0].spindle_setup, session.tests[1].spindle_setup);
+}
+
+/// Two joints about Y, 300 mm apart: the moment of a weight of one newton at the second about the first is
+/// 0.3 m · cos q of the first, whatever the second does. The second does not carry the first.
+#[test]
+fn a_weight_at_a_joint_has_the_moment_of_its_lever() {
+    let read = |component: &str, loaded: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("session.toml");
+        let text = format!(
+            "[machine]\nchain = \"w b J1 J2 t\"\n[machine.axis.J1]\nkind = \"rotary\"\ndirection = [0, 1, 0]\n\
+             [machine.axis.J2]\nkind = \"rotary\"\ndirection = [0, 1, 0]\norigin_mm = [300, 0, 0]\n\n[instrument]\n\
+             kind = \"tracker\"\n\n[[test]]\nname = \"T\"\ndata = \"T.csv\"\ntarget_mm = [500, 0, 0]\n\n\
+             [[effect]]\ncomponent = \"{component}\"\ndriver = \"gravity-{loaded}\"\nshape = \"power\"\ndegree = 1\n"
+        );
+        fs::write(&path, text).unwrap();
+        fs::write(folder.path().join("T.csv"), "j1_rad,j2_rad,px_mm,py_mm,pz_mm\n0,1,0,0,0\n0.7,2,0,0,0\n2,0,0,0,0\n")
+            .unwrap();
+        files::session(&path, &ReadOptions::default())
+    };
+    let session = read("EBJ1", "J2").unwrap();
+    let effect = &session.effects[0];
+    assert_eq!(effect.driver.to_string(), "gravity-J2");
+    let test = &session.tests[0];
+    let readings = test.readings.as_ref().unwrap();
+    let model = TestModel::new(session.machine.clone(), test.station.clone(), readings);
+    let input = DriverInput {
+        machine: &session.machine,
+        model: &model,
+        readings,
+        reference: &Reference::default(),
+        component_axis: effect.component.axis(&session.machine),
+        lag_s: None,
+    };
+    let samples = effect.driver.kind().samples(&input).unwrap();
+    for (sample, q) in samples.iter().zip([0.0_f64, 0.7, 2.0]) {
+        assert!((sample.value - 0.3 * q.cos()).abs() < 1e-12, "{} {q}", sample.value);
+    }
+    let error = |component: &str, loaded: &str| read(component, loaded).unwrap_err().to_string();
+    assert!(error("EBJ2", "J1").contains("axis J2 does not carry axis J1"), "{}", error("EBJ2", "J1"));
+    assert!(error("EBJ1", "J7").contains("J7"), "{}", error("EBJ1", "J7"));
 }
 
 /// The bar turns about its ball, so that its length does not show the mistake.

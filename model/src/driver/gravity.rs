@@ -15,7 +15,7 @@ use crate::scalar::Nominal;
 /// The moment of gravity.
 pub(super) struct Gravity;
 
-const METRE: DriverUnit = DriverUnit::new("m", "m", "m", " m");
+pub(super) const METRE: DriverUnit = DriverUnit::new("m", "m", "m", " m");
 const MILLIMETRES_PER_METRE: f64 = 1000.0;
 
 pub(super) const ENTRY: Entry = Entry { word: Some("gravity"), driver: |_| Driver::Gravity, units: &[METRE] };
@@ -49,14 +49,19 @@ impl DriverKind for Gravity {
         true
     }
     fn check_component(&self, component: &str, axis: Option<AxisKind>) -> Result<(), DriverFault> {
-        if axis == Some(AxisKind::Rotary) {
-            return Ok(());
-        }
-        Err(DriverFault {
-            message: format!("gravity exerts no moment about \"{component}\""),
-            help: "gravity acts on the errors of rotary axes, by a moment about the axis",
-        })
+        check_component(component, axis)
     }
+}
+
+/// Checks that a weight has a moment about the axis of a component.
+pub(super) fn check_component(component: &str, axis: Option<AxisKind>) -> Result<(), DriverFault> {
+    if axis == Some(AxisKind::Rotary) {
+        return Ok(());
+    }
+    Err(DriverFault {
+        message: format!("gravity exerts no moment about \"{component}\""),
+        help: "gravity acts on the errors of rotary axes, by a moment about the axis",
+    })
 }
 
 impl Symbols for Gravity {

@@ -69,6 +69,7 @@ drivers! {
     time: Time => time::Time,
     column: Column(name) => column::Column(name),
     gravity: Gravity => gravity::Gravity,
+    gravity_at: GravityAt(name) => gravity_at::GravityAt(name),
     speed_squared: SpeedSquared => speed_squared::SpeedSquared,
 }
 
@@ -78,6 +79,7 @@ impl Driver {
     pub fn parse(text: &str) -> Driver {
         match DRIVERS.iter().find(|entry| entry.word == Some(text)) {
             Some(entry) => (entry.driver)(text),
+            None if gravity_at::named(text).is_some() => (gravity_at::ENTRY.driver)(text),
             None if column::is_name(text) => Driver::Column(text.to_string()),
             None => Driver::Axis(text.to_string()),
         }
@@ -126,6 +128,7 @@ impl fmt::Display for Driver {
         let word = DRIVERS.iter().find(own).and_then(|entry| entry.word);
         match self {
             Driver::Axis(name) | Driver::Column(name) => formatter.write_str(word.unwrap_or(name)),
+            Driver::GravityAt(name) => formatter.write_str(&gravity_at::word(name)),
             _ => formatter.write_str(word.unwrap_or_default()),
         }
     }

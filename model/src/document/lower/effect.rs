@@ -183,12 +183,30 @@ fn driver(
             let help = format!("{help}; other drivers are {}, and columns as NAME_unit", listed(&others, "and"));
             return Err(Fault::new(format!("effect driven by \"{text}\": {message}"), help).at("driver"));
         }
+        (Driver::GravityAt(name), ..) => weight_at(context, component, text, &name)?,
         (other, ..) => other,
     };
     let own = component.axis(context.machine).map(|axis| context.machine.axes[axis].kind);
     let checked = driver.kind().check_component(&component.to_string(), own);
     checked.map_err(|fault| Fault::new(fault.message, fault.help).at("driver"))?;
     Ok(driver)
+}
+
+/// The driver of a weight at an axis, which the axis of the component has to carry.
+fn weight_at(context: &Context<'_>, component: &Component, text: &str, name: &str) -> Result<Driver, Fault> {
+    let machine = context.machine;
+    let Some(loaded) = quantity::axis_index(machine, name) else {
+        let (message, help) = quantity::no_axis(machine, name);
+        return Err(Fault::new(format!("effect driven by \"{text}\": {message}"), help).at("driver"));
+    };
+    match component.axis(machine) {
+        Some(axis) if !machine.carries(axis, loaded) => {
+            let (axis, loaded) = (&machine.axes[axis].name, &machine.axes[loaded].name);
+            let message = format!("effect driven by \"{text}\": axis {axis} does not carry axis {loaded}");
+            Err(Fault::new(message, format!("name an axis that {axis} carries, or \"gravity\"")).at("driver"))
+        }
+        _ => Ok(Driver::GravityAt(machine.axes[loaded].name.clone())),
+    }
 }
 
 /// The tests in which an effect acts. A test that its data split by socket stands for all its parts.
