@@ -1,5 +1,5 @@
 //! The shapes of a family for a component and a driver, as far as the session samples them. A family names a shape of
-//! the registry, or one of the two choices here, which combine a shape with tests or with other shapes.
+//! the registry, or one of the choices here, which combine a shape with tests or with other shapes.
 
 use abbe_model::axis::AxisKind;
 use abbe_model::driver::Driver;
@@ -18,6 +18,8 @@ const CONSTANT_PER_MOUNT: &str = "constant-per-mount";
 /// [`LOW_ORDER`].
 const HARMONIC_LOW: &str = "harmonic-low";
 const LOW_ORDER: usize = 2;
+/// The orders of gears of an axis about itself, for independent poses that read positions.
+const HARMONIC_OF_GEARS: &str = "harmonic-of-gears";
 /// A power of the driver.
 const POWER: &str = "power";
 
@@ -26,7 +28,7 @@ type Member = (Shape, Vec<String>, f64);
 
 /// Whether a family can have this shape.
 pub(super) fn is_known(word: &str) -> bool {
-    [CONSTANT_PER_MOUNT, HARMONIC_LOW].contains(&word) || Shape::entry_of(word).is_some()
+    [CONSTANT_PER_MOUNT, HARMONIC_LOW, HARMONIC_OF_GEARS].contains(&word) || Shape::entry_of(word).is_some()
 }
 
 /// Shapes of a family for a component and a driver.
@@ -40,6 +42,11 @@ pub(super) fn shapes(
     if family.shape == CONSTANT_PER_MOUNT {
         let mounts = mounts(problem, component).into_iter();
         return mounts.map(|tests| (Shape::Constant, tests, 0.0)).collect();
+    }
+    if family.shape == HARMONIC_OF_GEARS {
+        let is_robot = sampling.is_poses() && !sampling.reads_directions;
+        let orders = if is_robot { Harmonic::of_gears() } else { Vec::new() };
+        return orders.into_iter().map(|(shape, cost)| (shape, Vec::new(), cost)).collect();
     }
     let mut sampled = sampled(problem, sampling, component, driver);
     let members_of = |word: &str, sampled: &Sampled| {

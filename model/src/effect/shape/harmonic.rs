@@ -1,6 +1,7 @@
 //! `harmonic`: whole or broken cycles per revolution of a rotary axis: cos nq, sin nq.
 
 use std::f64::consts::TAU;
+use std::ops::RangeInclusive;
 
 use super::kind::{Basis, Entry, Follows, ShapeFault, ShapeKind, positive};
 use super::words::EffectWords;
@@ -19,6 +20,9 @@ pub struct Harmonic {
 const HIGHEST_ORDER: usize = 120;
 /// Highest order for poses, which sample an axis at random. An independent search found no significant order above it.
 const HIGHEST_ORDER_OF_POSES: usize = 40;
+
+/// Highest order of the error motion of an axis about itself, for poses.
+const HIGHEST_ORDER_OF_GEARS: usize = 200;
 
 pub(super) const ORDER: Key =
     Key { name: "order", form: KeyForm::Positive, meaning: "cycles per revolution of a harmonic" };
@@ -46,7 +50,17 @@ impl Harmonic {
     /// The members of the library up to an order. There are many high orders, and each single one is unlikely. The cost
     /// therefore grows as the logarithm of the order.
     pub fn up_to(most: usize) -> Vec<(Shape, f64)> {
-        let orders = (1..=most).map(|order| order as f64);
+        Harmonic::of_orders(1..=most)
+    }
+
+    /// The orders of gears about the axis itself, of poses: above those of the other error motions. The teeth of a strain
+    /// wave gear with a ratio of 100 come 100 or 200 times per turn.
+    pub fn of_gears() -> Vec<(Shape, f64)> {
+        Harmonic::of_orders(HIGHEST_ORDER_OF_POSES + 1..=HIGHEST_ORDER_OF_GEARS)
+    }
+
+    fn of_orders(orders: RangeInclusive<usize>) -> Vec<(Shape, f64)> {
+        let orders = orders.map(|order| order as f64);
         orders.map(|order| (Shape::Harmonic(Harmonic { order }), order.ln())).collect()
     }
 }
