@@ -30,6 +30,7 @@ pub mod oracle;
 pub mod plan;
 pub mod pose;
 pub mod recipe;
+pub mod robot;
 pub mod rtest;
 pub mod schedule;
 pub mod spindle;

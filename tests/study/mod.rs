@@ -19,5 +19,6 @@ mod gate;
 mod numbers;
 mod outside;
 mod pairs;
+mod robots;
 mod single;
 mod speed;
