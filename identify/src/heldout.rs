@@ -8,7 +8,7 @@
 
 pub(crate) mod figures;
 pub(crate) mod folds;
-mod joint_space;
+pub(crate) mod joint_space;
 pub(crate) mod left_out_test;
 pub(crate) mod paired;
 

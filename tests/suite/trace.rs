@@ -218,7 +218,7 @@ fn kuka_has_a_compliance_under_gravity_and_no_harmonics() {
         return;
     };
     let result = traced(&session, &TraceOptions::default());
-    assert!(result.effects.iter().any(|effect| effect.name.driver == "gravity"));
+    assert!(result.effects.iter().any(|effect| effect.name.driver.starts_with("gravity")));
     assert!(result.effects.iter().all(|effect| effect.name.shape != "harmonic"));
     let [extrapolation, interpolation] = held_out(&result);
     println!("KUKA with {} effects: {extrapolation:.4} mm, {interpolation:.4} mm", result.effects.len());

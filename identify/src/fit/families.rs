@@ -80,8 +80,6 @@ pub(crate) struct FoldEquations {
     folds: Vec<FoldRows>,
     /// Number of scalar readings.
     readings: f64,
-    /// Variance of a reading in units of the whitening, if it does not follow from the residual.
-    variance: Option<f64>,
     /// Index of each parameter among those of the problem.
     parameters: Vec<usize>,
     /// Size of each parameter.
@@ -181,7 +179,6 @@ impl FoldEquations {
             square += fold.y.squared_norm_l2();
         }
         let (prior, prior_projection) = fixed_prior(problem, beta, &families, &sizes, &present);
-        let noise = &problem.noise;
         FoldEquations {
             equations: NormalEquations {
                 gram,
@@ -193,7 +190,6 @@ impl FoldEquations {
             },
             folds,
             readings: readings.iter().sum(),
-            variance: (noise.source != NoiseSource::Residual).then_some(1.0 / noise.inflation),
             parameters: (0..count).collect(),
             sizes,
             origin,
@@ -212,21 +208,11 @@ impl FoldEquations {
     /// The same equations with some of the parameters only, in ascending order; the others stay at the point of the
     /// linearisation. Families without parameters are dropped.
     pub fn with_parameters(&self, present: &[usize]) -> FoldEquations {
-        let place = |j: &usize| present.binary_search(j).ok();
         let square =
             |matrix: &Mat<f64>| Mat::from_fn(present.len(), present.len(), |i, j| matrix[(present[i], present[j])]);
         let some = |values: &[f64]| -> Vec<f64> { present.iter().map(|j| values[*j]).collect() };
-        let own = &self.equations;
-        let families = own.families.iter().map(|family| family.iter().filter_map(place).collect::<Vec<usize>>());
         FoldEquations {
-            equations: NormalEquations {
-                gram: square(&own.gram),
-                projection: some(&own.projection),
-                square: own.square,
-                prior: square(&own.prior),
-                prior_projection: some(&own.prior_projection),
-                families: families.filter(|family| !family.is_empty()).collect(),
-            },
+            equations: self.equations_of(present),
             folds: (self.folds.iter())
                 .map(|fold| FoldRows {
                     rows: Mat::from_fn(fold.rows.nrows(), present.len(), |i, j| fold.rows[(i, present[j])]),
@@ -237,10 +223,48 @@ impl FoldEquations {
                 })
                 .collect(),
             readings: self.readings,
-            variance: self.variance,
             parameters: present.iter().map(|j| self.parameters[*j]).collect(),
             sizes: some(&self.sizes),
             origin: some(&self.origin),
+        }
+    }
+
+    /// The normal equations of some of the parameters only.
+    fn equations_of(&self, present: &[usize]) -> NormalEquations {
+        let place = |j: &usize| present.binary_search(j).ok();
+        let square =
+            |matrix: &Mat<f64>| Mat::from_fn(present.len(), present.len(), |i, j| matrix[(present[i], present[j])]);
+        let some = |values: &[f64]| -> Vec<f64> { present.iter().map(|j| values[*j]).collect() };
+        let own = &self.equations;
+        let families = own.families.iter().map(|family| family.iter().filter_map(place).collect::<Vec<usize>>());
+        NormalEquations {
+            gram: square(&own.gram),
+            projection: some(&own.projection),
+            square: own.square,
+            prior: square(&own.prior),
+            prior_projection: some(&own.prior_projection),
+            families: families.filter(|family| !family.is_empty()).collect(),
+        }
+    }
+
+    /// [`Scales::explained`] of the model of [`FoldEquations::at_present`] with some of the parameters only, without the
+    /// held-out folds. `self` has all parameters.
+    ///
+    /// # Errors
+    /// If the equations are not positive definite.
+    pub fn explained_at_present(&self, present: &[usize], problem: &Problem) -> Result<f64, IdentifyError> {
+        let equations = self.equations_of(present);
+        let own = |family: &Vec<usize>| present[family[0]];
+        let precisions: Vec<f64> =
+            equations.families.iter().map(|family| self.precision(own(family), problem)).collect();
+        Ok(equations.posterior(1.0, &precisions)?.explained)
+    }
+
+    /// The present precision of the family of a parameter.
+    fn precision(&self, parameter: usize, problem: &Problem) -> f64 {
+        match problem.parameters.list[self.parameters[parameter]].prior {
+            Prior::Gaussian(scale) => (self.sizes[parameter] / scale).powi(2),
+            Prior::Free | Prior::Known => START_PRECISION,
         }
     }
 
@@ -259,13 +283,8 @@ impl FoldEquations {
     /// # Errors
     /// If the equations are not positive definite.
     pub fn at_present(&self, problem: &Problem) -> Result<Scales, IdentifyError> {
-        let families = families(&problem.parameters);
-        let precision =
-            |(family, own): (&Family, &Vec<usize>)| match problem.parameters.list[family.parameters[0]].prior {
-                Prior::Gaussian(scale) => (self.sizes[own[0]] / scale).powi(2),
-                Prior::Free | Prior::Known => START_PRECISION,
-            };
-        let precisions: Vec<f64> = families.iter().zip(&self.equations.families).map(precision).collect();
+        let precision = |own: &Vec<usize>| self.precision(own[0], problem);
+        let precisions: Vec<f64> = self.equations.families.iter().map(precision).collect();
         // Rows whitened with the present noise have the unit variance.
         self.model(precisions, 1.0 / problem.noise.inflation, problem.noise.inflation)
     }
@@ -297,8 +316,7 @@ impl FoldEquations {
     /// If the equations are not positive definite.
     pub fn with_effect(&self, least: f64) -> Result<Vec<usize>, IdentifyError> {
         let start = vec![WIDE_PRECISION; self.equations.families.len()];
-        let variance = FIRST_INFLATION * self.variance.unwrap_or(1.0);
-        let posterior = self.equations.posterior(variance, &start)?;
+        let posterior = self.equations.posterior(FIRST_INFLATION, &start)?;
         let families = posterior.effective.iter().enumerate();
         Ok(families.filter(|(_, effective)| **effective >= least).map(|(family, _)| family).collect())
     }
@@ -335,10 +353,13 @@ impl FoldEquations {
             }
         }
         let noise = &mut problem.noise;
-        if self.variance.is_none() {
-            noise.sigma_mm = noise.likelihood_mm() * scales.variance.sqrt();
+        let sigma_mm = noise.likelihood_mm() * scales.variance.sqrt();
+        if noise.source == NoiseSource::Residual {
+            noise.sigma_mm = sigma_mm;
+            noise.inflation = scales.inflation;
+        } else {
+            noise.inflation = (scales.inflation * (sigma_mm / noise.sigma_mm).powi(2)).max(1.0);
         }
-        noise.inflation = scales.inflation;
     }
 }
 

@@ -194,7 +194,7 @@ fn finish(problem: &Problem, minimum: Minimum) -> Result<Fit, IdentifyError> {
     let p_value = residual_tail(chi_square, free, freedom_of_noise(problem, &residuals));
     let birge_ratio = (chi_square / free).sqrt();
     let aliases = aliases::at_solution(problem, &beta)?;
-    Ok(Fit {
+    let mut fit = Fit {
         beta,
         rank,
         covariance,
@@ -205,10 +205,22 @@ fn finish(problem: &Problem, minimum: Minimum) -> Result<Fit, IdentifyError> {
         degrees_of_freedom,
         birge_ratio,
         p_value,
-        u_enlargement: if p_value < BIRGE_SIGNIFICANCE { birge_ratio.max(1.0) } else { 1.0 },
+        u_enlargement: 1.0,
         aliases,
         intervals: Vec::new(),
-    })
+    };
+    if fit.exceeds_noise() {
+        // The inflation of the likelihood enlarges the uncertainties already.
+        fit.u_enlargement = (birge_ratio / problem.noise.inflation.sqrt()).max(1.0);
+    }
+    Ok(fit)
+}
+
+impl Fit {
+    /// Whether the residual exceeds the noise significantly.
+    pub(crate) fn exceeds_noise(&self) -> bool {
+        self.p_value < BIRGE_SIGNIFICANCE && self.birge_ratio > 1.0
+    }
 }
 
 /// Degrees of freedom of a noise that follows from repeats; `None` for a noise that is known.

@@ -27,7 +27,7 @@ pub(crate) fn goodness(problem: &Problem, fit: &Fit) -> Goodness {
     let judged = problem.noise.source.judges();
     let verdict = if !judged {
         GoodnessVerdict::NotJudged
-    } else if fit.u_enlargement > 1.0 {
+    } else if fit.exceeds_noise() {
         GoodnessVerdict::Exceeds
     } else if chi_square_ratio < MIN_RATIO {
         GoodnessVerdict::NoiseOverstated

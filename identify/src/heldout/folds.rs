@@ -59,6 +59,9 @@ pub struct Folds {
     pub of_row: Vec<Vec<usize>>,
     /// For blocks of joint space, the random folds that test interpolation.
     pub interpolation: Option<Box<Folds>>,
+    /// The pose of each row of each test. Rows at the same axis positions are one pose, as those of several targets on one
+    /// flange. Empty along runs.
+    pub pose_of_row: Vec<Vec<usize>>,
 }
 
 const BLOCKS_PER_TEST: usize = 5;
@@ -113,7 +116,7 @@ impl Folds {
                 rows
             })
             .collect();
-        Folds { kind, count, of_row, interpolation: None }
+        Folds { kind, count, of_row, interpolation: None, pose_of_row: Vec::new() }
     }
 
     /// One fold for each test.
@@ -123,21 +126,29 @@ impl Folds {
             count: models.len(),
             of_row: models.iter().enumerate().map(|(test, model)| vec![test; model.rows()]).collect(),
             interpolation: None,
+            pose_of_row: Vec::new(),
         }
     }
 
     /// The folds of independent poses.
     fn of_poses(machine: &Machine, readings: &[&Readings], seed: u64) -> Folds {
         let total: usize = readings.iter().map(|r| r.rows()).sum();
-        let mut order: Vec<usize> = (0..total).collect();
+        let poses = joint_space::poses(readings);
+        let distinct = poses.iter().max().map_or(0, |last| last + 1);
+        // Too few poses for folds of their own: repeated readings of a pose are in several folds.
+        let units = if distinct < RANDOM_FOLDS { (0..total).collect() } else { poses.clone() };
+        let mut order: Vec<usize> = (0..units.iter().max().map_or(0, |last| last + 1)).collect();
         order.shuffle(&mut rand_pcg::Pcg64::seed_from_u64(seed));
-        let mut fold_of = vec![0; total];
-        for (place, row) in order.into_iter().enumerate() {
-            fold_of[row] = place % RANDOM_FOLDS;
+        let mut fold_of_unit = vec![0; order.len()];
+        for (place, unit) in order.into_iter().enumerate() {
+            fold_of_unit[unit] = place % RANDOM_FOLDS;
         }
-        let random = Folds::over_tests(FoldKind::RandomPoses, readings, &fold_of);
+        let fold_of: Vec<usize> = units.into_iter().map(|unit| fold_of_unit[unit]).collect();
+        let pose_of_row = by_test(readings, &poses);
+        let random = Folds { pose_of_row, ..Folds::over_tests(FoldKind::RandomPoses, readings, &fold_of) };
         match joint_space::blocks(machine, readings, seed) {
             Some(blocks) => Folds {
+                pose_of_row: random.pose_of_row.clone(),
                 interpolation: Some(Box::new(random)),
                 ..Folds::over_tests(FoldKind::PoseBlocks, readings, &blocks)
             },
@@ -147,16 +158,19 @@ impl Folds {
 
     /// The folds of the rows of all tests, one test after the other.
     fn over_tests(kind: FoldKind, readings: &[&Readings], fold_of: &[usize]) -> Folds {
-        let mut rest = fold_of;
-        let of_test = |r: &&Readings| {
-            let (rows, others) = rest.split_at(r.rows());
-            rest = others;
-            rows.to_vec()
-        };
-        let of_row = readings.iter().map(of_test).collect();
         let count = fold_of.iter().max().map_or(1, |last| last + 1);
-        Folds { kind, count, of_row, interpolation: None }
+        Folds { kind, count, of_row: by_test(readings, fold_of), interpolation: None, pose_of_row: Vec::new() }
     }
+}
+
+/// The values of the rows of all tests, one test after the other, divided by test.
+fn by_test(readings: &[&Readings], mut values: &[usize]) -> Vec<Vec<usize>> {
+    let of_test = |r: &&Readings| {
+        let (rows, others) = values.split_at(r.rows());
+        values = others;
+        rows.to_vec()
+    };
+    readings.iter().map(of_test).collect()
 }
 
 /// Mean number of readings below which runs with recurring numbers are no traversals.

@@ -8,6 +8,8 @@
 //! minimises the sum of squared distances to the centres. Its start is k-means++ (D. Arthur, S. Vassilvitskii,
 //! k-means++: the advantages of careful seeding, SODA 2007, 1027–1035). Of several seeded starts the best result holds.
 
+use std::collections::HashMap;
+
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::session::readings::Readings;
@@ -30,7 +32,8 @@ const MAX_SAMPLE: usize = 4000;
 /// all have the same axis positions.
 pub(super) fn blocks(machine: &Machine, readings: &[&Readings], seed: u64) -> Option<Vec<usize>> {
     let points = coordinates(machine, readings);
-    let count = BLOCKS.min(points.len() / POSES_PER_BLOCK);
+    let distinct = poses(readings).into_iter().max().map_or(0, |last| last + 1);
+    let count = BLOCKS.min(distinct / POSES_PER_BLOCK);
     if count < 2 {
         return None;
     }
@@ -55,10 +58,27 @@ pub(super) fn blocks(machine: &Machine, readings: &[&Readings], seed: u64) -> Op
 }
 
 /// The coordinates of a pose.
-type Point = Vec<f64>;
+pub(crate) type Point = Vec<f64>;
 
-/// The coordinates of every pose.
-fn coordinates(machine: &Machine, readings: &[&Readings]) -> Vec<Point> {
+/// The pose of each row, over all tests, numbered in the order of their first rows: rows at the same axis positions are one
+/// pose.
+pub(super) fn poses(readings: &[&Readings]) -> Vec<usize> {
+    /// Steps per millimetre or radian below which positions are the same.
+    const STEPS: f64 = 1e7;
+    let mut numbers: HashMap<Vec<i64>, usize> = HashMap::new();
+    let key = |r: &Readings, row: usize| r.positions.iter().map(|axis| (axis[row] * STEPS).round() as i64).collect();
+    let mut of_row = Vec::new();
+    for r in readings {
+        for row in 0..r.rows() {
+            let next = numbers.len();
+            of_row.push(*numbers.entry(key(r, row)).or_insert(next));
+        }
+    }
+    of_row
+}
+
+/// The coordinates of every row.
+pub(crate) fn coordinates(machine: &Machine, readings: &[&Readings]) -> Vec<Point> {
     let mut points = vec![Point::new(); readings.iter().map(|r| r.rows()).sum()];
     for (number, axis) in machine.axes.iter().enumerate() {
         let positions = || readings.iter().flat_map(move |r| r.positions[number].iter().copied());
@@ -75,7 +95,7 @@ fn coordinates(machine: &Machine, readings: &[&Readings]) -> Vec<Point> {
     points
 }
 
-fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum()
 }
 
@@ -170,6 +190,14 @@ mod tests {
             let blocks = numbered(points.iter().map(|point| nearest(point, &centres).0));
             assert_eq!(blocks, [0, 1, 2].repeat(4));
         }
+    }
+
+    /// Two tests that hold the same three poses, as two targets on one flange do, have three poses.
+    #[test]
+    fn rows_of_two_targets_at_the_same_positions_are_one_pose() {
+        let axis = |q: [f64; 3]| Readings { positions: vec![q.to_vec()], ..Readings::default() };
+        let (first, second) = (axis([0.1, 0.2, 0.3]), axis([0.3, 0.1, 0.2]));
+        assert_eq!(poses(&[&first, &second]), [0, 1, 2, 2, 0, 1]);
     }
 
     #[test]

@@ -13,6 +13,8 @@ pub const MIN_EFFECTIVE: f64 = 1.0;
 pub const MIN_EFFECTIVE_OF_MEMBER: f64 = 0.5;
 /// Single effects whose held-out error is computed beside the families, in each round.
 pub const LINES_TRIED: usize = 8;
+/// Single effects that may take the place of the spectra of all joints. More of them would be a curve in pieces.
+pub const MAX_IN_PLACE_OF_FAMILIES: usize = 8;
 /// Relative difference of scores below which two candidates count as equivalent.
 pub const EQUIVALENT: f64 = 1e-6;
 /// Least detectability of a searched effect. An effect of the largest plausible size has to change the readings by this

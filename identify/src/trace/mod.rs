@@ -14,21 +14,21 @@
 
 pub mod alias;
 mod constants;
-mod families;
 mod implausible;
 pub mod interrupt;
 mod judge;
 mod moves;
+mod neighbours;
 pub(crate) mod noise_model;
 mod null;
 mod plausible;
 mod policy;
+mod poses;
 mod progress;
 mod remainder;
 pub mod result;
 pub mod screening;
 mod search;
-mod single_effects;
 mod start;
 mod state;
 
@@ -47,14 +47,14 @@ use crate::problem::Problem;
 use crate::results::TraceResult;
 use crate::tolerance::conformity;
 use constants::{BLOCK, MAX_AT_THE_SAME_TIME, SINGLE};
-use families::AcceptedFamilies;
 use implausible::Contradicted;
 use interrupt::Interrupt;
 use judge::RefittedModel;
 use noise_model::estimate_noise_model;
 use policy::{Policy, SIGNIFICANCE};
 pub use progress::Progress;
-use result::FamiliesEnded;
+use remainder::Structure;
+use result::PosesEnded;
 use search::{SearchRecord, search_and_refit};
 use start::Start;
 use state::SearchState;
@@ -290,9 +290,19 @@ fn trace_or_interrupted(
         ..policy
     };
     if policy.families
-        && let Some(found) = families::accepted(problem, before_fit, options, policy.max_effects, interrupt)?
+        && let Some(found) = poses::search(problem, before_fit, options, policy, interrupt)?
     {
-        return with_accepted_families((problem, before_fit), found, options, policy, interrupt);
+        progress(Progress::Judging);
+        let structure = |problem: &Problem, fit: &Fit| match found.interrupted {
+            true => Ok(None),
+            false => structure_of_poses(problem, fit, options),
+        };
+        let ended = PosesEnded {
+            stopped_early: found.model.effects.len() >= policy.max_effects,
+            structures: [structure(problem, before_fit)?, structure(&found.model.problem, &found.model.fit)?],
+            warnings: screening::unused_exclusions(problem, options)?,
+        };
+        return result::outcome_of_poses(problem, before_fit, found, ended);
     }
     let columns = Columns::new(problem, &before_fit.beta);
     let start = Start::of(problem, &columns, before_fit)?;
@@ -359,6 +369,10 @@ fn trace_or_interrupted(
     };
     let RefittedModel { after, after_fit, structure: structure_after, .. } = judged;
     search.tune_aliases()?;
+    let [structure_before, structure_after] = match policy.tests_structure || interrupted {
+        true => [structure_before.cloned(), structure_after],
+        false => [structure_of_poses(problem, before_fit, options)?, structure_of_poses(&after, &after_fit, options)?],
+    };
     let mut reported = result::report(&result::TraceFindings {
         before: problem,
         before_fit,
@@ -367,7 +381,7 @@ fn trace_or_interrupted(
         search: &search,
         assume: &options.assume,
         seed: options.seed,
-        structure_before,
+        structure_before: structure_before.as_ref(),
         structure_after: structure_after.as_ref(),
         last_p_value: ended.unwrap_or(1.0),
         stopped_early: ended.is_none() || search.selected().len() >= policy.max_effects,
@@ -392,33 +406,20 @@ fn trace_or_interrupted(
     })
 }
 
-/// Adds single effects to accepted families, and reports.
-fn with_accepted_families(
-    (problem, fit): (&Problem, &Fit),
-    mut found: AcceptedFamilies,
+/// The structure in the residual of a fit to independent poses; `None` if there are too few for the test.
+///
+/// # Errors
+/// If the model cannot be evaluated.
+fn structure_of_poses(
+    problem: &Problem,
+    fit: &Fit,
     options: &TraceOptions,
-    policy: Policy,
-    interrupt: Interrupt<'_>,
-) -> Result<TraceOutcome, IdentifyError> {
-    for (k, accepted) in found.effects.iter().enumerate() {
-        let held_out_um = accepted.heldout_rms_mm * 1e3;
-        (interrupt.0)(Progress::SelectedEffect(k + 1, accepted.effect.id(), held_out_um, problem.unit()));
-    }
-    let lines = match single_effects::add((problem, fit), &mut found, options, policy.max_effects, interrupt) {
-        Err(IdentifyError::Interrupted) => None,
-        ended => Some(ended?),
-    };
-    let ended = FamiliesEnded {
-        families: found.proposed,
-        candidates: lines.as_ref().map_or(0, |lines| lines.candidates),
-        detectable: lines.as_ref().map_or(0, |lines| lines.detectable),
-        last_p_value: lines.as_ref().map_or(1.0, |lines| lines.last_p_value),
-        stopped_early: found.effects.len() >= policy.max_effects,
-        interrupted: lines.is_none(),
-        warnings: screening::unused_exclusions(problem, options)?,
-    };
-    (interrupt.0)(Progress::Judging);
-    result::outcome_with_families(problem, fit, found, ended)
+) -> Result<Option<Structure>, IdentifyError> {
+    let columns = Columns::new(problem, &fit.beta);
+    let start = Start::of(problem, &columns, fit)?;
+    let (count, seed) = (null_draw_count(options), options.seed.wrapping_add(2));
+    let draws = null::draws(problem, &columns, &fit.residuals, &start.residual, count, SINGLE, seed);
+    Ok(neighbours::structure(problem, &columns, start.model.as_ref().as_ref(), &start.residual, draws))
 }
 
 /// Null draws from one message of progress to the next.

@@ -39,8 +39,10 @@ pub fn draws<'d>(
 ) -> impl ExactSizeIterator<Item = Vec<f64>> + use<'d> {
     let mut generator = Pcg64::seed_from_u64(seed ^ 0x6e75_6c6c);
     let mut draw: Box<dyn FnMut() -> Vec<f64> + 'd> = if Policy::of(problem).null == NullSource::SignFlips {
-        let origins = columns.origin_of_rows();
-        Box::new(move || sign_flipped(&origins, whitened, &mut generator))
+        let pose_of_row = &problem.folds.pose_of_row;
+        let poses: Vec<usize> =
+            columns.origin_of_rows().into_iter().map(|(test, row, _)| pose_of_row[test][row]).collect();
+        Box::new(move || sign_flipped(&poses, whitened, &mut generator))
     } else {
         let source = NoiseDraws::of(problem, residuals);
         Box::new(move || columns.placed(&source.draw(columns.rows(), block, &mut generator)))
@@ -48,13 +50,12 @@ pub fn draws<'d>(
     (0..count).map(move |_| draw())
 }
 
-/// The residual with a random sign for each pose. `origins` are the test, row and coordinate of each value.
-fn sign_flipped(origins: &[(usize, usize, usize)], whitened: &[f64], generator: &mut Pcg64) -> Vec<f64> {
-    let mut signs: HashMap<(usize, usize), f64> = HashMap::new();
-    let flipped = |((test, row, _), value): (&(usize, usize, usize), &f64)| {
-        *signs.entry((*test, *row)).or_insert_with(|| sign(generator)) * value
-    };
-    origins.iter().zip(whitened).map(flipped).collect()
+/// The residual with a random sign for each pose. `poses` are the poses of the values: the readings of several targets at
+/// one pose have one sign.
+fn sign_flipped(poses: &[usize], whitened: &[f64], generator: &mut Pcg64) -> Vec<f64> {
+    let mut signs: HashMap<usize, f64> = HashMap::new();
+    let flipped = |(pose, value): (&usize, &f64)| *signs.entry(*pose).or_insert_with(|| sign(generator)) * value;
+    poses.iter().zip(whitened).map(flipped).collect()
 }
 
 fn sign(generator: &mut Pcg64) -> f64 {

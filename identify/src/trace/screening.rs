@@ -5,6 +5,7 @@ use abbe_model::effect::Effect;
 use abbe_model::session::Session;
 
 use super::TraceOptions;
+use super::poses::proposed_ids;
 use super::start::Start;
 use crate::candidates::candidate::Candidate;
 use crate::candidates::columns::{Columns, EffectColumns};
@@ -82,7 +83,11 @@ pub(super) fn searched_candidates(
 /// A warning for each exclusion that matches no candidate.
 pub(super) fn unused_exclusions(problem: &Problem, options: &TraceOptions) -> Result<Vec<String>, IdentifyError> {
     let candidates = library::candidates(problem)?;
+    let is_of_poses = problem.folds.kind.is_poses();
+    let families = if is_of_poses { proposed_ids(problem) } else { Vec::new() };
+    let in_families = |text: &&String| families.iter().any(|id| id.contains(text.as_str()));
     Ok(matching_no_candidate(&candidates, &options.exclude)
+        .filter(|text| !in_families(text))
         .map(|text| format!("`{text}` excludes nothing: no candidate of this session has it in its identifier"))
         .collect())
 }

@@ -44,8 +44,9 @@ impl Columns<'_> {
         self.blocks.iter().flat_map(|block| self.counting(block).into_iter().map(move |i| fold(block, i))).collect()
     }
 
-    /// The independent units over which held-out errors are paired. Along runs they are the folds (runs or blocks). Among poses they are the blocks of joint space, because one fit predicts a
-    /// whole block, or the poses if folds are random. The rows are those of [`Columns::unwhitened_model_rows`].
+    /// The independent units over which held-out errors are paired. Along runs they are the folds (runs or blocks). Among
+    /// poses they are the blocks of joint space, because one fit predicts a whole block, or the poses if folds are random.
+    /// The rows are those of [`Columns::unwhitened_model_rows`].
     pub fn unwhitened_units(&self) -> Units {
         let rows = self.blocks.iter().flat_map(|block| {
             let channels = self.problem.channels(block.test);
@@ -54,7 +55,7 @@ impl Columns<'_> {
         });
         let fold = |test: usize, row: usize| self.problem.folds.of_row[test][row];
         match self.problem.folds.kind {
-            FoldKind::RandomPoses => Units::of(rows),
+            FoldKind::RandomPoses => Units::of(rows.map(|(test, row)| self.problem.folds.pose_of_row[test][row])),
             FoldKind::PoseBlocks | FoldKind::Runs | FoldKind::RunGroups | FoldKind::Blocks => {
                 Units::of(rows.map(|(test, row)| fold(test, row))).divided()
             }

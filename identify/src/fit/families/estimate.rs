@@ -58,13 +58,13 @@ impl FoldEquations {
 
     /// Scales and noise for an inflation, and the calibration of the held-out folds.
     fn at(&self, inflation: f64, start: &[f64]) -> Result<(Scales, f64), IdentifyError> {
-        let (mut precisions, mut variance) = (start.to_vec(), self.variance.unwrap_or(1.0));
+        let (mut precisions, mut variance) = (start.to_vec(), 1.0);
         let mut rounds = 0;
         let posterior = loop {
             let posterior;
             (precisions, posterior) = self.equations.maximise(inflation * variance, &precisions)?;
             let freedom = (self.readings - posterior.effective_total).max(1.0);
-            let next = self.variance.unwrap_or(posterior.residual_square / freedom).max(f64::MIN_POSITIVE);
+            let next = (posterior.residual_square / freedom).max(f64::MIN_POSITIVE);
             let change = (next / variance - 1.0).abs();
             rounds += 1;
             if change < SETTLED || rounds == MAX_ROUNDS {

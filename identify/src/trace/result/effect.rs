@@ -65,34 +65,49 @@ pub(super) fn result(
     let taken = search.selected()[found.number];
     let candidate = &search.candidates[found.candidate];
     let number = found.number + findings.before.parameters.effects.len();
-    let machine = &after.session.machine;
-    let alike = std::iter::once(&candidate.effect).chain(found.alias_effects);
+    let described = described(after, found.after_fit, number, found.parameters);
+    let aliases: Vec<&Effect> = found.alias_effects.iter().collect();
+    EffectResult {
+        family: families.get(candidate.family).map(|family| family.name.clone()).unwrap_or_default(),
+        p_value: taken.p_value,
+        rms_gain_um: found.rms_gain_um,
+        heldout_rms_um: held_out.um(found.number + 1),
+        left_out_test_rms_um: found.predicted.found_um,
+        aliases_left_out_test_rms_um: match found.predicted.found_um {
+            Some(_) => found.predicted.aliases_um.clone(),
+            None => Vec::new(),
+        },
+        ..explained_by(described, after, &candidate.effect, &aliases, found.costs)
+    }
+}
+
+/// The result of an effect with its aliases. `costs` are the increases of χ² and of the prior cost by each of these in its
+/// place.
+pub(super) fn explained_by(
+    of_effect: EffectResult,
+    problem: &Problem,
+    effect: &Effect,
+    aliases: &[&Effect],
+    costs: &[[f64; 2]],
+) -> EffectResult {
+    let machine = &problem.session.machine;
+    let alike = std::iter::once(effect).chain(aliases.iter().copied());
     let meanings: Vec<_> = alike.map(|effect| meaning(machine, effect)).collect();
     let ratio = |logarithm: f64| logarithm.min(LARGEST_EXPONENT).exp();
-    let alias = |(effect, [delta_chi2, prior_cost]): (&Effect, &[f64; 2])| AliasResult {
+    let alias = |(effect, [delta_chi2, prior_cost]): (&&Effect, &[f64; 2])| AliasResult {
         name: effect_name(machine, effect),
-        shape_parameters: shape_parameters_of(after, effect),
+        shape_parameters: shape_parameters_of(problem, effect),
         delta_chi2: *delta_chi2,
         likelihood_ratio: ratio(-0.5 * delta_chi2),
         prior_cost: *prior_cost,
         probability_ratio: ratio(-0.5 * delta_chi2 - prior_cost),
     };
     EffectResult {
-        reading_unit: after.unit(),
-        family: families.get(candidate.family).map(|family| family.name.clone()).unwrap_or_default(),
-        p_value: taken.p_value,
-        rms_gain_um: found.rms_gain_um,
-        heldout_rms_um: held_out.um(found.number + 1),
-        unique: found.alias_effects.is_empty(),
+        unique: aliases.is_empty(),
         explanation_count: meanings.len(),
         explanations: explanations(&meanings),
-        aliases: found.alias_effects.iter().zip(found.costs).map(alias).collect(),
-        left_out_test_rms_um: found.predicted.found_um,
-        aliases_left_out_test_rms_um: match found.predicted.found_um {
-            Some(_) => found.predicted.aliases_um.clone(),
-            None => Vec::new(),
-        },
-        ..described(after, found.after_fit, number, found.parameters)
+        aliases: aliases.iter().zip(costs).map(alias).collect(),
+        ..of_effect
     }
 }
 

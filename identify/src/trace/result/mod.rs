@@ -2,7 +2,7 @@
 
 mod curve;
 mod effect;
-mod families;
+mod poses;
 mod prediction;
 mod rejected;
 mod unsearched;
@@ -24,7 +24,7 @@ use crate::plausibility::Plausibility;
 use crate::problem::Problem;
 use crate::results::{ChangedParameter, EffectResult, ModelResult, OfAngles, ParameterResult, TraceResult};
 pub use effect::effect_name;
-pub(super) use families::{FamiliesEnded, outcome_with_families};
+pub(super) use poses::{PosesEnded, outcome_of_poses};
 pub(super) use unsearched::unsearched;
 use verdict::{not_examined, verdict};
 
@@ -136,15 +136,7 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
         after: after_result,
         effects,
         remainder,
-        residual_before: match findings.structure_before {
-            Some(structure) if structure.is_significant() => structure.description.clone(),
-            // Detectors examine one test at a time; the search sums the evidence of all tests for one effect.
-            Some(_) if !search.selected().is_empty() => {
-                "structure that no single test shows beyond noise; the search over all tests finds it".to_string()
-            }
-            Some(_) => "no structure beyond noise".to_string(),
-            None => "independent poses: structure is looked for effect by effect".to_string(),
-        },
+        residual_before: residual_before(before, findings.structure_before, !search.selected().is_empty()),
         rejected_candidates: rejected::candidates(&before.session.machine, search, &held_out),
         changed_parameters,
         candidates: findings.candidates,
@@ -162,6 +154,19 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
     }
     let (after, after_fit) = (after.clone(), after_fit.clone());
     Ok(ReportedEffect { after, after_fit, result, alias_effects, competing_effects })
+}
+
+/// The structure of the residual of the declared model, in words.
+fn residual_before(before: &Problem, structure: Option<&Structure>, found: bool) -> String {
+    let words = match structure {
+        Some(structure) if structure.is_significant() => return structure.description.clone(),
+        Some(_) if before.folds.kind.is_poses() => "neighbouring poses do not deviate alike",
+        // Detectors examine one test at a time; the search sums the evidence of all tests for one effect.
+        Some(_) if found => "structure that no single test shows beyond noise; the search over all tests finds it",
+        Some(_) => "no structure beyond noise",
+        None => "not tested: too few poses",
+    };
+    words.to_string()
 }
 
 /// Held-out errors in µm. The held-out error of the declared model converts whitened sums of squares to µm.

@@ -3,27 +3,48 @@
 use super::TraceFindings;
 use crate::results::{Remainder, TraceVerdict};
 use crate::trace::constants::EXPLAINED_SHARE;
+use crate::trace::remainder::Structure;
 
 /// The verdict of the search, and the residual of the model with the found effects, if it has found any.
 pub(super) fn verdict(findings: &TraceFindings<'_>, found: bool) -> (TraceVerdict, Remainder) {
     if findings.interrupted {
         return (TraceVerdict::Incomplete, not_examined());
     }
+    if !findings.search.policy.tests_structure {
+        return of_poses(found, findings.stopped_early, findings.structure_after, findings.last_p_value);
+    }
     let Some(after) = findings.structure_after else {
-        let word = match (found, findings.stopped_early) {
-            (false, _) => TraceVerdict::Clean,
-            (true, false) => TraceVerdict::Explained,
-            (true, true) => TraceVerdict::PartlyExplained,
-        };
-        let remainder = Remainder { structured: false, p_value: findings.last_p_value, place: None };
-        return (word, remainder);
+        return (TraceVerdict::Incomplete, not_examined());
     };
-    let structured = after.is_significant();
-    let remainder =
-        Remainder { structured, p_value: after.p_value, place: structured.then(|| after.description.clone()) };
+    let remainder = remainder(after);
+    let structured = remainder.structured;
     let before = findings.structure_before.map_or(0.0, |structure| structure.excess);
     let share = if before > 0.0 { after.excess / before } else { 0.0 };
     let word = word(found, structured, share);
+    (word, remainder)
+}
+
+fn remainder(structure: &Structure) -> Remainder {
+    let structured = structure.is_significant();
+    Remainder { structured, p_value: structure.p_value, place: structured.then(|| structure.description.clone()) }
+}
+
+/// The verdict of a search on independent poses. `structure` is that of the residual of the last model, `None` if there are
+/// too few poses to test it; `last_p_value` is that of the best effect that was not added.
+pub(super) fn of_poses(
+    found: bool,
+    stopped_early: bool,
+    structure: Option<&Structure>,
+    last_p_value: f64,
+) -> (TraceVerdict, Remainder) {
+    let untested = Remainder { structured: false, p_value: last_p_value, place: None };
+    let remainder = structure.map_or(untested, remainder);
+    let word = match (found, remainder.structured) {
+        (false, false) => TraceVerdict::Clean,
+        (false, true) => TraceVerdict::Unexplained,
+        (true, false) if !stopped_early => TraceVerdict::Explained,
+        (true, _) => TraceVerdict::PartlyExplained,
+    };
     (word, remainder)
 }
 

@@ -1,4 +1,4 @@
-//! The first stage of a search on independent poses: families of effects under one prior, each accepted as a whole.
+//! Families of effects under one prior, each group accepted as a whole.
 //!
 //! Choosing single orders out of a smooth error of a joint finds those that fit the poses at hand. A family takes all
 //! orders with a prior whose scale is estimated, so that the prior takes over where no pose determines the error. Two
@@ -11,43 +11,20 @@ use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::driver::Driver;
 use abbe_model::effect::shape::{Power, Spectrum};
 use abbe_model::effect::{CoefficientPrior, Component, Effect, Shape};
+use abbe_model::sensitivity::TestModel;
 
-use super::TraceOptions;
-use super::constants::{HIGHEST_ORDER_OF_SPECTRA, MIN_EFFECTIVE, MIN_EFFECTIVE_OF_MEMBER};
-use super::interrupt::Interrupt;
-use super::policy::has_few_poses;
-use super::screening::is_requested;
+use super::{AcceptedEffect, PoseModel};
 use crate::candidates::sampling::Sampling;
 use crate::error::IdentifyError;
 use crate::fit::families::{FoldEquations, Scales, families};
-use crate::fit::{Fit, with_families};
+use crate::fit::with_families;
 use crate::heldout::paired::HeldOutDecrease;
 use crate::problem::Problem;
-
-/// The families that a search accepted, with the fitted model that contains them.
-pub(super) struct AcceptedFamilies {
-    /// The problem with their effects.
-    pub problem: Problem,
-    /// Its fit.
-    pub fit: Fit,
-    /// The effects, in the order of the parameters.
-    pub effects: Vec<AcceptedEffect>,
-    /// Number of effects in the proposed groups.
-    pub proposed: usize,
-}
-
-/// An effect of an accepted family.
-#[derive(Clone, Debug)]
-pub(super) struct AcceptedEffect {
-    pub effect: Effect,
-    /// What its group is, in words.
-    pub group: String,
-    /// Of a family: probability of at least the decrease of the held-out error by its group, if the group has no effect.
-    /// Of a single effect: probability of a gain as large among all candidates, with the inflated noise.
-    pub p_value: f64,
-    /// Held-out rms with its group and those before it, mm.
-    pub heldout_rms_mm: f64,
-}
+use crate::trace::TraceOptions;
+use crate::trace::constants::{HIGHEST_ORDER_OF_SPECTRA, MIN_EFFECTIVE, MIN_EFFECTIVE_OF_MEMBER};
+use crate::trace::interrupt::Interrupt;
+use crate::trace::policy::has_few_poses;
+use crate::trace::screening::is_requested;
 
 /// A group of families that is accepted as a whole.
 struct Group {
@@ -55,8 +32,21 @@ struct Group {
     effects: Vec<Effect>,
 }
 
-/// The groups for a problem.
-fn groups(problem: &Problem, options: &TraceOptions, most: usize) -> Vec<Group> {
+/// The name of the group of the spectra.
+const SPECTRA: &str = "angular positioning errors of all joints, all orders";
+
+/// The identifiers of all effects that the search proposes in groups for a problem.
+pub(in crate::trace) fn proposed_ids(problem: &Problem) -> Vec<String> {
+    [true, false]
+        .iter()
+        .flat_map(|spectra| all(problem, *spectra))
+        .flat_map(|group| group.effects)
+        .map(|effect| effect.id())
+        .collect()
+}
+
+/// All groups for a problem.
+fn all(problem: &Problem, spectra: bool) -> Vec<Group> {
     let machine = &problem.session.machine;
     let sampling = Sampling::of(problem);
     let rotary = |axis: &usize| machine.axes[*axis].kind == AxisKind::Rotary;
@@ -76,22 +66,61 @@ fn groups(problem: &Problem, options: &TraceOptions, most: usize) -> Vec<Group> 
     };
     let joints: Vec<usize> = (0..machine.axes.len()).filter(rotary).collect();
     let moving = joints.iter().copied().filter(|axis| sampling.moves[*axis]);
-    let spectra = if has_few_poses(problem) { Vec::new() } else { moving.map(spectrum).collect() };
-    let groups = [
-        Group { name: "angular positioning errors of all joints, all orders", effects: spectra },
+    let spectra: Vec<Effect> =
+        if spectra && !has_few_poses(problem) { moving.map(spectrum).collect() } else { Vec::new() };
+    let link = |axis: usize, loaded: usize| {
+        let driver = Driver::GravityAt(machine.axes[loaded].name.clone());
+        let scale = driver.kind().default_scale(Some(AxisKind::Rotary));
+        let prior = CoefficientPrior::Family("links".to_string());
+        Effect { prior, ..Effect::new(own(axis), driver, Shape::Power(Power { degree: 1, scale })) }
+    };
+    // Beside curves of all orders, the links would be a second description of the same smooth errors.
+    let carriers = joints.iter().filter(|_| spectra.is_empty());
+    let loads = carriers.flat_map(|axis| loads(problem, *axis).into_iter().map(|loaded| (*axis, loaded)));
+    let links = loads.map(|(axis, loaded)| link(axis, loaded)).collect();
+    vec![
+        Group { name: SPECTRA, effects: spectra },
         Group {
             name: "compliance of all joints under gravity",
             effects: joints.iter().copied().map(compliance).collect(),
         },
-    ];
+        Group { name: "compliance of all joints under the weights of the links", effects: links },
+    ]
+}
+
+/// The groups that a model does not have yet, with at most `most` effects.
+fn groups(model: &PoseModel, options: &TraceOptions, spectra: bool, most: usize) -> Vec<Group> {
+    let problem = &model.problem;
     let declared = &problem.parameters.effects;
     let same = |a: &Effect, b: &Effect| (&a.component, &a.driver, &a.shape) == (&b.component, &b.driver, &b.shape);
     let is_new = |effect: &Effect| {
         is_requested(options, &effect.id()) && !declared.iter().any(|declared| same(declared, effect))
     };
-    let open =
-        groups.into_iter().map(|group| Group { effects: group.effects.into_iter().filter(is_new).collect(), ..group });
-    open.filter(|group| (1..=most).contains(&group.effects.len())).collect()
+    let open = all(problem, spectra)
+        .into_iter()
+        .map(|group| Group { effects: group.effects.into_iter().filter(is_new).collect(), ..group });
+    let has = |group: &Group| model.effects.iter().any(|accepted| accepted.group == group.name);
+    open.filter(|group| (1..=most).contains(&group.effects.len()) && !has(group)).collect()
+}
+
+/// The axes at whose origins a weight has a moment about an axis, each place once.
+fn loads(problem: &Problem, axis: usize) -> Vec<usize> {
+    /// Poses that are compared.
+    const POSES: usize = 32;
+    let machine = &problem.session.machine;
+    let mut found: Vec<(usize, Vec<f64>)> = Vec::new();
+    for loaded in (0..machine.axes.len()).filter(|loaded| machine.carries(axis, *loaded)) {
+        let of_model = |model: &TestModel| -> Vec<f64> {
+            let rows = (0..model.rows()).step_by(model.rows().div_ceil(POSES).max(1));
+            rows.filter_map(|row| machine.gravity_moment_of_axis_mm(axis, &model.state(row), loaded)).collect()
+        };
+        let moments: Vec<f64> = problem.models.iter().flat_map(of_model).collect();
+        let is_new = |(_, known): &(usize, Vec<f64>)| known.iter().zip(&moments).any(|(a, b)| (a - b).abs() > 1e-6);
+        if moments.iter().any(|moment| *moment != 0.0) && found.iter().all(is_new) {
+            found.push((loaded, moments));
+        }
+    }
+    found.into_iter().map(|(loaded, _)| loaded).collect()
 }
 
 /// A group whose families were accepted.
@@ -101,21 +130,25 @@ struct Accepted {
     scales: Scales,
 }
 
-/// Accepts families for a fitted problem. `None` if no group lowers the held-out error.
+/// Adds groups to a model as long as one lowers its held-out error, and returns whether it added one. `spectra` is whether
+/// the spectra are proposed, `most` the maximum number of effects.
 ///
 /// # Errors
 /// If the model with the families cannot be fitted, or [`IdentifyError::Interrupted`].
-pub(super) fn accepted(
-    problem: &Problem,
-    fit: &Fit,
+pub(super) fn add(
+    model: &mut PoseModel,
     options: &TraceOptions,
+    spectra: bool,
     most: usize,
     interrupt: Interrupt<'_>,
-) -> Result<Option<AcceptedFamilies>, IdentifyError> {
-    let groups = groups(problem, options, most);
+) -> Result<bool, IdentifyError> {
+    let most = most.saturating_sub(model.effects.len());
+    let groups = groups(model, options, spectra, most);
+    model.proposed = model.proposed.max(groups.iter().map(|group| group.effects.len()).sum());
     if groups.is_empty() {
-        return Ok(None);
+        return Ok(false);
     }
+    let (problem, fit) = (&model.problem, &model.fit);
     let mut all = problem.clone();
     for effect in groups.iter().flat_map(|group| &group.effects) {
         all.add_effect(effect)?;
@@ -175,27 +208,27 @@ pub(super) fn accepted(
         accepted.push(Accepted { group, decrease, scales: before.1 });
     }
     if accepted.is_empty() {
-        return Ok(None);
+        return Ok(false);
     }
-    finish(problem, &fit.beta, &equations, (&groups, &names), accepted, present).map(Some)
+    finish(model, &equations, (&groups, &names), accepted, present)?;
+    Ok(true)
 }
 
-/// Fits the problem with the accepted families.
+/// Fits the model with the accepted families.
 fn finish(
-    problem: &Problem,
-    declared: &[f64],
+    model: &mut PoseModel,
     equations: &FoldEquations,
     (groups, names): (&[Group], &[String]),
     accepted: Vec<Accepted>,
     (chosen, scales): (Vec<usize>, Scales),
-) -> Result<AcceptedFamilies, IdentifyError> {
+) -> Result<(), IdentifyError> {
+    let problem = &model.problem;
     // The held-out error after each group is that before the next one.
     let readings = equations.readings();
     let rms = |scales: &Scales| (scales.held_out_sum() / readings).sqrt() * problem.noise.likelihood_mm();
     let after: Vec<f64> = accepted.iter().skip(1).map(|next| rms(&next.scales)).chain([rms(&scales)]).collect();
     let kept = equations.with_families(&chosen);
     let mut with = problem.clone();
-    let mut effects = Vec::new();
     let mut first: Vec<usize> = Vec::new();
     let mut next = problem.parameters.list.len();
     for group in groups {
@@ -214,19 +247,20 @@ fn finish(
             }
             if kept.effective_among(&scales, &own) >= MIN_EFFECTIVE_OF_MEMBER {
                 with.add_effect(effect)?;
-                effects.push(AcceptedEffect {
+                model.effects.push(AcceptedEffect {
                     effect: effect.clone(),
                     group: group.name.to_string(),
+                    is_single: false,
                     p_value: accepted[order].decrease.p_value(),
                     heldout_rms_mm: after[order],
+                    aliases: Vec::new(),
                 });
             }
         }
     }
     // As in a fit of a session that declares these effects.
-    let mut start = declared.to_vec();
+    let mut start = model.fit.beta.clone();
     start.resize(with.parameters.list.len(), 0.0);
-    let (problem, fit) = with_families(with, start)?;
-    let proposed = groups.iter().map(|group| group.effects.len()).sum();
-    Ok(AcceptedFamilies { problem, fit, effects, proposed })
+    (model.problem, model.fit) = with_families(with, start)?;
+    Ok(())
 }

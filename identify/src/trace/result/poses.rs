@@ -3,49 +3,50 @@
 use faer::prelude::Solve;
 use faer::{Mat, Side};
 
-use super::effect::described;
+use abbe_model::effect::Effect;
+
+use super::effect::{described, explained_by};
 use super::unsearched::unsearched_of;
-use super::{changed_parameters, model_result};
+use super::verdict::of_poses;
+use super::{changed_parameters, model_result, residual_before};
 use crate::error::IdentifyError;
 use crate::fit::Fit;
+use crate::fit::outcome::Determined;
 use crate::parameters::Role;
 use crate::problem::Problem;
-use crate::results::{EffectResult, Remainder, TraceResult, TraceVerdict};
-use crate::trace::families::AcceptedFamilies;
+use crate::results::{EffectResult, TraceResult};
+use crate::trace::poses::{AcceptedEffect, PoseModel, PoseSearch};
+use crate::trace::remainder::Structure;
 use crate::trace::{SearchStep, TraceOutcome};
 
 /// How a search with families ended.
-pub(in crate::trace) struct FamiliesEnded {
-    /// Number of effects of the proposed families.
-    pub families: usize,
-    /// Number of single effects that were screened.
-    pub candidates: usize,
-    /// Number of those that the readings would show.
-    pub detectable: usize,
-    /// p-value of the best single effect that was not added.
-    pub last_p_value: f64,
+pub(in crate::trace) struct PosesEnded {
     /// Whether the maximum number of effects ended the search.
     pub stopped_early: bool,
-    /// Whether the caller interrupted it.
-    pub interrupted: bool,
+    /// Structure in the residuals of the declared and of the last model; `None` if there are too few poses for the test.
+    pub structures: [Option<Structure>; 2],
     /// Warnings about the options.
     pub warnings: Vec<String>,
 }
 
-/// The outcome of a search that accepted families: the declared model, and the model with the found effects. Their
-/// aliases are not examined: a family is the error of each joint about its own axis, as a whole.
+/// The outcome of a search that accepted families: the declared model, and the model with the found effects. The aliases
+/// of a family are not examined: it is the error of each joint about its own axis, as a whole.
 ///
 /// # Errors
 /// If the model cannot be evaluated for the cross-validation.
-pub(in crate::trace) fn outcome_with_families(
+pub(in crate::trace) fn outcome_of_poses(
     before: &Problem,
     before_fit: &Fit,
-    found: AcceptedFamilies,
-    ended: FamiliesEnded,
+    found: PoseSearch,
+    ended: PosesEnded,
 ) -> Result<TraceOutcome, IdentifyError> {
-    let AcceptedFamilies { problem: after, fit: after_fit, effects: accepted, .. } = found;
+    let PoseModel { problem: after, fit: after_fit, effects: accepted, proposed } = found.model;
     let before_result = model_result(before, before_fit, before_fit.held_out.rms_mm)?;
-    let after_result = model_result(&after, &after_fit, after_fit.held_out.rms_mm)?;
+    let mut after_result = model_result(&after, &after_fit, after_fit.held_out.rms_mm)?;
+    let [structure_before, structure_after] = ended.structures;
+    let (verdict, remainder) = of_poses(true, ended.stopped_early, structure_after.as_ref(), found.last_p_value);
+    after_result.goodness = after_result.goodness.with_structure(remainder.structured);
+    Determined::of(&after, &after_fit.rank)?.mark(&after, &mut after_result.parameters, after_result.goodness);
     let declared = before.parameters.effects.len();
     let effects: Vec<EffectResult> = (accepted.iter().enumerate())
         .map(|(k, accepted)| EffectResult {
@@ -53,10 +54,9 @@ pub(in crate::trace) fn outcome_with_families(
             p_value: accepted.p_value,
             heldout_rms_um: accepted.heldout_rms_mm * 1e3,
             rms_gain_um: rms_gain_mm(&after, &after_fit, declared + k) * 1e3,
-            ..described(&after, &after_fit, declared + k, &after_result.parameters)
+            ..with_aliases(described(&after, &after_fit, declared + k, &after_result.parameters), &after, accepted)
         })
         .collect();
-    let verdict = if ended.stopped_early { TraceVerdict::PartlyExplained } else { TraceVerdict::Explained };
     let steps = (accepted.iter().enumerate())
         .map(|(k, accepted)| SearchStep {
             id: accepted.effect.id(),
@@ -68,30 +68,39 @@ pub(in crate::trace) fn outcome_with_families(
         verdict: verdict.gated(after_result.goodness.verdict),
         changed_parameters: changed_parameters(&before_result.parameters, &after_result.parameters),
         before: before_result,
+        unique: effects.iter().all(|effect| effect.unique),
         effects,
-        remainder: Remainder { structured: false, p_value: ended.last_p_value, place: None },
-        residual_before: "independent poses: structure is looked for effect by effect".to_string(),
-        candidates: ended.families + ended.candidates,
-        candidates_detectable: ended.families + ended.detectable,
+        remainder,
+        residual_before: residual_before(before, structure_before.as_ref(), true),
+        candidates: proposed + found.candidates,
+        candidates_detectable: proposed + found.detectable,
         ..unsearched_of(&after, &after_fit, after_result)?
     };
     result.warnings.extend(ended.warnings);
-    if ended.interrupted {
+    if found.interrupted {
         result.mark_interrupted();
     }
     let count = accepted.len();
+    let aliases_of = |accepted: &AcceptedEffect| accepted.aliases.iter().map(|alias| alias.effect.clone()).collect();
     Ok(TraceOutcome {
         before: before.clone(),
         before_fit: before_fit.clone(),
+        alias_effects: accepted.iter().map(aliases_of).collect(),
+        effects: after.parameters.effects[declared..].to_vec(),
+        competing_effects: (0..count).map(|_| Vec::new()).collect(),
         after,
         after_fit,
-        effects: accepted.into_iter().map(|accepted| accepted.effect).collect(),
-        alias_effects: vec![Vec::new(); count],
-        competing_effects: (0..count).map(|_| Vec::new()).collect(),
         steps,
         strongest: None,
         result,
     })
+}
+
+/// The result of an effect with its aliases.
+fn with_aliases(of_effect: EffectResult, problem: &Problem, accepted: &AcceptedEffect) -> EffectResult {
+    let aliases: Vec<&Effect> = accepted.aliases.iter().map(|alias| &alias.effect).collect();
+    let costs: Vec<[f64; 2]> = accepted.aliases.iter().map(|alias| [alias.delta_chi2, alias.prior_cost]).collect();
+    explained_by(of_effect, problem, &accepted.effect, &aliases, &costs)
 }
 
 /// Rms of what an effect explains in addition to the rest of the model, mm: the increase of the sum of squares of

@@ -1,0 +1,242 @@
+//! Tests the residual of independent poses for remaining structure: whether neighbouring poses deviate alike.
+//!
+//! Independent noise differs from pose to pose. What a model lacks is a function of the pose, so that neighbours have
+//! similar residuals. Neighbours are the poses next to each other in joint space, or on the sky. In many dimensions the
+//! nearest pose is far away, while an error of one joint depends on the angle of that joint alone. So the poses are also
+//! sorted by each joint, and the residual is projected on what each error motion of that joint does to the readings:
+//!
+//! ```text
+//! T = Σ z_i·z_n(i) / Σ z_i²       z: residual vector of a pose, or its projection;  n(i): the neighbour of pose i
+//! ```
+//!
+//! The null distribution has the residuals with a random sign for each pose, less what the model explains of them: a fit
+//! makes the residuals of neighbours opposite. Each T is referred to mean and standard deviation of its null draws, and the
+//! largest of all decides.
+
+use abbe_model::axis::AxisKind;
+use abbe_model::component::{ErrorKind, ErrorName, Freedom};
+use abbe_model::driver::Driver;
+use abbe_model::effect::shape::Harmonic;
+use abbe_model::effect::{Component, Effect, Shape};
+use abbe_model::session::readings::Readings;
+use faer::{Col, Mat, MatRef};
+
+use super::remainder::Structure;
+use crate::candidates::columns::Columns;
+use crate::heldout::joint_space::{coordinates, squared_distance};
+use crate::numerics::parallel;
+use crate::problem::Problem;
+
+/// Least number of poses for the test.
+const MIN_POSES: usize = 20;
+/// Maximum number of poses that look for their nearest pose, and that are sorted by a joint.
+const MAX_POSES: usize = 4000;
+
+/// Tests the residual of a model, given by its orthonormal columns, for dependence between neighbouring poses. `None` if the
+/// readings are not of independent poses, or of too few.
+pub fn structure(
+    problem: &Problem,
+    columns: &Columns<'_>,
+    model: MatRef<'_, f64>,
+    residual: &[f64],
+    null: impl Iterator<Item = Vec<f64>>,
+) -> Option<Structure> {
+    let poses = Poses::of(problem, columns);
+    if poses.rows.len() < MIN_POSES {
+        return None;
+    }
+    let statistics = poses.statistics(problem, columns);
+    let found: Vec<f64> = statistics.iter().map(|one| one.correlation(residual)).collect();
+    let mut drawn: Vec<Vec<f64>> = vec![Vec::new(); statistics.len()];
+    for draw in null {
+        let draw = Col::from_fn(draw.len(), |i| draw[i]);
+        let remaining = &draw - model * (model.transpose() * &draw);
+        let remaining: Vec<f64> = remaining.iter().copied().collect();
+        let correlations = parallel::map(statistics.len(), &|k| statistics[k].correlation(&remaining));
+        drawn.iter_mut().zip(correlations).for_each(|(all, one)| all.push(one));
+    }
+    let draws = drawn.first().map_or(0, Vec::len);
+    let references: Vec<(f64, f64)> = drawn.iter().map(|of_one| mean_and_deviation(of_one)).collect();
+    let score = |value: f64, (mean, deviation): &(f64, f64)| (value - mean) / deviation.max(f64::MIN_POSITIVE);
+    let best = found.iter().zip(&references).map(|(value, reference)| score(*value, reference)).enumerate();
+    let (place, largest) = best.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let of_draw = |draw: usize| {
+        let scores = drawn.iter().zip(&references).map(|(of_one, reference)| score(of_one[draw], reference));
+        scores.fold(f64::NEG_INFINITY, f64::max)
+    };
+    let above = (0..draws).filter(|draw| of_draw(*draw) >= largest).count();
+    Some(Structure {
+        p_value: (above + 1) as f64 / (draws + 1) as f64,
+        excess: largest.max(0.0),
+        description: format!("{} (correlation {:.2})", statistics[place].description, found[place]),
+    })
+}
+
+fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
+    let count = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let square: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    (mean, (square / (count - 1.0).max(1.0)).sqrt())
+}
+
+/// The poses with accepted readings.
+struct Poses {
+    /// The whitened rows of each pose, with their test, reading and channel.
+    rows: Vec<Vec<usize>>,
+    /// Test and reading of the first row of each pose.
+    first: Vec<(usize, usize)>,
+}
+
+/// Pairs of neighbouring poses, and a weight of each row of a pose.
+struct Statistic {
+    /// For each pose its whitened rows and their weights. Without weights the residual vectors are compared.
+    rows: Vec<Vec<(usize, f64)>>,
+    projected: bool,
+    pairs: Vec<(usize, usize)>,
+    description: String,
+}
+
+impl Statistic {
+    /// The correlation of neighbours.
+    fn correlation(&self, residual: &[f64]) -> f64 {
+        let value = |pose: usize| self.rows[pose].iter().map(|(row, weight)| weight * residual[*row]).sum::<f64>();
+        let square = |pose: usize| self.rows[pose].iter().map(|(row, _)| residual[*row].powi(2)).sum::<f64>();
+        let vectors = |(a, b): (usize, usize)| {
+            let (a, b) = (self.rows[a].iter(), self.rows[b].iter());
+            a.zip(b).map(|((a, _), (b, _))| residual[*a] * residual[*b]).sum::<f64>()
+        };
+        let (mut products, mut squares) = (0.0, 0.0);
+        for &(a, b) in &self.pairs {
+            if self.projected {
+                let (a, b) = (value(a), value(b));
+                products += a * b;
+                squares += 0.5 * (a * a + b * b);
+            } else {
+                products += vectors((a, b));
+                squares += 0.5 * (square(a) + square(b));
+            }
+        }
+        if squares > 0.0 { products / squares } else { 0.0 }
+    }
+}
+
+impl Poses {
+    fn of(problem: &Problem, columns: &Columns<'_>) -> Poses {
+        let pose_of_row = &problem.folds.pose_of_row;
+        let mut poses = Poses { rows: Vec::new(), first: Vec::new() };
+        if pose_of_row.is_empty() {
+            return poses;
+        }
+        let mut places: Vec<Option<usize>> = Vec::new();
+        let mut origins: Vec<_> = columns.origin_of_rows().into_iter().enumerate().collect();
+        // The channels of one pose in the order of tests and channels.
+        origins.sort_by_key(|(_, origin)| *origin);
+        for (row, (test, reading, _)) in origins {
+            let pose = pose_of_row[test][reading];
+            places.resize(places.len().max(pose + 1), None);
+            let place = *places[pose].get_or_insert_with(|| {
+                poses.rows.push(Vec::new());
+                poses.first.push((test, reading));
+                poses.rows.len() - 1
+            });
+            poses.rows[place].push(row);
+        }
+        poses
+    }
+
+    /// The statistics: nearest poses, and neighbours by each rotary axis for each of its error motions.
+    fn statistics(&self, problem: &Problem, columns: &Columns<'_>) -> Vec<Statistic> {
+        let machine = &problem.session.machine;
+        let plain = |rows: &Vec<usize>| rows.iter().map(|row| (*row, 1.0)).collect::<Vec<_>>();
+        let mut statistics = vec![Statistic {
+            rows: self.rows.iter().map(plain).collect(),
+            projected: false,
+            pairs: self.nearest(problem),
+            description: "neighbouring poses deviate alike".to_string(),
+        }];
+        for (number, axis) in machine.axes.iter().enumerate().filter(|(_, axis)| axis.kind == AxisKind::Rotary) {
+            let angle = |pose: usize| {
+                let (test, reading) = self.first[pose];
+                problem.tests[test].readings.as_ref().map_or(0.0, |r| r.positions[number][reading])
+            };
+            let mut order: Vec<usize> = (0..self.rows.len()).collect();
+            order.sort_by(|a, b| angle(*a).total_cmp(&angle(*b)));
+            if order.last().map(|last| angle(*last)) <= order.first().map(|first| angle(*first) + 1e-6) {
+                continue;
+            }
+            let pairs: Vec<(usize, usize)> = order.windows(2).map(|pair| (pair[0], pair[1])).collect();
+            for freedom in Freedom::ALL {
+                let name = ErrorName { kind: ErrorKind::Motion, freedom, axis: axis.name.clone() };
+                let driver = Driver::Axis(axis.name.clone());
+                let effect = Effect::new(Component::Axis(name), driver, Shape::Harmonic(Harmonic { order: 1.0 }));
+                let Some(sensitivity) = sensitivities(columns, &effect, &angle, self) else { continue };
+                statistics.push(Statistic {
+                    rows: (self.rows.iter().zip(sensitivity))
+                        .map(|(rows, weights)| rows.iter().copied().zip(weights).collect())
+                        .collect(),
+                    projected: true,
+                    pairs: pairs.clone(),
+                    description: format!("{} follows the angle of {}", effect.component, axis.name),
+                });
+            }
+        }
+        statistics
+    }
+
+    /// Each pose and its nearest pose, in the coordinates of blocks of joint space.
+    fn nearest(&self, problem: &Problem) -> Vec<(usize, usize)> {
+        let readings: Vec<&Readings> = problem.tests.iter().filter_map(|test| test.readings.as_deref()).collect();
+        let all = coordinates(&problem.session.machine, &readings);
+        // The rows of all tests, one test after the other.
+        let mut start = Vec::new();
+        let mut next = 0;
+        for test in &problem.tests {
+            start.push(next);
+            next += test.readings.as_ref().map_or(0, |r| r.rows());
+        }
+        let points: Vec<&Vec<f64>> = self.first.iter().map(|(test, reading)| &all[start[*test] + reading]).collect();
+        let step = points.len().div_ceil(MAX_POSES);
+        let asked: Vec<usize> = (0..points.len()).step_by(step).collect();
+        parallel::map(asked.len(), &|k| {
+            let own = asked[k];
+            let others =
+                (0..points.len()).filter(|other| *other != own && self.rows[*other].len() == self.rows[own].len());
+            let distance = |other: &usize| squared_distance(points[own], points[*other]);
+            others.min_by(|a, b| distance(a).total_cmp(&distance(b))).map(|other| (own, other))
+        })
+        .into_iter()
+        .flatten()
+        .collect()
+    }
+}
+
+/// For each pose the changes of its whitened rows by an error motion of one radian or millimetre, to unit length. `None` if
+/// the readings do not depend on it.
+fn sensitivities(
+    columns: &Columns<'_>,
+    effect: &Effect,
+    angle: &dyn Fn(usize) -> f64,
+    poses: &Poses,
+) -> Option<Vec<Vec<f64>>> {
+    let set = columns.effect_columns(effect)?;
+    if set.count != 2 {
+        return None;
+    }
+    // Of a harmonic of order 1 over the angle: s·cos q and s·sin q, with the sensitivity s.
+    let mut values = Mat::<f64>::zeros(columns.rows(), 2);
+    columns.fill(&[&set], values.as_mut());
+    let mut largest = 0.0_f64;
+    let of_poses: Vec<Vec<f64>> = (poses.rows.iter().enumerate())
+        .map(|(pose, rows)| {
+            let (sin, cos) = angle(pose).sin_cos();
+            let own: Vec<f64> = rows.iter().map(|row| values[(*row, 0)] * cos + values[(*row, 1)] * sin).collect();
+            let length = own.iter().map(|s| s * s).sum::<f64>().sqrt();
+            largest = largest.max(length);
+            own
+        })
+        .collect();
+    if largest <= 0.0 {
+        return None;
+    }
+    Some(of_poses.into_iter().map(|own| own.into_iter().map(|s| s / largest).collect()).collect())
+}
