@@ -76,7 +76,9 @@ def effect_columns(effect):
         "EA0EL": lambda a, e: (math.sin(e), 0.0),
     }
     component, order, driver = effect["component"], effect.get("order") or 1, effect["driver"]
-    if component not in of or driver not in ("AZ", "EL"):
+    if driver not in ("AZ", "EL"):
+        return []
+    if component not in of:
         sys.exit(f"no columns are known of {component} over {driver}")
     angle = lambda a, e: abs(order) * (a if driver == "AZ" else e)
     times = lambda cell, value: (cell[0] * value, cell[1] * value)
