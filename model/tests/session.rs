@@ -293,7 +293,7 @@ fn a_weight_at_a_joint_has_the_moment_of_its_lever() {
             "[machine]\nchain = \"w b J1 J2 t\"\n[machine.axis.J1]\nkind = \"rotary\"\ndirection = [0, 1, 0]\n\
              [machine.axis.J2]\nkind = \"rotary\"\ndirection = [0, 1, 0]\norigin_mm = [300, 0, 0]\n\n[instrument]\n\
              kind = \"tracker\"\n\n[[test]]\nname = \"T\"\ndata = \"T.csv\"\ntarget_mm = [500, 0, 0]\n\n\
-             [[effect]]\ncomponent = \"{component}\"\ndriver = \"gravity-{loaded}\"\nshape = \"power\"\ndegree = 1\n"
+             [[effect]]\ncomponent = \"{component}\"\ndriver = \"gravity-{loaded}\"\nshape = \"polynomial\"\norder = 1\n"
         );
         fs::write(&path, text).unwrap();
         fs::write(folder.path().join("T.csv"), "j1_rad,j2_rad,px_mm,py_mm,pz_mm\n0,1,0,0,0\n0.7,2,0,0,0\n2,0,0,0,0\n")
