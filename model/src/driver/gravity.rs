@@ -13,14 +13,17 @@ use crate::axis::AxisKind;
 use crate::scalar::Nominal;
 
 /// The moment of gravity.
-pub(super) struct Gravity;
+pub(super) struct Gravity<'n> {
+    /// The axis at whose origin the weight is; `None` for the point of the instrument.
+    pub at: Option<&'n str>,
+}
 
 pub(super) const METRE: DriverUnit = DriverUnit::new("m", "m", "m", " m");
 const MILLIMETRES_PER_METRE: f64 = 1000.0;
 
 pub(super) const ENTRY: Entry = Entry { word: Some("gravity"), driver: |_| Driver::Gravity, units: &[METRE] };
 
-impl DriverKind for Gravity {
+impl DriverKind for Gravity<'_> {
     fn unit(&self, _: Option<AxisKind>) -> DriverUnit {
         METRE
     }
@@ -28,13 +31,23 @@ impl DriverKind for Gravity {
         let DriverInput { machine, model, .. } = input;
         let axis = input.component_axis?;
         let station = model.station();
-        let point = if axis < machine.workpiece_side { station.table_point_mm()? } else { station.tool_point_mm() };
-        let moment = |row| machine.gravity_moment_mm(axis, &model.state(row), point) / MILLIMETRES_PER_METRE;
-        let sample = |row| DriverSample::plain(moment(row), 0.0);
-        Some((0..model.rows()).map(sample).collect())
+        let point = if axis < machine.workpiece_side { station.table_point_mm() } else { Some(station.tool_point_mm()) };
+        let loaded = match self.at {
+            Some(name) => Some(machine.axis_index(name)?),
+            None => None,
+        };
+        let moment = |row| match loaded {
+            Some(loaded) => machine.gravity_moment_of_axis_mm(axis, &model.state(row), loaded),
+            None => Some(machine.gravity_moment_mm(axis, &model.state(row), point?)),
+        };
+        let sample = |row| Some(DriverSample::plain(moment(row)? / MILLIMETRES_PER_METRE, 0.0));
+        (0..model.rows()).map(sample).collect()
     }
     fn phrase(&self) -> String {
-        "the moment of gravity".to_string()
+        match self.at {
+            Some(axis) => format!("the moment of a weight at {axis}"),
+            None => "the moment of gravity".to_string(),
+        }
     }
     fn is_observable(&self, _: &Recorded<'_>, axis: Option<AxisKind>) -> bool {
         axis == Some(AxisKind::Rotary)
@@ -43,41 +56,51 @@ impl DriverKind for Gravity {
         Some("m")
     }
     fn proportional(&self) -> Option<String> {
-        Some(" under gravity (compliance)".to_string())
+        Some(match self.at {
+            Some(axis) => format!(" under a weight at {axis} (compliance)"),
+            None => " under gravity (compliance)".to_string(),
+        })
     }
     fn is_of_component(&self) -> bool {
         true
     }
     fn check_component(&self, component: &str, axis: Option<AxisKind>) -> Result<(), DriverFault> {
-        check_component(component, axis)
+        if axis == Some(AxisKind::Rotary) {
+            return Ok(());
+        }
+        Err(DriverFault {
+            message: format!("gravity exerts no moment about \"{component}\""),
+            help: "gravity acts on the errors of rotary axes, by a moment about the axis",
+        })
     }
 }
 
-/// Checks that a weight has a moment about the axis of a component.
-pub(super) fn check_component(component: &str, axis: Option<AxisKind>) -> Result<(), DriverFault> {
-    if axis == Some(AxisKind::Rotary) {
-        return Ok(());
-    }
-    Err(DriverFault {
-        message: format!("gravity exerts no moment about \"{component}\""),
-        help: "gravity acts on the errors of rotary axes, by a moment about the axis",
-    })
-}
-
-impl Symbols for Gravity {
+impl Symbols for Gravity<'_> {
     fn symbols<N: Nominal>(
         &self,
         input: &SymbolInput<'_, N>,
         named: &impl Fn(DriverQuantity) -> N,
     ) -> Option<DriverSample<N>> {
         let axis = &input.machine.axes[input.component_axis?].name;
+        let lower = axis.to_lowercase();
+        let (driver, identifier, text, weight) = match self.at {
+            Some(at) => (
+                Driver::GravityAt(at.to_string()),
+                format!("gravity_{axis}_{at}"),
+                format!("g_{lower}_{}", at.to_lowercase()),
+                format!("a unit weight at {at}"),
+            ),
+            None => {
+                (Driver::Gravity, format!("gravity_{axis}"), format!("g_{lower}"), "a unit weight".to_string())
+            }
+        };
         let moment = DriverQuantity {
-            driver: Driver::Gravity,
+            driver,
             part: DriverPart::Value,
-            identifier: format!("gravity_{axis}"),
-            text: format!("g_{}", axis.to_lowercase()),
+            identifier,
+            text,
             unit: "m",
-            meaning: format!("moment of a unit weight about axis {axis}"),
+            meaning: format!("moment of {weight} about axis {axis}"),
             range: [-1.0, 1.0],
         };
         Some(DriverSample::plain(named(moment), N::constant(0.0)))

@@ -68,8 +68,8 @@ drivers! {
     axis: Axis(name) => axis::AxisDriver(name),
     time: Time => time::Time,
     column: Column(name) => column::Column(name),
-    gravity: Gravity => gravity::Gravity,
-    gravity_at: GravityAt(name) => gravity_at::GravityAt(name),
+    gravity: Gravity => gravity::Gravity { at: None },
+    gravity_at: GravityAt(name) => gravity::Gravity { at: Some(name) },
     speed_squared: SpeedSquared => speed_squared::SpeedSquared,
 }
 

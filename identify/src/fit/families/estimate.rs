@@ -8,6 +8,8 @@ use crate::error::IdentifyError;
 const CALIBRATED: f64 = 0.01;
 /// Relative tolerance of the noise variance.
 const SETTLED: f64 = 1e-3;
+/// Least noise variance over that of the whitening. Readings with as many parameters as values leave no residual.
+const LEAST_VARIANCE: f64 = 1e-8;
 /// Maximum number of estimates of scales and noise in turn.
 const MAX_ROUNDS: usize = 8;
 /// Largest inflation: one piece of information in a thousand readings.
@@ -64,7 +66,7 @@ impl FoldEquations {
             let posterior;
             (precisions, posterior) = self.equations.maximise(inflation * variance, &precisions)?;
             let freedom = (self.readings - posterior.effective_total).max(1.0);
-            let next = (posterior.residual_square / freedom).max(f64::MIN_POSITIVE);
+            let next = (posterior.residual_square / freedom).max(LEAST_VARIANCE);
             let change = (next / variance - 1.0).abs();
             rounds += 1;
             if change < SETTLED || rounds == MAX_ROUNDS {

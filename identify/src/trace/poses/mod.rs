@@ -3,10 +3,12 @@
 //!
 //! Groups of families are added first ([`groups`]), then single effects ([`single_effects`]), then groups again. A curve of
 //! all orders explains whatever a joint does about its own axis, at the price of many coefficients. Where few orders are
-//! the truth, they predict better: the search is repeated without the spectra, and its model stays unless the spectra
-//! lower the held-out error by more than the standard error of the difference. With very many poses this is not tried. At the end each effect has to pay: one
-//! without which the held-out error does not rise by more than its standard error is removed. What is chosen depends on the
-//! readings and not on the noise that the session states, since the noise of a family is estimated from the residual.
+//! the truth, they predict better: the search is repeated without the spectra, and its model is chosen unless the spectra
+//! lower the held-out error by more than the standard error of the difference. With very many poses it is not repeated.
+//!
+//! At the end an effect without which the held-out error does not rise by more than the standard error of the rise is
+//! removed. What is chosen depends on the readings and not on the noise that the session states, since the noise of a
+//! family is estimated from the residual.
 
 mod aliases;
 mod groups;
@@ -83,25 +85,30 @@ impl PoseModel {
     /// # Errors
     /// If it cannot be fitted.
     fn without(&self, declared: (&Problem, &Fit), removed: &[usize]) -> Result<PoseModel, IdentifyError> {
-        let (problem, first) = (declared.0.clone(), declared.0.parameters.list.len());
-        let mut model = PoseModel { problem, effects: Vec::new(), ..self.clone() };
+        let (mut problem, first) = (declared.0.clone(), declared.0.parameters.list.len());
+        let mut effects = Vec::new();
         let mut beta = self.fit.beta[..first].to_vec();
         let mut next = first;
         for (k, accepted) in self.effects.iter().enumerate() {
             let own = next..next + accepted.effect.shape.coefficients();
             next = own.end;
             if !removed.contains(&k) {
-                model.problem.add_effect(&accepted.effect)?;
-                model.effects.push(accepted.clone());
+                problem.add_effect(&accepted.effect)?;
+                effects.push(accepted.clone());
                 beta.extend(&self.fit.beta[own]);
             }
         }
-        (model.problem, model.fit) = with_families(model.problem, beta)?;
-        Ok(model)
+        let (problem, fit) = with_families(problem, beta)?;
+        Ok(PoseModel { problem, fit, effects, proposed: self.proposed })
     }
 
     fn has_families(&self) -> bool {
         self.effects.iter().any(|accepted| !accepted.is_single)
+    }
+
+    /// Whether its held-out error is lower than that of another model by more than the standard error of the difference.
+    fn predicts_better_than(&self, other: &PoseModel) -> bool {
+        HeldOutDecrease::over_blocks(&other.held_out_of_folds(self), &self.held_out_of_folds(other)).is_significant()
     }
 
     /// Sums of squares of the held-out residuals of the folds, mm², over the readings that another model counts too.
@@ -148,28 +155,33 @@ pub(super) fn search(
     (interrupt.0)(Progress::Screening(library.count()));
     let limits = Limits { effects: most, significance: policy.significance, to_reach_mm: None };
     let ended = complete((problem, fit), &mut with, &library, options, true, limits, interrupt);
-    let mut search =
-        PoseSearch { model: with, candidates: library.count(), detectable: 0, last_p_value: 1.0, interrupted: false };
-    if !search.note(ended)? || !may_repeat {
-        return search.if_families(&library, interrupt);
-    }
-    let mut without = PoseModel::of(problem, fit);
-    let limits = Limits { to_reach_mm: Some(search.model.fit.held_out.rms_mm), ..limits };
-    let ended = groups::add(&mut without, options, false, most, interrupt).and_then(|has_groups| {
-        if !has_groups {
-            (without.problem, without.fit) = with_families(without.problem.clone(), fit.beta.clone())?;
-        }
-        complete((problem, fit), &mut without, &library, options, false, limits, interrupt)
-    });
-    let last_p_value = ended.as_ref().map_or(1.0, |ended| ended.last_p_value);
-    if search.note(ended)? {
-        let (single, curves) = (without.held_out_of_folds(&search.model), search.model.held_out_of_folds(&without));
-        if !HeldOutDecrease::over_blocks(&single, &curves).is_significant() {
-            search.model = without;
-            search.last_p_value = last_p_value;
+    let mut chosen = PoseSearch::of(with, &library, ended)?;
+    if may_repeat && !chosen.interrupted {
+        let mut without = PoseModel::of(problem, fit);
+        let limits = Limits { to_reach_mm: Some(chosen.model.fit.held_out.rms_mm), ..limits };
+        let ended = groups::add(&mut without, options, false, most, interrupt).and_then(|has_groups| {
+            if !has_groups {
+                (without.problem, without.fit) = with_families(without.problem.clone(), fit.beta.clone())?;
+            }
+            complete((problem, fit), &mut without, &library, options, false, limits, interrupt)
+        });
+        let single = PoseSearch::of(without, &library, ended)?;
+        // An interrupted repetition says nothing of what single effects could reach.
+        chosen.interrupted = single.interrupted;
+        if !single.interrupted && !chosen.model.predicts_better_than(&single.model) {
+            chosen = single;
         }
     }
-    search.if_families(&library, interrupt)
+    if !chosen.model.has_families() {
+        return Ok(None);
+    }
+    if !chosen.interrupted {
+        match aliases::find(&mut chosen.model, &library, interrupt) {
+            Err(IdentifyError::Interrupted) => chosen.interrupted = true,
+            found => found?,
+        }
+    }
+    Ok(Some(chosen))
 }
 
 /// Share of the coefficients of the spectra of all joints in the scalar readings below which a curve of all orders predicts
@@ -184,31 +196,18 @@ fn determines_spectra(problem: &Problem) -> bool {
 }
 
 impl PoseSearch {
-    /// Notes how a stage ended; returns whether it was not interrupted.
-    fn note(&mut self, ended: Result<Ended, IdentifyError>) -> Result<bool, IdentifyError> {
-        match ended {
-            Err(IdentifyError::Interrupted) => self.interrupted = true,
-            ended => {
-                let ended = ended?;
-                (self.detectable, self.last_p_value) = (ended.detectable, ended.last_p_value);
-            }
-        }
-        Ok(!self.interrupted)
-    }
-
-    /// The search with the aliases of its single effects, if families are among its effects.
-    fn if_families(
-        mut self,
+    /// A model and how its search ended. The effects accepted before an interruption remain.
+    fn of(
+        model: PoseModel,
         library: &Library<'_>,
-        interrupt: Interrupt<'_>,
-    ) -> Result<Option<PoseSearch>, IdentifyError> {
-        if !self.model.has_families() {
-            return Ok(None);
-        }
-        if !self.interrupted {
-            aliases::find(&mut self.model, library, interrupt)?;
-        }
-        Ok(Some(self))
+        ended: Result<Ended, IdentifyError>,
+    ) -> Result<PoseSearch, IdentifyError> {
+        let (ended, interrupted) = match ended {
+            Err(IdentifyError::Interrupted) => (Ended { detectable: 0, last_p_value: 1.0 }, true),
+            ended => (ended?, false),
+        };
+        let Ended { detectable, last_p_value } = ended;
+        Ok(PoseSearch { model, candidates: library.count(), detectable, last_p_value, interrupted })
     }
 }
 
