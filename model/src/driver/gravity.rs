@@ -31,7 +31,8 @@ impl DriverKind for Gravity<'_> {
         let DriverInput { machine, model, .. } = input;
         let axis = input.component_axis?;
         let station = model.station();
-        let point = if axis < machine.workpiece_side { station.table_point_mm() } else { Some(station.tool_point_mm()) };
+        let point =
+            if axis < machine.workpiece_side { station.table_point_mm() } else { Some(station.tool_point_mm()) };
         let loaded = match self.at {
             Some(name) => Some(machine.axis_index(name)?),
             None => None,
@@ -90,9 +91,7 @@ impl Symbols for Gravity<'_> {
                 format!("g_{lower}_{}", at.to_lowercase()),
                 format!("a unit weight at {at}"),
             ),
-            None => {
-                (Driver::Gravity, format!("gravity_{axis}"), format!("g_{lower}"), "a unit weight".to_string())
-            }
+            None => (Driver::Gravity, format!("gravity_{axis}"), format!("g_{lower}"), "a unit weight".to_string()),
         };
         let moment = DriverQuantity {
             driver,
