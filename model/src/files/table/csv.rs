@@ -40,11 +40,13 @@ impl DataFormat for Csv {
 struct CsvRows {
     lines: Lines,
     separator: u8,
+    /// The cells of an earlier row, whose memory is used again.
+    spare: Vec<String>,
 }
 
 impl CsvRows {
     fn new(lines: Lines, separator: u8) -> CsvRows {
-        CsvRows { lines, separator }
+        CsvRows { lines, separator, spare: Vec::new() }
     }
 
     /// The cells of a line with quotes.
@@ -78,13 +80,35 @@ impl Rows for CsvRows {
             let cells = if line.text.contains('"') {
                 self.quoted(&line.text)?
             } else {
-                line.text.split(char::from(self.separator)).map(|cell| cell.trim().to_string()).collect()
+                let mut cells = std::mem::take(&mut self.spare);
+                fill(&mut cells, line.text.split(char::from(self.separator)).map(str::trim));
+                cells
             };
             self.lines.count_row()?;
             return Ok(Some(Row::of_line(line, cells)));
         }
         Ok(None)
     }
+
+    fn reuse(&mut self, row: Row) {
+        self.spare = row.cells;
+    }
+}
+
+/// Replaces the cells of a row, in the memory that they have.
+fn fill<'t>(cells: &mut Vec<String>, texts: impl Iterator<Item = &'t str>) {
+    let mut filled = 0;
+    for text in texts {
+        match cells.get_mut(filled) {
+            Some(cell) => {
+                cell.clear();
+                cell.push_str(text);
+            }
+            None => cells.push(text.to_string()),
+        }
+        filled += 1;
+    }
+    cells.truncate(filled);
 }
 
 /// Readings as the text of a CSV file with our column names.

@@ -71,10 +71,14 @@ pub(super) fn message(file: &Path, line: &[usize], kept: &[usize]) -> String {
 
 /// Whether a state recurs within a run with a different reading.
 fn has_repeats(readings: &Readings, cells: &[u64], closed_runs: &HashMap<usize, usize>) -> bool {
-    let mut seen: HashMap<(i64, Vec<u64>), u64> = HashMap::new();
+    let mut seen: HashMap<u64, u64> = HashMap::with_capacity(cells.len());
     (0..cells.len()).filter(|row| !closed_runs.contains_key(row)).any(|row| {
-        let state = readings.positions.iter().map(|axis| axis[row].to_bits());
-        let before = seen.entry((readings.run[row], state.collect())).or_insert(cells[row]);
+        // A hash, as that of the cells: a vector for each of millions of rows costs more than all the rest.
+        let state = hash_of(|hasher| {
+            hasher.write_i64(readings.run[row]);
+            readings.positions.iter().for_each(|axis| hasher.write_u64(axis[row].to_bits()));
+        });
+        let before = seen.entry(state).or_insert(cells[row]);
         *before != cells[row]
     })
 }

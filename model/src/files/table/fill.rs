@@ -126,7 +126,12 @@ pub(super) fn read(
         if row.cells.len() != width {
             return Err(wrong_width(file, &row, width, &request.format));
         }
-        if traversals == 0 { push(&mut filled, &row)? } else { all.push(row) }
+        if traversals == 0 {
+            push(&mut filled, &row)?;
+            rows.reuse(row);
+        } else {
+            all.push(row);
+        }
     }
     for traversal in 0..traversals {
         let is_backward = filled.begin(traversal);

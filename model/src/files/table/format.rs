@@ -49,6 +49,9 @@ pub(super) trait Rows {
     /// # Errors
     /// If the next line is not a row of the format, or beyond a limit.
     fn next_row(&mut self) -> Result<Option<Row>, ModelError>;
+
+    /// Takes a row that is no longer needed, so that the next one can use its memory: a file has millions of them.
+    fn reuse(&mut self, _: Row) {}
 }
 
 /// Readings with all their columns.
