@@ -266,7 +266,12 @@ impl RepeatKeys {
 /// The direction of travel of every axis, one number per row.
 fn directions(readings: &Readings) -> Vec<i64> {
     let mut code = vec![0_i64; readings.rows()];
-    for axis in 0..readings.positions.len() {
+    for (axis, positions) in readings.positions.iter().enumerate() {
+        // An axis at rest has one direction in all rows.
+        let is_whole = readings.travel_before.is_empty() && readings.row_after.is_none();
+        if is_whole && positions.iter().all(|position| *position == positions[0]) {
+            continue;
+        }
         let samples = readings.axis_samples(axis, abbe_model::axis::AxisKind::Rotary);
         for (code, sample) in code.iter_mut().zip(samples) {
             *code = *code * 3 + sample.direction as i64 + 1;

@@ -27,18 +27,18 @@ pub(crate) fn trend_terms(times: &[f64]) -> Vec<[f64; TERMS]> {
     let powers = powers(times.len());
     let middle = times.iter().sum::<f64>() / n;
     let half = times.iter().map(|t| (t - middle).abs()).fold(f64::MIN_POSITIVE, f64::max);
-    let term = |t: &f64, i: usize| -> f64 {
+    let has_cycle = times.len() >= MIN_RUN;
+    let terms = |t: &f64| -> [f64; TERMS] {
         let time = (t - middle) / half;
-        let (sin, cos) = (std::f64::consts::PI * time).sin_cos();
-        match i {
+        let (sin, cos) = if has_cycle { (std::f64::consts::PI * time).sin_cos() } else { (0.0, 0.0) };
+        std::array::from_fn(|i| match i {
             0..POWERS if i < powers => time.powi(i as i32),
             0..POWERS => 0.0,
-            _ if times.len() < MIN_RUN => 0.0,
             POWERS => cos,
             _ => sin,
-        }
+        })
     };
-    let mut q: Vec<[f64; TERMS]> = times.iter().map(|t| std::array::from_fn(|i| term(t, i))).collect();
+    let mut q: Vec<[f64; TERMS]> = times.iter().map(terms).collect();
     for i in 0..TERMS {
         for j in (0..i).chain(0..i) {
             let along: f64 = q.iter().map(|row| row[i] * row[j]).sum();
