@@ -18,6 +18,6 @@ pub fn report(session: &Session, programs: &[(String, String)], control: &dyn Co
         report.key(format!("The form for {} has not been run on a control.", control.word()));
     }
     report.section("");
-    report.key("Try each program in single block and without the bar before it is trusted.");
+    report.key("Try each program in single block and without the instrument before it is trusted.");
     report
 }

@@ -40,8 +40,8 @@ pub const TEMPLATES: &[Template] = &[
     },
     Template {
         name: "distance",
-        about: "three-axis machine and a tracking interferometer at four unknown places; simulated readings",
-        files: files!("distance": "machine.toml", "session.toml", "S1.csv", "S2.csv", "S3.csv", "S4.csv"),
+        about: "three-axis machine and a tracking interferometer at four unknown places; a plan, and simulated readings",
+        files: files!("distance": "machine.toml", "plan.toml", "session.toml", "S1.csv", "S2.csv", "S3.csv", "S4.csv"),
     },
     Template {
         name: "hermle-c600u",
@@ -67,8 +67,8 @@ pub const TEMPLATES: &[Template] = &[
     },
     Template {
         name: "pose",
-        about: "six-axis robot before a camera system that reads poses, and before a tracker with range and angles; simulated readings",
-        files: files!("pose": "machine.toml", "session.toml", "tracker.toml", "body.csv", "target.csv"),
+        about: "six-axis robot before a camera system that reads poses, and before a tracker with range and angles; a plan, and simulated readings",
+        files: files!("pose": "machine.toml", "plan.toml", "session.toml", "tracker.toml", "body.csv", "target.csv"),
     },
     Template {
         name: "r-test",

@@ -7,6 +7,7 @@ use super::diagonals::{Box3, HIGH, LOW, body};
 use super::scatter::{OF_LEVEL, SQUARENESS, STATIONS, distance_data, level_data};
 use super::stands::{polar_data, pose_data};
 use super::*;
+use crate::suite::abbe;
 
 fn folder(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("sessions").join(name)
@@ -110,4 +111,28 @@ fn the_ready_session_of_diagonals_is_that_of_the_plant() {
     let mut truth: Vec<(&'static str, f64)> = SQUARENESS.iter().copied().zip(arcsec).collect();
     truth.extend([("EXX~X:p1", 3.6), ("EYY~Y:p1", -0.8), ("EZZ~Z:p1", 6.0), ("EXX~X:backlash", -1.2)]);
     assert_found("diagonals", "session.toml", &truth);
+}
+
+/// The ready plans determine each error to less than the smallest of the ready sessions, and give readings of which a fit identifies all
+/// parameters.
+#[test]
+fn the_ready_plans_determine_all_their_errors() {
+    for (name, errors) in [("angle", 6), ("diagonals", 6), ("distance", 3), ("pose", 5)] {
+        let place = tempfile::tempdir().unwrap();
+        let at = |file: &str| place.path().join(file).to_str().unwrap().to_string();
+        let plan = folder(name).join("plan.toml");
+        let of_plan = abbe(&["plan", plan.to_str().unwrap(), "--json", "-"]);
+        // The machines state no bodies.
+        let printed = String::from_utf8_lossy(&of_plan.stderr);
+        assert!(printed.lines().all(|line| line.contains("clearance is not checked")), "{name}: {printed}");
+        let of_plan: serde_json::Value = serde_json::from_slice(&of_plan.stdout).unwrap();
+        let rows = of_plan["errors"].as_array().unwrap();
+        assert_eq!(rows.len(), errors, "{name}");
+        assert!(rows.iter().all(|row| row["u"].as_f64().is_some_and(|u| u < 4.0)), "{name}: {rows:?}");
+        let simulated = abbe(&["simulate", plan.to_str().unwrap(), "--out", &at("run")]);
+        assert!(simulated.status.success(), "{name}: {}", String::from_utf8_lossy(&simulated.stderr));
+        let fit = abbe(&["fit", &at("run/session.toml"), "--json", "-"]);
+        let fit: serde_json::Value = serde_json::from_slice(&fit.stdout).unwrap();
+        assert_eq!(fit["rank"], fit["parameters"].as_array().unwrap().len(), "{name}");
+    }
 }
