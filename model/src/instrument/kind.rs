@@ -296,6 +296,12 @@ pub trait Instrument {
         let _ = values;
         None
     }
+    /// The direction in R to which it nominally points at a state of the axes, of unit length, if it reads directions of
+    /// the sky.
+    fn sight(&self, machine: &Machine, state: &[AxisPosition<f64>]) -> Option<[f64; 3]> {
+        let _ = (machine, state);
+        None
+    }
     /// Mirrors a measured position or pose in the instrument's frame.
     fn mirror(&self, values: &mut [f64]) {
         let _ = values;

@@ -166,6 +166,9 @@ impl Instrument for Pointing<f64> {
             *second = z.atan2(x.hypot(y));
         }
     }
+    fn sight(&self, machine: &Machine, state: &[AxisPosition<f64>]) -> Option<[f64; 3]> {
+        Some(self.nominal::<f64>(machine, state)[0].0)
+    }
     fn missing(&self, has: &dyn Fn(Quantity) -> bool) -> Option<Fault> {
         let column = COLUMNS.iter().find(|column| !has(column.quantity))?;
         let help = "pointing needs true_azimuth_deg and true_elevation_deg";
