@@ -12,6 +12,7 @@
 
 pub mod abscissa;
 pub mod paths;
+pub mod places;
 pub mod sensitivities;
 pub mod spectrum;
 
