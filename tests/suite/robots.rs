@@ -2,6 +2,7 @@
 
 use abbe::identify::fit::{prepare, report};
 use abbe::identify::results::FitResult;
+use abbe::identify::series::{self, places};
 use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
 use test_needs::data;
@@ -102,4 +103,31 @@ fn kuka_with_ball_and_sockets_only() {
     let in_sample = result.rms_3d_um.unwrap() * 1e-3;
     println!("KUKA, ball and sockets: {in_sample:.4} mm in sample");
     assert!((0.53..0.57).contains(&in_sample), "{in_sample}");
+}
+
+/// The cells of both views hold all poses that are not excluded: their mean squares make up the rms of the fit. The UR10
+/// moves its target through the workspace; the ball of the KUKA stays in six sockets, so its views are over joints.
+#[test]
+fn views_of_the_workspace_hold_every_pose() {
+    let name = "views_of_the_workspace_hold_every_pose";
+    let sets = [
+        ("ur10/session.toml", "landgraf_ur10", ["X", "Y", "X", "Z"], "mm"),
+        ("kuka-iiwa14/session.toml", "mukca", ["J1", "J3", "J5", "J6"], "deg"),
+    ];
+    for (session, folder, names, unit) in sets {
+        let Some(session) = session_on_public_data(name, session, folder) else { return };
+        let (problem, fit) = prepare(&session, 1).unwrap();
+        let result = report(&problem, &fit).unwrap();
+        let found = places::views(&problem, &series::views(&problem, &fit, None).unwrap());
+        assert_eq!(found.iter().flat_map(|view| view.names.clone()).collect::<Vec<_>>(), names);
+        for view in &found {
+            assert_eq!(view.unit, unit);
+            let poses: usize = view.cells.iter().map(|cell| cell.readings).sum();
+            assert_eq!(poses, result.readings);
+            let squares: f64 = view.cells.iter().map(|cell| cell.readings as f64 * cell.after * cell.after).sum();
+            let ratio = (squares / poses as f64).sqrt() / result.rms_3d_um.unwrap();
+            println!("{:?}: {poses} poses in {} cells, rms ratio {ratio}", view.names, view.cells.len());
+            assert!((ratio - 1.0).abs() < 1e-9);
+        }
+    }
 }

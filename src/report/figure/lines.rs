@@ -8,18 +8,67 @@ use super::svg::{Drawing, WIDTH, legend, shortened};
 use super::{Kind, Quantity};
 use crate::report::table::{Cell, Table, cells, numbers, words};
 
-/// Height of a drawing without its legend, SVG units.
-const HEIGHT: f64 = 254.0;
+/// Space of the tick labels and the label of the ordinate, SVG units.
 const LEFT: f64 = 62.0;
 const RIGHT: f64 = 16.0;
-/// Horizontal coordinates of the frame.
-const ACROSS: [f64; 2] = [LEFT, WIDTH - RIGHT];
-/// Vertical coordinates of the frame: of the minimum, of the maximum.
-const UP: [f64; 2] = [HEIGHT - 45.0, 12.0];
+const TOP: f64 = 12.0;
+/// Space of the tick labels and the label of the abscissa.
+const BELOW: f64 = 45.0;
 /// A series with fewer dots than this has larger dots.
 const SPARSE: usize = 150;
-/// The labels of flags to the right of this coordinate are aligned to the right.
-const LABEL_LIMIT: f64 = ACROSS[1] - 144.0;
+/// The labels of flags closer to the right edge of the frame than this are aligned to the right.
+const LABEL_LIMIT: f64 = 144.0;
+
+/// The size of a drawing with straight axes without its legend, SVG units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Size {
+    /// Width.
+    pub width: f64,
+    /// Height.
+    pub height: f64,
+}
+
+impl Size {
+    /// Two such drawings stand beside one another at 1,280 px.
+    pub const WIDE: Size = Size { width: WIDTH, height: 254.0 };
+    /// Three such drawings stand beside one another at 1,280 px.
+    pub const SMALL: Size = Size { width: PANEL, height: 225.0 };
+    /// As small, with a square frame.
+    pub const SQUARE: Size = Size { width: PANEL, height: PANEL - LEFT - RIGHT + TOP + BELOW };
+
+    /// The size of a drawing of this width, whose frame shows ranges of equal scale.
+    pub(super) fn of_equal_scales(width: f64, x: Scale, y: Scale) -> Size {
+        let range = |scale: Scale| scale.values[1] - scale.values[0];
+        let height = (width - LEFT - RIGHT) * range(y) / range(x);
+        Size { width, height: height + TOP + BELOW }
+    }
+
+    /// Horizontal coordinates of the frame.
+    fn across(self) -> [f64; 2] {
+        [LEFT, self.width - RIGHT]
+    }
+
+    /// Vertical coordinates of the frame: of the minimum, of the maximum.
+    fn up(self) -> [f64; 2] {
+        [self.height - BELOW, TOP]
+    }
+
+    /// Both axes in the frame.
+    pub(super) fn placed(self, x: &Axis, y: &Axis) -> [Placed; 2] {
+        [x.scale.between(self.across()), y.scale.between(self.up())]
+    }
+
+    /// Draws a legend below the frame. Returns it with the ordinate of its last line.
+    fn legend(self, entries: &[(String, String)]) -> (Markup, f64) {
+        match entries {
+            [] => (html! {}, self.height - 6.0),
+            _ => legend(entries, LEFT, self.height + 12.0, self.width - LEFT - RIGHT),
+        }
+    }
+}
+
+/// Width of a small drawing.
+const PANEL: f64 = 320.0;
 
 /// How the points of a series are drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,6 +81,8 @@ pub enum Mark {
     Stems(f64),
     /// Vertical strokes, each from an odd point to the next point.
     Bars,
+    /// Strokes in any direction, each from an odd point to the next point.
+    Vectors,
     /// Names at the top, each with a line down to its point.
     Flags,
 }
@@ -97,6 +148,9 @@ impl Series {
                 .chunks_exact(2)
                 .map(|pair| stroke(x.at(pair[0].0), y.at(pair[0].1) + 0.5, y.at(pair[1].1) - 0.5))
                 .collect(),
+            Mark::Vectors => {
+                self.points.chunks_exact(2).map(|pair| polyline(pair.iter().map(|p| (x.at(p.0), y.at(p.1))))).collect()
+            }
         }
     }
 
@@ -107,7 +161,7 @@ impl Series {
             Mark::Dots if self.points.len() < SPARSE => " dots sparse",
             Mark::Dots => " dots",
             Mark::Stems(_) => " stem",
-            Mark::Bars => " bars",
+            Mark::Bars | Mark::Vectors => " bars",
             Mark::Line | Mark::Flags => "",
         };
         format!("run {}{test}{mark}", self.class)
@@ -117,7 +171,7 @@ impl Series {
     fn key(&self) -> String {
         let mark = match self.mark {
             Mark::Dots => " dots",
-            Mark::Bars => " bars",
+            Mark::Bars | Mark::Vectors => " bars",
             _ => "",
         };
         format!("{}{mark}", self.class)
@@ -128,11 +182,12 @@ impl Series {
         html! {
             @if self.mark == Mark::Flags {
                 @for (number, ((at, top), flag)) in self.named().enumerate() {
-                    @let (at, top, baseline) = (x.at(*at), y.at(*top), UP[1] + 12.0 + 12.0 * (number % 3) as f64);
-                    @let (class, beside) = if at > LABEL_LIMIT { ("small right", -4.0) } else { ("small", 4.0) };
+                    @let frame_top = y.coordinates[1];
+                    @let (at, top, baseline) = (x.at(*at), y.at(*top), frame_top + 12.0 + 12.0 * (number % 3) as f64);
+                    @let (class, beside) = if at > x.coordinates[1] - LABEL_LIMIT { ("small right", -4.0) } else { ("small", 4.0) };
                     path class="found-line"
                         d=(polyline([(at, (top - 3.0).max(baseline + 2.0)), (at, baseline + 2.0)])) {}
-                    path class="found" d=(format!("M{} {}l-4 8h8z", coordinate(at), UP[0])) {}
+                    path class="found" d=(format!("M{} {}l-4 8h8z", coordinate(at), y.coordinates[0])) {}
                     text class=(class) x=(coordinate(at + beside)) y=(coordinate(baseline)) {
                         title { (flag.text) } (name(flag, 24))
                     }
@@ -192,6 +247,8 @@ pub struct Lines {
     pub y: Axis,
     /// Series, in drawing order.
     pub series: Vec<Series>,
+    /// Its size.
+    pub size: Size,
     /// The readings behind it. `None` for a static chart.
     pub live: Option<Live>,
 }
@@ -199,7 +256,13 @@ pub struct Lines {
 impl Lines {
     /// A static chart.
     pub fn new(x: Axis, y: Axis, series: Vec<Series>) -> Lines {
-        Lines { x, y, series, live: None }
+        Lines { x, y, series, size: Size::WIDE, live: None }
+    }
+
+    /// The same in another size.
+    #[must_use]
+    pub fn sized(self, size: Size) -> Lines {
+        Lines { size, ..self }
     }
 }
 
@@ -231,32 +294,28 @@ pub(super) fn table(series: &[Series], x: &Quantity, y: &Quantity) -> Table {
 }
 
 /// Draws the frame, the grid, the tick labels and the labels of the axes.
-fn frame(x: &Placed, y: &Placed, [x_label, y_label]: [String; 2]) -> Markup {
+pub(super) fn frame(x: &Placed, y: &Placed, [x_label, y_label]: [String; 2]) -> Markup {
+    let ([left, right], [bottom, top]) = (x.coordinates, y.coordinates);
     html! {
         @for (at, label) in y.ticks() {
-            path class="grid" d=(format!("M{} {}H{}", ACROSS[0], coordinate(at), ACROSS[1])) {}
-            text class="small soft right tick" x=(ACROSS[0] - 6.0) y=(coordinate(at + 4.0)) { (label) }
+            path class="grid" d=(format!("M{left} {}H{right}", coordinate(at))) {}
+            text class="small soft right tick" x=(left - 6.0) y=(coordinate(at + 4.0)) { (label) }
         }
         @for (at, label) in x.ticks() {
             @let at = coordinate(at);
-            path class="grid" d=(format!("M{at} {}V{}", UP[0], UP[1])) {}
-            text class="small soft middle" x=(at) y=(UP[0] + 16.0) { (label) }
+            path class="grid" d=(format!("M{at} {bottom}V{top}")) {}
+            text class="small soft middle" x=(at) y=(bottom + 16.0) { (label) }
         }
-        rect class="frame" x=(ACROSS[0]) y=(UP[1]) width=(ACROSS[1] - ACROSS[0]) height=(UP[0] - UP[1]) {}
-        text class="middle" x=((ACROSS[0] + ACROSS[1]) / 2.0) y=(UP[0] + 36.0) { (x_label) }
-        text class="middle" transform=(format!("translate(14 {}) rotate(-90)", (UP[0] + UP[1]) / 2.0)) { (y_label) }
+        rect class="frame" x=(left) y=(top) width=(right - left) height=(bottom - top) {}
+        text class="middle" x=((left + right) / 2.0) y=(bottom + 36.0) { (x_label) }
+        text class="middle" transform=(format!("translate(14 {}) rotate(-90)", (bottom + top) / 2.0)) { (y_label) }
     }
 }
 
 impl Kind for Lines {
     fn drawing(&self) -> Drawing {
-        let (x, y) = (self.x.scale.between(ACROSS), self.y.scale.between(UP));
-        let entries = entries(&self.series);
-        let (keys, bottom) = if entries.is_empty() {
-            (html! {}, HEIGHT - 6.0)
-        } else {
-            legend(&entries, LEFT, HEIGHT + 12.0, WIDTH - LEFT - RIGHT)
-        };
+        let [x, y] = self.size.placed(&self.x, &self.y);
+        let (keys, bottom) = self.size.legend(&entries(&self.series));
         let inner = html! {
             (frame(&x, &y, [self.x.quantity.label(), self.y.quantity.label()]))
             @for series in &self.series { (series.drawing(&x, &y)) }
@@ -271,7 +330,7 @@ impl Kind for Lines {
             })
             .to_string()
         });
-        Drawing { size: [WIDTH, bottom + 10.0], inner, interaction }
+        Drawing { size: [self.size.width, bottom + 10.0], inner, interaction }
     }
 
     fn table(&self) -> Table {

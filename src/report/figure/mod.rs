@@ -1,12 +1,13 @@
 //! Figures as data: what a chart shows, with its title, caption and units. Nothing here draws.
 //!
-//! One file per kind of chart ([`lines`], [`bars`], [`matrix`], [`polar`], [`chain`], [`machine`],
+//! One file per kind of chart ([`lines`], [`bars`], [`bubbles`], [`matrix`], [`polar`], [`chain`], [`machine`],
 //! [`set_up`]) holds the data of the kind, its
 //! table and its drawing. Printers: [`svg`] draws a figure inside the report or as a file; `png` (feature `png`) draws
 //! that file as pixels; [`pdf`] draws it for LaTeX; [`Figure::table`] gives the data as one tidy table, which
 //! [`crate::printers::csv`] writes. A further kind is one file and one variant of [`Chart`].
 
 pub mod bars;
+pub mod bubbles;
 pub mod chain;
 pub mod lines;
 pub mod machine;
@@ -47,6 +48,8 @@ pub enum Chart {
     Values(bars::Values),
     /// Bars from zero, one row per name.
     Bars(bars::Bars),
+    /// Two sizes over two straight axes of equal scale.
+    Bubbles(bubbles::Bubbles),
     /// A symmetric matrix, such as a correlation.
     Matrix(matrix::Matrix),
     /// Deviations about a nominal circle.
@@ -80,6 +83,7 @@ impl Figure {
             Chart::Lines(kind) => kind,
             Chart::Values(kind) => kind,
             Chart::Bars(kind) => kind,
+            Chart::Bubbles(kind) => kind,
             Chart::Matrix(kind) => kind,
             Chart::Polar(kind) => kind,
             Chart::Panels(kind) => kind,

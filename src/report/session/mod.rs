@@ -1,6 +1,7 @@
 //! The readings of a session as figures, and the sections of them that several reports share: residuals, traces,
 //! correlations, sensitivities, the machine.
 //!
+//! - [`sky`], [`workspace`]: residuals where independent poses are;
 //! - [`plots`]: deviations and residuals of each test; [`curves`]: derived quantities; [`residuals`]: their section;
 //! - [`abscissae`]: what they are plotted against; [`decimate`]: decimation that keeps extremes;
 //! - [`embed`]: data of the interactive figures of a page.
@@ -11,6 +12,8 @@ pub mod decimate;
 pub mod embed;
 pub mod plots;
 pub mod residuals;
+pub mod sky;
+pub mod workspace;
 
 use abbe::identify::IdentifyError;
 use abbe::identify::fit::Fit;

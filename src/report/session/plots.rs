@@ -5,7 +5,7 @@ use abbe::identify::series::{SessionSeries, TestSeries, is_round, lengths};
 
 use super::abscissae::{PlotAxis, axes_of};
 use super::decimate;
-use crate::report::figure::lines::{Axis, Lines, Live, Mark, Series};
+use crate::report::figure::lines::{Axis, Lines, Live, Mark, Series, Size};
 use crate::report::figure::polar::{DIVISIONS, Polar, division_um};
 use crate::report::figure::scale::{Scale, round_up, span};
 use crate::report::figure::{Chart, Figure, Quantity};
@@ -41,6 +41,15 @@ impl Column {
             Column::Deviation => "deviation",
             Column::Before => "before",
             Column::After => "after",
+        }
+    }
+
+    /// CSS class of its residual in a traversal.
+    fn class(self, backward: bool) -> &'static str {
+        match (self, backward) {
+            (Column::Before, true) => "before back",
+            (Column::After, true) => "after back",
+            _ => self.name(),
         }
     }
 
@@ -237,13 +246,19 @@ impl<'d> SessionPlots<'d> {
         };
         let is_pose = test.stretches.iter().any(|stretch| stretch.forward.is_none());
         let mark = if is_pose { Mark::Dots } else { Mark::Line };
+        let directions = [Some(true), Some(false)];
+        let both_ways = directions.iter().all(|way| test.stretches.iter().any(|stretch| stretch.forward == *way));
         let series = columns.iter().zip(values).flat_map(|(column, values)| {
             test.stretches.iter().enumerate().map(move |(k, stretch)| {
-                let class = if is_deviation { class_of(stretch.forward) } else { column.name() };
+                let backward = both_ways && stretch.forward == Some(false);
+                let class = if is_deviation { class_of(stretch.forward) } else { column.class(backward) };
                 let label = match (is_deviation, columns) {
-                    (true, _) if is_pose => "pose",
-                    (false, [_]) => "",
-                    _ => class,
+                    (true, _) if is_pose => "pose".to_string(),
+                    (true, _) => class.to_string(),
+                    (false, [_]) if backward => "backward".to_string(),
+                    (false, [_]) => String::new(),
+                    (false, _) if backward => format!("{}, backward", column.name()),
+                    (false, _) => column.name().to_string(),
                 };
                 let points = self.points(number, k, abscissa, values);
                 Series { source: Some((k, column.name())), ..Series::new(label, class, mark, points) }
@@ -259,6 +274,7 @@ impl<'d> SessionPlots<'d> {
             x: Axis::new(&axis.name, axis.unit, Scale::of_axis(span(abscissa.iter().copied()), axis.is_angle)),
             y: Axis::new(quantity, self.series.unit.name(), y),
             series: series.collect(),
+            size: Size::WIDE,
             live: Some(Live {
                 test: number,
                 column: columns[0].name(),

@@ -3,8 +3,8 @@
 use abbe::identify::series::spectrum::Spectrum;
 use abbe::model::words::counted;
 
-use super::curves;
 use super::plots::{MAX_TESTS, SessionPlots};
+use super::{curves, sky, workspace};
 use crate::report::block::{Report, Text};
 use crate::report::figure::Figure;
 use crate::report::number::{integer, micrometres};
@@ -19,6 +19,16 @@ pub fn figures(report: &mut Report, session: &SessionPlots<'_>, spectra: &[Spect
         let polar = session.polar_residuals(number, models).unwrap_or_default();
         polar.into_iter().chain(straight(session, number, spectra, maximum)).collect()
     };
+    let places = [("On the sky", sky::panels(session)), ("Over the workspace", workspace::views(session))];
+    let mut places = places.into_iter().filter(|(_, drawn)| !drawn.is_empty()).peekable();
+    let has_places = places.peek().is_some();
+    for (heading, drawn) in places {
+        report.page(Text::Heading(heading.to_string()));
+        report.figures(drawn);
+    }
+    if has_places {
+        report.page(Text::Heading("Each test".to_string()));
+    }
     let (affected, folded) = unaffected(session);
     for number in affected {
         if is_polar {
