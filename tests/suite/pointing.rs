@@ -1,6 +1,7 @@
 //! Pointing observations: the reading against rotation matrices, the stars of two telescopes against the fits of TPOINT.
 
 mod anew;
+mod hysteresis;
 mod panels;
 mod precession;
 

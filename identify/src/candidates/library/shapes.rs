@@ -20,6 +20,8 @@ const HARMONIC_LOW: &str = "harmonic-low";
 const LOW_ORDER: usize = 2;
 /// The orders of gears of an axis about itself, for independent poses that read positions.
 const HARMONIC_OF_GEARS: &str = "harmonic-of-gears";
+/// The lost motion of an axis about itself by the direction of its last move, for observed directions.
+const HYSTERESIS_OF_MOUNTS: &str = "hysteresis-of-mounts";
 /// A power of the driver.
 const POWER: &str = "power";
 
@@ -28,7 +30,8 @@ type Member = (Shape, Vec<String>, f64);
 
 /// Whether a family can have this shape.
 pub(super) fn is_known(word: &str) -> bool {
-    [CONSTANT_PER_MOUNT, HARMONIC_LOW, HARMONIC_OF_GEARS].contains(&word) || Shape::entry_of(word).is_some()
+    [CONSTANT_PER_MOUNT, HARMONIC_LOW, HARMONIC_OF_GEARS, HYSTERESIS_OF_MOUNTS].contains(&word)
+        || Shape::entry_of(word).is_some()
 }
 
 /// Shapes of a family for a component and a driver.
@@ -47,6 +50,11 @@ pub(super) fn shapes(
         let is_robot = sampling.is_poses() && !sampling.reads_directions;
         let orders = if is_robot { Harmonic::of_gears() } else { Vec::new() };
         return orders.into_iter().map(|(shape, cost)| (shape, Vec::new(), cost)).collect();
+    }
+    if family.shape == HYSTERESIS_OF_MOUNTS {
+        let axis = driver.axis(&problem.session.machine);
+        let reverses = sampling.reads_directions && axis.is_some_and(|axis| sampling.both_directions[axis]);
+        return if reverses { vec![(Shape::Backlash, Vec::new(), 0.0)] } else { Vec::new() };
     }
     let mut sampled = sampled(problem, sampling, component, driver);
     let members_of = |word: &str, sampled: &Sampled| {
