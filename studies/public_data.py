@@ -1,4 +1,5 @@
-"""Writes docs/validation/public-data.md: what Abbe finds in public measurements, with the commands.
+"""Writes docs/validation/public-data.md and the figures in docs/validation/public-data: what Abbe finds in public
+measurements, with the commands.
 
     cargo build --release
     python studies/public_data.py --data FOLDER
@@ -28,20 +29,26 @@ SESSIONS = ROOT / "sessions"
 PAGE = ROOT / "docs" / "validation" / "public-data.md"
 # The terms of the set-up of a mount: IA, IE, AW, AN. CA is the line of sight, which every session estimates.
 SET_UP = ["EC0AZ", "EB0EL", "EA0AZ", "EB0AZ"]
+# The nine panels of a mount on two axes.
+PANELS = [f"sky-{channel}-over-{over}" for channel in ("across", "up") for over in ("azimuth", "elevation", "order")]
+PANELS += ["sky-map", "sky-scatter", "sky-distribution"]
 AUXTEL = "AT_point_data_20220406_tw004_corr.dat"
 
 
 class Runs:
     """Runs the command, and keeps what it ran and how long it took."""
 
-    def __init__(self, command, folder):
-        self.command, self.folder, self.total_s = command, folder, 0.0
+    def __init__(self, command, folder, figures):
+        self.command, self.folder, self.figures, self.total_s = command, folder, figures, 0.0
 
-    def abbe(self, *arguments):
-        """The JSON document of a command, with the seconds that it took."""
+    def abbe(self, *arguments, plots=False):
+        """The JSON document of a command, with the seconds that it took; with `plots`, its figures for `drawn`."""
         file = self.folder / "result.json"
         file.unlink(missing_ok=True)
         call = [str(self.command), *map(str, arguments), "--json", str(file), "--quiet"]
+        if plots:
+            shutil.rmtree(self.folder / "plots", ignore_errors=True)
+            call += ["--plots", "plots"]
         start = time.monotonic()
         done = subprocess.run(call, cwd=self.folder, capture_output=True, text=True)
         taken = time.monotonic() - start
@@ -49,6 +56,19 @@ class Runs:
         if done.returncode != 0 or not file.exists():
             raise SystemExit(f"{' '.join(call)}\n{done.stderr}")
         return json.loads(file.read_text(encoding="utf-8")), taken
+
+    def drawn(self, data_set, names):
+        """Keeps figures of the last command with plots beside the page, and shows them."""
+        self.figures.mkdir(parents=True, exist_ok=True)
+        for old in self.figures.glob(f"{data_set}-*.svg"):
+            old.unlink()
+        shown = []
+        for name in names:
+            drawing = (self.folder / "plots" / f"{name}.svg").read_text(encoding="utf-8")
+            (self.figures / f"{data_set}-{name}.svg").write_text(drawing + "\n", encoding="utf-8")
+            title = " ".join(re.findall(r'class="title"[^>]*>([^<]*)<', drawing))
+            shown.append(f"![{title}]({self.figures.name}/{data_set}-{name}.svg)")
+        return "\n".join(shown) + "\n"
 
     def session(self, name, text, folder):
         """A session file beside a machine file."""
@@ -144,7 +164,7 @@ def telescopes(runs, data):
     traced = {}
     for most in (3, None):
         limit = ["--max-effects", most] if most else []
-        trace, taken = runs.abbe("trace", five, "--data", auxtel, *limit)
+        trace, taken = runs.abbe("trace", five, "--data", auxtel, *limit, plots=True)
         name = "`trace`" + (f", at most {most} effects" if most else ", until nothing more lowers the held-out error")
         if not traced:
             before = trace["before"]
@@ -152,6 +172,7 @@ def telescopes(runs, data):
         rows.append([name, trace["after"]["parameter_count"], trace["readings"], *sky_figures(trace["after"]), f"{taken:.1f} s"])
         traced[most] = trace
     trace = traced[None]
+    panels = runs.drawn("auxtel", PANELS)
     columns = ["model", "parameters", "stars", "in sample, ″", "interpolation, ″", "left-out regions, ″", "time"]
     found = stars(auxtel / AUXTEL)
     outliers = [outlier["line"] for outlier in trace["outliers"]]
@@ -174,7 +195,9 @@ def telescopes(runs, data):
         f" {sky_six:.2f}″ for six terms on {n_six} stars and {sky_auto:.2f}″ for {len(terms_auto)} automatic terms on {n_auto} stars.\n",
         table(columns, rows),
         f"\n`trace` adds: {in_words(trace['effects'])}. Beside the first two effects it excludes {len(outliers)} star as an"
-        f" outlier, in line {', '.join(map(str, outliers)) or 'none'} of the file.\n",
+        f" outlier, in line {', '.join(map(str, outliers)) or 'none'} of the file. The stars before (set-up) and after (with"
+        " these effects):\n",
+        panels,
     ]
     names = [name for name, *_ in terms_auto]
     whole = linear_fit(found, names)
@@ -251,10 +274,12 @@ def nights(runs, source, own, auxtel, mmt):
     validated("MMT, NPAE, TF, TX", mmt, own["mmt"], "2023-07", "point_20230702.dat", "2021-08", "point_20210821.dat")
     columns = ["machine, terms", "model of", "stars of", "stars", "model, set-up anew, ″", "set-up alone, ″", "verdict", "moved"]
     text = "The set-up (IA, IE, AN, AW, CA) is estimated anew; the other terms are those of the model. Sky rms.\n"
-    searched = []
+    searched, panels = [], ""
     for night, file in (("2021-08", "point_20210821.dat"), ("2023-07", "point_20230702.dat")):
         session = runs.session("mmt-five.toml", set_up_alone("mmt", own["mmt"]).replace("point_20210821.dat", file), source)
-        trace, taken = runs.abbe("trace", session, "--data", mmt)
+        trace, taken = runs.abbe("trace", session, "--data", mmt, plots=True)
+        if trace["effects"]:
+            panels += f"\nThe stars of {night} before and after:\n\n" + runs.drawn(f"mmt-{night}", PANELS)
         for name, of in (("set-up", trace["before"]), ("`trace`", trace["after"])):
             effects = in_words(trace["effects"]) if of is trace["after"] else ""
             searched.append([night, name, of["parameter_count"], *sky_figures(of), effects])
@@ -262,7 +287,7 @@ def nights(runs, source, own, auxtel, mmt):
         text,
         table(columns, rows),
         "\n## MMT, `trace` from the set-up\n",
-        table(["night", "model", "parameters", "in sample, ″", "interpolation, ″", "left-out regions, ″", "effects"], searched) + "\n",
+        table(["night", "model", "parameters", "in sample, ″", "interpolation, ″", "left-out regions, ″", "effects"], searched) + "\n" + panels,
     ]
 
 
@@ -292,7 +317,8 @@ def linear_axis(runs, data):
 
     whole = write("linear-axis", cycles)
     fit, _ = runs.abbe("fit", whole)
-    trace, taken = runs.abbe("trace", whole)
+    trace, taken = runs.abbe("trace", whole, plots=True)
+    drawn = runs.drawn("linear-axis", ["residual-X-over-X"])
     # Every cycle is predicted by the model that a trace of the others finds.
     squares, nominal, names, readings = 0.0, 0.0, [], 0
     for left in cycles:
@@ -317,6 +343,7 @@ def linear_axis(runs, data):
         table(["model", "parameters", "in sample, µm", "left-out runs, µm", "left-out cycles, search repeated and zero anew, µm"], rows),
         f"\n`trace` finds: {in_words(trace['effects'])}. Without each cycle it finds {'; '.join(sorted(set(names)))}."
         f" Verdict `{trace['verdict']}`: " + (f"{remains['where']} remains (p ≤ {remains['p_value']:.3f})." if remains["structured"] else "no structure remains.") + f" {taken:.1f} s.\n",
+        drawn,
     ])
 
 
@@ -329,13 +356,14 @@ def robots(runs, data):
     columns = ["model", "in sample, mm", "interpolation, mm", "left-out blocks of joint space, mm", "next session, mm", "time"]
     length = lambda of, key: figure(of[f"{key}_um"] * 1e-3, 3) if of.get(f"{key}_um") is not None else "–"
     figures = lambda of: [length(of, key) for key in ("rms_3d", "interpolation_rms_3d", "extrapolation_rms_3d")]
+    before_and_after = "\n\nRms length of the residual before (location errors) and after (with these effects):\n\n"
     if ur10.exists():
         text = (SESSIONS / "ur10" / "session.toml").read_text(encoding="utf-8")
         session = runs.session("ur10.toml", text, SESSIONS / "ur10")
         second = re.sub(r"Series_A.measurements_grid", "Series_B/measurements_joint_configurations", text)
         series_b = runs.session("ur10-b.toml", second, SESSIONS / "ur10")
         fit, fit_s = runs.abbe("fit", session, "--data", data, "--save", "ur10-fit.json")
-        trace, trace_s = runs.abbe("trace", session, "--data", data, "--save", "ur10.json")
+        trace, trace_s = runs.abbe("trace", session, "--data", data, "--save", "ur10.json", plots=True)
         judged, _ = runs.abbe("validate", "ur10.json", series_b, "--data", data)
         rows = [
             ["location errors", *figures(fit), length(judged["locations"], "rms_3d"), f"{fit_s:.1f} s"],
@@ -344,19 +372,21 @@ def robots(runs, data):
         parts.append(
             f"## UR10 before a laser tracker\n\n{fit['readings']} poses of Series A; the next session is Series B, {judged['readings']} poses,"
             f" nominal {length(judged['nominal'], 'rms_3d')} mm, verdict `{judged['verdict']}`. Rms of the 3-vector.\n\n"
-            + table(columns, rows) + f"\n\n`trace` finds: {in_words(trace['effects'])}.\n"
+            + table(columns, rows) + f"\n\n`trace` finds: {in_words(trace['effects'])}." + before_and_after
+            + runs.drawn("ur10", ["residual-over-X-Y", "residual-over-X-Z"])
         )
     if kuka.exists():
         session = runs.session("kuka.toml", (SESSIONS / "kuka-iiwa14" / "session.toml").read_text(encoding="utf-8"), SESSIONS / "kuka-iiwa14")
         fit, fit_s = runs.abbe("fit", session, "--data", data)
-        trace, trace_s = runs.abbe("trace", session, "--data", data)
+        trace, trace_s = runs.abbe("trace", session, "--data", data, plots=True)
+        over_joints = sorted(file.stem for file in (runs.folder / "plots").glob("residual-over-J*.svg"))
         rows = [
             ["location errors", *figures(fit), "–", f"{fit_s:.1f} s"],
             ["`trace`", *figures(trace["after"]), "–", f"{trace_s:.1f} s"],
         ]
         parts.append(
             f"## KUKA iiwa 14 in sockets\n\n{fit['readings']} poses, rms of the 3-vector.\n\n" + table(columns, rows)
-            + f"\n\n`trace` finds: {in_words(trace['effects'])}.\n"
+            + f"\n\n`trace` finds: {in_words(trace['effects'])}." + before_and_after + runs.drawn("kuka", over_joints)
         )
     return "\n".join(parts) or None
 
@@ -409,7 +439,7 @@ def main():
     if not data.is_dir():
         parser.error(f"{data} is no folder")
     with tempfile.TemporaryDirectory() as folder:
-        runs = Runs(command.resolve(), Path(folder))
+        runs = Runs(command.resolve(), Path(folder), options.out.parent / options.out.stem)
         parts, missing = [], []
         for name, of in (("telescopes", telescopes), ("linear axis", linear_axis), ("robots", robots)):
             part = of(runs, data)
