@@ -17,6 +17,7 @@
 
 mod estimate;
 
+use faer::linalg::solvers::Llt;
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::prelude::Solve;
 use faer::{Mat, Par, Side};
@@ -292,8 +293,10 @@ impl FoldEquations {
     /// The model with given scales, variance and inflation.
     fn model(&self, precisions: Vec<f64>, variance: f64, inflation: f64) -> Result<Scales, IdentifyError> {
         let posterior = self.equations.posterior(inflation * variance, &precisions)?;
-        let of_folds = self.held_out(inflation * variance, &precisions)?;
-        let held_out = of_folds.into_iter().map(|(square, _)| square).collect();
+        let of_folds = parallel::map(self.folds.len(), &|k| {
+            Ok(self.residual_without(k, inflation * variance, &precisions)?.0.squared_norm_l2())
+        });
+        let held_out = of_folds.into_iter().collect::<Result<_, IdentifyError>>()?;
         Ok(Scales { precisions, variance, inflation, posterior, held_out })
     }
 
@@ -323,15 +326,26 @@ impl FoldEquations {
 
     /// Sum of squares of a fold's residual under the model without it, and the sum of its variances from the parameters.
     fn without(&self, k: usize, variance: f64, precisions: &[f64]) -> Result<(f64, f64), IdentifyError> {
+        let (residual, factor) = self.residual_without(k, variance, precisions)?;
+        let mut along = self.folds[k].rows.transpose().to_owned();
+        solve_lower_triangular_in_place(factor.L(), along.as_mut(), Par::Seq);
+        Ok((residual.squared_norm_l2(), along.squared_norm_l2()))
+    }
+
+    /// A fold's residual under the model without it, and the Cholesky factor of the information of that model.
+    fn residual_without(
+        &self,
+        k: usize,
+        variance: f64,
+        precisions: &[f64],
+    ) -> Result<(Mat<f64>, Llt<f64>), IdentifyError> {
         let fold = &self.folds[k];
         let information = self.equations.information(variance, precisions) - &fold.gram * faer::Scale(1.0 / variance);
         let factor = information.llt(Side::Lower).map_err(|_| IdentifyError::Decomposition)?;
         let right = self.equations.right_side(variance);
         let right = Mat::from_fn(right.len(), 1, |j, _| right[j] - fold.projection[j] / variance);
         let residual = &fold.y - &fold.rows * factor.solve(&right);
-        let mut along = fold.rows.transpose().to_owned();
-        solve_lower_triangular_in_place(factor.L(), along.as_mut(), Par::Seq);
-        Ok((residual.squared_norm_l2(), along.squared_norm_l2()))
+        Ok((residual, factor))
     }
 
     /// The parameters at the posterior mean, in internal units.

@@ -37,7 +37,7 @@ pub use assume::assume;
 pub(crate) use covariance::{null_space, of_parameters as covariance_of_parameters};
 pub use numbers::NumberInterval;
 pub use prepare::{prepare, with_lever};
-pub(crate) use prepare::{prepare_with, refit, with_families};
+pub(crate) use prepare::{prepare_with, refit, with_families, with_families_linearised};
 pub(crate) use quantities::{Quantity, quantities, values_at};
 pub(crate) use reported::{ids, rms_of_units};
 pub use reported::{outliers, parameters, report, unobservable};
@@ -118,6 +118,32 @@ impl LeastSquares for IdentifiableDirections<'_> {
 /// If there are no parameters, the model cannot be evaluated, or the iterations do not converge.
 pub fn fit(problem: &Problem, start: Option<&[f64]>) -> Result<Fit, IdentifyError> {
     finish(problem, minimum(problem, start)?)
+}
+
+/// The readings near the minimum: the triangular factors of the folds at some parameters.
+pub(crate) struct Linearisation {
+    /// The parameters, in internal units.
+    pub beta: Vec<f64>,
+    /// The factors, whitened with this noise.
+    pub triangles: Vec<Triangle>,
+    /// Standard deviation of a reading, mm.
+    pub noise_mm: f64,
+}
+
+/// The fit whose minimum `beta` is that of a linearisation, without another one.
+///
+/// # Errors
+/// If the model cannot be evaluated.
+pub(crate) fn linearised(problem: &Problem, beta: Vec<f64>, near: Linearisation) -> Result<Fit, IdentifyError> {
+    let (rank, _) = rank_at_nominal(problem)?;
+    let coordinates = rank.coordinates(&beta, &problem.parameters.sizes());
+    let basis = &rank.identifiable_basis;
+    let beta: Vec<f64> =
+        (0..beta.len()).map(|j| (0..basis.ncols()).map(|k| basis[(j, k)] * coordinates[k]).sum()).collect();
+    let step: Vec<f64> = beta.iter().zip(&near.beta).map(|(end, start)| end - start).collect();
+    let factor = near.noise_mm / problem.noise.likelihood_mm();
+    let triangles = near.triangles.iter().map(|triangle| triangle.after(&step).scaled(factor)).collect();
+    finish(problem, Minimum { beta, triangles, rank })
 }
 
 /// The minimum of the sum of squares of readings and priors.

@@ -7,9 +7,9 @@ use abbe_model::session::Session;
 use abbe_model::session::limits::MIN_UM;
 use faer::Mat;
 
-use super::Fit;
 use super::families::{FoldEquations, families};
 use super::numbers::{fit_with_numbers, intervals};
+use super::{Fit, Linearisation};
 use crate::error::IdentifyError;
 use crate::heldout::{rms_by_unit_mm, rms_mm};
 use crate::noise::outliers;
@@ -183,13 +183,32 @@ fn settled(mut problem: Problem, stated: bool, floor: f64) -> Result<(Problem, F
 ///
 /// # Errors
 /// See [`prepare`].
-pub(crate) fn with_families(mut problem: Problem, mut start: Vec<f64>) -> Result<(Problem, Fit), IdentifyError> {
+pub(crate) fn with_families(problem: Problem, start: Vec<f64>) -> Result<(Problem, Fit), IdentifyError> {
+    in_turn_with_families(problem, start, |problem, beta: Vec<f64>, _| super::fit(problem, Some(&beta)))
+}
+
+/// The same without iterations of the fit: a search compares many models, between which the parameters change by so little
+/// that the readings are linear in them. `start` is near the minimum.
+///
+/// # Errors
+/// See [`prepare`].
+pub(crate) fn with_families_linearised(problem: Problem, start: Vec<f64>) -> Result<(Problem, Fit), IdentifyError> {
+    in_turn_with_families(problem, start, super::linearised)
+}
+
+/// Estimates scales and noise, and fits by `fit` from the estimates, in turn with the outliers.
+fn in_turn_with_families(
+    mut problem: Problem,
+    mut start: Vec<f64>,
+    fit: impl Fn(&Problem, Vec<f64>, Linearisation) -> Result<Fit, IdentifyError>,
+) -> Result<(Problem, Fit), IdentifyError> {
     let mut round = 0;
     loop {
-        let equations = FoldEquations::of(&problem, &start, &problem.triangles(&start)?);
+        let (triangles, noise_mm) = (problem.triangles(&start)?, problem.noise.likelihood_mm());
+        let equations = FoldEquations::of(&problem, &start, &triangles);
         let scales = equations.estimate()?;
         equations.apply(&scales, &mut problem);
-        let found = super::fit(&problem, Some(&equations.beta(&scales)))?;
+        let found = fit(&problem, equations.beta(&scales), Linearisation { beta: start, triangles, noise_mm })?;
         let rejected = outliers::reject(&problem, &found.residuals);
         round += 1;
         if rejected == problem.rejected || round == MAX_ROUNDS {

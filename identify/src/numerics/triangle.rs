@@ -46,12 +46,20 @@ impl Triangle {
         }
         let kept = self.factor.nrows();
         let width = self.columns + 1;
+        // Small blocks (folds of many tests) are collected until they are twice as many as the columns, then reduced
+        // together. The factor grows by doubling, so that a block does not copy those before it.
+        if kept + block.nrows() <= 2 * width {
+            if self.factor.col_stride().unsigned_abs() < kept + block.nrows() {
+                self.factor.reserve((kept + block.nrows()).max((2 * kept).min(2 * width)), width);
+            }
+            self.factor.resize_with(kept + block.nrows(), width, |_, _| 0.0);
+            self.factor.get_mut(kept.., ..).copy_from(block);
+            return;
+        }
         let mut stacked = Mat::zeros(kept + block.nrows(), width);
         stacked.get_mut(..kept, ..).copy_from(&self.factor);
         stacked.get_mut(kept.., ..).copy_from(block);
-        // Small blocks (folds of many tests) are collected until they are as many as the columns, then reduced
-        // together.
-        self.factor = if stacked.nrows() <= 2 * width { stacked } else { upper(stacked) };
+        self.factor = upper(stacked);
     }
 
     /// Rows of `[J | r]` with the same normal matrix as the absorbed rows: any number × (parameters + 1).
@@ -113,6 +121,11 @@ impl Triangle {
             moved.factor[(i, self.columns)] -= predicted;
         }
         moved
+    }
+
+    /// The factor of the rows times a number.
+    pub fn scaled(&self, by: f64) -> Triangle {
+        Triangle { columns: self.columns, factor: &self.factor * faer::Scale(by) }
     }
 
     /// The sum of squares of the residuals.

@@ -19,7 +19,7 @@ use abbe_model::driver::Driver;
 use abbe_model::effect::shape::Harmonic;
 use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::session::readings::Readings;
-use faer::{Col, Mat, MatRef};
+use faer::{Mat, MatRef};
 
 use super::remainder::Structure;
 use crate::candidates::columns::Columns;
@@ -31,6 +31,8 @@ use crate::problem::Problem;
 const MIN_POSES: usize = 20;
 /// Maximum number of poses that look for their nearest pose, and that are sorted by a joint.
 const MAX_POSES: usize = 4000;
+/// Number of null draws that are projected together.
+const DRAWS_AT_ONCE: usize = 32;
 
 /// Tests the residual of a model, given by its orthonormal columns, for dependence between neighbouring poses. `None` if the
 /// readings are not of independent poses, or of too few.
@@ -39,7 +41,7 @@ pub fn structure(
     columns: &Columns<'_>,
     model: MatRef<'_, f64>,
     residual: &[f64],
-    null: impl Iterator<Item = Vec<f64>>,
+    mut null: impl Iterator<Item = Vec<f64>>,
 ) -> Option<Structure> {
     let poses = Poses::of(problem, columns);
     if poses.rows.len() < MIN_POSES {
@@ -48,12 +50,19 @@ pub fn structure(
     let statistics = poses.statistics(problem, columns);
     let found: Vec<f64> = statistics.iter().map(|one| one.correlation(residual)).collect();
     let mut drawn: Vec<Vec<f64>> = vec![Vec::new(); statistics.len()];
-    for draw in null {
-        let draw = Col::from_fn(draw.len(), |i| draw[i]);
-        let remaining = &draw - model * (model.transpose() * &draw);
-        let remaining: Vec<f64> = remaining.iter().copied().collect();
-        let correlations = parallel::map(statistics.len(), &|k| statistics[k].correlation(&remaining));
-        drawn.iter_mut().zip(correlations).for_each(|(all, one)| all.push(one));
+    loop {
+        // The columns of the model are read once for many draws.
+        let block: Vec<Vec<f64>> = null.by_ref().take(DRAWS_AT_ONCE).collect();
+        if block.is_empty() {
+            break;
+        }
+        let draws = Mat::from_fn(model.nrows(), block.len(), |i, j| block[j][i]);
+        let remaining = &draws - model * (model.transpose() * &draws);
+        for column in remaining.col_iter() {
+            let remaining: Vec<f64> = column.iter().copied().collect();
+            let correlations = parallel::map(statistics.len(), &|k| statistics[k].correlation(&remaining));
+            drawn.iter_mut().zip(correlations).for_each(|(all, one)| all.push(one));
+        }
     }
     let draws = drawn.first().map_or(0, Vec::len);
     let references: Vec<(f64, f64)> = drawn.iter().map(|of_one| mean_and_deviation(of_one)).collect();

@@ -17,7 +17,7 @@ use super::{AcceptedEffect, PoseModel};
 use crate::candidates::sampling::Sampling;
 use crate::error::IdentifyError;
 use crate::fit::families::{FoldEquations, Scales, families};
-use crate::fit::with_families;
+use crate::fit::with_families_linearised;
 use crate::heldout::paired::HeldOutDecrease;
 use crate::problem::Problem;
 use crate::trace::TraceOptions;
@@ -261,6 +261,6 @@ fn finish(
     // As in a fit of a session that declares these effects.
     let mut start = model.fit.beta.clone();
     start.resize(with.parameters.list.len(), 0.0);
-    (model.problem, model.fit) = with_families(with, start)?;
+    (model.problem, model.fit) = with_families_linearised(with, start)?;
     Ok(())
 }

@@ -23,7 +23,7 @@ use super::policy::{Policy, has_few_poses};
 use super::{Progress, TraceOptions};
 use crate::error::IdentifyError;
 use crate::fit::families::FoldEquations;
-use crate::fit::{Fit, with_families};
+use crate::fit::{Fit, with_families, with_families_linearised};
 use crate::heldout::paired::HeldOutDecrease;
 use crate::parameters::Role;
 use crate::problem::Problem;
@@ -98,7 +98,7 @@ impl PoseModel {
                 beta.extend(&self.fit.beta[own]);
             }
         }
-        let (problem, fit) = with_families(problem, beta)?;
+        let (problem, fit) = with_families_linearised(problem, beta)?;
         Ok(PoseModel { problem, fit, effects, proposed: self.proposed })
     }
 
@@ -161,7 +161,7 @@ pub(super) fn search(
         let limits = Limits { to_reach_mm: Some(chosen.model.fit.held_out.rms_mm), ..limits };
         let ended = groups::add(&mut without, options, false, most, interrupt).and_then(|has_groups| {
             if !has_groups {
-                (without.problem, without.fit) = with_families(without.problem.clone(), fit.beta.clone())?;
+                (without.problem, without.fit) = with_families_linearised(without.problem.clone(), fit.beta.clone())?;
             }
             complete((problem, fit), &mut without, &library, options, false, limits, interrupt)
         });
@@ -175,6 +175,8 @@ pub(super) fn search(
     if !chosen.model.has_families() {
         return Ok(None);
     }
+    let model = &mut chosen.model;
+    (model.problem, model.fit) = with_families(model.problem.clone(), model.fit.beta.clone())?;
     if !chosen.interrupted {
         match aliases::find(&mut chosen.model, &library, interrupt) {
             Err(IdentifyError::Interrupted) => chosen.interrupted = true,

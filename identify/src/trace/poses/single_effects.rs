@@ -16,7 +16,7 @@ use crate::candidates::gram::Gram;
 use crate::candidates::library::{self, Family};
 use crate::error::IdentifyError;
 use crate::fit::families::FoldEquations;
-use crate::fit::{Fit, with_families};
+use crate::fit::{Fit, with_families_linearised};
 use crate::numerics::tails::ln_chi_square_tail;
 use crate::problem::Problem;
 use crate::trace::constants::{INDISTINGUISHABLE, LINES_TRIED, MAX_IN_PLACE_OF_FAMILIES};
@@ -113,7 +113,7 @@ pub(super) fn add(
         let mut beta = found.fit.beta.clone();
         beta.resize(with.parameters.list.len(), 0.0);
         interrupt.check()?;
-        (found.problem, found.fit) = with_families(with, beta)?;
+        (found.problem, found.fit) = with_families_linearised(with, beta)?;
         added += 1;
         let family = library.families.get(best.candidate.family);
         found.effects.push(AcceptedEffect {
