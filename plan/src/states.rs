@@ -82,7 +82,9 @@ pub(crate) fn noise_warning(noise: &Noise, unit: ReadingUnit) -> Option<String> 
     let found = match noise.source {
         NoiseSource::Stated => return None,
         NoiseSource::Assumed => "is assumed",
-        NoiseSource::Repeats | NoiseSource::Residual | NoiseSource::Model => "is estimated from its data",
+        NoiseSource::Repeats | NoiseSource::Targets | NoiseSource::Residual | NoiseSource::Model => {
+            "is estimated from its data"
+        }
     };
     Some(format!("the session states no `{}`: {} {found}", unit.noise_key(), unit.text(noise.sigma_mm * 1e3, 2)))
 }

@@ -89,6 +89,7 @@ mod simulate;
 mod standard_output;
 mod statements;
 mod supply_chain;
+mod targets;
 #[path = "../../model/tests/jacobians/topologies.rs"]
 mod topologies;
 mod tour;

@@ -25,7 +25,7 @@ use faer::Mat;
 
 use crate::error::IdentifyError;
 use crate::heldout::{HeldOut, held_out};
-use crate::noise::{NoiseSource, PureError};
+use crate::noise::{NoiseSource, PureError, ShownNoise};
 use crate::numerics::least_squares::{LeastSquares, Scaling, minimise};
 use crate::numerics::rank::Rank;
 use crate::numerics::tails::{chi_square_tail, residual_tail};
@@ -249,10 +249,14 @@ impl Fit {
     }
 }
 
-/// Degrees of freedom of a noise that follows from repeats; `None` for a noise that is known.
+/// Degrees of freedom of a noise that follows from repeats or targets; `None` for a noise that is known.
 fn freedom_of_noise(problem: &Problem, residuals: &[Vec<f64>]) -> Option<usize> {
     let kept = |test: usize, row: usize| !problem.rejected[test][row];
-    (problem.noise.source == NoiseSource::Repeats).then(|| PureError::of(&problem.tests, residuals, kept).freedom)
+    match problem.noise.source {
+        NoiseSource::Repeats => Some(PureError::of(&problem.tests, residuals, kept).freedom),
+        NoiseSource::Targets => ShownNoise::of(&problem.tests, residuals, kept).map(|shown| shown.freedom),
+        _ => None,
+    }
 }
 
 /// Factor on the standard uncertainties: the Birge ratio `√(χ²/ν)` if it is significantly above 1, else 1.

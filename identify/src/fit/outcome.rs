@@ -154,6 +154,11 @@ fn noise(problem: &Problem, fit: &Fit) -> Assumption {
         (NoiseSource::Repeats, None) => {
             (format!("{figure}, from repeats"), AssumptionVerdict::Agrees, "pure error of the repeats".to_string())
         }
+        (NoiseSource::Targets, None) => (
+            format!("{figure}, from several targets at each pose"),
+            AssumptionVerdict::Agrees,
+            "distances between the targets, which a pose does not change".to_string(),
+        ),
         (_, None) => (
             format!("{figure}, from the residual of the model"),
             AssumptionVerdict::NotTested,

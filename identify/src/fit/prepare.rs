@@ -13,7 +13,7 @@ use super::{Fit, Linearisation};
 use crate::error::IdentifyError;
 use crate::heldout::{rms_by_unit_mm, rms_mm};
 use crate::noise::outliers;
-use crate::noise::{Noise, NoiseSource, PureError};
+use crate::noise::{Noise, NoiseSource, PureError, ShownNoise};
 use crate::numerics::triangle::Triangle;
 use crate::parameters::Role;
 use crate::plausibility;
@@ -27,7 +27,8 @@ const MIN_NOISE_MM: f64 = MIN_UM * 1e-3;
 const MAX_ROUNDS: usize = 6;
 /// Relative change of the noise standard deviation at which the rounds stop.
 const NOISE_TOLERANCE: f64 = 1e-4;
-/// Prepares and fits a session. The noise is the stated one, that of repeats, or that of the residual. Outliers are
+/// Prepares and fits a session. The noise is the stated one, that of repeats or of several targets at each pose, or that of
+/// the residual. Outliers are
 /// excluded.
 ///
 /// # Errors
@@ -236,9 +237,9 @@ fn nominal_residual_mm(problem: &Problem) -> Result<f64, IdentifyError> {
 }
 
 fn estimated_noise(problem: &Problem, fit: &Fit, floor: f64) -> Noise {
-    let pure = PureError::of(&problem.tests, &fit.residuals, |test, row| !problem.rejected[test][row]);
-    if let Some(sigma) = pure.sigma_mm() {
-        return Noise::white(sigma.max(floor).max(MIN_NOISE_MM), NoiseSource::Repeats);
+    let kept = |test: usize, row: usize| !problem.rejected[test][row];
+    if let Some(shown) = ShownNoise::of(&problem.tests, &fit.residuals, kept) {
+        return Noise::white(shown.sigma_mm.max(floor).max(MIN_NOISE_MM), shown.source);
     }
     let count = problem.scalars() as f64;
     let freedom = (count - fit.rank.identifiable_basis.ncols() as f64).max(1.0);

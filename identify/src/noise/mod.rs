@@ -11,6 +11,7 @@
 //! deviations.
 
 mod autocorrelation;
+mod flange;
 pub mod outliers;
 mod stated;
 mod trends;
@@ -57,6 +58,8 @@ pub enum NoiseSource {
     Assumed,
     /// Repeated readings (pure error).
     Repeats,
+    /// Distances between several targets at each pose, which the pose does not change.
+    Targets,
     /// The residual of the model: noise and unmodelled effects.
     Residual,
     /// The saved model that a session is compared with.
@@ -70,6 +73,7 @@ impl NoiseSource {
             NoiseSource::Stated => "stated",
             NoiseSource::Assumed => "assumed",
             NoiseSource::Repeats => "repeats",
+            NoiseSource::Targets => "targets",
             NoiseSource::Residual => "residual",
             NoiseSource::Model => "model",
         }
@@ -77,7 +81,7 @@ impl NoiseSource {
 
     /// Whether the noise is known without the residual, so that the residual can be judged by it.
     pub fn judges(self) -> bool {
-        matches!(self, NoiseSource::Stated | NoiseSource::Repeats | NoiseSource::Model)
+        matches!(self, NoiseSource::Stated | NoiseSource::Repeats | NoiseSource::Targets | NoiseSource::Model)
     }
 }
 
@@ -112,6 +116,29 @@ impl Noise {
                 (0..n - 1).map(|k| (coefficients[k] + reflection * coefficients[n - 2 - k]) / bound).collect();
         }
         self.sigma_mm * variance_ratio.max(0.0).sqrt()
+    }
+}
+
+/// A noise that the readings show without a model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ShownNoise {
+    /// Standard deviation, mm.
+    pub sigma_mm: f64,
+    /// Degrees of freedom.
+    pub freedom: usize,
+    /// Repeats or targets.
+    pub source: NoiseSource,
+}
+
+impl ShownNoise {
+    /// From repeats; without enough of them, from several targets at each pose. `residuals` are those of any model, mm.
+    pub fn of(tests: &[Test], residuals: &[Vec<f64>], kept: impl Fn(usize, usize) -> bool) -> Option<ShownNoise> {
+        let pure = PureError::of(tests, residuals, &kept);
+        if let Some(sigma_mm) = pure.sigma_mm() {
+            return Some(ShownNoise { sigma_mm, freedom: pure.freedom, source: NoiseSource::Repeats });
+        }
+        let (sigma_mm, freedom) = flange::noise_of_targets(tests, kept)?;
+        Some(ShownNoise { sigma_mm, freedom, source: NoiseSource::Targets })
     }
 }
 

@@ -10,7 +10,7 @@ use crate::fit::{Minimum, minimum};
 use crate::heldout::stated_rms_mm;
 use crate::model_file::IdentifiedModel;
 use crate::noise::outliers;
-use crate::noise::{Noise, NoiseSource, PureError};
+use crate::noise::{Noise, NoiseSource, ShownNoise};
 use crate::numerics::triangle::Triangle;
 use crate::parameters::Role;
 use crate::problem::Problem;
@@ -201,14 +201,14 @@ impl<'m> KnownErrors<'m> {
             problem.rejected = rejected;
             let mut estimated = estimate_noise_model(&mut problem, &residuals);
             if !estimated && problem.noise.source == NoiseSource::Residual {
-                let pure = PureError::of(&problem.tests, &residuals, |test, row| !problem.rejected[test][row]);
-                if let Some(sigma) = pure.sigma_mm() {
-                    problem.noise = Noise::white(sigma.max(floor).max(MIN_UM * 1e-3), NoiseSource::Repeats);
+                let kept = |test: usize, row: usize| !problem.rejected[test][row];
+                if let Some(shown) = ShownNoise::of(&problem.tests, &residuals, kept) {
+                    problem.noise = Noise::white(shown.sigma_mm.max(floor).max(MIN_UM * 1e-3), shown.source);
                     estimated = true;
                 }
             }
-            if problem.noise.source == NoiseSource::Repeats {
-                self.noise_source = NoiseSource::Repeats;
+            if matches!(problem.noise.source, NoiseSource::Repeats | NoiseSource::Targets) {
+                self.noise_source = problem.noise.source;
             }
             settled &= !estimated;
             if settled {
@@ -370,9 +370,11 @@ fn first_noise(model: &IdentifiedModel, session: &Session) -> Result<(Noise, Noi
             Noise::white((model.quality.heldout_rms_um * 1e-3).max(model.noise.sigma_mm), NoiseSource::Residual)
         }
         // The inflation belongs to the likelihood of the model's families; it is no noise.
-        NoiseSource::Stated | NoiseSource::Assumed | NoiseSource::Repeats | NoiseSource::Model => {
-            Noise { source: NoiseSource::Residual, inflation: 1.0, ..model.noise.clone() }
-        }
+        NoiseSource::Stated
+        | NoiseSource::Assumed
+        | NoiseSource::Repeats
+        | NoiseSource::Targets
+        | NoiseSource::Model => Noise { source: NoiseSource::Residual, inflation: 1.0, ..model.noise.clone() },
     };
     Ok((noise, NoiseSource::Model))
 }

@@ -13,7 +13,7 @@ use faer::Mat;
 
 use super::known::{KnownErrors, Linearised};
 use crate::error::IdentifyError;
-use crate::noise::{NoiseSource, PureError};
+use crate::noise::{NoiseSource, ShownNoise};
 use crate::numerics::parallel;
 use crate::numerics::solve::{Svd, solve_square};
 use crate::numerics::symmetric::Symmetric;
@@ -66,9 +66,9 @@ impl Prediction {
             }
         }
         let freedom_of_noise = match known.noise_source {
-            NoiseSource::Repeats => {
+            NoiseSource::Repeats | NoiseSource::Targets => {
                 let kept = |test: usize, row: usize| !known.full.rejected[test][row];
-                Some(PureError::of(&known.full.tests, &residuals, kept).freedom)
+                ShownNoise::of(&known.full.tests, &residuals, kept).map(|shown| shown.freedom)
             }
             _ => None,
         };

@@ -26,6 +26,7 @@ pub fn part(study: &Study) -> Part {
         let source = match result.noise_source {
             NoiseSource::Stated => "is that of the instrument",
             NoiseSource::Repeats => "is estimated from repeated readings",
+            NoiseSource::Targets => "is estimated from the distances between the targets at each pose",
             _ => "is estimated from the residual",
         };
         report.key(format!(
