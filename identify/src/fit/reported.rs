@@ -32,6 +32,7 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> 
     let plausibility = plausibility::examine(problem, fit);
     let mut warnings = problem.session.warnings.clone();
     warnings.extend(plausibility::warnings(&plausibility));
+    warnings.extend(plausibility::coefficients::warnings(problem, fit));
     warnings.extend(noise::stated_against_repeats(problem, &fit.residuals));
     warnings.extend(mislabelled_runs(&problem.tests));
     warnings.extend(enlargement_warning(fit.u_enlargement));

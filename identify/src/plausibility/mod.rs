@@ -11,6 +11,7 @@
 //!
 //! Mistakes are found by refits of the session with one statement changed at a time (`hypotheses`, `suggest`).
 
+pub(crate) mod coefficients;
 mod hypotheses;
 mod locations;
 mod poses;

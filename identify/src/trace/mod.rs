@@ -390,6 +390,7 @@ fn trace_or_interrupted(
         candidates_seen: observable,
     })?;
     reported.result.warnings.extend(screening::unused_exclusions(problem, options)?);
+    reported.result.warnings.extend(crate::plausibility::coefficients::warnings(problem, before_fit));
     drop(search);
     drop(columns);
     Ok(TraceOutcome {

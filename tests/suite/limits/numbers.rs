@@ -1,5 +1,8 @@
 //! Lengths, angles and readings at the limits of double precision.
 
+use std::fs;
+
+use super::super::{abbe, ready, text};
 use super::{Case, displaced, fitted, folder, found, refused, session_refused, works};
 
 #[test]
@@ -80,4 +83,25 @@ fn huge_numbers_in_a_session() {
 fn denormal_readings() {
     let data = "run,c_deg,length_mm\n1,0,5e-324\n1,90,5e-324\n1,180,5e-324\n";
     refused(folder(&Case::default().session(), data).path(), "fit", &[], &["a bar of 100.0000 mm read 0.000 mm"]);
+}
+
+/// All positions are multiples of 0.5°: a wave of 0.001° is zero in all readings but for rounding, and its amplitude without meaning.
+#[test]
+fn an_amplitude_of_kilometres_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    for entry in fs::read_dir(ready("hermle-c600u/measured")).unwrap() {
+        let file = entry.unwrap().path();
+        fs::copy(&file, folder.path().join(file.file_name().unwrap())).unwrap();
+    }
+    let session = folder.path().join("session.toml");
+    let plain = fs::read_to_string(&session).unwrap();
+    let warned = |period_deg: f64| {
+        let wave = format!("component = \"EZC\"\ndriver = \"C\"\nshape = \"periodic\"\nperiod_deg = {period_deg}\n");
+        fs::write(&session, format!("{plain}\n[[effect]]\n{wave}")).unwrap();
+        let fit = abbe(&["fit", text(&session)]);
+        assert!(fit.status.success());
+        String::from_utf8(fit.stderr).unwrap().contains("which no machine has")
+    };
+    assert!(warned(0.001));
+    assert!(!warned(180.0));
 }
