@@ -152,18 +152,19 @@ impl Writer<'_> {
         Moves { test: self.test.name.clone(), stage, states, mounted }
     }
 
-    /// The balls of the instrument: where a bar, or a sensor and a ball, stand.
-    fn bar(&self) -> Option<BallBar<f64>> {
-        Some(BallBar {
-            workpiece_ball: self.test.station.table_point_mm()?,
+    /// The balls of the instrument: where a bar, or a sensor and a ball, stand. Without a target on the table, the tool moves
+    /// against its origin.
+    fn bar(&self) -> BallBar<f64> {
+        BallBar {
+            workpiece_ball: self.test.station.table_point_mm().unwrap_or_default(),
             spindle_ball: self.test.station.tool_point_mm(),
             bar: self.test.station.reference_mm(),
-        })
+        }
     }
 
     /// The positions with the tool retracted along itself; `None` if the linear axes or their travel do not allow it.
     fn retracted(&self, at: &[f64]) -> Option<Vec<f64>> {
-        let bar = self.bar()?;
+        let bar = self.bar();
         let states = self.machine.axis_positions(at);
         let none = vec![BodyErrors::<f64>::NONE; at.len()];
         let point = |z: f64| self.machine.tool_point::<f64>(&states, &none, Point([0.0, 0.0, z])).0;
@@ -175,7 +176,7 @@ impl Writer<'_> {
 
     /// The positions at which the bar is longer by the feed-in.
     fn fed_in(&self, at: &[f64]) -> Option<Vec<f64>> {
-        let bar = self.bar()?;
+        let bar = self.bar();
         let (workpiece, spindle) = balls(self.machine, &bar, at);
         let apart: [f64; 3] = std::array::from_fn(|i| spindle[i] - workpiece[i]);
         let length = apart.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -220,7 +221,7 @@ impl Writer<'_> {
             draft.blocks.push(Block::Stop(check));
         }
         let mut here: Option<Vec<f64>> = None;
-        let centre = self.bar().filter(|_| ball_bar && !centred).and_then(|bar| {
+        let centre = (ball_bar && !centred).then(|| self.bar()).and_then(|bar| {
             let centre = self.within(positions_for_bar(self.machine, &bar, start, [0.0; 3])?)?;
             Some((self.retracted(&centre)?, centre))
         });
