@@ -143,6 +143,17 @@ impl Paper {
         let (x, y) = label_place((x + 4.0, y - 4.0), &text, self.size);
         html! { text x=(coordinate(x)) y=(coordinate(y)) { (text) } }
     }
+
+    /// A label at the end of a line: below it if the line comes from above, else above it, so that neither covers the other.
+    fn label_of_line(&self, text: &str, [from, to]: [[f64; 3]; 2]) -> Markup {
+        let ((_, y0), (x1, y1)) = (self.at(from), self.at(to));
+        if y1 <= y0 {
+            return self.label(text, to);
+        }
+        let text = shortened(text, 16);
+        let (x, y) = label_place((x1 - 12.0, y1 + 15.0), &text, self.size);
+        html! { text x=(coordinate(x)) y=(coordinate(y)) { (text) } }
+    }
 }
 
 impl Kind for MachineAxes {
@@ -165,7 +176,7 @@ impl Kind for MachineAxes {
             }
             @for (line, ends) in self.axes.iter().zip(&lines) {
                 @if line.is_rotary { (paper.line("found-line", *ends)) } @else { (paper.arrow("motion", *ends)) }
-                (paper.label(&format!("{} ({})", line.name, line.moves), ends[1]))
+                (paper.label_of_line(&format!("{} ({})", line.name, line.moves), *ends))
             }
             circle class="dot-after" cx=(coordinate(x)) cy=(coordinate(y)) r="3" {}
             text x=(coordinate(x + 5.0)) y=(coordinate(y + 12.0)) { "R" }
