@@ -85,6 +85,7 @@ impl Figure {
             figure::Chart::Lines(_) => "lines",
             figure::Chart::Values(_) => "values",
             figure::Chart::Bars(_) => "bars",
+            figure::Chart::Bubbles(_) => "bubbles",
             figure::Chart::Matrix(_) => "matrix",
             figure::Chart::Polar(_) | figure::Chart::Panels(_) => "polar",
             figure::Chart::Chain(_) => "chain",
