@@ -127,8 +127,8 @@ impl PoseModel {
     }
 }
 
-/// Searches families and single effects for a fitted problem. `None` if no family remains: single effects alone are found
-/// by the search of the library.
+/// Searches families and single effects for a fitted problem. `None` if no family remains, or if the fit has no degree of
+/// freedom: single effects alone are found by the search of the library.
 ///
 /// # Errors
 /// If a model cannot be fitted, or [`IdentifyError::Interrupted`] before a group was accepted.
@@ -139,6 +139,10 @@ pub(super) fn search(
     policy: Policy,
     interrupt: Interrupt<'_>,
 ) -> Result<Option<PoseSearch>, IdentifyError> {
+    // Without a degree of freedom nothing is left to explain, and the noise that families need has no estimate.
+    if problem.scalars() <= fit.rank.identifiable_basis.ncols() {
+        return Ok(None);
+    }
     let most = policy.max_effects;
     let mut with = PoseModel::of(problem, fit);
     let may_repeat = !has_few_poses(problem) && !determines_spectra(problem);
