@@ -4,10 +4,10 @@
 //! zero in all of them. The fit then explains micrometres by a coefficient of kilometres. Such an estimate is named.
 
 use crate::fit::Fit;
-use crate::parameters::Role;
+use crate::parameters::{Role, physical_size};
 use crate::problem::Problem;
 
-/// Largest coefficient, in physical sizes of the parameter: 100 mm, 1 rad.
+/// Largest coefficient, in physical sizes of its component: 100 mm, 1 rad.
 const MAX_SIZES: f64 = 100.0;
 /// Coverage factor of the expanded uncertainty.
 const COVERAGE_FACTOR: f64 = 2.0;
@@ -18,8 +18,10 @@ pub(crate) fn warnings(problem: &Problem, fit: &Fit) -> Vec<String> {
     let mut warnings = Vec::new();
     for (j, parameter) in problem.parameters.list.iter().enumerate() {
         let Role::Coefficient { effect, .. } = parameter.role else { continue };
+        let component = &problem.parameters.effects[effect].component;
+        let Some(unit) = component.unit(&problem.session.instrument_parameters()) else { continue };
         let u = fit.covariance[(j, j)].max(0.0).sqrt() * fit.u_enlargement;
-        let beyond = fit.beta[j].abs() - COVERAGE_FACTOR * u > MAX_SIZES * parameter.size;
+        let beyond = fit.beta[j].abs() - COVERAGE_FACTOR * u > MAX_SIZES * physical_size(unit);
         if !beyond || named.contains(&effect) {
             continue;
         }
