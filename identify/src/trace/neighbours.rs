@@ -10,8 +10,9 @@
 //! ```
 //!
 //! The null distribution has the residuals with a random sign for each pose, less what the model explains of them: a fit
-//! makes the residuals of neighbours opposite. Each T is referred to mean and standard deviation of its null draws, and the
-//! largest of all decides.
+//! makes the residuals of neighbours opposite. Each T is referred to its mean and standard deviation, and the largest of all
+//! decides. For the p-value these are of the null draws and the residual together: a reference that lacks the residual would
+//! make it an outsider, and reject too often.
 
 use abbe_model::axis::AxisKind;
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
@@ -65,18 +66,23 @@ pub fn structure(
         }
     }
     let draws = drawn.first().map_or(0, Vec::len);
+    // The residual is the last of the values.
+    drawn.iter_mut().zip(&found).for_each(|(of_one, value)| of_one.push(*value));
     let references: Vec<(f64, f64)> = drawn.iter().map(|of_one| mean_and_deviation(of_one)).collect();
-    let score = |value: f64, (mean, deviation): &(f64, f64)| (value - mean) / deviation.max(f64::MIN_POSITIVE);
-    let best = found.iter().zip(&references).map(|(value, reference)| score(*value, reference)).enumerate();
-    let (place, largest) = best.max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let of_draw = |draw: usize| {
-        let scores = drawn.iter().zip(&references).map(|(of_one, reference)| score(of_one[draw], reference));
-        scores.fold(f64::NEG_INFINITY, f64::max)
+    let largest = |draw: usize| {
+        let scores = drawn
+            .iter()
+            .zip(&references)
+            .map(|(of_one, (mean, deviation))| (of_one[draw] - mean) / deviation.max(f64::MIN_POSITIVE));
+        scores.enumerate().max_by(|a, b| a.1.total_cmp(&b.1))
     };
-    let above = (0..draws).filter(|draw| of_draw(*draw) >= largest).count();
+    let (place, of_residual) = largest(draws)?;
+    let above = (0..draws).filter(|draw| largest(*draw).is_some_and(|(_, score)| score >= of_residual)).count();
+    let (mean, deviation) = mean_and_deviation(&drawn[place][..draws]);
+    let excess = (found[place] - mean) / deviation.max(f64::MIN_POSITIVE);
     Some(Structure {
         p_value: (above + 1) as f64 / (draws + 1) as f64,
-        excess: largest.max(0.0),
+        excess: excess.max(0.0),
         description: format!("{} (correlation {:.2})", statistics[place].description, found[place]),
     })
 }
