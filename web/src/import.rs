@@ -7,7 +7,7 @@ use abbe::model::axis::AxisKind;
 use abbe::model::files::import::session::keys;
 use abbe::model::files::import::{Foreign, Hint};
 use abbe::model::files::store::Store;
-use abbe::model::instrument::{Fault, InstrumentKind};
+use abbe::model::instrument::{Fault, kinds};
 use abbe::model::session::Session;
 use serde::{Deserialize, Serialize};
 use wasm_bindgen::prelude::*;
@@ -58,7 +58,7 @@ impl Import {
         let asked: Asked = serde_json::from_str(asked).map_err(|fault| Failed::from(fault.to_string()))?;
         let store = folder.store();
         let options = ImportOptions {
-            kind: InstrumentKind::ALL.iter().copied().find(|kind| asked.kind.as_deref() == Some(kind.word())),
+            kind: kinds().iter().copied().find(|kind| asked.kind.as_deref() == Some(kind.word())),
             set: keys(&asked.set).map_err(of_words)?,
             hints: asked.columns.iter().map(|text| Hint::parse(text)).collect::<Result<_, _>>().map_err(of_words)?,
             like: asked.like,
@@ -137,5 +137,5 @@ fn columns(session: &Session) -> Vec<String> {
 /// The instruments, in the words of `--kind`.
 #[wasm_bindgen]
 pub fn instruments() -> Vec<String> {
-    InstrumentKind::ALL.iter().map(|kind| kind.word().to_string()).collect()
+    kinds().iter().map(|kind| kind.word().to_string()).collect()
 }
