@@ -2,15 +2,18 @@
 
 cargo-mutants builds the workspace for each mutant, which takes longer than the tests. This script takes its list of mutants and writes a systematic
 sample into a copy of the workspace, each behind a condition (`if crate::mutant(17) { changed body } else { body }`). It builds the copy once and selects
-each mutant by ABBE_MUTANT. Tests run in stages until one fails, the cheapest first, then examples of the documentation, and kept answers last: what only
-they catch is reported apart, since a kept answer shows that a figure changed, not that it is wrong. The order of the mutants is random, so that an
-interrupted run is a random sample too. Mutants with a result in the output file are not tested again. The last lines are the rates by package.
+each mutant by ABBE_MUTANT. First each test runs alone and lists the mutants whose code it reaches: only these tests can catch them. For a mutant they run
+in stages until one fails, the cheapest first, then examples of the documentation, and kept answers last: what only they catch is reported apart, since a
+kept answer shows that a figure changed, not that it is wrong. The order of the mutants is random, so that an interrupted run is a random sample too.
+Mutants with a result in the output file are not tested again. The last lines are the rates by package.
 
     git worktree add ../mutants
     python tests/mutants.py --sample abbe-identify=200 --sample abbe-model=120 --sample abbe-codegen=80 --seed 2 --copy ../mutants --out mutants.jsonl
 """
 
 import argparse
+import concurrent.futures
+import dataclasses
 import json
 import os
 import pathlib
@@ -19,13 +22,22 @@ import re
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 
 SWITCH = """
-/// Whether the mutant of this number is selected.
+/// Whether the mutant of this number is selected. Its first call adds the number to the file ABBE_MUTANTS_REACHED.
 #[doc(hidden)]
 pub fn mutant(number: usize) -> bool {
     static SELECTED: std::sync::OnceLock<usize> = std::sync::OnceLock::new();
+    static REACHED: [std::sync::atomic::AtomicBool; 4096] = [const { std::sync::atomic::AtomicBool::new(false) }; 4096];
+    if !REACHED[number].load(std::sync::atomic::Ordering::Relaxed) && !REACHED[number].swap(true, std::sync::atomic::Ordering::Relaxed) {
+        if let Some(file) = std::env::var_os("ABBE_MUTANTS_REACHED") {
+            if let Ok(mut file) = std::fs::OpenOptions::new().append(true).create(true).open(file) {
+                let _ = std::io::Write::write_all(&mut file, format!("{number}\\n").as_bytes());
+            }
+        }
+    }
     *SELECTED.get_or_init(|| std::env::var("ABBE_MUTANT").ok().and_then(|text| text.parse().ok()).unwrap_or(0)) == number
 }
 """
@@ -139,10 +151,21 @@ def binaries(copy, asked):
     return found
 
 
-def run_tests(program, folder, names, number, limit):
+@dataclasses.dataclass
+class Test:
+    """A test of a program: its working folder, its name, its seconds, the mutants whose code it reaches."""
+
+    program: str
+    folder: str
+    name: str
+    seconds: float = 0.0
+    reached: frozenset = frozenset()
+
+
+def run_tests(program, folder, names, limit, **environment):
     """Status (0 passed, 1 failed, 2 timeout) and output."""
-    environment = dict(os.environ, ABBE_MUTANT=str(number), RUSTC_BOOTSTRAP="1", CI="true", INSTA_UPDATE="no", CARGO_MANIFEST_DIR=folder)
-    command = [program, "-Z", "unstable-options", "--fail-fast", "--report-time", "--exact", *names]
+    environment = dict(os.environ, CI="true", INSTA_UPDATE="no", RUSTC_BOOTSTRAP="1", CARGO_MANIFEST_DIR=folder, **environment)
+    command = [program, "-Z", "unstable-options", "--fail-fast", "--exact", *names]
     process = subprocess.Popen(command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True)
     try:
         printed, _ = process.communicate(timeout=limit)
@@ -160,36 +183,44 @@ def examples_fail(copy, package, number):
     return run.returncode != 0
 
 
-def timed_tests(programs, slowest_s):
-    """Runs all tests once; returns (seconds, program, folder, name), the cheapest first, without tests slower than `slowest_s`."""
-    timed = []
+def measured(test):
+    """The test with its seconds and the mutants that it reaches, from one run of it alone without a mutant."""
+    with tempfile.NamedTemporaryFile("r") as log:
+        begin = time.time()
+        status, printed = run_tests(test.program, test.folder, [test.name], 1800, ABBE_MUTANT="0", ABBE_MUTANTS_REACHED=log.name)
+        if status:
+            print(f"excluded, since it fails without a mutant: {test.name}\n{printed[-1000:]}", flush=True)
+            return None
+        return dataclasses.replace(test, seconds=time.time() - begin, reached=frozenset(map(int, log.read().split())))
+
+
+def measured_tests(programs, slowest_s):
+    """All tests, the cheapest first, without tests slower than `slowest_s`."""
+    tests = []
     for program, folder in programs:
         listed = subprocess.run([program, "--list"], cwd=folder, capture_output=True, text=True, check=True).stdout
         names = [line[:-6] for line in listed.splitlines() if line.endswith(": test") and not any(part in line for part in EXCLUDED_TESTS)]
-        if not names:
-            continue
-        status, printed = run_tests(program, folder, names, 0, 7200)
-        if status:
-            sys.exit("a test fails without a mutant:\n" + printed[-3000:])
-        seconds = dict(re.findall(r"^test (\S+)(?: - should panic)? \.\.\. ok <([\d.]+)s>", printed, re.M))
-        timed += [(float(seconds[name]), program, folder, name) for name in names if name in seconds]
-    for seconds, _, _, name in (test for test in timed if test[0] > slowest_s):
-        print(f"excluded as too slow: {name}, {seconds:.0f} s", flush=True)
-    return sorted(test for test in timed if test[0] <= slowest_s)
+        tests += [Test(program, folder, name) for name in names]
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        tests = sorted((test for test in pool.map(measured, tests) if test), key=lambda test: test.seconds)
+    for test in tests:
+        if test.seconds > slowest_s:
+            print(f"excluded as too slow: {test.name}, {test.seconds:.0f} s", flush=True)
+    return [test for test in tests if test.seconds <= slowest_s]
 
 
-def stages_of(timed, folders, kept):
-    """Stages of growing cost of the tests in these folders, in their order: (program, folder, names, seconds). Either of kept answers or of all others."""
-    timed = [test for test in timed if test[2] in folders and (KEPT in test[3]) == kept]
-    programs = sorted({test[1:3] for test in timed}, key=lambda program: folders.index(program[1]))
+def stages_of(tests, folders, number, kept):
+    """Stages of growing cost of the tests in these folders that reach a mutant, in their order. Either of kept answers or of all others."""
+    tests = [test for test in tests if number in test.reached and test.folder in folders and (KEPT in test.name) == kept]
+    programs = sorted({(test.program, test.folder) for test in tests}, key=lambda program: folders.index(program[1]))
     stages, bound = [], 0.5
-    while timed:
-        now = [test for test in timed if test[0] <= bound]
-        timed = [test for test in timed if test[0] > bound]
-        for program, folder in programs:
-            mine = [test for test in now if test[1] == program]
+    while tests:
+        now = [test for test in tests if test.seconds <= bound]
+        tests = [test for test in tests if test.seconds > bound]
+        for program in programs:
+            mine = [test for test in now if (test.program, test.folder) == program]
             if mine:
-                stages.append((program, folder, [test[3] for test in mine], sum(test[0] for test in mine)))
+                stages.append((*program, [test.name for test in mine], sum(test.seconds for test in mine)))
         bound *= 4
     return stages
 
@@ -205,7 +236,7 @@ def listed(copy, asked, only):
 def first_failing(stages, mutant):
     """Verdict of the first stage that fails, and the tests that fail in it."""
     for program, folder, names, seconds in stages:
-        status, printed = run_tests(program, folder, names, mutant["number"], 60 + 10 * seconds)
+        status, printed = run_tests(program, folder, names, 60 + 10 * seconds, ABBE_MUTANT=str(mutant["number"]))
         if status:
             return ["", "caught", "out of time"][status], " ".join(re.findall(r"^test (\S+) \.\.\. FAILED", printed, re.M)[:3])
     return "missed", ""
@@ -256,18 +287,15 @@ def main():
         print(f"{len(sample)} mutants, {len(unviable)} do not build", flush=True)
         random.Random(given.seed).shuffle(kept)
         asked = [word for package in packages for word in ("-p", package)] if given.own else ["--workspace"]
-        timed = timed_tests(binaries(copy, asked), given.slowest)
+        tests = measured_tests(binaries(copy, asked), given.slowest)
         tested_by = {package: TESTED_BY[package][:1] if given.own else TESTED_BY[package] for package in packages}
         folders = {package: [str((copy / folder).resolve()) for folder in tested_by[package]] for package in packages}
-        stages = {package: [stages_of(timed, folders[package], kept_answers) for kept_answers in (False, True)] for package in packages}
-        for package in packages:
-            both = sum(stages[package], [])
-            print(f"{package}: tests of {sum(stage[3] for stage in both):.0f} s in {len(both)} stages", flush=True)
+        print(f"{len(tests)} tests of {sum(test.seconds for test in tests):.0f} s", flush=True)
         tried = {json.loads(line)["name"] for line in given.out.read_text().splitlines()} if given.out.exists() else set()
         with given.out.open("a") as out:
             for mutant in (m for m in kept if m["name"] not in tried):
                 begin = time.time()
-                others, kept_answers = stages[mutant["package"]]
+                others, kept_answers = [stages_of(tests, folders[mutant["package"]], mutant["number"], of_kept) for of_kept in (False, True)]
                 verdict, by = first_failing(others, mutant)
                 if verdict == "missed" and examples_fail(copy, mutant["package"], mutant["number"]):
                     verdict, by = "caught", "an example of the documentation"
