@@ -58,7 +58,7 @@ pub fn functions(input: &[u8]) {
     });
 }
 
-/// The file of `simulate --errors`, and each of its lines as an argument of `--error`.
+/// The file of `simulate --values`, and each of its lines as an argument of `--error`.
 pub fn values(input: &[u8]) {
     fn check_value(given: &Given) {
         assert!(given.value.abs() <= LARGEST);

@@ -1,7 +1,8 @@
 //! The calibrated machine for other programs and for controls: one line of a registry for each format.
 
 use abbe_apply::ApplyError;
-use abbe_apply::compensation::{self, Compensation, TableFormat};
+use abbe_apply::compensation::curves::of_model;
+use abbe_apply::compensation::{self, Compensation, MAX_POINTS, TableFormat};
 use abbe_apply::control::{CONTROLS, Control, Kinematics};
 use abbe_apply::export::dh::{self, DhTable, DhUncertainty};
 use abbe_apply::export::kinematics::{ENTRIES, EntryChoice, KinematicTable};
@@ -17,6 +18,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::printers::csv;
+use crate::report::compensation::uncertainties;
 use crate::report::export as present;
 use crate::report::table::Table;
 
@@ -34,7 +36,15 @@ enum Form {
     Description(fn(&IdentifiedModel, &ExportOptions) -> Result<Exported, ApplyError>),
     /// What a control takes.
     Control(&'static Control),
+    /// The compensation tables of a control.
+    Tables(&'static TableFormat),
 }
+
+/// The file of the uncertainties beside compensation tables.
+const UNCERTAINTIES: &str = "uncertainty.csv";
+
+/// Places along the axis of a compensation table, if their number is not stated.
+pub const PLACES: usize = 37;
 
 /// What a format takes beside the model.
 pub struct ExportOptions {
@@ -50,6 +60,8 @@ pub struct ExportOptions {
     pub convention: Convention,
     /// The maker's table, near whose frames the calibrated ones lie.
     pub dh: Option<Source>,
+    /// Number of places along the axis of a compensation table; [`PLACES`] if it is not stated.
+    pub places: Option<usize>,
 }
 
 impl ExportOptions {
@@ -62,11 +74,12 @@ impl ExportOptions {
             patch: None,
             convention: Convention::Modified,
             dh: None,
+            places: None,
         }
     }
 }
 
-/// The formats: descriptions of the machine, then the controls.
+/// The formats: descriptions of the machine, then the controls, then their compensation tables.
 pub fn formats() -> Vec<ExportFormat> {
     let described =
         |word, about: &str, write| ExportFormat { word, about: about.to_string(), form: Form::Description(write) };
@@ -84,23 +97,30 @@ pub fn formats() -> Vec<ExportFormat> {
         let about = format!("{}, {about}", control.name);
         ExportFormat { word: control.word, about, form: Form::Control(control) }
     };
-    descriptions.into_iter().chain(CONTROLS.iter().map(of_control)).collect()
-}
-
-/// The words of the controls that take a choice of entries and the travel over which their error counts.
-pub fn words_with_entries() -> Vec<&'static str> {
-    formats().iter().filter(|format| format.takes_entries()).map(|format| format.word).collect()
+    let tables = CONTROLS.iter().filter_map(|control| {
+        let format = control.tables.as_ref()?;
+        let about = format!("{}, compensation tables: {}", control.name, format.about);
+        Some(ExportFormat { word: format.word, about, form: Form::Tables(format) })
+    });
+    descriptions.into_iter().chain(CONTROLS.iter().map(of_control)).chain(tables).collect()
 }
 
 /// What is written.
-#[derive(Default)]
 pub struct Exported {
-    /// The file.
-    pub text: Vec<u8>,
+    /// The file, or the files of a folder.
+    pub contents: Contents,
     /// The same as a table, if it is one.
     pub table: Option<Table>,
     /// The same as JSON.
     pub result: ExportResult,
+}
+
+/// One file or a folder of files.
+pub enum Contents {
+    /// A file.
+    File(Vec<u8>),
+    /// The files of a folder, each with its name.
+    Folder(Vec<(String, Vec<u8>)>),
 }
 
 /// The result of `abbe export` in JSON.
@@ -127,7 +147,10 @@ pub struct ExportResult {
     /// Changes of a control's kinematic parameters.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kinematics: Option<KinematicTable>,
-    /// Effects and errors that a fixed geometry does not hold.
+    /// How the control reads compensation tables.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub import: Vec<String>,
+    /// Effects and errors that the format does not hold.
     pub left_out: Vec<String>,
 }
 
@@ -148,7 +171,7 @@ pub fn entries(word: &str) -> Result<EntryChoice, ApplyError> {
 /// If there is none.
 pub fn format(word: &str) -> Result<ExportFormat, ApplyError> {
     formats().into_iter().find(|format| format.word == word).ok_or_else(|| {
-        let words = formats().iter().map(|format| format.word).collect::<Vec<_>>().join(", ");
+        let words = formats().into_iter().map(|format| format.word).collect::<Vec<_>>().join(", ");
         ApplyError::Request(format!("there is no format `{word}`; the formats are {words}"))
     })
 }
@@ -158,17 +181,26 @@ impl ExportFormat {
         matches!(self.form, Form::Control(Control { kinematics: Kinematics::Entries(_), .. }))
     }
 
-    /// An option that is stated and that this format does not take.
-    pub fn ignored(&self, options: &ExportOptions) -> Option<&'static str> {
-        match options {
-            ExportOptions { patch: Some(_), .. } if self.word != "urdf" => Some("patch"),
-            ExportOptions { dh: Some(_), .. } if self.word != "dh" => Some("dh"),
-            ExportOptions { convention: Convention::Standard, .. } if self.word != "dh" => Some("convention"),
-            _ if self.takes_entries() => None,
-            ExportOptions { entries: EntryChoice::Plain, .. } => Some("entries"),
-            ExportOptions { travel: Travel { is_measured: false, .. }, .. } => Some("travel"),
-            _ => None,
-        }
+    /// Whether its output is a folder of compensation tables.
+    pub fn is_of_tables(&self) -> bool {
+        matches!(self.form, Form::Tables(_))
+    }
+
+    /// An option that is stated and that this format does not take, with the words of the formats that take it.
+    pub fn ignored(&self, options: &ExportOptions) -> Option<(&'static str, Vec<&'static str>)> {
+        type Taken = fn(&ExportFormat) -> bool;
+        let entries: Taken = ExportFormat::takes_entries;
+        let stated: [(bool, &str, Taken); 6] = [
+            (options.patch.is_some(), "patch", |format| format.word == "urdf"),
+            (options.dh.is_some(), "dh", |format| format.word == "dh"),
+            (options.convention == Convention::Standard, "convention", |format| format.word == "dh"),
+            (options.places.is_some(), "places", ExportFormat::is_of_tables),
+            (options.entries == EntryChoice::Plain, "entries", entries),
+            (!options.travel.is_measured, "travel", entries),
+        ];
+        let (_, option, takes) = stated.into_iter().find(|(is_stated, _, takes)| *is_stated && !takes(self))?;
+        let owners = formats().into_iter().filter(takes).map(|format| format.word);
+        Some((option, owners.collect()))
     }
 
     /// The model in this format.
@@ -182,6 +214,7 @@ impl ExportFormat {
                 of_locations(model, format)
             }
             Form::Control(control) => of_control(model, control, options),
+            Form::Tables(format) => of_tables(model, format, options.places.unwrap_or(PLACES)),
         }
     }
 }
@@ -189,7 +222,7 @@ impl ExportFormat {
 /// A table under its header.
 fn tabled(header: String, table: Table, result: ExportResult) -> Result<Exported, ApplyError> {
     let rows = csv::text(&table).map_err(ApplyError::Request)?;
-    Ok(Exported { text: [header.into_bytes(), rows].concat(), table: Some(table), result })
+    Ok(Exported { contents: Contents::File([header.into_bytes(), rows].concat()), table: Some(table), result })
 }
 
 fn of_urdf(model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, ApplyError> {
@@ -198,7 +231,7 @@ fn of_urdf(model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported,
         Some((source, tip)) => urdf_patch::patched(model, source, tip.as_deref())?,
         None => urdf::urdf(model, options.tool_mm)?,
     };
-    Ok(Exported { text: text.into_bytes(), table: None, result })
+    Ok(Exported { contents: Contents::File(text.into_bytes()), table: None, result })
 }
 
 fn of_table(model: &IdentifiedModel, _: &ExportOptions) -> Result<Exported, ApplyError> {
@@ -239,10 +272,34 @@ fn of_locations(model: &IdentifiedModel, format: &TableFormat) -> Result<Exporte
         .filter_map(|(_, parameter)| Some((ErrorName::parse(&parameter.id)?, parameter.value)));
     let locations = named.filter(|(name, _)| name.kind == ErrorKind::Location).collect();
     let compensation = Compensation { locations, left_out: left_out(model), ..Compensation::default() };
-    let tables = compensation::tables(&model.machine, &compensation, format, compensation::MAX_POINTS);
+    let tables = compensation::tables(&model.machine, &compensation, format, MAX_POINTS);
     let file = tables.files.into_iter().next();
     let missing = || ApplyError::Request("the model has no location error that the format holds".to_string());
     let (_, text) = file.ok_or_else(missing)?;
     let result = ExportResult { left_out: tables.left_out, ..ExportResult::default() };
-    Ok(Exported { text: text.into_bytes(), table: None, result })
+    Ok(Exported { contents: Contents::File(text.into_bytes()), table: None, result })
+}
+
+/// The error motions as compensation tables with a number of places along each axis, and their standard uncertainty.
+fn of_tables(model: &IdentifiedModel, format: &TableFormat, places: usize) -> Result<Exported, ApplyError> {
+    if !(2..=MAX_POINTS).contains(&places) {
+        return Err(ApplyError::Request(format!(
+            "a table of {places} places: a number from 2 to {MAX_POINTS} is expected, the maximum of LinuxCNC and Heidenhain"
+        )));
+    }
+    let found = compensation::tables(&model.machine, &of_model(model), format, places);
+    if found.files.is_empty() {
+        let all = found.left_out.iter().map(|line| format!("\n  {line}")).collect::<String>();
+        return Err(ApplyError::Request(format!(
+            "no error can be compensated in this format: declare error motions as [[effect]], as `abbe trace --write` \
+             does, and fit again{all}"
+        )));
+    }
+    let mut files: Vec<(String, Vec<u8>)> =
+        found.files.into_iter().map(|(name, text)| (name, text.into_bytes())).collect();
+    let table = uncertainties(&found.uncertainties);
+    files.push((UNCERTAINTIES.to_string(), csv::text(&table).map_err(ApplyError::Request)?));
+    let import = format.import.iter().map(ToString::to_string).collect();
+    let result = ExportResult { left_out: found.left_out, import, ..ExportResult::default() };
+    Ok(Exported { contents: Contents::Folder(files), table: None, result })
 }

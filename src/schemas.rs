@@ -46,7 +46,7 @@ pub const SCHEMAS: &[FileSchema] = &[
     file("session", "session.toml", schema::session),
     file("machine", "machine.toml", schema::machine),
     file("fit", "`abbe fit --json`", of::<StatedFit>),
-    file("repeat", "`abbe fit --repeat --json`", of::<Repeated>),
+    file("repeat", "`abbe compare --repeated --json`", of::<Repeated>),
     file("geometric", "`abbe fit --method circle|cone|two-plane --json`", of::<GeometricComparison>),
     file("self-calibration", "`abbe fit --method self-calibration --json`", of::<SelfCalibration>),
     file("trace", "`abbe trace --json`", of::<StatedTrace>),
@@ -55,7 +55,7 @@ pub const SCHEMAS: &[FileSchema] = &[
     file("plan", "`abbe plan --json`", of::<StatedPlan>),
     file("next-test", "`abbe plan --improve|--separate|--range --json`", of::<NextTest>),
     file("global", "`abbe plan --global --json`", of::<GlobalAnalysis>),
-    file("poses", "`abbe plan --poses --json`", of::<PoseSelection>),
+    file("poses", "`abbe poses --json`", of::<PoseSelection>),
     file("patterns", "`abbe plan --patterns --json`", of::<Patterns>),
     file("simulate", "`abbe simulate --json`", of::<SimulationResult>),
     file("map", "`abbe volumetric --map --json`", of::<Summary>),
@@ -63,17 +63,17 @@ pub const SCHEMAS: &[FileSchema] = &[
     file("import", "`abbe import --json`", of::<ImportResult>),
     file("export", "`abbe export --json`", of::<ExportResult>),
     file("compensate", "`abbe compensate --json`", of::<stream::Summary>),
-    file("run", "`abbe run --json`", of::<RunResult>),
-    file("history", "`abbe history --json`", of::<StatedHistory>),
-    file("study", "`abbe study --json`", of::<StudyResult>),
+    file("run", "`abbe fleet run --json`", of::<RunResult>),
+    file("history", "`abbe fleet history --json`", of::<StatedHistory>),
+    file("study", "`abbe fleet study --json`", of::<StudyResult>),
     file("functions", "The error functions of `abbe volumetric --functions`, as JSON", || {
         schema::of::<error_functions::File>("Abbe file of error functions")
     }),
-    file("study-file", "The study file of `abbe study`, as JSON", || schema::of::<StudyFile>("Abbe study file")),
+    file("study-file", "The study file of `abbe fleet study`, as JSON", || schema::of::<StudyFile>("Abbe study file")),
     file("certificate", "`certificate.toml` of `abbe fit --dcc`, as JSON", || {
         schema::of::<Certificate>("Abbe file of a certificate")
     }),
-    file("record", "The result of a session in the folder of `abbe run`", plain::<Record>),
+    file("record", "The result of a session in the folder of `abbe fleet run`", plain::<Record>),
 ];
 
 /// The schema of a file that has no head of a command.

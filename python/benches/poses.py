@@ -1,4 +1,4 @@
-"""Poses of `abbe plan --poses` beside those of FIGAROH's exchange (DetMax) on the same robot.
+"""Poses of `abbe poses` beside those of FIGAROH's exchange (DetMax) on the same robot.
 
     pip install --no-deps figaroh==1.0.2
     python python/benches/poses.py
@@ -73,8 +73,8 @@ def main() -> None:
         for criterion in ("worst", "d"):
             rows, result = Path(folder, f"{criterion}.csv"), Path(folder, f"{criterion}.json")
             box = ",".join(str(end) for ends in BOX_MM for end in ends)
-            line = ["abbe", "plan", SESSION / "session.toml", "--poses", str(POSES), "--criterion", criterion, "--quiet"]
-            line += ["--noise-um", str(1e3 * NOISE_MM), "--box-mm", box, "--poses-csv", rows, "--json", result]
+            line = ["abbe", "poses", SESSION / "session.toml", "--poses", str(POSES), "--criterion", criterion, "--quiet"]
+            line += ["--noise-um", str(1e3 * NOISE_MM), "--box-mm", box, "--out", rows, "--json", result]
             subprocess.run([str(word) for word in line], check=True)
             table = list(csv.reader(rows.read_text().splitlines()))[1:]
             chosen[f"abbe plan --criterion {criterion}"] = np.array(table, dtype=float)

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use abbe::apply::correction::Correction;
 use abbe::apply::export::travel::Travel;
 use abbe::document::{Document, Origin, StatedValidation};
-use abbe::exports::{self, ExportOptions};
+use abbe::exports::{self, Contents, ExportOptions};
 use abbe::identify::model_file::errors::EstimatedErrors;
 use abbe::identify::model_file::{self, IdentifiedModel};
 use abbe::identify::unit::ARCSEC;
@@ -88,8 +88,8 @@ impl Model {
         parameters.map(row).collect()
     }
 
-    /// The file of `abbe export`; `travel` has axes with their ranges, mm or degrees.
-    #[pyo3(signature = (format, tool_mm, entries, travel, patch=None, tip=None, convention="modified", dh=None))]
+    /// The file of `abbe export`, without a name, or its files; `travel` has axes with their ranges, mm or degrees.
+    #[pyo3(signature = (format, tool_mm, entries, travel, patch=None, tip=None, convention="modified", dh=None, places=None))]
     fn export(
         &self,
         format: &str,
@@ -100,7 +100,8 @@ impl Model {
         tip: Option<String>,
         convention: &str,
         dh: Option<PathBuf>,
-    ) -> Result<Vec<u8>, Failed> {
+        places: Option<usize>,
+    ) -> Result<Vec<(Option<String>, Vec<u8>)>, Failed> {
         let format = exports::format(format)?;
         let measured = Travel::measured(&self.model);
         let options = ExportOptions {
@@ -111,18 +112,17 @@ impl Model {
             })?,
             dh: dh.map(|file| files::text(&file, "the table")).transpose()?,
             patch: patch.map(|file| files::text(&file, "the URDF file").map(|source| (source, tip))).transpose()?,
+            places,
             travel: travel.iter().try_fold(measured, |all, (axis, range)| all.with(&self.model, axis, *range))?,
         };
-        if let Some(option) = format.ignored(&options) {
-            let owners = match option {
-                "patch" => vec!["urdf"],
-                "dh" | "convention" => vec!["dh"],
-                _ => exports::words_with_entries(),
-            };
+        if let Some((option, owners)) = format.ignored(&options) {
             let owners: Vec<String> = owners.iter().map(|word| format!("\"{word}\"")).collect();
             return Err(Failed::argument(format!("`{option}` belongs to {}", owners.join(" and ")), ""));
         }
-        Ok(format.export(&self.model, &options)?.text)
+        Ok(match format.export(&self.model, &options)?.contents {
+            Contents::File(text) => vec![(None, text)],
+            Contents::Folder(files) => files.into_iter().map(|(name, text)| (Some(name), text)).collect(),
+        })
     }
 
     fn validate(&self, py: Python<'_>, session: &Session) -> PyResult<Validation> {

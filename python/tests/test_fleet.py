@@ -34,7 +34,7 @@ def test_results_are_those_of_the_command_whatever_the_workers(sessions, finishe
     again = abbe.fleet.run(sessions, finished, workers=1, progress=False, trace=False)
     assert (again.computed, again.kept) == (0, 24)
     done = subprocess.run(
-        [find_command(), "run", str(sessions), "--out", str(tmp_path / "command"), "--no-trace"], capture_output=True
+        [find_command(), "fleet", "run", str(sessions), "--out", str(tmp_path / "command"), "--no-trace"], capture_output=True
     )
     assert done.returncode == 0, done.stderr
     assert results(finished) == results(tmp_path / "command")
@@ -93,7 +93,7 @@ def find_file(out, key):
 
 def test_history_is_that_of_the_command(finished):
     found = abbe.fleet.history(finished)
-    done = subprocess.run([find_command(), "history", str(finished), "--json", "-"], capture_output=True, check=True)
+    done = subprocess.run([find_command(), "fleet", "history", str(finished), "--json", "-"], capture_output=True, check=True)
     printed = json.loads(done.stdout)
     assert {key: printed[key] for key in found} == found
     drifting = [

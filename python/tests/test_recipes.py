@@ -1,4 +1,4 @@
-"""The recipes of docs/guide/fleet.md: what is printed there runs here, and gives the results of `abbe run` alone."""
+"""The recipes of docs/guide/fleet.md: what is printed there runs here, and gives the results of `abbe fleet run` alone."""
 
 import os
 import re
@@ -15,10 +15,10 @@ COUNT = 6
 
 @pytest.fixture(scope="module")
 def alone(tmp_path_factory):
-    """Sessions, and their results by one `abbe run`."""
+    """Sessions, and their results by one `abbe fleet run`."""
     place = tmp_path_factory.mktemp("alone")
     make(place / "fleet", COUNT, machines=2)
-    subprocess.run([find_command(), "run", "fleet", "--out", "results", "--quiet"], cwd=place, check=True)
+    subprocess.run([find_command(), "fleet", "run", "fleet", "--out", "results", "--quiet"], cwd=place, check=True)
     assert len(results(place / "results")) == COUNT
     return place
 

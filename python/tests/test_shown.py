@@ -110,6 +110,39 @@ def test_compare_and_export(results, tmp_path):
         model.export("linuxcnc", travel={"A": (90, -90)})
     with pytest.raises(abbe.Error, match="the formats are table"):
         fit.model().export("nothing")
+    with pytest.raises(ValueError, match="`places` belongs to"):
+        model.export("urdf", places=5)
+
+
+def test_compensation_tables_of_a_model(tmp_path):
+    """A table of LinuxCNC holds the commanded position and where the axis stands: together they give the error."""
+    plan = {
+        "machine": {"chain": "w C b X Y Z t", "axis": {name: {} for name in "CXYZ"}},
+        "instrument": {"kind": "ballbar", "noise_um": 0.1},
+        "unknowns": {"errors": ["EX0C"]},
+        "effect": [{"component": "EXX", "shape": "polynomial", "order": 2}],
+        "test": [
+            {
+                "name": name,
+                "bar_mm": 100,
+                "workpiece_ball_mm": [x, 0, 0],
+                "spindle_ball_mm": [0, 0, 0],
+                "path": {"kind": "circle", "plane": "XY", "radius_mm": 100, "step_deg": 2},
+            }
+            for name, x in (("XY", 0), ("off centre", 60))
+        ],
+    }
+    session = abbe.Session(plan).simulate({"EX0C": "3um", "EXX~X:p2.1": "6um", "EXX~X:p2.2": "-3um"}, seed=3)
+    fit = session.fit()
+    files = fit.model().export("linuxcnc-tables", tmp_path / "tables", places=11)
+    assert set(files) == {"X.comp", "uncertainty.csv"}
+    assert (tmp_path / "tables" / "X.comp").read_text() == files["X.comp"]
+    rows = [line.split() for line in files["X.comp"].splitlines()]
+    assert len(rows) == 11
+    for row in rows:
+        at, actual = float(row[0]), float(row[1])
+        expected = fit["EXX~X:p2.1"].value * at / 100 + fit["EXX~X:p2.2"].value * (at / 100) ** 2
+        assert (actual - at) * 1e3 == pytest.approx(expected, abs=2e-3)
 
 
 def test_figures(results):

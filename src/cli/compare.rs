@@ -9,10 +9,10 @@ use abbe::model::files::stamp::FileStamp;
 use abbe::model::files::{self, ReadOptions, SourceMap};
 use clap::Args;
 
-use super::CommonArguments;
 use super::failure::Failure;
 use super::output::Outputs;
 use super::results::Read;
+use super::{CommonArguments, DataArguments, PlausibilityArguments, repeated};
 use crate::report;
 
 /// Examples of `abbe compare`.
@@ -24,14 +24,14 @@ pub struct CompareArguments {
     /// Sessions or models, the first one being that with which the others are compared.
     #[arg(required = true, num_args = 2..)]
     inputs: Vec<PathBuf>,
-    /// Folder of the data files of the sessions, if they do not lie beside the session files.
-    ///
-    /// Example: --data measurements
-    #[arg(long, value_name = "DIR")]
-    data: Option<PathBuf>,
-    /// Allow the sessions to read files outside their own folder and the folder of --data.
-    #[arg(long)]
-    allow_outside: bool,
+    #[command(flatten)]
+    data: DataArguments,
+    /// The sessions repeat one plan on an unchanged machine: state the standard uncertainty from the scatter of their fits
+    /// (Type A) beside that of each fit (Type B).
+    #[arg(long, conflicts_with_all = ["shared", "significance", "places"])]
+    repeated: bool,
+    #[command(flatten)]
+    plausibility: PlausibilityArguments,
     /// Set-up quantity that was not mounted again between the sessions: bar, workpiece_ball, spindle_ball, `none`; may be
     /// repeated [default: bars of the same name with the same prior].
     ///
@@ -43,7 +43,7 @@ pub struct CompareArguments {
     /// Example: --significance 0.01
     #[arg(long, value_name = "P", default_value_t = SIGNIFICANCE)]
     significance: f64,
-    /// Places along each axis at which the volumetric error is evaluated; 0 for none.
+    /// Number of places along each axis: here of the volumetric error, 0 for none.
     ///
     /// Example: --places 7
     #[arg(long, value_name = "N", default_value_t = 5)]
@@ -65,11 +65,10 @@ pub fn run(arguments: &CompareArguments) -> Result<(), Failure> {
     }
     let common = &arguments.common;
     let outputs = common.output.prepared(&[])?;
-    let reading = ReadOptions {
-        data_directory: arguments.data.clone(),
-        allow_outside: arguments.allow_outside,
-        ..ReadOptions::default()
-    };
+    if arguments.repeated {
+        return repeated::run(&arguments.inputs, &arguments.data, arguments.plausibility, common, &outputs);
+    }
+    let reading = arguments.data.options();
     let inputs: Vec<File> =
         arguments.inputs.iter().map(|file| read(file, &reading, &outputs)).collect::<Result<_, _>>()?;
     let names: Vec<String> = arguments.inputs.iter().map(|file| file.display().to_string()).collect();

@@ -29,7 +29,7 @@ pub struct CompensateArguments {
     model: PathBuf,
     /// The commanded positions.
     commands: PathBuf,
-    /// Where the corrected commands are written; `-` is standard output.
+    /// Where the result is written: the corrected commands; `-` is standard output.
     ///
     /// Example: --out corrected.csv
     #[arg(long, value_name = "FILE")]

@@ -24,21 +24,21 @@ pub const HELP: &str = include_str!("help/equation.txt");
 pub struct EquationArguments {
     #[command(flatten)]
     session: super::SessionArguments,
-    /// Name of the test in the session. Its readings, if there are any, state only which axes move and how far.
+    /// Name of a test of the session. Its readings, if there are any, state only which axes move and how far.
     ///
     /// Example: --test A150
     #[arg(
         long,
         value_name = "NAME",
-        required_unless_present = "all",
-        conflicts_with = "all",
+        required_unless_present = "all_tests",
+        conflicts_with = "all_tests",
         allow_hyphen_values = true
     )]
     test: Option<String>,
     /// The equations of all tests: in text, LaTeX and Typst with the derivatives of their readings by the errors as a
     /// matrix; as code with a file for each test in the folder that --out names.
     #[arg(long)]
-    all: bool,
+    all_tests: bool,
     /// Axes that stay symbols where the test holds them, separated by commas; `none` for numbers [default: in code none,
     /// otherwise the rotary axes that are held at an angle that is no multiple of 90°].
     ///
@@ -47,6 +47,8 @@ pub struct EquationArguments {
     symbols: Option<Vec<String>>,
     #[command(flatten)]
     form: FormArguments,
+    #[command(flatten)]
+    folder: folder::ForceArguments,
 }
 
 impl EquationArguments {
@@ -77,7 +79,7 @@ fn read(arguments: &super::SessionArguments) -> Result<(Session, SourceMap), Fai
 /// Runs `abbe equation`.
 pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
     let form = &arguments.form;
-    if arguments.all && matches!(form.language.audience, Audience::Compilers | Audience::Algebra) {
+    if arguments.all_tests && matches!(form.language.audience, Audience::Compilers | Audience::Algebra) {
         return write_all_code(arguments);
     }
     let outputs = Outputs::new(&form.out)?;
@@ -103,11 +105,11 @@ fn write_all_code(arguments: &EquationArguments) -> Result<(), Failure> {
     let form = &arguments.form;
     let Some(out) = &form.out else {
         return Err(Failure::Other(format!(
-            "`--all --as {}` writes a file for each test; name a new folder by --out",
+            "`--all-tests --as {}` writes a file for each test; name a new folder by --out",
             form.language.word
         )));
     };
-    folder::check(out, None)?;
+    folder::check(out, arguments.folder.force)?;
     let (session, _) = read(&arguments.session)?;
     let style = Style { name_of_test: true, ..form.style.style(form.language)? };
     let file = |test: &Test| -> Result<_, Failure> {
@@ -116,5 +118,5 @@ fn write_all_code(arguments: &EquationArguments) -> Result<(), Failure> {
     };
     let files: Vec<(String, String)> = session.tests.iter().map(file).collect::<Result<_, Failure>>()?;
     equation::refuse_equal_names(&session, &files)?;
-    folder::write(out, &files, false, |_| Ok(()))
+    folder::write(out, &files, arguments.folder.force, |_| Ok(()))
 }

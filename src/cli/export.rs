@@ -5,7 +5,7 @@ mod travel;
 use std::path::PathBuf;
 
 use abbe::apply::export::kinematics::ENTRIES;
-use abbe::exports::{self, ExportOptions};
+use abbe::exports::{self, Contents, ExportOptions};
 use abbe::identify::model_file;
 use abbe::model::files;
 use abbe::model::files::robot::dh::Convention;
@@ -14,7 +14,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 
 use super::failure::Failure;
 use super::results::{OutputArguments, Read};
-use super::{output, values};
+use super::{folder, output, values};
 use crate::report::export as present;
 
 /// Examples of `abbe export`.
@@ -34,17 +34,17 @@ fn entries() -> PossibleValuesParser {
 pub struct ExportArguments {
     /// The identified model: `abbe fit --save` or `abbe trace --save`.
     model: PathBuf,
-    /// What is written.
+    /// The format of the output.
     ///
     /// Example: --as urdf
     #[arg(long = "as", value_parser = formats(), value_name = "FORMAT")]
     format: String,
-    /// Where it is written; `-` is standard output.
+    /// Where the result is written: a file, `-` for standard output; for tables a new folder.
     ///
     /// Example: --out robot.urdf
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// The tool point in the tool frame, for urdf, dh and controls [default: the instrument's point in the model].
+    /// The tool point in the tool frame [default: the instrument's point in the model].
     ///
     /// Example: --tool-mm 0,0,120
     #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_hyphen_values = true)]
@@ -62,12 +62,13 @@ pub struct ExportArguments {
     /// Example: --as urdf --patch robot.urdf
     #[arg(long, value_name = "FILE")]
     patch: Option<PathBuf>,
-    /// The link at which the chain of --patch ends [default: the end of the arm].
+    /// The link at which the chain of the URDF ends [default: the end of the arm].
     ///
     /// Example: --as urdf --patch robot.urdf --tip tool0
     #[arg(long, value_name = "LINK", requires = "patch", allow_hyphen_values = true)]
     tip: Option<String>,
-    /// With dh: the convention of the parameters.
+    /// The convention of Denavit-Hartenberg parameters: standard is Rz(θ)·Tz(d)·Tx(a)·Rx(α), modified is
+    /// Tx(a)·Rx(α)·Rz(θ)·Tz(d).
     ///
     /// Example: --as dh --convention standard
     #[arg(long, value_parser = values::words(&Convention::WORDS), default_value = "modified")]
@@ -77,17 +78,24 @@ pub struct ExportArguments {
     /// Example: --as dh --convention standard --dh robot.csv
     #[arg(long, value_name = "FILE")]
     dh: Option<PathBuf>,
+    /// Number of places along each axis: here of a compensation table, over the range in which the axis moved while the
+    /// readings observed the error [default: 37].
+    ///
+    /// Example: --as heidenhain-tables --places 73
+    #[arg(long, value_name = "N")]
+    places: Option<usize>,
     #[command(flatten)]
     output: OutputArguments,
 }
 
 /// Runs `abbe export`.
 pub fn run(arguments: &ExportArguments) -> Result<(), Failure> {
-    let outputs = arguments.output.prepared(&[Some(&arguments.out)])?;
+    let format = exports::format(&arguments.format)?;
+    let file = Some(&arguments.out).filter(|_| !format.is_of_tables());
+    let outputs = arguments.output.prepared(&[file])?;
     outputs.refuse_overwrite([arguments.model.as_path()])?;
     let source = files::text(&arguments.model, "the model file")?;
     let model = model_file::of_source(&source)?;
-    let format = exports::format(&arguments.format)?;
     let patch = arguments.patch.as_ref().map(|file| files::text(file, "the URDF file")).transpose()?;
     outputs.refuse_overwrite(arguments.patch.iter().chain(&arguments.dh).map(PathBuf::as_path))?;
     let dh = arguments.dh.as_ref().map(|file| files::text(file, "the table")).transpose()?;
@@ -98,19 +106,21 @@ pub fn run(arguments: &ExportArguments) -> Result<(), Failure> {
         tool_mm: values::point_mm("--tool-mm", &arguments.tool_mm, model.tool_mm)?,
         entries: exports::entries(&arguments.entries)?,
         travel: travel::stated(&arguments.travel, &model)?,
+        places: arguments.places,
     };
-    if let Some(option) = format.ignored(&options) {
-        let owners = match option {
-            "patch" => vec!["urdf"],
-            "dh" | "convention" => vec!["dh"],
-            _ => exports::words_with_entries(),
-        };
+    if let Some((option, owners)) = format.ignored(&options) {
         let owners: Vec<String> = owners.iter().map(|word| format!("`--as {word}`")).collect();
         return Err(Failure::CommandLine(format!("`--{option}` belongs to {}", owners.join(" and "))));
     }
     let exported = format.export(&model, &options)?;
-    output::write_whole(&arguments.out, &exported.text)?;
-    let left_out = &exported.result.left_out;
-    let report = present::report(&model.machine.name, &arguments.out, exported.table, left_out);
+    let mut written = vec![arguments.out.clone()];
+    match &exported.contents {
+        Contents::File(text) => output::write_whole(&arguments.out, text)?,
+        Contents::Folder(files) => {
+            folder::write(&arguments.out, files, arguments.output.folder.force, |_| Ok(()))?;
+            written = files.iter().map(|(name, _)| arguments.out.join(name)).collect();
+        }
+    }
+    let report = present::report(&model.machine.name, &written, exported.table, &exported.result);
     arguments.output.put(&outputs, &report, &exported.result, &Read::files(&source.stamp))
 }

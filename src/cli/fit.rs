@@ -1,7 +1,5 @@
 //! `abbe fit`: estimate errors from readings.
 
-use std::path::PathBuf;
-
 use abbe::document::StatedFit;
 use abbe::identify::{fit, propagation};
 use clap::Args;
@@ -11,9 +9,7 @@ use super::forms::FormArguments;
 use super::method::{self, Method};
 use super::results::Read;
 use super::save::SaveArguments;
-use super::{
-    CommonArguments, SessionArguments, certificate, compensation, monte_carlo, read_session, readings, repeated,
-};
+use super::{CommonArguments, SessionArguments, certificate, monte_carlo, read_session, readings};
 use crate::report;
 
 /// Examples of `abbe fit`.
@@ -32,8 +28,8 @@ pub struct FitArguments {
     save: SaveArguments,
     #[command(flatten)]
     forms: FormArguments,
-    /// Explanation of a declared effect that is accepted on the user's word: the effect, or one of its aliases, which then
-    /// takes its place. Uncertainties do not cover the others; every output says so. May be repeated.
+    /// Explanation that is accepted on the user's word: a declared effect, or one of its aliases, which then takes its
+    /// place. Uncertainties do not cover the others; every output says so. May be repeated.
     ///
     /// Example: --assume EZC~C:h2
     #[arg(long, value_name = "EFFECT", allow_hyphen_values = true)]
@@ -49,36 +45,15 @@ pub struct FitArguments {
     certificate: certificate::CertificateArguments,
     #[command(flatten)]
     draws: monte_carlo::DrawArguments,
-    /// Compare with further sessions of the same plan: standard uncertainty from the scatter of the fits (Type A)
-    /// beside that of each fit (Type B).
-    ///
-    /// Example: --repeat day2/session.toml day3/session.toml
-    #[arg(
-        long,
-        value_name = "SESSION",
-        num_args = 1..,
-        conflicts_with_all = ["monte_carlo", "views", "residuals", "compensation", "save", "base", "terms", "dcc"]
-    )]
-    repeat: Vec<PathBuf>,
-    #[command(flatten)]
-    compensation: compensation::CompensationArguments,
 }
 
 /// Runs `abbe fit`.
 pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
-    arguments.compensation.check()?;
     let common = &arguments.common;
     let [views, residuals] = arguments.readings.files();
     let others = [views, residuals, arguments.save.file(), arguments.certificate.file()];
     let outputs = common.output.prepared(&others)?;
     let wanted = arguments.certificate.read(&arguments.session.session, &outputs)?;
-    if !arguments.repeat.is_empty() {
-        if arguments.method != Method::Full {
-            let message = "`--repeat` compares full fits: leave out `--method` or `--repeat`";
-            return Err(Failure::CommandLine(message.into()));
-        }
-        return repeated::run(&arguments.session, &arguments.repeat, arguments.plausibility, common, &outputs);
-    }
     let (session, sources) = read_session(&arguments.session, &outputs)?;
     let session = fit::assume(&session, &arguments.assume)?;
     let certificate = wanted.as_ref().map(|wanted| wanted.of(&session)).transpose()?;
@@ -88,7 +63,6 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
         method::refuse([
             ("--views", views.is_some()),
             ("--residuals", residuals.is_some()),
-            ("--compensation", arguments.compensation.wanted()),
             ("--base", arguments.forms.base),
             ("--terms", arguments.forms.terms.is_some()),
             ("--save", arguments.save.file().is_some()),
@@ -113,6 +87,5 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     if let (Some(wanted), Some(certificate)) = (&wanted, &certificate) {
         wanted.write(certificate, &problem, &result)?;
     }
-    arguments.save.run(&problem, &found, &sources, common.seed)?;
-    arguments.compensation.run(&problem, &found, outputs.tables())
+    arguments.save.run(&problem, &found, &sources, common.seed)
 }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use abbe::temporary::{self, TemporaryFolder};
+use clap::Args;
 
 use super::failure::Failure;
 use super::output;
@@ -21,7 +22,7 @@ pub fn write(
     check_files: impl FnOnce(&Path) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     let fault = |source| fault(folder, source);
-    let present = check(folder, Some(force))?;
+    let present = check(folder, force)?;
     let parent = match folder.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
@@ -92,11 +93,19 @@ fn fault(folder: &Path, source: std::io::Error) -> Failure {
     Failure::Write { path: folder.display().to_string(), source }
 }
 
-/// Whether the folder exists. `force` is the option of the user, if the command has one.
+/// `--force`: an option of every command that writes a folder. Files that options name are always replaced.
+#[derive(Args, Clone, Copy)]
+pub struct ForceArguments {
+    /// Replace files in an existing folder.
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Whether the folder exists. `force` is the option of the user.
 ///
 /// # Errors
 /// If nothing may be written into the folder.
-pub fn check(folder: &Path, force: Option<bool>) -> Result<bool, Failure> {
+pub fn check(folder: &Path, force: bool) -> Result<bool, Failure> {
     if folder.as_os_str() == "-" {
         let what = "`-` is standard output, which cannot contain a folder; name a folder";
         return Err(Failure::CommandLine(what.into()));
@@ -106,13 +115,9 @@ pub fn check(folder: &Path, force: Option<bool>) -> Result<bool, Failure> {
     }
     let present = folder.is_dir();
     let occupied = present && std::fs::read_dir(folder).map_err(|source| fault(folder, source))?.next().is_some();
-    if occupied && force != Some(true) {
-        let or = match force {
-            Some(_) => ", or use --force to replace files with the same names",
-            None => "",
-        };
+    if occupied && !force {
         return Err(Failure::Other(format!(
-            "{}: the folder exists and is not empty; name another{or}",
+            "{}: the folder exists and is not empty; name another, or use --force to replace files with the same names",
             folder.display()
         )));
     }

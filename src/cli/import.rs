@@ -35,10 +35,10 @@ pub struct ImportArguments {
     /// Example: --machine robot/machine.toml --out run1
     #[arg(long, value_name = "MACHINE", requires = "out")]
     machine: Option<PathBuf>,
-    /// The folder of the new session.
+    /// Where the result is written: a new folder for the session.
     ///
     /// Example: --out run1
-    #[arg(long, value_name = "FOLDER", conflicts_with = "session")]
+    #[arg(long, value_name = "DIR", conflicts_with = "session")]
     out: Option<PathBuf>,
     /// The session to which the tests are added. A file with the name of a planned test gives it its readings.
     ///
@@ -65,15 +65,12 @@ pub struct ImportArguments {
     /// Example: --like C100
     #[arg(long, value_name = "TEST", requires = "session", allow_hyphen_values = true)]
     like: Option<String>,
-    /// Allow the session to read files outside its folder.
+    /// Allow a session to read files outside its own folder.
     #[arg(long)]
     allow_outside: bool,
     /// Accept readings that contradict the machine, such as location errors above 5 % of a link.
     #[arg(long)]
     allow_implausible: bool,
-    /// Replace files with the same names: in the new folder, or beside the session.
-    #[arg(long)]
-    force: bool,
     #[command(flatten)]
     output: OutputArguments,
 }
@@ -100,8 +97,8 @@ pub fn run(arguments: &ImportArguments) -> Result<(), Failure> {
     };
     let imported = import(&files, target, &options).map_err(refused)?;
     match target {
-        Target::Machine(_) => folder::write(into, &imported.files, arguments.force, |_| Ok(()))?,
-        Target::Session(_) => folder::add(into, &imported.files, &arguments.files, arguments.force)?,
+        Target::Machine(_) => folder::write(into, &imported.files, arguments.output.folder.force, |_| Ok(()))?,
+        Target::Session(_) => folder::add(into, &imported.files, &arguments.files, arguments.output.folder.force)?,
     }
     let session = into.join(&imported.result.session);
     let report = present::report(&imported.result, &session.display().to_string());

@@ -23,18 +23,18 @@ pub fn write<T: Serialize>(path: &Path, origin: Origin, seed: Option<u64>, resul
 
 /// The name of the command, and the options on the command line of this process.
 pub fn command_line() -> Call {
-    let parser = Arguments::command();
+    let mut parser = Arguments::command();
     // The command line has been parsed before.
-    let Ok(matches) = parser.clone().try_get_matches_from(std::env::args_os()) else {
+    let Ok(mut matches) = parser.clone().try_get_matches_from(std::env::args_os()) else {
         return Call::default();
     };
-    match matches.subcommand() {
-        Some((name, own)) => {
-            let options = parser.find_subcommand(name).map_or(Map::new(), |command| options(command, own));
-            Call { command: name.to_string(), options }
-        }
-        None => Call::default(),
+    let mut name = String::new();
+    // Of `fleet run` the command is `run`.
+    while let Some((inner, own)) = matches.remove_subcommand() {
+        parser = parser.find_subcommand(&inner).cloned().unwrap_or_default();
+        (name, matches) = (inner, own);
     }
+    Call { command: name, options: options(&parser, &matches) }
 }
 
 /// Options that have a field of their own, or that change no result.

@@ -29,18 +29,18 @@ pub struct MapArguments {
     /// The errors as functions of the axes: a TOML file of constants, tables, polynomials and harmonics.
     #[arg(long, value_name = "FILE", requires = "map")]
     functions: Option<PathBuf>,
-    /// Places along each axis that moves.
+    /// Number of places along each axis: here of each that moves.
     #[arg(long, value_name = "N", requires = "map", default_value_t = 5)]
     places: usize,
     /// Where an axis stands in the map, or its own number of places: `A=30` (mm or degrees), `X:11`; may be repeated.
     #[arg(long = "axis", value_name = "AXIS=AT|AXIS:N", requires = "map", allow_hyphen_values = true)]
     axes: Vec<String>,
-    /// The tool point in the tool frame.
+    /// The tool point in the tool frame [default: 0,0,0].
     #[arg(long, value_name = "X,Y,Z", requires = "map", value_delimiter = ',', allow_hyphen_values = true)]
     tool_mm: Vec<f64>,
     /// Add the commands of the linear axes that cancel the error, and what they leave.
     #[arg(long, requires = "map")]
-    compensate: bool,
+    correction: bool,
     #[command(flatten)]
     pub output: OutputArguments,
 }
@@ -77,7 +77,7 @@ pub fn run(
     let tool_mm = values::point_mm("--tool-mm", &arguments.tool_mm, [0.0; 3])?;
     let grid = grid::grid(machine, arguments.places, &arguments.axes)?;
     let erring = MachineWithErrors { machine, functions: &functions, tool_mm };
-    let (places, summary) = volumetric::map(&erring, &grid, arguments.compensate)?;
+    let (places, summary) = volumetric::map(&erring, &grid, arguments.correction)?;
     output::write_whole(path, &output::csv(&present::places(machine, &places))?)?;
     let report = present::report(machine, path, &summary, functions.len());
     arguments.output.put(outputs, &report, &summary, &Read::files(machine_file.stamp.iter().chain(&source.stamp)))

@@ -8,16 +8,15 @@ macro_rules! say {
 mod certificate;
 mod compare;
 mod compensate;
-mod compensation;
 mod controls;
 mod equation;
 mod excerpt;
 mod export;
 mod failure;
 mod fit;
+mod fleet;
 mod folder;
 mod forms;
-mod history;
 mod import;
 mod interrupt;
 mod json;
@@ -32,16 +31,15 @@ mod output;
 mod overview;
 mod paper;
 mod plan;
+mod poses;
 mod readings;
 mod repeated;
 mod results;
-mod run;
 mod save;
 mod schema;
 mod search;
 mod sheet;
 mod simulate;
-mod study;
 mod trace;
 mod validate;
 mod values;
@@ -69,7 +67,7 @@ struct Arguments {
     /// Suppress tables and progress output; warnings and errors stay.
     #[arg(short, long, global = true)]
     quiet: bool,
-    /// Number of threads; by default all processors, but one for `run` and `study`.
+    /// Number of threads; by default all processors, but one for `fleet run` and `fleet study`.
     #[arg(long, global = true, value_name = "N", value_parser = values::threads())]
     threads: Option<u32>,
 }
@@ -118,15 +116,12 @@ enum Command {
         /// The shell.
         shell: clap_complete::Shell,
     },
-    /// Analyse many sessions; a second run computes what has changed.
-    #[command(after_help = run::HELP)]
-    Run(run::RunArguments),
+    /// Analyse many sessions and show machines over time; simulate studies.
+    #[command(subcommand)]
+    Fleet(Box<fleet::Fleet>),
     /// Turn foreign files of readings into a session.
     #[command(after_help = import::HELP)]
     Import(import::ImportArguments),
-    /// Show machines over time: drifts, steps, the next check.
-    #[command(after_help = history::HELP)]
-    History(history::HistoryArguments),
     /// Print the JSON Schema of a file or a result.
     #[command(after_help = schema::HELP)]
     Schema(schema::SchemaArguments),
@@ -136,9 +131,9 @@ enum Command {
     /// Simulate readings of planned tests with given errors.
     #[command(after_help = simulate::HELP)]
     Simulate(Box<simulate::SimulateArguments>),
-    /// Simulate many sessions: power, false claims, ranking of set-ups.
-    #[command(after_help = study::HELP)]
-    Study(study::StudyArguments),
+    /// Choose the poses of a robot or a probe that determine its errors best.
+    #[command(after_help = poses::HELP)]
+    Poses(poses::PoseArguments),
     /// Find the unmodelled effect behind the residual.
     #[command(after_help = trace::HELP)]
     Trace(trace::TraceArguments),
@@ -152,20 +147,34 @@ enum Command {
 pub struct SessionArguments {
     /// The session file.
     session: PathBuf,
+    #[command(flatten)]
+    data: DataArguments,
+}
+
+/// Where the data files of sessions are.
+#[derive(Args, Clone)]
+pub struct DataArguments {
     /// Folder of the data files, if they do not lie beside the session file.
     ///
     /// Example: --data measurements
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Allow the session to read files outside its own folder and the folder of --data.
+    /// Allow a session to read files outside its own folder. The folder of --data is always allowed.
     #[arg(long)]
     allow_outside: bool,
+}
+
+impl DataArguments {
+    /// Options of the reader.
+    fn options(&self) -> ReadOptions {
+        ReadOptions { data_directory: self.data.clone(), allow_outside: self.allow_outside, ..ReadOptions::default() }
+    }
 }
 
 /// What an identification does with estimates that mean nothing.
 #[derive(Args, Clone, Copy)]
 pub struct PlausibilityArguments {
-    /// Accept location errors of poses that are more than 5 % of a link.
+    /// Accept readings that contradict the machine, such as location errors above 5 % of a link.
     #[arg(long)]
     allow_implausible: bool,
 }
@@ -184,12 +193,12 @@ impl PlausibilityArguments {
 impl SessionArguments {
     /// Options of the reader.
     fn options(&self) -> ReadOptions {
-        ReadOptions { data_directory: self.data.clone(), allow_outside: self.allow_outside, ..ReadOptions::default() }
+        self.data.options()
     }
 
     /// How command lines name the session.
     fn commands(&self) -> Commands {
-        Commands::of(&self.session, self.data.as_deref(), self.allow_outside)
+        Commands::of(&self.session, self.data.data.as_deref(), self.data.allow_outside)
     }
 }
 
@@ -260,13 +269,12 @@ fn execute(command: Command, quiet: bool, threads: Option<u32>) -> Result<(), Fa
             output::whole(String::from_utf8_lossy(&script).trim_end());
             Ok(())
         }
-        Command::History(arguments) => history::run(&arguments),
+        Command::Fleet(command) => fleet::run(&command, threads),
         Command::Import(arguments) => import::run(&arguments),
-        Command::Run(arguments) => run::run(&arguments, threads.unwrap_or(1)),
+        Command::Poses(arguments) => poses::run(&arguments),
         Command::Schema(arguments) => schema::run(&arguments),
         Command::Sheet(arguments) => sheet::run(&arguments, quiet),
         Command::Simulate(arguments) => simulate::run(&arguments),
-        Command::Study(arguments) => study::run(&arguments, threads.unwrap_or(1)),
         Command::Trace(arguments) => trace::run(&arguments),
         Command::Validate(arguments) => validate::run(&arguments),
     }
@@ -293,13 +301,45 @@ mod tests {
         texts.map(ToString::to_string).collect::<Vec<_>>().join("\n")
     }
 
+    /// The options of all commands of this one, each with its command.
+    fn options(command: &Command) -> Vec<(&Command, &Arg)> {
+        let of = |inner| {
+            let own = Command::get_arguments(inner).filter(|option| !option.is_positional());
+            own.map(move |option| (inner, option)).chain(options(inner))
+        };
+        command.get_subcommands().flat_map(of).collect()
+    }
+
     /// The options of all commands that take a value, each with its command.
     fn options_with_values(command: &Command) -> Vec<(&Command, &Arg)> {
-        command
-            .get_subcommands()
-            .flat_map(|command| command.get_arguments().map(move |option| (command, option)))
-            .filter(|(_, option)| !option.is_positional() && option.get_action().takes_values())
-            .collect()
+        let mut options = options(command);
+        options.retain(|(_, option)| option.get_action().takes_values());
+        options
+    }
+
+    /// An option has one meaning: the same kind of value and the same first sentence wherever it stands.
+    #[test]
+    fn an_option_has_one_meaning() {
+        let command = Arguments::command();
+        let mut known: std::collections::BTreeMap<&str, ([String; 2], &str)> = std::collections::BTreeMap::new();
+        let mut several = Vec::new();
+        for (command, option) in options(&command) {
+            let Some(long) = option.get_long() else { continue };
+            let value = option.get_value_names().map_or(String::new(), |names| names[0].to_string());
+            let value = if ["FILE", "DIR"].iter().any(|path| value.starts_with(path)) { "path".into() } else { value };
+            let text = option.get_help().map(ToString::to_string).unwrap_or_default();
+            let sentence = text.split(['.', ':', ';', '[']).next().unwrap_or_default().trim().to_string();
+            let meaning = [value, sentence];
+            match known.get(long) {
+                Some((other, place)) if *other != meaning => {
+                    several.push(format!("--{long} of {place}: {other:?}, of {}: {meaning:?}", command.get_name()));
+                }
+                Some(_) => {}
+                None => drop(known.insert(long, (meaning, command.get_name()))),
+            }
+        }
+        assert!(known.len() > 100, "{} options", known.len());
+        assert!(several.is_empty(), "{}", several.join("\n"));
     }
 
     #[test]
@@ -353,11 +393,14 @@ mod tests {
             for example in text.lines().filter_map(|line| line.strip_prefix("Example: ")) {
                 let required: &[&str] = match command.get_name() {
                     "equation" => &["SESSION", "--test", "T"],
+                    "poses" => &["SESSION", "--poses", "3"],
                     "history" => &["DIR"],
                     "study" if example.contains("--out") => &["STUDY"],
                     "study" => &["STUDY", "--out", "DIR"],
-                    "run" if example.contains("--list") => &["--out", "DIR"],
-                    "sheet" if example.contains("--number") => &["SESSION", "--out", "OUT", "--control", "fanuc"],
+                    "run" if example.contains("--sessions") => &["--out", "DIR"],
+                    "sheet" if example.contains("--program-number") => {
+                        &["SESSION", "--out", "OUT", "--control", "fanuc"]
+                    }
                     "simulate" | "paper" | "run" | "sheet" => &["SESSION", "--out", "OUT"],
                     "volumetric" => &["MACHINE"],
                     "new" => &["DIR"],
@@ -382,7 +425,8 @@ mod tests {
                     [positional @ .., name, _] if is_given(name) => positional,
                     all => all,
                 };
-                let words = ["abbe", command.get_name()].into_iter();
+                let group = ["run", "history", "study"].contains(&command.get_name()).then_some("fleet");
+                let words = ["abbe"].into_iter().chain(group).chain([command.get_name()]);
                 let words = words.chain(required.iter().copied()).chain(example.split(' '));
                 let parsed = Arguments::command().try_get_matches_from(words);
                 assert!(parsed.is_ok(), "{}: {example}: {}", command.get_name(), parsed.unwrap_err());

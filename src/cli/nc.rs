@@ -24,21 +24,20 @@ pub const HELP: &str = include_str!("help/nc.txt");
 pub struct NcArguments {
     #[command(flatten)]
     session: SessionArguments,
-    /// The control that runs the programs.
+    /// The control of the NC programs.
     ///
     /// Example: --control linuxcnc
     #[arg(long, value_name = "CONTROL", value_parser = controls::with_programs())]
     control: &'static dyn nc::Control,
-    /// New folder for the programs.
+    /// Where the result is written: a new folder for the programs.
     ///
     /// Example: --out programs
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
     motion: MotionArguments,
-    /// Replace files in an existing folder.
-    #[arg(long)]
-    force: bool,
+    #[command(flatten)]
+    folder: folder::ForceArguments,
 }
 
 /// Runs `abbe nc`.
@@ -50,7 +49,7 @@ pub fn run(arguments: &NcArguments, quiet: bool) -> Result<(), Failure> {
     let NcFiles { files: written, warnings, moves, .. } = nc::files(&session, control, &options)?;
     output::Outputs::in_folder(&arguments.out, written.iter().map(|(name, _)| name))
         .refuse_overwrite_of_sources(&sources)?;
-    folder::write(&arguments.out, &written, arguments.force, |_| Ok(()))?;
+    folder::write(&arguments.out, &written, arguments.folder.force, |_| Ok(()))?;
     print_warnings(&warnings);
     print_warnings(&collision::warnings_of_programs(&session, &moves)?);
     if !quiet {

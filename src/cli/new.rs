@@ -32,33 +32,32 @@ The first lists the templates. --from-code creates machine.toml and plan.toml wi
 #[command(group = clap::ArgGroup::new("start").args(["template", "from_code", "from_urdf", "from_dh"]))]
 pub struct NewArguments {
     /// The new folder. Without it, the templates are listed.
-    #[arg(requires = "start")]
-    folder: Option<PathBuf>,
+    #[arg(requires = "start", value_name = "FOLDER")]
+    out: Option<PathBuf>,
     /// Copy this template.
     ///
     /// Example: --template hermle-c600u
-    #[arg(long, value_name = "NAME", requires = "folder", allow_hyphen_values = true)]
+    #[arg(long, value_name = "NAME", requires = "out", allow_hyphen_values = true)]
     template: Option<String>,
     /// Create a machine with this structural code, from workpiece over bed to tool, and a plan for it.
     ///
     /// Example: --from-code [wCXbYZAt]
-    #[arg(long, value_name = "CODE", requires = "folder")]
+    #[arg(long, value_name = "CODE", requires = "out")]
     from_code: Option<String>,
     #[command(flatten)]
     robot: robot::RobotArguments,
     #[command(flatten)]
     sizes: SizeArguments,
-    /// List the templates.
+    /// List the choices, and stop: the templates.
     #[arg(long)]
     list: bool,
-    /// Replace files in an existing folder.
-    #[arg(long)]
-    force: bool,
+    #[command(flatten)]
+    folder: folder::ForceArguments,
 }
 
 /// Runs `abbe new`.
 pub fn run(arguments: &NewArguments, quiet: bool) -> Result<(), Failure> {
-    let (Some(folder), false) = (&arguments.folder, arguments.list) else {
+    let (Some(folder), false) = (&arguments.out, arguments.list) else {
         list();
         return Ok(());
     };
@@ -71,7 +70,7 @@ pub fn run(arguments: &NewArguments, quiet: bool) -> Result<(), Failure> {
     if arguments.template.is_none() {
         check::planned(folder, &files)?;
     }
-    folder::write(folder, &files, arguments.force, |_| Ok(()))?;
+    folder::write(folder, &files, arguments.folder.force, |_| Ok(()))?;
     if quiet {
         return Ok(());
     }

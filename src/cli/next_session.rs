@@ -23,7 +23,7 @@ pub fn write(
     arguments: &SessionArguments,
     edit: impl FnOnce(&mut SessionText) -> Result<(), ModelError>,
 ) -> Result<(), Failure> {
-    let data = arguments.data.as_deref();
+    let data = arguments.data.data.as_deref();
     let mut text = sources.text.clone();
     text.relocate(output::folder_of(path), data)?;
     edit(&mut text)?;

@@ -18,10 +18,10 @@ Exit status: 0 done; 1 the input cannot be used; 2 wrong command line; 130 inter
 
 /// The commands by task.
 const TASKS: [(&str, &[&str]); 5] = [
-    ("Prepare", &["new", "import", "plan", "simulate", "sheet", "nc"]),
+    ("Prepare", &["new", "import", "plan", "poses", "simulate", "sheet", "nc"]),
     ("Analyse", &["fit", "trace", "validate", "compare"]),
     ("Correct", &["compensate", "volumetric", "export"]),
-    ("Many machines", &["run", "history", "study"]),
+    ("Many machines", &["fleet"]),
     ("Write", &["equation", "paper", "schema", "completions"]),
 ];
 

@@ -12,7 +12,7 @@ use clap::Args;
 use super::failure::Failure;
 use super::message::print_warnings;
 use super::values::{self, Words};
-use super::{SessionArguments, folder, output};
+use super::{DataArguments, folder, output};
 use crate::printers::paper;
 use crate::printers::paper::layout::{Class, Layout};
 use crate::report::paper::{SUBJECTS, Subject};
@@ -28,14 +28,13 @@ pub struct PaperArguments {
     /// The session files: plans or measured sessions.
     #[arg(required = true)]
     sessions: Vec<PathBuf>,
-    /// The folder to write; new or empty.
+    /// Where the result is written: a new folder.
     ///
     /// Example: --out paper
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Replace files with the same names in the folder.
-    #[arg(long)]
-    force: bool,
+    #[command(flatten)]
+    folder: folder::ForceArguments,
     /// The parts to write, separated by commas [default: all that the sessions have].
     ///
     /// Example: --parts identifiability,bias
@@ -46,7 +45,7 @@ pub struct PaperArguments {
     /// Example: --class ieeetran
     #[arg(long, value_parser = values::words(CLASSES), default_value = "elsarticle")]
     class: Class,
-    /// Two columns.
+    /// Set for two columns.
     #[arg(long)]
     two_column: bool,
     /// Undeclared effects of the bias table, by their identifiers [default: of location errors that are not estimated
@@ -55,15 +54,9 @@ pub struct PaperArguments {
     /// Example: --effects EZC~C:h2,EAC~C:h1
     #[arg(long, value_name = "EFFECT,…", value_delimiter = ',', allow_hyphen_values = true)]
     effects: Vec<String>,
-    /// Folder of the data files, if they do not lie beside the session files.
-    ///
-    /// Example: --data measurements
-    #[arg(long, value_name = "DIR")]
-    data: Option<PathBuf>,
-    /// Allow the sessions to read files outside their own folders and the folder of --data.
-    #[arg(long)]
-    allow_outside: bool,
-    /// Seed of the folds of a fit.
+    #[command(flatten)]
+    data: DataArguments,
+    /// Seed of the random numbers: folds, null distribution, simulated noise, Monte Carlo.
     ///
     /// Example: --seed 7
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -72,19 +65,14 @@ pub struct PaperArguments {
 
 /// Runs `abbe paper`.
 pub fn run(arguments: &PaperArguments, quiet: bool) -> Result<(), Failure> {
-    folder::check(&arguments.out, Some(arguments.force))?;
+    folder::check(&arguments.out, arguments.folder.force)?;
     let mut studies = Vec::new();
     let mut origins = Vec::new();
     for (place, path) in arguments.sessions.iter().enumerate() {
         if arguments.sessions[..place].iter().any(|earlier| output::is_same(earlier, path)) {
             return Err(Failure::Other(format!("{} is named twice; name each session once", path.display())));
         }
-        let read = SessionArguments {
-            session: path.clone(),
-            data: arguments.data.clone(),
-            allow_outside: arguments.allow_outside,
-        };
-        let (session, sources) = files::session_with_sources(path, &read.options())?;
+        let (session, sources) = files::session_with_sources(path, &arguments.data.options())?;
         let study = parts::study(arguments, parts::label(&arguments.sessions, path), &session)?;
         let warnings: Vec<String> =
             study.analysis.warnings.iter().map(|warning| format!("{}: {warning}", path.display())).collect();
@@ -103,7 +91,7 @@ pub fn run(arguments: &PaperArguments, quiet: bool) -> Result<(), Failure> {
     );
     let mut files = paper::files(&title, &summary, &sections, layout).map_err(Failure::Other)?;
     files.push(("README.md".into(), readme::readme(arguments, &origins, &sections)?.into_bytes()));
-    folder::write(&arguments.out, &files, arguments.force, |_| Ok(()))?;
+    folder::write(&arguments.out, &files, arguments.folder.force, |_| Ok(()))?;
     if !quiet {
         let names: Vec<&str> = sections.iter().map(|section| section.subject.word()).collect();
         say!("{}: {} in {}", arguments.out.display(), counted(files.len(), "file"), counted(names.len(), "section"));

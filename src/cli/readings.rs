@@ -20,7 +20,7 @@ pub struct ReadingArguments {
     #[arg(long, value_name = "FILE.csv")]
     views: Option<PathBuf>,
     /// Write reading and residual of every reading as CSV: test, run, line, axis positions, reading, residual in µm,
-    /// residual over the noise standard deviation, and whether the reading counts or is an outlier (full fit only).
+    /// residual over the noise standard deviation, and whether the reading counts or is an outlier; of the full fit.
     ///
     /// Example: --residuals residuals.csv
     #[arg(long, value_name = "FILE.csv")]

@@ -1,31 +1,30 @@
-//! `abbe fit SESSION --repeat …`: Type A evaluation over repeated sessions beside the Type B evaluation of each fit.
+//! `abbe compare … --repeated`: Type A evaluation over repeated sessions beside the Type B evaluation of each fit.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use abbe::identify::{fit, repeated};
 
 use super::failure::Failure;
 use super::output::{self, Outputs};
 use super::results::Read;
-use super::{CommonArguments, PlausibilityArguments, SessionArguments, read_session};
+use super::{CommonArguments, DataArguments, PlausibilityArguments, SessionArguments, read_session};
 use crate::report::block::Report;
 use crate::report::repeated as present;
 
 /// Fits each session separately and compares the fits.
 pub fn run(
-    first: &SessionArguments,
-    repeat: &[PathBuf],
+    all: &[PathBuf],
+    data: &DataArguments,
     plausibility: PlausibilityArguments,
     common: &CommonArguments,
     outputs: &Outputs,
 ) -> Result<(), Failure> {
-    let all: Vec<&Path> = std::iter::once(&first.session).chain(repeat).map(PathBuf::as_path).collect();
     let mut read = Vec::with_capacity(all.len());
     for (place, path) in all.iter().enumerate() {
         if all[..place].iter().any(|earlier| output::is_same(earlier, path)) {
             return Err(Failure::Other(format!("{} is named twice; name each repeated session once", path.display())));
         }
-        let arguments = SessionArguments { session: path.to_path_buf(), ..first.clone() };
+        let arguments = SessionArguments { session: path.clone(), data: data.clone() };
         read.push(read_session(&arguments, outputs)?);
     }
     let (mut sessions, mut warnings) = (Vec::with_capacity(all.len()), Vec::new());

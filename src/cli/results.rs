@@ -48,6 +48,8 @@ pub struct OutputArguments {
     /// Require PNG beside each SVG of --plots; an error if the program is built without the feature `png`.
     #[arg(long, requires = "plots")]
     png: bool,
+    #[command(flatten)]
+    pub folder: folder::ForceArguments,
     /// List everything that the first screen folds.
     #[arg(long)]
     all: bool,
@@ -110,7 +112,7 @@ impl OutputArguments {
             ));
         }
         if let Some(path) = &self.plots {
-            folder::check(path, None)?;
+            folder::check(path, self.folder.force)?;
         }
         let own = [&self.csv, &self.report, &self.json].map(Option::as_ref);
         Ok(Outputs::new(others.iter().chain(&own).copied().flatten())?.quieted(self.quiet))
@@ -143,7 +145,7 @@ impl OutputArguments {
             let text = page::html(report, &read.provenance()).map_err(Failure::Other)?;
             output::write_whole(path, text.as_bytes())?;
         }
-        self.plots.as_ref().map_or(Ok(()), |path| write_plots(report, path))
+        self.plots.as_ref().map_or(Ok(()), |path| write_plots(report, path, self.folder.force))
     }
 
     /// Prints a report, and its warnings to standard error.
@@ -155,7 +157,7 @@ impl OutputArguments {
     }
 }
 
-fn write_plots(report: &Report, path: &Path) -> Result<(), Failure> {
+fn write_plots(report: &Report, path: &Path, force: bool) -> Result<(), Failure> {
     #[cfg(feature = "png")]
     let fonts = crate::report::figure::png::Fonts::bundled();
     let mut files = Vec::new();
@@ -170,5 +172,5 @@ fn write_plots(report: &Report, path: &Path) -> Result<(), Failure> {
             files.push((format!("{}.png", figure.name), png));
         }
     }
-    folder::write(path, &files, false, |_| Ok(()))
+    folder::write(path, &files, force, |_| Ok(()))
 }

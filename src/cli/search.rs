@@ -1,4 +1,4 @@
-//! Which effects a search considers, and how many it adds: options of `abbe trace` and `abbe run`.
+//! Which effects a search considers, and how many it adds: options of `abbe trace` and `abbe fleet run`.
 
 use clap::Args;
 

@@ -25,7 +25,7 @@ pub const HELP: &str = include_str!("help/sheet.txt");
 pub struct SheetArguments {
     #[command(flatten)]
     session: SessionArguments,
-    /// The page; `-` is standard output.
+    /// Where the result is written: the page; `-` is standard output.
     ///
     /// Example: --out sheets.html
     #[arg(long, value_name = "FILE.html")]
@@ -50,25 +50,13 @@ pub struct SheetArguments {
     /// Example: --bar-min 3
     #[arg(long, value_name = "MIN", default_value_t = 5.0)]
     bar_min: f64,
-    /// The control whose programs the sheets name.
+    /// The control of the NC programs: the sheets name them.
     ///
     /// Example: --control fanuc
     #[arg(long, value_name = "CONTROL", value_parser = controls::with_programs())]
     control: Option<&'static dyn Control>,
     #[command(flatten)]
     motion: MotionArguments,
-    /// Replace an existing file.
-    #[arg(long)]
-    force: bool,
-}
-
-/// Refuses to replace a file, unless `--force` asks for it.
-fn refuse_existing(arguments: &SheetArguments) -> Result<(), Failure> {
-    if arguments.force || !arguments.out.is_file() {
-        return Ok(());
-    }
-    let file = arguments.out.display();
-    Err(Failure::Other(format!("{file}: the file exists; name another, or use --force to replace it")))
 }
 
 /// Runs `abbe sheet`.
@@ -88,7 +76,6 @@ pub fn run(arguments: &SheetArguments, quiet: bool) -> Result<(), Failure> {
         (session, sources) = files::session_of(&source, &arguments.session.options())?;
     }
     outputs.refuse_overwrite_of_sources(&sources)?;
-    refuse_existing(arguments)?;
     let times = SetUpTimes { setup_min: arguments.setup_min, test_min: arguments.test_min, bar_min: arguments.bar_min };
     let bars = session.tests.iter().filter_map(|test| Some(test.station.bar()?.bar));
     let basic_bar_mm = arguments.bar_mm.or(bars.reduce(f64::min));

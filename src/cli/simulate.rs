@@ -21,12 +21,12 @@ pub const HELP: &str = include_str!("help/simulate.txt");
 pub struct SimulateArguments {
     #[command(flatten)]
     session: SessionArguments,
-    /// New folder for the session with readings.
+    /// Where the result is written: a new folder for the session with readings.
     ///
     /// Example: --out run1
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Value of an error or a set-up parameter; may be repeated.
+    /// Value of an error; may be repeated. Set-up parameters have values too.
     ///
     /// Example: --error EY0A=35.3um --error bar[A100]=0.4um
     #[arg(long = "error", value_name = "NAME=VALUE", allow_hyphen_values = true)]
@@ -36,20 +36,20 @@ pub struct SimulateArguments {
     /// Example: --effect EZC~C:h2.amplitude=1.5um --effect EZC~C:h2.phase=60deg
     #[arg(long = "effect", value_name = "NAME=VALUE", allow_hyphen_values = true)]
     effects: Vec<String>,
-    /// TOML file with such values.
+    /// TOML file with values of errors, effects and set-up parameters.
     ///
-    /// Example: --errors errors.toml
-    #[arg(long = "errors", value_name = "FILE")]
+    /// Example: --values errors.toml
+    #[arg(long = "values", value_name = "FILE")]
     file: Option<PathBuf>,
-    /// Standard deviation of the noise of lengths, µm [default: the noise of the session].
+    /// Standard deviation of a reading, µm, instead of the session's.
     ///
     /// Example: --noise-um 0.5
-    #[arg(long, value_name = "X", allow_negative_numbers = true)]
+    #[arg(long, value_name = "UM", allow_negative_numbers = true)]
     noise_um: Option<f64>,
-    /// Standard deviation of the noise of angles, arcsec [default: the noise of the session].
+    /// Standard deviation of a reading of an angle, arcsec, instead of the session's.
     ///
     /// Example: --noise-arcsec 0.2
-    #[arg(long, value_name = "X", allow_negative_numbers = true)]
+    #[arg(long, value_name = "ARCSEC", allow_negative_numbers = true)]
     noise_arcsec: Option<f64>,
     /// Draw the set-up parameters from their priors.
     #[arg(long)]
@@ -57,9 +57,6 @@ pub struct SimulateArguments {
     /// Omit the declared effects from the session that is written.
     #[arg(long)]
     hide_effects: bool,
-    /// Replace files in an existing folder.
-    #[arg(long)]
-    force: bool,
     #[command(flatten)]
     common: CommonArguments,
 }
@@ -102,7 +99,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
     }
     output::Outputs::in_folder(&arguments.out, files.iter().map(|(name, _)| name))
         .refuse_overwrite_of_sources(&sources)?;
-    folder::write(&arguments.out, &files, arguments.force, |made| {
+    folder::write(&arguments.out, &files, arguments.common.output.folder.force, |made| {
         // The written files are read back as a session.
         let path = made.join("session.toml");
         files::session(&path, &files::ReadOptions::default())?;

@@ -16,9 +16,7 @@ use super::failure::Failure;
 use super::results::Read;
 use super::save::SaveArguments;
 use super::search::SearchArguments;
-use super::{
-    CommonArguments, PlausibilityArguments, SessionArguments, compensation, next_session, output, read_session,
-};
+use super::{CommonArguments, PlausibilityArguments, SessionArguments, next_session, output, read_session};
 use crate::report::{readings, trace as present};
 
 /// Examples of `abbe trace`.
@@ -49,10 +47,10 @@ pub struct TraceArguments {
     /// Example: --time-limit 10
     #[arg(long, value_name = "S", value_parser = seconds)]
     time_limit: Option<f64>,
-    /// List the candidates of the library with their detectability in this session, and stop.
-    #[arg(long, conflicts_with_all = ["json", "csv", "residuals", "write", "report", "plots", "compensation", "max_effects", "time_limit", "save"])]
+    /// List the choices, and stop: the candidates of the library with their detectability in this session.
+    #[arg(long, conflicts_with_all = ["json", "csv", "residuals", "write", "report", "plots", "max_effects", "time_limit", "save"])]
     list: bool,
-    /// Write the session with the found effects declared.
+    /// Write the session with the result in it: the found effects are declared.
     ///
     /// Example: --write next.toml
     #[arg(long, value_name = "FILE")]
@@ -60,24 +58,22 @@ pub struct TraceArguments {
     /// Append the tests that separate the effects from their aliases to the written session, with all positions.
     #[arg(long, requires = "write")]
     with_tests: bool,
-    /// Write reading and residual of every reading as CSV, for the model with the found effects: test, run, line, axis
-    /// positions, reading, residual in µm, residual over the noise standard deviation, and whether the reading counts
-    /// or is an outlier.
+    /// Write reading and residual of every reading as CSV: test, run, line, axis positions, reading, residual in µm,
+    /// residual over the noise standard deviation, and whether the reading counts or is an outlier; of the model with the
+    /// found effects.
     ///
     /// Example: --residuals residuals.csv
     #[arg(long, value_name = "FILE.csv")]
     residuals: Option<PathBuf>,
     #[command(flatten)]
     next: next::NextArguments,
-    #[command(flatten)]
-    compensation: compensation::CompensationArguments,
 }
 
 /// Runs `abbe trace`.
 pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
-    arguments.compensation.check()?;
-    arguments.next.check()?;
     let common = &arguments.common;
+    let force = common.output.folder.force;
+    arguments.next.check(force)?;
     let others = [arguments.write.as_ref(), arguments.residuals.as_ref(), arguments.save.file()];
     let outputs = common.output.prepared(&others)?;
     let (session, sources) = read_session(&arguments.session, &outputs)?;
@@ -106,9 +102,8 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         output::write_whole(path, &output::csv(&readings::residuals(&trace.after, &trace.after_fit))?)?;
     }
     if trace.result.interrupted {
-        return progress::ended_early(&trace, arguments.compensation.wanted(), arguments.save.file().is_some());
+        return progress::ended_early(&trace, arguments.save.file().is_some());
     }
-    arguments.next.run(&session, &sources, &trace, common.output.quiet)?;
-    arguments.save.run(&trace.after, &trace.after_fit, &sources, common.seed)?;
-    arguments.compensation.run(&trace.after, &trace.after_fit, outputs.tables())
+    arguments.next.run(&session, &sources, &trace, (common.output.quiet, force))?;
+    arguments.save.run(&trace.after, &trace.after_fit, &sources, common.seed)
 }

@@ -99,6 +99,11 @@ pub fn words<T: Clone + Send + Sync>(words: Words<T>) -> impl TypedValueParser<V
     PossibleValuesParser::new(words.iter().map(|(word, _)| *word)).try_map(value)
 }
 
+/// A positive length in µm, converted to mm.
+pub fn length_um(option: &str, um: f64) -> Result<f64, Failure> {
+    Ok(DEVIATION_UM.check(option, um)? * 1e-3)
+}
+
 /// A number of things from 1 to the most.
 pub fn count(option: &str, things: &str, value: usize, most: usize) -> Result<usize, Failure> {
     if (1..=most).contains(&value) {

@@ -118,7 +118,7 @@ pub fn history(store: &Store, machine_id: Option<&str>, options: &HistoryOptions
         .map(|(machine_id, file)| NotUsed {
             machine_id,
             file,
-            reason: "its result is missing or of another version of the schema: run `abbe run` again".to_string(),
+            reason: "its result is missing or of another version of the schema: run `abbe fleet run` again".to_string(),
         })
         .collect();
     let all = records.len();

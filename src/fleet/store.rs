@@ -148,7 +148,7 @@ impl Store {
         let folder = folder.into();
         if !folder.join("sessions").is_dir() {
             return Err(FleetError::Request(format!(
-                "{}: no results of `abbe run` are there; name its folder of --out",
+                "{}: no results of `abbe fleet run` are there; name its folder of --out",
                 folder.display()
             )));
         }

@@ -1,24 +1,29 @@
 //! Exported descriptions as tables.
 
-use std::path::Path;
+use std::path::PathBuf;
 
 use abbe::apply::compare::workspace::AxisRange;
 use abbe::apply::export::dh::{DhTables, FixedPose, PARAMETERS};
 use abbe::apply::export::kinematics::{EntryChoice, KinematicTable};
 use abbe::apply::export::neutral::AxisPlace;
 
+use abbe::exports::ExportResult;
 use abbe::model::files::robot::dh::Convention;
 
 use super::block::Report;
 use super::table::{Cell, Column, Table, cells, numbers};
 
-/// The report of an exported machine, in this file.
-pub fn report(machine: &str, file: &Path, table: Option<Table>, left_out: &[String]) -> Report {
+/// The report of an exported machine, in these files.
+pub fn report(machine: &str, files: &[PathBuf], table: Option<Table>, result: &ExportResult) -> Report {
     let mut report = Report::new(format!("Export of {machine}"));
-    report.method = "A fixed geometry holds location errors only.".to_string();
-    report.opening("", [format!("{}: written", file.display())]);
+    report.method = match result.import.is_empty() {
+        true => "A fixed geometry holds location errors only.".to_string(),
+        false => "A table over the position of an axis holds errors that depend on it; `u` is k = 1.".to_string(),
+    };
+    report.opening("", files.iter().map(|file| format!("{}: written", file.display())));
     table.into_iter().for_each(|table| report.key(table));
-    left_out.iter().for_each(|missing| report.key(format!("left out: {missing}")));
+    result.import.iter().for_each(|line| report.key(line.clone()));
+    result.left_out.iter().for_each(|missing| report.key(format!("left out: {missing}")));
     report
 }
 

@@ -138,7 +138,7 @@ fn measure(statement: &MeasureStatement, machine: Option<&Machine>, commands: &C
         NextStep::StateNoise => one("a run once more, or state the noise: only then can the model be judged"),
         NextStep::SeparatingTest => {
             let test = statement.description.as_deref().unwrap_or_default();
-            let written = command("trace", "--next next --programs CONTROL");
+            let written = command("trace", "--next next --control CONTROL");
             let what = "writes the test, its program and its sheet".into();
             vec![format!("What to measure next: {test}").into(), Sentence::Command(written, what)]
         }

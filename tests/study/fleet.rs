@@ -1,4 +1,4 @@
-//! A fleet of machines as files, made by the plant, for measurements of `abbe run` and of the Python package.
+//! A fleet of machines as files, made by the plant, for measurements of `abbe fleet run` and of the Python package.
 //!
 //! ```text
 //! ABBE_FLEET=/tmp/fleet cargo test --profile checked --test main a_fleet_is_written

@@ -58,9 +58,17 @@ fn coefficients(folder: &Path, session: &Path) -> impl Fn(&str) -> f64 {
 }
 
 fn tables(session: &Path, out: &Path, control: &str) -> String {
-    let run = abbe(&["fit", text(session), "--compensation", text(out), "--control", control, "--points", "41"]);
+    let run = exported(session, &["--as", &format!("{control}-tables"), "--out", text(out), "--places", "41"]);
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
     String::from_utf8(run.stdout).unwrap()
+}
+
+/// The output of `abbe export` of the model of a session.
+fn exported(session: &Path, arguments: &[&str]) -> std::process::Output {
+    let folder = tempfile::tempdir().unwrap();
+    let model = folder.path().join("model.json");
+    assert!(abbe(&["fit", text(session), "--save", text(&model)]).status.success());
+    abbe(&[&["export", text(&model)], arguments].concat())
 }
 
 fn numbers(line: &str) -> Vec<f64> {
@@ -180,7 +188,7 @@ fn effects_without_a_curve_have_no_table() {
     let measured = super::ready("hermle-c600u/measured/session.toml");
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("tables");
-    let run = abbe(&["fit", text(&measured), "--compensation", text(&out), "--control", "linuxcnc"]);
+    let run = exported(&measured, &["--as", "linuxcnc-tables", "--out", text(&out)]);
     assert_eq!(run.status.code(), Some(1));
     let message = String::from_utf8_lossy(&run.stderr).into_owned();
     assert!(
@@ -188,10 +196,9 @@ fn effects_without_a_curve_have_no_table() {
         "{message}"
     );
     assert!(!out.exists());
-    let few = ["fit", text(&measured), "--compensation", text(&out), "--control", "beckhoff", "--points", "1"];
-    let run = abbe(&few);
+    let run = exported(&measured, &["--as", "beckhoff-tables", "--out", text(&out), "--places", "1"]);
     assert_eq!(run.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&run.stderr).contains("`--points 1`: a number from 2 to 256"));
+    assert!(String::from_utf8_lossy(&run.stderr).contains("a table of 1 places: a number from 2 to 256"));
 }
 
 /// A session in which X moves over ±100 mm in one test and is stationary at −300 mm in another; EXX is a polynomial
@@ -274,7 +281,7 @@ fn a_stationary_axis_has_no_table() {
     let only_c = format!("{}{}", &text_of[..tests[0]], &text_of[tests[1]..]);
     std::fs::write(&session, only_c.replace("order = 2", "order = 1")).unwrap();
     let out = folder.path().join("none");
-    let run = abbe(&["fit", text(&session), "--compensation", text(&out), "--control", "linuxcnc"]);
+    let run = exported(&session, &["--as", "linuxcnc-tables", "--out", text(&out)]);
     let printed = String::from_utf8_lossy(&run.stderr).into_owned();
     assert_eq!(run.status.code(), Some(1), "{printed}");
     assert!(

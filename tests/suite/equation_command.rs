@@ -333,7 +333,7 @@ fn equations_are_set_and_called_as_requested() {
     assert!(of(&["--as", "c"]).contains("struct bar_length_errors {"));
     assert!(of(&["--as", "c", "--angles", "deg"]).contains("double A_deg;"));
     assert!(of(&["--as", "c", "--layout", "flat"]).contains("void bar_length_columns("));
-    let all = printed(&["equation", text(&plan), "--all", "--order", "first"]);
+    let all = printed(&["equation", text(&plan), "--all-tests", "--order", "first"]);
     for part in ["test A100", "test C150", "derivatives of the readings", "A100", "√(R_e² − R²)/L_0"] {
         assert!(all.contains(part), "`{part}` is not in\n{all}");
     }
@@ -342,7 +342,10 @@ fn equations_are_set_and_called_as_requested() {
     refuse(&["--as", "latex", "--layout", "flat"], &["`--layout` does not apply to `--as latex`", "rust, c, python"]);
     refuse(&["--as", "c", "--layout", "flat", "--angles", "deg"], &["`--angles` does not apply to `--layout flat`"]);
     refuse(&["--order", "first", "--form", "groups"], &["`groups`", "first order"]);
-    refused(&["equation", text(&plan), "--all", "--as", "c"], &["`--all --as c` writes a file for each test", "--out"]);
+    refused(
+        &["equation", text(&plan), "--all-tests", "--as", "c"],
+        &["`--all-tests --as c` writes a file for each test", "--out"],
+    );
     refuse(&["--symbols", "B"], &["no axis `B` that could stay a symbol", "C, A, Y, X, Z"]);
     for wrong in [&["--width", "84"][..], &["--width", "1mm"]] {
         let output = abbe(&[&a150[..], &["--as", "latex"], wrong].concat());
@@ -358,7 +361,7 @@ fn code_of_all_tests_is_a_folder() {
     let place = tempfile::tempdir().unwrap();
     let plan = plan();
     let out = place.path().join("readings");
-    let all = ["equation", text(&plan), "--all", "--gradient", "--out", text(&out)];
+    let all = ["equation", text(&plan), "--all-tests", "--gradient", "--out", text(&out)];
     assert_eq!(printed(&[&all[..], &["--as", "python"]].concat()), "");
     let mut names: Vec<String> =
         fs::read_dir(&out).unwrap().map(|file| file.unwrap().file_name().into_string().unwrap()).collect();
@@ -371,7 +374,7 @@ fn code_of_all_tests_is_a_folder() {
     // Not into a folder with files.
     refused(&[&all[..], &["--as", "python"]].concat(), &["is not empty"]);
     let flat = place.path().join("kernels");
-    let kernels = ["equation", text(&plan), "--all", "--as", "c", "--layout", "flat", "--out", text(&flat)];
+    let kernels = ["equation", text(&plan), "--all-tests", "--as", "c", "--layout", "flat", "--out", text(&flat)];
     printed(&kernels);
     let a100 = fs::read_to_string(flat.join("bar_length_a100.c")).unwrap();
     assert!(a100.contains("void bar_length_a100_columns(") && !a100.contains("R_c"), "{a100}");

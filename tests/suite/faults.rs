@@ -223,7 +223,7 @@ fn an_output_that_would_replace_an_input() {
         ("trace session.toml --quiet --write session.toml", "session.toml"),
         ("plan session.toml --no-effects --json circle.csv", "circle.csv"),
         ("equation session.toml --test XY --out session.toml", "session.toml"),
-        ("simulate session.toml --out run --errors errors.toml --json errors.toml", "errors.toml"),
+        ("simulate session.toml --out run --values errors.toml --json errors.toml", "errors.toml"),
         ("simulate plans/session.toml --allow-outside --out . --force", "circle.csv"),
         ("volumetric machine.toml --map functions.toml --functions functions.toml", "functions.toml"),
         ("volumetric machine.toml --map map.csv --functions functions.toml --json machine.toml", "machine.toml"),

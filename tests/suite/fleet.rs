@@ -1,4 +1,4 @@
-//! `abbe run`: results of many sessions are kept, whatever happens to some of them or to the program.
+//! `abbe fleet run`: results of many sessions are kept, whatever happens to some of them or to the program.
 #![cfg(unix)]
 
 use std::collections::BTreeMap;
@@ -35,9 +35,9 @@ pub(super) fn read(path: &Path) -> String {
     fs::read_to_string(path).unwrap()
 }
 
-/// Runs `abbe run` in the place; returns its summary.
+/// Runs `abbe fleet run` in the place; returns its summary.
 pub(super) fn run(place: &TestFolder, arguments: &str) -> Value {
-    let output = place.shell(&format!("abbe run fleet --out results --json summary.json {arguments}"));
+    let output = place.shell(&format!("abbe fleet run fleet --out results --json summary.json {arguments}"));
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     serde_json::from_str(&read(&place.at("summary.json"))).unwrap()
 }
@@ -89,7 +89,7 @@ fn results_do_not_depend_on_threads_or_order() {
     let place = fleet(6, monthly);
     run(&place, "--only EX --threads 2");
     let own = place.shell(
-        "abbe run fleet/s05 fleet/s01/session.toml fleet/s00 fleet/s04 fleet/s03 fleet/s02 --only EX --out other",
+        "abbe fleet run fleet/s05 fleet/s01/session.toml fleet/s00 fleet/s04 fleet/s03 fleet/s02 --only EX --out other",
     );
     assert!(own.status.success());
     let keys = |folder: &str| -> BTreeMap<String, String> { files(&place.at(folder).join("results")) };
@@ -97,7 +97,7 @@ fn results_do_not_depend_on_threads_or_order() {
     assert_eq!(keys("results").len(), 6);
     // The parts of an array of jobs are disjoint and complete.
     for (part, count) in [("1/4", 2), ("2/4", 2), ("3/4", 1), ("4/4", 1)] {
-        let output = place.shell(&format!("abbe run fleet --only EX --part {part} --out parts --json part.json"));
+        let output = place.shell(&format!("abbe fleet run fleet --only EX --part {part} --out parts --json part.json"));
         assert!(output.status.success());
         let summary: Value = serde_json::from_str(&read(&place.at("part.json"))).unwrap();
         assert_eq!(summary["computed"], count, "{part}");
@@ -192,7 +192,7 @@ fn a_killed_run_is_continued() {
     assert_eq!([count("results/"), count("sessions/")], [12, 12]);
 }
 
-/// Starts `abbe run` on the folder.
+/// Starts `abbe fleet run` on the folder.
 fn start(place: &TestFolder, summary: &str) -> std::process::Child {
     Command::new(env!("CARGO_BIN_EXE_abbe"))
         .args(["run", "fleet", "--out", "results", "--only", "EX", "--quiet", "--json", summary])
@@ -264,10 +264,11 @@ fn an_endless_record_counts_as_missing() {
         fs::remove_file(place.at("results").join(name)).unwrap();
         assert!(place.shell(&format!("{line} results/{name}")).status.success());
     }
-    let output = place.shell("ulimit -v 1500000; timeout 60 abbe history results");
+    let output = place.shell("ulimit -v 1500000; timeout 60 abbe fleet history results");
     assert!(output.status.success(), "{:?}: {}", output.status, String::from_utf8_lossy(&output.stderr));
-    let output = place
-        .shell("rm results/results/*/*.json; ulimit -v 1500000; timeout 60 abbe run fleet --out results --no-trace");
+    let output = place.shell(
+        "rm results/results/*/*.json; ulimit -v 1500000; timeout 60 abbe fleet run fleet --out results --no-trace",
+    );
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     assert_eq!(files(&place.at("results")), results);
 }
@@ -277,7 +278,8 @@ fn a_full_disk_ends_the_run_and_keeps_results() {
     let place = fleet(4, monthly);
     run(&place, "--no-trace");
     let results = files(&place.at("results"));
-    let output = place.shell("trap '' XFSZ; ulimit -f 0; exec abbe run fleet --out results --max-effects 1 --quiet");
+    let output =
+        place.shell("trap '' XFSZ; ulimit -f 0; exec abbe fleet run fleet --out results --max-effects 1 --quiet");
     let message = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1));
     assert!(message.contains("cannot be written") && message.contains("finished results are kept"), "{message}");
@@ -288,30 +290,30 @@ fn a_full_disk_ends_the_run_and_keeps_results() {
 fn unusable_requests_are_named() {
     let place = fleet(1, monthly);
     for (line, expected) in [
-        ("abbe run --out results", "SESSION"),
-        ("abbe run missing.toml --out session.csv --threads 0", "--threads"),
-        ("mkdir empty; abbe run empty --out results", "no session.toml lies in this folder"),
-        ("abbe run fleet flet --out results", "flet: neither a session file nor a folder is there"),
-        ("abbe run fleet --out results --part 5/4", "expected a part"),
-        ("abbe run fleet --out results --models nowhere", "name the folder of the saved models"),
-        ("abbe run --list nowhere.txt --out results", "nowhere.txt: cannot be read"),
-        ("abbe history nowhere", "no results of `abbe run` are there"),
+        ("abbe fleet run --out results", "SESSION"),
+        ("abbe fleet run missing.toml --out session.csv --threads 0", "--threads"),
+        ("mkdir empty; abbe fleet run empty --out results", "no session.toml lies in this folder"),
+        ("abbe fleet run fleet flet --out results", "flet: neither a session file nor a folder is there"),
+        ("abbe fleet run fleet --out results --part 5/4", "expected a part"),
+        ("abbe fleet run fleet --out results --models nowhere", "name the folder of the saved models"),
+        ("abbe fleet run --sessions nowhere.txt --out results", "nowhere.txt: cannot be read"),
+        ("abbe fleet history nowhere", "no results of `abbe fleet run` are there"),
         (
-            "abbe run fleet --out results --no-trace -q; abbe history results --machine X",
+            "abbe fleet run fleet --out results --no-trace -q; abbe fleet history results --machine-id X",
             "no session of the machine `X`",
         ),
         (
-            "echo 'a,b' > c.csv; echo '1,2' >> c.csv; abbe history results --compensations c.csv",
+            "echo 'a,b' > c.csv; echo '1,2' >> c.csv; abbe fleet history results --known-changes c.csv",
             "c.csv:1: no column `machine_id`",
         ),
         (
             "printf '# tables\nmachine_id,date,parameter,change,unit\n\nM0,2024-01-05,EX0C,many,um' > c.csv; \
-             abbe history results --compensations c.csv",
+             abbe fleet history results --known-changes c.csv",
             "c.csv:4",
         ),
         (
             "printf 'machine_id,date,parameter,change,unit\nM,2024-01-05,E,1,um\nM,2024-01-05,E,1,um\n' > c.csv; \
-             abbe history results --compensations c.csv",
+             abbe fleet history results --known-changes c.csv",
             "c.csv:3: the change of E on 2024-01-05 is stated twice",
         ),
     ] {
@@ -339,6 +341,6 @@ fn sessions_that_are_gone_leave_history() {
     // Other folders are not asked.
     fs::create_dir_all(place.at("other")).unwrap();
     fs::rename(place.at("fleet/s00"), place.at("other/s00")).unwrap();
-    assert!(place.shell("abbe run other --out results --no-trace").status.success());
+    assert!(place.shell("abbe fleet run other --out results --no-trace").status.success());
     assert_eq!(files(&place.at("results/sessions")).len(), 6);
 }

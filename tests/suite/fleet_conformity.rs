@@ -1,4 +1,4 @@
-//! `abbe history`: decisions of conformity over time, in every output.
+//! `abbe fleet history`: decisions of conformity over time, in every output.
 #![cfg(unix)]
 
 use std::fs;
@@ -22,7 +22,7 @@ fn decisions_of_conformity_are_shown_over_time() {
         fs::write(&file, format!("{}\n{limits} = {limit}\n", read(&file))).unwrap();
     }
     run(&place, "--no-trace -q");
-    let line = "abbe history results --json history.json --report report.html --pages pages";
+    let line = "abbe fleet history results --json history.json --report report.html --pages pages";
     let output = place.shell(line);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let shown = String::from_utf8_lossy(&output.stdout).into_owned();

@@ -1,4 +1,4 @@
-//! `abbe history`: the machines of many sessions over time.
+//! `abbe fleet history`: the machines of many sessions over time.
 #![cfg(unix)]
 
 use std::collections::BTreeMap;
@@ -13,7 +13,7 @@ use super::fleet::{files, fleet, read, run};
 
 /// The history of the results of a place.
 fn history(place: &TestFolder, arguments: &str) -> Value {
-    let output = place.shell(&format!("abbe history results --json history.json {arguments}"));
+    let output = place.shell(&format!("abbe fleet history results --json history.json {arguments}"));
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     serde_json::from_str(&read(&place.at("history.json"))).unwrap()
 }
@@ -25,7 +25,7 @@ fn one_machine_has_the_history_that_it_has_in_the_fleet() {
         format!("serial_number = \"M{}\"\nsession_id = \"{}\"\ndate = 2026-{:02}-05", k % 2, k / 2, k / 2 + 1)
     });
     run(&place, "--no-trace");
-    let (all, one) = (history(&place, "--csv all.csv"), history(&place, "--machine M1"));
+    let (all, one) = (history(&place, "--csv all.csv"), history(&place, "--machine-id M1"));
     // A history without a change has its figures in CSV too, with all their digits.
     let csv = read(&place.at("all.csv"));
     assert!(csv.starts_with("machine,parameter,quantity,date,value,u,unit\n"), "{csv}");
@@ -73,11 +73,11 @@ fn travels_and_damaged_models_leave_the_history() {
 #[test]
 fn sessions_that_have_one_identifier_are_named() {
     let place = fleet(3, |k| format!("session_id = \"A{}\"\nserial_number = \"M\"\ndate = 2026-01-0{}", k / 2, k + 1));
-    let output = place.shell("abbe run fleet --out results --no-trace");
+    let output = place.shell("abbe fleet run fleet --out results --no-trace");
     assert!(output.status.success());
     let message = String::from_utf8_lossy(&output.stderr);
     assert!(message.contains("`A0`") && message.contains("s00") && message.contains("s01"), "{message}");
-    let history = place.shell("abbe history results --json -");
+    let history = place.shell("abbe fleet history results --json -");
     let history: Value = serde_json::from_slice(&history.stdout).unwrap();
     assert_eq!(history["not_used"].as_array().unwrap().len(), 2);
     assert!(history["not_used"][0]["reason"].as_str().unwrap().contains("`A0`"));
@@ -105,7 +105,7 @@ fn sessions_that_do_not_fit_together_are_named_and_isolated() {
     let other = contents.replacen(&format!("\"schema_version\":{SCHEMA_VERSION}"), "\"schema_version\":99", 1);
     fs::write(place.at("results/results").join(name), other).unwrap();
 
-    let output = place.shell("abbe history results --json history.json");
+    let output = place.shell("abbe fleet history results --json history.json");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let history: Value = serde_json::from_str(&read(&place.at("history.json"))).unwrap();
     let reasons: BTreeMap<&str, &str> = history["not_used"]
@@ -165,7 +165,7 @@ fn a_step_of_a_short_series_is_found_and_named() {
     // A step before the last session: there is no later one to start the charts again.
     let last = sessions_with_a_step(7, 6);
     run(&last, "--no-trace");
-    let output = last.shell("abbe history results --json history.json");
+    let output = last.shell("abbe fleet history results --json history.json");
     let screen = String::from_utf8_lossy(&output.stdout).to_string();
     let out = &serde_json::from_str::<Value>(&read(&last.at("history.json"))).unwrap()["machines"][0]["out_of_control"];
     for id in out.as_array().unwrap() {
@@ -179,14 +179,15 @@ fn a_step_of_a_short_series_is_found_and_named() {
 fn a_history_has_pages_and_names_a_compensation() {
     let place = sessions_with_a_step(20, 10);
     run(&place, "--no-trace");
-    let plain = place.shell("abbe history results --json -");
+    let plain = place.shell("abbe fleet history results --json -");
     let plain: Value = serde_json::from_slice(&plain.stdout).unwrap();
     let change = &plain["machines"][0]["changes"][0];
     assert_eq!(change["kind"], "correction", "{change:#}");
     let value = change["changes"][0]["value"].as_f64().unwrap();
     assert!((value.abs() - 20.0).abs() < 1.0, "{change:#}");
     place.put("table.csv", &format!("machine_id,date,parameter,change,unit\nM,2024-10-20,EC0Y,{value:.1},arcsec\n"));
-    let line = "abbe history results --compensations table.csv --json history.json --pages pages --report report.html";
+    let line =
+        "abbe fleet history results --known-changes table.csv --json history.json --pages pages --report report.html";
     let output = place.shell(line);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let history: Value = serde_json::from_str(&read(&place.at("history.json"))).unwrap();
@@ -199,17 +200,17 @@ fn a_history_has_pages_and_names_a_compensation() {
     }
     // A row of a parameter that no session has explains nothing, and hides nothing.
     place.put("table.csv", "machine_id,date,parameter,change,unit\nM,2024-10-20,EC0Z,5,arcsec\n");
-    let unknown = place.shell("abbe history results --compensations table.csv --json -");
+    let unknown = place.shell("abbe fleet history results --known-changes table.csv --json -");
     let unknown: Value = serde_json::from_slice(&unknown.stdout).unwrap();
     assert_eq!(unknown["machines"], plain["machines"]);
     assert_eq!(unknown["not_used"][0]["file"], "table.csv:2");
     // A file without rows has these columns too.
     place.put("table.csv", "machine,date,parameter,change,unit\n");
-    let wrong = place.shell("abbe history results --compensations table.csv");
+    let wrong = place.shell("abbe fleet history results --known-changes table.csv");
     assert_eq!(wrong.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&wrong.stderr).contains("table.csv:1: no column `machine_id`"));
     // A table in another unit is no table.
     place.put("table.csv", "machine_id,date,parameter,change,unit\nM,2024-10-20,EC0Y,-20,um\n");
-    let wrong = place.shell("abbe history results --compensations table.csv");
+    let wrong = place.shell("abbe fleet history results --known-changes table.csv");
     assert!(String::from_utf8_lossy(&wrong.stderr).contains("state it in arcsec"));
 }

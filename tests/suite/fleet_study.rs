@@ -1,4 +1,4 @@
-//! `abbe study`: power, false claims and coverage of simulated sessions.
+//! `abbe fleet study`: power, false claims and coverage of simulated sessions.
 #![cfg(unix)]
 
 use serde_json::Value;
@@ -18,7 +18,8 @@ fn a_study_has_its_nominal_coverage() {
              [[plan]]\nname = \"four\"\nsession = {plan:?}\n[[noise]]\nname = \"white\"\num = 0.3\n[[effect]]\nname = \"none\"\n"
         );
         place.put("study.toml", &file);
-        let output = place.shell("abbe study study.toml --out study --threads 2 --json study.json --csv study.csv");
+        let output =
+            place.shell("abbe fleet study study.toml --out study --threads 2 --json study.json --csv study.csv");
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         serde_json::from_str::<Value>(&read(&place.at("study.json"))).unwrap()
     };
@@ -51,7 +52,7 @@ fn a_study_finds_a_large_effect_and_claims_no_other() {
          [[effect]]\nname = \"axial\"\nsize = 20\n\
          effect = { component = \"EZC\", driver = \"C\", shape = \"harmonic\", order = 2 }\n",
     );
-    let output = place.shell("abbe study study.toml --out study --threads 2 --json -");
+    let output = place.shell("abbe fleet study study.toml --out study --threads 2 --json -");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let found: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(found["effects"][0]["found"]["count"], 3, "{found:#}");
@@ -95,7 +96,7 @@ fn unusable_study_files_are_named() {
         // Every number of draws is allowed by itself, and not with two kinds of noise.
         let draws = if to.contains("name = \"m\"") { "draws = 600000" } else { "draws = 1" };
         place.put("study.toml", &file.replacen("draws = 1", draws, 1).replacen(from, to, 1));
-        let output = place.shell("abbe study study.toml --out study");
+        let output = place.shell("abbe fleet study study.toml --out study");
         let message = String::from_utf8_lossy(&output.stderr);
         assert!(!output.status.success() && message.contains(expected), "{to}: {message}");
     }
@@ -117,7 +118,7 @@ fn a_blind_plan_is_the_last() {
                  name = \"white\"\num = 0.3\n[[effect]]\nname = \"drift\"\nsize = 10\n\
                  effect = { component = \"EYA\", driver = \"A\", shape = \"harmonic\", order = 3 }\n";
     place.put("study.toml", study);
-    let output = place.shell("abbe study study.toml --out study --threads 2 --json -");
+    let output = place.shell("abbe fleet study study.toml --out study --threads 2 --json -");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let found: Value = serde_json::from_slice(&output.stdout).unwrap();
     let ranking = found["ranking"].as_array().unwrap();

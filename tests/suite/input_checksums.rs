@@ -100,12 +100,13 @@ fn known_compensations_and_studies_are_read_once() {
     let place = fleet::fleet(6, fleet::monthly);
     fleet::run(&place, "--no-trace");
     place.put("known.csv", "machine_id,date,parameter,change,unit\nM0,2020-02-01,EC0Y,1,arcsec\n");
-    let line = "mkfifo pipe; cat known.csv > pipe & abbe history results --compensations pipe --json out.json --quiet";
+    let line =
+        "mkfifo pipe; cat known.csv > pipe & abbe fleet history results --known-changes pipe --json out.json --quiet";
     assert_eq!(checksums(&document(&place, line)), [sha256(&place.at("known.csv"))]);
     let study = "[study]\nanalysis = \"fit\"\ndraws = 2\n[[plan]]\nname = \"a\"\nsession = \"fleet/s00/session.toml\"\n\
         [[noise]]\nname = \"a\"\num = 0.3\n[[effect]]\nname = \"none\"\n";
     place.put("study.toml", study);
-    let line = "mkfifo study; cat study.toml > study & abbe study study --out draws --json out.json --quiet";
+    let line = "mkfifo study; cat study.toml > study & abbe fleet study study --out draws --json out.json --quiet";
     assert_eq!(checksums(&document(&place, line)), [sha256(&place.at("study.toml"))]);
 }
 
@@ -124,6 +125,6 @@ fn a_record_has_the_checksums_of_its_files() {
     }
     assert_eq!(found, 2);
     // No session, and a pipe: the run ends.
-    let output = bash(&place, "mkfifo pipe; (echo '[machine]' > pipe &) ; abbe run pipe --out others --no-trace");
+    let output = bash(&place, "mkfifo pipe; (echo '[machine]' > pipe &) ; abbe fleet run pipe --out others --no-trace");
     assert!(output.status.success(), "{:?}", output.status);
 }

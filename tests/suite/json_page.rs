@@ -10,7 +10,7 @@ use super::{abbe, workspace};
 /// The commands, and the subject of `abbe schema` for each.
 const COMMANDS: [(&str, &str); 22] = [
     ("abbe fit", "fit"),
-    ("abbe fit --repeat", "repeat"),
+    ("abbe compare --repeated", "repeat"),
     ("abbe fit --method circle, cone or two-plane", "geometric"),
     ("abbe fit --method self-calibration", "self-calibration"),
     ("abbe trace", "trace"),
@@ -23,14 +23,14 @@ const COMMANDS: [(&str, &str); 22] = [
     ("abbe plan", "plan"),
     ("abbe plan --improve, --separate or --range", "next-test"),
     ("abbe plan --global", "global"),
-    ("abbe plan --poses", "poses"),
+    ("abbe poses", "poses"),
     ("abbe plan --patterns", "patterns"),
     ("abbe simulate", "simulate"),
     ("abbe volumetric --map", "map"),
-    ("abbe run", "run"),
-    ("The result of a session in the folder of abbe run", "record"),
-    ("abbe history", "history"),
-    ("abbe study", "study"),
+    ("abbe fleet run", "run"),
+    ("The result of a session in the folder of abbe fleet run", "record"),
+    ("abbe fleet history", "history"),
+    ("abbe fleet study", "study"),
 ];
 
 const HEAD: &str = "# JSON results

@@ -11,7 +11,7 @@ use super::json_page::{self, kept_current, kind, one_line, schema, unit};
 const FILES: [(&str, &str); 4] = [
     ("Sessions and machines", "session"),
     ("Error functions of abbe volumetric", "functions"),
-    ("Studies of abbe study", "study-file"),
+    ("Studies of abbe fleet study", "study-file"),
     ("Certificates of abbe fit --dcc", "certificate"),
 ];
 

@@ -62,12 +62,12 @@ fn every_table_is_printed_with_a_name_of_100_000_characters() {
         "sheet session.toml --out sheet.html",
         "paper session.toml --out paper",
         "volumetric session.toml",
-        "run session.toml later.toml --out results --no-trace",
-        "run --list list.txt --out listed --no-trace",
-        "history results --all --report history.html",
-        "history results --pages pages",
-        "history listed",
-        "study study.toml --out draws",
+        "fleet run session.toml later.toml --out results --no-trace",
+        "fleet run --sessions list.txt --out listed --no-trace",
+        "fleet history results --all --report history.html",
+        "fleet history results --pages pages",
+        "fleet history listed",
+        "fleet study study.toml --out draws",
     ] {
         let output = run(&place, line);
         let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -100,7 +100,7 @@ fn a_message_quotes_80_characters_of_a_long_input() {
     let session = fs::read_to_string(place.at("session.toml")).unwrap();
     let data = fs::read_to_string(place.at("circle.csv")).unwrap();
     assert!(run(&place, "fit session.toml --save model.json").status.success());
-    assert!(run(&place, "run session.toml --out results --no-trace").status.success());
+    assert!(run(&place, "fleet run session.toml --out results --no-trace").status.success());
     let model = fs::read_to_string(place.at("model.json")).unwrap();
     let study = "[study]\nanalysis = \"fit\"\ndraws = 2\n[[plan]]\nname = \"a\"\nsession = \"session.toml\"\n\
         [[noise]]\nname = \"a\"\num = 0.3\n[[effect]]\nname = \"a\"\n";
@@ -127,7 +127,7 @@ fn a_message_quotes_80_characters_of_a_long_input() {
     ] {
         put("long.toml", &session, from, &to);
         is_short(what, "fit long.toml");
-        is_short(what, "run long.toml --out results --no-trace -q --json - | grep -q . ; abbe fit long.toml");
+        is_short(what, "fleet run long.toml --out results --no-trace -q --json - | grep -q . ; abbe fit long.toml");
     }
     for (what, from, to) in [
         ("a column", "length_mm", long.clone()),
@@ -167,7 +167,7 @@ fn a_message_quotes_80_characters_of_a_long_input() {
         ("a value of a study", "0.3", format!("\"{long}\"")),
     ] {
         put("long.toml", study, from, &to);
-        is_short(what, "study long.toml --out draws");
+        is_short(what, "fleet study long.toml --out draws");
     }
     for (what, text) in [
         ("a column of compensations", format!("machine_id,{long}\nM,1\n")),
@@ -175,7 +175,7 @@ fn a_message_quotes_80_characters_of_a_long_input() {
         ("a change of compensations", format!("machine_id,date,parameter,change,unit\nM,2026-11-23,EC0Y,{long},um\n")),
     ] {
         place.put("long.csv", &text);
-        is_short(what, "history results --compensations long.csv");
+        is_short(what, "fleet history results --known-changes long.csv");
     }
     // A column of another program is carried over, and a row that cannot be read is marked.
     for text in [format!("x_mm,{long}\n1,2\n"), format!("x_mm,y_mm\n1,{long}\n")] {
@@ -185,11 +185,11 @@ fn a_message_quotes_80_characters_of_a_long_input() {
         assert!(output.stdout.len() + output.stderr.len() < MAX_MESSAGE);
     }
     for (what, text) in [
-        ("a name of --errors", format!("{long} = \"1 um\"\n")),
-        ("a value of --errors", format!("EC0Y = \"{long}\"\n")),
+        ("a name of --values", format!("{long} = \"1 um\"\n")),
+        ("a value of --values", format!("EC0Y = \"{long}\"\n")),
     ] {
         place.put("errors.toml", &text);
-        is_short(what, "simulate session.toml --out simulated --errors errors.toml");
+        is_short(what, "simulate session.toml --out simulated --values errors.toml");
     }
 }
 

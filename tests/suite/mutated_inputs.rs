@@ -31,7 +31,7 @@ const INPUTS: [(&str, &[&str]); 17] = [
             "plan session.toml --no-effects --json out.json",
             "trace session.toml --only EXY --json out.json",
             "simulate session.toml --out out",
-            "equation session.toml --all",
+            "equation session.toml --all-tests",
             "nc session.toml --control linuxcnc --out out",
             "sheet session.toml --out out.html",
             "validate model.json session.toml --json out.json",
@@ -39,7 +39,10 @@ const INPUTS: [(&str, &[&str]); 17] = [
     ),
     ("plan.toml", &["plan plan.toml --json out.json", "plan plan.toml --improve 1", "simulate plan.toml --out out"]),
     ("machine.toml", &["plan plan.toml --no-effects", "volumetric machine.toml", "simulate plan.toml --out out"]),
-    ("circle.csv", &["fit session.toml --json out.json --report out.html", "run session.toml --out out --no-trace"]),
+    (
+        "circle.csv",
+        &["fit session.toml --json out.json --report out.html", "fleet run session.toml --out out --no-trace"],
+    ),
     ("circle.jsonl", &["fit lines.toml --json out.json"]),
     ("circle.xlsx", &["fit book.toml --json out.json"]),
     ("ballbar.b5r", &["fit xml.toml --json out.json"]),
@@ -54,12 +57,18 @@ const INPUTS: [(&str, &[&str]); 17] = [
         ],
     ),
     ("positions.csv", &["compensate model.json positions.csv --out out.csv --json out.json"]),
-    ("study.toml", &["study study.toml --out out --json out.json"]),
-    ("list.txt", &["run --list list.txt --out out --no-trace --json out.json"]),
-    ("known.csv", &["history results --compensations known.csv --json out.json"]),
-    ("RECORD", &["history results --json out.json", "run session.toml --out results --no-trace --json out.json"]),
-    ("NOTE", &["history results --json out.json", "run session.toml --out results --no-trace --json out.json"]),
-    ("errors.toml", &["simulate session.toml --out out --errors errors.toml"]),
+    ("study.toml", &["fleet study study.toml --out out --json out.json"]),
+    ("list.txt", &["fleet run --sessions list.txt --out out --no-trace --json out.json"]),
+    ("known.csv", &["fleet history results --known-changes known.csv --json out.json"]),
+    (
+        "RECORD",
+        &["fleet history results --json out.json", "fleet run session.toml --out results --no-trace --json out.json"],
+    ),
+    (
+        "NOTE",
+        &["fleet history results --json out.json", "fleet run session.toml --out results --no-trace --json out.json"],
+    ),
+    ("errors.toml", &["simulate session.toml --out out --values errors.toml"]),
     ("functions.toml", &["volumetric axes.toml --functions functions.toml --map out.csv --places 3 --json out.json"]),
 ];
 
@@ -154,9 +163,10 @@ fn folder() -> TestFolder {
         "[constant]\nEC0Y = \"-4.0 arcsec\"\n[[function]]\nerror = \"EXX\"\ntable = { at_mm = [-100, 0, 100], um = [-6, 0, 3.5] }\n\
          [[function]]\nerror = \"EYX\"\npolynomial = { scale_mm = 100, um = [0, -2.4, 1.6] }\n",
     );
-    for line in
-        ["abbe fit session.toml --save model.json --quiet", "abbe run session.toml --out results --no-trace --quiet"]
-    {
+    for line in [
+        "abbe fit session.toml --save model.json --quiet",
+        "abbe fleet run session.toml --out results --no-trace --quiet",
+    ] {
         let output = place.shell(line);
         assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
     }

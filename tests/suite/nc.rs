@@ -14,7 +14,7 @@ fn programs_are_written_together_or_not_at_all() {
     for (options, expected) in [
         (&["--control", "fanuc", "--overshoot-deg", "4000"][..], "the overshoot in degrees is 4000"),
         (&["--control", "fanuc", "--increment-mm", "0.002"], "the increment in mm is 0.002"),
-        (&["--control", "heidenhain", "--number", "7000"], "programs for heidenhain have no numbers"),
+        (&["--control", "heidenhain", "--program-number", "7000"], "programs for heidenhain have no numbers"),
         (&["--control", "linuxcnc", "--tool-point"], "linuxcnc has no function that moves the tool point"),
     ] {
         let output = run(options);
@@ -92,7 +92,8 @@ fn numbers_and_increments_of_a_fanuc() {
     let plan = ready("hermle-c600u/chapter5.toml");
     for (name, options, decimals) in [("usual", &[][..], 3), ("finer", &["--increment-mm", "0.0001"][..], 4)] {
         let out = place.path().join(name);
-        let fixed = ["nc", text(&plan), "--control", "fanuc", "--number", "7000", "--out", text(&out), "--quiet"];
+        let fixed =
+            ["nc", text(&plan), "--control", "fanuc", "--program-number", "7000", "--out", text(&out), "--quiet"];
         let output = abbe(&[&fixed[..], options].concat());
         assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
         let main = std::fs::read_to_string(out.join("main.nc")).unwrap();

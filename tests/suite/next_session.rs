@@ -60,7 +60,7 @@ fn a_trace_writes_the_next_measurement_as_a_session_of_its_own() {
     let [next, found] = ["next", "trace.json"].map(|name| place.path().join(name));
     let only = ["--only", "EZC~C:h", "--only", "EAC~C:h"];
     let asked =
-        ["trace", text(&measured), "--next", text(&next), "--programs", "linuxcnc", "--json", text(&found), "--quiet"];
+        ["trace", text(&measured), "--next", text(&next), "--control", "linuxcnc", "--json", text(&found), "--quiet"];
     run(&[&asked[..], &only].concat());
     let tests = parsed(&found)["effects"][0]["separating_tests"].as_array().unwrap().clone();
     let session = next.join("session.toml");
@@ -84,7 +84,7 @@ fn the_next_measurement_is_written_whole_or_not_at_all() {
     let next = place.path().join("next");
     let only = ["--only", "EZC~C:h", "--only", "EAC~C:h", "--quiet"];
     let asked = |control: &str| {
-        let asked = ["trace", text(&measured), "--next", text(&next), "--programs", control];
+        let asked = ["trace", text(&measured), "--next", text(&next), "--control", control];
         abbe(&[&asked[..], &only].concat())
     };
     let refused = asked("nonsense");

@@ -111,7 +111,7 @@ fn invalid_requests_fail_with_the_reason() {
         (vec!["plan", &session, "--noise-um", "0"], "is expected"),
         (vec!["plan", &session, "--improve", "--bars-mm", "0"], "a length from 1 to 1000000 mm"),
         (vec!["plan", &session, "--improve", "--bars-mm", "20"], "no candidate test"),
-        (vec!["plan", &session, "--clearance-mm", "1,2"], "six lengths"),
+        (vec!["plan", &session, "--device-mm", "1,2"], "six lengths"),
         (vec!["plan", &session, "--improve", "--sweep-shares", "1.5"], "a share of the range above 0 and at most 1"),
         (vec!["plan", &session, "--improve", "--feeds", "0"], "a multiple of the feed above 0 and at most 1000"),
         (vec!["plan", &session, "--improve", "--setup-min=-1"], "a number of minutes from 0 to 10000"),

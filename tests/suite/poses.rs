@@ -1,4 +1,4 @@
-//! `abbe plan --poses`: poses of the UR10 against random sets, the predicted uncertainty against simulation, limits.
+//! `abbe poses`: poses of the UR10 against random sets, the predicted uncertainty against simulation, limits.
 
 use abbe::identify::fit;
 use abbe::model::component::ErrorName;
@@ -129,7 +129,7 @@ fn the_command_writes_poses_and_refuses_what_is_wrong() {
     let [csv, json] = ["poses.csv", "poses.json"].map(|name| folder.path().join(name));
     let ur10 = ready("ur10/session.toml");
     let few = ["--poses", "12", "--candidates", "100", "--criterion", "d", "--noise-um", "50"];
-    let asked = ["plan", text(&ur10), "--poses-csv", text(&csv), "--json", text(&json)];
+    let asked = ["poses", text(&ur10), "--out", text(&csv), "--json", text(&json)];
     let run = abbe(&[&asked[..], &few].concat());
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
     let written = std::fs::read_to_string(&csv).unwrap();
@@ -141,12 +141,12 @@ fn the_command_writes_poses_and_refuses_what_is_wrong() {
         ("ur10/session.toml", &["--poses", "0"][..], "a number from 1 to 1000 is expected"),
         ("ur10/session.toml", &["--poses", "5", "--box-mm=1,0,0,1,0,1"], "six numbers are expected"),
         ("ur10/session.toml", &["--poses", "5", "--box-mm=9000,9001,0,1,0,1", "--candidates", "5"], "widen the limits"),
-        ("ur10/session.toml", &["--poses", "5", "--pose-test", "Q"], "the session has no such test; its tests are A"),
+        ("ur10/session.toml", &["--poses", "5", "--test", "Q"], "the session has no such test; its tests are A"),
         ("kuka-iiwa14/session.toml", &["--poses", "5", "--candidates", "100"], "the readings of 5 poses have rank"),
         ("kuka-iiwa14/session.toml", &["--poses", "5", "--height-mm", "0,1"], "this session's instrument is a socket"),
         ("self-calibration/session.toml", &["--poses", "5", "--height-mm", "1,0"], "two numbers are expected"),
     ] {
-        let run = abbe(&[&["plan", text(&ready(session))][..], options].concat());
+        let run = abbe(&[&["poses", text(&ready(session))][..], options].concat());
         let message = String::from_utf8_lossy(&run.stderr).replace('\n', " ");
         assert_eq!(run.status.code(), Some(1), "{message}");
         assert!(message.contains(expected), "{expected}: {message}");
@@ -161,7 +161,7 @@ fn rank_and_noise_are_stated() {
     let json = folder.path().join("poses.json");
     let ur10 = ready("ur10/session.toml");
     let run = |more: &[&str]| {
-        let output = abbe(&[&["plan", text(&ur10), "--candidates", "300", "--json", text(&json)][..], more].concat());
+        let output = abbe(&[&["poses", text(&ur10), "--candidates", "300", "--json", text(&json)][..], more].concat());
         let message = String::from_utf8_lossy(&output.stderr).replace('\n', " ");
         (output.status.code(), message, String::from_utf8_lossy(&output.stdout).into_owned())
     };

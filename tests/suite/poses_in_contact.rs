@@ -1,4 +1,4 @@
-//! `abbe plan --poses` for sockets and probes: every pose meets the instrument's condition by the chain of the
+//! `abbe poses` for sockets and probes: every pose meets the instrument's condition by the chain of the
 //! independent simulator, and simulated readings have the predicted uncertainty.
 
 use abbe::identify::fit;
@@ -295,7 +295,7 @@ fn the_command_names_sockets_and_says_what_is_out_of_reach() {
     let [csv, json, plan] = ["poses.csv", "poses.json", "session.toml"].map(|name| folder.path().join(name));
     let kuka = ready("kuka-iiwa14/session.toml");
     let few = ["--poses", "40", "--candidates", "300", "--criterion", "d", "--noise-um", "100"];
-    let asked = ["plan", text(&kuka), "--poses-csv", text(&csv), "--json", text(&json)];
+    let asked = ["poses", text(&kuka), "--out", text(&csv), "--json", text(&json)];
     let run = abbe(&[&asked[..], &few].concat());
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
     let shown = String::from_utf8_lossy(&run.stdout).into_owned();
@@ -315,7 +315,7 @@ fn the_command_names_sockets_and_says_what_is_out_of_reach() {
     let test = "[[test]]\nname = \"all\"\ndata = \"poses.csv\"\nball_mm = [0, 0, 1346.7]\nball_u_um = inf\n";
     let run = |test: &str, more: &[&str]| {
         std::fs::write(&plan, format!("{head}{test}")).unwrap();
-        let output = abbe(&[&["plan", text(&plan), "--poses", "12", "--candidates", "100"][..], more].concat());
+        let output = abbe(&[&["poses", text(&plan), "--poses", "12", "--candidates", "100"][..], more].concat());
         let message = String::from_utf8_lossy(&output.stderr).replace('\n', " ");
         (output.status.code(), message.split_whitespace().collect::<Vec<_>>().join(" "))
     };
@@ -382,7 +382,7 @@ fn robots_hold_a_bar_and_touch_a_cylinder() {
     }
     // Out of reach.
     std::fs::write(&place, format!("{head}[instrument]\n{}", probe.replace("500, 200", "5000, 200"))).unwrap();
-    let output = abbe(&["plan", text(&place), "--poses", "5"]);
+    let output = abbe(&["poses", text(&place), "--poses", "5"]);
     let message = String::from_utf8_lossy(&output.stderr).replace('\n', " ");
     assert_eq!(output.status.code(), Some(1), "{message}");
     assert!(message.contains("none of 1000 drawn poses makes the probe touch the cylinder"), "{message}");

@@ -205,7 +205,7 @@ fn equations_and_maps() {
         &[
             vec!["equation", "plan.toml", "--test", "A150", "--order", "first"],
             vec!["equation", "plan.toml", "--test", "C150", "--as", "c", "--gradient", "--out", "c150.c"],
-            vec!["volumetric", machine, "--map", "map.csv", "--functions", errors, "--compensate"],
+            vec!["volumetric", machine, "--map", "map.csv", "--functions", errors, "--correction"],
         ],
     );
 }

@@ -121,7 +121,8 @@ fn the_command_compares_files() {
     };
     let files = ["1", "2", "3"].map(run);
     let json = folder.path().join("repeat.json");
-    let output = abbe(&["fit", text(&files[0]), "--repeat", text(&files[1]), text(&files[2]), "--json", text(&json)]);
+    let output =
+        abbe(&["compare", text(&files[0]), text(&files[1]), text(&files[2]), "--repeated", "--json", text(&json)]);
     let screen = String::from_utf8(output.stdout).unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let found: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
@@ -135,16 +136,16 @@ fn the_command_compares_files() {
     }
 
     let refused = |status: i32, arguments: &[&str], part: &str| {
-        let mut all = vec!["fit", text(&files[0])];
+        let mut all = vec!["compare", text(&files[0]), "--repeated"];
         all.extend(arguments);
         let output = abbe(&all);
         let stderr = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(status), "{stderr}");
         assert!(stderr.contains(part), "{stderr}");
     };
-    refused(1, &["--repeat", text(&files[0])], "is named twice");
+    refused(1, &[text(&files[0])], "is named twice");
     let other = ready("hermle-c600u/measured/session.toml");
-    refused(1, &["--repeat", text(&other)], "is not a repeat of");
-    refused(2, &["--repeat", text(&files[1]), "--method", "cone"], "`--repeat` compares full fits");
-    refused(1, &["--repeat", text(&plan)], "has no readings");
+    refused(1, &[text(&other)], "is not a repeat of");
+    refused(2, &[text(&files[1]), "--shared", "bar"], "cannot be used with");
+    refused(1, &[text(&plan)], "has no readings");
 }

@@ -95,7 +95,7 @@ fn a_planned_session_is_simulated_and_fitted_with_raw_sensors_in_both_settings()
 #[test]
 fn the_bundled_session_is_planned_and_its_clearance_checked_in_its_setting() {
     let output =
-        abbe(&["plan", text(&ready("r-test/plan.toml")), "--no-effects", "--clearance-mm", "290,500,100,120,100,100"]);
+        abbe(&["plan", text(&ready("r-test/plan.toml")), "--no-effects", "--device-mm", "290,500,100,120,100,100"]);
     assert!(output.status.success());
     let warned = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
     assert!(warned.contains("device on the table: shaft and jig, 200 mm"), "{warned}");

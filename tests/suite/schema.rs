@@ -358,7 +358,7 @@ fn the_other_results_hold() {
                 text(&map),
                 "--functions",
                 text(&errors),
-                "--compensate",
+                "--correction",
                 "--axis",
                 "X:3",
                 "--axis",
@@ -387,7 +387,7 @@ fn the_other_results_hold() {
     let session = out.join("session.toml");
     let again = folder.path().join("again");
     written(&["simulate", text(&plan), "--out", text(&again), "--seed", "2"]);
-    let repeated = written(&["fit", text(&session), "--repeat", text(&again.join("session.toml"))]);
+    let repeated = written(&["compare", text(&session), text(&again.join("session.toml")), "--repeated"]);
     assert_eq!(faults(&validator("repeat"), &repeated), Vec::<String>::new());
     let compared = written(&["fit", text(&session), "--method", "cone"]);
     assert_eq!(faults(&validator("geometric"), &compared), Vec::<String>::new());

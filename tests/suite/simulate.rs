@@ -136,7 +136,7 @@ fn errors_come_from_a_file_and_the_command_line_overrides_it() {
     let errors = folder.path().join("errors.toml");
     fs::write(&errors, "e_y0c = \"10 um\"\n\"bar[C 150]\" = \"0.4um\"\nEB0C = \"1 arcsec\"\n").unwrap();
     let printed =
-        simulated(&plan, &folder.path().join("out"), &["--errors", text(&errors), "--error", "EB0C=-2arcsec"]);
+        simulated(&plan, &folder.path().join("out"), &["--values", text(&errors), "--error", "EB0C=-2arcsec"]);
     let row = |id: &str| printed.lines().find(|line| line.trim().starts_with(id)).map(str::to_string);
     assert!(row("EY0C").unwrap().contains("10.0000"), "{printed}");
     assert!(row("bar[C 150]").unwrap().contains("0.4000"), "{printed}");
@@ -147,7 +147,7 @@ fn errors_come_from_a_file_and_the_command_line_overrides_it() {
         ("EY0C = ", "errors.toml:1: not valid TOML"),
     ] {
         fs::write(&errors, bad).unwrap();
-        let stderr = refused(&plan, &folder.path().join("bad"), &["--errors", text(&errors)]);
+        let stderr = refused(&plan, &folder.path().join("bad"), &["--values", text(&errors)]);
         assert!(stderr.contains(message) && stderr.contains("errors.toml"), "{stderr}");
     }
 }

@@ -9,7 +9,7 @@ use super::text;
 /// Commands that print a table and write JSON, for the files of [`test_folder`].
 const COMMANDS: &[&str] = &[
     "fit session.toml",
-    "fit session.toml --repeat again/session.toml",
+    "compare session.toml again/session.toml --repeated",
     "fit hermle/session.toml --method cone",
     "fit probe/session.toml --method self-calibration",
     "trace session.toml --only backlash",
@@ -126,12 +126,10 @@ fn other_outputs_go_to_standard_output_too() {
 fn standard_output_takes_one_output_and_no_folder() {
     let place = test_folder();
     let session = place.at("session.toml");
-    let compensation = ["--compensation", "-", "--control", "linuxcnc"];
     for (arguments, words) in [
         (&["--json", "-", "--csv", "-"][..], "`-` is given for two outputs"),
         (&["--json", "-", "--report", "-"], "`-` is given for two outputs"),
         (&["--plots", "-"], "standard output, which cannot contain a folder"),
-        (&compensation, "standard output, which cannot contain a folder"),
     ] {
         let output = abbe(&[&["fit", text(&session)], arguments].concat());
         let stderr = String::from_utf8(output.stderr).unwrap();

@@ -149,7 +149,7 @@ fn the_command_writes_map_and_summary_and_names_what_is_wrong() {
         let output = abbe(&[&base[..], &[functions], more].concat());
         (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
     };
-    let more = ["--compensate", "--places", "3", "--axis", "C:4", "--axis", "A=-30", "--json", text(&json)];
+    let more = ["--correction", "--places", "3", "--axis", "C:4", "--axis", "A=-30", "--json", text(&json)];
     let (status, printed) = run(text(&errors), &more);
     assert_eq!(status, Some(0), "{printed}");
     let table = std::fs::read_to_string(&map).unwrap();

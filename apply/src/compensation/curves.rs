@@ -1,4 +1,4 @@
-//! Identified error motions as functions of the position of their own axis.
+//! Identified error motions of a model as functions of the position of their own axis.
 //!
 //! `E(q) = Σ kᵢ·bᵢ(q)` sums the declared effects of one error motion that depend on the position of its own axis or on
 //! its direction of travel. A curve covers the positions through which its axis moved in runs that observe the error.
@@ -10,13 +10,12 @@
 use std::ops::Range;
 
 use abbe_model::component::{ErrorKind, ErrorName};
-use abbe_model::driver::{Driver, DriverPart, DriverSample};
+use abbe_model::driver::{DriverPart, DriverSample};
 use abbe_model::effect::{Component, Effect};
 
-use super::range::observed_range;
-use abbe_identify::fit::Fit;
+use abbe_identify::model_file::IdentifiedModel;
+use abbe_identify::model_file::motion::over_own_axis;
 use abbe_identify::parameters::Role;
-use abbe_identify::problem::Problem;
 
 /// One error motion as a function of the position of its axis.
 #[derive(Clone, Debug)]
@@ -28,9 +27,9 @@ pub struct ErrorCurve {
     /// The positions through which the axis moved while readings observed the error, mm or rad.
     pub range: Range<f64>,
     terms: Vec<(Effect, Vec<f64>)>,
-    /// The indices of the terms' coefficients and estimated numbers among the fit's parameters, term by term.
+    /// The indices of the terms' coefficients and estimated numbers among the model's parameters, term by term.
     unknowns: Vec<usize>,
-    /// Their covariance, row by row, with the fit's factor on uncertainties; internal units.
+    /// Their covariance, row by row, internal units.
     covariance: Vec<Vec<f64>>,
 }
 
@@ -111,54 +110,46 @@ pub struct Compensation {
     pub left_out: Vec<String>,
 }
 
-/// The curves and location errors of a fit.
-pub fn of_fit(problem: &Problem, fit: &Fit) -> Compensation {
+/// The curves and location errors of a model.
+pub fn of_model(model: &IdentifiedModel) -> Compensation {
     let mut result = Compensation::default();
-    let machine = &problem.session.machine;
-    let list = &problem.parameters.list;
+    let machine = &model.machine;
+    let list = &model.parameters;
     for (j, parameter) in list.iter().enumerate() {
-        if parameter.role != Role::Error || !fit.rank.is_identifiable(j) {
+        if parameter.role != Role::Error || !model.is_identifiable(j) {
             continue;
         }
         match ErrorName::parse(&parameter.id) {
-            Some(name) if name.kind == ErrorKind::Location => result.locations.push((name, fit.beta[j])),
+            Some(name) if name.kind == ErrorKind::Location => result.locations.push((name, parameter.value)),
             _ => result
                 .left_out
                 .push(format!("{}: a constant error motion is not a function of the position", parameter.id)),
         }
     }
-    for (index, effect) in problem.parameters.effects.iter().enumerate() {
-        let Component::Axis(error) = &effect.component else {
+    for (index, effect) in model.effects.iter().enumerate() {
+        if !matches!(effect.component, Component::Axis(_)) {
+            continue;
+        }
+        let mut left_out = |why: &str| result.left_out.push(format!("{}: {why}", effect.id()));
+        let Some(error) = over_own_axis(effect) else {
+            left_out("a table over the position of its axis cannot represent it");
             continue;
         };
-        let id = effect.id();
-        let mut found = vec![None; effect.shape.coefficients()];
-        for (j, parameter) in list.iter().enumerate() {
-            if let Role::Coefficient { effect: of, coefficient } = parameter.role
-                && of == index
-                && fit.rank.is_identifiable(j)
-            {
-                found[coefficient] = Some(j);
-            }
-        }
-        let own = matches!(&effect.driver, Driver::Axis(driver) if *driver == error.axis);
-        let fits_table = own && effect.shape.fits_position_table();
-        if error.kind != ErrorKind::Motion || !fits_table {
-            result.left_out.push(format!("{id}: a table over the position of its axis cannot represent it"));
-            continue;
-        }
         if !effect.tests.is_empty() {
-            let why = "it acts in some tests only, so it is not a property of the axis";
-            result.left_out.push(format!("{id}: {why}"));
+            left_out("it acts in some tests only, so it is not a property of the axis");
             continue;
         }
+        let of_effect = |wanted: usize| {
+            list.iter().position(|other| other.role == Role::Coefficient { effect: index, coefficient: wanted })
+        };
+        let coefficients = (0..effect.shape.coefficients()).map(|k| of_effect(k).filter(|j| model.is_identifiable(*j)));
         let (Some(axis), Some(coefficients)) =
-            (machine.axis_index(&error.axis), found.into_iter().collect::<Option<Vec<usize>>>())
+            (machine.axis_index(&error.axis), coefficients.collect::<Option<Vec<usize>>>())
         else {
-            result.left_out.push(format!("{id}: not all of its coefficients are identifiable"));
+            left_out("not all of its coefficients are identifiable");
             continue;
         };
-        let term = (effect.clone(), coefficients.iter().map(|j| fit.beta[*j]).collect());
+        let term = (effect.clone(), coefficients.iter().map(|j| list[*j].value).collect());
         let is_number = |j: &usize| matches!(list[*j].role, Role::Number { effect, .. } if effect == index);
         let unknowns = coefficients.into_iter().chain((0..list.len()).filter(is_number));
         if let Some(curve) = result.curves.iter_mut().find(|curve| curve.error == *error) {
@@ -166,35 +157,33 @@ pub fn of_fit(problem: &Problem, fit: &Fit) -> Compensation {
             curve.unknowns.extend(unknowns);
             continue;
         }
-        let Some(observed) = observed_range(problem, error, axis) else {
-            let why = "its axis stands still wherever readings observe it, and the positions between are not measured";
-            result.left_out.push(format!("{id}: {why}"));
+        let id = error.to_string();
+        let Some(observed) = model.motion_ranges.iter().find(|range| range.error == id) else {
+            left_out("the model does not state where it was observed; save it again with this version");
+            continue;
+        };
+        let Some((range, unconnected)) = observed.internal.split_first() else {
+            left_out("its axis stands still wherever readings observe it, and the positions between are not measured");
             continue;
         };
         let kind = machine.axes[axis].kind;
-        for unconnected in &observed.unconnected {
+        for [start, end] in unconnected.iter().map(|ends| ends.map(|end| kind.to_display(end))) {
             result.left_out.push(format!(
-                "{error} from {:.3} to {:.3} {}: not connected to the longest range of motion of the axis",
-                kind.to_display(unconnected.start),
-                kind.to_display(unconnected.end),
+                "{error} from {start:.3} to {end:.3} {}: not connected to the longest range of motion of the axis",
                 kind.unit()
             ));
         }
         result.curves.push(ErrorCurve {
             error: error.clone(),
             axis,
-            range: observed.range,
+            range: range[0]..range[1],
             terms: vec![term],
             unknowns: unknowns.collect(),
             covariance: Vec::new(),
         });
     }
-    let covariance = fit.covariance_with_aliases();
     for curve in &mut result.curves {
-        let row = |j: &usize| -> Vec<f64> {
-            let columns = curve.unknowns.iter();
-            columns.map(|k| covariance[(*j, *k)]).collect()
-        };
+        let row = |j: &usize| curve.unknowns.iter().map(|k| model.covariance[(*j, *k)]).collect();
         curve.covariance = curve.unknowns.iter().map(row).collect();
     }
     result

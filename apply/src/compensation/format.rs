@@ -9,6 +9,8 @@ pub type FileText = (String, String);
 
 /// The format of the tables of a control.
 pub struct TableFormat {
+    /// The word by which it is requested.
+    pub word: &'static str,
     /// The file.
     pub about: &'static str,
     /// How the control reads the files, one sentence or two.

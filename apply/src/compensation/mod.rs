@@ -1,12 +1,11 @@
 //! Estimated errors as compensation tables of controls, as far as their formats are publicly documented.
 //!
-//! - [`curves`]: the errors of a fit as functions of the position; `range`: where they were observed;
+//! - [`curves`]: the errors of a model as functions of the position;
 //! - [`TableFormat`]: the format of a control ([`crate::control`]); `position`: errors as changes of an axis position.
 
 pub mod curves;
 mod format;
 pub(crate) mod position;
-mod range;
 mod uncertainty;
 
 use abbe_model::chain::Machine;
@@ -20,7 +19,7 @@ pub const MAX_POINTS: usize = 256;
 
 /// The tables of a control.
 pub struct Tables {
-    /// The files; none if the format can hold no error of the fit.
+    /// The files; none if the format can hold no error of the model.
     pub files: Vec<FileText>,
     /// The standard uncertainty of each point of each curve.
     pub uncertainties: Vec<PointUncertainty>,

@@ -13,6 +13,7 @@ pub(super) const CONTROL: Control = Control {
     word: "beckhoff",
     name: "Beckhoff TwinCAT CNC TF5280",
     tables: Some(TableFormat {
+        word: "beckhoff-tables",
         about: "ISG CSV format",
         import: &[
             "file_format[0] ISG_CSV; values are errors (actual less nominal), which the control subtracts; `negate` reverses the sign",

@@ -18,6 +18,7 @@ pub(super) const CONTROL: Control = Control {
     word: "heidenhain",
     name: "Heidenhain",
     tables: Some(TableFormat {
+        word: "heidenhain-tables",
         about: "columns of a .COM table",
         import: &[
             "columns of a .COM table; the frame of the file is not publicly documented: enter or import the \

@@ -19,6 +19,7 @@ pub(super) const CONTROL: Control = Control {
     word: "linuxcnc",
     name: "LinuxCNC",
     tables: Some(TableFormat {
+        word: "linuxcnc-tables",
         about: "COMP_FILE of type 0",
         import: &[
             "in [JOINT_n] of the INI file: COMP_FILE = the file, COMP_FILE_TYPE = 0; the control then ignores BACKLASH",

@@ -42,6 +42,7 @@ pub(super) fn model(machine: Machine, errors: &[(String, f64)]) -> IdentifiedMod
         reading_unit: abbe_identify::unit::ReadingUnit::Micrometre,
         quality: Quality { readings: 1, rms_um: 0.0, heldout_rms_um: 0.0, u_enlargement: 1.0 },
         ranges: Vec::new(),
+        motion_ranges: Vec::new(),
         tool_mm: [0.0; 3],
         table_mm: [0.0; 3],
         reference: abbe_model::driver::Reference::default(),

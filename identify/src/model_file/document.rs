@@ -58,6 +58,9 @@ pub struct Document {
     pub fit: FitQuality,
     /// The range of every axis and driver that the readings covered.
     pub ranges: Vec<Range>,
+    /// The ranges of each error motion that is a function of the position of its own axis; absent without such errors.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub motion_ranges: Vec<MotionRange>,
     /// The instrument's point in the tool frame at the first test.
     pub tool_mm: [f64; 3],
     /// The instrument's point in the table frame there; 0 for instruments without one.
@@ -228,6 +231,17 @@ pub struct Range {
     pub unit: String,
     /// Least and greatest value, internal unit.
     pub internal: [f64; 2],
+}
+
+/// The positions through which the axis of an error motion moved while readings observed the error.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MotionRange {
+    /// `EXX`, …
+    pub error: String,
+    /// Least and greatest position of each unconnected range, mm or rad, the longest range first; empty if the axis stood
+    /// still.
+    pub internal: Vec<[f64; 2]>,
 }
 
 /// Reference values from which drivers count.

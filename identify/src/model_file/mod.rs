@@ -7,12 +7,13 @@
 //!
 //! - `of_fit`: the model of a fit; [`carried`]: the part that another session shares, with the errors of the machine at
 //!   any state;
-//! - [`range`]: the range of axes and drivers;
+//! - [`range`]: the range of axes and drivers; [`motion`]: that of error motions over their own axis;
 //! - [`document`]: the JSON form; `read`, `write`: from and to a file, with a checksum.
 
 pub mod carried;
 pub mod document;
 pub mod errors;
+pub mod motion;
 mod of_fit;
 pub mod range;
 mod read;
@@ -30,9 +31,12 @@ use crate::noise::Noise;
 use crate::parameters::Role;
 use crate::unit::ReadingUnit;
 use crate::unit::Unit;
-pub use document::{InputFile, Provenance};
+pub use document::{InputFile, MotionRange, Provenance};
 pub use range::DriverRange;
 pub use read::{of_source, read};
+
+/// Share of a parameter in a null direction, in physical sizes, above which the readings do not determine it by itself.
+const UNDETERMINED: f64 = 1e-6;
 
 /// A parameter of a model.
 #[derive(Clone, Debug, PartialEq)]
@@ -92,6 +96,8 @@ pub struct IdentifiedModel {
     pub quality: Quality,
     /// The range of every axis and driver.
     pub ranges: Vec<DriverRange>,
+    /// The ranges of the error motions that are functions of the position of their own axis.
+    pub motion_ranges: Vec<MotionRange>,
     /// The instrument's point in the tool frame at the first test, mm: the load point of gravity, and the tool point if
     /// no other is stated.
     pub tool_mm: [f64; 3],
@@ -107,6 +113,13 @@ impl IdentifiedModel {
     /// Standard uncertainty of a parameter, internal units; 0 if it is held.
     pub fn u(&self, parameter: usize) -> f64 {
         self.covariance[(parameter, parameter)].max(0.0).sqrt()
+    }
+
+    /// Whether the readings determine a parameter by itself.
+    pub fn is_identifiable(&self, parameter: usize) -> bool {
+        let size = self.parameters[parameter].size;
+        self.is_estimated(parameter)
+            && self.null_directions.iter().all(|direction| (direction[parameter] / size).abs() < UNDETERMINED)
     }
 
     /// Whether the readings determine a parameter, alone or in a combination. The others stay at nominal.

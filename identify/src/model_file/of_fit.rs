@@ -4,7 +4,7 @@ use abbe_model::component::ErrorName;
 use abbe_model::driver::Reference;
 use abbe_model::session::Session;
 
-use super::{IdentifiedModel, ModelParameter, Provenance, Quality, range};
+use super::{IdentifiedModel, ModelParameter, Provenance, Quality, motion, range};
 use crate::error::IdentifyError;
 use crate::fit::base::{Gauge, base_parameters};
 use crate::fit::{Fit, minimum};
@@ -54,6 +54,7 @@ impl IdentifiedModel {
                 u_enlargement: fit.u_enlargement,
             },
             ranges: range::of_problem(problem, &problem.parameters.effects),
+            motion_ranges: motion::of_problem(problem),
             tool_mm: problem.models[0].station().tool_point_mm(),
             table_mm: problem.models[0].station().table_point_mm().unwrap_or_default(),
             reference: Reference::without_history(problem.reference.time_s, problem.reference.means.clone()),

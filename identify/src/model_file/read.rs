@@ -140,6 +140,7 @@ fn model(document: Document) -> Result<IdentifiedModel, Fault> {
     Ok(IdentifiedModel {
         locations: locations.collect::<Result<_, Fault>>()?,
         ranges: document.ranges.iter().map(|of| range(&machine, of)).collect(),
+        motion_ranges: document.motion_ranges,
         quality: Quality {
             readings: document.fit.readings,
             rms_um: document.fit.rms_um,

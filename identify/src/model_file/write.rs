@@ -67,6 +67,7 @@ impl IdentifiedModel {
                 u_enlargement: self.quality.u_enlargement,
             },
             ranges: self.ranges.iter().map(|range| self.range(range)).collect(),
+            motion_ranges: self.motion_ranges.clone(),
             tool_mm: self.tool_mm,
             table_mm: self.table_mm,
             reference: document::Reference {

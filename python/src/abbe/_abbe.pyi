@@ -191,7 +191,8 @@ class Model:
         tip: str | None = None,
         convention: str = "modified",
         dh: _Path | None = None,
-    ) -> bytes: ...
+        places: int | None = None,
+    ) -> list[tuple[str | None, bytes]]: ...
     def validate(self, session: Session) -> Validation: ...
     def correct(
         self,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import pathlib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -132,15 +133,19 @@ class Model:
         tip: str | None = None,
         convention: str = "modified",
         dh: str | os.PathLike[str] | None = None,
-    ) -> str:
+        places: int | None = None,
+    ) -> str | dict[str, str]:
         """Return the calibrated machine for other programs and for controls, as ``abbe export``.
+
+        Compensation tables are several files: a dictionary of their names and texts.
 
         Parameters
         ----------
         format : str
-            ``"table"``, ``"urdf"``, ``"dh"``, ``"linuxcnc"``, ``"fanuc"`` or ``"beckhoff"``.
+            ``"table"``, ``"urdf"``, ``"dh"``, ``"linuxcnc"``, ``"fanuc"``, ``"beckhoff"``, ``"linuxcnc-tables"``,
+            ``"heidenhain-tables"`` or ``"beckhoff-tables"``.
         path : path-like, optional
-            A file to write it to. It is replaced if it exists.
+            A file to write it to, which is replaced if it exists. With tables: a folder, which is made if it does not exist.
         tool_mm : tuple of three floats, optional
             The tool point in the tool frame, for ``"urdf"``, ``"dh"`` and controls; that of the instrument by default.
         entries : str, optional
@@ -156,12 +161,23 @@ class Model:
             With ``"dh"``: ``"standard"`` or ``"modified"``.
         dh : path-like, optional
             With ``"dh"``: the maker's table (CSV), near whose frames the calibrated ones lie.
+        places : int, optional
+            With tables: the number of places along the axis; 37 by default.
         """
         ranges = [(axis, (float(low), float(high))) for axis, (low, high) in (travel or {}).items()]
-        text = self._handle.export(format, tool_mm, entries, ranges, patch, tip, convention, dh).decode()
+        found = self._handle.export(format, tool_mm, entries, ranges, patch, tip, convention, dh, places)
+        files = {name: text.decode() for name, text in found if name is not None}
+        if not files:
+            text = found[0][1].decode()
+            if path is not None:
+                write_whole(path, text)
+            return text
         if path is not None:
-            write_whole(path, text)
-        return text
+            folder = pathlib.Path(path)
+            folder.mkdir(parents=True, exist_ok=True)
+            for name, text in files.items():
+                write_whole(folder / name, text)
+        return files
 
     def compensate(
         self,

@@ -29,10 +29,10 @@ const FORMS: Words<Arrangement> =
 /// The form of an equation.
 #[derive(Args)]
 pub struct FormArguments {
-    /// The language of the equation.
+    /// The format of the output.
     ///
     /// Example: --as latex
-    #[arg(long = "as", value_parser = languages(), default_value = "text")]
+    #[arg(long = "as", value_parser = languages(), value_name = "FORMAT", default_value = "text")]
     pub language: &'static OutputLanguage,
     /// Order in the errors: all terms, products of two errors, or one sensitivity coefficient per error.
     ///
@@ -68,7 +68,7 @@ pub struct FormArguments {
     gradient: bool,
     #[command(flatten)]
     pub style: StyleArguments,
-    /// Write the equation to a file instead of standard output; with --all, code goes to a new folder.
+    /// Where the result is written: a file [default: standard output]; for code of all tests a new folder.
     ///
     /// Example: --out equation.tex
     #[arg(long, value_name = "FILE")]

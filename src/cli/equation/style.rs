@@ -23,7 +23,7 @@ pub struct StyleArguments {
     /// Example: --width 84mm
     #[arg(long, value_name = "LENGTH", value_parser = width_mm)]
     width: Option<f64>,
-    /// LaTeX, Typst: break lines for a two-column page, as --width 84mm.
+    /// Set for two columns: in LaTeX and Typst lines are broken as with --width 84mm.
     #[arg(long, conflicts_with = "width")]
     two_column: bool,
     /// LaTeX, Typst: add a table of all symbols.

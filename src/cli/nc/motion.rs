@@ -50,9 +50,9 @@ pub struct MotionArguments {
     increment_mm: Option<f64>,
     /// Program number of `main` on a fanuc; the tests follow [default: 1000].
     ///
-    /// Example: --number 7000
+    /// Example: --program-number 7000
     #[arg(long, value_name = "N", requires = "control")]
-    number: Option<u32>,
+    program_number: Option<u32>,
     /// Write paths of rotary and linear axes for the tool point over the table.
     #[arg(long, requires = "control")]
     tool_point: bool,
@@ -70,7 +70,7 @@ impl MotionArguments {
             approach_feed: self.approach_mm_min,
             chord_error_mm: self.chord_um * 1e-3,
             increment_mm: self.increment_mm,
-            number: self.number,
+            number: self.program_number,
             tool_point: self.tool_point,
         }
     }

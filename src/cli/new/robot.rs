@@ -23,7 +23,7 @@ pub struct RobotArguments {
     /// Create the machine of this URDF file, and a plan for it.
     ///
     /// Example: --from-urdf robot.urdf
-    #[arg(long, value_name = "FILE", requires = "folder")]
+    #[arg(long, value_name = "FILE", requires = "out")]
     from_urdf: Option<PathBuf>,
     /// The link at which the chain of the URDF ends [default: the end of the arm].
     ///
@@ -35,7 +35,8 @@ pub struct RobotArguments {
     /// Example: --from-dh robot.csv --convention modified
     #[arg(long, value_name = "FILE", requires = "convention")]
     from_dh: Option<PathBuf>,
-    /// The convention of the table: standard is Rz(θ)·Tz(d)·Tx(a)·Rx(α), modified is Tx(a)·Rx(α)·Rz(θ)·Tz(d).
+    /// The convention of Denavit-Hartenberg parameters: standard is Rz(θ)·Tz(d)·Tx(a)·Rx(α), modified is
+    /// Tx(a)·Rx(α)·Rz(θ)·Tz(d).
     ///
     /// Example: --from-dh robot.csv --convention standard
     #[arg(long, value_parser = values::words(CONVENTIONS), requires = "from_dh")]

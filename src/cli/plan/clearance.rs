@@ -1,4 +1,4 @@
-//! `abbe plan --clearance-mm`: collisions of spindle, table and device.
+//! `abbe plan --device-mm`: collisions of spindle, table and device.
 
 use abbe::model::instrument::rtest::Setting;
 use abbe::model::session::Session;
@@ -12,10 +12,10 @@ pub fn faults(session: &Session, sizes: &str) -> Result<Vec<String>, Failure> {
     let numbers: Vec<f64> = sizes.split(',').filter_map(|size| size.trim().parse().ok()).collect();
     let &[spindle_mm, table_mm, device_height_mm, device_width_mm, shaft_mm, jig_mm] = numbers.as_slice() else {
         return Err(Failure::Other(format!(
-            "`--clearance-mm {sizes}`: six lengths are expected: diameters of spindle and table, height and width of the device, shaft, jig"
+            "`--device-mm {sizes}`: six lengths are expected: diameters of spindle and table, height and width of the device, shaft, jig"
         )));
     };
-    values::SIZE_MM.all("--clearance-mm", &numbers)?;
+    values::SIZE_MM.all("--device-mm", &numbers)?;
     let settings: Vec<Setting> = session.tests.iter().filter_map(|test| Some(test.station.rtest()?.setting)).collect();
     let faults = [(Setting::Table, "device on the table"), (Setting::Spindle, "device in the spindle")]
         .into_iter()

@@ -12,7 +12,7 @@ use crate::cli::failure::Failure;
 pub struct GlobalArguments {
     /// Sobol' indices of each identified error by set-up errors, noise and undeclared effects, with the full fit,
     /// beside the linear prediction.
-    #[arg(long, conflicts_with_all = ["improve", "separate", "range", "patterns", "clearance_mm"])]
+    #[arg(long, conflicts_with_all = ["improve", "separate", "range", "patterns", "device_mm"])]
     global: bool,
     /// Size of an input of --global: half the range of an undeclared effect, or the standard deviation of a set-up
     /// parameter instead of its prior; may be repeated.

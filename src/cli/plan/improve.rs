@@ -34,7 +34,7 @@ pub struct ImproveArguments {
     separate: Option<String>,
     #[command(flatten)]
     candidates: CandidateArguments,
-    /// Write the session with the proposed tests at its end, with all positions.
+    /// Write the session with the result in it: the proposed tests stand at its end, with all positions.
     ///
     /// Example: --improve 2 --write next.toml
     #[arg(long, value_name = "FILE", requires = "next_test")]

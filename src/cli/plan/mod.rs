@@ -5,7 +5,6 @@ mod global;
 mod improve;
 mod overrides;
 mod patterns;
-mod poses;
 
 use abbe::document::StatedPlan;
 use abbe::plan::collision;
@@ -14,10 +13,9 @@ use abbe::plan::range::shrinkages;
 use abbe::plan::{self, PlanOptions};
 use clap::Args;
 
-use self::overrides::positive;
 use super::failure::Failure;
 use super::results::Read;
-use super::{CommonArguments, SessionArguments, read_session};
+use super::{CommonArguments, SessionArguments, read_session, values};
 use crate::report;
 
 /// `abbe plan SESSION`
@@ -27,7 +25,7 @@ pub struct PlanArguments {
     session: SessionArguments,
     #[command(flatten)]
     common: CommonArguments,
-    /// Standard deviation of a reading, instead of the session's.
+    /// Standard deviation of a reading, µm, instead of the session's.
     ///
     /// Example: --noise-um 0.5
     #[arg(long, value_name = "UM", allow_negative_numbers = true)]
@@ -43,19 +41,17 @@ pub struct PlanArguments {
     /// Use the planned movements even if there are data.
     #[arg(long)]
     planned: bool,
-    /// Check the clearance of spindle and table with the table upright: diameters of spindle and table, height and
-    /// width of the device, length of the shaft from jig to ball, length of the jig.
+    /// Check the clearance of an R-test device with the table upright: diameters of spindle and table, height and width
+    /// of the device, length of the shaft from jig to ball, length of the jig.
     ///
-    /// Example: --clearance-mm 80,320,60,80,150,50
+    /// Example: --device-mm 80,320,60,80,150,50
     #[arg(long, value_name = "DS,DT,H,W,L,T", allow_hyphen_values = true, conflicts_with_all = ["improve", "separate", "range"])]
-    clearance_mm: Option<String>,
+    device_mm: Option<String>,
     /// Do not screen undeclared effects.
     #[arg(long)]
     no_effects: bool,
     #[command(flatten)]
     improve: improve::ImproveArguments,
-    #[command(flatten)]
-    poses: poses::PoseArguments,
     #[command(flatten)]
     patterns: patterns::PatternArguments,
     #[command(flatten)]
@@ -71,11 +67,8 @@ pub const HELP: &str = include_str!("../help/plan.txt");
 /// Runs `abbe plan`.
 pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
     let common = &arguments.common;
-    let others = [arguments.patterns.file(), arguments.improve.file(), arguments.poses.file()];
+    let others = [arguments.patterns.file(), arguments.improve.file()];
     let outputs = common.output.prepared(&others)?;
-    if arguments.poses.asked() {
-        return poses::run(arguments, &outputs);
-    }
     // The written session has the mounts and the priors of the file, not those of the command line.
     arguments.improve.refuse_overrides(arguments.one_spindle_ball || arguments.setup_um.is_some())?;
     let (mut session, sources) = read_session(&arguments.session, &outputs)?;
@@ -87,7 +80,7 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
         return common.output.put(&outputs, &report::patterns::report(&session, &found.patterns), &found, &read);
     }
     let options = PlanOptions {
-        noise_mm: arguments.noise_um.map(|um| positive("--noise-um", um)).transpose()?,
+        noise_mm: arguments.noise_um.map(|um| values::length_um("--noise-um", um)).transpose()?,
         planned_only: arguments.planned,
         effects: !arguments.no_effects,
         reach_mm: arguments.improve.reach_mm()?,
@@ -109,7 +102,7 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
     }
     let mut analysis = plan::analyse(&session, &options)?;
     analysis.warnings.extend(collision::unchecked(&session, options.planned_only));
-    if let Some(sizes) = &arguments.clearance_mm {
+    if let Some(sizes) = &arguments.device_mm {
         analysis.warnings.extend(clearance::faults(&session, sizes)?);
     }
     let commands = arguments.session.commands();

@@ -5,15 +5,10 @@ use abbe::model::session::{Prior, Session};
 use crate::cli::failure::Failure;
 use crate::cli::values;
 
-/// A positive length in µm, converted to mm.
-pub fn positive(flag: &str, um: f64) -> Result<f64, Failure> {
-    Ok(values::DEVIATION_UM.check(flag, um)? * 1e-3)
-}
-
 /// Replaces the standard uncertainty of every set-up length that has a Gaussian prior, and mounts one spindle ball.
 pub fn apply(session: &mut Session, setup_um: Option<f64>, one_spindle_ball: bool) -> Result<(), Failure> {
     if let Some(u_um) = setup_um {
-        set_priors(session, positive("--setup-um", u_um)?);
+        set_priors(session, values::length_um("--setup-um", u_um)?);
     }
     if one_spindle_ball {
         session.tests.iter_mut().for_each(|test| test.spindle_setup = "all tests".to_string());

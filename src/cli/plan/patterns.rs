@@ -20,14 +20,13 @@ pub struct PatternArguments {
     #[arg(
         long,
         value_name = "FILE.csv",
-        conflicts_with_all = ["improve", "separate", "range", "clearance_mm", "noise_um", "setup_um"]
+        conflicts_with_all = ["improve", "separate", "range", "device_mm", "noise_um", "setup_um"]
     )]
     patterns: Option<PathBuf>,
-    /// Size of an error for --patterns; may be repeated
-    /// [default: all errors that the session estimates, 10 µm and 0.01°].
+    /// Value of an error; may be repeated [default of --patterns: all errors that the session estimates, 10 µm and 0.01°].
     ///
     /// Example: --patterns patterns.csv --error EY0A=10um --error EB0A=0.01deg
-    #[arg(long = "error", value_name = "NAME=SIZE", allow_hyphen_values = true, requires = "patterns")]
+    #[arg(long = "error", value_name = "NAME=VALUE", allow_hyphen_values = true, requires = "patterns")]
     errors: Vec<String>,
 }
 

@@ -22,14 +22,14 @@ pub struct NextArguments {
     /// Write what to measure next into a new folder: a session that holds only the tests that separate the found effects
     /// from their aliases, their NC programs and their set-up sheets.
     ///
-    /// Example: --next next --programs siemens
-    #[arg(long, value_name = "FOLDER")]
+    /// Example: --next next --control siemens
+    #[arg(long, value_name = "DIR")]
     next: Option<PathBuf>,
-    /// Write the programs for this control beside it.
+    /// The control of the NC programs: they are written beside the session.
     ///
-    /// Example: --next next --programs fanuc
+    /// Example: --next next --control fanuc
     #[arg(long, value_name = "CONTROL", value_parser = controls::with_programs(), requires = "next")]
-    programs: Option<&'static dyn Control>,
+    control: Option<&'static dyn Control>,
 }
 
 /// The name of the session in the folder.
@@ -41,8 +41,8 @@ const SHEETS: &str = "sheets.html";
 
 impl NextArguments {
     /// Refuses a folder that cannot be written before the search.
-    pub fn check(&self) -> Result<(), Failure> {
-        self.next.as_ref().map_or(Ok(()), |folder| folder::check(folder, None).map(|_| ()))
+    pub fn check(&self, force: bool) -> Result<(), Failure> {
+        self.next.as_ref().map_or(Ok(()), |folder| folder::check(folder, force).map(|_| ()))
     }
 
     /// Writes the folder, if it is asked for.
@@ -51,7 +51,7 @@ impl NextArguments {
         session: &Session,
         sources: &SourceMap,
         trace: &TraceOutcome,
-        quiet: bool,
+        (quiet, force): (bool, bool),
     ) -> Result<(), Failure> {
         let Some(out) = &self.next else { return Ok(()) };
         let proposed = proposals(&trace.result);
@@ -66,14 +66,14 @@ impl NextArguments {
         let effects: Vec<Effect> = session.effects.iter().chain(&trace.effects).filter(of_all).cloned().collect();
         text.add_effects(&effects, &session.machine)?;
         proposed.into_iter().try_for_each(|block| text.add_block(block))?;
-        folder::write(out, &files_of(text, sources)?, false, |made| {
+        folder::write(out, &files_of(text, sources)?, force, |made| {
             files::session(&made.join(SESSION), &ReadOptions { read_data: false, ..ReadOptions::default() })?;
             self.documents(made)
         })?;
         if !quiet {
             let at = |name: &str| out.join(name).display().to_string();
             say!("{}: the tests to measure next", at(SESSION));
-            if let Some(control) = self.programs {
+            if let Some(control) = self.control {
                 say!("{}: their programs for {}", at(PROGRAMS), control.word());
             }
             say!("{}: their set-up sheets", at(SHEETS));
@@ -84,7 +84,7 @@ impl NextArguments {
     /// The programs and the sheets of the session in a folder that is not in its place yet.
     fn documents(&self, made: &Path) -> Result<(), Failure> {
         let [session, programs, sheets] = [SESSION, PROGRAMS, SHEETS].map(|name| made.join(name).display().to_string());
-        let control: Vec<&str> = self.programs.iter().flat_map(|control| ["--control", control.word()]).collect();
+        let control: Vec<&str> = self.control.iter().flat_map(|control| ["--control", control.word()]).collect();
         if !control.is_empty() {
             again(&[&["nc", &session, "--out", &programs], &control[..]].concat(), true)?;
         }

@@ -72,14 +72,11 @@ pub fn trace(
     Ok(trace)
 }
 
-/// Says what is not written of a trace that ended early: compensation tables, a saved model.
+/// Says that the model of a trace that ended early is not saved.
 ///
 /// # Errors
 /// If the user interrupted it.
-pub fn ended_early(trace: &TraceOutcome, tables: bool, model: bool) -> Result<(), Failure> {
-    if tables {
-        tell(Kind::Warning, "no compensation tables are written: effects may be missing from the model");
-    }
+pub fn ended_early(trace: &TraceOutcome, model: bool) -> Result<(), Failure> {
     if model {
         tell(Kind::Warning, "no model is saved: effects may be missing from it");
     }

@@ -92,8 +92,8 @@ fn a_plan_for_sockets_takes_its_files_one_by_one() {
     let measured = place.path().join("measured");
     std::fs::create_dir(&measured).unwrap();
     for (number, socket) in ["S1", "S2", "S3"].into_iter().enumerate() {
-        let asked = ["plan", text(&plan), "--poses", "14", "--candidates", "200", "--pose-test", socket];
-        let output = abbe(&[&asked[..], &["--poses-csv", text(&poses), "--quiet"]].concat());
+        let asked = ["poses", text(&plan), "--poses", "14", "--candidates", "200", "--test", socket];
+        let output = abbe(&[&asked[..], &["--out", text(&poses), "--quiet"]].concat());
         assert!(output.status.success(), "{}", message(&output));
         // As a controller writes them: other names, semicolons.
         let mut file = String::from("A1 [deg];A2 [deg];A3 [deg];A4 [deg];A5 [deg];A6 [deg]\n");

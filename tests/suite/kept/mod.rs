@@ -258,7 +258,7 @@ fn a_fit_by_each_method() {
             "simulate plan.toml --out run --draw-setups --seed 6 --error EY0A=35.3um --error EB0A=-1.29arcsec --error EA0C=3arcsec",
             "simulate plan.toml --out again --draw-setups --seed 7 --error EY0A=35.3um --error EB0A=-1.29arcsec --error EA0C=3arcsec",
             "fit run/session.toml --method two-plane --json two-plane.json",
-            "fit run/session.toml --repeat again/session.toml --json repeated.json",
+            "compare run/session.toml again/session.toml --repeated --json repeated.json",
         ],
     );
 }
@@ -271,11 +271,12 @@ fn every_shape_of_an_effect() {
         &[],
         &[
             "plan plan.toml --no-effects --json plan.json",
-            "simulate plan.toml --out run --seed 3 --noise-um 0.2 --errors errors.toml --json run.json",
+            "simulate plan.toml --out run --seed 3 --noise-um 0.2 --values errors.toml --json run.json",
             "fit run/session.toml --json fit.json --csv fit.csv",
-            "fit run/session.toml --compensation linuxcnc --control linuxcnc --points 9",
-            "fit run/session.toml --compensation heidenhain --control heidenhain --points 9",
-            "fit run/session.toml --compensation beckhoff --control beckhoff --points 9",
+            "fit run/session.toml --save model.json",
+            "export model.json --as linuxcnc-tables --out linuxcnc --places 9",
+            "export model.json --as heidenhain-tables --out heidenhain --places 9",
+            "export model.json --as beckhoff-tables --out beckhoff --places 9",
             "trace run/session.toml --max-effects 2 --only C --json trace.json",
             "trace run/session.toml --list --only :h2 --only backlash --only time",
             "equation plan.toml --test C --as python --layout flat --order bilinear --gradient",
@@ -344,7 +345,7 @@ fn a_plan() {
         &[("plan.toml", coarse("chapter5.toml"))],
         &[
             "plan plan.toml --json plan.json --range",
-            "plan plan.toml --no-effects --setup-um 1 --noise-um 0.5 --one-spindle-ball --clearance-mm 60,300,120,80,60,20 --json known.json",
+            "plan plan.toml --no-effects --setup-um 1 --noise-um 0.5 --one-spindle-ball --device-mm 60,300,120,80,60,20 --json known.json",
             "plan plan.toml --no-effects --improve 2 --bars-mm 50,100,150 --json improve.json",
             "plan plan.toml --no-effects --improve 1 --setup-min 5 --test-min 2 --remount-spindle-ball --no-follow --json minutes.json",
             "plan plan.toml --no-effects --separate EZC~C:h2,EAC~C:h1 --bars-mm 100,150 --json separate.json",
@@ -361,7 +362,7 @@ fn a_map() {
         &ready("volumetric"),
         &[],
         &[
-            "volumetric machine.toml --map map.csv --functions errors.toml --places 3 --compensate --json map.json",
+            "volumetric machine.toml --map map.csv --functions errors.toml --places 3 --correction --json map.json",
             "volumetric machine.toml --order first --errors EX0C,EXX,EAX",
         ],
     );

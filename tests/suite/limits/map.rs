@@ -20,10 +20,10 @@ fn message_of(folder: &TempDir, functions: &Path, more: &[&str]) -> String {
     stderr
 }
 
-/// The output of `abbe simulate --errors` with a file, and its output folder.
+/// The output of `abbe simulate --values` with a file, and its output folder.
 fn simulated(folder: &TempDir, errors: &Path) -> (Output, PathBuf) {
     let (plan, out) = (ready("hermle-c600u/chapter5.toml"), folder.path().join("out"));
-    let output = abbe(&["simulate", text(&plan), "--out", text(&out), "--errors", text(errors)]);
+    let output = abbe(&["simulate", text(&plan), "--out", text(&out), "--values", text(errors)]);
     (output, out)
 }
 

@@ -149,7 +149,7 @@ fn plan(chain: &Chain, measured: Measured, target_mm: [f64; 3]) -> String {
 fn tracker(chain: &Chain, point: &str, target_mm: [f64; 3], columns: &[String]) -> String {
     let mut text = format!(
         "# A plan for a laser tracker: each joint turns alone with the target at {} in the frame of the flange.\n\
-         # `abbe plan plan.toml` says what these tests identify, `abbe plan plan.toml --poses 60` chooses poses instead.\n\
+         # `abbe plan plan.toml` says what these tests identify, `abbe poses plan.toml --poses 60` chooses poses instead.\n\
          # Measured poses: `abbe import poses.csv --session plan.toml`, columns {}, px_mm, py_mm, pz_mm.\n\n\
          [machine]\nfile = \"machine.toml\"\n\n\
          [instrument]\nkind = \"tracker\"\n# Enter the standard deviation of one coordinate.\nnoise_um = 20\n",
@@ -189,7 +189,7 @@ fn tracker(chain: &Chain, point: &str, target_mm: [f64; 3], columns: &[String]) 
 fn sockets(chain: &Chain, point: &str, target_mm: [f64; 3], columns: &[String]) -> String {
     let mut text = format!(
         "# A plan for a ball in {SOCKETS} sockets; the ball is at {} in the frame of the flange.\n\
-         # `abbe plan plan.toml --poses 40 --poses-csv poses.csv` chooses poses. Enter where the sockets are.\n\
+         # `abbe poses plan.toml --poses 40 --out poses.csv` chooses poses. Enter where the sockets are.\n\
          # Measured poses: one file for each socket with the columns {}.\n\n\
          [machine]\nfile = \"machine.toml\"\n\n\
          [instrument]\nkind = \"socket\"\n# Enter how well the ball repeats in its socket.\nnoise_um = 20\n",

@@ -17,7 +17,7 @@ def history(
     tolerance_u: float = 4.0,
     compensations: Path | None = None,
 ) -> dict[str, Any]:
-    """Return the parameters of every machine over time, as ``abbe history``.
+    """Return the parameters of every machine over time, as ``abbe fleet history``.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ def study(
     retries: int = 2,
     progress: bool | Callable[[int, int], object] = True,
 ) -> dict[str, Any]:
-    """Simulate and analyse the sessions of a study file, as ``abbe study``.
+    """Simulate and analyse the sessions of a study file, as ``abbe fleet study``.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-//! `abbe study`: simulate and analyse many sessions.
+//! `abbe fleet study`: simulate and analyse many sessions.
 
 use std::path::PathBuf;
 
@@ -9,22 +9,22 @@ use abbe::fleet::study::summary::summary;
 use abbe::fleet::{FleetError, study};
 use clap::Args;
 
-use super::failure::Failure;
-use super::interrupt::Interrupts;
-use super::message::progress_bar;
-use super::results::{OutputArguments, Read};
+use crate::cli::failure::Failure;
+use crate::cli::interrupt::Interrupts;
+use crate::cli::message::progress_bar;
+use crate::cli::results::{OutputArguments, Read};
 use crate::report::study as present;
 
-/// Examples of `abbe study`.
-pub const HELP: &str = include_str!("help/study.txt");
+/// Examples of `abbe fleet study`.
+pub const HELP: &str = include_str!("../help/study.txt");
 
-/// `abbe study STUDY --out DIR`
+/// `abbe fleet study STUDY --out DIR`
 #[derive(Args)]
 pub struct StudyArguments {
     /// The study file.
     #[arg(value_name = "STUDY")]
     study: PathBuf,
-    /// Folder of the draws; new, or that of an earlier run.
+    /// Where the result is written: a folder, new or that of an earlier run.
     ///
     /// Example: --out study
     #[arg(long, value_name = "DIR")]
@@ -33,7 +33,7 @@ pub struct StudyArguments {
     output: OutputArguments,
 }
 
-/// Runs `abbe study`.
+/// Runs `abbe fleet study`.
 pub fn run(arguments: &StudyArguments, threads: u32) -> Result<(), Failure> {
     let outputs = arguments.output.prepared(&[])?;
     outputs.refuse_overwrite([arguments.study.as_path()])?;

@@ -1,4 +1,4 @@
-//! `abbe history`: the parameters of machines over time.
+//! `abbe fleet history`: the parameters of machines over time.
 
 use std::path::PathBuf;
 
@@ -10,17 +10,17 @@ use abbe::fleet::store::Store;
 use abbe::model::files;
 use clap::Args;
 
-use super::failure::Failure;
-use super::folder;
-use super::results::{OutputArguments, Read};
+use crate::cli::failure::Failure;
+use crate::cli::folder;
+use crate::cli::results::{OutputArguments, Read};
 use crate::printers::page;
 use crate::report::block::Report;
 use crate::report::history as report;
 
-/// Examples of `abbe history`.
-pub const HELP: &str = include_str!("help/history.txt");
+/// Examples of `abbe fleet history`.
+pub const HELP: &str = include_str!("../help/history.txt");
 
-/// `abbe history DIR`
+/// `abbe fleet history DIR`
 #[derive(Args)]
 pub struct HistoryArguments {
     /// Folder of the results.
@@ -28,9 +28,9 @@ pub struct HistoryArguments {
     results: PathBuf,
     /// Identifier of one machine.
     ///
-    /// Example: --machine SN-0412
+    /// Example: --machine-id SN-0412
     #[arg(long, value_name = "ID", allow_hyphen_values = true)]
-    machine: Option<String>,
+    machine_id: Option<String>,
     /// False discovery rate over all parameters of all machines.
     ///
     /// Example: --false-discovery-rate 0.01
@@ -41,11 +41,11 @@ pub struct HistoryArguments {
     /// Example: --tolerance-u 6
     #[arg(long, value_name = "K", default_value_t = HistoryOptions::default().tolerance_u)]
     tolerance_u: f64,
-    /// CSV file of known compensations.
+    /// CSV file of known changes by compensation.
     ///
-    /// Example: --compensations compensations.csv
+    /// Example: --known-changes changes.csv
     #[arg(long, value_name = "FILE")]
-    compensations: Option<PathBuf>,
+    known_changes: Option<PathBuf>,
     /// New folder for a page of the fleet, index.html, and a page of each machine.
     ///
     /// Example: --pages pages
@@ -55,7 +55,7 @@ pub struct HistoryArguments {
     output: OutputArguments,
 }
 
-/// Runs `abbe history`.
+/// Runs `abbe fleet history`.
 pub fn run(arguments: &HistoryArguments) -> Result<(), Failure> {
     let outputs = arguments.output.prepared(&[])?;
     if !(arguments.false_discovery_rate > 0.0 && arguments.false_discovery_rate < 1.0) {
@@ -65,20 +65,20 @@ pub fn run(arguments: &HistoryArguments) -> Result<(), Failure> {
         return Err(Failure::CommandLine("`--tolerance-u`: a positive number is expected".into()));
     }
     if let Some(path) = &arguments.pages {
-        folder::check(path, None)?;
+        folder::check(path, arguments.output.folder.force)?;
     }
     let store = Store::existing(&arguments.results)?;
     let text = |file: &PathBuf| files::text(file, "the file of compensations");
-    let known = arguments.compensations.as_ref().map(text).transpose()?;
+    let known = arguments.known_changes.as_ref().map(text).transpose()?;
     let options = HistoryOptions {
         false_discovery_rate: arguments.false_discovery_rate,
         tolerance_u: arguments.tolerance_u,
         compensations: known.as_ref().map(compensations::of_source).transpose()?.unwrap_or_default(),
     };
-    let found = history(&store, arguments.machine.as_deref(), &options)?;
+    let found = history(&store, arguments.machine_id.as_deref(), &options)?;
     let read = Read::files(known.iter().filter_map(|source| source.stamp.as_ref()));
     let stated = StatedHistory::of_history(&found);
-    let report = match (&arguments.machine, found.history.machines.first()) {
+    let report = match (&arguments.machine_id, found.history.machines.first()) {
         (Some(_), Some(machine)) => report::machine(machine, &stated.statements, &found.conformity),
         _ => report::fleet(&stated),
     };
@@ -93,5 +93,5 @@ pub fn run(arguments: &HistoryArguments) -> Result<(), Failure> {
         let own = report::machine(machine, &statements(std::slice::from_ref(machine)), &found.conformity);
         files.push((format!("{:04}-{name}.html", number + 1), html(&own)?));
     }
-    folder::write(path, &files, false, |_| Ok(()))
+    folder::write(path, &files, arguments.output.folder.force, |_| Ok(()))
 }

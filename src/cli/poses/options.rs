@@ -1,6 +1,4 @@
-//! What `abbe plan --poses` asks for: tests, number, limits.
-
-use std::path::PathBuf;
+//! What `abbe poses` asks for: tests, number, limits.
 
 use abbe::model::session::{Session, Test};
 use abbe::plan::poses::candidates::{LineOfSight, PoseLimits};
@@ -17,28 +15,18 @@ const MAX_POSES: usize = 1000;
 const MAX_CANDIDATES: usize = 20_000;
 
 impl PoseArguments {
-    /// Whether poses are requested.
-    pub fn asked(&self) -> bool {
-        self.poses.is_some()
-    }
-
-    /// The file of the poses.
-    pub fn file(&self) -> Option<&PathBuf> {
-        self.poses_csv.as_ref()
-    }
-
     /// Selects the poses.
-    pub fn select(&self, session: &Session, noise_mm: Option<f64>, seed: u64) -> Result<PoseSelection, Failure> {
+    pub fn select(&self, session: &Session) -> Result<PoseSelection, Failure> {
         let options = PoseOptions {
-            poses: values::count("--poses", "", self.poses.unwrap_or(1), MAX_POSES)?,
+            poses: values::count("--poses", "", self.poses, MAX_POSES)?,
             goal: self.criterion.clone(),
             candidates: values::count("--candidates", "", self.candidates, MAX_CANDIDATES)?,
-            seed,
+            seed: self.common.seed,
             limits: self.limits()?,
-            noise_mm,
+            noise_mm: self.noise_um.map(|um| values::length_um("--noise-um", um)).transpose()?,
         };
         let found = select(session, &self.tests(session)?, &options)?;
-        if let Some(path) = &self.poses_csv {
+        if let Some(path) = &self.out {
             output::write_whole(path, &output::csv(&present::exact_poses(&found))?)?;
         }
         Ok(found)
@@ -46,12 +34,12 @@ impl PoseArguments {
 
     /// The tests whose instruments measure the poses.
     pub fn tests<'s>(&self, session: &'s Session) -> Result<Vec<&'s Test>, Failure> {
-        let tests = measured_by(session, self.pose_test.as_deref());
+        let tests = measured_by(session, self.test.as_deref());
         if tests.is_empty() {
             let names: Vec<&str> = session.tests.iter().map(|test| test.name.as_str()).collect();
             return Err(Failure::Other(format!(
-                "`--pose-test {}`: the session has no such test; its tests are {}",
-                self.pose_test.as_deref().unwrap_or_default(),
+                "`--test {}`: the session has no such test; its tests are {}",
+                self.test.as_deref().unwrap_or_default(),
                 names.join(", ")
             )));
         }

@@ -1,4 +1,4 @@
-//! `abbe run`: analyse many sessions, and keep what is done.
+//! `abbe fleet run`: analyse many sessions, and keep what is done.
 
 use std::path::PathBuf;
 
@@ -11,33 +11,33 @@ use abbe::fleet::{FleetError, list};
 use abbe::model::words::counted;
 use clap::Args;
 
-use super::failure::Failure;
-use super::interrupt::Interrupts;
-use super::message::progress_bar;
-use super::results::{OutputArguments, Read};
-use super::search::SearchArguments;
+use crate::cli::failure::Failure;
+use crate::cli::interrupt::Interrupts;
+use crate::cli::message::progress_bar;
+use crate::cli::results::{OutputArguments, Read};
+use crate::cli::search::SearchArguments;
 use crate::report;
 
-/// Examples of `abbe run`.
-pub const HELP: &str = include_str!("help/run.txt");
+/// Examples of `abbe fleet run`.
+pub const HELP: &str = include_str!("../help/run.txt");
 
-/// `abbe run SESSION… --out DIR`
+/// `abbe fleet run SESSION… --out DIR`
 #[derive(Args)]
 pub struct RunArguments {
     /// Session files, or folders in which every session.toml is found.
-    #[arg(value_name = "SESSION", required_unless_present = "list")]
+    #[arg(value_name = "SESSION", required_unless_present = "listed")]
     sessions: Vec<PathBuf>,
     /// File with one session file or folder in each line; `-` is standard input.
     ///
-    /// Example: --list sessions.txt
-    #[arg(long, value_name = "FILE")]
-    list: Option<PathBuf>,
+    /// Example: --sessions sessions.txt
+    #[arg(long = "sessions", value_name = "FILE")]
+    listed: Option<PathBuf>,
     /// Analyse part K of N of the sessions, for an array of jobs: every Nth session from the Kth on.
     ///
     /// Example: --part 3/100
     #[arg(long, value_name = "K/N", value_parser = part)]
     part: Option<(usize, usize)>,
-    /// Folder of the results; new, or that of an earlier run.
+    /// Where the result is written: a folder, new or that of an earlier run.
     ///
     /// Example: --out results
     #[arg(long, value_name = "DIR")]
@@ -52,7 +52,7 @@ pub struct RunArguments {
     /// Example: --models models
     #[arg(long, value_name = "DIR")]
     models: Option<PathBuf>,
-    /// Allow sessions to read files outside their own folders.
+    /// Allow a session to read files outside its own folder.
     #[arg(long)]
     allow_outside: bool,
     #[command(flatten)]
@@ -68,10 +68,10 @@ fn part(text: &str) -> Result<(usize, usize), String> {
     }
 }
 
-/// Runs `abbe run`.
+/// Runs `abbe fleet run`.
 pub fn run(arguments: &RunArguments, threads: u32) -> Result<(), Failure> {
     let outputs = arguments.output.prepared(&[])?;
-    let (paths, files) = list::chosen(&arguments.sessions, arguments.list.as_deref(), arguments.part)?;
+    let (paths, files) = list::chosen(&arguments.sessions, arguments.listed.as_deref(), arguments.part)?;
     if let Some(models) = arguments.models.as_ref().filter(|models| !models.is_dir()) {
         let message = format!("{}: this is no folder; name the folder of the saved models", models.display());
         return Err(Failure::Other(message));
