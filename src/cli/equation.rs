@@ -1,12 +1,13 @@
 //! `abbe equation`: closed-form equations of tests.
 
+mod files;
 pub mod form;
 mod style;
 
-use abbe::codegen::print::{Audience, Style, TestEquations};
+use abbe::codegen::print::{Audience, TestEquations};
 use abbe::codegen::{Checked, Equation, SessionTest, check};
 use abbe::equation;
-use abbe::model::files::{self, SourceMap};
+use abbe::model::files::{SourceMap, text};
 use abbe::model::session::{Session, Test};
 use clap::Args;
 
@@ -67,7 +68,7 @@ impl EquationArguments {
 
 /// The session with its readings, or without them and with a note if they cannot be read.
 fn read(arguments: &super::SessionArguments) -> Result<(Session, SourceMap), Failure> {
-    let source = files::text(&arguments.session, "the session file")?;
+    let source = text(&arguments.session, "the session file")?;
     let (session, sources, fault) = equation::session(&source, &arguments.options())?;
     if let Some(fault) = fault {
         tell(Kind::Note, &fault.to_string());
@@ -80,7 +81,7 @@ fn read(arguments: &super::SessionArguments) -> Result<(Session, SourceMap), Fai
 pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
     let form = &arguments.form;
     if arguments.all_tests && matches!(form.language.audience, Audience::Compilers | Audience::Algebra) {
-        return write_all_code(arguments);
+        return files::write(arguments);
     }
     let outputs = Outputs::new(&form.out)?;
     let (session, sources) = read(&arguments.session)?;
@@ -98,25 +99,4 @@ pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
     let tests: Vec<TestEquations<'_>> =
         pairs.iter().map(|[equation, first]| TestEquations { equation, first }).collect();
     form.put(&form.language.print_system(&tests, &form.style.style(form.language)?)?)
-}
-
-/// A file of code for each test, in a new folder.
-fn write_all_code(arguments: &EquationArguments) -> Result<(), Failure> {
-    let form = &arguments.form;
-    let Some(out) = &form.out else {
-        return Err(Failure::Other(format!(
-            "`--all-tests --as {}` writes a file for each test; name a new folder by --out",
-            form.language.word
-        )));
-    };
-    folder::check(out, arguments.folder.force)?;
-    let (session, _) = read(&arguments.session)?;
-    let style = Style { name_of_test: true, ..form.style.style(form.language)? };
-    let file = |test: &Test| -> Result<_, Failure> {
-        let (equation, source) = form.of_test(&session, test, arguments.source(&session, test)?, false)?;
-        Ok((form.language.file_name(&equation), form.language.print(&check(&equation, &source)?, &style)?))
-    };
-    let files: Vec<(String, String)> = session.tests.iter().map(file).collect::<Result<_, Failure>>()?;
-    equation::refuse_equal_names(&session, &files)?;
-    folder::write(out, &files, arguments.folder.force, |_| Ok(()))
 }

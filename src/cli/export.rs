@@ -1,11 +1,11 @@
 //! `abbe export`: the calibrated machine for other programs and for controls.
 
-mod travel;
+mod options;
 
 use std::path::PathBuf;
 
 use abbe::apply::export::kinematics::ENTRIES;
-use abbe::exports::{self, Contents, ExportOptions};
+use abbe::exports::{self, Contents};
 use abbe::identify::model_file;
 use abbe::model::files;
 use abbe::model::files::robot::dh::Convention;
@@ -96,18 +96,8 @@ pub fn run(arguments: &ExportArguments) -> Result<(), Failure> {
     outputs.refuse_overwrite([arguments.model.as_path()])?;
     let source = files::text(&arguments.model, "the model file")?;
     let model = model_file::of_source(&source)?;
-    let patch = arguments.patch.as_ref().map(|file| files::text(file, "the URDF file")).transpose()?;
     outputs.refuse_overwrite(arguments.patch.iter().chain(&arguments.dh).map(PathBuf::as_path))?;
-    let dh = arguments.dh.as_ref().map(|file| files::text(file, "the table")).transpose()?;
-    let options = ExportOptions {
-        convention: arguments.convention,
-        dh,
-        patch: patch.map(|source| (source, arguments.tip.clone())),
-        tool_mm: values::point_mm("--tool-mm", &arguments.tool_mm, model.tool_mm)?,
-        entries: exports::entries(&arguments.entries)?,
-        travel: travel::stated(&arguments.travel, &model)?,
-        places: arguments.places,
-    };
+    let options = arguments.options(&model)?;
     if let Some((option, owners)) = format.ignored(&options) {
         let owners: Vec<String> = owners.iter().map(|word| format!("`--as {word}`")).collect();
         return Err(Failure::CommandLine(format!("`--{option}` belongs to {}", owners.join(" and "))));
