@@ -1,9 +1,13 @@
 //! `abbe new`: every template is a readable session.
 
 use abbe::apply::volumetric::functions;
+use abbe::model::axis::AxisKind;
 use abbe::model::files::{self, ReadOptions};
 
 use super::{abbe, text};
+
+/// Half the travel that a linear axis has where a plan needs less, mm.
+const USUAL_HALF_TRAVEL_MM: f64 = 300.0;
 
 #[test]
 fn every_template_is_copied_and_reads() {
@@ -89,6 +93,20 @@ fn any_structural_code_gives_a_plan_that_runs() {
         assert!(plan.status.success(), "{code}: {}", String::from_utf8_lossy(&plan.stderr));
         let stderr = String::from_utf8_lossy(&plan.stderr).into_owned();
         assert!(!stderr.contains("warning"), "{code}: {stderr}");
+        // The stated travel is not far beyond what the plan commands, unless it is the usual one.
+        let options = files::ReadOptions { read_data: false, ..Default::default() };
+        let session = files::session(&made.join("plan.toml"), &options).unwrap();
+        let (planned, _) = abbe::plan::prepared(&session, &abbe::plan::PlanOptions::default()).unwrap();
+        for (place, axis) in session.machine.axes.iter().enumerate().filter(|(_, axis)| axis.kind == AxisKind::Linear) {
+            let positions = planned.tests.iter().filter_map(|test| Some(&test.readings.as_ref()?.positions[place]));
+            let reach = positions.flatten().fold(0.0_f64, |reach, position| reach.max(position.abs()));
+            let [from, to] = axis.travel.unwrap();
+            assert!(
+                (to - from) / 2.0 <= (reach + 250.0).max(USUAL_HALF_TRAVEL_MM),
+                "{code} {}: {from} to {to}, {reach}",
+                axis.name
+            );
+        }
         // Every line with a value has a comment above it or beside it.
         for file in ["machine.toml", "plan.toml"] {
             let written = std::fs::read_to_string(made.join(file)).unwrap();

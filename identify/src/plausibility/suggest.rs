@@ -102,3 +102,35 @@ fn is_contradicted(hypothesis: &Hypothesis, problem: &Problem, conflicts: &[Conf
 fn needs_no_parameter(kind: SuggestionKind) -> bool {
     !matches!(kind, SuggestionKind::WrongSetup | SuggestionKind::OtherSession)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::sync::Arc;
+
+    use abbe_model::files::{self, ReadOptions};
+
+    use super::*;
+
+    /// The residual alone names no mistake that frees a parameter: freeing a set-up always lowers χ².
+    #[test]
+    fn the_residual_alone_frees_no_parameter() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let mut session = files::session(&file, &ReadOptions::default()).unwrap();
+        // One test is 2 mm too short throughout, as with another bar.
+        let readings = session.tests[1].readings.as_mut().unwrap();
+        Arc::make_mut(readings).observed.iter_mut().for_each(|observed| *observed -= 2.0);
+        let problem = Problem::new(&session, Noise::white(1e-3, NoiseSource::Stated), 1).unwrap();
+        let allowed = super::super::Pulls::default().allowed();
+        let told = suggestions(&problem, &[], allowed);
+        assert!(told.iter().all(|one| needs_no_parameter(one.kind)), "{told:?}");
+        // The same hypotheses are tried where a conflict is about the test.
+        let tried = hypotheses::of_two_sides(&session);
+        let other = |one: &&Hypothesis| one.kind == SuggestionKind::OtherSession;
+        assert_eq!(tried.iter().filter(other).count(), session.tests.len());
+        session.tests.truncate(2);
+        assert_eq!(hypotheses::of_two_sides(&session).iter().filter(other).count(), 2);
+        session.tests.truncate(1);
+        assert_eq!(hypotheses::of_two_sides(&session).iter().filter(other).count(), 0);
+    }
+}

@@ -65,9 +65,20 @@ pub fn structure(
             drawn.iter_mut().zip(correlations).for_each(|(all, one)| all.push(one));
         }
     }
+    let (place, p_value, excess) = judged(&found, drawn)?;
+    Some(Structure {
+        p_value,
+        excess: excess.max(0.0),
+        description: format!("{} (correlation {:.2})", statistics[place].description, found[place]),
+    })
+}
+
+/// The statistic that deviates most from its null draws, its p-value among the largest deviations of all draws, and by how
+/// many standard deviations of its own draws it exceeds their mean.
+fn judged(found: &[f64], mut drawn: Vec<Vec<f64>>) -> Option<(usize, f64, f64)> {
     let draws = drawn.first().map_or(0, Vec::len);
     // The residual is the last of the values.
-    drawn.iter_mut().zip(&found).for_each(|(of_one, value)| of_one.push(*value));
+    drawn.iter_mut().zip(found).for_each(|(of_one, value)| of_one.push(*value));
     let references: Vec<(f64, f64)> = drawn.iter().map(|of_one| mean_and_deviation(of_one)).collect();
     let largest = |draw: usize| {
         let scores = drawn
@@ -80,11 +91,7 @@ pub fn structure(
     let above = (0..draws).filter(|draw| largest(*draw).is_some_and(|(_, score)| score >= of_residual)).count();
     let (mean, deviation) = mean_and_deviation(&drawn[place][..draws]);
     let excess = (found[place] - mean) / deviation.max(f64::MIN_POSITIVE);
-    Some(Structure {
-        p_value: (above + 1) as f64 / (draws + 1) as f64,
-        excess: excess.max(0.0),
-        description: format!("{} (correlation {:.2})", statistics[place].description, found[place]),
-    })
+    Some((place, (above + 1) as f64 / (draws + 1) as f64, excess))
 }
 
 fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
@@ -254,4 +261,26 @@ fn sensitivities(
         return None;
     }
     Some(of_poses.into_iter().map(|own| own.into_iter().map(|s| s / largest).collect()).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of 19 draws none deviates as the second statistic does: p = 1/20, the least that 19 draws give. Its draws have mean 2
+    /// and standard deviation 1, so that 5 exceeds them by 3.
+    #[test]
+    fn the_statistic_that_deviates_most_is_judged_by_all_draws() {
+        let deviation = (18.0_f64 / 18.0).sqrt();
+        let draw = |k: usize| if k == 18 { 0.0 } else { (if k % 2 == 0 { 1.0 } else { -1.0 }) * deviation };
+        let none: Vec<f64> = (0..19).map(|k| 10.0 + 4.0 * draw(k)).collect();
+        let shifted: Vec<f64> = (0..19).map(|k| 2.0 + draw(k)).collect();
+        let (place, p_value, excess) = judged(&[12.0, 5.0], vec![none.clone(), shifted.clone()]).unwrap();
+        assert_eq!((place, p_value), (1, 0.05));
+        assert!((excess - 3.0).abs() < 1e-12, "{excess}");
+        // A residual like its draws: every draw with one standard deviation on either side is at least as extreme.
+        let (_, p_value, excess) = judged(&[10.0, 2.0], vec![none, shifted]).unwrap();
+        assert!(p_value > 0.4 && excess.abs() < 0.1, "{p_value}, {excess}");
+        assert!(judged(&[], Vec::new()).is_none());
+    }
 }

@@ -99,3 +99,25 @@ fn class(program: &Program, tree: &Tree) -> u8 {
 fn sum_class(largest: u8) -> u8 {
     if largest % 2 == 1 { largest + 1 } else { largest.max(2) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sum(op: Binary, a: Tree, b: Tree) -> Tree {
+        Tree::Binary(op, Box::new(a), Box::new(b))
+    }
+
+    /// `a·b + c·d − a·b` is `c·d`, whether a factor is a length of the session or a step of the program.
+    #[test]
+    fn equal_terms_of_opposite_sign_cancel() {
+        let inputs = ["a", "b", "c", "d"].map(|name| Input::Plain(Variable::Length(name.into()))).to_vec();
+        let program = Program { inputs, steps: Vec::new(), outputs: Vec::new() };
+        let times = |a, b| sum(Binary::Mul, Tree::Input(a), Tree::Input(b));
+        let whole = sum(Binary::Sub, sum(Binary::Add, times(0, 1), times(2, 3)), times(0, 1));
+        assert_eq!(tidied(&program, &whole), times(2, 3));
+        // A sum without equal terms stays as it is, in its order.
+        let other = sum(Binary::Sub, times(2, 3), times(0, 1));
+        assert_eq!(tidied(&program, &other), other);
+    }
+}

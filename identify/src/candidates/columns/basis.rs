@@ -345,6 +345,7 @@ fn cached<K: std::hash::Hash + Eq, V: Clone>(store: &Mutex<HashMap<K, V>>, key: 
 mod tests {
     use std::path::Path;
 
+    use abbe_model::effect::shape::{Harmonic, Polynomial};
     use abbe_model::files::{self, ReadOptions};
 
     use super::*;
@@ -370,6 +371,26 @@ mod tests {
         }
         drop(columns);
         assert!(problem.add_effect(&effect).is_err());
+    }
+
+    /// A bar tells errors of a tenth of a physical size at most: 0.1 mm, 1 mrad. A function that reaches 3 is scaled.
+    #[test]
+    fn the_largest_plausible_coefficient_moves_the_component_by_a_tenth_of_its_size() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let session = files::session(&file, &ReadOptions::default()).unwrap();
+        let (problem, fit) = prepare(&session, 1).unwrap();
+        let columns = Columns::new(&problem, &fit.beta);
+        let plausible = |component: &str, driver: &str, shape: Shape| {
+            let component = Component::parse(component).unwrap();
+            let driver = Driver::parse_on(&session.machine, driver);
+            let effect = Effect::new(component, driver, shape);
+            let column_set = columns.effect_columns(&effect).unwrap();
+            (columns.plausible(&effect, &column_set), column_set.greatest())
+        };
+        let (angle, greatest) = plausible("EAC", "C", Shape::Harmonic(Harmonic { order: 1.0 }));
+        assert!((greatest - 1.0).abs() < 1e-9 && (angle - 1e-3).abs() < 1e-12, "{angle} rad");
+        let (length, greatest) = plausible("EZC", "C", Shape::Polynomial(Polynomial { degree: 2, scale: 1.0 }));
+        assert!(greatest > 1.5 && (length * greatest - 0.1).abs() < 1e-9, "{length} mm, {greatest}");
     }
 
     /// Chunks are full, and each effect is in exactly one. The chunk size bounds the memory of a screening.
