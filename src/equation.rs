@@ -68,21 +68,22 @@ pub struct EquationParameters {
 }
 
 impl EquationParameters {
+    /// The errors of a session, and its effects that act in a test.
+    pub fn declared(session: &Session, test: &Test) -> EquationParameters {
+        let effects = session.effects.iter().filter(|effect| effect.acts_in(&test.name)).cloned();
+        EquationParameters { errors: session.unknowns.clone(), effects: effects.collect(), ..Default::default() }
+    }
+
     /// The parameters of the readings of a test by their names; without names, the errors and declared effects of the
     /// session.
     ///
     /// # Errors
     /// As [`EquationParameters::parse`].
     pub fn of_test(session: &Session, test: &Test, names: &[String]) -> Result<EquationParameters, String> {
-        let effects: Vec<Effect> =
-            session.effects.iter().filter(|effect| effect.acts_in(&test.name)).cloned().collect();
         if names.is_empty() {
-            return Ok(EquationParameters {
-                errors: session.unknowns.clone(),
-                effects,
-                ..EquationParameters::default()
-            });
+            return Ok(EquationParameters::declared(session, test));
         }
+        let effects = EquationParameters::declared(session, test).effects;
         EquationParameters::parse(names, &session.machine, test.station.kind().unknowns(), &effects)
     }
 

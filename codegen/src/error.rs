@@ -7,6 +7,9 @@ use abbe_model::expression::Unary;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CodegenError {
+    /// The states of a test cannot be made.
+    #[error(transparent)]
+    Model(#[from] abbe_model::ModelError),
     /// An exponential, a sign, a step or a rounding of an error; the chain cannot differentiate it.
     #[error("the function {function:?} is applied to an error; only nominal quantities are allowed")]
     FunctionOfError {

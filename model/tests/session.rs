@@ -429,3 +429,15 @@ fn missing_runs_are_reported() {
         }
     }
 }
+
+/// Rounding to a step spreads a reading evenly over the step: its standard deviation is the step over the root of 12.
+#[test]
+fn a_resolution_is_noise_of_an_even_distribution() {
+    let file = ready("hermle-c600u/chapter5.toml");
+    let options = ReadOptions { read_data: false, ..ReadOptions::default() };
+    let mut session = files::session(&file, &options).unwrap();
+    session.resolution_mm = Some(1e-3);
+    assert!((session.resolution_noise_mm() - 0.288_675_134_6e-3).abs() < 1e-12);
+    session.resolution_mm = None;
+    assert_eq!(session.resolution_noise_mm(), 0.0);
+}

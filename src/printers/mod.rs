@@ -30,7 +30,7 @@ mod tests {
         report.key(Text::Note("remark-words".into()));
         report.key(Text::Steps(vec![("step-words".into(), "purpose-words".into())]));
         report.key(Table::new(["heading-words"], [cells!["cell-words"]]).named("table"));
-        report.key(Formula { latex: "latex-words", typst: "typst-words", text: "plain-words" });
+        report.key(Formula::new("latex-words", "typst-words", "plain-words"));
         report.brief(Text::Note("brief-words".into()));
         report.folded("fold-words", "detail-words");
         report.page("page-words");

@@ -4,6 +4,8 @@
 //! blocks and details; a page prints all but the brief ones. A further kind of block is a variant of [`Body`] here and
 //! its arm in each of `src/printers/`.
 
+use std::borrow::Cow;
+
 use serde_json::Value;
 
 use super::figure::Figure;
@@ -120,14 +122,24 @@ pub enum Text {
 }
 
 /// A formula in the languages of the printers.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Formula {
     /// LaTeX.
-    pub latex: &'static str,
+    pub latex: Cow<'static, str>,
     /// Typst.
-    pub typst: &'static str,
+    pub typst: Cow<'static, str>,
     /// Plain text.
-    pub text: &'static str,
+    pub text: Cow<'static, str>,
+    /// Whether these are displayed equations with headings and words of their own, not one formula.
+    pub displayed: bool,
+}
+
+impl Formula {
+    /// A formula from LaTeX, Typst and plain text.
+    pub fn new(latex: &'static str, typst: &'static str, text: &'static str) -> Formula {
+        let [latex, typst, text] = [latex, typst, text].map(Cow::Borrowed);
+        Formula { latex, typst, text, displayed: false }
+    }
 }
 
 impl KeyFigure {

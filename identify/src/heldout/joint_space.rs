@@ -174,6 +174,23 @@ fn numbered(blocks: impl Iterator<Item = usize>) -> Vec<usize> {
 mod tests {
     use super::*;
 
+    /// A rotary axis counts as a point of the unit circle, a linear axis from -1 to 1 over the range of its positions.
+    #[test]
+    fn axes_of_both_kinds_have_coordinates_of_one_size() {
+        let machine = Machine::from_code("w C b X t").unwrap();
+        let [x, c] = ["X", "C"].map(|name| machine.axis_index(name).unwrap());
+        let mut positions = vec![Vec::new(); 2];
+        positions[x] = vec![10.0, 15.0, 30.0];
+        positions[c] = vec![0.0, std::f64::consts::FRAC_PI_2, std::f64::consts::PI];
+        let readings = Readings { positions, ..Readings::default() };
+        let found = coordinates(&machine, &[&readings]);
+        for (point, (along, turn)) in found.iter().zip([(-1.0, [1.0, 0.0]), (-0.5, [0.0, 1.0]), (1.0, [-1.0, 0.0])]) {
+            let expected = if x < c { vec![along, turn[0], turn[1]] } else { vec![turn[0], turn[1], along] };
+            assert!(point.len() == 3 && point.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-12), "{point:?}");
+        }
+        assert_eq!(found.len(), 3);
+    }
+
     /// Three groups of points far from each other: k-means finds them from any start, and each start ends at the same
     /// sum of squares, which follows from the offsets within the groups.
     #[test]

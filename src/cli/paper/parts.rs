@@ -14,7 +14,7 @@ use abbe::plan::{self, PlanOptions};
 use super::PaperArguments;
 use crate::cli::failure::Failure;
 use crate::report::paper::contents::{self, Study};
-use crate::report::paper::{Part, SUBJECTS, Subject, comparison, methods};
+use crate::report::paper::{Part, SUBJECTS, Subject, comparison, equations, methods};
 
 /// Effects of the bias table where none are named.
 const BIASING_EFFECTS: usize = 12;
@@ -52,6 +52,7 @@ pub fn parts(arguments: &PaperArguments, studies: &[Study]) -> Result<Vec<Part>,
         let section = match subject {
             Subject::Methods => Some(methods::part(study)),
             Subject::SetUp => Some(contents::set_up(study)),
+            Subject::Equations => Some(equations::part(study, arguments.two_column)?),
             Subject::Sensitivity => Some(contents::sensitivity(study)?),
             Subject::Uncertainty => Some(contents::uncertainty(study)),
             Subject::Correlation => Some(contents::correlation(study)),

@@ -33,6 +33,9 @@ pub fn readme(
             Subject::Sensitivity => format!("abbe plan {first} --all --patterns patterns.csv"),
             Subject::Trace => format!("abbe fit {first} --all --residuals residuals.csv --plots plots"),
             Subject::Methods if section.report.blocks.len() > 3 => format!("abbe fit {first} --json fit.json"),
+            Subject::Equations => {
+                format!("abbe equation {first} --all-tests --order first --form single --nomenclature --as latex")
+            }
             Subject::Bias => format!("abbe paper {first} --out bias --parts bias"),
             _ => format!("abbe plan {first} --all --json plan.json"),
         };

@@ -86,7 +86,10 @@ impl Typesetter for Latex {
     }
 
     fn formula(&self, formula: &Formula) -> String {
-        format!("\\begin{{equation*}}\n{}\n\\end{{equation*}}\n\n", formula.latex)
+        match formula.displayed {
+            true => format!("{}\n", formula.latex),
+            false => format!("\\begin{{equation*}}\n{}\n\\end{{equation*}}\n\n", formula.latex),
+        }
     }
 
     fn heading(&self, text: &str) -> String {

@@ -41,7 +41,10 @@ impl Typesetter for Typst {
     }
 
     fn formula(&self, formula: &Formula) -> String {
-        format!("$ {} $\n\n", formula.typst)
+        match formula.displayed {
+            true => format!("{}\n", formula.typst),
+            false => format!("$ {} $\n\n", formula.typst),
+        }
     }
 
     fn heading(&self, text: &str) -> String {

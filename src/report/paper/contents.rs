@@ -126,16 +126,16 @@ pub fn identifiability(study: &Study) -> Part {
          parameters estimated within their priors, and to n scalar readings: O1 [@borm1991], O2 [@driels1990], O3 \
          [@nahvi1994], O4 [@nahvi1996] and O5 [@sun2008].",
     );
-    report.key(Formula {
-        latex: r"O_1 = \frac{(\sigma_1 \cdots \sigma_m)^{1/m}}{\sqrt{n}}, \quad O_2 = \frac{\sigma_m}{\sigma_1}, \quad O_3 = \sigma_m",
-        typst: r#"O_1 = (sigma_1 dots.c sigma_m)^(1 slash m) / sqrt(n), quad O_2 = sigma_m / sigma_1, quad O_3 = sigma_m"#,
-        text: "O1 = (σ1 ⋯ σm)^(1/m) / √n,  O2 = σm / σ1,  O3 = σm",
-    });
-    report.key(Formula {
-        latex: r"O_4 = \frac{\sigma_m^2}{\sigma_1}, \quad O_5 = \Bigl(\frac{1}{\sigma_1} + \cdots + \frac{1}{\sigma_m}\Bigr)^{-1}",
-        typst: r#"O_4 = sigma_m^2 / sigma_1, quad O_5 = (1 / sigma_1 + dots.c + 1 / sigma_m)^(-1)"#,
-        text: "O4 = σm² / σ1,  O5 = (1/σ1 + ⋯ + 1/σm)⁻¹",
-    });
+    report.key(Formula::new(
+r"O_1 = \frac{(\sigma_1 \cdots \sigma_m)^{1/m}}{\sqrt{n}}, \quad O_2 = \frac{\sigma_m}{\sigma_1}, \quad O_3 = \sigma_m",
+r#"O_1 = (sigma_1 dots.c sigma_m)^(1 slash m) / sqrt(n), quad O_2 = sigma_m / sigma_1, quad O_3 = sigma_m"#,
+"O1 = (σ1 ⋯ σm)^(1/m) / √n,  O2 = σm / σ1,  O3 = σm",
+));
+    report.key(Formula::new(
+r"O_4 = \frac{\sigma_m^2}{\sigma_1}, \quad O_5 = \Bigl(\frac{1}{\sigma_1} + \cdots + \frac{1}{\sigma_m}\Bigr)^{-1}",
+r#"O_4 = sigma_m^2 / sigma_1, quad O_5 = (1 / sigma_1 + dots.c + 1 / sigma_m)^(-1)"#,
+"O4 = σm² / σ1,  O5 = (1/σ1 + ⋯ + 1/σm)⁻¹",
+));
     report.key(indices(&analysis.indices).named("observability"));
     Part { subject: Subject::Identifiability, report }
 }
@@ -221,11 +221,11 @@ pub fn bias(study: &Study) -> Part {
          estimated parameters, the weights W and the information P of the priors, it biases the estimates by b and \
          leaves e in the residual [@jcgm102]:",
     );
-    report.key(Formula {
-        latex: r"b = (J^\mathsf{T} W J + P)^{-1} J^\mathsf{T} W c, \quad e = c - J b",
-        typst: r#"b = (J^sans(T) W J + P)^(-1) J^sans(T) W c, quad e = c - J b"#,
-        text: "b = (JᵀWJ + P)⁻¹ JᵀW c,  e = c − J b",
-    });
+    report.key(Formula::new(
+        r"b = (J^\mathsf{T} W J + P)^{-1} J^\mathsf{T} W c, \quad e = c - J b",
+        r#"b = (J^sans(T) W J + P)^(-1) J^sans(T) W c, quad e = c - J b"#,
+        "b = (JᵀWJ + P)⁻¹ JᵀW c,  e = c − J b",
+    ));
     let caption = "Bias of each error per unit of an undeclared effect; root mean square of the signal in the readings and of \
                    what remains of it in the residual";
     report.key(Table::new(columns, rows).titled(caption).named("bias"));

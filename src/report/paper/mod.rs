@@ -2,6 +2,7 @@
 
 pub mod comparison;
 pub mod contents;
+pub mod equations;
 pub mod methods;
 
 use super::block::Report;
@@ -13,6 +14,8 @@ pub enum Subject {
     Methods,
     /// Machine, set-ups and tests.
     SetUp,
+    /// The closed form of the readings, and the nomenclature.
+    Equations,
     /// Sensitivities of the readings.
     Sensitivity,
     /// Predicted uncertainties.
@@ -33,6 +36,7 @@ pub enum Subject {
 pub const SUBJECTS: &[(&str, Subject)] = &[
     ("methods", Subject::Methods),
     ("set-up", Subject::SetUp),
+    ("equations", Subject::Equations),
     ("sensitivity", Subject::Sensitivity),
     ("uncertainty", Subject::Uncertainty),
     ("correlation", Subject::Correlation),

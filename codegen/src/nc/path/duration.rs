@@ -40,3 +40,42 @@ impl Leg {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One way through a leg of each kind. The machine has the axes X, Y and C in this order.
+    fn minutes(shape: Shape, vertices: &[[f64; 3]]) -> f64 {
+        let vertices = vertices.iter().map(|state| state.to_vec()).collect();
+        let leg = Leg { vertices, measured: true, shape };
+        let machine = Machine::from_code("w C b X Y t").unwrap();
+        let place = |name: &str| machine.axis_index(name).unwrap();
+        let order = [place("X"), place("Y"), place("C")];
+        let ordered = |state: &Vec<f64>| {
+            let mut own = vec![0.0; 3];
+            order.iter().zip(state).for_each(|(place, value)| own[*place] = *value);
+            own
+        };
+        let leg = Leg { vertices: leg.vertices.iter().map(ordered).collect(), ..leg };
+        let path = Path {
+            legs: vec![leg],
+            overshoots: Vec::new(),
+            runs: 1,
+            both_directions: false,
+            feed: (0.0, ""),
+            remarks: Vec::new(),
+            warnings: Vec::new(),
+        };
+        path.minutes(&machine, 60.0)
+    }
+
+    /// 500 mm at 1000 mm/min take half a minute, 180° at 90°/min two minutes, ten segments of 3 s half a minute.
+    #[test]
+    fn a_path_takes_its_length_over_its_feed() {
+        assert!((minutes(Shape::Line(1000.0), &[[0.0, 0.0, 0.0], [-500.0, 0.0, 0.0]]) - 0.5).abs() < 1e-12);
+        assert!((minutes(Shape::Line(90.0), &[[0.0, 0.0, 0.0], [0.0, 0.0, PI]]) - 2.0).abs() < 1e-12);
+        let steps: Vec<[f64; 3]> = (0..=10).map(|k| [f64::from(k), 0.0, 0.0]).collect();
+        assert!((minutes(Shape::Segments { seconds: 3.0, tool_points: None }, &steps) - 0.5).abs() < 1e-12);
+    }
+}

@@ -81,7 +81,7 @@ pub(crate) fn naming(equation: &Equation, labels: Vec<Label>) -> Program {
 pub(crate) fn scalar(name: &str) -> (&'static str, &'static str) {
     match name {
         "L_0" => ("distance without errors", "mm"),
-        "S" => ("sum of the errors, each times its coefficient and L_0", "mm²"),
+        "S" => ("sum of the errors with their coefficients, times the distance without errors", "mm²"),
         "d" => ("distance between the balls", "mm"),
         "a" => ("square of the step perpendicular to the axis of the artefact", "mm²"),
         "b" => ("product of position and step perpendicular to the axis", "mm²"),

@@ -1,0 +1,88 @@
+//! The equations of the tests in first order, the derivatives of their readings, and the nomenclature.
+
+use abbe::codegen::print::{Numbering, Style, TestEquations, language};
+use abbe::codegen::{Arrangement, CodegenError, Equation, Options, Order, SessionTest, Symbols, check};
+use abbe::equation::EquationParameters;
+use abbe::model::session::{Session, Test};
+
+use super::contents::Study;
+use super::{Part, Subject};
+use crate::report::block::{Formula, Report};
+
+/// Width of a line in a page of two columns, mm.
+const COLUMN_MM: f64 = 84.0;
+
+/// Length of the LaTeX of all tests in first order, bytes, beyond which the first test is printed frame by frame instead.
+const LONGEST: usize = 40_000;
+
+/// The part.
+///
+/// # Errors
+/// If the equation of a test cannot be made or does not agree with the chain.
+pub fn part(study: &Study, two_column: bool) -> Result<Part, CodegenError> {
+    let session = &study.problem.session;
+    let style = Style {
+        numbering: Numbering::Last,
+        width_mm: two_column.then_some(COLUMN_MM),
+        nomenclature: true,
+        ..Style::default()
+    };
+    let first_order = Form { order: Order::First, arrangement: Arrangement::Single };
+    let made = session.tests.iter().map(|test| first_order.of(session, test)).collect::<Result<Vec<_>, _>>()?;
+    let checked = made.iter().map(|(equation, source)| check(equation, source)).collect::<Result<Vec<_>, _>>()?;
+    let tests: Vec<TestEquations<'_>> =
+        checked.iter().map(|equation| TestEquations { equation, first: equation }).collect();
+    let all = |word: &str, style: &Style| language(word)?.print_system(&tests, style);
+    let latex = all("latex", &style)?;
+    let mut report = Report::new("Equations");
+    if latex.len() <= LONGEST {
+        report.key(
+            "The readings of each test in first order of the errors, from the kinematic chain. Each equation agrees with the \
+             derivatives of the chain at random states. The derivatives of all readings at zero errors and the symbols follow.",
+        );
+        report.key(displayed(latex, all("typst", &style)?, all("text", &Style::default())?));
+        return Ok(Part { subject: Subject::Equations, report });
+    }
+    let [test, ..] = session.tests.as_slice() else { return Ok(Part { subject: Subject::Equations, report }) };
+    let (equation, source) = Form { order: Order::Exact, arrangement: Arrangement::Frames }.of(session, test)?;
+    let checked = check(&equation, &source)?;
+    let one = |word: &str, style: &Style| language(word)?.print(&checked, style);
+    report.key(format!(
+        "The readings of test {} from frame to frame of the kinematic chain, exact in the errors; in first order they fill \
+         pages. The equation agrees with the chain at random states.",
+        test.name
+    ));
+    report.key(displayed(one("latex", &style)?, one("typst", &style)?, one("text", &Style::default())?));
+    Ok(Part { subject: Subject::Equations, report })
+}
+
+fn displayed(latex: String, typst: String, text: String) -> Formula {
+    Formula { latex: latex.into(), typst: typst.into(), text: text.into(), displayed: true }
+}
+
+/// How an equation is made.
+struct Form {
+    order: Order,
+    arrangement: Arrangement,
+}
+
+impl Form {
+    /// The equation of a test with the errors and effects of its session.
+    fn of<'s>(&self, session: &'s Session, test: &'s Test) -> Result<(Equation, SessionTest<'s>), CodegenError> {
+        let source = SessionTest::new(session, test)?;
+        let parameters = EquationParameters::declared(session, test);
+        let options = Options {
+            order: self.order,
+            arrangement: self.arrangement,
+            rotation: None,
+            symbols: Symbols::Literature,
+            gradient: false,
+            unknowns: parameters.instrument,
+            effects: parameters.effects,
+        };
+        let mut equation = Equation::of(&session.machine, &source, &parameters.errors, &options)?;
+        // Comments of a session file are notes of its author, not words of a paper.
+        equation.meanings.clear();
+        Ok((equation, source))
+    }
+}
