@@ -62,7 +62,7 @@ pub fn parts(arguments: &PaperArguments, studies: &[Study]) -> Result<Vec<Part>,
             Subject::Trace => contents::trace(study)?,
         };
         match section {
-            Some(section) => sections.push(section),
+            Some(section) => sections.push(section.with_set_up_in_words(&study.problem)),
             None if is_named && *subject == Subject::Comparison => {
                 return Err(Failure::CommandLine(
                     "`--parts comparison` needs at least two sessions; name another".into(),

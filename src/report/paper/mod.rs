@@ -5,7 +5,11 @@ pub mod contents;
 pub mod equations;
 pub mod methods;
 
-use super::block::Report;
+use abbe::identify::parameters::Role;
+use abbe::identify::problem::Problem;
+
+use super::block::{Body, Report, Text};
+use super::table::Cell;
 
 /// What a part of the paper is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,4 +63,44 @@ pub struct Part {
     pub subject: Subject,
     /// Contents.
     pub report: Report,
+}
+
+impl Part {
+    /// The part with words in place of the identifiers of set-up parameters: `spindle_ball.y[S1]` is "spindle ball y (S1)".
+    pub fn with_set_up_in_words(mut self, problem: &Problem) -> Part {
+        let set_up = problem.parameters.list.iter().filter(|parameter| parameter.role == Role::Setup);
+        let mut words: Vec<(&str, String)> =
+            set_up.map(|parameter| (parameter.id.as_str(), in_words(&parameter.id))).collect();
+        // A longer identifier may contain a shorter one.
+        words.sort_by_key(|(id, _)| std::cmp::Reverse(id.len()));
+        let replace = |text: &mut String| {
+            words.iter().filter(|(id, _)| text.contains(id)).collect::<Vec<_>>().into_iter().for_each(|(id, words)| {
+                *text = text.replace(id, words);
+            });
+        };
+        for block in &mut self.report.blocks {
+            match &mut block.body {
+                Body::Table(table) => {
+                    for cell in table.rows.iter_mut().flatten() {
+                        if let Cell::Text(text) = cell {
+                            replace(text);
+                        }
+                    }
+                    table.columns.iter_mut().for_each(|column| replace(&mut column.heading));
+                }
+                Body::Text(Text::Paragraph(text)) => replace(text),
+                _ => {}
+            }
+        }
+        self
+    }
+}
+
+/// `spindle_ball.y[S1]` as "spindle ball y (S1)".
+fn in_words(id: &str) -> String {
+    let (quantity, group) = match id.strip_suffix(']').and_then(|id| id.split_once('[')) {
+        Some((quantity, group)) => (quantity, format!(" ({group})")),
+        None => (id, String::new()),
+    };
+    quantity.replace('_', " ").replace('.', " ") + &group
 }

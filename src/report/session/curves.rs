@@ -234,6 +234,9 @@ fn amount(unit_name: &str) -> Option<(f64, &'static str)> {
     }
 }
 
+/// Share of the largest value by which two curves differ at most if they are drawn as one.
+const SAME_SHARE: f64 = 1e-3;
+
 fn polar_sensitivities(test: &TestSensitivities, columns: &[Sensitivity], um: f64) -> Figure {
     let panel = |column: &Sensitivity| {
         let (amount, label) = amount(&column.unit)?;
@@ -260,18 +263,29 @@ fn curves(test: &TestSensitivities, columns: &[Sensitivity]) -> Figure {
         None => (test.test.clone(), format!("{}: sensitivity", test.test)),
     };
     let way = &test.way;
-    let series = columns.iter().zip(CLASSES).map(|(column, class)| {
-        let label = format!("{}, per {}", shortened(&column.id, 20), unit(&column.unit));
-        let points = way.values.iter().copied().zip(column.values.iter().copied());
-        Series::new(label, class, Mark::Line, points.collect())
+    // All curves have the unit of the reading, and equal curves are one.
+    let mut found: Vec<(String, &str, Vec<f64>)> = Vec::new();
+    for column in columns {
+        let (amount, size) = amount(&column.unit).unwrap_or((1.0, "1"));
+        let values: Vec<f64> = column.values.iter().map(|value| value * amount).collect();
+        let most = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+        let is_same = |other: &[f64]| other.iter().zip(&values).all(|(a, b)| (a - b).abs() <= SAME_SHARE * most);
+        let name = shortened(&column.id, 20);
+        match found.iter_mut().find(|(_, other, curve)| *other == size && is_same(curve)) {
+            Some((names, ..)) => *names = format!("{names}, {name}"),
+            None => found.push((name, size, values)),
+        }
+    }
+    let y = Scale::with_zero(span(found.iter().flat_map(|(.., values)| values.iter().copied())), 6);
+    let series = found.into_iter().zip(CLASSES).map(|((names, size, values), class)| {
+        Series::new(format!("{names} = {size}"), class, Mark::Line, way.values.iter().copied().zip(values).collect())
     });
     let x = Scale::of_axis(span(way.values.iter().copied()), way.is_angle);
-    let y = Scale::with_zero(span(columns.iter().flat_map(|column| column.values.iter().copied())), 6);
     let lines = Lines::new(
         Axis::new(&way.name, if way.is_angle { "deg" } else { "mm" }, x),
-        Axis::new("", "um per unit", y),
+        Axis::new("change of the reading", "um", y),
         series.collect(),
     );
-    let caption = "Change of the reading per unit of each error, along the first run.";
+    let caption = "Change of the reading by each error alone, of this size, along the first run.";
     Figure::new(format!("sensitivity-{name}"), title, caption, Chart::Lines(lines))
 }
