@@ -320,7 +320,10 @@ fn outliers() {
     for of in [&walk.trace, &walk.fit] {
         assert!(!list(&of["outliers"], "outliers").is_empty());
         let assumptions = list(&of["outcome"]["assumptions"], "assumptions");
-        assert!(assumptions.iter().any(|one| one["kind"] == "excluded-readings"), "{assumptions:?}");
+        let excluded = assumptions.iter().find(|one| one["kind"] == "excluded-readings").unwrap();
+        let count = list(&of["outliers"], "outliers").len() as f64;
+        let share = 100.0 * count / (of["readings"].as_f64().unwrap() + count);
+        assert!(excluded["test"].as_str().unwrap().ends_with(&format!("{share:.2} % of the readings")), "{excluded}");
     }
 }
 
